@@ -17,9 +17,12 @@ import numpy as np
 #: Iterations of the corrector: more mean that the step was too long.
 MOST_ITERATIONS = 7
 #: A residual so small, in units of the scale, is rounding; one so small that stalls is accepted.
-CLOSED, STALLED = 1e-13, 1e-9
-#: Cosine of the angle between tangents at the ends of a step: less halves the step.
+CLOSED, STALLED = 1e-14, 1e-9
+#: Cosine of the angle between tangents at the ends of a step, and between it and each of them: less
+#: halves the step. A step to another curve that runs alongside is at an angle to both.
 TURN = 0.97
+#: The second step of the corrector, in first ones: more halves the step. It may lead elsewhere.
+CONTRACTS = 0.5
 #: Steps are doubled where so few evaluations sufficed and the tangent turned by less.
 EASY, STRAIGHT = 3, 0.995
 #: First, longest and shortest step, in units of the scale.
@@ -87,14 +90,15 @@ class Curve:
 
 @dataclass(frozen=True)
 class Corrected:
-    """Points of curves: float64[k, m + 1], the derivative there, which were found, and in how many
-    evaluations.
+    """Points of curves: float64[k, m + 1], the derivative there, which were found, in how many
+    evaluations, and how the second step of the iteration compares with the first, all float64[k].
     """
 
     z: np.ndarray
     derivative: np.ndarray
     found: np.ndarray
     evaluations: np.ndarray
+    contraction: np.ndarray
 
 
 def correct(
@@ -122,7 +126,8 @@ def correct(
     z, derivative = guess.copy(), np.full((k, size - 1, size), np.nan)
     found, count = np.zeros(k, bool), np.zeros(k, np.int64)
     before, left = np.full(k, np.inf), np.arange(k)
-    for _ in range(MOST_ITERATIONS):
+    steps = np.zeros((2, k))
+    for iteration in range(MOST_ITERATIONS):
         if not len(left):
             break
         residual, matrix = equations.evaluate(z[left], rows[left])
@@ -137,10 +142,13 @@ def correct(
         whole = np.concatenate([matrix, normal[left][:, None]], axis=1)
         right = np.concatenate([residual, np.zeros((len(left), 1))], axis=1)
         step = -solved(whole, right)
+        if iteration < len(steps):
+            steps[iteration, left] = np.linalg.norm(step, axis=1)
         z[left] += step * scale[left]
         near = np.linalg.norm((z[left] - guess[left]) / scale[left], axis=1) <= limit[left]
         left = left[np.isfinite(step).all(axis=1) & near]
-    return Corrected(z, derivative, found, count)
+    contraction = steps[1] / np.maximum(steps[0], STALLED)
+    return Corrected(z, derivative, found, count, contraction)
 
 
 def solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -232,6 +240,7 @@ class _Fronts:
     def begin(self, here: Corrected, tangent: np.ndarray) -> None:
         """The first points."""
         self.z, self.tangent = here.z.copy(), tangent
+        self.before = np.full((2, *tangent.shape), np.nan)  # the points before these, and tangents
         for i, curve in enumerate(self.curves):
             if here.found[i]:
                 _add(curve, here.z[i], tangent[i], here.derivative[i], 0.0)
@@ -251,15 +260,20 @@ class _Fronts:
         scale, length = self.equations.scale[going], self.length[going]
         trial = correct(self.equations, guess, normal, going, ASTRAY * length)
         tangent = tangents(_finite(trial.derivative), self.tangent[going])
-        turn = np.einsum("ki,ki->k", tangent, self.tangent[going])
-        counts = trial.found & ((turn > TURN) | (length < 100 * SHORTEST))
+        step = (trial.z - self.z[going]) / scale
+        moved = np.linalg.norm(step, axis=1)
+        chord = step / np.maximum(moved, np.finfo(float).tiny)[:, None]
+        sides = ((tangent, self.tangent[going]), (chord, tangent), (chord, self.tangent[going]))
+        turn = np.min([np.einsum("ki,ki->k", *both) for both in sides], axis=0)
+        short = length < 100 * SHORTEST
+        counts = trial.found & ((turn > TURN) & (trial.contraction < CONTRACTS) | short)
         easy = counts & (trial.evaluations <= EASY) & (turn > STRAIGHT)
-        moved = np.linalg.norm((trial.z - self.z[going]) / scale, axis=1)
         for j in np.flatnonzero(counts):
             curve = self.curves[going[j]]
             _add(curve, trial.z[j], tangent[j], trial.derivative[j], moved[j])
             curve.end = "range" if outside[j] else ""
         taken = going[counts]
+        self.before[:, taken] = self.z[taken], self.tangent[taken]
         self.z[taken], self.tangent[taken] = trial.z[counts], tangent[counts]
         self.equations.accepted(self.z[taken], taken)
         factor = np.where(counts, np.where(easy, 2.0, 1.0), 0.5)
@@ -276,29 +290,45 @@ class _Fronts:
         for kept in (curve.z, curve.tangent, curve.derivative, curve.length):
             kept.pop()
         self.z[i], self.tangent[i], self.length[i] = curve.z[-1], curve.tangent[-1], length
+        self.before[:, i] = (curve.z[-2], curve.tangent[-2]) if len(curve.z) > 1 else np.nan
         self.equations.accepted(self.z[[i]], np.array([i]))
         curve.end = why if length < ENDING else ""
 
     def _predicted(self, going: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Points along the tangents, the planes in which they are corrected, and which land on an
+        """Points ahead on the curves, the planes in which they are corrected, and which land on an
         end of the range.
         """
-        normal = self.tangent[going].copy()
-        step = self.length[going, None] * self.tangent[going] * self.equations.scale[going]
-        here, share, at = self.z[going], np.ones(len(going)), np.full(len(going), -1)
+        normal, here, whole = self.tangent[going].copy(), self.z[going], np.ones(len(going))
+        share, at = whole.copy(), np.full(len(going), -1)
+        guess = here + self._ahead(going, whole)
+        straight = here + self.length[going, None] * normal * self.equations.scale[going]
+        # by the tangent too: a curve that only touches the end of a range is to land there
         for column, (low, high) in self.bounds.items():
-            ahead = here[:, column] + step[:, column]
-            bound = np.clip(ahead, low, high)
-            with np.errstate(invalid="ignore", divide="ignore"):
-                reach = (bound - here[:, column]) / step[:, column]
-            nearer = (bound != ahead) & (reach < share)
-            share[nearer], at[nearer] = reach[nearer], column
-        guess, outside = here + share[:, None] * step, at >= 0
-        normal[outside] = 0.0
-        normal[outside, at[outside]] = 1.0
-        for j in np.flatnonzero(outside):
-            guess[j, at[j]] = np.clip(guess[j, at[j]], *self.bounds[int(at[j])])
-        return guess, normal, outside
+            for ahead in (straight[:, column], guess[:, column]):
+                bound = np.clip(ahead, low, high)
+                with np.errstate(invalid="ignore", divide="ignore"):
+                    reach = (bound - here[:, column]) / (ahead - here[:, column])
+                nearer = (bound != ahead) & (reach < share)
+                share[nearer], at[nearer] = reach[nearer], column
+                guess[nearer] = here[nearer] + self._ahead(going[nearer], share[nearer])
+                guess[nearer, column], normal[nearer] = bound[nearer], np.eye(len(here[0]))[column]
+        return guess, normal, at >= 0
+
+    def _ahead(self, going: np.ndarray, share: np.ndarray) -> np.ndarray:
+        """How far the curves go in shares float64[g] of the next steps, by the cubic through the
+        last two points with their tangents; behind a single point, by its tangent.
+        """
+        scale, here = self.equations.scale[going], self.tangent[going]
+        length = (share * self.length[going])[:, None]
+        before, slope = self.before[:, going]
+        back = (before - self.z[going]) / scale
+        chord = np.linalg.norm(back, axis=1)[:, None]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            ahead = length / chord
+            bend = ahead**2 * (3.0 * back + chord * (2.0 * here + slope)) + ahead**3 * (
+                2.0 * back + chord * (here + slope)
+            )
+        return np.asarray((length * here + np.where(np.isfinite(bend), bend, 0.0)) * scale)
 
     def _close(self, taken: np.ndarray) -> None:
         """Close the curves that are about to pass their start as they left it."""

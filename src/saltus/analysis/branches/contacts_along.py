@@ -65,17 +65,22 @@ class Jumps:
 
     def __init__(self, system: System, contacts: Sequence[Contact], size: int, mode: int = 0):
         self._system, self._size = system, size
-        self._entries = [_entries(system, contact, mode, size) for contact in contacts or (None,)]
+        places: dict[Contact | None, list[int]] = {}
+        for i, contact in enumerate(contacts or (None,)):
+            places.setdefault(contact, []).append(i)
+        self._places = [
+            (_entries(system, contact, mode, size), alike) for contact, alike in places.items()
+        ]
 
     def at(self, time: np.ndarray, states: np.ndarray) -> At:
         """What happens at times float64[r, m] in states float64[r, m, E]."""
         (r, m, width), size = states.shape, self._size
-        columns = np.empty((len(self._entries[0]), r, m))
-        for i, entries in enumerate(self._entries):
-            named = dict(zip(self._system.states, states[:, i].T, strict=True))
-            values = evaluate(entries, t=time[:, i], states=named, values=self._system.values)
+        columns = np.empty((1 + width + 1 + size * (width + 3), r, m))
+        for entries, alike in self._places:
+            named = dict(zip(self._system.states, states[:, alike].T, strict=True))
+            values = evaluate(entries, t=time[:, alike].T, states=named, values=self._system.values)
             for column, value in zip(columns, values, strict=True):
-                column[:, i] = value
+                column[:, alike] = np.transpose(value)
         last = np.moveaxis(columns, 0, -1)
         gap, normal, by_time, rate, after, by_state, after_by_time = np.split(
             last, np.cumsum([1, width, 1, size, size, size * width]), axis=2

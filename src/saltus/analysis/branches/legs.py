@@ -164,15 +164,21 @@ class Legs:
             time and the span [periods].
         """
         start = self._states(after, rest, phase, span)
-        ends = np.empty(after.shape)
-        matrices = np.empty((*after.shape, start.shape[2]))
-        for mode, map_ in self._maps.items():
-            mine = [i for i, one in enumerate(self._modes) if one == mode]
-            end, matrix = self._flown(map_, start[:, mine].reshape(-1, start.shape[2]))
-            shape = (len(after), len(mine))
-            ends[:, mine] = end[:, : self.size].reshape(*shape, -1)
-            matrices[:, mine] = matrix[:, : self.size].reshape(*shape, self.size, -1)
+        ends, matrices = self._ends(start, np.tile(self._modes, (len(after), 1)))
         matrices[..., -2:] *= self.unit
+        return ends, matrices
+
+    def _ends(self, start: np.ndarray, modes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Ends float64[r, m, D] of legs from states float64[r, m, E + 2] in modes int64[r, m], and
+        their derivatives float64[r, m, D, E + 2].
+        """
+        ends = np.empty((*modes.shape, self.size))
+        matrices = np.empty((*ends.shape, start.shape[2]))
+        for mode, map_ in self._maps.items():
+            mine = modes == mode
+            if mine.any():
+                end, matrix = self._flown(map_, start[mine])
+                ends[mine], matrices[mine] = end[:, : self.size], matrix[:, : self.size]
         return ends, matrices
 
     def _flown(self, map_: Stroboscope, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -391,16 +397,13 @@ class Legs:
     def orbit(self, z: np.ndarray) -> np.ndarray:
         """Orbits float64[r, z] by their points at whole periods: unknowns of the free sequence."""
         phase, _, rest = self.nodes(z)
-        after = self.at(z).after
-        points = np.empty((len(z), self.n, self.size))
-        for k in range(self.n):
-            since = (k - phase) % self.n  # time since each contact
-            since[np.minimum(since, self.n - since) < AT_ONCE] = 0.0
-            last = since.argmin(axis=1)
-            rows = np.arange(len(z))
-            wanted = np.zeros_like(phase)
-            wanted[rows, last] = since[rows, last]
-            points[:, k] = self.fly(after, rest, phase, wanted)[0][rows, last]
+        since = (np.arange(self.n)[:, None] - phase[:, None]) % self.n  # of each point and contact
+        since[np.minimum(since, self.n - since) < AT_ONCE] = 0.0
+        last = since.argmin(axis=2)
+        rows = np.arange(len(z))[:, None]
+        span = np.take_along_axis(since, last[..., None], axis=2)[..., 0]
+        start = self._states(self.at(z).after[rows, last], rest, phase[rows, last], span)
+        points = self._ends(start, np.array(self._modes)[last])[0]
         return np.concatenate([points.reshape(len(z), -1), rest], axis=1)
 
     def admissible(self, z: np.ndarray) -> np.ndarray:

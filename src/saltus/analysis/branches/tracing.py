@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
 from saltus.analysis.branches.arclength import ENDING, FIRST, Curve, correct, follow, tangents
 from saltus.analysis.branches.sequence_changes import contact_points
@@ -469,15 +470,9 @@ def _known(z: np.ndarray, n: int, branches: Sequence[Branch]) -> bool:
 
 
 def _lies_on(z: np.ndarray, branch: Branch) -> bool:
-    value = branch.z[:, -1]
-    across = np.flatnonzero((value[1:] - z[-1]) * (value[:-1] - z[-1]) <= 0)
     normal = np.zeros((1, len(z)))
     normal[0, -1] = 1.0
-    for i in across:
-        width = value[i + 1] - value[i]
-        share = (z[-1] - value[i]) / width if width else 0.0
-        guess = branch.z[i] + share * (branch.z[i + 1] - branch.z[i])
-        guess[-1] = z[-1]
+    for guess in _passes(branch, float(z[-1])):
         if _apart(z, guess, branch) > PASSES:
             continue
         orbits = branch.orbits.near(guess[None], np.array([branch.row]))
@@ -485,6 +480,27 @@ def _lies_on(z: np.ndarray, branch: Branch) -> bool:
         if point.found[0] and _apart(z, point.z[0], branch, exact=True) < SAME:
             return True
     return False
+
+
+def _passes(branch: Branch, value: float) -> np.ndarray:
+    """Where a branch passes a value of the parameter, float64[g, z]: by cubics between its points,
+    which turn back beyond a fold as it does.
+    """
+    step = np.diff(branch.z, axis=0) / branch.scale
+    length = np.append(0.0, np.cumsum(np.linalg.norm(step, axis=1)))
+    each = np.append(True, np.diff(length) > 0.0)
+    if each.sum() < 2:
+        return np.zeros((0, len(branch.scale)))
+    curve = CubicHermiteSpline(
+        length[each], branch.z[each] / branch.scale, branch.tangent[each], extrapolate=False
+    )
+    own = CubicHermiteSpline(
+        curve.x, branch.z[each, -1] / branch.scale[-1], branch.tangent[each, -1]
+    )
+    places = own.solve(value / branch.scale[-1], extrapolate=False)
+    result = curve(places[np.isfinite(places)]) * branch.scale
+    result[:, -1] = value
+    return np.asarray(result)
 
 
 def _apart(a: np.ndarray, b: np.ndarray, branch: Branch, exact: bool = False) -> float:
