@@ -1,8 +1,8 @@
 """Pseudo-arclength continuation of curves F(z) = 0, m equations in m + 1 unknowns, many curves side
 by side.
 
-A step goes along the tangent and returns to the curve by Newton's method in the plane across it, so
-that folds are points like all others. Keller, in Applications of Bifurcation Theory (1977);
+A step goes along the cubic through the last two points and returns to the curve by Newton's method
+in the plane across the tangent, so that folds are points like all others. Keller, in Applications of Bifurcation Theory (1977);
 Allgower & Georg, Introduction to Numerical Continuation Methods (2003), chapters 2 and 6.
 """
 

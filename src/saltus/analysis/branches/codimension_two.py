@@ -20,8 +20,8 @@ from saltus.analysis.branches.singular_orbits import SingularOrbits
 from saltus.analysis.branches.special_points import zeros
 
 Equations = SingularOrbits | GrazingOrbits
-#: Distance of the orbits whose differences are third derivatives, in units of the scale: at a distance
-#: of h, rounding makes an error of 4e-16/h^2, and what the difference leaves out one of h^4/90.
+#: Distance h of the orbits whose differences are third derivatives, in units of the scale: rounding
+#: makes an error of 4e-16/h^2, and what the difference leaves out one of h^4/90.
 WIDE = 5e-3
 #: Share of the largest value of a test below which a change of its sign is rounding.
 ROUNDING = 1e-7

@@ -32,6 +32,8 @@ PASSES = 0.3
 LEAST = 1e-9
 #: The parameter's share of a tangent that is nothing but rounding.
 STILL = 1e-8
+#: What a test comes down to between points, in shares of what it is there, to be evaluated there.
+DIP = 0.5
 #: How often an interval is halved in which changes of stability don't add up.
 HALVINGS = 6
 
@@ -123,6 +125,7 @@ class Branch:
         """Locate what happens along the branch; halve the intervals where stability doesn't add
         up.
         """
+        refine(self, *_dips(self))
         for left in reversed(range(HALVINGS)):
             self.events = _located(self)
             self.unexplained = _unexplained(self)
@@ -318,9 +321,40 @@ def _of(
 
 
 # -- events ----------------------------------------------------------------------------------------
-def _located(branch: Branch) -> list[SpecialPoint]:
+def _tests(branch: Branch) -> np.ndarray:
+    """The functions whose zeros are bifurcations, at the points of a branch, float64[tests, p]."""
     values = tests(branch.tangent, branch.derivative, branch.multipliers, branch.z.shape[1] - 1)
     values[0, _vertical(branch)] = 0.0
+    return values
+
+
+def _dips(branch: Branch) -> tuple[list[int], np.ndarray]:
+    """Points between which and the next ones a test may vanish twice, and where, in shares of the
+    step: a parabola through three points has its vertex there, nearer to zero than DIP of them all.
+    """
+    if len(branch.z) < 3:
+        return [], np.zeros(0)
+    values, step = _tests(branch), np.diff(branch.length)
+    one, middle, other = values[:, :-2], values[:, 1:-1], values[:, 2:]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        slope = np.diff(values, axis=1) / step
+        bend = np.diff(slope, axis=1) / (step[:-1] + step[1:])
+        slope = slope[:, :-1] + bend * step[:-1]
+        vertex, least = -0.5 * slope / bend, middle - 0.25 * slope**2 / bend
+        side, near = np.sign(middle), np.abs([one, middle, other]).min(axis=0)
+        dips = (one * side > 0) & (other * side > 0) & (bend * side > 0)
+        dips &= (least * side < DIP * near) & (vertex > -step[:-1]) & (vertex < step[1:])
+    found = {}
+    for which, place in zip(*np.nonzero(dips), strict=True):
+        at = vertex[which, place]
+        after = int(place) + int(at > 0)
+        found[after] = (at / step[after]) % 1.0
+    places = sorted(found)
+    return places, np.array([found[after] for after in places])
+
+
+def _located(branch: Branch) -> list[SpecialPoint]:
+    values = _tests(branch)
     kinds, after = np.nonzero(values[:, 1:] * values[:, :-1] < 0)
     step = branch.z[after + 1] - branch.z[after]
     length = np.einsum("ki,ki->k", step / branch.scale, branch.tangent[after])
@@ -403,16 +437,17 @@ def _unexplained(branch: Branch, turning: bool = False) -> list[int]:
     return result
 
 
-def refine(branch: Branch, places: Sequence[int]) -> np.ndarray:
-    """Put a point in the midst of some intervals, by the points before them; the numbers of the new
-    points, int64[r].
+def refine(branch: Branch, places: Sequence[int], shares: np.ndarray | float = 0.5) -> np.ndarray:
+    """Put a point into each of some intervals, by the points before them; the numbers of the new
+    points, int64[r]. ``shares``: where in them.
     """
     after = np.array(places, np.int64)
     step = (branch.z[after + 1] - branch.z[after]) / branch.scale
     length = np.einsum("ki,ki->k", step, branch.tangent[after])
     orbits = branch.orbits.near(branch.z[after], np.full(len(after), branch.row))
     rows = np.arange(len(after))
-    guess = branch.z[after] + 0.5 * length[:, None] * branch.tangent[after] * branch.scale
+    along = (shares * length)[:, None] * branch.tangent[after]
+    guess = branch.z[after] + along * branch.scale
     point = correct(orbits, guess, branch.tangent[after], rows, np.abs(length))
     good = np.flatnonzero(point.found & (np.abs(length) > LEAST))
     if not len(good):
@@ -420,9 +455,9 @@ def refine(branch: Branch, places: Sequence[int]) -> np.ndarray:
     derivative = point.derivative[good]
     tangent = tangents(derivative, branch.tangent[after[good]])
     own = orbits.multipliers(point.z[good], derivative, rows[good])
-    middle = 0.5 * (branch.length[after[good]] + branch.length[after[good] + 1])
+    between = branch.length[after] + shares * (branch.length[after + 1] - branch.length[after])
     new = {"z": point.z[good], "tangent": tangent, "derivative": derivative}
-    for name, values in {**new, "multipliers": own, "length": middle}.items():
+    for name, values in {**new, "multipliers": own, "length": between[good]}.items():
         setattr(branch, name, np.insert(getattr(branch, name), after[good] + 1, values, axis=0))
     placed = after[good] + 1 + np.arange(len(good))
     branch.events = [replace(event, after=_moved(branch, event, placed)) for event in branch.events]

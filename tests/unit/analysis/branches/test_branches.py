@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 import saltus as sl
 from saltus.errors import ParameterError, SaltusError
@@ -359,3 +360,27 @@ def test_wrong_units_and_odd_arguments_are_answered_in_a_sentence():
     ):
         with pytest.raises(SaltusError, match=words):
             sl.branches(rig_b, **arguments)
+
+
+@sl.system(states="x v", forced_at="omega", units={"omega": "rad/s"})
+def swing(t, x, v, *, c=0.1, depth=0.2, cubic=0.2, omega=2.0):
+    return v, -c * v - (1 + depth * sl.cos(omega * t)) * x - cubic * x**3
+
+
+def hill_determinant(omega, depth, c=0.1):
+    """Zero where x'' + c x' + (1 + depth cos(omega t)) x = 0 has a motion of two periods."""
+    rates = (np.arange(-8, 8) + 0.5) * omega
+    band = np.diag(np.full(15, 0.5 * depth), 1)
+    return np.linalg.det((np.diag(1 - rates**2 + 1j * c * rates) + band + band.T) / rates**2).real
+
+
+@pytest.mark.parametrize("depth", [0.2001, 0.201, 0.21])
+def test_a_tongue_narrower_than_a_step_of_the_branch_is_found(depth):
+    system = swing.with_values(depth=depth)
+    found = sl.branches(system, {"omega": (1.4, 2.7)}, (0, 0), at=1, longest=1, progress=False)
+    assert found.event_kind.values.tolist() == 2 * ["period_doubling"]
+    first, last = found.event_omega.values
+    assert last - first < 0.07
+    for omega in (first, last):
+        ends = (omega - 1e-3, omega + 1e-3)
+        assert omega == pytest.approx(brentq(hill_determinant, *ends, args=(depth,)), rel=1e-11)
