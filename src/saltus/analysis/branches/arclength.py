@@ -2,8 +2,9 @@
 by side.
 
 A step goes along the cubic through the last two points and returns to the curve by Newton's method
-in the plane across the tangent, so that folds are points like all others. Keller, in Applications of Bifurcation Theory (1977);
-Allgower & Georg, Introduction to Numerical Continuation Methods (2003), chapters 2 and 6.
+in the plane across the tangent, so that folds are points like all others. Keller, in Applications
+of Bifurcation Theory (1977); Allgower & Georg, Introduction to Numerical Continuation Methods
+(2003), chapters 2 and 6.
 """
 
 from __future__ import annotations
