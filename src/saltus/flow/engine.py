@@ -273,16 +273,18 @@ def allocate(
         system, request.start, request.parameters, request.origin, request.period
     )
     finite &= ~beyond
+    zeros, counts = np.zeros((2, n)), np.zeros((3, n), np.int64)
+    counts[2] = -1
     whole = {
         "period": request.period,
-        "origin": np.full(n, float(request.origin)),
+        "origin": zeros[0] + request.origin,
         "state": start,
-        "count": np.zeros(n, np.int64),
-        "phase": np.zeros(n),
-        "mode": np.full(n, -1, np.int64),
-        "fresh": np.zeros(n, np.int64),
+        "count": counts[0],
+        "phase": zeros[1],
+        "mode": counts[2],
+        "fresh": counts[1],
         "carry": np.zeros((n, module.CARRY)),
-        "status": np.where(finite, st.RUNNING, st.INVALID).astype(np.int64),
+        "status": np.where(finite, st.RUNNING, st.INVALID),
         "end_count": request.end_count,
         "end_phase": request.end_phase,
         "counters": np.zeros((n, len(st.COUNTERS)), np.int64),

@@ -215,7 +215,8 @@ class Stroboscope:
 
     def _with(self, **changed: object) -> Stroboscope:
         other = copy.copy(self)  # the checked arguments don't change
-        other.__dict__.pop("exact_map", None)
+        for derived in ("exact_map", "_tangent_map"):
+            other.__dict__.pop(derived, None)
         other.__dict__.update(changed)
         return other
 
@@ -277,9 +278,15 @@ class Stroboscope:
         schedule: Schedule | None = None,
     ) -> engine.Outcome:
         k, size = start.shape
-        first = np.broadcast_to(np.eye(size), (k, size, size)) if directions is None else directions
-        extended = np.concatenate([start, first.reshape(k, size * size)], axis=1)
-        return self.of_system(tangent_system(self.system)).run(extended, count, schedule)
+        first = np.eye(size) if directions is None else directions
+        extended = np.empty((k, size + size**2))
+        extended[:, :size], extended[:, size:] = start, first.reshape(-1, size**2)
+        return self._tangent_map.run(extended, count, schedule)
+
+    @functools.cached_property
+    def _tangent_map(self) -> Stroboscope:
+        """The same rows of the system with its tangents."""
+        return self.of_system(tangent_system(self.system))
 
     def sequences(self, start: np.ndarray, count: int) -> tuple[np.ndarray, list[np.ndarray]]:
         """See :class:`Map`."""

@@ -8,7 +8,7 @@ import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from contextvars import copy_context
 from typing import Any, TypeVar
 
@@ -47,8 +47,9 @@ def on_threads(
         stop.hold()
         return None if stop.is_set() else (item, work(item))
 
-    if len(items) == 1 and progress is None and may_wait(stop):
-        with _ctrl_c_asks(stop):
+    handler = _ctrl_c_of(stop)
+    if len(items) == 1 and progress is None and _is_ours(handler):
+        with _ctrl_c_asks(stop) if handler is signal.default_int_handler else nullcontext():
             result = copy_context().run(one, items[0])
         if result is not None:
             done(*result)
@@ -80,9 +81,17 @@ def may_wait(stop: Stop) -> bool:
     """Whether Ctrl-C can wait until a piece of work in this thread has ended: wherever nobody has a
     handler of his own for it.
     """
+    return _is_ours(_ctrl_c_of(stop))
+
+
+def _ctrl_c_of(stop: Stop) -> Any:
+    """What Ctrl-C calls in the midst of this thread's work; None where it doesn't arrive."""
     if stop.inside or threading.current_thread() is not threading.main_thread():
-        return True
-    handler = signal.getsignal(signal.SIGINT)
+        return None
+    return signal.getsignal(signal.SIGINT)
+
+
+def _is_ours(handler: Any) -> bool:
     return handler is signal.default_int_handler or not callable(handler)
 
 
@@ -91,10 +100,6 @@ def _ctrl_c_asks(stop: Stop) -> Iterator[None]:
     """Ctrl-C asks to stop, and is raised where the block ends: in the midst of it, it would cut a
     table of contacts in two.
     """
-    main = threading.current_thread() is threading.main_thread()
-    if stop.inside or not main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
-        yield
-        return
     pressed = False
 
     def note(*_: object) -> None:

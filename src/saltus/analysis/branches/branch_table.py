@@ -68,10 +68,10 @@ def values_of(
     resolve(branches, functools.partial(_sampled_peaks, system, method))
     counts = [len(branch.z) for branch in branches]
     points = [(branch, z) for branch in branches for z in branch.z]
-    numbers = numbers_of(system, _with_equations(points), outputs, method)
     events = [(number, event) for number, branch in enumerate(branches) for event in branch.events]
     at_events = [(branches[number], event.z) for number, event in events]
-    event_numbers = numbers_of(system, _with_equations(at_events), outputs, method)
+    every = numbers_of(system, _with_equations([*points, *at_events]), outputs, method)
+    numbers, event_numbers = every.rows(slice(len(points))), every.rows(slice(len(points), None))
     begins = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
     multipliers = stacked([branch.multipliers for branch in branches], size)
     event_multipliers = stacked([event.multipliers[None] for _, event in events], size)
@@ -95,8 +95,8 @@ def values_of(
             ],
             float,
         ),
-        "point_peak": numbers.peak[:, 0] if len(points) else np.zeros(0),
-        "point_rms": numbers.rms[:, 0] if len(points) else np.zeros(0),
+        "point_peak": numbers.peak[:, 0],
+        "point_rms": numbers.rms[:, 0],
         "point_contacts": numbers.contacts * (1 if system.forced_at is None else periods),
         "point_itinerary": list(numbers.itinerary),
         "point_margin": numbers.margin,
@@ -114,8 +114,8 @@ def values_of(
         "event_branch": np.array([number for number, _ in events], np.int64),
         "event_point": np.array([begins[i] + event.after for i, event in events], np.int64),
         "event_<parameter>": {name: np.array([event.z[-1] for _, event in events], float)},
-        "event_peak": event_numbers.peak[:, 0] if len(events) else np.zeros(0),
-        "event_rms": event_numbers.rms[:, 0] if len(events) else np.zeros(0),
+        "event_peak": event_numbers.peak[:, 0],
+        "event_rms": event_numbers.rms[:, 0],
         **_complex("event_multiplier", np.where(event_rests[:, None], np.nan, event_multipliers)),
         **_complex("event_eigenvalue", event_own),
         "event_<state>": states[len(points) :],

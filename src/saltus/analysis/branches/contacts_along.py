@@ -5,7 +5,7 @@ rate, the state behind the contact, and their derivatives.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -44,10 +44,6 @@ class At:
     after: np.ndarray
     by_state: np.ndarray
     by_time: np.ndarray
-
-    def rows(self, which: slice) -> At:
-        """Some of the orbits."""
-        return At(*(getattr(self, one.name)[which] for one in fields(self)))
 
 
 class Jumps:

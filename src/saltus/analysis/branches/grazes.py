@@ -49,6 +49,8 @@ class ContactEvent:
     slope : float64[z]
         Derivative of the gap that grazes with respect to the orbit; of a corner, of the time
         between the contacts.
+    derivative : float64[.., z]
+        Of the orbit's equations.
     """
 
     kind: str
@@ -59,6 +61,13 @@ class ContactEvent:
     place: int
     state: np.ndarray
     slope: np.ndarray
+    derivative: np.ndarray
+
+    @cached_property
+    def multipliers(self) -> np.ndarray:
+        """Floquet multipliers of the orbit, complex128[D]."""
+        row = np.zeros(1, np.int64)
+        return np.asarray(self.legs.multipliers(self.z[None], self.derivative[None], row)[0])
 
     @cached_property
     def orbit(self) -> np.ndarray:
@@ -117,11 +126,14 @@ def graze(legs: Legs, z: np.ndarray, guard: int, phase: float) -> ContactEvent |
     begins = legs.nodes(z[None])[0][0, place]
     phase = nearest_turn(legs, z, place, gap, (phase - begins) % legs.n) + begins
     row, scale = np.zeros(1, np.int64), np.append(legs.scale[0], 1.0)
+    state, slope, derivative = np.empty(legs.size), np.empty(len(z)), np.empty(0)
 
     def equations(u: np.ndarray, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        (residual, derivative), _, value, slopes = touching(legs, place, gap, u, row)
+        nonlocal derivative
+        (residual, by_z), states, value, slopes = touching(legs, place, gap, u, row)
+        state[:], slope[:], derivative = states[0], slopes[0, 0, :-1], by_z[0]
         whole = np.zeros((1, len(scale), len(scale)))
-        whole[:, :-2, :-1], whole[:, -2:] = derivative, slopes * scale
+        whole[:, :-2, :-1], whole[:, -2:] = by_z, slopes * scale
         unit = np.abs(whole[:, -2:]).max(axis=2)
         whole[:, -2:] /= unit[..., None]
         return np.concatenate([residual, value / unit], axis=1), whole
@@ -130,11 +142,8 @@ def graze(legs: Legs, z: np.ndarray, guard: int, phase: float) -> ContactEvent |
     u, found = newton(equations, np.append(z, phase)[None], scale[None])
     if not found[0]:
         return None
-    state, _, slopes = touch(legs, place, gap, u)
-    phase = float(u[0, -1]) % legs.n
-    return ContactEvent(
-        "graze", (guard,), phase, legs, u[0, :-1], place, state[0], slopes[0, 0, :-1]
-    )
+    z, phase = u[0, :-1], float(u[0, -1]) % legs.n  # the last step was rounding
+    return ContactEvent("graze", (guard,), phase, legs, z, place, state, slope, derivative)
 
 
 def touch(
@@ -152,16 +161,14 @@ def touching(
     """What :meth:`Legs.evaluate` returns of orbits float64[k, z + 1], whose last entry is a time,
     and what :func:`touch` does: all flights in one.
     """
-    z, when, size, k = u[:, :-1], u[:, -1], legs.size, len(u)
-    both = np.concatenate([z, z])  # the legs as they are, and one of them as far as that time
-    first, _, rest = legs.nodes(both)
-    spans, at = legs.spans(first), legs.at(both)
-    spans[k:] = 0.0
-    spans[k:, place] = when - first[k:, place]
-    state, by_z, by_time = legs.along(both, at, spans)
-    closed = legs.closed(z, rows, at.rows(slice(0, k)), state[:k], by_z[:k], by_time[:k])
-    state, by_z, by_time = state[k:, place], by_z[k:, place], by_time[k:, place]
-    own, slopes, order = legs.orbits.own(rest[k:])
+    z, when, size = u[:, :-1], u[:, -1], legs.size
+    first, _, rest = legs.nodes(z)
+    at, until = legs.at(z), when[:, None] - first[:, [place]]
+    spans = np.concatenate([legs.spans(first), until], axis=1)
+    state, by_z, by_time = legs.along(z, at, spans, [place])
+    closed = legs.closed(z, rows, at, state[:, :-1], by_z[:, :-1], by_time[:, :-1])
+    state, by_z, by_time = state[:, -1], by_z[:, -1], by_time[:, -1]
+    own, slopes, order = legs.orbits.own(rest)
     found = gap.at(when * legs.unit, np.concatenate([state, own], axis=1))
     value, normal, by_clock = found[..., 0], found[..., 1:-1], found[..., -1] * legs.unit
     entries = normal[..., :size] @ by_z
@@ -197,9 +204,10 @@ def corner(legs: Legs, z: np.ndarray, place: int) -> ContactEvent | None:
         The leg that vanishes.
     """
     row, after = np.zeros(1, np.int64), (place + 1) % legs.count
-    width = legs.size + 1
+    width, derivative = legs.size + 1, np.empty(0)
 
     def equations(u: np.ndarray, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        nonlocal derivative
         residual, derivative = legs.evaluate(u, row)
         last = np.zeros((1, 1, u.shape[1]))
         last[0, 0, after * width] += 1.0
@@ -215,4 +223,5 @@ def corner(legs: Legs, z: np.ndarray, place: int) -> ContactEvent | None:
     slope = np.zeros(len(z))
     slope[after * width], slope[place * width] = 1.0, -1.0
     state = legs.nodes(u)[1][0, place]
-    return ContactEvent("corner", guards, phase, legs, u[0], place, state, slope)
+    own = derivative[0]
+    return ContactEvent("corner", guards, phase, legs, u[0], place, state, slope, own)

@@ -88,7 +88,7 @@ class LegBranch(Branch):
         event = piece.end.event
         none = np.zeros(0)
         return SpecialPoint(
-            event.kind, max(after, 0), event.orbit, none, event.legs.multipliers_at(event.z), none,
+            event.kind, max(after, 0), event.orbit, none, event.multipliers, none,
             event.guards, event.phase, outcome, sqrt_coefficient(event),
         )  # fmt: skip
 

@@ -11,6 +11,7 @@ Dankowicz & Schilder, Recipes for Continuation (2013), chapter 9.
 from __future__ import annotations
 
 import copy
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -152,10 +153,15 @@ class Legs:
 
     # -- flights -----------------------------------------------------------------------------------
     def fly(
-        self, after: np.ndarray, rest: np.ndarray, phase: np.ndarray, span: np.ndarray
+        self,
+        after: np.ndarray,
+        rest: np.ndarray,
+        phase: np.ndarray,
+        span: np.ndarray,
+        legs: Sequence[int] | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Legs from states float64[r, m, D] behind each contact, at times and for times float64[r,
-        m] in periods.
+        m] in periods; ``legs`` says which they are, if not all in their order.
 
         Returns
         -------
@@ -164,7 +170,8 @@ class Legs:
             time and the span [periods].
         """
         start = self._states(after, rest, phase, span)
-        ends, matrices = self._ends(start, np.tile(self._modes, (len(after), 1)))
+        modes = self._modes if legs is None else [self._modes[i] for i in legs]
+        ends, matrices = self._ends(start, np.tile(modes, (len(after), 1)))
         matrices[..., -2:] *= self.unit
         return ends, matrices
 
@@ -261,28 +268,29 @@ class Legs:
         return np.append(residual, where[:, None], axis=1), np.append(derivative, row, axis=1)
 
     def along(
-        self, z: np.ndarray, at: At, spans: np.ndarray
+        self, z: np.ndarray, at: At, spans: np.ndarray, more: Sequence[int] = ()
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """States some time [periods] float64[r, m] after each contact of orbits float64[r, z].
+        """States some time [periods] after each contact of orbits float64[r, z], and after ``more``
+        of them: float64[r, m + more].
 
         Returns
         -------
-        float64[r, m, D], float64[r, m, D, z], float64[r, m, D]
+        float64[r, m + more, D], float64[r, m + more, D, z], float64[r, m + more, D]
             The states, their derivatives with respect to the unknowns at a time that stays, and
             those with respect to that time [periods].
         """
-        size, used = self.size, self.count * (self.size + 1)
+        size, used, legs = self.size, self.count * (self.size + 1), [*range(self.count), *more]
         phase, _, rest = self.nodes(z)
         _, slopes, order = self.orbits.own(rest)
-        ends, matrices = self.fly(at.after, rest, phase, spans)
+        ends, matrices = self.fly(at.after[:, legs], rest, phase[:, legs], spans, legs)
         by_state, by_start, by_span = matrices[..., :size], matrices[..., -2], matrices[..., -1]
-        through = by_state @ at.by_state  # with respect to the states before the contact
-        jumped = (by_state @ at.by_time[..., None])[..., 0] * self.unit
+        through = by_state @ at.by_state[:, legs]  # with respect to the states before the contact
+        jumped = (by_state @ at.by_time[:, legs, :, None])[..., 0] * self.unit
         derivative = np.zeros((*ends.shape, z.shape[1]))
-        for i in range(self.count):
-            here = i * (size + 1)
-            derivative[:, i, :, here] = by_start[:, i] - by_span[:, i] + jumped[:, i]
-            derivative[:, i, :, here + 1 : here + 1 + size] = through[:, i, :, :size]
+        for flight, i in enumerate(legs):
+            here, mine = i * (size + 1), derivative[:, flight]
+            mine[..., here] = by_start[:, flight] - by_span[:, flight] + jumped[:, flight]
+            mine[..., here + 1 : here + 1 + size] = through[:, flight, :, :size]
         own = matrices[..., size:-2] + through[..., size:]
         derivative[..., used + order] = own * slopes[:, None, None]
         return ends, derivative, by_span
@@ -353,11 +361,6 @@ class Legs:
                 segments = across(product(segments), at.rate[i, 0])[None]
             result.append(multipliers(segments))
         return np.array(result)
-
-    def multipliers_at(self, z: np.ndarray) -> np.ndarray:
-        """Those of one orbit float64[z]."""
-        row = np.zeros(1, np.int64)
-        return np.asarray(self.multipliers(z[None], self.evaluate(z[None], row)[1], row)[0])
 
     def segments(self, at: At, derivative: np.ndarray, i: int, row: int) -> np.ndarray:
         """The tangent map from each contact to the next one, both before them, float64[m, D, D]."""

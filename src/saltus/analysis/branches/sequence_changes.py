@@ -73,7 +73,7 @@ def contact_points(
     derivative = orbits.evaluate(places, np.full(len(found), row))[1]
     return [
         SpecialPoint(
-            event.kind, after, place, tangent[after], event.legs.multipliers_at(event.z), matrix,
+            event.kind, after, place, tangent[after], event.multipliers, matrix,
             event.guards, event.phase, sqrt_coefficient=sqrt_coefficient(event),
         )
         for (after, event), place, matrix in zip(found, places, derivative, strict=True)

@@ -64,6 +64,8 @@ class PeriodicOrbits:
         self.system, self.names, self.n, self.scale = system, tuple(names), n, scale
         self.size, self.free = len(system.states), system.forced_at is None
         self.parametric = parametric(system, self.names)
+        first = self.names.index(system.forced_at) if system.forced_at in self.names else 0
+        self._order = np.array(sorted(range(len(names) + self.free), key=lambda i: i != first))
         self._turns = system.period({system.forced_at: 1.0}) if system.forced_at else 1.0
         few = method.suited_to(1)  # tangents make many states: wide lanes don't pay
         self.map = Stroboscope(
@@ -71,6 +73,12 @@ class PeriodicOrbits:
             threads=threads,
         )  # fmt: skip
         self.phase = np.full((len(scale), 2, self.size), np.nan)  # point and direction
+        self._next = (np.arange(n) + 1) % n  # the point that follows each
+        self._less_next = -np.eye(n * self.size)[self._columns_of(self._next)]
+
+    def _columns_of(self, shots: np.ndarray) -> np.ndarray:
+        """Which unknowns some of the points are, int64[s, D]."""
+        return shots[:, None] * self.size + np.arange(self.size)
 
     @property
     def width(self) -> int:
@@ -100,21 +108,22 @@ class PeriodicOrbits:
         beside the points float64[r, e], the derivative of each with respect to its unknown, both
         float64[r, e], and which unknown that is, int64[e].
         """
+        slopes = np.ones(rest.shape)
         if self.system.forced_at not in self.names:
-            return rest, np.ones_like(rest), np.arange(rest.shape[1])
-        j = self.names.index(self.system.forced_at)
-        order = np.array([j, *range(j), *range(j + 1, rest.shape[1])])
-        values, slopes = rest[:, order], np.ones_like(rest)
-        values[:, 0] = self._turns / rest[:, j]
-        slopes[:, 0] = -self._turns / rest[:, j] ** 2
-        return values, slopes, order
+            return rest, slopes, self._order
+        values, frequency = rest[:, self._order], rest[:, self._order[0]]
+        values[:, 0] = self._turns / frequency
+        slopes[:, 0] = -values[:, 0] / frequency
+        return values, slopes, self._order
 
     def starts(self, z: np.ndarray) -> np.ndarray:
         """The points as states of the parametric system, float64[r, n, E]."""
         return self._with_own(z, self.own(z[:, self.n * self.size :])[0])
 
     def _with_own(self, z: np.ndarray, own: np.ndarray) -> np.ndarray:
-        return np.concatenate([self.points(z), np.repeat(own[:, None], self.n, axis=1)], axis=2)
+        states = np.empty((len(z), self.n, self.size + own.shape[1]))
+        states[..., : self.size], states[..., self.size :] = self.points(z), own[:, None]
+        return states
 
     # -- equations ---------------------------------------------------------------------------------
     def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -123,20 +132,18 @@ class PeriodicOrbits:
         own, slopes, order = self.own(z[:, n * size :])
         points, start = self.points(z), self._with_own(z, own)
         ends, matrices = self.map.tangent(start.reshape(r * n, -1), 1)
-        ends = ends.reshape(r, n, -1)[:, :, :size]
-        matrices = matrices.reshape(r, n, start.shape[2], start.shape[2])[:, :, :size]
-        residual = ends - np.roll(points, -1, axis=1)
-        derivative = np.zeros((r, n, size, z.shape[1]))
-        shots, each = np.arange(n), np.arange(size)
-        by_points = derivative[..., : n * size].reshape(r, n, size, n, size)
-        by_points[:, shots, :, shots] = np.moveaxis(matrices[..., :size], 1, 0)
-        by_points[:, shots[:, None], each, (shots[:, None] + 1) % n, each] -= 1.0
-        derivative[..., : n * size] = by_points.reshape(r, n, size, n * size)
+        ends = ends[:, :size].reshape(r, n, size)
+        matrices = matrices[:, :size].reshape(r, n, size, -1)
+        derivative = np.empty((r, n, size, z.shape[1]))
+        derivative[..., : n * size] = self._less_next
+        for i in range(n):
+            derivative[:, i, :, i * size : (i + 1) * size] += matrices[:, i, :, :size]
         derivative[..., n * size + order] = matrices[..., size:] * slopes[:, None, None]
         unit = self.scale[rows]
         each = unit[:, : n * size].reshape(r, n, size)
-        residual = (residual / each).reshape(r, -1)
-        derivative = (derivative / each[..., None]).reshape(r, n * size, -1) * unit[:, None]
+        residual = ((ends - points[:, self._next]) / each).reshape(r, -1)
+        derivative /= each[..., None]
+        derivative = derivative.reshape(r, n * size, -1) * unit[:, None]
         if not self.free:
             return residual, derivative
         at, along = self.phase[rows, 0], self.phase[rows, 1]

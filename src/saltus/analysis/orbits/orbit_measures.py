@@ -92,6 +92,10 @@ class Measures:
             "amplitude": np.abs(self.harmonic), "phase": np.angle(self.harmonic),
         }  # fmt: skip
 
+    def rows(self, which: slice) -> Measures:
+        """Those of some of the motions."""
+        return Measures(*(getattr(self, field.name)[which] for field in fields(self)))
+
     def put(self, rows: np.ndarray, other: Measures) -> None:
         """Write another's numbers to the rows int64[n]."""
         for field in fields(self):
