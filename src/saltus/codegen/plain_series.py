@@ -17,8 +17,9 @@ from saltus.kernels import lanes, marks, trigonometry
 from saltus.system.system import System
 
 
+@lru_cache(maxsize=64)
 def series_module(system: System, order: int) -> ModuleType:
-    """Jets and step length of a system, as its Taylor flow compiles them.
+    """Jets and step length of a system, as its Taylor flow compiles them: the same for all values.
 
     It evaluates a motion that a flow has computed. Nothing is compiled, so a new function costs no
     time.

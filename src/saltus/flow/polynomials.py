@@ -108,21 +108,24 @@ def _refined(terms: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray
     """The one root of each polynomial between low and high, by Newton's method inside a shrinking
     bracket.
     """
-    rates = derivative(terms)
-    rises = value(terms, high) > value(terms, low)
-    x = 0.5 * (low + high)
+    rates, root = derivative(terms), 0.5 * (low + high)
+    rises, which = value(terms, high) > value(terms, low), np.arange(len(root))
     for _ in range(MOST_STEPS):
+        x = root[which]
         here = value(terms, x)
         below = (here < 0.0) == rises
         low, high = np.where(below, x, low), np.where(below, high, x)
         with np.errstate(all="ignore"):
             new = x - here / value(rates, x)
         new = np.where((new >= low) & (new <= high), new, 0.5 * (low + high))
-        still = (np.abs(new - x) > CONVERGED) & (here != 0.0)
-        x = np.where(here == 0.0, x, new)
-        if not still.any():
+        root[which] = np.where(here == 0.0, x, new)
+        on = (np.abs(new - x) > CONVERGED) & (here != 0.0)
+        if not on.any():
             break
-    return x
+        if not on.all():
+            which, low, high, rises = which[on], low[on], high[on], rises[on]
+            terms, rates = terms[:, on], rates[:, on]
+    return root
 
 
 def hermite(a: np.ndarray, b: np.ndarray, da: np.ndarray, db: np.ndarray) -> np.ndarray:

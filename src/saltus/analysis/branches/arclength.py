@@ -29,7 +29,7 @@ EASY, STRAIGHT = 3, 0.995
 #: First, longest and shortest step, in units of the scale.
 FIRST, LONGEST, SHORTEST = 0.02, 0.12, 1e-7
 #: Distance from where a curve ends within which its last point lies, in units of the scale.
-ENDING = 0.005
+ENDING = 0.0005
 #: Farthest that the corrector moves from the predicted point, in steps.
 ASTRAY = 0.6
 #: Points after which a curve may be found to be closed, and the cosine of the angle at which it

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.analysis.branches.arclength import ENDING, Curve, tangents
+from saltus.analysis.branches.arclength import Curve, tangents
 from saltus.analysis.branches.rests import Rests
 from saltus.analysis.branches.special_points import SpecialPoint
 from saltus.analysis.branches.tracing import (
@@ -39,6 +39,8 @@ from saltus.system.system import System
 #: Newton's method on a defining system finds the point that was bracketed, within this distance in
 #: units of the scale.
 SAME = 1e-5
+#: Farthest that a branch ends from what ends it, in units of the scale.
+ENDING = 0.02
 #: Rates that vanish on one side of a boundary and are smaller than this on the other, in units of
 #: their derivatives, vanish there too.
 CONTINUOUS = 1e-9
@@ -231,7 +233,7 @@ def _meet_boundary(branch: RestBranch, side: int, place: int) -> None:
         return
     end, one = np.append(found.state, found.value), np.array([row])
     apart = float(np.linalg.norm((end - z) / unit))
-    if apart > 4 * ENDING:
+    if apart > ENDING:
         return
     derivative = orbits.evaluate(end[None], one)[1]
     tangent = tangents(derivative, out[None])[0]

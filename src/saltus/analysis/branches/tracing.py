@@ -13,13 +13,17 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from saltus.analysis.branches.arclength import ENDING, FIRST, Curve, correct, follow, tangents
+from saltus.analysis.branches.arclength import FIRST, Curve, correct, follow, tangents
 from saltus.analysis.branches.sequence_changes import contact_points
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.special_points import SpecialPoint, locate, outside, tests
 
 #: How far a new branch begins from the point where it leaves another, in units of the scale.
 ASIDE = 0.001
+#: A branch that ends so near to where another is to leave is that one, in units of the scale.
+BORN = 0.015
+#: Radius of a limit cycle that is lost because it shrinks to an equilibrium, in units of the scale.
+SHRUNK = 0.005
 #: Farthest that a seed lies from its orbit, in units of the scale.
 ASTRAY = 0.5
 #: A fold so near to a branch point is none, in units of the scale: it is located less well there.
@@ -32,8 +36,9 @@ PASSES = 0.3
 LEAST = 1e-9
 #: The parameter's share of a tangent that is nothing but rounding.
 STILL = 1e-8
-#: What a test comes down to between points, in shares of what it is there, to be evaluated there.
-DIP = 0.5
+#: A test that comes down to less than this share of what it is beside may vanish twice there; so
+#: often points are put where it may.
+DIP, DIVES = 0.5, 4
 #: How often an interval is halved in which changes of stability don't add up.
 HALVINGS = 6
 
@@ -125,7 +130,9 @@ class Branch:
         """Locate what happens along the branch; halve the intervals where stability doesn't add
         up.
         """
-        refine(self, *_dips(self))
+        for _ in range(DIVES):
+            if not len(refine(self, *_dips(self))):
+                break
         for left in reversed(range(HALVINGS)):
             self.events = _located(self)
             self.unexplained = _unexplained(self)
@@ -281,7 +288,7 @@ def both_ways(
     )  # fmt: skip
     for curve in curves:
         shrunk = curve.end == "lost" and orbits.free and len(curve.z) > 1
-        if shrunk and orbits.radius(curve.z[-1]) < ENDING:
+        if shrunk and orbits.radius(curve.z[-1]) < SHRUNK:
             curve.end = "hopf"
     return _joined(orbits, [curve for curve in curves if curve.z], start.seed, kind)
 
@@ -330,22 +337,25 @@ def _tests(branch: Branch) -> np.ndarray:
 
 def _dips(branch: Branch) -> tuple[list[int], np.ndarray]:
     """Points between which and the next ones a test may vanish twice, and where, in shares of the
-    step: a parabola through three points has its vertex there, nearer to zero than DIP of them all.
+    step: at the vertex of the parabola through three points if it is much nearer to zero than they
+    are, or to both sides of a point that is much nearer than those beside it.
     """
     if len(branch.z) < 3:
         return [], np.zeros(0)
     values, step = _tests(branch), np.diff(branch.length)
-    one, middle, other = values[:, :-2], values[:, 1:-1], values[:, 2:]
+    middle, beside = values[:, 1:-1], np.stack([values[:, :-2], values[:, 2:]])
     with np.errstate(invalid="ignore", divide="ignore"):
         slope = np.diff(values, axis=1) / step
         bend = np.diff(slope, axis=1) / (step[:-1] + step[1:])
         slope = slope[:, :-1] + bend * step[:-1]
         vertex, least = -0.5 * slope / bend, middle - 0.25 * slope**2 / bend
-        side, near = np.sign(middle), np.abs([one, middle, other]).min(axis=0)
-        dips = (one * side > 0) & (other * side > 0) & (bend * side > 0)
-        dips &= (least * side < DIP * near) & (vertex > -step[:-1]) & (vertex < step[1:])
-    found = {}
-    for which, place in zip(*np.nonzero(dips), strict=True):
+        side, next_least = np.sign(middle), np.abs(beside).min(axis=0)
+        one_side = (beside * side > 0).all(axis=0)
+        low = one_side & (np.abs(middle) < DIP * next_least)
+        lower = (least * side < DIP * np.minimum(np.abs(middle), next_least)) & (bend * side > 0)
+        lower &= one_side & (vertex > -step[:-1]) & (vertex < step[1:])
+    found = {int(place) + i: 0.5 for place in np.flatnonzero(low.any(axis=0)) for i in (0, 1)}
+    for which, place in zip(*np.nonzero(lower), strict=True):
         at = vertex[which, place]
         after = int(place) + int(at > 0)
         found[after] = (at / step[after]) % 1.0
@@ -564,7 +574,7 @@ def _ends_there(seed: Seed, branches: Sequence[Branch]) -> bool:
         for place in (0, -1):
             apart = np.linalg.norm((others - branch.z[place]) / branch.scale, axis=1)
             born = branch.ends[place] in ("period_doubling", "hopf")
-            if born and apart.min() < 3 * ENDING:
+            if born and apart.min() < BORN:
                 return True
     return False
 
