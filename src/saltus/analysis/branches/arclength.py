@@ -134,20 +134,22 @@ def correct(
         residual, matrix = equations.evaluate(z[left], rows[left])
         count[left] += 1
         error = np.abs(residual).max(axis=1)
-        good = np.isfinite(error) & np.isfinite(matrix).all(axis=(1, 2))
+        good = np.isfinite(error + matrix.sum(axis=(1, 2)))
         done = good & ((error < CLOSED) | ((error < STALLED) & (error > 0.5 * before[left])))
         derivative[left[done]], found[left[done]] = matrix[done], True
         before[left] = error
-        going = good & ~done
-        left, residual, matrix = left[going], residual[going], matrix[going]
-        whole = np.concatenate([matrix, normal[left][:, None]], axis=1)
-        right = np.concatenate([residual, np.zeros((len(left), 1))], axis=1)
+        going = np.flatnonzero(good & ~done)
+        left = left[going]
+        if not len(left):
+            break
+        whole, right = np.empty((len(left), size, size)), np.zeros((len(left), size))
+        whole[:, :-1], whole[:, -1], right[:, :-1] = matrix[going], normal[left], residual[going]
         step = -solved(whole, right)
         if iteration < len(steps):
             steps[iteration, left] = np.linalg.norm(step, axis=1)
         z[left] += step * scale[left]
         near = np.linalg.norm((z[left] - guess[left]) / scale[left], axis=1) <= limit[left]
-        left = left[np.isfinite(step).all(axis=1) & near]
+        left = left[near]  # no step is NaN, then
     contraction = steps[1] / np.maximum(steps[0], STALLED)
     return Corrected(z, derivative, found, count, contraction)
 

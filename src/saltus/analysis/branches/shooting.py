@@ -18,6 +18,7 @@ import numpy as np
 
 from saltus.analysis.orbits.equilibria import field_of
 from saltus.analysis.orbits.floquet import across, multipliers
+from saltus.analysis.orbits.newton import leading_first
 from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
@@ -241,6 +242,10 @@ class PeriodicOrbits:
         """Floquet multipliers of orbits float64[r, z], the largest first, without the trivial one
         of a system without forcing; complex128[r, D] or [r, D - 1].
         """
+        if self.n == 1 and not self.free:
+            unit = self.scale[rows, : self.size]
+            own = derivative[:, : self.size, : self.size] * unit[:, :, None] / unit[:, None]
+            return leading_first(own + np.eye(self.size))
         flows = self._flow(z) if self.free else None
         result = []
         for i, row in enumerate(rows):
