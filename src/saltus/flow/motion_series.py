@@ -87,7 +87,7 @@ class MotionSeries:
     def __init__(self, map_: Stroboscope, watched: System, guards: int):
         self._map, self._guards, self._own = map_, guards, len(map_.system.guards)
         self._asked = np.r_[guards : len(watched.guards), 0 : self._own]
-        self._module: ModuleType = series_module(watched.origin, ORDER)
+        self._module: ModuleType = series_module(watched, ORDER)
         k, module = len(map_), self._module
         self._tables = table_data(watched)
         self._constants, self._turns = (

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -61,8 +62,7 @@ def pieces(
         The quantities are the states, then those asked for, then the gaps of the system. A motion
         that didn't reach the end has no pieces.
     """
-    asked = tuple(Guard(f"quantity {i}", quantity) for i, quantity in enumerate(quantities))
-    watched = replace(map_.system, guards=(*guards, *asked))
+    watched = _watched(map_.system.origin, tuple(guards), tuple(quantities))
     whole, outcome = _pieces(
         map_, start, periods, watched, len(guards), not map_.method.records_contacts
     )
@@ -77,6 +77,13 @@ def pieces(
             good = whole.rows(~np.isin(whole.motion, bad))
             whole = _joined([[good, replace(cubics, motion=bad[cubics.motion])]])
     return whole, outcome
+
+
+@lru_cache(maxsize=64)
+def _watched(system: System, guards: tuple[Guard, ...], quantities: tuple[Expr, ...]) -> System:
+    """A system whose last guards are quantities: made once, since its series are."""
+    asked = tuple(Guard(f"quantity {i}", quantity) for i, quantity in enumerate(quantities))
+    return replace(system, guards=(*guards, *asked))
 
 
 def nodes_of(map_: Stroboscope, cubic: bool = False) -> int:

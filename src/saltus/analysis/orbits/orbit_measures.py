@@ -178,7 +178,7 @@ def _measured(
             result.maximum[known, output], result.minimum[known, output] = _extremes(
                 whole, first, turns[output], output
             )
-            _means(map_, whole, first, output, result)
+        _means(map_, whole, first, wide, result)
         gaps = range(wide, whole.terms.shape[1])
         margins = [_margin(whole, first, turns[gap], gap) for gap in gaps]
         ranges = [np.subtract(*_extremes(whole, first, turns[gap], gap)) for gap in gaps]
@@ -269,30 +269,36 @@ def _margin(whole: Pieces, first: np.ndarray, turns: _Turns, gap: int) -> np.nda
 
 
 def _means(
-    map_: Stroboscope, whole: Pieces, first: np.ndarray, output: int, result: Measures
+    map_: Stroboscope, whole: Pieces, first: np.ndarray, outputs: int, result: Measures
 ) -> None:
-    """Mean, root mean square about it and first harmonic of an output, over the whole of each
+    """Mean, root mean square about it and first harmonic of the outputs, over the whole of each
     motion.
     """
     motion, count = whole.motion, np.diff(np.append(first, len(whole.motion)))
+    known, forced = motion[first], map_.system.forced_at is not None
     places, weights = polynomials.gauss(PLACES)
-    total = np.add.reduceat(whole.length, first)
-    values = places[:, None] ** np.arange(len(whole.terms)) @ whole.terms[:, output]
-    share = weights[:, None] * (whole.length / np.repeat(total, count))
-    # a small motion about a large mean keeps its digits
-    origin = np.repeat(whole.terms[0, output, first], count)
-    mean = np.add.reduceat((share * (values - origin)).sum(axis=0), first)
-    values -= origin + np.repeat(mean, count)
-    angle = 2.0 * np.pi * (whole.phase + places[:, None] * whole.length) / map_.period[motion]
-    known = motion[first]
-    result.mean[known, output] = whole.terms[0, output, first] + mean
-    result.deviation[known, output] = np.sqrt(
-        np.add.reduceat((share * values**2).sum(axis=0), first)
+    powers = places[:, None] ** np.arange(len(whole.terms))
+    share = weights[:, None] * (
+        whole.length / np.repeat(np.add.reduceat(whole.length, first), count)
     )
-    if map_.system.forced_at is not None:
-        result.harmonic[known, output] = 2.0 * np.add.reduceat(
-            (share * values * np.exp(-1j * angle)).sum(axis=0), first
-        )
+    if forced:
+        angle = 2.0 * np.pi * (whole.phase + places[:, None] * whole.length) / map_.period[motion]
+        in_phase, behind = share * np.cos(angle), share * np.sin(angle)
+
+    def sums(part: np.ndarray) -> np.ndarray:
+        return np.add.reduceat(part.sum(axis=0), first)
+
+    for output in range(outputs):
+        values = powers @ whole.terms[:, output]
+        # a small motion about a large mean keeps its digits
+        origin = np.repeat(whole.terms[0, output, first], count)
+        mean = sums(share * (values - origin))
+        values -= origin + np.repeat(mean, count)
+        result.mean[known, output] = whole.terms[0, output, first] + mean
+        result.deviation[known, output] = np.sqrt(sums(share * values**2))
+        if forced:
+            sine = sums(behind * values)
+            result.harmonic[known, output] = 2.0 * (sums(in_phase * values) - 1j * sine)
 
 
 def _itineraries(names: list[str], outcome: Outcome) -> list[str]:
