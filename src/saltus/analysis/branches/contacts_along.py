@@ -75,8 +75,10 @@ class Jumps:
         for entries, alike in self._places:
             named = dict(zip(self._system.states, states[:, alike].T, strict=True))
             values = evaluate(entries, t=time[:, alike].T, states=named, values=self._system.values)
-            for column, value in zip(columns, values, strict=True):
-                column[:, alike] = np.transpose(value)
+            mine = np.empty((len(columns), len(alike), r))
+            for row, value in zip(mine, values, strict=True):
+                row[:] = value
+            columns[:, :, alike] = mine.swapaxes(1, 2)
         last = np.moveaxis(columns, 0, -1)
         gap, normal, by_time, rate, after, by_state, after_by_time = np.split(
             last, np.cumsum([1, width, 1, size, size, size * width]), axis=2

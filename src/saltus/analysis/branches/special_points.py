@@ -112,7 +112,6 @@ def locate(
     rows: np.ndarray,
     z: np.ndarray,
     tangent: np.ndarray,
-    length: np.ndarray,
     kind: np.ndarray,
 ) -> list[SpecialPoint | None]:
     """The zeros of tests between points and the next ones.
@@ -123,22 +122,28 @@ def locate(
         The equations.
     rows : int64[e]
         Which of its curves.
-    z, tangent : float64[e, m + 1]
-        The points before.
-    length : float64[e]
-        Distance of the next point along the tangent, in units of the scale.
+    z, tangent : float64[e, 2, m + 1]
+        The points before and behind.
     kind : int64[e]
         Which test.
     """
     if not len(rows):
         return []
-    column = z.shape[1] - 1
+    column, scale = z.shape[2] - 1, orbits.scale[rows]
+    step = (z[:, 1] - z[:, 0]) / scale
+    z, (tangent, beyond) = z[:, 0], tangent.swapaxes(0, 1)
     orbits, rows = orbits.near(z, rows), np.arange(len(rows))
+    length = np.einsum("ei,ei->e", step, tangent)
+    aside = step - length[:, None] * tangent  # of the next point, and how the curve leaves there
+    slope = beyond / np.einsum("ei,ei->e", beyond, tangent)[:, None] - tangent
+    slope *= length[:, None]
     known: dict[int, SpecialPoint] = {}
 
     def at(flat: np.ndarray, which: np.ndarray) -> np.ndarray:
         mine = rows[which]
-        guess = z[which] + flat[:, None] * tangent[which] * orbits.scale[mine]
+        share = (flat / length[which])[:, None]
+        bend = share**2 * ((3.0 - 2.0 * share) * aside[which] + (share - 1.0) * slope[which])
+        guess = z[which] + (flat[:, None] * tangent[which] + bend) * scale[which]
         point = correct(orbits, guess, tangent[which], mine)
         derivative = np.where(point.found[:, None, None], point.derivative, 0.0)
         direction = tangents(derivative, tangent[which])

@@ -366,12 +366,8 @@ def _dips(branch: Branch) -> tuple[list[int], np.ndarray]:
 def _located(branch: Branch) -> list[SpecialPoint]:
     values = _tests(branch)
     kinds, after = np.nonzero(values[:, 1:] * values[:, :-1] < 0)
-    step = branch.z[after + 1] - branch.z[after]
-    length = np.einsum("ki,ki->k", step / branch.scale, branch.tangent[after])
-    found = locate(
-        branch.orbits, np.full(len(after), branch.row), branch.z[after], branch.tangent[after],
-        length, kinds,
-    )  # fmt: skip
+    ends, rows = np.stack([after, after + 1], axis=1), np.full(len(after), branch.row)
+    found = locate(branch.orbits, rows, branch.z[ends], branch.tangent[ends], kinds)
     events = [
         replace(point, after=int(place))
         for place, point in zip(after, found, strict=True)
