@@ -21,9 +21,7 @@ another tolerance (the floor), and with each other where neither changes its min
 
 from __future__ import annotations
 
-import contextlib
 import itertools
-import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -107,17 +105,6 @@ class Subset:
 
 
 # -- clock -----------------------------------------------------------------------------------------
-@contextlib.contextmanager
-def one_core() -> Iterator[None]:
-    """Everything within on one pinned core."""
-    before = os.sched_getaffinity(0)
-    rig.pin()
-    try:
-        yield
-    finally:
-        os.sched_setaffinity(0, before)
-
-
 def timed(job: Callable[[], object], repeats: int = 1) -> tuple[Seconds, object]:
     """Smallest times of a job over some repeats, and what it returned."""
     taken = []
@@ -346,7 +333,7 @@ def beside(
     """Print the rivals' rows, the floors, and what is wrong where labels differ; returns those
     rows, and the other tables to be kept.
     """
-    with one_core():
+    with rig.one_core():
         taylor = rows(heyoka, subset, ds, unit, left_out)
         rivals = taylor + rows(pynamicalsys, subset.first(few), ds, unit, left_out)
         _, again = ours(len(ds.x), 1, method=sl.Taylor(tolerance=OTHER_TOLERANCE))
@@ -393,7 +380,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     chosen = parser.parse_args(argv)
     ours(6, 1)  # compiles
     heading(chosen.cells)
-    with one_core():
+    with rig.one_core():
         unit, ds = ours(chosen.cells, 1, repeats=chosen.repeats)
     print(line("saltus, 1 thread", unit, unit, "", "all cells"), flush=True)
     seconds, _ = ours(chosen.cells, 2, repeats=chosen.repeats)

@@ -4,10 +4,11 @@ contacts located.
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,6 +56,17 @@ def starts(count: int, seed: int = 15) -> tuple[np.ndarray, np.ndarray]:
 def pin(core: int | None = None) -> None:
     """Keep this process on one core: the last one it may use, unless told otherwise."""
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0)) if core is None else core})
+
+
+@contextlib.contextmanager
+def one_core() -> Iterator[None]:
+    """Everything within on one pinned core."""
+    before = os.sched_getaffinity(0)
+    pin()
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, before)
 
 
 def cpu_seconds(job: Callable[[], object], repeats: int = 3) -> float:
