@@ -237,6 +237,19 @@ def _values(system: System, name: str, value: Any) -> Any:
     return along(name, value, lambda one: single(system, name, one), "values", example)
 
 
+def at_values(system: System, values: Mapping[str, Any] | None) -> System:
+    """A system at other values of its parameters, one each. Raises ParameterError or UnitError
+    where one isn't a value.
+    """
+    if values is None:
+        return system
+    if not isinstance(values, Mapping):
+        raise ParameterError('values must be a mapping, such as values={"force": "4 N"}.')
+    for name, value in values.items():
+        single(system, name, value)
+    return system.with_values(**values)
+
+
 def single(system: System, name: str, value: Any) -> float:
     """The value of a parameter [SI] at an end of a range, or in a list of them. Raises
     ParameterError for many in place of one.

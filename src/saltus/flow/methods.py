@@ -41,3 +41,16 @@ def check_method(method: Any) -> Method:
             f"method must be such as sl.Taylor() or sl.ODE45(rtol=1e-4, atol=1e-7), not {what}."
         )
     return method
+
+
+def exact_method(method: Any, asked: str) -> Method:
+    """The same for what closes orbits by Newton's method, ``asked``: a ParameterError for methods
+    whose errors are more than rounding.
+    """
+    method = check_method(method)
+    if not method.exact:
+        raise ParameterError(
+            f"{asked} needs a method whose errors are rounding, not {method.name}: Newton's method "
+            "doesn't close its orbits. Leave method= out."
+        )
+    return method

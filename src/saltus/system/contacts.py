@@ -354,24 +354,34 @@ def _settled(held: Held, states: Sequence[str]) -> Field:
 
 
 # -- impacts ---------------------------------------------------------------------------------------
+def _shares(
+    met: _Met, velocity: Expr, moved: Sequence[str], states: Sequence[str], said: tuple[str, str]
+) -> list[Expr]:
+    """What an impulse of one along a velocity changes each state by: the slope over the mass, zero
+    of states that it doesn't move. Raises TraceError where the velocity isn't linear in them.
+    """
+    normal = gradient(velocity, states)
+    for name in moved:
+        slope = set(ex.walk(normal[states.index(name)]))
+        if any(ex.state(other) in slope for other in moved):
+            raise TraceError(
+                f"{met.law!r}: {said[0]} isn't linear in {name}. The {said[1]} is a sum of "
+                f"velocities times functions of positions and time."
+            )
+    return [
+        ex.div(slope, met.parts[weight(name)]) if name in moved else _ZERO
+        for name, slope in zip(states, normal, strict=True)
+    ]
+
+
 def _impact(met: _Met, field: Field, guards: Sequence[Guard], states: Sequence[str]) -> Law:
     """Newton's law of impact."""
     assert isinstance(met.law, Impact)
     w, restitution = met.parts["velocity"], met.parts["restitution"]
     guard = guards[met.number]
     _check_velocity(met, guard, field, states)
-    normal = gradient(w, states)
-    for name in met.law.moved:
-        slope = normal[states.index(name)]
-        if any(ex.state(other) in set(ex.walk(slope)) for other in met.law.moved):
-            raise TraceError(
-                f"{met.law!r}: the velocity {w!r} isn't linear in {name}. The closing velocity is "
-                f"a sum of velocities times functions of positions and time."
-            )
-    impulse = [
-        ex.div(normal[i], met.parts[weight(name)]) if name in met.law.moved else _ZERO
-        for i, name in enumerate(states)
-    ]
+    said = f"the velocity {w!r}", "closing velocity"
+    impulse = _shares(met, w, met.law.moved, states, said)
     side = 1 if met.positive else -1
     return Law(
         "impact",
@@ -382,7 +392,7 @@ def _impact(met: _Met, field: Field, guards: Sequence[Guard], states: Sequence[s
         direction=tuple(ex.neg(one) for one in impulse),
         restitution=restitution,
         friction=met.parts.get(FRICTION),
-        mass=ratio(_ONE, dot(normal, impulse)),
+        mass=ratio(_ONE, dot(gradient(w, states), impulse)),
     )
 
 
@@ -464,18 +474,8 @@ def _rubbing(met: _Met, states: Sequence[str]) -> _Rubbing | None:
             f"{met.law!r}: slip_velocity = {slip!r} is decided by the time alone. Give the "
             f"velocity at which the contact slides."
         )
-    normal = gradient(slip, states)
-    for name in met.law.rubbed:
-        slope = normal[states.index(name)]
-        if any(ex.state(other) in set(ex.walk(slope)) for other in met.law.rubbed):
-            raise TraceError(
-                f"{met.law!r}: slip_velocity = {slip!r} isn't linear in {name}. The velocity of "
-                f"sliding is a sum of velocities times functions of positions and time."
-            )
-    direction = tuple(
-        ex.div(normal[i], met.parts[weight(name)]) if name in met.law.rubbed else _ZERO
-        for i, name in enumerate(states)
-    )
+    said = f"slip_velocity = {slip!r}", "velocity of sliding"
+    direction = tuple(_shares(met, slip, met.law.rubbed, states, said))
     along = 1 if bit is found else -1
     return _Rubbing(met.number, bit.guard, met.parts[FRICTION], sign, direction, along)
 

@@ -21,11 +21,11 @@ from saltus.analysis.branches.free_vibration import (
 from saltus.analysis.branches.special_points import zeros
 from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.outputs import outputs_of
-from saltus.analysis.starts import check_system, single
+from saltus.analysis.starts import at_values, check_system
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, UnitError, among, nearest, shown
 from saltus.flow.counts import whole
-from saltus.flow.methods import Method, check_method
+from saltus.flow.methods import Method, exact_method
 from saltus.flow.progress import reporting
 from saltus.results import build
 from saltus.results.dataset import schema
@@ -129,15 +129,7 @@ def backbone(
     '11.420668320 Hz'
     """
     check_system(system)
-    method = check_method(method)
-    if not method.exact:
-        raise ParameterError(
-            f"sl.backbone needs a method whose errors are rounding, not {method.name}. Leave "
-            "method= out."
-        )
-    for name, value in (values or {}).items():
-        single(system, name, value)
-    system = system.with_values(**(values or {}))
+    method, system = exact_method(method, "sl.backbone"), at_values(system, values)
     state = system.states[0] if state is None else state
     if not among(state, system.states):
         raise ParameterError(

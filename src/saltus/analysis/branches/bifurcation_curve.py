@@ -23,7 +23,7 @@ from saltus.analysis.starts import check_system, range_of
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, nearest, shown
 from saltus.flow.counts import whole
-from saltus.flow.methods import Method, check_method
+from saltus.flow.methods import Method, exact_method
 from saltus.flow.progress import reporting
 from saltus.results import build
 from saltus.results.dataset import schema
@@ -112,12 +112,7 @@ def bifurcation_curve(
     ('fold', 'range')
     """
     check_system(system)
-    method = check_method(method)
-    if not method.exact:
-        raise ParameterError(
-            f"sl.bifurcation_curve needs a method whose errors are rounding, not {method.name}. "
-            "Leave method= out."
-        )
+    method = exact_method(method, "sl.bifurcation_curve")
     names, limits = _ranges(system, vary)
     points = whole(points, "points", 2)
     start = _start(system, event)

@@ -21,11 +21,11 @@ from saltus.analysis.outputs import outputs_of
 from saltus.analysis.responses.continued import LONGEST_DOUBLED, POINTS, SWITCHES, seeds_of_grid
 from saltus.analysis.responses.grid import Grid, grid_of
 from saltus.analysis.responses.responses import find
-from saltus.analysis.starts import check_system, range_of, single
+from saltus.analysis.starts import at_values, check_system, range_of
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, among, nearest, shown
 from saltus.flow.counts import whole
-from saltus.flow.methods import Method, check_method
+from saltus.flow.methods import Method, exact_method
 from saltus.flow.progress import reporting, stage
 from saltus.interrupt import Interrupted
 from saltus.system.system import System
@@ -156,15 +156,7 @@ def branches(
     ['fold at 17.734087 Hz']
     """
     check_system(system)
-    method = check_method(method)
-    if not method.exact:
-        raise ParameterError(
-            f"sl.branches needs a method whose errors are rounding, not {method.name}: Newton's "
-            "method doesn't close its orbits. Leave method= out."
-        )
-    for name, value in (values or {}).items():
-        single(system, name, value)
-    system = system.with_values(**(values or {}))
+    method, system = exact_method(method, "sl.branches"), at_values(system, values)
     name, limits = _range(system, vary)
     chosen = frozenset(_kinds(switch))
     wanted = outputs_of(system, outputs)

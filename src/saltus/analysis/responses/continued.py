@@ -16,7 +16,7 @@ from saltus.analysis.outputs import Outputs
 from saltus.analysis.responses.grid import Grid
 from saltus.analysis.responses.responses import GridResponses
 from saltus.errors import ParameterError
-from saltus.flow.methods import Method
+from saltus.flow.methods import Method, exact_method
 
 #: Doubled branches are followed to orbits of this number of periods, each way over this number of
 #: points.
@@ -35,11 +35,8 @@ def check_continued(unstable: bool, grid: Grid, method: Method) -> None:
         raise ParameterError(
             "unstable=True follows branches over a range: give two values or more."
         )
-    if unstable and not method.exact:
-        raise ParameterError(
-            f"unstable=True needs a method whose errors are rounding, not {method.name}: Newton's "
-            "method doesn't close its orbits. Leave method= out."
-        )
+    if unstable:
+        exact_method(method, "unstable=True")
 
 
 def seeds_of_grid(found: GridResponses, grid: Grid, method: Method) -> list[Seed]:

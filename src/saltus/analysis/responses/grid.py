@@ -14,7 +14,7 @@ from saltus.analysis.axes import along
 from saltus.analysis.orbits.tolerances import LONGEST
 from saltus.analysis.orbits.turns import ASKED, looks_every
 from saltus.analysis.random_starts import random_starts
-from saltus.analysis.starts import check_system, ensemble, single
+from saltus.analysis.starts import at_values, check_system, ensemble, single
 from saltus.errors import ParameterError, nearest, shown
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
@@ -122,12 +122,7 @@ def grid_of(
         If a name is unknown, a range is empty, or the grid too large.
     """
     check_system(system)
-    if values is not None:
-        if not isinstance(values, Mapping):
-            raise ParameterError('values must be a mapping, such as values={"force": "4 N"}.')
-        for name, value in values.items():
-            single(system, name, value)
-        system = system.with_values(**values)
+    system = at_values(system, values)
     points = {name: axis(system, name, given) for name, given in axes.items()}
     if len(points) not in (1, 2):
         raise ParameterError(f"one or two parameters may vary, not {len(points)}.")
