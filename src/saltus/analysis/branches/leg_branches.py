@@ -66,7 +66,7 @@ class LegBranch(Branch):
             back = number < self.backwards
             if back and piece.end is not None:
                 events.append(self._between(first - 1, piece, piece.outcome))
-            z.append(branch.orbits.orbit(branch.z[again:]))
+            z.append(_by_points(branch.orbits, branch.z[again:]))
             multipliers.append(branch.multipliers[again:])
             steps = np.append(0.0, np.diff(branch.length))[again:]
             lengths += list(lengths[-1] + np.cumsum(steps))
@@ -80,16 +80,20 @@ class LegBranch(Branch):
         self._complete()
 
     def _own(self, branch: PieceBranch, event: SpecialPoint, first: int) -> SpecialPoint:
-        return replace(event, after=first + event.after, z=branch.orbits.orbit(event.z[None])[0])
+        return replace(
+            event, after=first + event.after, z=_by_points(branch.orbits, event.z[None])[0]
+        )
 
     def _between(self, after: int, piece: Piece, outcome: str) -> SpecialPoint:
         """The event behind a piece."""
         assert piece.end is not None
         event = piece.end.event
-        none = np.zeros(0)
+        none, legs = np.zeros(0), event.legs
+        orbit = _by_points(legs, event.z[None])[0]
+        phase = (event.phase - float(legs.begin(event.z[None])[0])) % legs.n
         return SpecialPoint(
-            event.kind, max(after, 0), event.orbit, none, event.multipliers, none,
-            event.guards, event.phase, outcome, sqrt_coefficient(event),
+            event.kind, max(after, 0), orbit, none, event.multipliers, none,
+            event.guards, phase, outcome, sqrt_coefficient(event),
         )  # fmt: skip
 
     def _complete(self) -> None:
@@ -103,6 +107,13 @@ class LegBranch(Branch):
             matrix = self.orbits.evaluate(event.z[None], rows[:1])[1]
             way = tangents(np.where(np.isfinite(matrix), matrix, 0.0), self.tangent[[event.after]])
             self.events[i] = replace(event, derivative=matrix[0], tangent=way[0])
+
+
+def _by_points(legs: Legs, z: np.ndarray) -> np.ndarray:
+    """Orbits float64[r, z] by their points, limit cycles from one that is well away from contacts:
+    next to one, rounding would say whether it is met.
+    """
+    return legs.orbit(z, legs.begin(z))
 
 
 def leg_branch(plan: Plan, start: Start) -> Branch | None:

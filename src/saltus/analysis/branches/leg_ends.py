@@ -10,7 +10,6 @@ from saltus.analysis.branches.arclength import correct, tangents
 from saltus.analysis.branches.contact_sequences import (
     Contact,
     ContactSequence,
-    sequences,
     shift,
     without,
 )
@@ -184,10 +183,11 @@ def _leg_vanishes(legs: Legs, z: np.ndarray, place: int, tangent: np.ndarray) ->
 # -- contacts that appear --------------------------------------------------------------------------
 def _first_extra(legs: Legs, z: np.ndarray) -> tuple[Contact, float] | None:
     """The first contact that the free flow meets beside those of a virtual orbit, and when."""
-    free = sequences(legs.orbits, legs.orbit(z[None]))[0]
+    free, begin = legs.free_flow(z[None])[0], legs.begin(z[None])[0]
     if free is None:
         return None
-    phase = np.sort(legs.nodes(z[None])[0][0] % legs.n) if legs.contacts else np.zeros(0)
+    own = legs.nodes(z[None])[0][0] if legs.contacts else np.zeros(0)
+    phase = np.sort((own - begin) % legs.n) + begin
     for i, contact in enumerate(free.contacts):
         if i == len(phase) or free.phase[i] < phase[i] - SAME_TIME:
             return contact, float(free.phase[i])
@@ -217,15 +217,15 @@ def _by_free_flow(event: ContactEvent, z: np.ndarray, tangent: np.ndarray) -> En
     legs = event.legs
     for beyond in BEYOND:
         virtual = z + beyond * tangent * legs.scale[0]
-        orbit = legs.orbit(virtual[None])
-        free = sequences(legs.orbits, orbit)[0]
+        free, begin = legs.free_flow(virtual[None])[0], legs.begin(virtual[None])
+        orbit = legs.orbit(virtual[None], begin)
         if free is None or shift(legs.sequence_at(virtual), free, legs.n) is not None:
             continue
         onto, near = Legs.of(legs.orbits, free, orbit[0], legs.free_scale)
         along = onto.tangent(near)
         step = 1e-6 * along * onto.scale[0]
-        ahead = (onto.orbit((near + step)[None]) - onto.orbit(near[None]))[0]
-        old = legs.orbit((virtual + 1e-6 * tangent * legs.scale[0])[None])[0] - orbit[0]
+        ahead = (onto.orbit((near + step)[None], begin) - onto.orbit(near[None], begin))[0]
+        old = legs.orbit((virtual + 1e-6 * tangent * legs.scale[0])[None], begin)[0] - orbit[0]
         sign = 1.0 if (ahead / legs.free_scale) @ (old / legs.free_scale) > 0 else -1.0
         onto.accepted(near[None], _ROW)
         point = correct(onto, near[None], sign * along[None], _ROW, 10 * beyond)

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -55,6 +56,7 @@ class Legs:
         self.contacts = sequence.contacts
         self.count = max(len(self.contacts), 1)
         self._modes = [one.after for one in self.contacts] or [sequence.mode]
+        self._longest = int(np.argmax(self.spans(sequence.phase[None]))) if self.contacts else 0
         self._jumps = Jumps(orbits.parametric.system, self.contacts, self.size, sequence.mode)
         self.unit = float(orbits.map.period[0])  # of the time, in those of the parametric system
         self._maps = {
@@ -397,10 +399,22 @@ class Legs:
         closing = np.einsum("rmi,rmi->rm", at.normal[..., : self.size], at.rate) + at.gap_by_time
         return np.asarray(closing * way)
 
-    def orbit(self, z: np.ndarray) -> np.ndarray:
-        """Orbits float64[r, z] by their points at whole periods: unknowns of the free sequence."""
+    def begin(self, z: np.ndarray) -> np.ndarray:
+        """When limit cycles float64[r, z] are well away from a contact [periods], so that they may
+        begin there, float64[r]; 0 of orbits that the forcing tells where to begin.
+        """
+        if not self.free or not self.contacts:
+            return np.zeros(len(z))
+        phase = self.nodes(z)[0]
+        return np.asarray(phase + 0.5 * self.spans(phase))[:, self._longest]
+
+    def orbit(self, z: np.ndarray, begin: np.ndarray | float = 0.0) -> np.ndarray:
+        """Orbits float64[r, z] by their points at whole periods after times float64[r] [periods]:
+        unknowns of the free sequence.
+        """
         phase, _, rest = self.nodes(z)
-        since = (np.arange(self.n)[:, None] - phase[:, None]) % self.n  # of each point and contact
+        whole = np.arange(self.n) + np.broadcast_to(begin, len(z))[:, None]
+        since = (whole[..., None] - phase[:, None]) % self.n  # of each point and contact
         since[np.minimum(since, self.n - since) < AT_ONCE] = 0.0
         last = since.argmin(axis=2)
         rows = np.arange(len(z))[:, None]
@@ -420,13 +434,23 @@ class Legs:
         if not len(which):
             return result
         phase = self.nodes(z)[0]
-        for i, free in zip(which, sequences(self.orbits, self.orbit(z[which])), strict=True):
+        for i, free in zip(which, self.free_flow(z[which]), strict=True):
             own = ContactSequence(
                 self.contacts, phase[i], self.sequence.after, self.sequence.velocity,
                 self.sequence.mode,
             )  # fmt: skip
             result[i] = free is not None and shift(own, free, self.n) is not None
         return result
+
+    def free_flow(self, z: np.ndarray) -> list[ContactSequence | None]:
+        """The sequences of the free flow that begins on the orbits float64[r, z], in their time."""
+        begin = self.begin(z)
+        return [
+            None if found is None else replace(found, phase=found.phase + since)
+            for found, since in zip(
+                sequences(self.orbits, self.orbit(z, begin)), begin, strict=True
+            )
+        ]
 
 
 def product(segments: np.ndarray) -> np.ndarray:

@@ -152,12 +152,24 @@ def test_the_hopf_point_and_the_graze_of_a_relief_valve():
     """Values of an independent solution: Newton's method on defining systems in mpmath."""
     valve = sl.models.relief_valve()
     found = sl.branches(
-        valve, {"flow": (7.0, 10.0)}, sl.equilibria(valve.with_values(flow=9.0)), progress=False
-    )
-    assert [one[0] for one in events(found)] == ["hopf", "graze"]
+        valve, {"flow": (5.0, 10.0)}, sl.equilibria(valve.with_values(flow=9.0)),
+        switch=("hopf",), progress=False,
+    )  # fmt: skip
+    assert [one[0] for one in events(found)] == ["hopf", "graze", "period_doubling"]
     assert found.event_flow.values[0] == pytest.approx(8.4911176351833271, rel=1e-14)
     assert found.event_eigenvalue_imag.values[0, 0] == pytest.approx(3.0907088479743406, rel=1e-13)
     assert found.event_flow.values[1] == pytest.approx(7.557210972, abs=6e-10)
+    # behind the graze the cycle hits its seat and is unstable, multiplier -3e4 and less; at last it
+    # is the one that a motion settles on
+    assert found.point_multiplier_real.min() < -1e4
+    last = found.isel(point=np.flatnonzero(found.point_branch == 1)).sortby("point_flow")
+    last = last.isel(point=0)
+    assert float(last.point_flow) == 5.0
+    assert last.point_itinerary.item() == "x = 0-"
+    settled = sl.attractors(valve.with_values(flow=5.0), (1.0, 0.0, 6.0), every=1.0, progress=False)
+    assert settled.attractor_cycle.item() == pytest.approx(float(last.point_period), rel=1e-9)
+    settled_multiplier = settled.attractor_multiplier_real.values[0].min()
+    assert settled_multiplier == pytest.approx(last.point_multiplier_real.min().item(), abs=1e-7)
 
 
 def test_the_cycles_of_a_linear_centre_are_one_family():
