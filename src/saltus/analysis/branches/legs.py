@@ -56,7 +56,7 @@ class Legs:
         self.contacts = sequence.contacts
         self.count = max(len(self.contacts), 1)
         self._modes = [one.after for one in self.contacts] or [sequence.mode]
-        self._longest = int(np.argmax(self.spans(sequence.phase[None]))) if self.contacts else 0
+        self._beside = _widest_gap(sequence.phase)
         self._jumps = Jumps(orbits.parametric.system, self.contacts, self.size, sequence.mode)
         self.unit = float(orbits.map.period[0])  # of the time, in those of the parametric system
         self._maps = {
@@ -400,13 +400,14 @@ class Legs:
         return np.asarray(closing * way)
 
     def begin(self, z: np.ndarray) -> np.ndarray:
-        """When limit cycles float64[r, z] are well away from a contact [periods], so that they may
-        begin there, float64[r]; 0 of orbits that the forcing tells where to begin.
+        """When limit cycles float64[r, z], and all of their parts, may begin well away from a
+        contact [periods], float64[r]; 0 of orbits that the forcing tells where to begin.
         """
         if not self.free or not self.contacts:
             return np.zeros(len(z))
-        phase = self.nodes(z)[0]
-        return np.asarray(phase + 0.5 * self.spans(phase))[:, self._longest]
+        one, other = self.nodes(z)[0][:, self._beside].T
+        gap = (other - one) % 1.0
+        return np.asarray(one + 0.5 * np.where(gap == 0.0, 1.0, gap))
 
     def orbit(self, z: np.ndarray, begin: np.ndarray | float = 0.0) -> np.ndarray:
         """Orbits float64[r, z] by their points at whole periods after times float64[r] [periods]:
@@ -451,6 +452,16 @@ class Legs:
                 sequences(self.orbits, self.orbit(z, begin)), begin, strict=True
             )
         ]
+
+
+def _widest_gap(phase: np.ndarray) -> list[int]:
+    """The contacts between which there is none for longest, whatever period they are in."""
+    if not len(phase):
+        return [0, 0]
+    order = np.argsort(phase % 1.0)
+    gaps = np.diff(phase[order] % 1.0, append=phase[order[0]] % 1.0 + 1.0)
+    widest = int(gaps.argmax())
+    return [int(order[widest]), int(order[(widest + 1) % len(order)])]
 
 
 def product(segments: np.ndarray) -> np.ndarray:

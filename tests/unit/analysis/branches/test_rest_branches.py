@@ -152,10 +152,12 @@ def test_the_hopf_point_and_the_graze_of_a_relief_valve():
     """Values of an independent solution: Newton's method on defining systems in mpmath."""
     valve = sl.models.relief_valve()
     found = sl.branches(
-        valve, {"flow": (5.0, 10.0)}, sl.equilibria(valve.with_values(flow=9.0)),
-        switch=("hopf",), progress=False,
-    )  # fmt: skip
-    assert [one[0] for one in events(found)] == ["hopf", "graze", "period_doubling"]
+        valve, {"flow": (5.0, 10.0)}, sl.equilibria(valve.with_values(flow=9.0)), progress=False
+    )
+    assert [one[0] for one in events(found)] == [
+        "hopf", "graze", "period_doubling",
+        "graze", "period_doubling", "graze",  # of the cycle of twice the period
+    ]  # fmt: skip
     assert found.event_flow.values[0] == pytest.approx(8.4911176351833271, rel=1e-14)
     assert found.event_eigenvalue_imag.values[0, 0] == pytest.approx(3.0907088479743406, rel=1e-13)
     assert found.event_flow.values[1] == pytest.approx(7.557210972, abs=6e-10)
@@ -170,6 +172,10 @@ def test_the_hopf_point_and_the_graze_of_a_relief_valve():
     assert settled.attractor_cycle.item() == pytest.approx(float(last.point_period), rel=1e-9)
     settled_multiplier = settled.attractor_multiplier_real.values[0].min()
     assert settled_multiplier == pytest.approx(last.point_multiplier_real.min().item(), abs=1e-7)
+    # the cycle of two turns and one impact is born at the same graze
+    assert found.event_flow.values[5] == pytest.approx(found.event_flow.values[1], rel=1e-12)
+    twice = found.isel(point=np.flatnonzero(found.point_branch == 2))
+    assert "x = 0-" in twice.point_itinerary.values
 
 
 def test_the_cycles_of_a_linear_centre_are_one_family():
