@@ -24,6 +24,9 @@ CLOSED, STALLED = 1e-14, 1e-9
 TURN = 0.97
 #: The second step of the corrector, in first ones: more halves the step. It may lead elsewhere.
 CONTRACTS = 0.5
+#: Longest step over which the derivative and the tangent together change the sign of their
+#: determinant, in units of the scale: it passes a branch point, or leads to the branch beside.
+PASSING = 1e-3
 #: Steps are doubled where so few evaluations sufficed and the tangent turned by less.
 EASY, STRAIGHT = 3, 0.995
 #: First, longest and shortest step, in units of the scale.
@@ -243,6 +246,7 @@ class _Fronts:
     def begin(self, here: Corrected, tangent: np.ndarray) -> None:
         """The first points."""
         self.z, self.tangent = here.z.copy(), tangent
+        self.side = _orientation(here.derivative, tangent)
         self.before = np.full((2, *tangent.shape), np.nan)  # the points before these, and tangents
         for i, curve in enumerate(self.curves):
             if here.found[i]:
@@ -268,8 +272,10 @@ class _Fronts:
         chord = step / np.maximum(moved, np.finfo(float).tiny)[:, None]
         sides = ((tangent, self.tangent[going]), (chord, tangent), (chord, self.tangent[going]))
         turn = np.min([np.einsum("ki,ki->k", *both) for both in sides], axis=0)
-        short = length < 100 * SHORTEST
-        counts = trial.found & ((turn > TURN) & (trial.contraction < CONTRACTS) | short)
+        side = _orientation(trial.derivative, tangent)
+        stays = (side * self.side[going] >= 0) | (length < PASSING)
+        smooth = (turn > TURN) & (trial.contraction < CONTRACTS) & stays
+        counts = trial.found & (smooth | (length < 100 * SHORTEST))
         easy = counts & (trial.evaluations <= EASY) & (turn > STRAIGHT)
         for j in np.flatnonzero(counts):
             curve = self.curves[going[j]]
@@ -278,6 +284,7 @@ class _Fronts:
         taken = going[counts]
         self.before[:, taken] = self.z[taken], self.tangent[taken]
         self.z[taken], self.tangent[taken] = trial.z[counts], tangent[counts]
+        self.side[taken] = side[counts]
         self.equations.accepted(self.z[taken], taken)
         factor = np.where(counts, np.where(easy, 2.0, 1.0), 0.5)
         self.length[going] = np.minimum(factor * length, LONGEST)
@@ -293,6 +300,7 @@ class _Fronts:
         for kept in (curve.z, curve.tangent, curve.derivative, curve.length):
             kept.pop()
         self.z[i], self.tangent[i], self.length[i] = curve.z[-1], curve.tangent[-1], length
+        self.side[i] = _orientation(curve.derivative[-1][None], curve.tangent[-1][None])[0]
         self.before[:, i] = (curve.z[-2], curve.tangent[-2]) if len(curve.z) > 1 else np.nan
         self.equations.accepted(self.z[[i]], np.array([i]))
         curve.end = why if length < ENDING else ""
@@ -340,6 +348,14 @@ class _Fronts:
             apart = (curve.z[0] - curve.z[-1]) / self.equations.scale[i]
             _add(curve, curve.z[0], curve.tangent[0], curve.derivative[0], _size(apart))
             curve.end = "closed"
+
+
+def _orientation(derivative: np.ndarray, tangent: np.ndarray) -> np.ndarray:
+    """Sign of the determinant of the derivative with the tangent below, float64[k]: along a curve
+    it changes at branch points only. 0 where there is none.
+    """
+    whole = np.concatenate([_finite(derivative), tangent[:, None]], axis=1)
+    return np.asarray(np.linalg.slogdet(whole)[0])
 
 
 def _size(vector: np.ndarray) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from saltus.analysis.branches.arclength import correct, follow
+from saltus.analysis.branches.arclength import Curve, _Fronts, correct, follow
 
 
 class Ellipses:
@@ -70,3 +70,48 @@ def test_the_corrector_stays_in_its_plane():
     assert point.found.all()
     assert point.z[0, 1] == 0.1
     assert point.z[0, 0] == pytest.approx(np.sqrt(0.99), abs=1e-14)
+
+
+def test_a_step_follows_the_cubic_through_the_last_two_points():
+    """What it misses falls by 2^4 where the step is halved."""
+    missed = []
+    for length in (0.1, 0.05):
+        fronts = _Fronts(Ellipses([1.0]), {}, [Curve()], length)
+        c, s = np.cos(length), np.sin(length)
+        fronts.z, fronts.tangent = np.array([[1.0, 0.0]]), np.array([[0.0, 1.0]])
+        fronts.before = np.array([[[c, -s]], [[s, c]]])
+        guess = fronts._predicted(np.array([0]))[0][0]
+        missed.append(abs(np.hypot(*guess) - 1.0))
+    assert missed[0] < 1e-4
+    assert missed[0] / missed[1] == pytest.approx(16, rel=0.1)
+
+
+class Imperfect(Ellipses):
+    """y (x - y**2) = e: two curves, which all but cross at the origin."""
+
+    def __init__(self, e):
+        self.e, self.scale = e, np.ones((1, 2))
+
+    def evaluate(self, z, rows):
+        y, x = z.T
+        value = y * (x - y**2) - self.e
+        return value[:, None], np.stack([x - 3 * y**2, y], axis=1)[:, None]
+
+
+@pytest.mark.parametrize("e", [1e-3, 1e-4, 1e-5, -1e-4])
+@pytest.mark.parametrize("x", [1.0, 0.83, 0.71])
+def test_a_branch_stays_on_its_side_of_a_broken_pitchfork(e, x):
+    """From large y, where x = y**2, towards the origin: for e > 0 back by the axis y = 0."""
+    y = np.roots([1, 0, -x, e])
+    start = np.array([[y.real.max(), x]])
+    (curve,) = follow(Imperfect(e), start, np.array([[0.0, -1.0]]), {1: (-1.0, 1.0)}, 4000)
+    y, x = np.array(curve.z).T
+    np.testing.assert_allclose(y * (x - y**2), e, atol=1e-12)
+    assert curve.end == "range"
+    if e > 0:
+        assert (y > 0).all()  # it turns back at a fold
+        assert x[-1] == 1.0
+        assert y[-1] < 0.01
+    else:
+        assert x[-1] == -1.0
+        assert 0 < y[-1] < 0.01

@@ -60,7 +60,7 @@ def test_a_pitchfork():
     off = found.point_branch.values != line
     # at the branch point itself the equation is singular: there the field is zero to rounding
     np.testing.assert_allclose(x * (load - x**2), 0.0, atol=1e-13)
-    far = off & (np.abs(x) > 1e-3)
+    far = off & (np.abs(x) > 0.02)  # nearer, the rounding of the field over x is more
     assert far.any()
     np.testing.assert_allclose(x[far] ** 2, load[far], atol=1e-12)
     np.testing.assert_allclose(x[~off], 0.0, atol=1e-12)
