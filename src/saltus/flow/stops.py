@@ -13,7 +13,12 @@ ROUNDINGS = 64.0
 
 
 def on_allowed_sides(
-    system: System, start: np.ndarray, parameters: np.ndarray, origin: float, period: np.ndarray
+    system: System,
+    start: np.ndarray,
+    parameters: np.ndarray,
+    origin: float,
+    period: np.ndarray,
+    roundings: float = ROUNDINGS,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The starts, those that rounding has put beyond a stop back on the side that it allows; and
     which starts lie where an impact allows no motion.
@@ -33,6 +38,8 @@ def on_allowed_sides(
         Time of the starts [s].
     period : float64[n]
         Forcing period, or the span of a run without forcing [s].
+    roundings : float
+        How many roundings beyond a stop a start may lie.
 
     Returns
     -------
@@ -63,7 +70,7 @@ def on_allowed_sides(
         normal = columns(system.guard_gradients[g]) * side
         way = np.abs(columns(system.field)) * period[:, None]
         size = (np.abs(normal) * (np.abs(start) + way)).sum(axis=1)
-        here = (inside < 0.0) & (inside >= -ROUNDINGS * EPS * size)
+        here = (inside < 0.0) & (inside >= -roundings * EPS * size)
         back = (EPS * size - inside) / (normal**2).sum(axis=1)
         start[here] += (back[:, None] * normal)[here]
         beyond |= (inside < 0.0) & ~here

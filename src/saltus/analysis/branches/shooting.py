@@ -22,6 +22,7 @@ from saltus.analysis.orbits.newton import leading_first
 from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
+from saltus.flow.stops import on_allowed_sides
 from saltus.system.parametric import parametric
 from saltus.system.system import System
 
@@ -29,6 +30,9 @@ from saltus.system.system import System
 SAMPLES, LOCATED = 400, 3
 #: Radius of a limit cycle that is small, in units of the scale.
 SMALL = 0.3
+#: A guess so many roundings beyond a rigid stop, 2e-7 of the size of the states, lies on it: orbits
+#: that rest on a stop at a whole period are found from guesses on either side.
+GUESSED = 1e9
 
 
 class PeriodicOrbits:
@@ -74,6 +78,9 @@ class PeriodicOrbits:
             threads=threads,
         )  # fmt: skip
         self.phase = np.full((len(scale), 2, self.size), np.nan)  # point and direction
+        self._stops = any(
+            guard.law is not None and guard.law.kind == "impact" for guard in system.guards
+        )
         self._next = (np.arange(n) + 1) % n  # the point that follows each
         self._less_next = -np.eye(n * self.size)[self._columns_of(self._next)]
 
@@ -131,8 +138,13 @@ class PeriodicOrbits:
         """See :class:`saltus.analysis.branches.arclength.Equations`."""
         r, n, size = len(z), self.n, self.size
         own, slopes, order = self.own(z[:, n * size :])
-        points, start = self.points(z), self._with_own(z, own)
-        ends, matrices = self.map.tangent(start.reshape(r * n, -1), 1)
+        points, start = self.points(z), self._with_own(z, own).reshape(r * n, -1)
+        if self._stops:
+            start, _ = on_allowed_sides(
+                self.map.system, start, self.map.parameters, 0.0,
+                np.broadcast_to(self.map.period, r * n), GUESSED,
+            )  # fmt: skip
+        ends, matrices = self.map.tangent(start, 1)
         ends = ends[:, :size].reshape(r, n, size)
         matrices = matrices[:, :size].reshape(r, n, size, -1)
         derivative = np.empty((r, n, size, z.shape[1]))

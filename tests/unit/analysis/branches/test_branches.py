@@ -384,3 +384,16 @@ def test_a_tongue_narrower_than_a_step_of_the_branch_is_found(depth):
     for omega in (first, last):
         ends = (omega - 1e-3, omega + 1e-3)
         assert omega == pytest.approx(brentq(hill_determinant, *ends, args=(depth,)), rel=1e-11)
+
+
+def test_the_ball_that_chatters_and_rests_at_whole_periods_is_one_branch():
+    """It rests on the table there: x = 0 at the table's own velocity, and forgets everything."""
+    found = sl.branches(
+        sl.models.bouncing_ball(), {"amplitude": (0.6, 1.5)}, (2.0, 0.0), at=2, progress=False
+    )
+    assert found.sizes["branch"] == 1
+    assert found.sizes["point"] < 100
+    assert {found.branch_begin.item(), found.branch_end.item()} == {"range"}
+    np.testing.assert_allclose(found.point_x, 0.0, atol=1e-13)
+    np.testing.assert_allclose(found.point_v[:, 0], found.point_amplitude, rtol=1e-13)
+    assert np.abs(found.point_multiplier_real).max() < 1e-6  # a double zero: roots of rounding
