@@ -126,7 +126,9 @@ def prepare_files(plot: bool) -> threading.Thread:
 def _netcdf() -> None:
     import xarray as xr
 
-    xr.Dataset({"one": 1.0}).to_netcdf(engine="h5netcdf")  # it imports dask too, where there is one
+    from saltus.results.files import hdf5
+
+    hdf5.content(xr.Dataset({"one": 1.0}))
 
 
 def _pyplot() -> Any:

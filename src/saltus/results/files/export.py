@@ -8,7 +8,7 @@ import os
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import xarray as xr
 
@@ -84,13 +84,10 @@ def to_netcdf(ds: xr.Dataset, path: Target) -> Path:
     and one of the file, at its end.
     """
     _check(ds, "to_netcdf", list(TABLES))
-    engine: Literal["h5netcdf", "scipy"] = (
-        "h5netcdf" if _has("h5netcdf") and _has("h5py") else "scipy"
-    )
     marked = ds.assign_attrs(file_hash=file_hash(ds))
     try:
         # to memory: the HDF5 library crashes the process when it meets a full disk
-        content = marked.to_netcdf(engine=engine)
+        content = _content(marked)
     except ValueError as error:
         if "safely cast" not in str(error):
             raise
@@ -114,6 +111,15 @@ def _check(ds: xr.Dataset, caller: str, kinds: Sequence[str]) -> None:
             f"{caller}: {place} holds control characters, which a terminal would "
             f"obey. Write plain text."
         )
+
+
+def _content(ds: xr.Dataset) -> bytes | memoryview:
+    """netCDF-4, or netCDF-3 where what writes the former isn't installed."""
+    if not (_has("h5netcdf") and _has("h5py")):
+        return ds.to_netcdf(engine="scipy")
+    from saltus.results.files import hdf5
+
+    return hdf5.content(ds)
 
 
 def _has(package: str) -> bool:

@@ -78,7 +78,7 @@ def _read(path: Path) -> xr.Dataset:
             try_elsewhere(path, engine)
             if digest is not None:
                 known.note(digest)
-        ds = xr.load_dataset(path, engine=engine)
+        ds = _content(path, engine)
         if not kind_of(ds):
             raise ResultFileError(
                 f"{path} is a netCDF file, but not a result of saltus. Read it "
@@ -106,6 +106,14 @@ def _read(path: Path) -> xr.Dataset:
             f"{path} is damaged: {type(error).__name__}: {error}. Restore it "
             f"from a copy or compute it again."
         ) from error
+
+
+def _content(path: Path, engine: str) -> xr.Dataset:
+    if engine == "scipy":
+        return xr.load_dataset(path, engine="scipy")
+    from saltus.results.files import hdf5
+
+    return hdf5.dataset(path)
 
 
 def _engine(path: Path) -> str:
