@@ -35,11 +35,21 @@ def mutual_information(series: np.ndarray, lag: int) -> float:
     """What a sample says about the one ``lag`` later [nat], by a histogram of cells of equal
     chance.
     """
+    return _information(*_cells(series), lag)
+
+
+def _cells(series: np.ndarray) -> tuple[np.ndarray, int]:
+    """The cell of each sample, and how many there are."""
     cells = max(int(np.sqrt(len(series) / PER_CELL)), 4)
-    rank = np.argsort(np.argsort(series, kind="stable"), kind="stable") * cells // len(series)
-    joint = np.bincount(rank[:-lag] * cells + rank[lag:], minlength=cells * cells).reshape(
+    rank = np.empty(len(series), np.int64)
+    rank[np.argsort(series, kind="stable")] = np.arange(len(series))
+    return rank * cells // len(series), cells
+
+
+def _information(cell: np.ndarray, cells: int, lag: int) -> float:
+    joint = np.bincount(cell[:-lag] * cells + cell[lag:], minlength=cells * cells).reshape(
         cells, cells
-    ) / (len(series) - lag)
+    ) / (len(cell) - lag)
     product = joint.sum(axis=1, keepdims=True) * joint.sum(axis=0, keepdims=True)
     there = joint > 0
     return float((joint[there] * np.log(joint[there] / product[there])).sum())
@@ -50,9 +60,10 @@ def first_minimum(series: np.ndarray) -> int:
     on either side.
     """
     longest = max(int(LONGEST * len(series)), 3)
+    cell, cells = _cells(series)
     values: list[float] = []
     for lag in range(1, longest + 3):
-        values.append(mutual_information(series, lag))
+        values.append(_information(cell, cells, lag))
         if lag > 4 and values[-3] == min(values[-5:]):
             return lag - 2
     return int(np.argmin(values)) + 1

@@ -66,15 +66,25 @@ class Search:
 
 def crowd_distance(points: np.ndarray, smallest: float, exclude: int) -> float:
     """Median distance to the 20th allowed neighbour; inf if most points have fewer."""
-    distances = []
-    for here in np.unique(np.linspace(0, len(points) - 1, ASKED).round().astype(int)):
-        distance = np.linalg.norm(points - points[here], axis=1)
-        distance[max(here - exclude, 0) : here + exclude + 1] = np.inf
-        distance[distance < smallest] = np.inf
-        distances.append(
-            np.partition(distance, CROWD - 1)[CROWD - 1] if len(points) > CROWD else np.inf
-        )
-    return float(np.median(distances))
+    tree = cKDTree(points)
+    asked = np.unique(np.linspace(0, len(points) - 1, ASKED).round().astype(int))
+    return float(np.median([_crowd(points, tree, here, smallest, exclude) for here in asked]))
+
+
+def _crowd(points: np.ndarray, tree: cKDTree, here: int, smallest: float, exclude: int) -> float:
+    """Distance of a point to its 20th allowed neighbour: among a few that the tree finds, among
+    more, at last among all.
+    """
+    for count in (4 * CROWD, 16 * CROWD, len(points)):
+        if count < len(points) // 8:
+            distances, places = tree.query(points[here], k=count)
+        else:
+            distances = np.linalg.norm(points - points[here], axis=1)
+            places = np.arange(len(points))
+        allowed = distances[(np.abs(places - here) > exclude) & (distances >= smallest)]
+        if len(allowed) >= CROWD:
+            return float(np.partition(allowed, CROWD - 1)[CROWD - 1])
+    return math.inf
 
 
 def follow(points: np.ndarray, search: Search) -> Evolutions:
