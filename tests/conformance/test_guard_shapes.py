@@ -247,7 +247,7 @@ def three_deep():
     )
 
 
-@pytest.mark.parametrize("method", [sl.Taylor(8), sl.ODE45(1e-9, 1e-11)])
+@pytest.mark.parametrize("method", [sl.Taylor(6), sl.ODE45(1e-9, 1e-11)])
 def test_boundaries_that_depend_on_one_another_three_deep(three_deep, method):
     """The side of the last asks about the one before it, and so on."""
     nested, start, exact = three_deep

@@ -29,7 +29,7 @@ def test_phase_after_a_million_periods():
     frequencies in the same batch.
     """
     frequency = np.array([17.0, 3.0, 7.1, 11.3, 13.7, 16.9, 23.0, 29.99])
-    rest, method = {"x": np.zeros(8), "v": np.zeros(8)}, sl.Taylor(lanes=8)
+    rest, method = {"x": np.zeros(8), "v": np.zeros(8)}, sl.Taylor(lanes=4)
     run = sl.stroboscope(
         LINEAR, rest, 1_000_000, keep=1, values={"frequency": frequency}, method=method
     )

@@ -67,7 +67,7 @@ def lane_width() -> int:
     return 4 if triple.startswith(("aarch64", "arm64")) else 2
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=256)
 def taylor_module(system: System, order: int, lanes: int) -> Flow:
     """The compiled Taylor flow of a system. Parameters are arguments: new values
     never recompile.
@@ -87,7 +87,7 @@ _STEPS: dict[str, tuple[Interface, str, Mapping[str, Constant]]] = {
 }
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=256)
 def steps_module(system: System, method: str) -> Flow:
     """The compiled flow of a system by a method that runs one trajectory after the other."""
     interface, template, numbers = _STEPS[method]

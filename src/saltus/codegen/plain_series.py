@@ -17,7 +17,7 @@ from saltus.kernels import lanes, marks, trigonometry
 from saltus.system.system import System
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=256)
 def series_module(system: System, order: int) -> ModuleType:
     """Jets and step length of a system, as its Taylor flow compiles them: the same for all values.
 
@@ -27,7 +27,7 @@ def series_module(system: System, order: int) -> ModuleType:
     return _plain(taylor_head(system, order, 1).text)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=256)
 def _plain(head: str) -> ModuleType:
     """A head and the templates of a step as a Python module, its lanes whole arrays."""
     module = ModuleType(f"saltus_series_{hashlib.sha256(head.encode()).hexdigest()[:32]}")

@@ -253,7 +253,7 @@ def options_of(method: Method, periods: float, count: int, checks: int = 0) -> n
     return options
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=256)
 def tables_of(system: System) -> np.ndarray:
     """The tables of a system as its kernels read them: the same for all values."""
     return table_data(system)

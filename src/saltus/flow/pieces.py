@@ -79,7 +79,7 @@ def pieces(
     return whole, outcome
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=256)
 def _watched(system: System, guards: tuple[Guard, ...], quantities: tuple[Expr, ...]) -> System:
     """A system whose last guards are quantities: made once, since its series are."""
     asked = tuple(Guard(f"quantity {i}", quantity) for i, quantity in enumerate(quantities))

@@ -252,7 +252,7 @@ def gap_units(system: System) -> list[str]:
     return list(_gap_units(system.origin))
 
 
-@lru_cache(maxsize=64)  # the same for all values, and as long to find as a short run
+@lru_cache(maxsize=256)  # the same for all values, and as long to find as a short run
 def _gap_units(system: System) -> tuple[str, ...]:
     gaps = [guard.gap for guard in system.guards]
     found = units_of(system.states, system.units, system.field, gaps)

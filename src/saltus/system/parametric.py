@@ -45,7 +45,7 @@ class Parametric:
     names: tuple[str, ...]
 
 
-@functools.lru_cache(maxsize=64)
+@functools.lru_cache(maxsize=256)
 def parametric(system: System, names: tuple[str, ...]) -> Parametric:
     """The system with these parameters as states: the same one each time.
 

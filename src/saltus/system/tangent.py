@@ -32,7 +32,7 @@ def derivative_name(row: str, column: str) -> str:
     return f"d{row}/d{column}(0)"
 
 
-@functools.lru_cache(maxsize=64)
+@functools.lru_cache(maxsize=256)
 def tangent_system(system: System) -> System:
     """The system with D states extended to D + D*D: the states, then the rows of Y one after the
     other; the same one each time.
@@ -53,7 +53,7 @@ def tangent_system(system: System) -> System:
     )
 
 
-@functools.lru_cache(maxsize=64)
+@functools.lru_cache(maxsize=256)
 def _extension(
     states: tuple[str, ...],
     jacobian: tuple[tuple[Expr, ...], ...],

@@ -143,7 +143,7 @@ def _nudged(system: System, request: Request) -> tuple[np.ndarray, np.ndarray]:
     return starts, request.parameters * of_values
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=256)
 def _nudges(system: System) -> tuple[np.ndarray, np.ndarray]:
     """Factors of the states float64[copy, 1, D] and of the values float64[copy, 1, P]: the same for
     all values of the system.

@@ -372,6 +372,6 @@ def _index(name: str, values: np.ndarray) -> xr.indexes.PandasIndex:
 
 
 # the names of guards are the same in every run, and take longer to index than all numbers
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=256)
 def _text_index(name: str, dtype: np.dtype, words: tuple[str, ...]) -> xr.indexes.PandasIndex:
     return xr.indexes.PandasIndex(pd.Index(np.array(words, dtype), name=name), name, dtype)
