@@ -468,6 +468,6 @@ def test_an_impact_that_is_not_located_is_dated_at_the_node_behind_it():
 @every
 def test_impacts_are_the_same_in_any_pieces(method, monkeypatch):
     start = STARTS[STOP][:5]
-    whole = run(STOP, start, method, 30.0, samples=7)
+    whole = run(STOP, start, method, 12.0, samples=7)
     monkeypatch.setattr(engine, "SLICE", 7)
-    assert whole.equals(run(STOP, start, method, 30.0, samples=7, threads=1))
+    assert whole.equals(run(STOP, start, method, 12.0, samples=7, threads=1))

@@ -36,7 +36,7 @@ def interrupt(share):
     ],
 )
 def test_an_interrupted_stretch_holds_what_was_computed(ask, arguments, variable):
-    starts = {"x": np.linspace(0, 0.2, 3000), "v": 0.5}
+    starts = {"x": np.linspace(0, 0.2, 500), "v": 0.5}
     with pytest.raises(sl.Interrupted) as caught:
         ask(lab, starts, periods=2000, values=STOP, progress=interrupt, threads=1, **arguments)
     partial = caught.value.partial
@@ -92,7 +92,7 @@ def test_the_outcome_of_a_run_inside_is_no_answer():
     with pytest.raises(sl.Interrupted) as caught:
         sl.attractors(
             lab.with_values(**STOP),
-            {"x": np.linspace(0, 0.2, 3000), "v": 0.5},
+            {"x": np.linspace(0, 0.2, 500), "v": 0.5},
             progress=interrupt,
             threads=1,
         )
