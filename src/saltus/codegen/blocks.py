@@ -13,7 +13,7 @@ from typing import NamedTuple
 from saltus.errors import TraceError
 
 #: Most lines of a function that isn't split, and lines of a block.
-WHOLE, LENGTH = 1000, 250
+WHOLE, LENGTH = 1000, 60
 #: Most bytes of the stack for the values that blocks share: threads have 8 MB on Linux, and less
 #: elsewhere.
 MAX_STACK = 4_000_000

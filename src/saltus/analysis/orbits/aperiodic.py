@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from saltus.analysis.statistics import BOUNDED, UNCLEAR
 from saltus.flow.maps import Map
@@ -170,11 +171,11 @@ def _settles(iterates: np.ndarray, scale: np.ndarray) -> bool:
 
 def mismatch(iterates: np.ndarray, scale: np.ndarray) -> float:
     """Smallest n-step difference, n up to half of them: the largest of it over the last quarter."""
-    last = len(iterates) // 4
-    return min(
-        float(np.abs((iterates[-last:] - iterates[-last - n : -n]) / scale).max())
-        for n in range(1, len(iterates) // 2)
-    )
+    last, half = len(iterates) // 4, len(iterates) // 2
+    # n = 1, ..., half - 1 steps before the last quarter
+    before = sliding_window_view(iterates, last, axis=0)[-half:-1]
+    apart = np.abs((iterates[-last:].T - before) / scale[:, None])
+    return float(apart.max(axis=(1, 2)).min())
 
 
 def kind_of_growth(blocks: np.ndarray) -> tuple[str, float, float] | None:
