@@ -90,7 +90,7 @@ def test_the_frequency_of_a_one_sided_spring():
 
 # -- limit cycle -----------------------------------------------------------------------------------
 def test_the_limit_cycle_of_the_switched_rotor():
-    found = sl.attractors(switched_rotor(), (0.1, 1.0), every=0.5)
+    found = sl.attractors(switched_rotor(), (0.1, 1.0), every=0.5, method=sl.Taylor(lanes=4))
     assert found.attractor_type.values.tolist() == ["limit_cycle"]
     assert found.attractor_cycle.item() == pytest.approx(
         known("switched_rotor", "period"), rel=1e-11
