@@ -74,41 +74,50 @@ class Call:
         TypeError
             If an array isn't of its type, or isn't contiguous.
         """
-        numbers = []
+        numbers, shapes = [], []
         for value, (dtype, axes) in zip(values, self._kinds, strict=True):
             if dtype is None:
                 numbers.append(int(value))
-            elif value.dtype != dtype or value.ndim != axes or not value.flags.c_contiguous:
+                continue
+            shape = value.shape
+            if value.dtype != dtype or len(shape) != axes or not value.flags.c_contiguous:
                 raise TypeError(
                     f"a kernel takes a contiguous array of {dtype} with {axes} "
-                    f"axes, not of {value.dtype} {value.shape}."
+                    f"axes, not of {value.dtype} {shape}."
                 )
-            else:
-                numbers.append(_address(value))
-        block = self._shaped(tuple([getattr(value, "shape", ()) for value in values])).copy()
+            numbers.append(_address(value, shape))
+            shapes.append(shape)
+        block = self._shaped(tuple(shapes)).copy()
         block[self._places] = numbers
         return block
 
     def _of_shapes(self, shapes: tuple[tuple[int, ...], ...]) -> np.ndarray:
         """The block of arrays of some shapes, but for where they lie."""
         numbers: list[int] = []
-        for shape, (dtype, _) in zip(shapes, self._kinds, strict=True):
+        given = iter(shapes)
+        for dtype, _ in self._kinds:
             if dtype is None:
                 numbers.append(0)
             else:
+                shape = next(given)
                 strides = [8 * math.prod(shape[i + 1 :]) for i in range(len(shape))]
                 numbers += (0, 0, math.prod(shape), 8, 0, *shape, *strides)
         return np.array(numbers, np.int64)
 
 
-def _address(array: np.ndarray) -> int:
-    """Where a contiguous array lies, in a third of the time of ``array.ctypes``: a call asks for
-    fifty. Nothing lies in an empty one.
+def _address(
+    array: np.ndarray,
+    shape: tuple[int, ...],
+    beginning: Callable[[Any], Any] = ctypes.c_char.from_buffer,
+    place: Callable[[Any], int] = ctypes.addressof,
+) -> int:
+    """Where a contiguous array of a shape lies, in a quarter of the time of ``array.ctypes``: a
+    call asks for fifty. Nothing lies in an empty one.
     """
-    if not array.size:
+    if 0 in shape:
         return 0
     try:
-        return ctypes.addressof(ctypes.c_char.from_buffer(array))  # type: ignore[arg-type]  # a buffer, which stubs for 3.11 don't know
+        return place(beginning(array))
     except TypeError:  # read-only
         return int(array.ctypes.data)
 

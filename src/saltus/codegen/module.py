@@ -58,7 +58,12 @@ def lane_width() -> int:
     lanes 2.06, 1.87, 2.05; without fused multiply-add 2 and 4 lanes 17.7, 23.8. NEON has registers
     of 2, so 4 lanes; nobody has measured it.
     """
-    triple, processor, listed = machine.target()
+    return _lanes_of(machine.target())
+
+
+@lru_cache(maxsize=1)
+def _lanes_of(target: machine.Target) -> int:
+    triple, processor, listed = target
     features = set(listed.split(","))
     if features >= {"+avx512f", "+avx512dq"} or processor == "x86-64-v4":
         return 16
