@@ -15,6 +15,7 @@ import pytest
 import xarray as xr
 
 import saltus as sl
+from saltus.analysis.basins import pipeline
 from saltus.results.dataset import schema
 from saltus.results.dataset.result import Result
 from saltus.results.provenance import file_hash, to_json, versions
@@ -36,6 +37,14 @@ FORCE = {"in SI": (3.9, 4.1), "in units": ("3.9 N", "4.1 N")}
 
 
 SIZES = {"in SI": (2e-4, 6e-4), "in units": ("0.2 mm", "0.6 mm")}
+
+
+@pytest.fixture(autouse=True, scope="module")
+def few_scouts():
+    """Maps of 4 x 4 cells need no thousand scouts."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pipeline, "SCOUTS", 64)
+        yield
 
 
 @cache

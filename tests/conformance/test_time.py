@@ -25,11 +25,11 @@ def _steady(frequency):
 
 
 def test_phase_after_a_million_periods():
-    """1e6 periods at 17 Hz: phase error below 1e-9 rad (it is below 1e-14), and at 7 other
+    """1e6 periods at 17 Hz: phase error below 1e-9 rad (it is below 1e-14), and at 3 other
     frequencies in the same batch.
     """
-    frequency = np.array([17.0, 3.0, 7.1, 11.3, 13.7, 16.9, 23.0, 29.99])
-    rest, method = {"x": np.zeros(8), "v": np.zeros(8)}, sl.Taylor(lanes=4)
+    frequency = np.array([17.0, 7.1, 23.0, 29.99])
+    rest, method = {"x": np.zeros(4), "v": np.zeros(4)}, sl.Taylor(lanes=4)
     run = sl.stroboscope(
         LINEAR, rest, 1_000_000, keep=1, values={"frequency": frequency}, method=method
     )

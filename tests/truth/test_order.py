@@ -63,7 +63,7 @@ def best(system):
             t_end=END,
             samples=1,
             time_errors="local",
-            method=sl.Taylor(9, 2.0**-48),
+            method=sl.Taylor(9, 2.0**-48, lanes=4),
         )
     )
 
@@ -141,7 +141,7 @@ def fixed_step_order(system, method, spans):
 
 def test_steps_are_fixed(oscillator):
     free = oscillator.with_values(place=100.0)
-    assert chained(free, sl.Taylor(6, NO_TOLERANCE), 0.25)[1] == 40
+    assert chained(free, sl.Taylor(6, NO_TOLERANCE, lanes=4), 0.25)[1] == 40
     assert chained(free, sl.ODE45(1.0, 1e9), 0.5)[1] == 200
 
 
@@ -150,7 +150,7 @@ def test_steps_are_fixed(oscillator):
 def test_taylor_has_its_order_through_contacts(oscillator, law, order):
     spans = [0.125, 0.0625] if law == "bends" else [0.5, 0.25]  # stiffer, faster
     measured = fixed_step_order(
-        oscillator.with_values(**LAWS[law]), sl.Taylor(order, NO_TOLERANCE), spans
+        oscillator.with_values(**LAWS[law]), sl.Taylor(order, NO_TOLERANCE, lanes=4), spans
     )
     assert order - 0.3 < measured < order + 1.0
 
@@ -192,7 +192,7 @@ def test_taylor_error_falls_with_steps_to_the_order(oscillator, law, order):
     tolerances = 2.0 ** -np.arange(12.0, 29.0, 4.0)
     steps, errors = adaptive(
         oscillator.with_values(**LAWS[law]),
-        [sl.Taylor(order, tolerance) for tolerance in tolerances],
+        [sl.Taylor(order, tolerance, lanes=4) for tolerance in tolerances],
     )
     assert abs(-slope(steps, errors) - order) < 1.5
     # N / (N - 1), the exponent of the step rule, and a little
