@@ -143,8 +143,6 @@ def correct(
         before[left] = error
         going = np.flatnonzero(good & ~done)
         left = left[going]
-        if not len(left):
-            break
         whole, right = np.empty((len(left), size, size)), np.zeros((len(left), size))
         whole[:, :-1], whole[:, -1], right[:, :-1] = matrix[going], normal[left], residual[going]
         step = -solved(whole, right)
@@ -155,6 +153,15 @@ def correct(
         left = left[near]  # no step is NaN, then
     contraction = steps[1] / np.maximum(steps[0], STALLED)
     return Corrected(z, derivative, found, count, contraction)
+
+
+def cubic(step: np.ndarray, slope: np.ndarray, end: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """How far a cubic has come in a share of its step; its slopes at both ends are by the share."""
+    return np.asarray(
+        share * slope
+        + share**2 * (3.0 * step - 2.0 * slope - end)
+        + share**3 * (slope + end - 2.0 * step)
+    )
 
 
 def solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -335,11 +342,8 @@ class _Fronts:
         back = (before - self.z[going]) / scale
         chord = np.linalg.norm(back, axis=1)[:, None]
         with np.errstate(invalid="ignore", divide="ignore"):
-            ahead = length / chord
-            bend = ahead**2 * (3.0 * back + chord * (2.0 * here + slope)) + ahead**3 * (
-                2.0 * back + chord * (here + slope)
-            )
-        return np.asarray((length * here + np.where(np.isfinite(bend), bend, 0.0)) * scale)
+            far = cubic(back, -chord * here, -chord * slope, -length / chord)
+        return np.asarray(np.where(np.isfinite(far), far, length * here) * scale)
 
     def _close(self, taken: np.ndarray) -> None:
         """Close the curves that are about to pass their start as they left it."""

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.resolution import resolve
 from saltus.analysis.branches.rests import Rests
+from saltus.analysis.branches.same_branch import has_twin
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.special_points import outside
-from saltus.analysis.branches.tracing import Branch, has_twin
 from saltus.analysis.dataset_parts import guards_over, provenance, subject
 from saltus.analysis.orbits.orbit_measures import Measures, measure, unknown
 from saltus.analysis.outputs import Outputs

@@ -14,13 +14,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from saltus.analysis.branches.arclength import tangents
+from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.contact_sequences import sequences
 from saltus.analysis.branches.grazing_orbits import sqrt_coefficient
 from saltus.analysis.branches.leg_pieces import Piece, follow_legs
 from saltus.analysis.branches.legs import Legs
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.special_points import SpecialPoint
-from saltus.analysis.branches.tracing import Branch, Plan, Start, both_ways
+from saltus.analysis.branches.tracing import Plan, Start, both_ways
 
 
 @dataclass

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from saltus.analysis.branches.tracing import Branch, refine
+from saltus.analysis.branches.branch import Branch, refine
 
 #: Largest change of the size of the orbit from one point to the next, relative to the larger.
 CHANGE = 0.08

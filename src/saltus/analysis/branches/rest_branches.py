@@ -16,18 +16,11 @@ from typing import Any
 import numpy as np
 
 from saltus.analysis.branches.arclength import Curve, tangents
+from saltus.analysis.branches.branch import Branch, refine
 from saltus.analysis.branches.rests import Rests
 from saltus.analysis.branches.special_points import SpecialPoint
-from saltus.analysis.branches.tracing import (
-    Branch,
-    Plan,
-    Seed,
-    both_ways,
-    branch_of,
-    crossing,
-    refine,
-    trace,
-)
+from saltus.analysis.branches.switching import Seed, crossing
+from saltus.analysis.branches.tracing import Plan, both_ways, trace
 from saltus.analysis.orbits.special_equilibria import (
     SpecialEquilibrium,
     boundary_equilibrium,
@@ -94,25 +87,25 @@ class RestBranch(Branch):
             if self.ends[side] == "boundary_equilibrium" and self.borders[side] is None:
                 _meet_boundary(self, side, place)
 
-    def is_known(self, branches: Sequence[Branch]) -> bool:
-        """See :class:`Branch`: a branch that crosses another may have been followed through there,
-        which can't be told from where they cross.
-        """
-        return branch_of(self.z[len(self.z) // 2], 1, branches) >= 0
 
-    def children(self, plan: Plan, number: int) -> Iterator[Seed]:
-        """Seeds of the branches of equilibria that leave it; see :class:`Branch`."""
-        unit, size = self.scale[: self.orbits.size], self.orbits.size
-        for index, event in enumerate(self.events):
-            points, own = event.z[None, :size], event.z[size:]
-            if event.kind == "branch_point" and event.kind in plan.switch:
-                for sign in (1.0, -1.0):
-                    yield Seed(points, own, unit, sign * crossing(event), (number, index))
-            if event.kind != "boundary_equilibrium":
-                continue
-            for border, beyond in zip(self.borders, self.beyond, strict=True):
-                if border is not None and beyond is not None and (border.z == event.z).all():
-                    yield Seed(points, own, unit, beyond, (number, index))
+def _leave(
+    branch: RestBranch,
+    number: int,
+    switch: frozenset[str],
+    longest: int,  # noqa: ARG001
+) -> Iterator[Seed]:
+    """Seeds of the branches of equilibria that leave one; see :func:`switching.children`."""
+    unit, size = branch.scale[: branch.orbits.size], branch.orbits.size
+    for index, event in enumerate(branch.events):
+        points, own = event.z[None, :size], event.z[size:]
+        if event.kind == "branch_point" and event.kind in switch:
+            for sign in (1.0, -1.0):
+                yield Seed(points, own, unit, sign * crossing(event), (number, index))
+        if event.kind != "boundary_equilibrium":
+            continue
+        for border, beyond in zip(branch.borders, branch.beyond, strict=True):
+            if border is not None and beyond is not None and (border.z == event.z).all():
+                yield Seed(points, own, unit, beyond, (number, index))
 
 
 def trace_rests(
@@ -143,7 +136,7 @@ def trace_rests(
     def make(_: int, scale: np.ndarray) -> Any:
         return Rests(system, name, scale)
 
-    mine = replace(plan, make=make, follow=follow)
+    mine = replace(plan, make=make, follow=follow, leave=_leave, crossed=True)
     trace(mine, seeds, branches)
     rests = [(i, one) for i, one in enumerate(branches) if isinstance(one, RestBranch)]
     known: list[SpecialPoint] = []

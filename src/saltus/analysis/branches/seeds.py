@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.branches.tracing import Seed
+from saltus.analysis.branches.switching import Seed
 from saltus.analysis.orbits.all_equilibria import all_equilibria
 from saltus.analysis.orbits.cycles import units
 from saltus.analysis.orbits.orbit_measures import measure

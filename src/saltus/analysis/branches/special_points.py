@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import elementwise
 
-from saltus.analysis.branches.arclength import correct, tangents
+from saltus.analysis.branches.arclength import correct, cubic, tangents
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.orbits.tolerances import SINGULAR
 
@@ -134,16 +134,16 @@ def locate(
     z, (tangent, beyond) = z[:, 0], tangent.swapaxes(0, 1)
     orbits, rows = orbits.near(z, rows), np.arange(len(rows))
     length = np.einsum("ei,ei->e", step, tangent)
-    aside = step - length[:, None] * tangent  # of the next point, and how the curve leaves there
-    slope = beyond / np.einsum("ei,ei->e", beyond, tangent)[:, None] - tangent
-    slope *= length[:, None]
+    # slopes by the share of the step along the first tangent
+    along = length[:, None] * tangent
+    end = (length / np.einsum("ei,ei->e", beyond, tangent))[:, None] * beyond
     known: dict[int, SpecialPoint] = {}
 
     def at(flat: np.ndarray, which: np.ndarray) -> np.ndarray:
         mine = rows[which]
         share = (flat / length[which])[:, None]
-        bend = share**2 * ((3.0 - 2.0 * share) * aside[which] + (share - 1.0) * slope[which])
-        guess = z[which] + (flat[:, None] * tangent[which] + bend) * scale[which]
+        far = cubic(step[which], along[which], end[which], share)
+        guess = z[which] + far * scale[which]
         point = correct(orbits, guess, tangent[which], mine)
         derivative = np.where(point.found[:, None, None], point.derivative, 0.0)
         direction = tangents(derivative, tangent[which])

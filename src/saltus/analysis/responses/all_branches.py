@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.branch_table import table_of
 from saltus.analysis.branches.plans import plan_of
 from saltus.analysis.branches.rest_branches import trace_rests
 from saltus.analysis.branches.seeds import resting_between, resting_seeds, scaled, seeds_of
-from saltus.analysis.branches.tracing import Branch, Seed, trace
+from saltus.analysis.branches.switching import Seed
+from saltus.analysis.branches.tracing import trace
 from saltus.analysis.orbits.equilibria import autonomous
 from saltus.analysis.outputs import outputs_of
 from saltus.analysis.responses.continued import LONGEST_DOUBLED, POINTS, SWITCHES, seeds_of_grid

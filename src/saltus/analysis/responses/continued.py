@@ -7,10 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.branch_table import attributes_of, values_of
 from saltus.analysis.branches.plans import plan_of
+from saltus.analysis.branches.same_branch import branch_of
 from saltus.analysis.branches.seeds import scaled, seeds_at
-from saltus.analysis.branches.tracing import Branch, Seed, branch_of, trace
+from saltus.analysis.branches.switching import Seed
+from saltus.analysis.branches.tracing import trace
 from saltus.analysis.orbits.tolerances import LONGEST
 from saltus.analysis.outputs import Outputs
 from saltus.analysis.responses.grid import Grid

@@ -14,7 +14,8 @@ from saltus.analysis.branches.contact_sequences import sequences, shift
 from saltus.analysis.branches.plans import plan_of
 from saltus.analysis.branches.sequence_changes import contact_points
 from saltus.analysis.branches.shooting import PeriodicOrbits
-from saltus.analysis.branches.tracing import Seed, trace
+from saltus.analysis.branches.switching import Seed
+from saltus.analysis.branches.tracing import trace
 
 REFERENCE = Path(__file__).parents[3] / "reference"
 

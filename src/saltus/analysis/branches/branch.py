@@ -1,0 +1,254 @@
+"""A branch of periodic orbits: the points on it, and the bifurcations between them."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from saltus.analysis.branches.arclength import correct, tangents
+from saltus.analysis.branches.sequence_changes import contact_points
+from saltus.analysis.branches.shooting import PeriodicOrbits
+from saltus.analysis.branches.special_points import SpecialPoint, locate, outside, tests
+
+#: A fold so near to a branch point is none, in units of the scale: it is located less well there.
+VERTEX = 1e-4
+#: Shortest interval that is halved, in units of the scale.
+LEAST = 1e-9
+#: The parameter's share of a tangent that is nothing but rounding.
+STILL = 1e-8
+#: A test that comes down to less than this share of what it is beside may vanish twice there; so
+#: often points are put where it may.
+DIP, DIVES = 0.5, 4
+#: How often an interval is halved in which changes of stability don't add up.
+HALVINGS = 6
+
+
+@dataclass
+class Branch:
+    """A branch of periodic orbits of n periods.
+
+    Attributes
+    ----------
+    orbits : PeriodicOrbits
+        The equations, of which it is a row.
+    row : int
+        Which.
+    z : float64[p, z]
+        Its points: see :class:`PeriodicOrbits`.
+    tangent, derivative : float64[p, ...]
+        There, in units of the scale.
+    length : float64[p]
+        Arclength from its first point, in units of the scale.
+    multipliers : complex128[p, D]
+        Floquet multipliers, the largest first, without a trivial one.
+    ends : (str, str)
+        Why it ends at its first and at its last point: see :class:`Curve`; ``period_doubling``
+        where it becomes an orbit of half the period, ``hopf`` where a limit cycle shrinks to an
+        equilibrium, ``boundary_equilibrium`` where an equilibrium meets a boundary.
+    events : list of SpecialPoint
+        In the order of the branch.
+    unexplained : list of int
+        Points after which the number of multipliers outside the unit circle changes by more or less
+        than the events there explain.
+    parent : (int, int) or None
+        The branch and its event that it leaves.
+    """
+
+    orbits: PeriodicOrbits
+    row: int
+    z: np.ndarray
+    tangent: np.ndarray
+    derivative: np.ndarray
+    length: np.ndarray
+    multipliers: np.ndarray
+    ends: tuple[str, str]
+    events: list[SpecialPoint] = field(default_factory=list)
+    unexplained: list[int] = field(default_factory=list)
+    parent: tuple[int, int] | None = None
+
+    @property
+    def closed(self) -> bool:
+        """Whether it returns to where it began."""
+        return self.ends == ("closed", "closed")
+
+    @property
+    def scale(self) -> np.ndarray:
+        """Unit of each unknown."""
+        return np.asarray(self.orbits.scale[self.row])
+
+    def find_events(self) -> None:
+        """Locate what happens along the branch; halve the intervals where stability doesn't add
+        up.
+        """
+        for _ in range(DIVES):
+            if not len(refine(self, *_dips(self))):
+                break
+        for left in reversed(range(HALVINGS)):
+            self.events = _located(self)
+            self.unexplained = _unexplained(self)
+            if not left or not self.unexplained or not len(refine(self, self.unexplained)):
+                break
+        self.unexplained = _unexplained(self, turning=True)
+        self.events = _in_order(self, [*self.events, *self._contacts()])
+
+    def _contacts(self) -> list[SpecialPoint]:
+        """Where the contact sequence changes."""
+        return contact_points(self.orbits, self.row, self.z, self.tangent)
+
+
+# -- events ----------------------------------------------------------------------------------------
+def _tests(branch: Branch) -> np.ndarray:
+    """The functions whose zeros are bifurcations, at the points of a branch, float64[tests, p]."""
+    values = tests(branch.tangent, branch.derivative, branch.multipliers, branch.z.shape[1] - 1)
+    values[0, _vertical(branch)] = 0.0
+    return values
+
+
+def _dips(branch: Branch) -> tuple[list[int], np.ndarray]:
+    """Points between which and the next ones a test may vanish twice, and where, in shares of the
+    step: at the vertex of the parabola through three points if it is much nearer to zero than they
+    are, or to both sides of a point that is much nearer than those beside it.
+    """
+    if len(branch.z) < 3:
+        return [], np.zeros(0)
+    values, step = _tests(branch), np.diff(branch.length)
+    middle, beside = values[:, 1:-1], np.stack([values[:, :-2], values[:, 2:]])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        slope = np.diff(values, axis=1) / step
+        bend = np.diff(slope, axis=1) / (step[:-1] + step[1:])
+        slope = slope[:, :-1] + bend * step[:-1]
+        vertex, least = -0.5 * slope / bend, middle - 0.25 * slope**2 / bend
+        side, next_least = np.sign(middle), np.abs(beside).min(axis=0)
+        one_side = (beside * side > 0).all(axis=0)
+        low = one_side & (np.abs(middle) < DIP * next_least)
+        lower = (least * side < DIP * np.minimum(np.abs(middle), next_least)) & (bend * side > 0)
+        lower &= one_side & (vertex > -step[:-1]) & (vertex < step[1:])
+    found = {int(place) + i: 0.5 for place in np.flatnonzero(low.any(axis=0)) for i in (0, 1)}
+    for which, place in zip(*np.nonzero(lower), strict=True):
+        at = vertex[which, place]
+        after = int(place) + int(at > 0)
+        found[after] = (at / step[after]) % 1.0
+    places = sorted(found)
+    return places, np.array([found[after] for after in places])
+
+
+def _located(branch: Branch) -> list[SpecialPoint]:
+    values = _tests(branch)
+    kinds, after = np.nonzero(values[:, 1:] * values[:, :-1] < 0)
+    ends, rows = np.stack([after, after + 1], axis=1), np.full(len(after), branch.row)
+    found = locate(branch.orbits, rows, branch.z[ends], branch.tangent[ends], kinds)
+    events = [
+        replace(point, after=int(place))
+        for place, point in zip(after, found, strict=True)
+        if point is not None and _is_real(point)
+    ]
+    events = [event for event in events if not _is_vertex(event, events, branch)]
+    return _in_order(branch, events)
+
+
+def _vertical(branch: Branch) -> np.ndarray:
+    """Where a branch stays at one value of the parameter, bool[p]: a family of orbits about the
+    centre of a linear system, of which none is isolated and a multiplier is 1.
+    """
+    still = np.abs(branch.tangent[:, -1]) < STILL
+    beside = np.append(still[1:], False) | np.append(False, still[:-1])
+    return still & beside
+
+
+def _in_order(branch: Branch, events: Sequence[SpecialPoint]) -> list[SpecialPoint]:
+    """Events in the order in which the branch comes by."""
+    return sorted(events, key=lambda event: (event.after, _ahead(branch, event)))
+
+
+def _is_vertex(event: SpecialPoint, events: Sequence[SpecialPoint], branch: Branch) -> bool:
+    """Whether a fold is where a branch point's crossing branch turns back."""
+    return event.kind == "fold" and any(
+        other.kind == "branch_point" and np.abs((other.z - event.z) / branch.scale).max() < VERTEX
+        for other in events
+    )
+
+
+def _is_real(point: SpecialPoint) -> bool:
+    """Whether a zero of the test for tori is a complex pair on the unit circle."""
+    if point.kind != "neimark_sacker":
+        return True
+    on = np.abs(np.abs(point.multipliers) - 1.0) < 1e-6
+    return bool((on & (np.abs(point.multipliers.imag) > 1e-7)).sum() >= 2)
+
+
+def _ahead(branch: Branch, point: SpecialPoint) -> float:
+    step = (point.z - branch.z[point.after]) / branch.scale
+    return float(step @ branch.tangent[point.after])
+
+
+#: How many multipliers cross the unit circle at each kind of event.
+_CROSSING = {"fold": 1, "branch_point": 1, "period_doubling": 1, "neimark_sacker": 2}
+
+
+def _unexplained(branch: Branch, turning: bool = False) -> list[int]:
+    """Points after which the count of multipliers outside the circle isn't explained by events;
+    ``turning``: a branch may keep its stability where it turns back at a branch point.
+    """
+    count = outside(branch.multipliers).sum(axis=1)
+    vertical = _vertical(branch)
+    result = []
+    for place, change in enumerate(np.diff(count)):
+        if vertical[place] or vertical[place + 1]:
+            continue
+        ways = branch.tangent[max(place - 1, 0) : place + 3, -1]
+        turns = turning and ways.min() < 0 < ways.max()
+        changes = [
+            (-crossing, 0, crossing)
+            if turns and event.kind == "branch_point"
+            else (-crossing, crossing)
+            for event in branch.events
+            if event.after == place
+            or (turns and event.kind == "branch_point" and abs(event.after - place) == 1)
+            for crossing in [_CROSSING.get(event.kind, 0)]
+        ]
+        sums = {sum(one) for one in itertools.product(*changes)}
+        if int(change) not in sums:
+            result.append(place)
+    return result
+
+
+def refine(branch: Branch, places: Sequence[int], shares: np.ndarray | float = 0.5) -> np.ndarray:
+    """Put a point into each of some intervals, by the points before them; the numbers of the new
+    points, int64[r]. ``shares``: where in them.
+    """
+    after = np.array(places, np.int64)
+    step = (branch.z[after + 1] - branch.z[after]) / branch.scale
+    length = np.einsum("ki,ki->k", step, branch.tangent[after])
+    orbits = branch.orbits.near(branch.z[after], np.full(len(after), branch.row))
+    rows = np.arange(len(after))
+    along = (shares * length)[:, None] * branch.tangent[after]
+    guess = branch.z[after] + along * branch.scale
+    point = correct(orbits, guess, branch.tangent[after], rows, np.abs(length))
+    good = np.flatnonzero(point.found & (np.abs(length) > LEAST))
+    if not len(good):
+        return good
+    derivative = point.derivative[good]
+    tangent = tangents(derivative, branch.tangent[after[good]])
+    own = orbits.multipliers(point.z[good], derivative, rows[good])
+    between = branch.length[after] + shares * (branch.length[after + 1] - branch.length[after])
+    new = {"z": point.z[good], "tangent": tangent, "derivative": derivative}
+    for name, values in {**new, "multipliers": own, "length": between[good]}.items():
+        setattr(branch, name, np.insert(getattr(branch, name), after[good] + 1, values, axis=0))
+    placed = after[good] + 1 + np.arange(len(good))
+    branch.events = [replace(event, after=_moved(branch, event, placed)) for event in branch.events]
+    return placed
+
+
+def _moved(branch: Branch, event: SpecialPoint, placed: np.ndarray) -> int:
+    """The point that comes before an event, once new points have been put in."""
+    place = event.after
+    for new in placed:
+        if new <= place:
+            place += 1
+        elif new == place + 1:
+            step = (event.z - branch.z[new]) / branch.scale
+            place += int(step @ branch.tangent[new] >= 0)
+    return place
