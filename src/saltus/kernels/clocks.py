@@ -155,28 +155,22 @@ def first_guess(j, tau, n, base, data):
     """A piece near the one that holds tau."""
     if begin_of(j, 1, n, base, data) == math.inf:
         return 0
-    if not is_cyclic(j, data):
-        if CLOCK_KIND[j] == LEVEL:
-            return 0
-        low, high = 0, knots(data, j)  # begin_of(low) <= tau < begin_of(high + 1)
-        while low < high:
-            middle = (low + high + 1) // 2
-            if begin_of(j, middle, n, base, data) <= tau:
-                low = middle
-            else:
-                high = middle - 1
-        return low
-    rate = rate_of(j, n, data)
-    turns = math.floor(
-        abs(rate) * tau + (place_at_base(j, n) if rate > 0.0 else -place_at_base(j, n))
-    )
-    if CLOCK_KIND[j] == CYCLE:
-        return int(turns)
-    if CLOCK_KIND[j] != TABLE:
-        return 2 * int(turns)
-    count = knots(data, j) - 1
-    low, high = int(turns) * count, int(turns) * count + count - 1
-    while low < high:
+    if is_cyclic(j, data):
+        rate = rate_of(j, n, data)
+        turns = math.floor(
+            abs(rate) * tau + (place_at_base(j, n) if rate > 0.0 else -place_at_base(j, n))
+        )
+        if CLOCK_KIND[j] == CYCLE:
+            return int(turns)
+        if CLOCK_KIND[j] != TABLE:
+            return 2 * int(turns)
+        count = knots(data, j) - 1
+        low, high = int(turns) * count, int(turns) * count + count - 1
+    elif CLOCK_KIND[j] == LEVEL:
+        return 0
+    else:
+        low, high = 0, knots(data, j)
+    while low < high:  # begin_of(low) <= tau < begin_of(high + 1)
         middle = (low + high + 1) // 2
         if begin_of(j, middle, n, base, data) <= tau:
             low = middle
