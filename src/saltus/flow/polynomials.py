@@ -132,7 +132,19 @@ def hermite(a: np.ndarray, b: np.ndarray, da: np.ndarray, db: np.ndarray) -> np.
     """Terms of the cubics with the values a, b and the slopes da, db at 0 and 1,
     float64[4, ...].
     """
-    return np.stack([a, da, 3.0 * (b - a) - 2.0 * da - db, 2.0 * (a - b) + da + db])
+    return np.stack([a, da, *_bends(a, b, da, db)])
+
+
+def between(
+    a: np.ndarray, b: np.ndarray, da: np.ndarray, db: np.ndarray, share: np.ndarray
+) -> np.ndarray:
+    """The cubics of :func:`hermite` at a share of the way."""
+    bend, twist = _bends(a, b, da, db)
+    return np.asarray(a + share * (da + share * (bend + share * twist)))
+
+
+def _bends(a: np.ndarray, b: np.ndarray, da: np.ndarray, db: np.ndarray) -> tuple:
+    return 3.0 * (b - a) - 2.0 * da - db, 2.0 * (a - b) + da + db
 
 
 @functools.cache

@@ -15,6 +15,8 @@ from typing import Protocol
 
 import numpy as np
 
+from saltus.flow.polynomials import between
+
 #: Iterations of the corrector: more mean that the step was too long.
 MOST_ITERATIONS = 7
 #: A residual so small, in units of the scale, is rounding; one so small that stalls is accepted.
@@ -153,15 +155,6 @@ def correct(
         left = left[near]  # no step is NaN, then
     contraction = steps[1] / np.maximum(steps[0], STALLED)
     return Corrected(z, derivative, found, count, contraction)
-
-
-def cubic(step: np.ndarray, slope: np.ndarray, end: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """How far a cubic has come in a share of its step; its slopes at both ends are by the share."""
-    return np.asarray(
-        share * slope
-        + share**2 * (3.0 * step - 2.0 * slope - end)
-        + share**3 * (slope + end - 2.0 * step)
-    )
 
 
 def solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -342,7 +335,7 @@ class _Fronts:
         back = (before - self.z[going]) / scale
         chord = np.linalg.norm(back, axis=1)[:, None]
         with np.errstate(invalid="ignore", divide="ignore"):
-            far = cubic(back, -chord * here, -chord * slope, -length / chord)
+            far = between(0.0 * back, back, -chord * here, -chord * slope, -length / chord)
         return np.asarray(np.where(np.isfinite(far), far, length * here) * scale)
 
     def _close(self, taken: np.ndarray) -> None:

@@ -16,9 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import elementwise
 
-from saltus.analysis.branches.arclength import correct, cubic, tangents
+from saltus.analysis.branches.arclength import correct, tangents
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.orbits.tolerances import SINGULAR
+from saltus.flow.polynomials import between
 
 #: Tests in the order in which they are made.
 KINDS = ("fold", "branch_point", "period_doubling", "neimark_sacker")
@@ -142,7 +143,7 @@ def locate(
     def at(flat: np.ndarray, which: np.ndarray) -> np.ndarray:
         mine = rows[which]
         share = (flat / length[which])[:, None]
-        far = cubic(step[which], along[which], end[which], share)
+        far = between(np.zeros_like(end[which]), step[which], along[which], end[which], share)
         guess = z[which] + far * scale[which]
         point = correct(orbits, guess, tangent[which], mine)
         derivative = np.where(point.found[:, None, None], point.derivative, 0.0)

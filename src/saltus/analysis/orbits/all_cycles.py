@@ -31,6 +31,7 @@ from saltus.analysis.orbits.newton import Equations
 from saltus.analysis.orbits.tolerances import AMPLIFIED, CONVERGED, LONGEST, SAME
 from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
+from saltus.flow.polynomials import between
 
 #: Turns that starts are followed before a return is looked for, in turn: none, so that cycles are
 #: found which nothing comes near; some, so that a chaotic set is reached.
@@ -104,12 +105,14 @@ class Cycle:
     def at(self, place: np.ndarray) -> np.ndarray:
         """States at places float64[...] in samples, float64[..., D]: cubics between the samples."""
         whole = np.floor(place)
-        share = (place - whole)[..., None]
-        i = whole.astype(int) % SAMPLES
-        a, b, step = self.samples[i], self.samples[i + 1], self.time / SAMPLES
-        da, db = step * self.rates[i], step * self.rates[i + 1]
-        bend = 3 * (b - a) - 2 * da - db
-        return np.asarray(a + share * (da + share * (bend + share * (2 * (a - b) + da + db))))
+        i, step = whole.astype(int) % SAMPLES, self.time / SAMPLES
+        return between(
+            self.samples[i],
+            self.samples[i + 1],
+            step * self.rates[i],
+            step * self.rates[i + 1],
+            (place - whole)[..., None],
+        )
 
 
 @dataclass

@@ -23,6 +23,7 @@ from saltus.analysis.orbits.orbits import OrbitBatch
 from saltus.analysis.orbits.tolerances import AMPLIFIED, BESIDE, CONVERGED, LONGEST, RESTS, ROUNDING
 from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
+from saltus.flow.polynomials import between
 
 #: Samples of the motion in which a return is searched; ratio of the lengths of two windows.
 SAMPLES, ZOOM = 4096, 8
@@ -147,7 +148,7 @@ def _crossings(
     height = np.einsum("kij,kj->ki", offset, across[:, 0])
     share = height[:, 1:-1] / (height[:, 1:-1] - height[:, 2:])
     rises = (height[:, 1:-1] < 0) & (height[:, 2:] >= 0)
-    at = _cubic(offset[:, 1:-1], offset[:, 2:], ahead[:, 1:-1], ahead[:, 2:], share)
+    at = between(offset[:, 1:-1], offset[:, 2:], ahead[:, 1:-1], ahead[:, 2:], share[..., None])
     apart = np.where(rises, np.abs(at).max(axis=2), np.inf)
     time = 1 + np.arange(share.shape[1]) + np.where(np.isfinite(share), share, 0.0)
     return time, np.where(np.isfinite(apart), apart, np.inf), rises
@@ -200,14 +201,6 @@ def close_returns(map_: Stroboscope, start: np.ndarray, edges: np.ndarray) -> li
         when = np.where(np.isfinite(far), when * (longest / SAMPLES), np.nan)
         result.append(Returns(when, far, np.where(moves[at], ranges[at], scale)))
     return result
-
-
-def _cubic(
-    a: np.ndarray, b: np.ndarray, da: np.ndarray, db: np.ndarray, share: np.ndarray
-) -> np.ndarray:
-    """Cubics with these values and slopes at the ends, at a share of the way."""
-    s = share[..., None]
-    return a + s * (da + s * ((3 * (b - a) - 2 * da - db) + s * (2 * (a - b) + da + db)))
 
 
 def _locate(map_: Stroboscope, start: np.ndarray, which: np.ndarray, result: Returns) -> None:
