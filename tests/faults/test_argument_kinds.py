@@ -302,3 +302,9 @@ def test_an_equation_nested_too_deeply_is_refused():
 
     with pytest.raises(sl.SaltusError, match="hundreds of operations stand within one another"):
         sl.simulate(tower, (0.1, 0.0), t_end=1.0)
+
+
+@pytest.mark.parametrize("what", [sl.models.delangre, lambda t, x: x])
+def test_a_function_is_no_system(what):
+    with pytest.raises(sl.SaltusError, match=r"Call it|@sl\.system"):
+        sl.simulate(what, periods=3)

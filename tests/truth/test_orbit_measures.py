@@ -267,3 +267,16 @@ def test_a_table_has_a_column_for_each_number_of_each_output(linear, tmp_path):
     } <= set(columns)
     sl.save(linear, tmp_path / "linear.nc")
     assert sl.load(tmp_path / "linear.nc").identical(linear)
+
+
+def test_an_impact_at_a_speed_is_no_graze():
+    """A rigid stop turns the gap at zero: what counts is where it turns by itself, as in a run."""
+    system = sl.models.impact_oscillator(restitution=0.5, gap=0.2)
+    found = sl.attractors(system, (0.0, 0.0))
+    assert found.attractor_contacts.item() == 1.0
+    run = sl.simulate(system, (0.0, 0.0), periods=3000, keep=1)
+    orbit = sl.simulate(system, (run.end_x.item(), run.end_v.item()), periods=3)
+    margin = found.attractor_margin.item()
+    assert margin == pytest.approx(orbit.smallest_gap_margin.item(), rel=1e-9)
+    assert margin > 0.1
+    assert sl.lyapunov(system, (0.0, 0.0), periods=300).near_graze.item() == 0

@@ -155,7 +155,8 @@ def _branches(ds: xr.Dataset) -> list[str]:
     closed, stable = ds["branch_closed"].values, ds["point_stable"].values
     lines = [
         f"found    {counted(ds.sizes['branch'], 'branch')}, {int(closed.sum())} of "
-        f"them closed, {ds.sizes['point']} points, {stable.mean():.0%} of them stable",
+        f"them closed, {ds.sizes['point']} points"
+        + (f", {stable.mean():.0%} of them stable" if len(stable) else ""),
     ]
     at, kind, of = (ds[one].values for one in (event_name(name), "event_kind", "event_branch"))
     for i, periods in enumerate(ds["branch_periods"].values.tolist()):

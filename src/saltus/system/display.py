@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from saltus.errors import counted
 from saltus.system.expression import ELEMENTARY, Condition, Expr, state, varies
-from saltus.system.guards import Law, is_hold
+from saltus.system.guards import Law, at_equality, is_hold
 from saltus.system.reduction import free_field
 from saltus.system.text import _ATOM, _PRODUCT, PI_MULTIPLES, Writer
 from saltus.units import from_si
@@ -128,7 +128,7 @@ def _guard_rows(system: System) -> list[tuple[str, str]]:
     for number, guard in enumerate(system.guards):
         if is_hold(guard):
             continue
-        place = writer.side(number).replace(" > ", " = ", 1)
+        place = at_equality(writer.side(number))
         if guard.boundary is not None and guard.state is not None:
             (value,) = evaluate([guard.boundary], values=system.values)
             place += (

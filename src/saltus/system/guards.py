@@ -451,7 +451,17 @@ def _renumbered(root: Expr, new: Mapping[int, int]) -> Expr:
 
 def equation_of(number: int, guards: Sequence[Guard]) -> str:
     """The equation of a boundary, such as ``x = -lower_gap``."""
-    return Writer(guards[: number + 1], limit=100).side(number).replace(" > ", " = ", 1)
+    return at_equality(Writer(guards[: number + 1], limit=100).side(number))
+
+
+def at_equality(side: str) -> str:
+    """A comparison as the equation of its boundary; those within brackets stay as they are."""
+    depth = 0
+    for place, sign in enumerate(side):
+        depth += (sign == "(") - (sign == ")")
+        if not depth and side.startswith(" > ", place):
+            return f"{side[:place]} = {side[place + 3 :]}"
+    return side
 
 
 def _with_names(guards: Sequence[Guard], known: int) -> list[Guard]:

@@ -4,6 +4,7 @@ import re
 
 import pytest
 
+import saltus as sl
 from saltus.models import MODELS, delangre
 from saltus.system import abs, atan, piecewise, sqrt, system
 from saltus.system.display import latex_lines, latex_name
@@ -135,3 +136,11 @@ def test_html_is_escaped():
     assert "<i>" not in view
     assert "&lt;i&gt;x&lt;/i&gt; &amp; y" in view
     assert not re.search(r"&(?!amp;|lt;|gt;|quot;|#x27;)", view)
+
+
+def test_a_boundary_of_a_choice_keeps_the_comparison_in_it():
+    @sl.system(states="x v")
+    def stopped(t, x, v, *, k=3.0, gap=0.1):
+        return v, -x - sl.piecewise((k * x, sl.abs(x) > gap), otherwise=0)
+
+    assert "piecewise((x, x > 0), otherwise=-x) = gap" in str(stopped)

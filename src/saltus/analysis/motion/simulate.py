@@ -13,7 +13,7 @@ import xarray as xr
 from saltus.analysis import dataset_parts
 from saltus.analysis.motion import time_errors as measure
 from saltus.analysis.outcome_messages import warn
-from saltus.analysis.starts import Ensemble, Span, ensemble, span
+from saltus.analysis.starts import Ensemble, Span, check_system, ensemble, span
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, among, shown
 from saltus.flow import engine
@@ -117,6 +117,7 @@ def simulate(
     (21, True)
     """
     method = check_method(method)
+    check_system(system)
     group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
     length = span(system, group, periods, t_end, t_start)
     flown = remembering(system)

@@ -32,6 +32,8 @@ HELD = 8192
 PLACES = 21
 #: Turning points closer than this are one [forcing periods].
 SAME = 1e-9
+#: A gap that closes at more than this share of its largest rate is struck, not grazed.
+STRUCK = 1e-6
 
 
 @dataclass(frozen=True)
@@ -259,13 +261,26 @@ def _extremes(
 
 def _margin(whole: Pieces, first: np.ndarray, turns: _Turns, gap: int) -> np.ndarray:
     """Smallest size of a gap where it turns, of each motion; zero where it is below the rounding
-    error of the gap.
+    error of the gap. Where an impact turns it, it has been closed at a speed and is no graze.
     """
     sizes = np.abs(turns.values(whole, gap))
-    sizes = np.where(sizes <= whole.noise[gap, turns.piece], 0.0, sizes)
+    closed = sizes <= whole.noise[gap, turns.piece]
+    sizes = np.where(closed, 0.0, sizes)
+    sizes[closed & (turns.place == 0.0) & _struck(whole, first, gap)[turns.piece]] = np.inf
     least = np.full(len(whole.motion), np.inf)
     np.minimum.at(least, turns.piece, sizes)
     return np.minimum.reduceat(least, first)
+
+
+def _struck(whole: Pieces, first: np.ndarray, gap: int) -> np.ndarray:
+    """Pieces before which a gap has closed at a speed, bool[p]."""
+    rates = polynomials.derivative(whole.terms[:, gap])
+    begin, end = np.abs(rates[0]) / whole.length, rates.sum(axis=0) / whole.length
+    before = np.arange(len(end)) - 1
+    before[first] = np.append(first[1:], len(end)) - 1
+    count = np.diff(np.append(first, len(end)))
+    fastest = np.repeat(np.maximum.reduceat(np.maximum(begin, np.abs(end)), first), count)
+    return np.asarray(np.abs(end[before]) > STRUCK * fastest)
 
 
 def _means(
