@@ -166,13 +166,27 @@ def _branches(ds: xr.Dataset) -> list[str]:
             for word, value in zip(kind[of == i], at[of == i], strict=True)
         )
         extent = f"{mine.min():.6g} to {mine.max():.6g} {unit}".rstrip()
-        ends = ", closed" if closed[i] else ""
+        ends = ", closed" if closed[i] else _stopped(ds.isel(branch=i), mine[[0, -1]])
         what = ds["branch_kind"].values[i]
         what = period_text(periods) if what == "periodic" else what.replace("_", " ")
         lines.append(f"  {i}: {what} from {extent}{ends}{text and '; ' + text}")
-    if ds.attrs["unexplained_changes"]:
-        lines.append(f"unsure   {ds.attrs['unexplained_changes']} changes of stability unexplained")
+    for i, count in enumerate(ds["branch_unexplained"].values.tolist()):
+        if count:
+            changes = counted(count, "change")
+            lines.append(
+                f"unsure   {changes} of stability unexplained on branch {i}: a narrower range of "
+                f"{name} gives shorter steps"
+            )
     return lines
+
+
+def _stopped(branch: xr.Dataset, ends: np.ndarray) -> str:
+    """Where a branch ends within the range though it goes on."""
+    words = {"points": "stopped by points=", "lost": "lost"}
+    why = (branch["branch_begin"].item(), branch["branch_end"].item())
+    return "".join(
+        f", {words[one]} at {at:.6g}" for one, at in zip(why, ends, strict=True) if one in words
+    )
 
 
 def _curve(ds: xr.Dataset) -> list[str]:

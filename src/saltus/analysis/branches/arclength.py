@@ -29,6 +29,9 @@ CONTRACTS = 0.5
 #: Longest step over which the derivative and the tangent together change the sign of their
 #: determinant, in units of the scale: it passes a branch point, or leads to the branch beside.
 PASSING = 1e-3
+#: Farthest that a point lies from where it was predicted, in steps; more halves a step that is
+#: longer than this, in units of the scale: it may have passed over a loop of the curve.
+PREDICTED, SHORT = 0.05, 0.002
 #: Steps are doubled where so few evaluations sufficed and the tangent turned by less.
 EASY, STRAIGHT = 3, 0.995
 #: First, longest and shortest step, in units of the scale.
@@ -38,8 +41,10 @@ ENDING = 0.0005
 #: Farthest that the corrector moves from the predicted point, in steps.
 ASTRAY = 0.6
 #: Points after which a curve may be found to be closed, and the cosine of the angle at which it
-#: then meets its start, and passes it.
+#: then passes its start.
 LEAST_CLOSED, AGAIN = 8, 0.9
+#: Farthest that a step lies from a point that it passes, in steps.
+PASSED = 0.02
 
 
 class Equations(Protocol):
@@ -189,6 +194,7 @@ def follow(
     first: float | np.ndarray = FIRST,
     ends: Callable[[Curve], str] | None = None,
     group: np.ndarray | None = None,
+    longest: float = LONGEST,
 ) -> list[Curve]:
     """Curves from points float64[k, m + 1] on them, until they leave the range of an unknown, are
     closed or have ``points`` points.
@@ -210,10 +216,12 @@ def follow(
         ENDING of there.
     group : int64[k], optional
         Curves that are one: where one of them is closed, the others go no farther.
+    longest : float
+        Longest step, in units of the scale.
     """
     rows = np.arange(len(start))
     here = correct(equations, start, tangents_at(equations, start, along, rows), rows, 1.0)
-    fronts = _Fronts(equations, bounds, [Curve() for _ in rows], first)
+    fronts = _Fronts(equations, bounds, [Curve() for _ in rows], first, longest)
     fronts.begin(here, tangents(_finite(here.derivative), along))
     while len(fronts.going):
         taken = fronts.step()
@@ -239,8 +247,10 @@ class _Fronts:
         bounds: Mapping[int, tuple[float, float]],
         curves: list[Curve],
         first: float | np.ndarray,
+        longest: float = LONGEST,
     ) -> None:
         self.equations, self.bounds, self.curves = equations, bounds, curves
+        self.longest = longest
         self.length = np.broadcast_to(first, len(curves)).astype(float)
 
     def begin(self, here: Corrected, tangent: np.ndarray) -> None:
@@ -274,7 +284,9 @@ class _Fronts:
         turn = np.min([np.einsum("ki,ki->k", *both) for both in sides], axis=0)
         side = _orientation(trial.derivative, tangent)
         stays = (side * self.side[going] >= 0) | (length < PASSING)
-        smooth = (turn > TURN) & (trial.contraction < CONTRACTS) & stays
+        off = np.linalg.norm((trial.z - guess) / scale, axis=1)
+        foreseen = (off < PREDICTED * length) | (length < SHORT)
+        smooth = (turn > TURN) & (trial.contraction < CONTRACTS) & stays & foreseen
         counts = trial.found & (smooth | (length < 100 * SHORTEST))
         easy = counts & (trial.evaluations <= EASY) & (turn > STRAIGHT)
         for j in np.flatnonzero(counts):
@@ -287,7 +299,7 @@ class _Fronts:
         self.side[taken] = side[counts]
         self.equations.accepted(self.z[taken], taken)
         factor = np.where(counts, np.where(easy, 2.0, 1.0), 0.5)
-        self.length[going] = np.minimum(factor * length, LONGEST)
+        self.length[going] = np.minimum(factor * length, self.longest)
         for i in going[~counts & (self.length[going] < SHORTEST)]:
             self.curves[i].end = "lost"
         self._close(taken)
@@ -339,12 +351,39 @@ class _Fronts:
         return np.asarray(np.where(np.isfinite(far), far, length * here) * scale)
 
     def _close(self, taken: np.ndarray) -> None:
-        """Close the curves that are about to pass their start as they left it."""
-        for i in taken[_closed(self.equations, self.curves, taken, self.length)]:
+        """Close the curves that have passed their start as they left it."""
+        for i in taken:
             curve = self.curves[i]
+            if len(curve.z) < LEAST_CLOSED or not _has_returned(self.equations, curve, i):
+                continue
+            for kept in (curve.z, curve.tangent, curve.derivative, curve.length):
+                kept.pop()
             apart = (curve.z[0] - curve.z[-1]) / self.equations.scale[i]
             _add(curve, curve.z[0], curve.tangent[0], curve.derivative[0], _size(apart))
             curve.end = "closed"
+
+
+def passes(curve: Curve, point: np.ndarray, scale: np.ndarray) -> bool:
+    """Whether the last step of a curve passes a point: the cubic between its ends does."""
+    step, way = (curve.z[-1] - curve.z[-2]) / scale, (point - curve.z[-2]) / scale
+    length = _size(step)
+    share = float(way @ step) / length**2 if length else 0.0
+    if not 0.0 < share <= 1.0:
+        return False
+    before, here = (length * tangent for tangent in curve.tangent[-2:])
+    on = between(np.zeros_like(step), step, before, here, np.array(share))
+    return _size(way - on) < PASSED * length
+
+
+def _has_returned(equations: Equations, curve: Curve, row: int) -> bool:
+    """Whether a curve has passed its start in the direction in which it left."""
+    scale, one = equations.scale[row], np.array([row])
+    starts = equations.alike(curve.z[0][None], one)[0]
+    ways = equations.alike(curve.tangent[0][None] * scale, one)[0] / scale
+    return any(
+        way @ curve.tangent[-1] >= AGAIN and passes(curve, same, scale)
+        for same, way in zip(starts, ways, strict=True)
+    )
 
 
 def _orientation(derivative: np.ndarray, tangent: np.ndarray) -> np.ndarray:
@@ -378,28 +417,3 @@ def _add(
     curve.tangent.append(tangent.copy())
     curve.derivative.append(derivative.copy())
     curve.length.append((curve.length[-1] if curve.length else 0.0) + float(moved))
-
-
-def _closed(
-    equations: Equations, curves: list[Curve], rows: np.ndarray, step: np.ndarray
-) -> np.ndarray:
-    """Which curves are about to pass their start in the direction in which they left, bool[r]."""
-    result = np.zeros(len(rows), bool)
-    for j, i in enumerate(rows):
-        curve = curves[i]
-        if len(curve.z) < LEAST_CLOSED or curve.end:
-            continue
-        scale = equations.scale[i]
-        one = np.array([i])
-        starts = equations.alike(curve.z[0][None], one)[0]
-        ways = equations.alike(curve.tangent[0][None] * scale, one)[0] / scale
-        for same, way in zip(starts, ways, strict=True):
-            there = (same - curve.z[-1]) / scale
-            apart = float(np.linalg.norm(there))
-            if (
-                apart <= 1.05 * step[i]
-                and there @ curve.tangent[-1] >= AGAIN * apart
-                and way @ curve.tangent[-1] >= AGAIN
-            ):
-                result[j] = True
-    return result

@@ -2,28 +2,35 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from saltus.analysis.branches.arclength import correct, tangents
+from saltus.analysis.branches.arclength import Curve, correct, follow, passes, tangents
 from saltus.analysis.branches.sequence_changes import contact_points
 from saltus.analysis.branches.shooting import PeriodicOrbits
-from saltus.analysis.branches.special_points import SpecialPoint, locate, outside, tests
+from saltus.analysis.branches.special_points import COMPLEX, SpecialPoint, locate, outside, tests
 
 #: A fold so near to a branch point is none, in units of the scale: it is located less well there.
 VERTEX = 1e-4
 #: Shortest interval that is halved, in units of the scale.
 LEAST = 1e-9
+#: What is smaller at the zero of a test vanishes there.
+VANISHES = 1e-6
 #: The parameter's share of a tangent that is nothing but rounding.
 STILL = 1e-8
 #: A test that comes down to less than this share of what it is beside may vanish twice there; so
 #: often points are put where it may.
 DIP, DIVES = 0.5, 4
-#: How often an interval is halved in which changes of stability don't add up.
-HALVINGS = 6
+#: How often an interval is halved in which changes of stability don't add up; how often it is then
+#: followed anew, with how many times shorter steps, and to how many points at most.
+HALVINGS, RETRACED, SHORTER, MOST_POINTS = 6, 3, 16, 400
+#: A way between two points that is longer than the step by this factor is another one; it isn't
+#: looked for in a step shorter than this, in units of the scale.
+LONGER, NARROW = 1.02, 1e-4
 
 
 @dataclass
@@ -86,13 +93,22 @@ class Branch:
         for _ in range(DIVES):
             if not len(refine(self, *_dips(self))):
                 break
+        for _ in range(RETRACED):
+            self._halve()
+            if not retrace(self, self.unexplained):
+                break
+        else:
+            self._halve()
+        self.unexplained = _unexplained(self, turning=True)
+        self.events = _in_order(self, [*self.events, *self._contacts()])
+
+    def _halve(self) -> None:
+        """Locate bifurcations; halve the intervals in which they don't explain what changes."""
         for left in reversed(range(HALVINGS)):
             self.events = _located(self)
             self.unexplained = _unexplained(self)
             if not left or not self.unexplained or not len(refine(self, self.unexplained)):
                 break
-        self.unexplained = _unexplained(self, turning=True)
-        self.events = _in_order(self, [*self.events, *self._contacts()])
 
     def _contacts(self) -> list[SpecialPoint]:
         """Where the contact sequence changes."""
@@ -172,11 +188,18 @@ def _is_vertex(event: SpecialPoint, events: Sequence[SpecialPoint], branch: Bran
 
 
 def _is_real(point: SpecialPoint) -> bool:
-    """Whether a zero of the test for tori is a complex pair on the unit circle."""
-    if point.kind != "neimark_sacker":
-        return True
-    on = np.abs(np.abs(point.multipliers) - 1.0) < 1e-6
-    return bool((on & (np.abs(point.multipliers.imag) > 1e-7)).sum() >= 2)
+    """Whether a test vanishes at a point: it may also change its sign by a leap, between branches
+    that run alongside or at two real multipliers whose product is one.
+    """
+    own = point.multipliers
+    if point.kind == "fold":
+        return bool(abs(point.tangent[-1]) < VANISHES)
+    if point.kind == "period_doubling":
+        return bool(np.abs(own + 1.0).min() < VANISHES)
+    if point.kind == "neimark_sacker":
+        on = np.abs(np.abs(own) - 1.0) < VANISHES
+        return bool((on & (np.abs(own.imag) > COMPLEX)).sum() >= 2)
+    return True
 
 
 def _ahead(branch: Branch, point: SpecialPoint) -> float:
@@ -234,12 +257,58 @@ def refine(branch: Branch, places: Sequence[int], shares: np.ndarray | float = 0
     tangent = tangents(derivative, branch.tangent[after[good]])
     own = orbits.multipliers(point.z[good], derivative, rows[good])
     between = branch.length[after] + shares * (branch.length[after + 1] - branch.length[after])
-    new = {"z": point.z[good], "tangent": tangent, "derivative": derivative}
-    for name, values in {**new, "multipliers": own, "length": between[good]}.items():
-        setattr(branch, name, np.insert(getattr(branch, name), after[good] + 1, values, axis=0))
-    placed = after[good] + 1 + np.arange(len(good))
+    return _put(branch, after[good], point.z[good], tangent, derivative, own, between[good])
+
+
+def _put(
+    branch: Branch,
+    after: np.ndarray,
+    z: np.ndarray,
+    tangent: np.ndarray,
+    derivative: np.ndarray,
+    multipliers: np.ndarray,
+    length: np.ndarray,
+) -> np.ndarray:
+    """Put new points behind the points int64[r]; their numbers, int64[r]."""
+    new = {"z": z, "tangent": tangent, "derivative": derivative, "multipliers": multipliers}
+    for name, values in {**new, "length": length}.items():
+        setattr(branch, name, np.insert(getattr(branch, name), after + 1, values, axis=0))
+    placed = after + 1 + np.arange(len(after))
     branch.events = [replace(event, after=_moved(branch, event, placed)) for event in branch.events]
     return placed
+
+
+def retrace(branch: Branch, places: Sequence[int]) -> bool:
+    """Follow a branch anew in some intervals, by shorter steps: a step across a loop leads to the
+    same branch beyond it. Whether another way was found.
+    """
+    found = False
+    for after in sorted(places, reverse=True):
+        ahead, unit = branch.z[after + 1], branch.scale
+        whole = float(np.linalg.norm((ahead - branch.z[after]) / unit))
+        if whole < NARROW:
+            continue
+        orbits = branch.orbits.near(branch.z[[after]], np.array([branch.row]))
+        (curve,) = follow(
+            orbits, branch.z[[after]], branch.tangent[[after]], {}, MOST_POINTS, whole / SHORTER,
+            ends=functools.partial(_arrived, ahead, unit), longest=whole / SHORTER,
+        )  # fmt: skip
+        if curve.end != "arrived" or curve.length[-1] < LONGER * whole:
+            continue
+        z, tangent, derivative = (
+            np.array(one[1:]) for one in (curve.z, curve.tangent, curve.derivative)
+        )
+        length = branch.length[after] + np.array(curve.length[1:])
+        end = length[-1] + np.linalg.norm((ahead - z[-1]) / unit)
+        branch.length[after + 1 :] += end - branch.length[after + 1]
+        own = orbits.multipliers(z, derivative, np.zeros(len(z), np.int64))
+        _put(branch, np.full(len(z), after), z, tangent, derivative, own, length)
+        found = True
+    return found
+
+
+def _arrived(point: np.ndarray, unit: np.ndarray, curve: Curve) -> str:
+    return "arrived" if len(curve.z) > 1 and passes(curve, point, unit) else ""
 
 
 def _moved(branch: Branch, event: SpecialPoint, placed: np.ndarray) -> int:

@@ -66,8 +66,11 @@ def _passes(branch: Branch, value: float) -> np.ndarray:
     own = CubicHermiteSpline(
         curve.x, branch.z[each, -1] / branch.scale[-1], branch.tangent[each, -1]
     )
-    places = own.solve(value / branch.scale[-1], extrapolate=False)
-    result = curve(places[np.isfinite(places)]) * branch.scale
+    level = value / branch.scale[-1]
+    places = own.solve(level, extrapolate=False)
+    ends = curve.x[[0, -1]]  # of which rounding would say whether they are passed
+    ends = ends[np.abs(own(ends) - level) < SAME]
+    result = curve(np.append(places[np.isfinite(places)], ends)) * branch.scale
     result[:, -1] = value
     return np.asarray(result)
 

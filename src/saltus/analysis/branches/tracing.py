@@ -6,19 +6,20 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from saltus.analysis.branches.arclength import FIRST, Curve, correct, follow
 from saltus.analysis.branches.branch import Branch
-from saltus.analysis.branches.same_branch import branch_of
+from saltus.analysis.branches.same_branch import SAME, branch_of
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.switching import Seed, children, ends_there
 
-#: How far a new branch begins from the point where it leaves another, in units of the scale.
-ASIDE = 0.001
+#: How far a new branch begins from the point where it leaves another, in units of the scale: the
+#: first of these at which Newton's method finds it.
+ASIDE = (1e-3, 2e-4, 4e-5)
 #: Radius of a limit cycle that is lost because it shrinks to an equilibrium, in units of the scale.
 SHRUNK = 0.005
 #: Farthest that a seed lies from its orbit, in units of the scale.
@@ -78,9 +79,9 @@ def trace(
         if start is not None and not known and not ends_there(seed, branches):
             branch = plan.follow(plan, start)
             if branch is not None and not _was_followed(plan, branch, branches):
-                branches.append(branch)
                 branch.find_events()
-                waiting += plan.leave(branch, len(branches) - 1, plan.switch, plan.longest)
+                number = _place(branch, branches, waiting)
+                waiting += plan.leave(branch, number, plan.switch, plan.longest)
         if progress is not None:
             progress(begun / (begun + len(waiting)))
 
@@ -90,14 +91,49 @@ def _was_followed(plan: Plan, branch: Branch, branches: Sequence[Branch]) -> boo
     return plan.crossed and branch_of(middle, branch.orbits.n, branches) >= 0
 
 
+def _place(branch: Branch, branches: list[Branch], waiting: list[Seed]) -> int:
+    """Add a branch to a list and return its number: that of one that it runs along from end to end,
+    which had stepped over where the new one began and makes room for it.
+    """
+    old = {branch_of(branch.z[place], branch.orbits.n, branches) for place in (1, -2)}
+    number = old.pop() if len(branch.z) > 2 and len(old) == 1 else -1
+    if number < 0:
+        branches.append(branch)
+        return len(branches) - 1
+    before, branches[number] = branches[number], branch
+    branch.parent = before.parent
+    for i, one in enumerate(branches):
+        branches[i].parent = _renumbered(one.parent, number, before, branch)
+    for i, seed in enumerate(waiting):
+        waiting[i] = replace(seed, parent=_renumbered(seed.parent, number, before, branch))
+    return number
+
+
+def _renumbered(
+    parent: tuple[int, int] | None, number: int, before: Branch, after: Branch
+) -> tuple[int, int] | None:
+    """The event that a branch leaves, once another branch has this number."""
+    if parent is None or parent[0] != number:
+        return parent
+    event = before.events[parent[1]]
+    apart = [
+        np.abs((other.z - event.z) / after.scale).max() if other.kind == event.kind else np.inf
+        for other in after.events
+    ]
+    return (number, int(np.argmin(apart))) if apart and min(apart) < SAME else None
+
+
 # -- following -------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class Start:
-    """The orbit of a seed, closed by Newton's method: float64[z], and the units of its unknowns."""
+    """The orbit of a seed, closed by Newton's method: float64[z], the units of its unknowns, and
+    the first step from there, in these.
+    """
 
     seed: Seed
     z: np.ndarray
     scale: np.ndarray
+    first: float = FIRST
 
     @property
     def n(self) -> int:
@@ -113,11 +149,6 @@ class Start:
         up[-1] = 1.0
         return np.stack([up, -up])
 
-    @property
-    def first(self) -> float:
-        """The first step, in units of the scale."""
-        return FIRST if self.seed.along is None else ASIDE
-
     @classmethod
     def of(cls, plan: Plan, seed: Seed) -> Start | None:
         """At the parameter of the seed, beside it where a branch leaves another; None if there is
@@ -126,14 +157,16 @@ class Start:
         n, z = len(seed.points), seed.z
         scale = np.concatenate([np.tile(seed.scale, n), np.abs(seed.own)])
         scale[-1] = plan.limits[1] - plan.limits[0]
-        normal = np.zeros(len(z))
-        normal[-1] = 1.0
-        if seed.along is not None:
-            z, normal = z + ASIDE * seed.along * scale, seed.along
         row, orbits = np.zeros(1, np.int64), plan.make(n, scale[None])
-        orbits.accepted(z[None], row)
-        point = correct(orbits, z[None], normal[None], row, ASTRAY)
-        return cls(seed, point.z[0], scale) if point.found[0] else None
+        up = np.eye(len(z))[-1]
+        for aside in (0.0,) if seed.along is None else ASIDE:
+            normal = up if seed.along is None else seed.along
+            begin = z + aside * normal * scale
+            orbits.accepted(begin[None], row)
+            point = correct(orbits, begin[None], normal[None], row, ASTRAY)
+            if point.found[0]:
+                return cls(seed, point.z[0], scale, aside or FIRST)
+        return None
 
 
 def _halved(orbits: PeriodicOrbits, curve: Curve) -> str:

@@ -266,6 +266,52 @@ def test_a_fold_and_a_graze_next_to_each_other_are_both_found():
     assert found.attrs["unexplained_changes"] == 0
 
 
+@sl.system(states="p q u w", forced_at="frequency")
+def gears(t, p, q, u, w, *, gap=0.004, frequency=5.7):
+    """A pair of gears with backlash; its T orbits turn back twice within 0.01 Hz, and again."""
+    mesh = sl.freeplay(p - q, stiffness=500.0, gap=gap) + 0.2 * (u - w)
+    drive = 1.0 + 2.0 * sl.cos(2 * sl.pi * frequency * t)
+    return u, w, (drive - mesh - 20 * p - 0.05 * u) / 0.01, (mesh - 1.0 - 20 * q - 0.05 * w) / 0.02
+
+
+def at_rest(vary, **more):
+    """Branches of the gears from rest."""
+    return sl.branches(gears, {"frequency": vary}, (0.0,) * 4, progress=False, **more)
+
+
+def test_a_loop_within_a_step_is_followed_by_shorter_ones():
+    """Of which changes of stability tell that don't add up."""
+    whole, near = at_rest((5.6, 5.8), switch=(), at=2), at_rest((5.65, 5.66), switch=(), at=2)
+    for found in (whole, near):
+        assert found.attrs["unexplained_changes"] == 0
+        assert (found.branch_periods == 1).all()
+    folds = [located(whole, "fold", value) for value in (5.6526, 5.6578)]
+    np.testing.assert_allclose(folds, [located(near, "fold", value) for value in folds], rtol=1e-11)
+
+
+def test_at_each_bifurcation_a_multiplier_lies_on_the_unit_circle():
+    """Also where a test of stability changes its sign between branches that run alongside."""
+    found = at_rest((5.62, 5.7), switch=(), at=2)
+    own = found.event_multiplier_real.values + 1j * found.event_multiplier_imag.values
+    for kind, where in (("fold", 1.0), ("period_doubling", -1.0)):
+        these = own[found.event_kind.values == kind]
+        assert len(these)
+        assert np.abs(these - where).min(axis=1).max() < 1e-6
+
+
+def test_each_doubling_is_the_end_of_a_branch_of_twice_the_period():
+    """Though those curve away from their beginning within a thousandth of the range."""
+    found = at_rest((5.61, 6.35))
+    values, of = found.point_frequency.values, found.point_branch.values
+    ends = [values[of == i][[0, -1]] for i in np.flatnonzero(found.branch_periods.values == 2)]
+    for kind, at, branch in zip(
+        found.event_kind.values, found.event_frequency.values, found.event_branch.values,
+        strict=True,
+    ):  # fmt: skip
+        if kind == "period_doubling" and found.branch_periods.values[branch] == 1:
+            assert np.abs(np.array(ends) - at).min() < 1e-3
+
+
 def test_a_limit_cycle_is_followed_with_its_period():
     """Van der Pol's: the multiplier is exp(mu integral(1 - x**2)); the period is known."""
 

@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import saltus as sl
 
@@ -32,6 +33,12 @@ def brusselator(t, x, v, *, feed=1.0, excess=2.5):
 def bistable(t, x, v, *, load=0.0):
     """Rests where load = x**3 - x: folds at x**2 = 1/3."""
     return v, load + x - x**3 - 0.4 * v
+
+
+@sl.system(states="x")
+def wrinkled(t, x, *, load=0.0, width=0.0005):
+    """Rests on an S, with a loop near x = 0 that is far narrower than a step."""
+    return load - x + x**3 + 2 * width * sl.tanh(x / width)
 
 
 def events(found):
@@ -189,3 +196,24 @@ def test_the_cycles_of_a_linear_centre_are_one_family():
     assert len(kinds) == 3
     np.testing.assert_allclose(np.ptp(found.event_alpha.values), 0.0, atol=1e-9)
     assert found.attrs["unexplained_changes"] == 0
+
+
+def test_a_branch_makes_room_for_one_with_a_loop_that_it_stepped_over():
+    """A seed outside the loop comes first, and a step passes over it; the next one lies in it."""
+    seeds = sl.equilibria(wrinkled, x=(-2.0, 2.0))
+    assert seeds.sizes["equilibrium"] == 5
+    found = sl.branches(wrinkled, {"load": (-0.2, 0.2)}, seeds, progress=False)
+    assert found.sizes["branch"] == 3
+    width = wrinkled.values["width"]
+    turn = brentq(lambda x: 1 - 3 * x**2 - 2 / np.cosh(x / width) ** 2, width / 50, 2 * width)
+    fold = 2 * width * np.tanh(turn / width) - turn + turn**3
+    assert [kind for kind, _, _ in events(found)] == ["fold", "fold"]
+    np.testing.assert_allclose(np.sort(found.event_load), [-fold, fold], rtol=1e-9)
+
+
+def test_a_branch_that_stops_early_says_so():
+    found = of_rests(wrinkled, {"load": (-0.2, 0.2)}, x=(-2.0, -0.5))
+    assert "stopped" not in sl.describe(found)
+    seeds = sl.equilibria(wrinkled, x=(-2.0, -0.5))
+    few = sl.branches(wrinkled, {"load": (-0.2, 0.2)}, seeds, points=3, progress=False)
+    assert "stopped by points= at" in sl.describe(few)
