@@ -285,6 +285,7 @@ def test_a_loop_within_a_step_is_followed_by_shorter_ones():
     for found in (whole, near):
         assert found.attrs["unexplained_changes"] == 0
         assert (found.branch_periods == 1).all()
+        assert not found.branch_closed.any()
     folds = [located(whole, "fold", value) for value in (5.6526, 5.6578)]
     np.testing.assert_allclose(folds, [located(near, "fold", value) for value in folds], rtol=1e-11)
 
