@@ -11,6 +11,7 @@ import pytest
 import xarray as xr
 
 import saltus as sl
+from saltus.errors import ParameterError, SaltusWarning, TraceError
 from saltus.models import find
 
 pytestmark = pytest.mark.filterwarnings("ignore")
@@ -283,3 +284,44 @@ def test_every_refusal_is_in_words(only_arguments, seed, trials):
 def test_what_once_ended_inside(only_arguments, call, told):
     with pytest.raises(sl.SaltusError, match=told):
         call()
+
+
+# -- what to do next -------------------------------------------------------------------------------
+@sl.system(states="x v")
+def unnamed(t, x, v, *, f=0.2):
+    """Its forcing repeats, and nothing says so."""
+    return v, -x - 0.1 * v + sl.cos(2 * sl.pi * f * t)
+
+
+@sl.system(states="x v", forced_at="f")
+def walled(t, x, v, *, f=0.2, gap=0.5):
+    """With a rigid stop."""
+    return v, -x - 0.1 * v + sl.cos(2 * sl.pi * f * t), sl.impact(x < gap, v, restitution=0.8)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: sl.attractors(unnamed, (0, 0)), "depends on time, .* name it by forced_at="),
+        (lambda: sl.lyapunov(unnamed, (0, 0)), "depends on time, .* name it by forced_at="),
+        (lambda: sl.basin_fractions(rig, x=(-1, 1, 9), v=(0, 1)), r"x must be \(low, high\)"),
+        (lambda: sl.bifurcation_diagram(rig, force=(1, 2, 3)), "vary={'force': "),
+        (lambda: sl.energy_balance(rig), r"energy=\.\.\., supplied=\.\.\."),
+    ],
+)
+def test_a_wrong_call_is_answered_by_the_right_one(call, words):
+    with pytest.raises(ParameterError, match=words):
+        call()
+
+
+def test_comparisons_that_are_joined_need_brackets():
+    with pytest.raises(TraceError, match=r"brackets, \(x > gap\) & \(v > 0\)"):
+
+        @sl.system(states="x v")
+        def made(t, x, v):
+            return v, -sl.piecewise((x, x > 1.0 & v > 0.0), otherwise=0.0)
+
+
+def test_a_start_beyond_a_stop_is_called_that():
+    with pytest.warns(SaltusWarning, match="invalid - the start lies beyond a stop"):
+        sl.simulate(walled, (0.6, 0.0), periods=1)

@@ -119,6 +119,21 @@ def test_every_code_is_a_class():
         basin_entropy(labels, box=0)
 
 
+def test_cells_beyond_a_stop_count_nowhere():
+    """Half of the grid is a wall: there is no boundary along it, and what lies before it counts."""
+    walled = np.full((100, 100), 3)
+    walled[:52] = -3
+    assert basin_entropy(walled)[0] == 0.0
+    assert math.isnan(basin_entropy(walled)[1])
+    assert uncertain_share(walled, 1) == 0.0
+    beside = np.where(walled < 0, -4, noise(100, 0.5))
+    free = beside >= 0
+    entropy, _ = basin_entropy(beside)
+    assert entropy == pytest.approx(basin_entropy(beside[55:])[0], rel=0.02)
+    assert uncertain_share(beside, 2) == pytest.approx(15 / 16, abs=0.02)
+    assert free.mean() == 0.48
+
+
 @pytest.mark.parametrize("p", [0.5, 0.2])
 def test_noise_has_the_entropy_of_the_binomial_sum(p):
     """A box of 25 cells holds k of one label with the binomial probability; its entropy is that of

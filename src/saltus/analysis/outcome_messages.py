@@ -83,11 +83,21 @@ def messages(run: xr.Dataset, asked: Span | None = None, system: System | None =
                 advice = stuck or f"{_outlook(run, asked, int(here[0]))} {advice}"
             if code == st.NONFINITE and run.attrs.get("method", "Taylor") != "Taylor":
                 advice += _BELOW_A_ROOT.format(method=run.attrs["method"])
+            if code == st.INVALID and _is_finite(run, int(here[0]), system):
+                meaning = "the start lies beyond a stop"
             texts.append(
                 f"{len(here)} of {len(status)} trajectories: {name} - {meaning} (first: "
                 f"{_where(run, int(here[0]))}). {advice}"
             )
     return texts
+
+
+def _is_finite(run: xr.Dataset, index: int, system: System | None) -> bool:
+    """Whether the state at the end of a trajectory, and its parameters, are numbers."""
+    place = run.isel(trajectory=index) if "trajectory" in run.dims else run
+    names = [f"end_{name}" for name in str(run.attrs["states"]).split()]
+    names += [] if system is None else system.values
+    return all(np.isfinite(place[name].values).all() for name in names if name in place.variables)
 
 
 def _where(run: xr.Dataset, index: int) -> str:

@@ -157,6 +157,8 @@ def _instead(
 ) -> str:
     """What to write in place of an argument that isn't there."""
     system = kwargs.get("system", args[0] if args else None)
+    if isinstance(system, System) and word in system.values and "vary" in known:
+        return f"It is a parameter of {system.name}: vary={{{word!r}: (low, high, count)}}."
     if isinstance(system, System) and word in system.values:
         by = f"values={{{word!r}: ...}} or " if "values" in known else ""
         return f"It is a parameter of {system.name}: give it by {by}system.with_values({word}=...)."
@@ -193,6 +195,9 @@ def _call(known: Mapping[str, inspect.Parameter]) -> str:
         p.name
         for p in known.values()
         if p.default is p.empty and p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)
+    ]
+    needed += [
+        f"{p.name}=..." for p in known.values() if p.default is p.empty and p.kind == p.KEYWORD_ONLY
     ]
     ranges = [
         _RANGES[p.name] for p in known.values() if p.kind == p.VAR_KEYWORD and p.name in _RANGES

@@ -171,6 +171,14 @@ class Expr:
         return id(self)
 
     # -- everything that would need a number -------------------------------------------------------
+    def __and__(self, other: object) -> Expr:
+        raise TraceError(
+            "an equation joined two values by & or |, which bind tighter than comparisons: put "
+            "each comparison in brackets, (x > gap) & (v > 0)."
+        )
+
+    __or__ = __rand__ = __ror__ = __and__
+
     def __bool__(self) -> bool:
         raise TraceError(
             "an equation asked whether a traced value is true. It is a symbol here, not a number: "

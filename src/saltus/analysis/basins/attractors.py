@@ -264,11 +264,14 @@ def box_ranges(system: System, box: Mapping[str, Any]) -> dict[str, tuple[float,
     ranges = {}
     for name, given in box.items():
         try:
-            low, high = (to_si(value, system.units[name], name) for value in given)
-        except (TypeError, ValueError) as error:
+            low, high = given
+        except (TypeError, ValueError):
+            unit = system.units[name]
             raise ParameterError(
-                f'{name} must be (low, high), such as {name}=("-5 mm", "5 mm"): {error}'
+                f'{name} must be (low, high), such as {name}=("-1 {unit}", "1 {unit}"), not '
+                f"{shown(given)}."
             ) from None
+        low, high = (to_si(value, system.units[name], name) for value in (low, high))
         if not low < high:
             raise ParameterError(f"the range of {name} is empty: {shown(low)} to {shown(high)}.")
         ranges[name] = (low, high)

@@ -4,7 +4,8 @@ intricate the boundaries are.
 All functions take the labels of the cells of a regular grid, int[nA, nB]. Negative labels are codes
 (escaped, unconverged, ...), not attractors: they have no share, but in the measures of boundaries
 each code counts as one more class, since a cell that may or may not settle is as uncertain as one
-between two attractors.
+between two attractors. Cells without a motion, whose start lies beyond a stop or wasn't computed,
+count nowhere.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ BOX = 5
 LARGEST_DISTANCE = 16
 #: Distances that a slope needs at least, so that it has an error.
 FEWEST_DISTANCES = 3
+#: Codes of cells without a motion.
+NO_MOTION = (Kind.FAILED, Kind.NOT_COMPUTED)
 
 
 # -- shares ----------------------------------------------------------------------------------------
@@ -92,7 +95,8 @@ def basin_entropy(labels: np.ndarray, box: int = BOX) -> tuple[float, float]:
     Parameters
     ----------
     labels : array of int, shape (nA, nB)
-        Attractor or code of each cell; each code is a class of its own.
+        Attractor or code of each cell; each code is a class of its own but those in NO_MOTION:
+        such cells count in no box.
     box : int
         Cells along the side of a box.
 
@@ -110,26 +114,32 @@ def basin_entropy(labels: np.ndarray, box: int = BOX) -> tuple[float, float]:
     if rows * columns == 0:
         return np.nan, np.nan
     boxes = labels[: rows * box, : columns * box].reshape(rows, box, columns, box)
+    cells = (~np.isin(boxes, NO_MOTION)).sum(axis=(1, 3))
     entropy, classes = np.zeros((rows, columns)), np.zeros((rows, columns), dtype=int)
-    for label in np.unique(labels):
-        share = (boxes == label).mean(axis=(1, 3))
-        present = share > 0
-        entropy[present] -= share[present] * np.log(share[present])
+    for label in np.setdiff1d(labels, NO_MOTION):
+        count = (boxes == label).sum(axis=(1, 3))
+        present = count > 0
+        share = count[present] / cells[present]
+        entropy[present] -= share * np.log(share)
         classes += present
-    mixed = classes > 1
-    return float(entropy.mean()), float(entropy[mixed].mean()) if mixed.any() else np.nan
+    mixed, held = entropy[classes > 1], entropy[cells > 0]
+    return _mean(held), _mean(mixed)
+
+
+def _mean(of: np.ndarray) -> float:
+    return float(of.mean()) if of.size else np.nan
 
 
 def uncertain_share(labels: np.ndarray, distance: int) -> float:
     """Share of the cells of which a neighbour ``distance`` cells away, along either axis and to
-    either side, has another label.
+    either side, has another label; cells in NO_MOTION are none.
 
     Beyond its edges the grid is continued by its mirror image. That keeps every cell and changes no
     dimension: a share of the cells that have all four neighbours would grow with the distance for a
     straight line, one of all cells would fall for noise.
     """
     labels = np.asarray(labels)
-    uncertain = np.zeros(labels.shape, dtype=bool)
+    uncertain, moves = np.zeros(labels.shape, dtype=bool), ~np.isin(labels, NO_MOTION)
     for axis, size in enumerate(labels.shape):
         place = np.arange(size)
         below, above = place - distance, place + distance
@@ -137,8 +147,9 @@ def uncertain_share(labels: np.ndarray, distance: int) -> float:
             np.where(below < 0, -1 - below, below),
             np.where(above >= size, 2 * size - 1 - above, above),
         ):
-            uncertain |= labels != np.take(labels, neighbour, axis=axis)
-    return float(uncertain.mean())
+            differs = labels != np.take(labels, neighbour, axis=axis)
+            uncertain |= differs & np.take(moves, neighbour, axis=axis)
+    return float(uncertain[moves].mean()) if moves.any() else 0.0
 
 
 def uncertainty_exponent(labels: np.ndarray) -> tuple[float, float, float]:

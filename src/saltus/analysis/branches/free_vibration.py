@@ -65,8 +65,9 @@ def free_system(system: System) -> tuple[System, str]:
     )  # fmt: skip
     if not autonomous(made):
         raise ParameterError(
-            f"{system.name} is forced: its equations depend on time. Set the force, and what "
-            'damps, to zero: values={"force": 0, "damping_ratio": 0}.'
+            f"{system.name} is forced: its equations depend on time. Set the parameters of its "
+            f"forcing, and of what damps, to zero by values={{name: 0}} - it has "
+            f'{", ".join(system.values)} - or take phase="quadrature".'
         )
     return made, name
 

@@ -15,7 +15,7 @@ import numpy as np
 from saltus.analysis.orbits.cycles import directions
 from saltus.analysis.orbits.equilibria import autonomous, jacobian_of
 from saltus.errors import ParameterError, shown
-from saltus.flow.maps import FORCED, NO_PERIOD, Stroboscope
+from saltus.flow.maps import FORCED, Stroboscope
 from saltus.flow.taylor import Taylor
 from saltus.system.system import System
 from saltus.units import to_si
@@ -57,7 +57,11 @@ def looks_every(
         return None
     if every is None:
         if not autonomous(system):
-            raise ParameterError(f"{system.name} {NO_PERIOD}")
+            raise ParameterError(
+                f"{system.name} depends on time, but no parameter is named as the frequency of its "
+                f"forcing: name it by forced_at= in @sl.system. If the forcing repeats otherwise, "
+                f'give every=, its period, such as every="0.1 s".'
+            )
         return _turn(system, start, parameters)
     seconds = to_si(every, "s", "every")
     if not 0 < seconds < math.inf:

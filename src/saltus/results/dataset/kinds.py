@@ -37,7 +37,7 @@ CLOSED = (Kind.PERIODIC, Kind.EQUILIBRIUM, Kind.LIMIT_CYCLE)
 WITHOUT: Mapping[Kind, str] = {
     Kind.ESCAPED: "escaped: their motion grew beyond all numbers",
     Kind.UNCONVERGED: "lead to no known attractor within the periods allowed",
-    Kind.FAILED: "failed: the integration ended early, and status says why",
+    Kind.FAILED: "failed: they begin beyond a stop or ended early, and status says why",
     Kind.NOT_COMPUTED: "weren't computed: the run was stopped",
 }
 #: The words for them by their codes.
