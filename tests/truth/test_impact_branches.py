@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import impact_orbits
 import saltus as sl
@@ -118,3 +119,43 @@ def test_a_ball_in_a_shaken_box():
     )  # fmt: skip
     fold = float(exact["B30"])
     assert nearest(found, "fold", fold) == pytest.approx(fold, rel=1e-14)
+
+
+def test_a_branch_goes_on_with_another_impact_behind_a_graze():
+    """Of orbits whose impacts are all at one stop: it doesn't turn back upon itself. Their period
+    is closed by an independent solver, flight by flight.
+    """
+    found = sl.branches(IMPACT(), {"frequency": (0.5, 2.0)}, progress=False)
+    whole = np.flatnonzero(found.branch_periods.values == 1)
+    assert len(whole) == 1
+    assert {found.branch_begin.values[whole[0]], found.branch_end.values[whole[0]]} == {"range"}
+    of, kind = found.event_branch.values == whole[0], found.event_kind.values
+    grazes = found.event_frequency.values[of & (kind == "graze")]
+    assert np.diff(np.sort(grazes)).min() > 1e-3
+    impacts = found.point_contacts.values
+    mine = np.flatnonzero((found.point_branch.values == whole[0]) & (impacts == 2))
+    for i in mine[len(mine) * np.array([4, 6, 8]) // 12]:
+        frequency = float(found.point_frequency[i])
+        start = [float(found[f"point_{name}"].values[i, 0]) for name in ("x", "v")]
+        end, count = flown(start, frequency)
+        assert count == 2
+        np.testing.assert_allclose(end, start, atol=1e-8)
+
+
+def flown(state, frequency):
+    """The state after a forcing period, and the impacts on the way."""
+
+    def rates(t, z):
+        return z[1], np.cos(frequency * t) - 0.1 * z[1] - z[0]
+
+    def gap(_, z):
+        return z[0] - 1.0
+
+    gap.terminal, gap.direction = True, 1.0
+    t, end, count = 0.0, 2 * np.pi / frequency, 0
+    while True:
+        run = solve_ivp(rates, (t, end), state, "DOP853", events=gap, rtol=1e-12, atol=1e-13)
+        if run.status != 1:
+            return run.y[:, -1], count
+        t, (x, v), count = run.t[-1], run.y[:, -1], count + 1
+        state = [min(x, 1.0), -0.8 * v]

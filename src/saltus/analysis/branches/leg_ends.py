@@ -206,7 +206,7 @@ def _appears(
         return _by_free_flow(event, event.z, tangent)
     start, onto = with_impact(event, contact, None)
     along = onto.tangent(start)
-    place = onto.contacts.index(contact, event.place if legs.contacts else 0)
+    place = event.place + 1 if legs.contacts else 0
     step = 1e-6 * along * onto.scale[0]
     faster = onto.speeds(np.array([start + step, start - step]))[:, place]
     return End(event, event.z, onto, start, along if faster[0] > faster[1] else -along)

@@ -15,6 +15,7 @@ from saltus.analysis.branches.arclength import FIRST, Curve, correct, follow
 from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.same_branch import SAME, branch_of
 from saltus.analysis.branches.shooting import PeriodicOrbits
+from saltus.analysis.branches.special_points import SpecialPoint
 from saltus.analysis.branches.switching import Seed, children, ends_there
 
 #: How far a new branch begins from the point where it leaves another, in units of the scale: the
@@ -92,35 +93,44 @@ def _was_followed(plan: Plan, branch: Branch, branches: Sequence[Branch]) -> boo
 
 
 def _place(branch: Branch, branches: list[Branch], waiting: list[Seed]) -> int:
-    """Add a branch to a list and return its number: that of one that it runs along from end to end,
-    which had stepped over where the new one began and makes room for it.
+    """Add a branch to a list and return its number: that of the first one that it holds from end to
+    end. Those stepped over where the new one began, or were lost on the way, and leave the list.
     """
-    old = {branch_of(branch.z[place], branch.orbits.n, branches) for place in (1, -2)}
-    number = old.pop() if len(branch.z) > 2 and len(old) == 1 else -1
-    if number < 0:
+    held = {i: one for i, one in enumerate(branches) if _holds(branch, one)}
+    if not held:
         branches.append(branch)
         return len(branches) - 1
-    before, branches[number] = branches[number], branch
-    branch.parent = before.parent
-    for i, one in enumerate(branches):
-        branches[i].parent = _renumbered(one.parent, number, before, branch)
-    for i, seed in enumerate(waiting):
-        waiting[i] = replace(seed, parent=_renumbered(seed.parent, number, before, branch))
+    number, *others = held
+    branch.parent, branches[number] = held[number].parent, branch
+    kept = [i for i in range(len(branches)) if i not in others]
+    branches[:] = [branches[i] for i in kept]
+
+    def now(parent: tuple[int, int] | None) -> tuple[int, int] | None:
+        if parent is None or parent[0] not in held:
+            return parent and (kept.index(parent[0]), parent[1])
+        event = _same_event(held[parent[0]].events[parent[1]], branch)
+        return None if event is None else (number, event)
+
+    for one in branches:
+        one.parent = now(one.parent)
+    waiting[:] = [replace(seed, parent=now(seed.parent)) for seed in waiting]
     return number
 
 
-def _renumbered(
-    parent: tuple[int, int] | None, number: int, before: Branch, after: Branch
-) -> tuple[int, int] | None:
-    """The event that a branch leaves, once another branch has this number."""
-    if parent is None or parent[0] != number:
-        return parent
-    event = before.events[parent[1]]
+def _holds(branch: Branch, other: Branch) -> bool:
+    """Whether a branch passes both ends of another."""
+    ends = other.z[[1, -2]] if len(other.z) > 2 else other.z
+    n = other.orbits.n
+    return n == branch.orbits.n and all(branch_of(z, n, [branch]) == 0 for z in ends)
+
+
+def _same_event(event: SpecialPoint, branch: Branch) -> int | None:
+    """The number of an event among those of another branch."""
     apart = [
-        np.abs((other.z - event.z) / after.scale).max() if other.kind == event.kind else np.inf
-        for other in after.events
+        np.abs((other.z - event.z) / branch.scale).max() if other.kind == event.kind else np.inf
+        for other in branch.events
     ]
-    return (number, int(np.argmin(apart))) if apart and min(apart) < SAME else None
+    return int(np.argmin(apart)) if apart and min(apart) < SAME else None
 
 
 # -- following -------------------------------------------------------------------------------------
