@@ -36,6 +36,9 @@ PREDICTED, SHORT = 0.05, 0.002
 EASY, STRAIGHT = 3, 0.995
 #: First, longest and shortest step, in units of the scale.
 FIRST, LONGEST, SHORTEST = 0.02, 0.12, 1e-7
+#: Distance from where a curve began, in units of the scale, at which steps may be longer than the
+#: longest; the least share of a tangent.
+FAR, TINY = 10.0, 1e-3
 #: Distance from where a curve ends within which its last point lies, in units of the scale.
 ENDING = 0.0005
 #: Farthest that the corrector moves from the predicted point, in steps.
@@ -299,11 +302,20 @@ class _Fronts:
         self.side[taken] = side[counts]
         self.equations.accepted(self.z[taken], taken)
         factor = np.where(counts, np.where(easy, 2.0, 1.0), 0.5)
-        self.length[going] = np.minimum(factor * length, self.longest)
+        self.length[going] = np.minimum(factor * length, self._longest(going))
         for i in going[~counts & (self.length[going] < SHORTEST)]:
             self.curves[i].end = "lost"
         self._close(taken)
         return taken
+
+    def _longest(self, going: np.ndarray) -> np.ndarray:
+        """The longest steps of curves, which grow where these are far from where they began; those
+        of unknowns with a range don't.
+        """
+        begun = np.array([self.curves[i].z[0] for i in going])
+        away = np.linalg.norm((self.z[going] - begun) / self.equations.scale[going], axis=1)
+        within = np.abs(self.tangent[going][:, list(self.bounds)]).max(axis=1, initial=TINY)
+        return self.longest * np.clip(away / FAR, 1.0, 1.0 / within)
 
     def undo(self, i: int, why: str) -> None:
         """Take the last point of a curve back: it lies beyond the end."""
