@@ -33,8 +33,8 @@ def gaps_function(system: System, clocks: Clocks) -> str:
     """``gaps(t, y, p, h, out)``: value of every guard, sides taken from the state; h is what the
     clocks hold.
 
-    Whether a contact is held, and the side of a gap that is zero, are taken from out. Behind the
-    gaps come, for a guard whose contact can be held, the rate at which its constraint is left
+    Whether a contact is held, and the side of a gap that is zero or on whose boundary the state is
+    known to stand (twice the side), are taken from out. Behind the gaps come, for a guard whose contact can be held, the rate at which its constraint is left
     without its own force, what that force changes of it (of an impact, over what it changes without
     friction), and the constraint itself.
     """
@@ -45,12 +45,14 @@ def gaps_function(system: System, clocks: Clocks) -> str:
         switch=clocks.side,
     )
     if laws:
-        code.lines += [f"up_{i} = out[{i}] > 0.0" for i in range(len(system.guards))]
+        for i in range(len(system.guards)):
+            code.lines += [f"side_{i} = out[{i}]", f"up_{i} = side_{i} > 0.0"]
     for i in evaluation_order(system):
         value = code.value(system.guards[i].gap)
         code.lines.append(f"out[{i}] = {value}")
         if laws:
-            code.lines.append(f"up_{i} = {value} > 0.0 or ({value} == 0.0 and up_{i})")
+            above = f"({value} > 0.0 and side_{i} > -1.5) or side_{i} > 1.5"
+            code.lines.append(f"up_{i} = {above} or ({value} == 0.0 and up_{i})")
     count, held = len(system.guards), []
     for i, guard in enumerate(system.guards):
         if guard.law and guard.law.kind == "hold":
@@ -158,7 +160,8 @@ def taylor_head(system: System, order: int, lanes: int) -> Head:
         for k in range(order + 1):
             code.write(row * (order + 1) + k, code.state(i, k), of_column=row in column)
     gaps = [_gap_form(builder, *each) for each in zip(system.guards, aside.gaps, strict=True)]
-    guards, rows = _write_guards(system, code, gaps, constants, order)
+    sizes = [builder.form(gap) for gap in aside.gaps]
+    guards, rows = _write_guards(system, code, gaps, sizes, constants, order)
     gap_row, scale_row, calm_row = rows, rows + len(system.guards), rows + 2 * len(system.guards)
     for j in range(len(aside.guards)):
         for i, entry in enumerate(aside.without(j, moved)):
@@ -277,9 +280,16 @@ def tables(**rows: list) -> dict[str, Constant]:
 
 
 def _write_guards(
-    system: System, code: JetCode, forms: list[Linear], constants: Constants, order: int
+    system: System,
+    code: JetCode,
+    forms: list[Linear],
+    sizes: list[Linear],
+    constants: Constants,
+    order: int,
 ) -> tuple[_Guards, int]:
-    """Write every gap to the work rows; guards of one state share that state's rows."""
+    """Write every gap to the work rows, and the size of its terms, held or not; guards of one state
+    share that state's rows.
+    """
     guards, rows = _Guards(), len(system.states) * (order + 1)
     boundaries = [
         None if guard.law and guard.law.kind == "hold" else _state_boundary(form)
@@ -302,14 +312,14 @@ def _write_guards(
         for k in range(order + 1):
             code.write(own_rows + k, code.linear(form, k))
         own_rows += order + 1
-    for i, (form, boundary) in enumerate(zip(forms, boundaries, strict=True)):
+    for i, (form, size, boundary) in enumerate(zip(forms, sizes, boundaries, strict=True)):
         if boundary:
             x, c = code.state(guards.snap_state[i], 0), f"load(c, {guards.snap_const[i]}, LANES)"
             value: str | None = f"{x} - {c}" if boundary[1] > 0 else f"{c} - {x}"
         else:
             value = code.linear(form, 0)
         code.write(own_rows + i, value)
-        code.write(own_rows + len(forms) + i, code.size(form))
+        code.write(own_rows + len(forms) + i, code.size(size))
     return guards, own_rows
 
 

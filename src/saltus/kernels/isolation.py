@@ -146,6 +146,33 @@ def leading_sign(q, degree):
 
 
 @kernel
+def is_rounding(q, degree, noise):
+    """Whether all terms together are within the noise: on [0, 1] the gap can't be told from zero."""
+    total = 0.0
+    for k in range(degree + 1):
+        total += abs(q[k])
+    return total <= noise
+
+
+@kernel
+def side_of_leaving(q, degree, noise):
+    """Sign of ``x * q(x)`` where it can first be told from zero on [0, 1] (0: nowhere). Leading terms
+    of the other sign are rounding, and made zero.
+    """
+    side, x = 0, 2.0**-DEEPEST
+    while side == 0 and x <= 1.0:
+        value = x * polynomial(q, degree, x)
+        if abs(value) > noise:
+            side = 1 if value > 0.0 else -1
+        x *= 2.0
+    for k in range(degree + 1):
+        if side == 0 or q[k] * side > 0.0:
+            break
+        q[k] = 0.0
+    return side
+
+
+@kernel
 def turning_place(q, degree, low, high, rates):
     """The one place in (low, high) where q' goes from - to +; leaves the coefficients of q' in
     `rates`.

@@ -23,6 +23,7 @@ NONUNIQUE = 15
 INVALID_RESTITUTION = 16
 PAINLEVE = 17
 INVALID_FRICTION = 18
+MODE_VIOLATION = 19
 
 #: Name and meaning of every status code.
 STATUS = {
@@ -78,6 +79,11 @@ STATUS = {
     INVALID_FRICTION: (
         "invalid_friction",
         "the force of friction, or its coefficient in a contact that rests, is negative",
+    ),
+    MODE_VIOLATION: (
+        "mode_violation",
+        "the state was found on the other side of a boundary than the equations that moved it are "
+        "for: this motion is wrong from there on",
     ),
     PAINLEVE: (
         "painleve",

@@ -14,8 +14,10 @@ from saltus.kernels.isolation import (
     TOUCH_GUARD,
     first_crossing,
     is_exact_zero,
+    is_rounding,
     leading_sign,
     polynomial,
+    side_of_leaving,
 )
 from saltus.kernels.lanes import lowest_bit
 from saltus.kernels.status import (
@@ -25,6 +27,7 @@ from saltus.kernels.status import (
     GRAZE_SHALLOW,
     GRAZES,
     HOLD_LAW,
+    MODE_VIOLATION,
     REC_DIRECTION,
     REC_GUARD,
     REC_KIND,
@@ -82,12 +85,19 @@ def first_place(lanes, lane, g, h, slow, count):
         return 2.0 * h, count
     noise = scaled_gap(lanes, lane, g, h, slow)
     fresh = lanes.fresh[g, lane] > 0.5
+    if fresh and abs(lanes.work[GAP_ROW + g, lane]) > allowed_beside(lanes, lane, g):
+        lanes.memo[lane, FAULT] = MODE_VIOLATION
+        return 2.0 * h, count
     sign = leading_sign(slow.q, ORDER)
+    if fresh and is_rounding(slow.q, ORDER, noise):
+        sign = 0
+    elif lanes.fresh[g, lane] == RIDDEN:  # nothing leaves it by rounding
+        sign = side_of_leaving(slow.q, ORDER, noise)
+    if sign == 0:
+        lanes.memo[lane, RESTS] |= 1 << g  # it is ridden
+        return 2.0 * h, count
     if sign < 0:
         return 0.0, count  # on the wrong side from the start of the step on
-    if sign == 0:
-        lanes.memo[lane, RESTS] |= 1 << g
-        return 2.0 * h, count
     slow.out[MARGIN] = lanes.run[LEAST, lane]
     # a node on the boundary that turns back: a tangency at the node
     if not fresh and slow.q[0] == 0.0:
@@ -109,6 +119,12 @@ def first_place(lanes, lane, g, h, slow, count):
     )
     lanes.run[LEAST, lane] = slow.out[MARGIN]
     return (slow.out[AT] * h if crosses else 2.0 * h), min(count, MOST_TOUCHES - 1)
+
+
+@inner
+def allowed_beside(lanes, lane, g):
+    """How far rounding may carry a lane off a boundary that it keeps to."""
+    return KEPT * (lanes.work[SCALE_ROW + g, lane] + lanes.prior[PRIOR_ROWS * g + OLD, lane])
 
 
 @kernel
@@ -283,15 +299,38 @@ def show_clocks(lanes, lane, slow):
             slow.held[HELD * j + REF] += lanes.clock[BASE, lane]
 
 
+@inner
+def stands_at(lanes, lane, g, slow):
+    """Whether a lane is known to stand on a boundary whose gap is in slow.gaps: what that is then
+    says nothing of the side.
+    """
+    near = TOLD * ROUNDING * lanes.prior[PRIOR_ROWS * g + NEW, lane]
+    return lanes.fresh[g, lane] > 0.5 and abs(slow.gaps[g]) <= near
+
+
 @kernel
 def gaps_here(lanes, lane, batch, slow):
     """All gaps at the node where a lane stands, to slow.gaps; of contacts that can be held also
-    what `gaps` writes behind them.
+    what `gaps` writes behind them, in the mode of the lane where it stands on a boundary.
     """
     for i in range(NSTATES):
         slow.state[i] = lanes.y[i, lane]
     for g in range(NGUARDS):
         slow.gaps[g] = lanes.side[g, lane]
+    look_at_gaps(lanes, lane, batch, slow)
+    rounded = False
+    for g in range(NGUARDS if LAWS else 0):
+        rounded = rounded or (slow.gaps[g] != 0.0 and stands_at(lanes, lane, g, slow))
+    if rounded:
+        for g in range(NGUARDS):
+            known = stands_at(lanes, lane, g, slow)
+            slow.gaps[g] = lanes.side[g, lane] * (KNOWN if known else 1.0)
+        look_at_gaps(lanes, lane, batch, slow)
+
+
+@kernel
+def look_at_gaps(lanes, lane, batch, slow):
+    """What `gaps` says of the state in slow.state, with the sides in slow.gaps."""
     show_clocks(lanes, lane, slow)
     parameters = batch.param[lanes.memo[lane, WHO] * batch.stride]
     gaps(
@@ -408,15 +447,24 @@ def time_error(lanes, lane, g, rate, tau):
 
 
 @inner
-def land(lanes, lane, batch, g, rate, slow):
-    """One contact: snap the state to the boundary, change the side, make the guard fresh, count and
-    record.
-    """
-    before = mode_of(lanes, lane)
+def snap(lanes, lane, g):
+    """Put the state on the boundary of a guard."""
     if SNAP_STATE[g] >= 0:
         lanes.y[SNAP_STATE[g], lane] = lanes.c[SNAP_CONST[g], lane]
-    lanes.fresh[g, lane] = 1.0
-    change_side(lanes, lane, batch, g, rate, before, g, slow)
+    if lanes.fresh[g, lane] != RIDDEN:
+        lanes.fresh[g, lane] = 1.0
+
+
+@inner
+def land(lanes, lane, batch, g, rate, slow):
+    """One contact: snap the state to the boundary, change the side, make the guard fresh, count and
+    record. A boundary on which the state stood is left because it came to another.
+    """
+    before, crossed = mode_of(lanes, lane), g
+    if lanes.found[DELTA, lane] == 0.0 and lanes.fresh[g, lane] > 0.5 and lanes.run[CAUSE, lane] >= 0.0:
+        crossed = int(lanes.run[CAUSE, lane])
+    snap(lanes, lane, g)
+    change_side(lanes, lane, batch, g, rate, before, crossed, slow)
 
 
 @inner
@@ -437,17 +485,8 @@ def jump_over(lanes, lane, batch, g, rate, slow):
     """One contact that the boundary made: it jumped over the state, when that crossed another
     boundary or at a break (-1).
     """
-    flipped = int(lanes.run[FLIPPED, lane])
-    change_side(
-        lanes,
-        lane,
-        batch,
-        g,
-        rate,
-        mode_of(lanes, lane),
-        lowest_bit(flipped) if flipped != 0 else -1,
-        slow,
-    )
+    cause = int(lanes.run[CAUSE, lane])
+    change_side(lanes, lane, batch, g, rate, mode_of(lanes, lane), cause, slow)
 
 
 @inner
@@ -463,6 +502,8 @@ def change_side(lanes, lane, batch, g, rate, before, crossed, slow):
         for m in range(batch.cursor[who]):
             batch.sample_mode[who, m] = mode_of(lanes, lane)
         return
+    if lanes.run[CAUSE, lane] < 0.0:
+        lanes.run[CAUSE, lane] = float(crossed)
     if TANGENT and crossed >= 0:
         saltate(lanes, lane, batch, crossed, before, slow)
     if lanes.run[BOUNCES, lane] > 1.5:
@@ -528,7 +569,7 @@ def note_arrival(lanes, lane):
     arrived = lanes.found[DELTA, lane] > 0.0 or now != lanes.run[LANDED, lane]
     if arrived:
         lanes.run[BOUNCES, lane], lanes.run[STARTING, lane], lanes.run[LANDED, lane] = 0.0, 0.0, now
-        lanes.run[FLIPPED, lane] = 0.0
+        lanes.run[FLIPPED, lane], lanes.run[CAUSE, lane] = 0.0, -1.0
     else:
         lanes.run[BOUNCES, lane] += 1.0
     return arrived
@@ -558,7 +599,9 @@ def land_all(lanes, lane, batch, hits, slow):
                 and lanes.fresh[g, lane] < 0.5
                 and past > ROUNDING * lanes.work[SCALE_ROW + g, lane]
             ):
-                batch.counters[who, VIOLATIONS] += arrived
+                if arrived:
+                    batch.counters[who, VIOLATIONS] += 1
+                    return MODE_VIOLATION
                 jump_over(lanes, lane, batch, g, rate, slow)
             else:
                 land(lanes, lane, batch, g, rate, slow)

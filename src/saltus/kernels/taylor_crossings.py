@@ -152,15 +152,16 @@ def classify(lanes, g, h):
     falls, rises, concave, convex = one_way(p1, p2, p3, rest)
     dips = convex & turns & (6.0 * (vertex + larger(p3, 0.0) + noise) + rest < 0.0)
     inside, asked = p0 > 0.0, load(lanes.run, ACTIVE, LANES) > 0.5
-    if LAWS:  # more known zeros than one are left to the slow path
+    if LAWS:  # what is ridden, or has more known zeros than one, is left to the slow path
         asked = asked & (load(lanes.side, WATCHED + g, LANES) > 0.5)
-        inside = inside & (load(lanes.fresh, g, LANES) < 1.5)
+        inside = inside & (load(lanes.fresh, g, LANES) < RIDDEN)
     clear = inside & (((falls | rises | concave) & (end > noise)) | (least > noise))
     once = inside & (end < -noise) & (falls | concave | convex)
     closes = asked & inside & (~clear)
     undecided = ~inside
     if LAWS:
-        undecided = undecided & asked
+        beside = on_boundary & (magnitude(a0) > KEPT * (size + inherited))
+        undecided = (undecided | beside) & asked
     if NSERIES > 1:
         store(lanes.found, RIVALS + g, splat(-1.0, LANES))
     if any_lane(closes):
@@ -589,7 +590,7 @@ def share_to_first_crossing(lanes, h):
         inside, discriminant = p0 > 0.0, p1 * p1 - 4.0 * p0 * p2
         if LAWS:
             inside = inside & (load(lanes.side, WATCHED + g, LANES) > 0.5)
-            inside = inside & (load(lanes.fresh, g, LANES) < 1.5)
+            inside = inside & (load(lanes.fresh, g, LANES) < RIDDEN)
         x = 2.0 * p0 / (root(larger(discriminant, 0.0)) - p1)
         x = select(inside & (discriminant >= 0.0) & (x > 0.0), x, math.inf)
         second, first = smaller(second, larger(first, x)), smaller(first, x)

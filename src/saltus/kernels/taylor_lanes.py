@@ -16,6 +16,7 @@ from saltus.kernels.status import (
     HOLD_LAW,
     IMPACT_LAW,
     INVALID_FRICTION,
+    MODE_VIOLATION,
     NO_LAW,
     NONFINITE,
     NONUNIQUE,
@@ -138,7 +139,7 @@ def end_stretch(lanes, lane, batch, slow):
     if LAWS and lanes.memo[lane, FAULT] != 0:
         return lanes.memo[lane, FAULT]
     for g in range(NGUARDS):
-        if (lanes.memo[lane, RESTS] >> g) & 1 and LAW[g] == NO_LAW:
+        if (lanes.memo[lane, ALWAYS] >> g) & 1 and LAW[g] == NO_LAW:
             return RESTING
     return GRAZE_UNRESOLVED if lanes.run[SHALLOW, lane] > 0.0 else OK
 
@@ -181,6 +182,17 @@ def periods_behind(lanes, lane, batch):
 
 
 @inner
+def ride(lanes, lane):
+    """Keep the boundaries known to which a lane has kept in this step: it rides them."""
+    if lanes.memo[lane, DECIDED] == 0:
+        lanes.memo[lane, RESTS] = 0
+    for g in range(NGUARDS):
+        if (lanes.memo[lane, RESTS] >> g) & 1:
+            lanes.fresh[g, lane] = RIDDEN if LAWS else 1.0
+    lanes.memo[lane, ALWAYS] &= lanes.memo[lane, RESTS]
+
+
+@inner
 def crossing_guards(lanes, lane):
     """Bits of the guards that cross at the end of this step."""
     if lanes.memo[lane, DECIDED] == 1:
@@ -198,11 +210,9 @@ def attend(lanes, lane, batch, slow):
     hits = crossing_guards(lanes, lane)
     if lanes.run[DUE, lane] <= lanes.clock[TAU, lane]:
         write_samples(lanes, lane, batch, start, slow)
-    if LEVELS and lanes.memo[lane, FAULT] != 0:
+    if lanes.memo[lane, FAULT] != 0:
         return lanes.memo[lane, FAULT]
-    for g in range(NGUARDS):
-        if (lanes.memo[lane, RESTS] >> g) & 1:
-            lanes.fresh[g, lane] = 1.0
+    ride(lanes, lane)
     status = land_all(lanes, lane, batch, hits, slow) if hits != 0 else RUNNING
     if LAWS and lanes.memo[lane, FAULT] != 0:
         return lanes.memo[lane, FAULT]
@@ -210,6 +220,8 @@ def attend(lanes, lane, batch, slow):
         pass_break(lanes, lane, batch, slow)
     if status == RUNNING and lanes.clock[TAU, lane] >= lanes.run[END, lane]:
         status = end_stretch(lanes, lane, batch, slow)
+    if LAWS and status == RUNNING and strays(lanes, lane, batch, slow):
+        status = MODE_VIOLATION
     if status == RUNNING and is_slow(lanes, lane, batch):
         status = BUDGET_STEPS
     if status == RUNNING and lanes.run[MET, lane] >= lanes.run[MOST_MET, lane]:
@@ -225,11 +237,12 @@ def start_sides(lanes, lane, batch, slow):
     by the first step. No contact is held yet; a stop is on the side that it allows.
     """
     for g in range(NGUARDS):
-        lanes.side[g, lane] = -1.0
+        lanes.side[g, lane], lanes.fresh[g, lane] = -1.0, 0.0
     gaps_here(lanes, lane, batch, slow)
     for g in range(NGUARDS):
         lanes.side[g, lane] = -1.0 if slow.gaps[g] < 0.0 else 1.0
         lanes.fresh[g, lane] = 1.0 if slow.gaps[g] == 0.0 else 0.0
+        lanes.memo[lane, ALWAYS] |= (1 if slow.gaps[g] == 0.0 else 0) << g
         if LAW[g] == HOLD_LAW:
             lanes.side[g, lane], lanes.fresh[g, lane] = -1.0, 0.0
         if LAW[g] == IMPACT_LAW and slow.gaps[g] == 0.0:
@@ -276,6 +289,7 @@ def fill(lanes, lane, who, batch, slow):
         batch.minima[who, CONTACT_SPEED],
     )
     lanes.run[BOUNCES, lane], lanes.run[STARTING, lane], lanes.run[FLIPPED, lane] = 0.0, 0.0, 0.0
+    lanes.run[CAUSE, lane] = -1.0
     lanes.run[ACTIVE, lane] = 1.0
     lanes.run[TOLERANCE, lane] = batch.options[who, LOG2_TOLERANCE]
     lanes.run[MOST_MET, lane] = batch.options[who, MOST_CONTACTS]
@@ -309,6 +323,8 @@ def fill(lanes, lane, who, batch, slow):
         batch.carry[who, 4],
         batch.carry[who, 5],
     )
+    lanes.run[CAUSE, lane] = batch.carry[who, 6]
+    lanes.memo[lane, ALWAYS] = int(batch.carry[who, 7])
 
 
 @kernel
@@ -335,6 +351,8 @@ def empty(lanes, lane, batch, status):
         lanes.run[LIMIT, lane],
         lanes.run[MARK, lane],
     )
+    batch.carry[who, 6] = lanes.run[CAUSE, lane]
+    batch.carry[who, 7] = lanes.memo[lane, ALWAYS]
     batch.counters[who, STEPS] = int(lanes.run[TAKEN, lane])
     batch.counters[who, EVENTS], batch.counters[who, UNRESOLVED] = (
         int(lanes.run[MET, lane]),

@@ -66,14 +66,6 @@ def meet(lanes, lane, batch, g, rate, slow):
     return False
 
 
-@inner
-def snap(lanes, lane, g):
-    """Put the state on the boundary of a guard."""
-    if SNAP_STATE[g] >= 0:
-        lanes.y[SNAP_STATE[g], lane] = lanes.c[SNAP_CONST[g], lane]
-    lanes.fresh[g, lane] = 1.0
-
-
 @kernel
 def note(lanes, lane, batch, g, kind, direction, velocity, before, later, slow):
     """Count and record what a law did to the state in slow.state, `later` than now by some seconds;
@@ -278,11 +270,34 @@ def caught(lanes, lane, batch, g, slow):
     snap(lanes, lane, g)
     gaps_here(lanes, lane, batch, slow)
     if slow.gaps[NGUARDS + g] == 0.0 and slow.gaps[2 * NGUARDS + g] == 0.0:
-        return True  # another contact holds what this one could
+        return holds_any(lanes, lane)  # another contact holds what this one could
     if slow.gaps[2 * NGUARDS + g] < 0.0 and slow.gaps[PARTNER[g]] > 0.0:
         hold(lanes, lane, batch, g, 0.0, slow)
         return True
     return False
+
+
+@inner
+def holds_any(lanes, lane):
+    """Whether a contact of a lane is held."""
+    held = False
+    for g in range(NGUARDS):
+        held = held or (LAW[g] == HOLD_LAW and lanes.side[g, lane] > 0.0)
+    return held
+
+
+@kernel
+def strays(lanes, lane, batch, slow):
+    """Whether a contact that is held isn't on its boundary: then its reduced equations are wrong."""
+    if not holds_any(lanes, lane):
+        return False
+    gaps_here(lanes, lane, batch, slow)
+    away = False
+    for g in range(NGUARDS):
+        held = PARTNER[g] >= 0 and LAW[g] != HOLD_LAW and lanes.side[PARTNER[g], lane] > 0.0
+        near = KEPT * lanes.prior[PRIOR_ROWS * g + NEW, lane]
+        away = away or (held and not abs(slow.gaps[g]) <= near)
+    return away
 
 
 @kernel
@@ -428,6 +443,8 @@ def release(lanes, lane, batch, h, slow):
             if free and slow.gaps[m] == 0.0:
                 lanes.fresh[m, lane] = 2.0 if fades else 1.0
     watch(lanes, lane)
+    if lanes.run[CAUSE, lane] < 0.0:
+        lanes.run[CAUSE, lane] = float(h)
     if TANGENT and fades:
         saltate(lanes, lane, batch, h, before, slow)
     for i in range(NSTATES):

@@ -42,7 +42,8 @@ CLOCK_ROWS = CLOCK_ROW + HELD * NCLOCKS
 # changed sides at the last landing's instant (bits; bit NGUARDS: one of them changed back and was
 # counted again); the number of steps at which its pace is looked at next, and the periods behind it
 # when that was done last; the phase of the next break of a clock, and from which on it counts as
-# reached; log2 of the tolerance, and the contacts that the trajectory may make.
+# reached; log2 of the tolerance, and the contacts that the trajectory may make; the guard whose
+# boundary the state came to at the last landing's instant (-1: none).
 (
     END,
     DUE,
@@ -63,8 +64,8 @@ CLOCK_ROWS = CLOCK_ROW + HELD * NCLOCKS
     BREAK,
     WATCH,
 ) = range(18)
-TOLERANCE, MOST_MET = 18, 19
-RUN_ROWS = 20
+TOLERANCE, MOST_MET, CAUSE = 18, 19, 20
+RUN_ROWS = 21
 # Rows of `bounds`, for each series that a gap reads (see bound_series).
 LINEAR, QUADRATIC, CUBIC, CHANGE, SLOPE_AT_END, REST, BOUNDS = range(7)
 # Rows of `found`: time to the event or end of step, rate of the gap there, guard (-1: none),
@@ -79,9 +80,10 @@ DELTA, RATE, WHICH, NEAREST, TURNED, SIGN, DEPTH, ONBOARD, SERIES, UNTIL, P0, P1
 # Columns of `memo`: trajectory, periods, whether the slow path has decided this step, guards that
 # it found to cross (bits), guards on which the state rests (bits), whether a harmonic of time has
 # another phase in every period, whether this step isn't made of numbers, the status with which a
-# law of contact ends the motion (0: none does), whether a friction may become negative.
-WHO, COUNT, DECIDED, HITS, RESTS, DRIFTS, BROKEN, FAULT, MAY_PUSH = range(9)
-MEMO = 9
+# law of contact ends the motion (0: none does), whether a friction may become negative, guards
+# whose boundaries the state has ridden since its start (bits).
+WHO, COUNT, DECIDED, HITS, RESTS, DRIFTS, BROKEN, FAULT, MAY_PUSH, ALWAYS = range(10)
+MEMO = 10
 # Columns of `options`: log2 of the tolerance; steps after which a trajectory's pace is looked at;
 # contacts that it may make; periods that it must have gained by then, infinite if the steps are all
 # that it may take.
@@ -90,8 +92,9 @@ LOG2_TOLERANCE, MOST_STEPS, MOST_CONTACTS, PACE = range(4)
 # this one, each step counting half of the one after it; their rounding is inherited.
 OLD, NEW, PRIOR_ROWS = range(3)
 # Columns of `carry`, what a paused lane needs besides its state: LANDED, BOUNCES, STARTING,
-# FLIPPED, LIMIT, MARK, then NEW for each guard; where contacts have laws, `fresh` of each.
-CARRIED = 6
+# FLIPPED, LIMIT, MARK, CAUSE, ALWAYS, then NEW for each guard; where contacts have laws, `fresh` of
+# each.
+CARRIED = 8
 CARRY = CARRIED + (2 if LAWS else 1) * NGUARDS
 #: Records that one step may write at most: contacts and touches of all lanes, in the step and at
 #: the end of the run.
@@ -117,6 +120,14 @@ PARADOX = 1.0e-9
 CHATTER = 1.0e-8
 #: Times within this many ulp are one event (EVENTS.md, rule 6).
 COINCIDENT = 10.0 * 2.220446049250313e-16
+#: Part of the size of a gap's terms by which rounding may carry the state off a boundary that it
+#: keeps to, in all steps together.
+KEPT = 2.0**-30
+#: What `fresh` says of a boundary that is ridden, where contacts have laws: one zero is known, and
+#: what leaves it leaves it at once.
+RIDDEN = 1.25
+#: Side of a guard on whose boundary the state is known to stand, as `gaps` is told of it.
+KNOWN = 2.0
 #: Rounds of flips at one instant before the contact is given up as sliding (EVENTS.md, rule 6).
 MOST_BOUNCES = 100
 HUGE = 1.0e300

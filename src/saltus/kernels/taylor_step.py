@@ -261,6 +261,7 @@ def land_simply(lanes, simple, tau):
             )
     store(run, SHALLOW, shallow)
     store(run, FLIPPED, flipped)
+    store(run, CAUSE, select(simple, which, load(run, CAUSE, LANES)))
     met, slowest = load(run, MET, LANES), load(run, SLOWEST, LANES)
     store(run, MET, select(simple, met + 1.0, met))
     store(run, SLOWEST, select(simple, smaller(rate, slowest), slowest))
