@@ -19,7 +19,7 @@ from saltus.codegen.series import Linear, SeriesBuilder, is_constant
 from saltus.kernels.status import LAW_KINDS, NO_LAW
 from saltus.system import expression as ex
 from saltus.system.expression import Expr
-from saltus.system.guards import Guard
+from saltus.system.guards import Guard, is_hold
 from saltus.system.quantity import is_remembered
 from saltus.system.singular import set_aside
 from saltus.system.system import System
@@ -132,13 +132,17 @@ def _state_boundary(form: Linear) -> tuple[str, float, Expr] | None:
     return str(series.payload), sign, ex.neg(form.offset) if sign > 0 else form.offset
 
 
-def _gap_form(builder: SeriesBuilder, guard: Guard, gap: Expr) -> Linear:
+def _gap_form(builder: SeriesBuilder, number: int, guard: Guard, gap: Expr) -> Linear:
     """The series of a gap. While the contact is held its gap stays zero, and a difference of states
-    and times would leave rounding in its place, whose series allows no step: there it is zero.
+    and times would leave rounding in its place, whose series allows no step: there it is zero. So is
+    how far a contact that isn't held is from its release, where that may have poles.
     """
     form = builder.form(gap)
-    if guard.law is None or guard.law.partner < 0 or guard.law.kind == "hold":
+    if guard.law is None or guard.law.partner < 0:
         return form
+    if is_hold(guard):
+        poles = any(node.op == "div" and ex.varies(node.args[1]) for node in ex.walk(gap))
+        return builder.form(ex.select(ex.Bit(number), gap, 0.0)) if poles else form
     if _state_boundary(form) is not None:
         return form
     return builder.form(ex.select(ex.Bit(guard.law.partner), 0.0, gap))
@@ -159,8 +163,14 @@ def taylor_head(system: System, order: int, lanes: int) -> Head:
     for i, row in enumerate(written):
         for k in range(order + 1):
             code.write(row * (order + 1) + k, code.state(i, k), of_column=row in column)
-    gaps = [_gap_form(builder, *each) for each in zip(system.guards, aside.gaps, strict=True)]
-    sizes = [builder.form(gap) for gap in aside.gaps]
+    gaps = [
+        _gap_form(builder, number, guard, gap)
+        for number, (guard, gap) in enumerate(zip(system.guards, aside.gaps, strict=True))
+    ]
+    sizes = [
+        form if is_hold(guard) else builder.form(gap)
+        for form, guard, gap in zip(gaps, system.guards, aside.gaps, strict=True)
+    ]
     guards, rows = _write_guards(system, code, gaps, sizes, constants, order)
     gap_row, scale_row, calm_row = rows, rows + len(system.guards), rows + 2 * len(system.guards)
     for j in range(len(aside.guards)):

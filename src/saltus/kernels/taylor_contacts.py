@@ -137,7 +137,7 @@ def decide(lanes, lane, batch, slow):
     first, hits, count, least = h, 0, 0, lanes.run[LEAST, lane]
     lanes.memo[lane, DECIDED], lanes.memo[lane, RESTS], lanes.memo[lane, HITS] = 1, 0, 0
     if is_broken(lanes, lane, h, slow):
-        lanes.memo[lane, BROKEN] = 1
+        lanes.memo[lane, BROKEN], lanes.found[DELTA, lane] = 1, 0.0
         return
     for g in range(NGUARDS):
         at, count = first_place(lanes, lane, g, h, slow, count)

@@ -206,7 +206,7 @@ def attend(lanes, lane, batch, slow):
     """Everything that happened to one lane in this step. Returns its status."""
     start = lanes.run[START, lane]
     if overflowed(lanes, lane):
-        return NONFINITE
+        return RUNNING if LAWS and gives_way(lanes, lane, batch, slow) else NONFINITE
     hits = crossing_guards(lanes, lane)
     if lanes.run[DUE, lane] <= lanes.clock[TAU, lane]:
         write_samples(lanes, lane, batch, start, slow)

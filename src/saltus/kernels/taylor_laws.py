@@ -287,6 +287,26 @@ def holds_any(lanes, lane):
 
 
 @kernel
+def gives_way(lanes, lane, batch, slow):
+    """Let go of the surfaces that are held where nothing holds them any more, because the state came
+    to another boundary: the equations reduced by them are no numbers. Returns whether there is one.
+    """
+    if lanes.memo[lane, BROKEN] == 0 or not holds_any(lanes, lane):
+        return False
+    for g in range(NGUARDS):
+        lanes.prior[PRIOR_ROWS * g + NEW, lane] = lanes.prior[PRIOR_ROWS * g + OLD, lane]
+    lanes.memo[lane, BROKEN], lanes.memo[lane, DECIDED] = 0, 0
+    found = False
+    for g in range(NGUARDS):
+        if LAW[g] == SURFACE_LAW and lanes.side[PARTNER[g], lane] > 0.0:
+            gaps_here(lanes, lane, batch, slow)
+            if slow.gaps[2 * NGUARDS + g] == 0.0:
+                release(lanes, lane, batch, PARTNER[g], slow)
+                found = True
+    return found
+
+
+@kernel
 def strays(lanes, lane, batch, slow):
     """Whether a contact that is held isn't on its boundary: then its reduced equations are wrong."""
     if not holds_any(lanes, lane):
