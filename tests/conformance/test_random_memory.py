@@ -1,7 +1,8 @@
 """Contacts with a memory at large: random plays, sliders, ratchets, relays, tanks and followers, in
 many spellings, against exact motions found mode by mode (oracles/memory_automaton.py).
 
-The machines' modes and exits are their textbooks', written by hand; nothing is shared with the flow.
+The machines' modes and exits are their textbooks', written by hand; nothing is shared with the
+flow.
 ``python -m oracles.memory_check COUNT SEED`` runs as many as one likes, with RK4 as second judge.
 """
 

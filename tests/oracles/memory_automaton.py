@@ -1,11 +1,11 @@
 """Exact motions of piecewise-linear systems with a memory: one linear flow a mode, modes and exits
 written by hand.
 
-Each element (a play, a slider, a relay, ...) is a small state machine of its textbook: what flows in
-each of its modes, and which conditions end the mode. A system is a few elements on a common host;
-its mode is the tuple of theirs. In one mode the state, extended by ``1``, time and the harmonic
-drive, obeys ``z' = M z``, so that ``z(t + s)`` is a polynomial of degree :data:`DEGREE` in ``s`` to
-rounding once ``|M| s <= 1``. Exits are roots of such polynomials, every one bracketed before it is
+Each element (a play, a slider, a relay, ...) is a small state machine of its textbook: what flows
+in each of its modes, and which conditions end the mode. A system is a few elements on a common
+host; its mode is the tuple of theirs. In one mode the state, extended by ``1``, time and the
+harmonic drive, obeys ``z' = M z``, so that ``z(t + s)`` is a polynomial of degree :data:`DEGREE` in
+``s`` to rounding once ``|M| s <= 1``. Exits are roots of such polynomials, every one bracketed before it is
 polished.
 
 **Forms.** A linear form is a dictionary of coefficients. Its names are states, ``"1"``, ``"t"``,
@@ -21,6 +21,7 @@ gap of a carried element is, its first derivative that isn't zero decides.
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import NamedTuple, Protocol
 
@@ -55,8 +56,8 @@ class Exit(NamedTuple):
 
     forms: tuple[Form, ...]
     target: str
-    set: dict[str, Form] = {}
-    snap: dict[str, Form] = {}
+    set: dict[str, Form] = {}  # noqa: RUF012
+    snap: dict[str, Form] = {}  # noqa: RUF012
 
 
 class Element(Protocol):
@@ -306,7 +307,7 @@ def _first_positive(lines, values, slopes, noise):
     for line, value, slope in zip(lines, values, slopes, strict=True):
         cuts.update(_roots(line, value, slope))
     ordered = sorted(cuts)
-    for left, right in zip(ordered[:-1], ordered[1:], strict=True):
+    for left, right in itertools.pairwise(ordered):
         middle = np.polynomial.polynomial.polyval(0.5 * (left + right), lines.T)
         if (middle > noise).all():
             return left
@@ -315,10 +316,9 @@ def _first_positive(lines, values, slopes, noise):
 
 def _roots(line, value, slope):
     """All roots of a polynomial on [0, 1], its extremes located where two might hide."""
-    points, rate = list(_NODES), line[1:] * np.arange(1, DEGREE + 1)
-    for j in np.flatnonzero((slope[:-1] < 0.0) != (slope[1:] < 0.0)):
-        points.append(_root(rate, _NODES[j], _NODES[j + 1]))
-    points.sort()
+    rate, turns = line[1:] * np.arange(1, DEGREE + 1), (slope[:-1] < 0.0) != (slope[1:] < 0.0)
+    points = [_root(rate, _NODES[j], _NODES[j + 1]) for j in np.flatnonzero(turns)]
+    points = sorted([*_NODES, *points])
     at = np.polynomial.polynomial.polyval(np.array(points), line)
     return [
         _root(line, points[j], points[j + 1])

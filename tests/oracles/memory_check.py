@@ -1,8 +1,9 @@
 """saltus beside two independent solvers on random systems with a memory.
 
-``PYTHONPATH=src:tests python -m oracles.memory_check COUNT SEED`` prints how many systems ended how,
-and for each that doesn't agree a program that repeats it. ``... COUNT SEED conditions`` takes random
-joined and nested conditions instead, which RK4 alone judges. ``... 1 SEED.NUMBER`` repeats one.
+``PYTHONPATH=src:tests python -m oracles.memory_check COUNT SEED`` prints how many systems ended
+how, and for each that doesn't agree a program that repeats it. ``... COUNT SEED conditions`` takes
+random joined and nested conditions instead, which RK4 alone judges. ``... 1 SEED.NUMBER`` repeats
+one.
 """
 
 from __future__ import annotations
@@ -120,6 +121,16 @@ def _one(seed: str, conditions: bool) -> tuple[Case, Judged, Answer]:
         signal.alarm(0)
 
 
+def report(seed: str, case: Case, judged: Judged, ours: Answer) -> str:
+    """Everything that is needed to repeat a case and to see what is wrong."""
+    return (
+        f"\n# {seed}, {case.name}: {ours.status}, {ours.verdict} {ours.words}\n"
+        f"# off {ours.off:.2e}, allowed {judged.allowed:.1e}; "
+        f"RK4 is off by {judged.apart:.1e} of its own error\n"
+        f"# saltus {ours.end}\n# judge  {judged.end}\n{case.reproduction()}"
+    )
+
+
 def _late(*_):
     raise LateError
 
@@ -140,11 +151,7 @@ def main(arguments=None) -> int:
         if judged.apart > 1.0:
             count["judges differ"] += 1
         if ours.verdict not in ("same", "undecidable") or judged.apart > 1.0:
-            print(f"\n# {seed}, {that.name}: {ours.status}, {ours.verdict} {ours.words}")
-            print(
-                f"# off {ours.off:.2e}, allowed {judged.allowed:.1e}, RK4 {judged.apart:.1e} of its error"
-            )
-            print(f"# saltus {ours.end}\n# judge  {judged.end}\n{that.reproduction()}", flush=True)
+            print(report(seed, that, judged, ours), flush=True)
         if i % 50 == 49:
             print(
                 f"# {i + 1} systems, {time.process_time() - began:.0f} s: {dict(count)}", flush=True

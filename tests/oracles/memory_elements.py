@@ -1,8 +1,8 @@
 """Elements with a memory: each as its textbook's state machine, and as a user would write it.
 
-A part is made of linear forms (see :mod:`oracles.memory_automaton`) and of text. The two are written
-side by side by hand; nothing translates one into the other. A random generator chooses among the
-spellings of the text, never the machine.
+A part is made of linear forms (see :mod:`oracles.memory_automaton`) and of text. The two are
+written side by side by hand; nothing translates one into the other. A random generator chooses
+among the spellings of the text, never the machine.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ class Port(NamedTuple):
     """A displacement (or any signal) and its rate, as forms and as text.
 
     A rate that is written as pieces can't be compared with 0 in an equation of saltus (it says so);
-    the conditions under which it rises and falls then stand in ``rises`` and ``falls`` ("" : never).
+    the conditions under which it rises and falls then stand in ``rises`` and ``falls``; "": never.
     """
 
     x: Form
@@ -108,14 +108,14 @@ def chosen(
     """
     joined = [(value, " & ".join(parts)) for value, parts in rows]
     same = len({value for value, _ in rows}) == 1
-    way = rng.choice("rows nested joined negated sum".split())
+    way = rng.choice(("rows", "nested", "joined", "negated", "sum"))
     if way == "joined" and same:
         condition = " | ".join(f"({c})" for _, c in joined)
         return f"sl.piecewise(({rows[0][0]}, {condition}), otherwise={otherwise})"
     if way == "negated" and same:
         apart = " & ".join("(" + " | ".join(f"~{p}" for p in parts) + ")" for _, parts in rows)
         return f"sl.piecewise(({otherwise}, {apart}), otherwise={rows[0][0]})"
-    if way == "nested":
+    if way == "nested" and disjoint:
         inner = [
             (f"sl.piecewise(({value}, {' & '.join(parts[1:])}), otherwise={otherwise})", parts[0])
             if len(parts) > 1
@@ -219,7 +219,7 @@ def jenkins(rng: Random, f: str, port: Port, pushed: str) -> Part:
             "high": (Exit((times(-1, port.v),), "stick"),),
             "low": (Exit((port.v,), "stick"),),
         },
-        dict.fromkeys(("stick", "high", "low"), {pushed: {f: -1.0}}),
+        {mode: {pushed: {f: -1.0}} for mode in ("stick", "high", "low")},
         states={f: rng.choice((0.0, limit, _number(rng, -limit, limit)))},
         texts={f: rate},
         pushes=[f"- {f}"],
@@ -269,7 +269,9 @@ def ratchet(rng: Random, c: str, port: Port, pushed: str | None) -> Part:
 
 
 def peak(rng: Random, c: str, port: Port, pushed: str | None) -> Part:
-    """Peak detector with a leak: c rides on x where x would leave it below, and decays elsewhere."""
+    """Peak detector with a leak: c rides on x where x would leave it below, and decays
+    elsewhere.
+    """
     leak, k = _number(rng, 0.05, 0.4), _number(rng, 0.0, 0.5)
     x, v = port.x_text, port.v_text
     quicker = add(port.v, {c: leak})
@@ -294,7 +296,9 @@ def peak(rng: Random, c: str, port: Port, pushed: str | None) -> Part:
 
 
 def integrator(rng: Random, z: str, port: Port, pushed: str | None) -> Part:
-    """Integrator that stops at its limits (anti wind-up): z' = e unless at a limit and pushed on."""
+    """Integrator that stops at its limits (anti wind-up): z' = e unless at a limit and pushed
+    on.
+    """
     limit, gain, k = _number(rng, 0.1, 0.7), _number(rng, 0.3, 1.5), _number(rng, 0.2, 1.0)
     e, error = f"{gain}*({port.x_text})", times(gain, port.x)
     high = (reaches(rng, z, repr(limit)), positive(rng, port.x_text))

@@ -206,8 +206,8 @@ def _source(host, rates, parts):
 
 def random_drift(rng: Random, jumps: bool) -> Case:
     """The drifting oscillator in bounded coordinates p = x - v, q = z - v: a mass pushes a massless
-    slider with spring and dashpot over a gap; the slider sticks up to a force of 1 and drifts beyond
-    (Pavlovskaia, Wiercigroch & Grebogi, Phys. Rev. E 64 (2001) 056224).
+    slider with spring and dashpot over a gap; the slider sticks up to a force of 1 and drifts
+    beyond (Pavlovskaia, Wiercigroch & Grebogi, Phys. Rev. E 64 (2001) 056224).
     """
     xi, a, b = _number(rng, 0.01, 0.2), _number(rng, 0.1, 0.6), _number(rng, 0.05, 0.3)
     g, w = _number(rng, 0.0, 0.2), _number(rng, 0.1, 1.5)
@@ -221,7 +221,8 @@ def drift(xi, a, b, g, w, jumps, t_end, start=(0.0, 0.0, 0.0, 0.0)) -> Case:
     touch = "m > 0.5" if jumps else "p - q >= g"
     states = "p y q v m" if jumps else "p y q v"
     laws = ", 0.0, sl.jump(p - q > g, m=1), sl.jump(F < 0, m=0)" if jumps else ""
-    source = f"""def equation(t, {", ".join(states.split())}, *, xi={xi}, a={a}, b={b}, g={g}, w={w}):
+    values = f"xi={xi}, a={a}, b={b}, g={g}, w={w}"
+    source = f"""def equation(t, {", ".join(states.split())}, *, {values}):
     F = 2*xi*y + q
     touch = {touch}
     force = sl.piecewise((1.0, touch & (F > 1)), (F, touch & (F > 0)), otherwise=0)

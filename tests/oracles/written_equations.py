@@ -15,30 +15,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numba import njit
 
-_OPERATIONS = (
-    "add sub mult div neg sin cos abs sqrt max min gt gte lt lte and or not select".split()
-)
-(
-    ADD,
-    SUB,
-    MULT,
-    DIV,
-    NEG,
-    SIN,
-    COS,
-    ABS,
-    SQRT,
-    MAX,
-    MIN,
-    GT,
-    GTE,
-    LT,
-    LTE,
-    AND,
-    OR,
-    NOT,
-    SELECT,
-) = range(len(_OPERATIONS))
+(ADD, SUB, MULT, DIV, NEG, SIN, COS, ABS, SQRT, MAX, MIN) = range(11)
+(GT, GTE, LT, LTE, AND, OR, NOT, SELECT) = range(11, 19)
 _BINARY = {ast.Add: ADD, ast.Sub: SUB, ast.Mult: MULT, ast.Div: DIV, ast.BitAnd: AND, ast.BitOr: OR}
 _COMPARED = {ast.Gt: GT, ast.GtE: GTE, ast.Lt: LT, ast.LtE: LTE}
 _CALLED = {"sin": SIN, "cos": COS, "abs": ABS, "sqrt": SQRT, "max": MAX, "min": MIN}
@@ -154,8 +132,15 @@ def run(tape: Tape, start, t_end: float, steps: int, t_start: float = 0.0) -> np
     tape : Tape
         The equation.
     start : sequence of float (states,)
+        State at the start.
     t_end, t_start : float
+        Times.
     steps : int
+        How many.
+
+    Returns
+    -------
+    float array (states,)
     """
     state = np.array(start, float)
     jumps = np.array(tape.jumps, np.int64).reshape(-1, 3)
