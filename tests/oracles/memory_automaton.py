@@ -5,8 +5,8 @@ Each element (a play, a slider, a relay, ...) is a small state machine of its te
 in each of its modes, and which conditions end the mode. A system is a few elements on a common
 host; its mode is the tuple of theirs. In one mode the state, extended by ``1``, time and the
 harmonic drive, obeys ``z' = M z``, so that ``z(t + s)`` is a polynomial of degree :data:`DEGREE` in
-``s`` to rounding once ``|M| s <= 1``. Exits are roots of such polynomials, every one bracketed before it is
-polished.
+``s`` to rounding once ``|M| s <= 1``. Exits are roots of such polynomials, every one bracketed
+before it is polished.
 
 **Forms.** A linear form is a dictionary of coefficients. Its names are states, ``"1"``, ``"t"``,
 ``"cos"`` and ``"sin"`` (of the drive), ``"d:x"`` (the rate of the state x in the mode at hand) and

@@ -27,6 +27,7 @@ from .memory_systems import Case, random_case, random_conditions
 REACHED = ("ok", "graze_unresolved")
 SHIFT = 1e-7
 STEPS_A_SECOND = (4_000, 10_000)
+UNDECIDABLE = 0.05  # of motions of order one
 SECONDS = 20
 
 
@@ -85,8 +86,7 @@ def judge(case: Case, rk4: bool = True) -> Judged:
         written_equations.run(tape, np.add(case.start, shift), case.t_end, round(case.t_end * n))
         for n, shift in ((many, 0.0), (few, 0.0), (few, SHIFT))
     ]
-    own, spread = (np.abs(runs[1] - runs[i]).max() for i in (0, 2))
-    error = 1.0 / many + 20.0 * own + 1000.0 * spread
+    error = 1.0 / many + 10.0 * max(np.abs(runs[1] - runs[i]).max() for i in (0, 2))
     if end is None:
         return Judged(runs[0], error)
     return Judged(end, allowed, float(np.abs(runs[0] - end).max() / error))
@@ -106,7 +106,7 @@ def answer(case: Case, judged: Judged) -> Answer:
     status, off = str(run.status.item()), float(np.abs(end - judged.end).max())
     if status not in REACHED:
         return Answer(status, "dead end", off, end, f"at t = {run.end_time.item()}")
-    if judged.allowed > 1e-2:
+    if judged.allowed > UNDECIDABLE:
         return Answer(status, "undecidable", off, end)
     return Answer(status, "same" if off <= judged.allowed else "differs", off, end)
 
