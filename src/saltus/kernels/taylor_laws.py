@@ -454,7 +454,7 @@ def release(lanes, lane, batch, h, slow):
         needed, most = slow.gaps[NGUARDS + g], abs(slow.gaps[2 * NGUARDS + g])
         lanes.side[g, lane] = 1.0 if needed > 0.0 else -1.0
         starts_slowly = fades and abs(abs(needed) - most) <= SLOW_START * most
-        lanes.fresh[g, lane] = 2.0 if starts_slowly else 1.0
+        lanes.fresh[g, lane] = 2.0 if starts_slowly else RIDDEN
     else:
         lanes.side[g, lane] = LAW_SIDE[g]
         lanes.fresh[g, lane] = 3.0 if fades else 2.0
