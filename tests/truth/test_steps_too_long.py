@@ -1,5 +1,5 @@
-"""Fixed steps that are too long: refused where they don't see the forcing, and no success where only
-their errors grow.
+"""Fixed steps that are too long: refused where they don't see the forcing, and no success where
+only their errors grow.
 """
 
 from __future__ import annotations

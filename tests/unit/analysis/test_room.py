@@ -81,7 +81,7 @@ WIDE = ("2 Hz", "30 Hz", MANY)
         lambda: sl.simulate(rig, AXIS, periods=1, samples=1),
         lambda: sl.simulate(rig, (0, 0), t_end=1, values={"frequency": WIDE}),
         lambda: sl.simulate(rig, (0, 0), periods=1, samples=MANY),
-        lambda: sl.simulate(sl.models.bouncing_ball(), (1, 0), t_end=1, samples=MANY),
+        lambda: sl.simulate(sl.models.falling_ball(), (1, 0), t_end=1, samples=MANY),
         lambda: sl.stroboscope(rig, AXIS, 1),
         lambda: sl.stroboscope(rig, (0, 0), MANY),
         lambda: sl.poincare(rig, AXIS, periods=1, surface="v turns"),
