@@ -90,6 +90,7 @@ WIDE = ("2 Hz", "30 Hz", MANY)
         lambda: sl.energy_balance(rig, AXIS, periods=1, **sl.models.energy("delangre")),
         lambda: sl.attractors(rig, AXIS),
         lambda: sl.lyapunov(rig, AXIS),
+        lambda: sl.lyapunov(rig, (0, 0), method="wolf", periods=MANY),
     ],
 )
 def test_what_is_refused_is_counted_before_there_is_an_array_of_it(small, call):
