@@ -41,9 +41,9 @@ LAST = 96
 #: Where nothing but magnitudes is known, a state counts as at least this share of the largest of
 #: its unit: one that has died away beside others has no size of its own.
 LEAST_SHARE = 1e-6
-#: The size that every state has at least [SI]: of one that died away and is alone of its unit.
-#: A proton measures 1e-15 m.
-AT_REST = 1e-20
+#: The size that every state has at least [SI]: of one that died away and is alone of its unit. An
+#: atom measures 1e-10 m.
+AT_REST = 1e-14
 #: Rounding of a state, relative to the largest value of its unit.
 ROUNDING = 64 * np.finfo(float).eps
 #: Numbers of one state that are looked at together.
