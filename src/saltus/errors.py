@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import difflib
+import linecache
 import reprlib
+import traceback
 import unicodedata
 from collections.abc import Iterable
 from typing import Any
@@ -23,6 +25,10 @@ class SaltusError(Exception):
 
     def __init__(self, *args: object) -> None:
         super().__init__(*(_cut(part) if isinstance(part, str) else part for part in args))
+
+    def _render_traceback_(self) -> list[str]:
+        """What IPython shows in place of a traceback: the user's own line, and the message."""
+        return [*_own_line(self), f"{type(self).__name__}: {self}"]
 
 
 class TraceError(SaltusError):
@@ -53,6 +59,19 @@ class SaltusWarning(UserWarning):
 
 class UnusedParameterWarning(SaltusWarning):
     """A parameter of a system stands in none of its equations."""
+
+
+def _own_line(error: BaseException) -> list[str]:
+    """The user's line that called this package, with its number; nothing where it isn't known."""
+    found: list[str] = []
+    for frame, number in traceback.walk_tb(error.__traceback__):
+        package = str(frame.f_globals.get("__name__", "")).partition(".")[0]
+        if package == __name__.partition(".")[0] and found:
+            break
+        line = linecache.getline(frame.f_code.co_filename, number, frame.f_globals).strip()
+        if package not in ("IPython", "ipykernel") and line:
+            found = [f"line {number}: {line}"]
+    return found
 
 
 def _cut(message: str) -> str:

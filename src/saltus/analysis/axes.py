@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import ParameterError, among, nearest, shown
-from saltus.flow.counts import whole
+from saltus.flow.counts import MOST, whole
 
 #: Values along a range, by what users write for the scale.
 SCALES = ("linear", "log")
@@ -68,6 +68,17 @@ def along(
             f"{name} from {first} to {last} can't have a log scale: give ends above zero."
         )
     return np.geomspace(low, high, count) if scale == "log" else np.linspace(low, high, count)
+
+
+def count_along(given: Any) -> int:
+    """How many values :func:`along` makes of what users write, before it makes them: what they take
+    is counted first. 1 of a single value, and of what it refuses.
+    """
+    if isinstance(given, tuple):
+        count = given[2] if len(given) in (3, 4) else 1
+        number = isinstance(count, int | float | np.integer | np.floating)
+        return int(count) if number and 1 <= count <= MOST else 1
+    return max(len(given), 1) if not isinstance(given, str) and axes_of(given) == 1 else 1
 
 
 def axes_of(given: Any) -> int:

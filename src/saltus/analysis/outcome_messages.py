@@ -41,6 +41,11 @@ _ADVICE = {
     st.NOT_COMPUTED: "The run was stopped; start it again.",
 }
 
+#: What ends a run in steps of a fixed length most often.
+_GROWN = (
+    "Errors of steps that are too long grow: take them well below 1/(the fastest rate of the "
+    "system), in contact too, or sl.Taylor(). "
+)
 #: What may have ended a run of such a method long before the motion met anything.
 _BELOW_A_ROOT = (
     " A trial step of {method} that goes below a root ends it too: end the law before it, as "
@@ -85,6 +90,8 @@ def messages(run: xr.Dataset, asked: Span | None = None, system: System | None =
                 advice += _BELOW_A_ROOT.format(method=run.attrs["method"])
             if code == st.INVALID and _is_finite(run, int(here[0]), system):
                 meaning = "the start lies beyond a stop"
+            if code == st.NONFINITE and run.attrs.get("method") == "RK4":
+                meaning, advice = f"{meaning}, or is made of errors that grew", _GROWN + advice
             texts.append(
                 f"{len(here)} of {len(status)} trajectories: {name} - {meaning} (first: "
                 f"{_where(run, int(here[0]))}). {advice}"

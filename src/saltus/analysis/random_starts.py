@@ -10,8 +10,11 @@ import numpy as np
 
 from saltus.errors import ParameterError, UnitError, nearest, shown
 from saltus.flow.counts import whole
+from saltus.flow.room import check_room
 from saltus.system.system import System
 from saltus.units import to_si
+
+_COUNT = re.compile("0*[1-9][0-9]{0,11}")
 
 
 def random_starts(
@@ -37,8 +40,8 @@ def random_starts(
     ParameterError, UnitError
         If that is no such word, or no such box.
     """
-    word, _, number = start.partition(" ")
-    if word != "random" or not re.fullmatch("0*[1-9][0-9]{0,11}", number.strip()):
+    count = random_count(start)
+    if not count:
         raise ParameterError(
             f"start={shown(start)} isn't known. "
             f"{nearest(start, (*others, 'random 20'))} Or give states."
@@ -49,7 +52,7 @@ def random_starts(
             for name in system.states[:2]
         )
         raise ParameterError(f"random starts need a box to be drawn from: box={{{example}}}.")
-    count = int(number)
+    check_room(16.0 * count * len(system.states), f"{count} random starts", "Draw fewer.")
     unit = np.random.default_rng(whole(seed, "seed", 0)).random((count, len(system.states)))
     starts = np.zeros((count, len(system.states)))
     for name, ends in box.items():
@@ -57,6 +60,12 @@ def random_starts(
         column = system.states.index(name)
         starts[:, column] = low + (high - low) * unit[:, column]
     return starts
+
+
+def random_count(start: str) -> int:
+    """How many starts ``"random 20"`` asks for; 0 of any other word."""
+    word, _, number = start.partition(" ")
+    return int(number) if word == "random" and _COUNT.fullmatch(number.strip()) else 0
 
 
 def _range(system: System, name: str, ends: Any) -> tuple[float, float]:

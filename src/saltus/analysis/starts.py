@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from saltus.analysis.axes import along
+from saltus.analysis.axes import along, axes_of, count_along
 from saltus.errors import ParameterError, SaltusError, among, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.engine import Request, Schedule
+from saltus.flow.room import check_room
 from saltus.system import expression as ex
 from saltus.system.checks import check_values
 from saltus.system.system import System
@@ -20,7 +21,8 @@ from saltus.units import to_si
 
 #: Trajectories that a single call may hold before their starts alone fill memory.
 MOST_TRAJECTORIES = 100_000_000
-
+#: Memory of a trajectory of D states that keeps nothing but its end [bytes]: rows of the engine.
+TRAJECTORY, TRAJECTORY_OF_A_STATE = 200.0, 24.0
 
 #: Different combinations of values whose periodicity is checked; each takes half a millisecond.
 MOST_PERIOD_CHECKS = 2000
@@ -75,6 +77,7 @@ def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> En
     if values is not None and not isinstance(values, Mapping):
         raise ParameterError('values must be a mapping, such as values={"frequency": [5.0, 10.0]}.')
     _check_labels({**(start if isinstance(start, Mapping) else {}), **(values or {})})
+    _check_count(system, trajectories(start, values))
     columns = _columns(system, start)
     given = {name: _values(system, name, value) for name, value in (values or {}).items()}
     empty = [name for name, value in given.items() if not np.size(value)]
@@ -93,11 +96,6 @@ def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> En
         raise ParameterError(
             f"starts and values must have one length: {', '.join(wrong)}, the longest has {count}."
         )
-    if count > MOST_TRAJECTORIES:
-        raise ParameterError(
-            f"{count} trajectories in one call are too many for memory. Split them into calls of "
-            f"{MOST_TRAJECTORIES} at most."
-        )
     states = np.stack(
         [np.broadcast_to(np.ravel(columns[name]), count) for name in system.states], axis=1
     ).astype(float)
@@ -115,6 +113,28 @@ def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> En
         rows = [varied.get(name, np.full(count, value)) for name, value in shared.items()]
         return Ensemble(states, np.stack(rows, axis=1), varied, True)
     return Ensemble(states, np.array([list(shared.values())]), {}, bool(sizes))
+
+
+def trajectories(start: Any, values: Any) -> int:
+    """How many trajectories starts and values ask for, before any array of them is made."""
+    given = [*(start.values() if isinstance(start, Mapping) else ())]
+    given += values.values() if isinstance(values, Mapping) else ()
+    rows = 1 if isinstance(start, Mapping) or axes_of(start) != 2 else max(len(start), 1)
+    return max([rows, *map(count_along, given)])
+
+
+def _check_count(system: System, count: int) -> None:
+    """Raise ParameterError for more trajectories than one call may hold."""
+    if count > MOST_TRAJECTORIES:
+        raise ParameterError(
+            f"{count} trajectories in one call are too many for memory. Split them into calls of "
+            f"{MOST_TRAJECTORIES} at most."
+        )
+    check_room(
+        count * (TRAJECTORY + TRAJECTORY_OF_A_STATE * len(system.states)),
+        f"{count} trajectories",
+        "Split them into calls of fewer.",
+    )
 
 
 def _check_labels(given: Mapping[str, Any]) -> None:

@@ -20,6 +20,7 @@ from saltus.codegen.module import Flow
 from saltus.errors import SaltusWarning
 from saltus.flow.contact_table import ContactTable
 from saltus.flow.counts import whole as whole_number
+from saltus.flow.growth import mark_growth
 from saltus.flow.methods import Method
 from saltus.flow.pace import marks, resume
 from saltus.flow.room import Contacts
@@ -220,6 +221,7 @@ def run(
     periods = float(np.max(request.end_count + request.end_phase / request.period, initial=0.0))
     data, due = tables_of(system.origin), method.due(periods)
     whole["options"] = options_of(method, periods, len(request.start), request.checks)
+    check_steps(system, method, request.period)
     chunks = [
         _cut(request, whole, first, data, due) for first in range(0, len(request.start), CHUNK)
     ]
@@ -239,7 +241,20 @@ def run(
             SaltusWarning,
             stacklevel=4,
         )
-    return _finish(outcome, whole, chunks, request.t_end)
+    _finish(outcome, whole, chunks, request.t_end)
+    if method.fixed:
+        companion = method.companion()
+        try:
+            mark_growth(outcome, request, lambda one: run(system, companion, one, threads))
+        except KeyboardInterrupt:
+            raise RunInterrupted(lambda: outcome) from None
+    return outcome
+
+
+def check_steps(system: System, method: Method, period: np.ndarray) -> None:
+    """Raise ParameterError if the steps of a method are too long for the forcing periods [s]."""
+    if system.forced_at is not None and len(period):
+        method.check_forcing(float(np.min(period)))
 
 
 def options_of(method: Method, periods: float, count: int, checks: int = 0) -> np.ndarray:

@@ -12,6 +12,9 @@ from saltus.flow.method import check_positive, explain_unknown_options
 from saltus.flow.one_by_one import OneByOne
 from saltus.units import to_si
 
+#: Steps that a forcing period takes at least: fewer don't see what drives the motion.
+STEPS_PER_FORCING = 10
+
 
 @explain_unknown_options
 @dataclass(frozen=True)
@@ -21,8 +24,9 @@ class RK4(OneByOne):
     Parameters
     ----------
     step : float | str
-        Length of a step [s]. The last step before the end, and before a break of the forcing, is
-        shorter.
+        Length of a step [s], at most a tenth of the forcing's period. The last step before the end,
+        and before a break of the forcing, is shorter. A motion that only errors of too long steps
+        let grow ends with status ``nonfinite``.
     events : {"ignore", "henon", "inverse", "bisect"}
         ``"ignore"``: the right-hand side picks its side from the state at every stage; the order
         falls to 2 where a force bends, to 1 where it jumps. An impact or a jump of the state then
@@ -65,6 +69,21 @@ class RK4(OneByOne):
     def _own_numbers(self) -> tuple[float, float, float]:
         """Length of a step, tolerance, the way of crossing."""
         return float(self.step), self.tolerance, float(self.EVENTS.index(self.events))
+
+    @property
+    def fixed(self) -> bool:
+        """They have."""
+        return True
+
+    def check_forcing(self, period: float) -> None:
+        """Raise ParameterError for fewer than :data:`STEPS_PER_FORCING` steps in a period [s]."""
+        longest = period / STEPS_PER_FORCING
+        if float(self.step) > longest * (1 + 1e-9):
+            raise ParameterError(
+                f"RK4's step of {float(self.step):g} s is longer than a tenth of the forcing's "
+                f"period of {period:g} s, which it doesn't see so. Take at most "
+                f"RK4({longest:.3g}), or sl.Taylor(), which finds its steps itself."
+            )
 
     @property
     def label(self) -> str:

@@ -7,7 +7,15 @@ from __future__ import annotations
 import numpy as np
 
 from saltus.flow.contact_table import ContactTable
-from saltus.flow.engine import ARGUMENTS, Request, allocate, options_of, slice_of, tables_of
+from saltus.flow.engine import (
+    ARGUMENTS,
+    Request,
+    allocate,
+    check_steps,
+    options_of,
+    slice_of,
+    tables_of,
+)
 from saltus.flow.methods import Method
 from saltus.flow.pace import marks, resume
 from saltus.interrupt import check_stop
@@ -63,6 +71,7 @@ class Flight:
         longest: float,
     ):
         count = len(start)
+        check_steps(system, method, period)
         self._module = method.kernels(system.origin)
         request = Request.periods(start, parameters, period, 0)
         _, self._arrays = allocate(request, system, self._module)

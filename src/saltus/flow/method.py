@@ -94,6 +94,9 @@ class Method:
         """The options as the kernel reads them, for a run of ``periods``."""
         raise NotImplementedError
 
+    def check_forcing(self, period: float) -> None:
+        """Raise ParameterError if its steps are too long for a forcing of this period [s]."""
+
     def due(self, periods: float) -> float | None:  # noqa: ARG002
         """Least progress in :data:`saltus.flow.pace.LONG_CHECK_STEPS` steps, in periods; None if
         there is a budget of steps.
@@ -128,6 +131,11 @@ class Method:
         errors explain.
         """
         raise NotImplementedError
+
+    @property
+    def fixed(self) -> bool:
+        """Whether its steps have one length, so that nothing keeps errors from growing."""
+        return False
 
     @property
     def exact(self) -> bool:

@@ -9,7 +9,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -36,10 +36,10 @@ def reporting(
         yield progress
     elif progress is not None and not progress:
         yield None
-    elif progress is None and not os.isatty(2):
+    elif progress is None and not os.isatty(2) and not _in_notebook():
         yield Lines(_to_stderr).show
     else:
-        bar = _Bar()
+        bar = _NotebookBar() if _in_notebook() else _Bar()
         try:
             yield bar.show
         finally:
@@ -98,6 +98,50 @@ class Lines:
             f"{share:.0%} done in {now - self._begun:.0f} s"
             + (f", about {left:.0f} s left" if left is not None else "")
         )
+
+
+def _in_notebook() -> bool:
+    """Whether this runs in a kernel, which shows outputs below cells."""
+    ipython = sys.modules.get("IPython")
+    return ipython is not None and hasattr(ipython.get_ipython(), "kernel")
+
+
+class _NotebookBar:
+    """A bar below a cell that appears only if the work lasts, and leaves nothing there."""
+
+    PATIENCE, EVERY = 2.0, 0.2
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._begun = self._shown = clock()
+        self._output: Any = None
+
+    def show(self, share: float) -> None:
+        """Show the share done, once patience has run out."""
+        now = self._clock()
+        if now - self._begun < self.PATIENCE or now - self._shown < self.EVERY:
+            return
+        self._shown = now
+        text = f"integrating: {share:.0%} in {now - self._begun:.0f} s"
+        self._put(
+            {
+                "text/plain": text,
+                "text/html": f'<progress value="{share:.4f}"></progress> <small>{text}</small>',
+            }
+        )
+
+    def close(self) -> None:
+        """Take the bar away."""
+        if self._output is not None:
+            self._put({})
+
+    def _put(self, content: dict[str, str]) -> None:
+        from IPython.display import display
+
+        if self._output is None:
+            self._output = display(content, raw=True, display_id=True)
+        else:
+            self._output.update(content, raw=True)
 
 
 class _Bar:

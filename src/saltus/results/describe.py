@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
@@ -13,6 +14,9 @@ from saltus.results.dataset.schema import STROBOSCOPE, TABLES, TRAJECTORY, check
 from saltus.results.summary import summary
 from saltus.results.wording import tally
 from saltus.units import from_si
+
+#: Lines of a result that a notebook shows above its variables.
+_LINES = 8
 
 
 @reader
@@ -59,6 +63,37 @@ def describe(ds: xr.Dataset) -> str:
             f"contacts {_tally(ds['contact_kind'].values) if ds.sizes['contact'] else 'none'}"
         )
     return "\n".join([*lines, f"hash     {ds.attrs.get('result_hash', 'none')[:16]}"])
+
+
+def headline(ds: xr.Dataset) -> str:
+    """The content of a result in a line or a few, such as ``delangre: 60 T, 162 contacts, ok, no
+    unresolved graze``; ``""`` for a Dataset that isn't one.
+    """
+    name = ds.attrs.get("system", "system without a name")
+    if kind_of(ds) in (TRAJECTORY, STROBOSCOPE):
+        return f"{name}: {', '.join(_content(ds))}"
+    if not kind_of(ds):
+        return ""
+    lines = summary(ds)
+    more = [f"and {len(lines) - _LINES} lines more: sl.describe"] if len(lines) > _LINES else []
+    return "\n".join([name, *lines[:_LINES], *more])
+
+
+def _content(ds: xr.Dataset) -> Iterator[str]:
+    """What a run holds: its length, contacts, status and grazes, so far as they are there."""
+    if "trajectory" in ds.dims:
+        yield counted(ds.sizes["trajectory"], "trajectory")
+    if "period" in ds.coords and ds["period"].size:
+        yield f"{np.ptp(ds['period'].values):g} T"
+    elif "time" in ds.coords and ds["time"].size:
+        yield f"{np.ptp(ds['time'].values):g} s"
+    if "contact" in ds.dims:
+        yield counted(ds.sizes["contact"], "contact") if ds.sizes["contact"] else "no contact"
+    if "status" in ds:
+        yield _tally(ds["status"].values)
+    if "grazes_unresolved" in ds:
+        grazes = int(ds["grazes_unresolved"].sum())
+        yield counted(grazes, "unresolved graze") if grazes else "no unresolved graze"
 
 
 def _parameters(ds: xr.Dataset) -> str:

@@ -2,12 +2,17 @@
 what is free is used.
 """
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
 import saltus as sl
 from saltus.errors import SaltusWarning
 from saltus.flow import room
+from saltus.study.run.running import Resources
+from saltus.study.run.study import run_study
+from saltus.study.tables.read import parse
 
 rig = sl.models.delangre("b", force="4 N", frequency="15 Hz")
 START = {"x": np.linspace(-4e-3, 4e-3, 12), "v": np.linspace(-0.5, 0.5, 12)}
@@ -51,6 +56,78 @@ def test_what_does_not_fit_is_refused_with_its_size(small, call, teaches):
     with pytest.raises(sl.SaltusError, match=teaches) as refused:
         call()
     assert "half of the free memory is 0.05 GB" in str(refused.value)
+
+
+MANY = 10**7
+AXIS = {"x": (-1e-3, 1e-3, MANY), "v": 0.0}
+BOX = {"x": (-1e-3, 1e-3), "v": (-1.0, 1.0)}
+WIDE = ("2 Hz", "30 Hz", MANY)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: sl.basins(rig, x=(-1e-3, 1e-3, MANY), v=(-1.0, 1.0, MANY)),
+        lambda: sl.basins(rig, x=(1e-4, 1e-3, MANY, "log"), v=(-1.0, 1.0, 2)),
+        lambda: sl.basin_fractions(rig, **BOX, samples=MANY),
+        lambda: sl.frequency_response(rig, WIDE),
+        lambda: sl.frequency_response(rig, [12.0, 13.0], f"random {MANY}", box=BOX),
+        lambda: sl.bifurcation_diagram(rig, {"frequency": WIDE, "force": ("1 N", "2 N", MANY)}),
+        lambda: sl.bifurcation_diagram(rig, {"frequency": ("2 Hz", "30 Hz", 10)}, AXIS),
+        lambda: sl.branches(rig, {"frequency": (12.0, 18.0)}, at=MANY),
+        lambda: sl.branches(rig, {"frequency": (12.0, 18.0)}, f"random {MANY}", box=BOX),
+        lambda: sl.periodic_orbits(rig, f"random {MANY}", box=BOX),
+        lambda: sl.periodic_orbits(rig, AXIS),
+        lambda: sl.simulate(rig, AXIS, periods=1, samples=1),
+        lambda: sl.simulate(rig, (0, 0), t_end=1, values={"frequency": WIDE}),
+        lambda: sl.simulate(rig, (0, 0), periods=1, samples=MANY),
+        lambda: sl.simulate(sl.models.falling_ball(), (1, 0), t_end=1, samples=MANY),
+        lambda: sl.stroboscope(rig, AXIS, 1),
+        lambda: sl.stroboscope(rig, (0, 0), MANY),
+        lambda: sl.poincare(rig, AXIS, periods=1, surface="v turns"),
+        lambda: sl.impact_statistics(rig, AXIS, periods=1),
+        lambda: sl.impact_statistics(rig, periods=1, bins=MANY),
+        lambda: sl.energy_balance(rig, AXIS, periods=1, **sl.models.energy("delangre")),
+        lambda: sl.attractors(rig, AXIS),
+        lambda: sl.lyapunov(rig, AXIS),
+        lambda: sl.lyapunov(rig, (0, 0), method="wolf", periods=MANY),
+    ],
+)
+def test_what_is_refused_is_counted_before_there_is_an_array_of_it(small, call):
+    """An array of ten million numbers is one of 80 MB."""
+    tracemalloc.start()
+    try:
+        with pytest.raises(sl.SaltusError, match="more than fits here"):
+            call()
+        assert tracemalloc.get_traced_memory()[1] < 2**23
+    finally:
+        tracemalloc.stop()
+
+
+QUESTIONS = {
+    "basins": f"""
+        [basins]
+        axes.x = {{first = "-1 mm", last = "1 mm", count = {MANY}}}
+        axes.v = {{first = "-1 m/s", last = "1 m/s", count = {MANY}}}
+    """,
+    "responses": f"""
+        [frequency_response]
+        frequency = {{first = "5 Hz", last = "9 Hz", count = {MANY}}}
+    """,
+}
+
+
+@pytest.mark.parametrize("question", QUESTIONS)
+def test_a_study_is_counted_before_there_is_an_array_of_it(small, tmp_path, question):
+    text = '[study]\nname = "wide"\n[system]\nmodel = "delangre"\n' + QUESTIONS[question]
+    study, resources = parse(text), Resources(threads=1)
+    tracemalloc.start()
+    try:
+        with pytest.raises(sl.SaltusError, match="more than fits here"):
+            run_study(study, text, tmp_path, None, resources, lambda _: None, [].append, False)
+        assert tracemalloc.get_traced_memory()[1] < 2**24
+    finally:
+        tracemalloc.stop()
 
 
 def test_free_memory_is_told_and_sensible():

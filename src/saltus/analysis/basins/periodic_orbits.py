@@ -18,8 +18,8 @@ from saltus.analysis.orbits.equilibria import autonomous
 from saltus.analysis.orbits.orbit_table import table_of, table_of_cycles
 from saltus.analysis.orbits.tolerances import LONGEST
 from saltus.analysis.orbits.turns import looks_every
-from saltus.analysis.random_starts import random_starts
-from saltus.analysis.starts import check_system, ensemble
+from saltus.analysis.random_starts import random_count, random_starts
+from saltus.analysis.starts import check_system, ensemble, trajectories
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, shown
 from saltus.flow.counts import whole
@@ -137,14 +137,15 @@ def periodic_orbits(
     """
     check_system(system)
     periods = whole(periods, "periods", 1, LONGEST)
+    size = len(system.states)
+    many = random_count(start) if isinstance(start, str) else trajectories(start, None)
+    check_room(many * periods * size * 400.0, f"{many} starts", "Take fewer.")
     states = (
         random_starts(system, start, box, seed)
         if isinstance(start, str)
         else _given(system, start, box)
     )
     method = exact_method(method)
-    size = len(system.states)
-    check_room(len(states) * periods * size * 400.0, f"{len(states)} starts", "Take fewer.")
     attrs = provenance(system, method, system.values) | {"starts": len(states), "seed": seed}
     if system.forced_at is None:
         turn = _turn(system, states)

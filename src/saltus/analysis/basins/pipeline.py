@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.axes import along
+from saltus.analysis.axes import along, count_along
 from saltus.analysis.basins import uncertainty
 from saltus.analysis.basins.halton import halton
 from saltus.analysis.basins.labels import OPEN, Settling, complete, settle
@@ -268,13 +268,13 @@ def basin_plan(
             f"range and number of starts: {example}."
         )
     periods = whole(periods, "periods")
-    values = {name: _axis(system, name, given) for name, given in axes.items()}
-    first, second = (len(one) for one in values.values())
+    first, second = (count_along(given) for given in axes.values())
     check_room(
         memory(first * second, len(system.states)),
         f"{first} x {second} cells",
         "Take a coarser grid, or sl.basin_fractions.",
     )
+    values = {name: _axis(system, name, given) for name, given in axes.items()}
     plan = BasinPlan(system, method, values, fixed, periods)
     some = plan.starts(np.linspace(0, plan.cells - 1, ASKED).astype(int))
     return replace(plan, every=looks_every(system, every, some))

@@ -16,6 +16,7 @@ from saltus.analysis.recorded.wolf import NOTHING, Growing, default_search, meas
 from saltus.analysis.statistics import CONFIDENCE, RUNNING
 from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
+from saltus.flow.room import check_room
 from saltus.kernels import status as st
 
 #: Samples of a block: neighbours on an orbit then lie closer than the widest distance.
@@ -37,6 +38,11 @@ class NeighbourExponents(Algorithm):
     def run(self, progress: Callable[[float], None] | None = None) -> None:
         """Compute all, in groups."""
         k, size = self._start.shape
+        check_room(
+            self._periods * SAMPLES * (16.0 * size + 32.0),
+            f"{SAMPLES} samples in each of {self._periods} periods",
+            "Give fewer periods=.",
+        )
         schedule = Schedule.even(self._periods, SAMPLES, first=self._transient)
         step = max(GROUP // (self._periods * SAMPLES * size), 1)
         for first in range(0, k, step):

@@ -15,8 +15,10 @@ from saltus.analysis.outcome_messages import warn
 from saltus.analysis.starts import check_system
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, nearest, shown
+from saltus.flow.counts import whole
 from saltus.flow.engine import Outcome, Schedule
 from saltus.flow.methods import Method, check_method
+from saltus.flow.room import check_room
 from saltus.results.dataset import schema
 from saltus.system.evaluate import evaluate
 from saltus.system.expression import walk
@@ -141,6 +143,12 @@ def impact_statistics(
     columns = {guard: len(system.states) + i for i, guard in enumerate([*forces, *stops])}
     columns |= {touchdowns.hold_of(system, guard): columns[guard] for guard in stops}
     seen = stretch(system, start, values, periods, t_end, t_start, transient)
+    if np.ndim(bins) == 0:
+        check_room(
+            8.0 * whole(bins, "bins") * seen.group.size * len(system.guards),
+            f"{bins} bins of each boundary of {seen.group.size} trajectories",
+            "Take fewer bins.",
+        )
     begin = Schedule(np.array([seen.skipped]), np.zeros(1))
 
     def answer(outcome: Outcome) -> xr.Dataset:
@@ -261,11 +269,6 @@ def _impulse_unit(system: System) -> str:
 def _edges(bins: Any, speed: np.ndarray) -> np.ndarray:
     """Edges of the bins of speed."""
     if np.ndim(bins) == 0:
-        if isinstance(bins, bool) or bins != int(bins) or bins < 1:
-            raise ParameterError(
-                f"bins must be a whole number of at least 1, or the edges of the "
-                f"bins, not {shown(bins)}."
-            )
         largest = float(speed.max(initial=0.0))
         return np.linspace(0.0, largest if largest > 0 else 1.0, int(bins) + 1)
     edges = np.asarray(bins, dtype=float)

@@ -8,6 +8,7 @@ Newton and Floquet multipliers do that.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,9 +17,17 @@ import xarray as xr
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
 from saltus.flow.counts import whole as whole_number
+from saltus.flow.method import check_positive
 from saltus.results import Subject, build, inherited
 from saltus.results.dataset.reader import reader
-from saltus.results.dataset.schema import SETTLED, TRAJECTORY, check, kind_of, states_of
+from saltus.results.dataset.schema import (
+    SETTLED,
+    TRAJECTORY,
+    check,
+    kind_of,
+    sample_dim,
+    states_of,
+)
 
 #: Largest mismatch that counts as a repeat: far above rounding, far below what tells 24T from its
 #: neighbour 12T on the rig (1e-2).
@@ -29,6 +38,16 @@ TOLERANCE = 1e-6
 UNDECIDED = 10
 #: Periods looked at, by default: enough for two repeats of a 48T response.
 LAST = 96
+#: Where nothing but magnitudes is known, a state counts as at least this share of the largest of
+#: its unit: one that has died away beside others has no size of its own.
+LEAST_SHARE = 1e-6
+#: The size that every state has at least [SI]: of one that died away and is alone of its unit. An
+#: atom measures 1e-10 m.
+AT_REST = 1e-14
+#: Rounding of a state, relative to the largest value of its unit.
+ROUNDING = 64 * np.finfo(float).eps
+#: Numbers of one state that are looked at together.
+TOGETHER = 2**19
 
 
 @verb
@@ -44,8 +63,10 @@ def settled(
         What ``simulate`` returned for a forced system with samples at whole periods, or what
         ``stroboscope`` returned.
     tolerance : float
-        Largest difference of states n periods apart that counts as a repeat, relative to the range
-        of each state in the samples looked at (from a stroboscope, to its largest magnitude).
+        Largest difference of states n periods apart that counts as a repeat, relative to the
+        largest range that a state of the same unit has in the samples looked at; where there are
+        samples at whole periods only, to the largest magnitude of the state, and at least to a
+        millionth of the largest of its unit. States without a unit count as of one unit.
     last : int, optional
         Whole periods at the end to compare; at least 2, by default at most 96. The longest response
         that is recognised is half of them.
@@ -75,6 +96,7 @@ def settled(
     3
     """
     check(run, caller="settled")
+    check_positive("tolerance", tolerance)
     phases = _phases(run)
     whole = np.flatnonzero(phases == np.round(phases))
     kept = max(whole.size - 1, 0)
@@ -85,15 +107,23 @@ def settled(
             f"kept. Give keep={max(last, LAST)}."
         )
     whole = whole[-last - 1 :]
-    batch = "trajectory" in run.dims
-    each = (
-        [(run.isel(trajectory=i), i) for i in range(run.sizes["trajectory"])]
-        if batch
-        else [(run, None)]
-    )
-    return _dataset(
-        run, [_one(one, number, whole, tolerance) for one, number in each], batch, last // 2
-    )
+    states = states_of(run)
+    samples = [np.atleast_2d(run[name].transpose(..., sample_dim(run)).values) for name in states]
+    units = [str(run[name].attrs.get("units", "")) for name in states]
+    parts = [
+        _smallest_repeats(
+            np.stack([of[some][:, whole] for of in samples], axis=1),
+            _scales([of[some] for of in samples], units, whole, tolerance),
+            tolerance,
+        )
+        for some in _parts(samples[0])
+    ]
+    n, mismatch = (np.concatenate(column) for column in zip(*parts, strict=True))
+    n = np.where(np.isin(run["status"].values, ("ok", "graze_unresolved")), n, 0)
+    values: dict[str, Any] = {"mismatch": mismatch, "response_period": n}
+    if kind_of(run) == TRAJECTORY:
+        values |= _measures(run, dict(zip(states, samples, strict=True)), whole, n)
+    return _dataset(run, values, last // 2)
 
 
 def _phases(run: xr.Dataset) -> np.ndarray:
@@ -110,89 +140,123 @@ def _phases(run: xr.Dataset) -> np.ndarray:
     return np.where(np.abs(phases - nearest) < 1e-9 * np.maximum(1.0, nearest), nearest, phases)
 
 
-def _one(
-    run: xr.Dataset, number: int | None, whole: np.ndarray, tolerance: float
-) -> dict[str, float]:
-    """The row of one trajectory; ``number`` is its place in a batch, whose contacts share one
-    table.
+def _parts(samples: np.ndarray) -> Iterator[slice]:
+    """Trajectories that are looked at together."""
+    size = max(TOGETHER // max(samples.shape[1], 1), 1)
+    return (slice(first, first + size) for first in range(0, len(samples), size))
+
+
+def _scales(
+    samples: Sequence[np.ndarray], units: Sequence[str], whole: np.ndarray, tolerance: float
+) -> np.ndarray:
+    """What differences of each state are measured against, float64[trajectory, state].
+
+    The range of a state that rests, or is on its way there, says nothing: it is measured by the
+    range of others of its unit, by the rounding of values of that unit, or by :data:`AT_REST`.
     """
-    names = states_of(run)
-    window = run[list(names)].isel({run[names[0]].dims[0]: slice(whole[0], whole[-1] + 1)})
-    strobe = np.stack([run[name].values[whole] for name in names])
-    sampled = kind_of(run) == TRAJECTORY
-    scale = np.array(
+    between = whole[-1] - whole[0] > len(whole) - 1
+    looked_at = [of[:, whole[0] : whole[-1] + 1] for of in samples]
+    own = np.stack(
+        [np.ptp(of, axis=1) if between else np.abs(of).max(axis=1) for of in looked_at], axis=1
+    )
+    size = np.stack([np.abs(of).max(axis=1) for of in samples], axis=1)
+    for unit in set(units):
+        alike = np.array([one == unit for one in units])
+        largest = own[:, alike].max(axis=1, keepdims=True) * (1.0 if between else LEAST_SHARE)
+        rounding = np.fmax.reduce(size[:, alike], axis=1)[:, None] * (ROUNDING / tolerance)
+        own[:, alike] = np.maximum(np.maximum(own[:, alike], largest), rounding)
+    return np.maximum(own, AT_REST)
+
+
+def _smallest_repeats(
+    strobe: np.ndarray, scale: np.ndarray, tolerance: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Smallest n with states n periods apart equal, and how equal, for each trajectory; 0 and the
+    smallest mismatch where none is decided.
+
+    ``strobe`` has shape (trajectory, state, period), ``scale`` (trajectory, state); n runs up to
+    half of the periods.
+    """
+    finite = np.isfinite(strobe).all(axis=(1, 2))
+    points = np.where(finite[:, None, None], strobe, 0.0)
+    longest = (strobe.shape[2] - 1) // 2
+    mismatches = np.stack(
         [
-            np.ptp(window[name].values) if sampled else np.abs(window[name].values).max()
-            for name in names
-        ]
+            (np.abs(points[..., n:] - points[..., :-n]).max(axis=2) / scale).max(axis=1)
+            for n in range(1, longest + 1)
+        ],
+        axis=1,
     )
-    row: dict[str, float] = {}
-    n, row["mismatch"] = _smallest_repeat(strobe, scale, tolerance)
-    row["response_period"] = n if str(run["status"].item()) in ("ok", "graze_unresolved") else 0
-    if not sampled:
-        return row
-    repeats = (whole.size - 1) // n if n else 0
-    first = whole[-1 - repeats * n] if n else whole[0]
-    row["contacts_per_response"] = (
-        _contacts(run, number, first, whole[-1]) / repeats if row["response_period"] else np.nan
-    )
-    for name in states_of(run):
-        samples = run[name].values[first : whole[-1]]
-        row[f"{name}_peak"] = np.abs(samples).max()
-        row[f"{name}_rms"] = np.sqrt(np.mean(samples**2))
-    return row
+    repeats, near = mismatches <= tolerance, mismatches <= UNDECIDED * tolerance
+    for n in range(1, longest + 1):
+        parts = [part - 1 for part in range(1, n) if n % part == 0]
+        repeats[:, n - 1] &= ~near[:, parts].any(axis=1)
+    found = repeats.any(axis=1)
+    chosen = np.where(found, repeats.argmax(axis=1), mismatches.argmin(axis=1))
+    mismatch = mismatches[np.arange(len(strobe)), chosen]
+    return np.where(found & finite, chosen + 1, 0), np.where(finite, mismatch, np.nan)
 
 
-def _smallest_repeat(strobe: np.ndarray, scale: np.ndarray, tolerance: float) -> tuple[int, float]:
-    """Smallest n with states n columns apart equal, and how equal; 0 and the smallest mismatch if
-    none is decided.
-
-    ``strobe`` has shape (state, period), ``scale`` (state,); n runs up to half of the periods.
+def _measures(
+    run: xr.Dataset, samples: Mapping[str, np.ndarray], whole: np.ndarray, n: np.ndarray
+) -> dict[str, Any]:
+    """Contacts in a response, peak and rms of each state, over whole responses; where nothing
+    repeats, over all that was looked at.
     """
-    if not np.isfinite(strobe).all():
-        return 0, np.nan
-    rounding = 64 * np.finfo(float).eps * np.abs(strobe).max(axis=1)
-    scale = np.maximum(np.maximum(scale, rounding / tolerance), np.finfo(float).tiny)[:, None]
-    mismatches = [
-        float((np.abs(strobe[:, n:] - strobe[:, :-n]) / scale).max())
-        for n in range(1, (strobe.shape[1] - 1) // 2 + 1)
-    ]
-    for n, mismatch in enumerate(mismatches, start=1):
-        if mismatch <= tolerance and all(
-            mismatches[part - 1] > UNDECIDED * tolerance for part in range(1, n) if n % part == 0
-        ):
-            return n, mismatch
-    return 0, min(mismatches)
+    last, each = len(whole) - 1, np.arange(len(n))
+    repeats = np.where(n > 0, last // np.maximum(n, 1), 0)
+    begin = np.where(n > 0, last - repeats * n, 0)
+    contacts = _contacts(run, whole[begin], whole[-1], len(n))
+    values: dict[str, Any] = {
+        "contacts_per_response": np.where(n > 0, contacts / np.maximum(repeats, 1), np.nan)
+    }
+    peaks, rms = {}, {}
+    for name, of in samples.items():
+        parts = [_from_each_period(of[some], whole) for some in _parts(of)]
+        largest, squares = (np.concatenate(column) for column in zip(*parts, strict=True))
+        peaks[name] = largest[each, begin]
+        rms[name] = np.sqrt(squares[each, begin] / (whole[-1] - whole[begin]))
+    return values | {"<state>_peak": peaks, "<state>_rms": rms}
 
 
-def _contacts(run: xr.Dataset, number: int | None, first: int, final: int) -> int:
-    """Crossings and impacts between two samples, the later end included."""
-    time, contact = run["time"].values, run["contact_time"].values
-    inside = (
-        (contact > time[first])
-        & (contact <= time[final])
+def _from_each_period(samples: np.ndarray, whole: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Largest magnitude and sum of squares from each whole period to the last, two arrays
+    float64[trajectory, period].
+    """
+    looked_at, begins = samples[:, whole[0] : whole[-1]], whole[:-1] - whole[0]
+    largest = np.maximum.reduceat(np.abs(looked_at), begins, axis=1)
+    squares = np.add.reduceat(looked_at**2, begins, axis=1)
+    return (
+        np.maximum.accumulate(largest[:, ::-1], axis=1)[:, ::-1],
+        np.add.accumulate(squares[:, ::-1], axis=1)[:, ::-1],
+    )
+
+
+def _contacts(run: xr.Dataset, first: np.ndarray, final: int, count: int) -> np.ndarray:
+    """Crossings and impacts of each trajectory from sample ``first`` of it to sample ``final``, the
+    later end included.
+    """
+    time = np.broadcast_to(np.atleast_2d(run["time"].values), (count, run["time"].shape[-1]))
+    contact = run["contact_time"].values
+    place, known = np.zeros(contact.size, np.int64), np.ones(contact.size, bool)
+    if "trajectory" in run.coords:  # of those that were chosen, in their order
+        numbers, who = np.atleast_1d(run["trajectory"].values), run["contact_trajectory"].values
+        order = np.argsort(numbers)
+        place = order[np.searchsorted(numbers, who, sorter=order) % count]
+        known = numbers[place] == who
+    begin, end = time[np.arange(count), first], time[:, final]
+    counts = (
+        known
+        & (contact > begin[place])
+        & (contact <= end[place])
         & np.isin(run["contact_kind"].values, ("crossing", "impact"))
     )
-    if number is not None:
-        inside &= run["contact_trajectory"].values == number
-    return int(inside.sum())
+    return np.bincount(place[counts], minlength=count)
 
 
-def _dataset(
-    run: xr.Dataset, rows: list[dict[str, float]], batch: bool, longest: int
-) -> xr.Dataset:
-    states = states_of(run)
-    values: dict[str, Any] = {
-        name: np.array([row[name] for row in rows])
-        for name in ("mismatch", "response_period", "contacts_per_response")
-        if name in rows[0]
-    }
-    for measure in ("peak", "rms") if kind_of(run) == TRAJECTORY else ():
-        values[f"<state>_{measure}"] = {
-            name: np.array([row[f"{name}_{measure}"] for row in rows]) for name in states
-        }
-    if batch:
-        values["trajectory"] = run["trajectory"].values
+def _dataset(run: xr.Dataset, values: Mapping[str, Any], longest: int) -> xr.Dataset:
+    states, batch = states_of(run), "trajectory" in run.dims
     units = {name: run[name].attrs.get("units", "") for name in states}
     attrs = inherited(run) | {"longest_period": longest}
-    return build(SETTLED, Subject(states, units, attrs, batch=batch), values)
+    trajectory = {"trajectory": run["trajectory"].values} if batch else {}
+    return build(SETTLED, Subject(states, units, attrs, batch=batch), {**values, **trajectory})

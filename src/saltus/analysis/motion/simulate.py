@@ -13,7 +13,7 @@ import xarray as xr
 from saltus.analysis import dataset_parts
 from saltus.analysis.motion import time_errors as measure
 from saltus.analysis.outcome_messages import warn
-from saltus.analysis.starts import Ensemble, Span, check_system, ensemble, span
+from saltus.analysis.starts import Ensemble, Span, check_system, ensemble, span, trajectories
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, among, shown
 from saltus.flow import engine
@@ -118,6 +118,8 @@ def simulate(
     """
     method = check_method(method)
     check_system(system)
+    many = trajectories(start, values)
+    _check_room(system, many, _least_samples(system, many, periods, samples, keep))
     group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
     length = span(system, group, periods, t_end, t_start)
     flown = remembering(system)
@@ -183,17 +185,32 @@ def _plan(
     first = max(int(np.min(length.count)) - kept, 0) if keep is not None else 0
     longest = np.max((length.count + length.phase / length.period) * per)
     count = int(longest + 1e-9) + 1 - first * per
-    check_room(
-        count * group.size * (16.0 * states + 16.0),
-        f"{group.size} trajectories with {count} samples each",
-        "Give keep= (last periods) or fewer samples=, or use sl.stroboscope.",
-    )
+    _check_room(system, group.size, count, states)
     periods = np.arange(first, first - (-count // per))
     return _Plan(
         Schedule(
             np.repeat(periods, per)[:count], np.tile(np.arange(per) / per, len(periods))[:count]
         ),
         first,
+    )
+
+
+def _least_samples(system: System, trajectories: int, periods: Any, samples: Any, keep: Any) -> int:
+    """Samples that each trajectory has at least, known before any array is made."""
+    if system.forced_at is None:
+        return _whole(samples, "samples", _per_span(trajectories)) + 1
+    if periods is None:
+        return 1
+    kept = whole(periods, "periods")
+    return min(kept, _whole(keep, "keep", kept)) * _whole(samples, "samples", PER_PERIOD) + 1
+
+
+def _check_room(system: System, trajectories: int, samples: int, states: int | None = None) -> None:
+    """Raise ParameterError if samples of so many trajectories don't fit into memory."""
+    check_room(
+        samples * trajectories * (16.0 * (states or len(system.states)) + 16.0),
+        f"{trajectories} trajectories with {samples} samples each",
+        "Give keep= (last periods) or fewer samples=, or use sl.stroboscope.",
     )
 
 

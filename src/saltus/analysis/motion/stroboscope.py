@@ -12,7 +12,7 @@ import xarray as xr
 from saltus.analysis import dataset_parts
 from saltus.analysis.motion.window import computed
 from saltus.analysis.outcome_messages import warn
-from saltus.analysis.starts import ensemble, span
+from saltus.analysis.starts import check_system, ensemble, span, trajectories
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
 from saltus.flow.counts import whole
@@ -78,20 +78,20 @@ def stroboscope(
     True
     """
     method = check_method(method)
-    group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
+    check_system(system)
     if system.forced_at is None:
         raise ParameterError(
             f"{system.name} has no forcing period to be seen once in. Take "
             f"sl.simulate with t_end=, or sl.poincare."
         )
-    length = span(system, group, periods, None, t_start)
     whole_periods = whole(periods, "periods")
     first = 0 if keep is None else max(whole_periods + 1 - whole(keep, "keep"), 0)
     count = whole_periods + 1 - first
-    size = count * group.size * (16.0 * len(system.states) + 16.0)
-    check_room(
-        size, f"{group.size} trajectories with {count} periods each", "Give keep= (last periods)."
-    )
+    many = trajectories(start, values)
+    size = count * many * (16.0 * len(system.states) + 16.0)
+    check_room(size, f"{many} trajectories with {count} periods each", "Give keep= (last periods).")
+    group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
+    length = span(system, group, periods, None, t_start)
     kept = np.arange(first, whole_periods + 1, dtype=np.int64)
     schedule = Schedule(kept, np.zeros(len(kept)))
     request = length.request(group.start, group.parameters, schedule, None)

@@ -21,7 +21,7 @@ from saltus.analysis.branches.tracing import trace
 from saltus.analysis.orbits.equilibria import autonomous
 from saltus.analysis.outputs import outputs_of
 from saltus.analysis.responses.continued import LONGEST_DOUBLED, POINTS, SWITCHES, seeds_of_grid
-from saltus.analysis.responses.grid import Grid, grid_of
+from saltus.analysis.responses.grid import Grid, check_grid, grid_of
 from saltus.analysis.responses.responses import find
 from saltus.analysis.starts import at_values, check_system, range_of
 from saltus.analysis.verb import verb
@@ -171,7 +171,8 @@ def branches(
                 begins = seeds_of(system, name, start)
                 rests = [] if system.forced_at else resting_seeds(system, name, start)
             else:
-                places = np.linspace(*limits, whole(at, "at", 1) + 2)[1:-1]
+                check_grid(system, whole(at, "at", 1), start)
+                places = np.linspace(*limits, int(at) + 2)[1:-1]
                 grid = grid_of(system, {name: places}, start, box, None, seed, None, every)
                 if autonomous(system):
                     rests = resting_between(system, name, limits, grid.starts)

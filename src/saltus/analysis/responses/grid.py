@@ -4,17 +4,18 @@ bifurcation diagrams run over.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from saltus.analysis.axes import along
+from saltus.analysis.axes import along, count_along
 from saltus.analysis.orbits.tolerances import LONGEST
 from saltus.analysis.orbits.turns import ASKED, looks_every
-from saltus.analysis.random_starts import random_starts
-from saltus.analysis.starts import at_values, check_system, ensemble, single
+from saltus.analysis.random_starts import random_count, random_starts
+from saltus.analysis.starts import at_values, check_system, ensemble, single, trajectories
 from saltus.errors import ParameterError, nearest, shown
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
@@ -123,9 +124,10 @@ def grid_of(
     """
     check_system(system)
     system = at_values(system, values)
+    if len(axes) not in (1, 2):
+        raise ParameterError(f"one or two parameters may vary, not {len(axes)}.")
+    check_grid(system, math.prod(count_along(given) for given in axes.values()), start)
     points = {name: axis(system, name, given) for name, given in axes.items()}
-    if len(points) not in (1, 2):
-        raise ParameterError(f"one or two parameters may vary, not {len(points)}.")
     starts, sweeps, drawn = _starts(system, start, box, seed)
     if follow:
         sweeps = sweeps or ("up",) * len(starts)
@@ -134,18 +136,24 @@ def grid_of(
             "a sweep follows one parameter; this grid has two. Leave follow= and sweeps out."
         )
     grid = Grid(system, points, starts, sweeps, drawn)
-    check_room(
-        grid.places
-        * (len(starts) * (400.0 + RESPONSE * len(system.states)) + 16.0 * len(system.values)),
-        f"{grid.places} values with {len(starts)} starts each",
-        "Take a coarser grid or fewer starts.",
-    )
     corners = {name: np.array([column.min(), column.max()]) for name, column in points.items()}
     # ranges and periodicity of the forcing are checked there
     ensemble(system, np.zeros(len(system.states)), corners)
     some = np.unique(np.linspace(0, grid.places - 1, ASKED).astype(int))
     begin = starts[np.arange(len(some)) % len(starts)]
     return replace(grid, every=looks_every(system, every, begin, grid.rows[some]))
+
+
+def check_grid(system: System, places: int, start: Any) -> None:
+    """Raise ParameterError if responses from these starts at so many values of parameters don't fit
+    into memory.
+    """
+    starts = max(random_count(start), 1) if isinstance(start, str) else trajectories(start, None)
+    check_room(
+        places * (starts * (400.0 + RESPONSE * len(system.states)) + 16.0 * len(system.values)),
+        f"{places} values with {starts} starts each",
+        "Take a coarser grid or fewer starts.",
+    )
 
 
 def axis(system: System, name: str, given: Any) -> np.ndarray:

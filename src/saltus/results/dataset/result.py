@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import html
 import math
-from collections.abc import Hashable, Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from typing import Any, ClassVar
 
 import xarray as xr
 
@@ -21,6 +22,18 @@ class Result(xr.Dataset):
     """
 
     __slots__ = ()
+
+    #: Its content in a few lines; ``saltus.results`` sets it, which knows what each kind says.
+    _headline: ClassVar[Callable[[xr.Dataset], str]] = str
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the content in a few lines, and below it what xarray shows."""
+        try:
+            text = type(self)._headline(self)
+        except Exception:  # of a Dataset that somebody has changed since, xarray shows what is left
+            text = ""
+        top = f"<pre>{html.escape(text)}</pre>" if text else ""
+        return top + str(super()._repr_html_())
 
     @classmethod
     def of(

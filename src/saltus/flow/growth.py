@@ -1,0 +1,59 @@
+"""Motions that only the errors of fixed steps let grow: steps beyond what a method is stable for
+multiply them each time, and the end is a number like any other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from saltus.kernels import status as st
+
+if TYPE_CHECKING:
+    from saltus.flow.engine import Outcome, Request
+
+#: A motion that ends at a state of so many SI units, or times its start, is computed again.
+LARGE = 1e3
+#: It grew by errors alone if its end is so many times that of the exact motion.
+TOO_LARGE = 1e3
+
+
+def mark_growth(outcome: Outcome, request: Request, exactly: Callable[[Request], Outcome]) -> None:
+    """Give the status ``nonfinite`` to trajectories that reached the end only by errors that grew.
+
+    Parameters
+    ----------
+    outcome : Outcome
+        What came out of steps of a fixed length.
+    request : Request
+        What was asked for.
+    exactly : callable
+        The outcome of a request by an exact method.
+    """
+    with np.errstate(over="ignore"):
+        begin = np.maximum(np.abs(request.start).max(axis=1), 1.0)
+        end = np.abs(outcome.state).max(axis=1)
+    ended = np.isin(outcome.status, (st.OK, st.GRAZE_UNRESOLVED))
+    large = np.flatnonzero(ended & (end > LARGE * begin))
+    if not len(large):
+        return
+    shared = len(request.parameters) == 1
+    exact = exactly(
+        replace(
+            request,
+            start=request.start[large],
+            parameters=request.parameters if shared else request.parameters[large],
+            **{
+                name: getattr(request, name)[large] for name in ("period", "end_count", "end_phase")
+            },
+            schedule=type(request.schedule).none(),
+            record_from=None,
+            checks=0,
+        )
+    )
+    known = np.isin(exact.status, (st.OK, st.GRAZE_UNRESOLVED))
+    size = np.maximum(np.abs(exact.state).max(axis=1), begin[large])
+    outcome.status[large[known & (end[large] > TOO_LARGE * size)]] = st.NONFINITE
