@@ -78,13 +78,13 @@ TAYLOR = Interface(
     sizes=(
         "NSTATES", "NGUARDS", "ORDER", "NCONST", "NTURNS", "CLOCK_ROW", "GAP_ROW", "SCALE_ROW",
         "CALM_ROW", "ROWS", "NMOVED", "NSINGULAR",
-        "NEWTON_DEGREE_1", "NEWTON_DEGREE_2", "NSTEPPED", "NSERIES", "NCLOCKS",
+        "NEWTON_DEGREE_1", "NEWTON_DEGREE_2", "NSERIES", "NCLOCKS",
     ),
     flags=("PROBED", "TANGENT", "LAWS", "LEVELS"),
     tables=MappingProxyType(
         dict.fromkeys(
             (
-                "STEP_ROW", "SERIES_ROW", "GUARD_ROW", "GUARD_SERIES", "SNAP_STATE", "SNAP_CONST",
+                "SERIES_ROW", "GUARD_ROW", "GUARD_SERIES", "SNAP_STATE", "SNAP_CONST",
                 "SINGULAR_GUARD", "CLOCK_KIND",
                 "CLOCK_TABLE", "LAW", "PARTNER", "SUPPORT",
             ),

@@ -184,20 +184,18 @@ def taylor_head(system: System, order: int, lanes: int) -> Head:
         else []
     )
     series = sorted(set(guards.row))
-    stepped = sorted({*series, *(i * (order + 1) for i in range(len(system.states)))})
     constants_of_head: dict[str, Constant] = dict(
         LANES=lanes, NSTATES=len(system.states), NGUARDS=len(system.guards), ORDER=order,
         NCONST=len(constants.rows),
         NTURNS=len(code.harmonics), CLOCK_ROW=FIRST_TURN + len(code.harmonics), GAP_ROW=gap_row,
         SCALE_ROW=scale_row, CALM_ROW=calm_row,
         ROWS=handed_row + len(code.lines.handed), NMOVED=moved, NSINGULAR=len(aside.guards),
-        NEWTON_DEGREE_1=min(5, order), NEWTON_DEGREE_2=min(11, order), NSTEPPED=len(stepped),
-        NSERIES=len(series),
+        NEWTON_DEGREE_1=min(5, order), NEWTON_DEGREE_2=min(11, order), NSERIES=len(series),
         PROBED=probed, TANGENT=system.tangent_of is not None,
         LAWS=any(guard.law for guard in system.guards),
         LEVELS=bool(levels_of(system)),
         **tables(
-            STEP_ROW=stepped, SERIES_ROW=series, GUARD_ROW=guards.row,
+            SERIES_ROW=series, GUARD_ROW=guards.row,
             GUARD_SERIES=[series.index(row) for row in guards.row],
             GUARD_SIGN=guards.sign, SNAP_STATE=guards.snap_state, SNAP_CONST=guards.snap_const,
             SINGULAR_GUARD=list(aside.guards),

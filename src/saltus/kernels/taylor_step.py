@@ -26,39 +26,47 @@ def step_length(work, log2_tolerance):
 
     After Jorba & Zou (2005), with the scale of a series taken from its value, its rate or its
     acceleration times the step, whichever allows most: a state that passes through zero doesn't
-    shrink the step, and changing units changes nothing. Gaps that aren't a state count too: a wall
-    may move while the body rests.
+    shrink the step, and changing units changes nothing. Gaps that aren't a state count too, on the
+    scale of their terms: a wall may move while the body rests, and a boundary that is ridden leaves
+    nothing but their rounding.
     """
     log_h = splat(1000.0, LANES)
-    for i in range(NSTEPPED):
-        base = STEP_ROW[i]
-        log_h = smaller(longest(work, base, ORDER - 1, log2_tolerance), log_h)
-        log_h = smaller(longest(work, base, ORDER, log2_tolerance), log_h)
-        vanishing = (
-            magnitude(load(work, base + ORDER, LANES))
-            + magnitude(load(work, base + ORDER - 1, LANES))
-            <= 0.0
-        )
-        # a series with holes, or a polynomial: ask the upper half of its terms
-        if any_lane(vanishing):
-            for j in range((ORDER + 1) // 2, ORDER - 1):
-                log_h = smaller(
-                    select(vanishing, longest(work, base, j, log2_tolerance), 1000.0), log_h
-                )
+    for i in range(NSTATES):
+        base = i * (ORDER + 1)
+        log_h = shortened(work, base, load(work, base, LANES), log_h, log2_tolerance)
+    for g in range(NGUARDS):
+        base = GUARD_ROW[g]
+        if base >= NSTATES * (ORDER + 1):
+            size = larger(magnitude(load(work, base, LANES)), load(work, SCALE_ROW + g, LANES))
+            log_h = shortened(work, base, size, log_h, log2_tolerance)
     return coarse_exp2(log_h)
 
 
 @inner
-def longest(work, base, j, log2_tolerance):
+def shortened(work, base, value, log_h, log2_tolerance):
+    """log_h, or less where a series of this value asks for a shorter step."""
+    log_h = smaller(longest(work, base, value, ORDER - 1, log2_tolerance), log_h)
+    log_h = smaller(longest(work, base, value, ORDER, log2_tolerance), log_h)
+    vanishing = (
+        magnitude(load(work, base + ORDER, LANES)) + magnitude(load(work, base + ORDER - 1, LANES))
+        <= 0.0
+    )
+    # a series with holes, or a polynomial: ask the upper half of its terms
+    if any_lane(vanishing):
+        for j in range((ORDER + 1) // 2, ORDER - 1):
+            log_h = smaller(
+                select(vanishing, longest(work, base, value, j, log2_tolerance), 1000.0), log_h
+            )
+    return log_h
+
+
+@inner
+def longest(work, base, value, j, log2_tolerance):
     """log2 of the step at which term j of a series is as large as the tolerance times its first
     three (at rest: its first ones).
     """
     last = coarse_log2(load(work, base + j, LANES)) - log2_tolerance
-    value, rate, acceleration = (
-        load(work, base, LANES),
-        load(work, base + 1, LANES),
-        load(work, base + 2, LANES),
-    )
+    rate, acceleration = load(work, base + 1, LANES), load(work, base + 2, LANES)
     by_value, by_rate = (
         (coarse_log2(value) - last) * (1.0 / j),
         (coarse_log2(rate) - last) * (1.0 / (j - 1)),
