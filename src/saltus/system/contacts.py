@@ -245,9 +245,10 @@ def _held_contacts(
     for number in surfaces:
         if number in of_contacts:
             continue
-        surface = split(number, field, OnSurface(guards[number].gap, states))
+        place = OnSurface(guards[number].gap, states)
+        surface = split(number, field, place)
         directions = {
-            other: tuple(averaged(entry, number, holds[number]) for entry in direction)
+            other: tuple(averaged(entry, number, holds[number], place) for entry in direction)
             for other, direction in directions.items()
         }
         directions[number] = surface.halves

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from saltus.errors import SaltusError, among, shown
+from saltus.system import checks
 from saltus.system.clocks import affine, switch
 from saltus.system.expression import (
     ELEMENTARY,
@@ -334,7 +335,12 @@ def _node(
 
 def _condition(data: Sequence[Any], nodes: Sequence[Expr]) -> Condition:
     kind, *parts = data
-    if kind == "bit" and len(parts) == 1 and isinstance(parts[0], int) and parts[0] >= 0:
+    if (
+        kind == "bit"
+        and len(parts) == 1
+        and isinstance(parts[0], int)
+        and 0 <= parts[0] < checks.MOST_GUARDS
+    ):
         return Bit(parts[0])
     if (
         kind == "switch"
