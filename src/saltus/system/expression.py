@@ -31,6 +31,9 @@ _INTERNED: weakref.WeakValueDictionary[tuple, Expr] = weakref.WeakValueDictionar
 _JOINED: weakref.WeakValueDictionary[tuple, Condition] = weakref.WeakValueDictionary()
 _LOCK = threading.RLock()  # two nodes for one state would make a derivative silently zero
 _OBSERVER: ContextVar[Callable[[Expr], None] | None] = ContextVar("observer", default=None)
+#: Most comparisons in one condition, as they would be written out (a chain in which each condition
+#: uses the one before twice doubles at each), and within one another (Python reads 200 brackets).
+MOST_JOINED, DEEPEST = 1000, 150
 #: A number with one bit for each operation, in the order in which they were met.
 _OPS: dict[str, int] = {}
 Number = int | float
@@ -291,26 +294,35 @@ class Condition:
     ----------
     ops, bits : int
         What stands in it, as :class:`Expr` has them.
+    length, depth : int
+        Comparisons in it, as they would be written out, and brackets within one another.
     """
 
     ops: int
     bits: int
+    length: int
+    depth: int
 
     def __post_init__(self) -> None:
-        ops, bits = 0, 0
+        ops, bits, length, depth = 0, 0, 0, 0
         for part in self._parts():
             ops, bits = ops | part.ops, bits | part.bits
-        object.__setattr__(self, "ops", ops)
-        object.__setattr__(self, "bits", bits)
+            length += part.length if isinstance(part, Condition) else 1
+            depth = max(depth, part.depth + 1) if isinstance(part, Condition) else 1
+        self._set(ops=ops, bits=bits, length=length, depth=depth)
+
+    def _set(self, **values: int) -> None:
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
 
     def _parts(self) -> tuple[Expr | Condition, ...]:
         raise NotImplementedError
 
     def __and__(self, other: Condition) -> Condition:
-        return And(self, _condition(other))
+        return _not_too_long(And(self, _condition(other)))
 
     def __or__(self, other: Condition) -> Condition:
-        return Or(self, _condition(other))
+        return _not_too_long(Or(self, _condition(other)))
 
     def __invert__(self) -> Condition:
         return Not(self)
@@ -355,8 +367,7 @@ class Bit(Condition, metaclass=_MadeOnce):
     guard: int
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "ops", 0)
-        object.__setattr__(self, "bits", 1 << self.guard)
+        self._set(ops=0, bits=1 << self.guard, length=1, depth=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -386,6 +397,17 @@ class Not(Condition, metaclass=_MadeOnce):
 
     def _parts(self) -> tuple[Expr | Condition, ...]:
         return (self.inner,)
+
+
+def _not_too_long(condition: Condition) -> Condition:
+    if condition.length > MOST_JOINED or condition.depth > DEEPEST:
+        raise TraceError(
+            f"an equation joined {condition.length} comparisons in one condition, "
+            f"{condition.depth} within one another; at most {MOST_JOINED} can be, {DEEPEST} within "
+            f"one another, and each use of a condition in another one counts. Write one piecewise "
+            f"inside the other in place of joining conditions."
+        )
+    return condition
 
 
 def _condition(value: object) -> Condition:

@@ -26,7 +26,7 @@ from saltus.system.surfaces import ratio, total
 _ZERO, _ONE = ex.constant(0.0), ex.constant(1.0)
 #: Most surfaces that one rate may depend on for whether they are held to be known in what is written
 #: for each of them: that doubles the terms for each.
-_MOST_KNOWN = 6
+_MOST_KNOWN = 4
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from saltus.errors import SaltusError, among, shown
-from saltus.system import checks
 from saltus.system.clocks import affine, switch
 from saltus.system.expression import (
     ELEMENTARY,
@@ -33,6 +32,8 @@ if TYPE_CHECKING:
 
 #: Changes whenever the meaning of the data does. Systems without a law of contact, and with one.
 FORMAT, WITH_LAWS = "saltus-system/1", "saltus-system/2"
+#: Bound of the numbers of guards in conditions, well above those that any system has.
+MOST_BITS = 1000
 #: Entries of a law's data, by what they hold: expressions, one of them or none, anything else.
 _TUPLES = ("reset", "settled", "normal", "direction")
 _SINGLE = ("constraint", "drive", "pivot", "limit", "restitution", "friction", "remaining", "mass")
@@ -339,7 +340,7 @@ def _condition(data: Sequence[Any], nodes: Sequence[Expr]) -> Condition:
         kind == "bit"
         and len(parts) == 1
         and isinstance(parts[0], int)
-        and 0 <= parts[0] < checks.MOST_GUARDS
+        and 0 <= parts[0] < MOST_BITS
     ):
         return Bit(parts[0])
     if (
