@@ -81,9 +81,12 @@ class Expr:
                 node = object.__new__(cls)
                 node.op, node.args, node.payload = op, args, payload
                 node.ops, node.bits = _number_of(op), 0
-                for below in (*args, payload) if isinstance(payload, Condition) else args:
+                for below in args:
                     node.ops |= below.ops
                     node.bits |= below.bits
+                if isinstance(payload, Condition):
+                    node.ops |= payload.ops
+                    node.bits |= payload.bits
                 _INTERNED[key] = node
         observer = _OBSERVER.get()
         if observer is not None:

@@ -24,8 +24,8 @@ from saltus.system.singular import assuming
 from saltus.system.surfaces import ratio, total
 
 _ZERO, _ONE = ex.constant(0.0), ex.constant(1.0)
-#: Most surfaces that one rate may depend on for whether they are held to be known in what is written
-#: for each of them: that doubles the terms for each.
+#: Most contacts that one rate may hold for its terms to be written for each of them apart, held and
+#: not: with each the terms double.
 _MOST_KNOWN = 4
 
 

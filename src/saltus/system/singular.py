@@ -24,6 +24,7 @@ from saltus.system.canonical import Canonical, is_multiple
 from saltus.system.expression import And, Bit, Condition, Expr, Not, Or, Relation
 from saltus.system.guards import Guard, bits_in
 
+_ZERO = ex.constant(0.0)
 #: Order of a logarithm: below every power.
 _LOG = -1e-9
 #: Most branches of a function of pieces: a sum of k pieces has 2**k values.
@@ -338,7 +339,7 @@ class _Boundaries:
             elif node is state:
                 known[node] = guard.boundary
             else:
-                args = tuple(known[one] for one in node.args)
+                args = tuple(new for one in node.args if (new := known[one]) is not None)
                 try:
                     known[node] = ex.rebuild(node, args, node.payload)
                 except TraceError:
@@ -354,7 +355,7 @@ class _Boundaries:
         try:
             new = self._spread(node, count(1))
         except _TooManyError:
-            return node
+            return _one_by_one(node)
         if new is node:
             return node
         for number in range(len(self._gaps)):
@@ -387,6 +388,43 @@ class _Boundaries:
             new = ex.rebuild(node, (inner, *node.args[1:]), node.payload)
             both.append(self._spread(new, branches) if new.op == node.op else new)
         return ex.select(Bit(outer), *both)
+
+
+def _one_by_one(node: Expr) -> Expr:
+    """A function of a sum of many pieces, each zero on one side: apart where one of them acts alone,
+    since only there it may vanish on a boundary, and where none does.
+    """
+    operand, acts = node.args[0], dict[Condition, None]()
+    for below in ex.walk(operand):
+        if (acting := _acting(below)) is not None:
+            acts[acting] = None
+
+    def where(one: Condition | None) -> Expr:
+        """The function where one of the pieces acts, or none."""
+        new: dict[Expr, Expr] = {}
+        for below in ex.walk(operand):
+            acting, args = _acting(below), tuple(new[child] for child in below.args)
+            if acting is None:
+                new[below] = ex.rebuild(below, args, below.payload)
+            else:
+                new[below] = args[args[0] is _ZERO] if acting is one else _ZERO
+        return ex.rebuild(node, (new[operand], *node.args[1:]), node.payload)
+
+    none = where(None)
+    if none.op != "const":
+        return node
+    lifted = ex.select(reduce(Or, acts), node, none)
+    for one in acts:
+        rest = [Not(other) for other in acts if other is not one]
+        lifted = ex.select(reduce(And, rest, one), where(one), lifted)
+    return lifted
+
+
+def _acting(node: Expr) -> Condition | None:
+    """The condition in which a piece isn't zero, if it is elsewhere."""
+    if node.op != "select" or all(one is not _ZERO for one in node.args):
+        return None
+    return node.payload if node.args[1] is _ZERO else Not(node.payload)
 
 
 class _TooManyError(Exception):
