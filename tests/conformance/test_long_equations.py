@@ -246,9 +246,10 @@ def depth_of(i, x, _v, z):
 def test_work_grows_with_operations_and_boundaries(family):
     """Twice the pieces have twice the boundaries; with what holds the motion on each of them they
     have up to four times the operations, most of which are looked at for a few boundaries only.
+    Functions of up to seven pieces are written out for all sides of these.
     """
-    few = calls(family(6), 500_000)
-    assert calls(family(12), 7 * few) < 7 * few
+    few = calls(family(8), 1_000_000)
+    assert calls(family(16), 7 * few) < 7 * few
 
 
 @pytest.mark.parametrize("seed", range(2))

@@ -24,9 +24,12 @@ def wait_for(said):
 
 def test_long_work_says_once_what_it_is(impatient):
     lines = []
-    with announce.announcing_to(lines.append), announce.working(lambda: "compiling rig (2 walls)"):
-        with announce.working(lambda: "a part"):
-            wait_for(lambda: lines)
+    with (
+        announce.announcing_to(lines.append),
+        announce.working(lambda: "compiling rig (2 walls)"),
+        announce.working(lambda: "a part"),
+    ):
+        wait_for(lambda: lines)
     assert lines == ["compiling rig (2 walls), 0 s so far"]
 
 
@@ -50,7 +53,8 @@ def test_on_a_terminal_the_line_is_gone_afterwards_even_when_stopped(impatient, 
             wait_for(terminal.getvalue)
             raise KeyboardInterrupt
 
-    pytest.raises(KeyboardInterrupt, stopped)
+    with pytest.raises(KeyboardInterrupt):
+        stopped()
     assert "saltus: tracing rig, 0 s so far" in terminal.getvalue()
     assert terminal.getvalue().endswith("\r\x1b[K")
     assert "\n" not in terminal.getvalue()

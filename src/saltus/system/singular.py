@@ -391,8 +391,8 @@ class _Boundaries:
 
 
 def _one_by_one(node: Expr) -> Expr:
-    """A function of a sum of many pieces, each zero on one side: apart where one of them acts alone,
-    since only there it may vanish on a boundary, and where none does.
+    """A function of a sum of many pieces, each zero on one side: apart where one of them acts
+    alone, since only there it may vanish on a boundary, and where none does.
     """
     operand, acts = node.args[0], dict[Condition, None]()
     for below in ex.walk(operand):
