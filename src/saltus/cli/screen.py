@@ -134,7 +134,7 @@ def reporting(kind: str) -> Iterator[tuple[Callable[[Report], None], Callable[[s
         if kind == "json":
             print(json.dumps({"note": text}), file=sys.stderr, flush=True)  # noqa: T201
 
-    from saltus.codegen.announce import announcing_to
+    from saltus.announce import announcing_to
 
     with announcing_to(note_json):
         yield report_json, say if kind != "json" else lambda _: None

@@ -22,8 +22,8 @@ from functools import cached_property
 from pathlib import Path
 
 from saltus import cache
+from saltus.announce import announce
 from saltus.codegen import machine, templates
-from saltus.codegen.announce import announce
 from saltus.codegen.asker import PARENT_ID
 from saltus.errors import CacheError
 from saltus.interrupt import check_stop, ctrl_c_waits

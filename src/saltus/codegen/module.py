@@ -9,6 +9,7 @@ from importlib import resources
 from types import ModuleType
 from typing import Any, Protocol
 
+from saltus.announce import working
 from saltus.codegen import machine, tableaux, templates
 from saltus.codegen.head import Constant, Head
 from saltus.codegen.interface import ADAMS, CAPTURE, FIXED_STEP, NDF, PAIR, TAYLOR, Interface
@@ -16,6 +17,8 @@ from saltus.codegen.kernels import Kernels
 from saltus.codegen.rates_head import rates_head
 from saltus.codegen.taylor_head import taylor_head
 from saltus.errors import TraceError
+from saltus.system.expression import walk
+from saltus.system.guards import expressions_of
 from saltus.system.quantity import acting_guards
 from saltus.system.system import System
 
@@ -78,8 +81,9 @@ def taylor_module(system: System, order: int, lanes: int) -> Flow:
     never recompile.
     """
     title = f"{system.name}, Taylor order {order}, {lanes} lanes"
-    head = _printed(system, lambda: taylor_head(system, order, lanes))
-    return _flow(TAYLOR, f"taylor_{lanes}", head, title, f"{_described(system)} for Taylor")
+    with working(lambda: f"compiling {_sized(system)}"):
+        head = _printed(system, lambda: taylor_head(system, order, lanes))
+        return _flow(TAYLOR, f"taylor_{lanes}", head, title, f"{_described(system)} for Taylor")
 
 
 #: Name of each other method: templates, their bitcode, and the numbers that they are given.
@@ -96,9 +100,10 @@ _STEPS: dict[str, tuple[Interface, str, Mapping[str, Constant]]] = {
 def steps_module(system: System, method: str) -> Flow:
     """The compiled flow of a system by a method that runs one trajectory after the other."""
     interface, template, numbers = _STEPS[method]
-    head = _printed(system, lambda: rates_head(system, numbers, "jacobian" in interface.functions))
-    title = f"{system.name}, {method}"
-    return _flow(interface, template, head, title, f"{_described(system)} for {method}")
+    jacobian, title = "jacobian" in interface.functions, f"{system.name}, {method}"
+    with working(lambda: f"compiling {_sized(system)}"):
+        head = _printed(system, lambda: rates_head(system, numbers, jacobian))
+        return _flow(interface, template, head, title, f"{_described(system)} for {method}")
 
 
 def _printed(system: System, head: Callable[[], Head]) -> Head:
@@ -130,6 +135,12 @@ def _described(system: System) -> str:
         if len(acting_guards(system)) < len(system.guards)
         else system.name
     )
+
+
+def _sized(system: System) -> str:
+    """What is compiled, and how large it is."""
+    operations = sum(1 for _ in walk(*system.field, *expressions_of(system.guards)))
+    return f"{_described(system)} ({len(system.guards)} boundaries, {operations} operations)"
 
 
 def _flow(interface: Interface, template: str, head: Head, title: str, what: str) -> Any:

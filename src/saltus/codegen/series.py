@@ -19,6 +19,8 @@ from saltus.system.expression import Expr
 
 #: Series kinds whose value is finite wherever their operands are.
 _TOTAL = ("state", "time", "since", "product", "sin", "cos", "atan", "tanh", "linear")
+#: Most branches into which a factor is pushed: those of a product of pieces multiply.
+_MOST_BRANCHES = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,19 +66,44 @@ def is_constant(coefficient: Expr, value: float) -> bool:
 
 def _scale(factor: Expr, c: Expr, by_division: bool = False) -> Expr:
     """``c * factor`` (or ``c / factor``), pushed into the branches of a mode selection so that
-    nothing is divided at run time.
+    nothing is divided at run time; where these are many it stands as it is.
     """
-    if c.op == "select":
-        return ex.select(
-            c.payload,
-            _scale(factor, c.args[0], by_division),
-            _scale(factor, c.args[1], by_division),
-        )
-    if c.op == "neg":
-        return ex.neg(_scale(factor, c.args[0], by_division))
-    if factor.op == "select" and not by_division:
-        return ex.select(factor.payload, _scale(factor.args[0], c), _scale(factor.args[1], c))
-    return ex.div(c, factor) if by_division else ex.mul(c, factor)
+    pushed = _branches(c) * (1 if by_division else _branches(factor)) <= _MOST_BRANCHES
+    return _scaled_branches(factor, c, by_division, pushed, {})
+
+
+def _scaled_branches(
+    factor: Expr, c: Expr, by_division: bool, pushed: bool, memo: dict[tuple[Expr, Expr], Expr]
+) -> Expr:
+    if (factor, c) in memo:
+        return memo[factor, c]
+
+    def scaled(factor: Expr, c: Expr) -> Expr:
+        return _scaled_branches(factor, c, by_division, pushed, memo)
+
+    if c.op == "select" and pushed:
+        made = ex.select(c.payload, *(scaled(factor, branch) for branch in c.args))
+    elif c.op == "neg":
+        made = ex.neg(scaled(factor, c.args[0]))
+    elif factor.op == "select" and pushed and not by_division:
+        made = ex.select(factor.payload, *(scaled(branch, c) for branch in factor.args))
+    else:
+        made = ex.div(c, factor) if by_division else ex.mul(c, factor)
+    memo[factor, c] = made
+    return made
+
+
+def _branches(c: Expr) -> int:
+    """How many different branches a coefficient has, counted until they are too many."""
+    seen, stack, count = {c}, [c], 0
+    while stack and count <= _MOST_BRANCHES:
+        top = stack.pop()
+        count += top.op not in ("select", "neg")
+        for below in top.args if top.op in ("select", "neg") else ():
+            if below not in seen:
+                seen.add(below)
+                stack.append(below)
+    return count
 
 
 def _may_hide(series: Series) -> bool:

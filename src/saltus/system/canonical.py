@@ -33,9 +33,8 @@ class Canonical:
 
     def polynomial(self, root: Expr) -> Polynomial:
         """The normal form of ``root``."""
-        for node in walk(root):
-            if node not in self._memo:
-                self._memo[node] = self._normal(node)
+        for node in walk(root, known=self._memo):
+            self._memo[node] = self._normal(node)
         return self._memo[root]
 
     def kinds(self, polynomial: Polynomial) -> frozenset[str]:
@@ -104,7 +103,7 @@ class Canonical:
         total: Polynomial = {}
         for left, p in a.items():
             for right, q in b.items():
-                total = _sum(total, {_merged(left, right): p * q})
+                _add(total, _merged(left, right), p * q)
         return total
 
     def _inverse(self, a: Polynomial) -> Polynomial:
@@ -126,10 +125,15 @@ class Canonical:
 def _sum(a: Polynomial, b: Polynomial) -> Polynomial:
     total = dict(a)
     for monomial, coefficient in b.items():
-        value = total.pop(monomial, Fraction(0)) + coefficient
-        if value:
-            total[monomial] = value
+        _add(total, monomial, coefficient)
     return total
+
+
+def _add(total: Polynomial, monomial: Monomial, coefficient: Fraction) -> None:
+    """Add one term to a sum, in place."""
+    value = total.pop(monomial, Fraction(0)) + coefficient
+    if value:
+        total[monomial] = value
 
 
 def _scaled(a: Polynomial, factor: int) -> Polynomial:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -242,22 +242,53 @@ def _held_contacts(
             ex.add(by, ex.select(Bit(holds[one.guard]), _ZERO, more)) if more is not _ZERO else by
             for by, more in zip(directions[one.contact], slides, strict=True)
         )
+    alone = {number: _moved_alone(number, field) for number in surfaces}
     for number in surfaces:
         if number in of_contacts:
             continue
-        surface = split(number, field, OnSurface(guards[number].gap, states))
+        place = OnSurface(guards[number].gap, states)
+        apart = {
+            holds[other]
+            for other, i in alone.items()
+            if other < number and i is not None and i == alone[number]
+        }
+        free = tuple(_known(entry, apart, False) for entry in field)
+        surface = split(number, free, place)
         directions = {
-            other: tuple(averaged(entry, number, holds[number]) for entry in direction)
+            other: direction
+            if holds[other] in apart
+            else tuple(averaged(entry, number, holds[number], place) for entry in direction)
             for other, direction in directions.items()
         }
         directions[number] = surface.halves
-        field = held_at(field, surface, holds[number])
+        new = held_at(free, surface, holds[number])
+        field = tuple(
+            ex.select(Bit(holds[number]), assuming(now, holds[number], True), before)
+            if apart and i == alone[number]
+            else now
+            for i, (now, before) in enumerate(zip(new, field, strict=True))
+        )
     held = []
     for number in order:
         constraint = laws[number].constraint
         assert constraint is not None
         held.append(held_contact(number, holds[number], constraint, directions[number], states))
     return with_pivots(held), field
+
+
+def _moved_alone(number: int, field: Field) -> int | None:
+    """The state whose rate a surface decides, if that is just one: of several surfaces that decide
+    only the same rate one can be held at a time, and no term is written for two at once.
+    """
+    moved = [i for i, entry in enumerate(field) if number in bits_in([entry])]
+    return moved[0] if len(moved) == 1 else None
+
+
+def _known(entry: Expr, bits: Iterable[int], value: bool) -> Expr:
+    """An expression with some bits known."""
+    for bit in bits:
+        entry = assuming(entry, bit, value)
+    return entry
 
 
 def _scaled(factor: Operand, direction: Sequence[Expr]) -> Field:

@@ -29,7 +29,7 @@ def evaluate(
     t: Any = 0.0,
     states: Mapping[str, Any] | None = None,
     values: Mapping[str, Any] | None = None,
-    bits: Sequence[Any] = (),
+    bits: Sequence[Any] | Mapping[int, Any] = (),
 ) -> list[Any]:
     """Values of expressions.
 
@@ -41,9 +41,9 @@ def evaluate(
         Time [s].
     states, values : mapping of str to float or array
         States and parameters [SI]. All arrays must broadcast.
-    bits : sequence of bool or array of bool
-        Side of each guard: True where its gap is positive. May be shorter than the list of guards
-        if the rest isn't used.
+    bits : sequence of bool or array of bool, or mapping
+        Side of each guard, by its number: True where its gap is positive. Those that aren't used
+        may be missing.
 
     Returns
     -------

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 import threading
 import weakref
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -28,10 +28,20 @@ ELEMENTARY = ("sqrt", "exp", "log", "sin", "cos", "tan", "atan", "tanh")
 
 _MATH = {name: getattr(math, name) for name in ELEMENTARY}
 _INTERNED: weakref.WeakValueDictionary[tuple, Expr] = weakref.WeakValueDictionary()
+_JOINED: weakref.WeakValueDictionary[tuple, Condition] = weakref.WeakValueDictionary()
 _LOCK = threading.RLock()  # two nodes for one state would make a derivative silently zero
 _OBSERVER: ContextVar[Callable[[Expr], None] | None] = ContextVar("observer", default=None)
+#: Most comparisons in one condition, as they would be written out (a chain in which each condition
+#: uses the one before twice doubles at each), and within one another (Python reads 200 brackets).
+MOST_JOINED, DEEPEST = 1000, 150
+#: A number with one bit for each operation, in the order in which they were met.
+_OPS: dict[str, int] = {}
 Number = int | float
 Operand = Union["Expr", int, float]
+
+
+def _number_of(op: str) -> int:
+    return _OPS.setdefault(op, 1 << len(_OPS))
 
 
 class Expr:
@@ -48,13 +58,18 @@ class Expr:
     payload : object
         The number of a ``const``, the name of a ``param`` or ``state``, the condition of a
         ``select``, the data of a ``table``; else None.
+    ops, bits : int
+        What stands at and below the node, conditions and the gaps in them included: operations
+        (:func:`depends_on`), and guards whose bits it asks for, guard i as ``1 << i``.
     """
 
-    __slots__ = ("__weakref__", "args", "op", "payload")
+    __slots__ = ("__weakref__", "args", "bits", "op", "ops", "payload")
 
     op: str
     args: tuple[Expr, ...]
     payload: Any
+    ops: int
+    bits: int
 
     def __new__(cls, op: str, args: tuple[Expr, ...] = (), payload: Any = None) -> Expr:
         """The one node of this operation on these operands."""
@@ -65,6 +80,13 @@ class Expr:
             if node is None:
                 node = object.__new__(cls)
                 node.op, node.args, node.payload = op, args, payload
+                node.ops, node.bits = _number_of(op), 0
+                for below in args:
+                    node.ops |= below.ops
+                    node.bits |= below.bits
+                if isinstance(payload, Condition):
+                    node.ops |= payload.ops
+                    node.bits |= payload.bits
                 _INTERNED[key] = node
         observer = _OBSERVER.get()
         if observer is not None:
@@ -253,16 +275,57 @@ class _LeavesOpen(Protocol):
 
 
 # -- conditions ------------------------------------------------------------------------------------
+class _MadeOnce(type):
+    """Equal conditions are one object, as equal nodes are: a comparison of two takes no longer for
+    long ones.
+    """
+
+    def __call__(cls, *parts: Condition | int) -> Any:
+        key = (cls, *(id(part) if isinstance(part, Condition) else part for part in parts))
+        with _LOCK:
+            made = _JOINED.get(key)
+            if made is None:
+                made = _JOINED[key] = super().__call__(*parts)
+        return made
+
+
 class Condition:
     """A truth value that depends on the state: sides of guards, joined by ``&``,
     ``|`` and ``~``.
+
+    Attributes
+    ----------
+    ops, bits : int
+        What stands in it, as :class:`Expr` has them.
+    length, depth : int
+        Comparisons in it, as they would be written out, and brackets within one another.
     """
 
+    ops: int
+    bits: int
+    length: int
+    depth: int
+
+    def __post_init__(self) -> None:
+        ops, bits, length, depth = 0, 0, 0, 0
+        for part in self._parts():
+            ops, bits = ops | part.ops, bits | part.bits
+            length += part.length if isinstance(part, Condition) else 1
+            depth = max(depth, part.depth + 1) if isinstance(part, Condition) else 1
+        self._set(ops=ops, bits=bits, length=length, depth=depth)
+
+    def _set(self, **values: int) -> None:
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    def _parts(self) -> tuple[Expr | Condition, ...]:
+        raise NotImplementedError
+
     def __and__(self, other: Condition) -> Condition:
-        return And(self, _condition(other))
+        return _not_too_long(And(self, _condition(other)))
 
     def __or__(self, other: Condition) -> Condition:
-        return Or(self, _condition(other))
+        return _not_too_long(Or(self, _condition(other)))
 
     def __invert__(self) -> Condition:
         return Not(self)
@@ -286,6 +349,9 @@ class Relation(Condition):
 
     gap: Expr
 
+    def _parts(self) -> tuple[Expr | Condition, ...]:
+        return (self.gap,)
+
 
 @dataclass(frozen=True, eq=False)
 class Friction(Relation):
@@ -297,34 +363,54 @@ class Friction(Relation):
     levels: tuple[Expr, ...]
 
 
-@dataclass(frozen=True)
-class Bit(Condition):
+@dataclass(frozen=True, eq=False)
+class Bit(Condition, metaclass=_MadeOnce):
     """Side of guard number ``guard`` in a system's list: true where that guard is positive."""
 
     guard: int
 
+    def __post_init__(self) -> None:
+        self._set(ops=0, bits=1 << self.guard, length=1, depth=1)
 
-@dataclass(frozen=True)
-class And(Condition):
+
+@dataclass(frozen=True, eq=False)
+class _Joint(Condition, metaclass=_MadeOnce):
+    """Two conditions, joined."""
+
+    left: Condition
+    right: Condition
+
+    def _parts(self) -> tuple[Expr | Condition, ...]:
+        return self.left, self.right
+
+
+class And(_Joint):
     """Both conditions hold."""
 
-    left: Condition
-    right: Condition
 
-
-@dataclass(frozen=True)
-class Or(Condition):
+class Or(_Joint):
     """At least one condition holds."""
 
-    left: Condition
-    right: Condition
 
-
-@dataclass(frozen=True)
-class Not(Condition):
+@dataclass(frozen=True, eq=False)
+class Not(Condition, metaclass=_MadeOnce):
     """The condition does not hold."""
 
     inner: Condition
+
+    def _parts(self) -> tuple[Expr | Condition, ...]:
+        return (self.inner,)
+
+
+def _not_too_long(condition: Condition) -> Condition:
+    if condition.length > MOST_JOINED or condition.depth > DEEPEST:
+        raise TraceError(
+            f"an equation joined {condition.length} comparisons in one condition, "
+            f"{condition.depth} within one another; at most {MOST_JOINED} can be, {DEEPEST} within "
+            f"one another, and each use of a condition in another one counts. Write one piecewise "
+            f"inside the other in place of joining conditions."
+        )
+    return condition
 
 
 def _condition(value: object) -> Condition:
@@ -505,14 +591,20 @@ def absolute(a: Operand) -> Expr:
 
 # -- walking ---------------------------------------------------------------------------------------
 def relations_in(condition: Condition) -> Iterator[Relation]:
-    """Every relation in a condition, left to right."""
-    if isinstance(condition, Relation):
-        yield condition
-    elif isinstance(condition, And | Or):
-        yield from relations_in(condition.left)
-        yield from relations_in(condition.right)
-    elif isinstance(condition, Not):
-        yield from relations_in(condition.inner)
+    """Every relation in a condition, left to right; one that stands in it twice may come once."""
+    seen: set[Condition] = set()
+    stack = [condition]
+    while stack:
+        one = stack.pop()
+        if not one.ops or one in seen:  # of bits alone
+            continue
+        seen.add(one)
+        if isinstance(one, Relation):
+            yield one
+        elif isinstance(one, And | Or):
+            stack += (one.right, one.left)
+        elif isinstance(one, Not):
+            stack.append(one.inner)
 
 
 def operands(node: Expr) -> tuple[Expr, ...]:
@@ -522,11 +614,14 @@ def operands(node: Expr) -> tuple[Expr, ...]:
     return node.args
 
 
-def walk(*roots: Expr, conditions: bool = True) -> Iterator[Expr]:
+def walk(
+    *roots: Expr, conditions: bool = True, known: Container[Expr] = (), bits: int = -1
+) -> Iterator[Expr]:
     """Every node below the roots once, operands before the nodes that use them (iterative: deep
     sums don't overflow the stack).
 
-    Those that only comparisons in conditions use are left out if ``conditions`` is False.
+    Those that only comparisons in conditions use are left out if ``conditions`` is False. Nothing
+    is entered that is ``known`` or, unless ``bits`` is -1, asks for none of these bits.
     """
     seen: set[Expr] = set()
     stack = [(root, False) for root in reversed(roots)]
@@ -534,7 +629,7 @@ def walk(*roots: Expr, conditions: bool = True) -> Iterator[Expr]:
         node, ready = stack.pop()
         if ready:
             yield node
-        elif node not in seen:
+        elif node not in seen and node not in known and (bits == -1 or node.bits & bits):
             seen.add(node)
             stack.append((node, True))
             below = operands(node) if conditions else node.args
@@ -572,7 +667,7 @@ def substituted(root: Expr, new: Mapping[Expr, Expr]) -> Expr:
 
 def depends_on(node: Expr, ops: tuple[str, ...]) -> bool:
     """Whether a leaf of one of the kinds ``ops`` stands below ``node``."""
-    return any(leaf.op in ops for leaf in walk(node))
+    return any(node.ops & _number_of(op) for op in ops)
 
 
 def varies(node: Expr) -> bool:

@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
+from operator import or_
 
 from saltus.errors import TraceError
 from saltus.system import expression as ex
@@ -287,18 +289,17 @@ class _Finder:
     def rewrite(self, root: Expr) -> Expr:
         """The expression with bits in place of relations, all of which must be known."""
         memo = self._rewritten
-        for node in ex.walk(root):
-            if node not in memo:
-                args = tuple(memo[child] for child in node.args)
-                if node.op != "select":
-                    memo[node] = ex.rebuild(node, args, node.payload)
-                else:
-                    condition = self._condition(node.payload)
-                    memo[node] = (
-                        args[not condition]
-                        if isinstance(condition, bool)
-                        else ex.rebuild(node, args, condition)
-                    )
+        for node in ex.walk(root, known=memo):
+            args = tuple(memo[child] for child in node.args)
+            if node.op != "select":
+                memo[node] = ex.rebuild(node, args, node.payload)
+            else:
+                condition = self._condition(node.payload)
+                memo[node] = (
+                    args[not condition]
+                    if isinstance(condition, bool)
+                    else ex.rebuild(node, args, condition)
+                )
         return memo[root]
 
     def _condition(self, condition: Condition) -> Condition | bool:
@@ -409,20 +410,10 @@ def _used_only(
     return field, tuple(_with_names(used_guards, known))
 
 
-def bits_in(roots: Sequence[Expr]) -> set[int]:
+def bits_in(roots: Iterable[Expr]) -> set[int]:
     """Numbers of the guards whose bits stand in conditions below the roots."""
-    return {bit for node in ex.walk(*roots) if node.op == "select" for bit in _bits(node.payload)}
-
-
-def _bits(condition: Condition) -> Iterator[int]:
-    match condition:
-        case Bit(guard):
-            yield guard
-        case Not(inner):
-            yield from _bits(inner)
-        case And(left, right) | Or(left, right):
-            yield from _bits(left)
-            yield from _bits(right)
+    bits = reduce(or_, (root.bits for root in roots), 0)
+    return {number for number in range(bits.bit_length()) if bits >> number & 1}
 
 
 def _renumbered(root: Expr, new: Mapping[int, int]) -> Expr:

@@ -19,11 +19,14 @@ from saltus.system import expression as ex
 from saltus.system.canonical import Canonical
 from saltus.system.derivatives import gradient, time_derivative
 from saltus.system.expression import Bit, Expr
-from saltus.system.guards import Guard
+from saltus.system.guards import Guard, bits_in
 from saltus.system.singular import assuming
 from saltus.system.surfaces import ratio, total
 
 _ZERO, _ONE = ex.constant(0.0), ex.constant(1.0)
+#: Most contacts that one rate may hold for its terms to be written for each of them apart, held and
+#: not: with each the terms double.
+_MOST_KNOWN = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,11 +74,17 @@ def held_contact(
 
 def with_pivots(contacts: Sequence[Held]) -> list[Held]:
     """The contacts with their pivots: of the states in which a constraint is linear, one that the
-    contact's force moves and that is no other contact's.
+    contact's force moves and that is no other contact's. If that force moves just one state, it is
+    this one: of several that move only the same state one can be held at a time.
     """
     chosen: dict[int, int] = {}
     candidates = {number: _linear_states(one) for number, one in enumerate(contacts)}
-    for number in sorted(candidates, key=lambda number: len(candidates[number])):
+    for number, states in candidates.items():
+        moved = [i for i, by in enumerate(contacts[number].direction) if by is not _ZERO]
+        if len(moved) == 1 and moved[0] in states:
+            chosen[number] = moved[0]
+    waiting = [number for number in candidates if number not in chosen]
+    for number in sorted(waiting, key=lambda number: len(candidates[number])):
         free = [i for i in candidates[number] if i not in chosen.values()]
         if free or candidates[number]:
             chosen[number] = (free or candidates[number])[0]
@@ -111,6 +120,8 @@ class Elimination:
     def __init__(self, field: Sequence[Expr], contacts: Sequence[Held]) -> None:
         self._field, self._contacts = tuple(field), tuple(contacts)
         self._canonical = Canonical()
+        holds = {one.hold for one in contacts}
+        self._known = all(len(holds & bits_in([entry])) <= _MOST_KNOWN for entry in field)
 
     def reduced(self) -> tuple[Expr, ...]:
         """The field: the reduced one where hold guards say so."""
@@ -159,16 +170,15 @@ class Elimination:
     ) -> tuple[Expr, ...]:
         """Entries minus a share of a contact's direction, where it is held."""
         new = tuple(
-            _held(one, ex.sub(entry, ex.mul(by, share)), entry)
+            self._held(one, ex.sub(entry, ex.mul(by, share)), entry)
             if by is not _ZERO and i != one.pivot
             else entry
             for i, (entry, by) in enumerate(zip(entries, own, strict=True))
         )
         return self._put(one, new, drift, entries) if one.pivot is not None else new
 
-    @staticmethod
     def _put(
-        one: Held, entries: tuple[Expr, ...], drift: Expr, free: tuple[Expr, ...]
+        self, one: Held, entries: tuple[Expr, ...], drift: Expr, free: tuple[Expr, ...]
     ) -> tuple[Expr, ...]:
         """The pivot's entry from the constraint, exactly, where the contact is held."""
         if one.pivot is None:
@@ -180,7 +190,15 @@ class Elimination:
             if k != i and slope is not _ZERO and entry is not _ZERO
         ]
         exact = ratio(ex.neg(total([drift, *others])), one.normal[i])
-        return (*entries[:i], _held(one, exact, free[i]), *entries[i + 1 :])
+        return (*entries[:i], self._held(one, exact, free[i]), *entries[i + 1 :])
+
+    def _held(self, one: Held, value: Expr, otherwise: Expr) -> Expr:
+        """``value`` where a contact is held."""
+        if self._known:
+            value, otherwise = (
+                assuming(root, one.hold, side) for root, side in ((value, True), (otherwise, False))
+            )
+        return ex.select(Bit(one.hold), value, otherwise)
 
     def _in_order(self) -> list[Held]:
         """The contacts with pivots, each behind those whose pivots its own rate follows from; those
@@ -207,13 +225,6 @@ class Elimination:
 
 def _is_nothing(node: Expr) -> bool:
     return node.op == "const" and node.payload == 0
-
-
-def _held(one: Held, value: Expr, otherwise: Expr) -> Expr:
-    """``value`` where a contact is held."""
-    return ex.select(
-        Bit(one.hold), assuming(value, one.hold, True), assuming(otherwise, one.hold, False)
-    )
 
 
 def hold_gap(kind: str, drive: Expr, pivot: Expr, limit: Expr | None) -> Expr:

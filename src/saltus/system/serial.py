@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 #: Changes whenever the meaning of the data does. Systems without a law of contact, and with one.
 FORMAT, WITH_LAWS = "saltus-system/1", "saltus-system/2"
+#: Bound of the numbers of guards in conditions, well above those that any system has.
+MOST_BITS = 1000
 #: Entries of a law's data, by what they hold: expressions, one of them or none, anything else.
 _TUPLES = ("reset", "settled", "normal", "direction")
 _SINGLE = ("constraint", "drive", "pivot", "limit", "restitution", "friction", "remaining", "mass")
@@ -334,7 +336,12 @@ def _node(
 
 def _condition(data: Sequence[Any], nodes: Sequence[Expr]) -> Condition:
     kind, *parts = data
-    if kind == "bit" and len(parts) == 1 and isinstance(parts[0], int) and parts[0] >= 0:
+    if (
+        kind == "bit"
+        and len(parts) == 1
+        and isinstance(parts[0], int)
+        and 0 <= parts[0] < MOST_BITS
+    ):
         return Bit(parts[0])
     if (
         kind == "switch"

@@ -11,8 +11,11 @@ it goes to zero.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
 from functools import reduce
+from itertools import count
+from operator import or_
 from typing import NamedTuple
 
 from saltus.errors import TraceError
@@ -21,8 +24,11 @@ from saltus.system.canonical import Canonical, is_multiple
 from saltus.system.expression import And, Bit, Condition, Expr, Not, Or, Relation
 from saltus.system.guards import Guard, bits_in
 
+_ZERO = ex.constant(0.0)
 #: Order of a logarithm: below every power.
 _LOG = -1e-9
+#: Most branches of a function of pieces: a sum of k pieces has 2**k values.
+_MOST_BRANCHES = 256
 
 
 class Order(NamedTuple):
@@ -171,6 +177,10 @@ def assuming(root: Expr, bit: int, value: bool) -> Expr:
     stack = [root]
     while stack:
         node = stack[-1]
+        if not node.bits >> bit & 1:
+            memo[node] = node
+            stack.pop()
+            continue
         condition = _knowing(node.payload, bit, value) if node.op == "select" else None
         decided = isinstance(condition, bool)
         args = (node.args[not condition],) if decided else node.args
@@ -188,6 +198,8 @@ def assuming(root: Expr, bit: int, value: bool) -> Expr:
 
 
 def _knowing(condition: Condition, bit: int, value: bool) -> Condition | bool:
+    if not condition.bits >> bit & 1:
+        return condition
     match condition:
         case Bit(number):
             return value if number == bit else condition
@@ -230,7 +242,10 @@ class _Boundaries:
         self._canonical = Canonical()
         self._gaps = [self._canonical.polynomial(guard.gap) for guard in guards]
         self._guards = tuple(guards)
-        self._states = [_states_in(guard.gap) for guard in guards]
+        self._states: dict[Expr, int] = {}
+        self._one_more = (1 << place for place in count())
+        self._orders: list[dict[Expr, Order]] = [{} for _ in guards]
+        self._there: list[dict[Expr, Expr | None]] = [{} for _ in guards]
 
     def singular_terms(self, field: Sequence[Expr], number: int) -> list[Expr]:
         """The nodes at which a series ends to exist on a boundary: powers, roots, logarithms and
@@ -253,9 +268,9 @@ class _Boundaries:
         return False
 
     def orders(self, field: Sequence[Expr], number: int) -> dict[Expr, Order]:
-        """Order of every node on boundary ``number``."""
-        orders: dict[Expr, Order] = {}
-        for node in ex.walk(*field):
+        """Order of every node on boundary ``number``, and of those asked for before."""
+        orders = self._orders[number]
+        for node in ex.walk(*field, known=orders):
             orders[node] = self._order(node, orders, number)
         return orders
 
@@ -295,18 +310,41 @@ class _Boundaries:
         """Whether a node is zero on a boundary: the gap times a factor, or zero once the state is
         put there.
         """
-        guard = self._guards[number]
-        if not self._states[number] & _states_in(node):
+        if not self._states_in(self._guards[number].gap) & self._states_in(node):
             return False
         if self._is_gap(node, number):
             return True
+        there = self._on_boundary(node, number)
+        return there is not None and not self._canonical.polynomial(there)
+
+    def _states_in(self, root: Expr) -> int:
+        """The states below a node, each by a bit of a number."""
+        known = self._states
+        for node in ex.walk(root, known=known):
+            own = next(self._one_more) if node.op == "state" else 0
+            known[node] = reduce(or_, (known[one] for one in ex.operands(node)), own)
+        return known[root]
+
+    def _on_boundary(self, root: Expr, number: int) -> Expr | None:
+        """A node where the state of a boundary is put there; None of a boundary that is no level,
+        and of what is no number there.
+        """
+        guard, known = self._guards[number], self._there[number]
         if guard.state is None or guard.boundary is None:
-            return False
-        try:
-            there = ex.substituted(node, {ex.state(guard.state): guard.boundary})
-        except TraceError:  # something in it is no number there
-            return False
-        return not self._canonical.polynomial(there)
+            return None
+        state = ex.state(guard.state)
+        for node in ex.walk(root, known=known):
+            if any(known[one] is None for one in ex.operands(node)):
+                known[node] = None
+            elif node is state:
+                known[node] = guard.boundary
+            else:
+                args = tuple(new for one in node.args if (new := known[one]) is not None)
+                try:
+                    known[node] = ex.rebuild(node, args, node.payload)
+                except TraceError:
+                    known[node] = None
+        return known[root]
 
     def _is_gap(self, node: Expr, number: int) -> bool:
         """Whether a node is the gap of a guard times a factor."""
@@ -314,7 +352,10 @@ class _Boundaries:
 
     def lifted(self, node: Expr) -> Expr:
         """A function of a piece as a piece of functions, if that shows a zero on a boundary."""
-        new = self._spread(node)
+        try:
+            new = self._spread(node, count(1))
+        except _TooManyError:
+            return _one_by_one(node)
         if new is node:
             return node
         for number in range(len(self._gaps)):
@@ -331,36 +372,78 @@ class _Boundaries:
             else node
         )
 
-    def _spread(self, node: Expr) -> Expr:
+    def _spread(self, node: Expr, branches: Iterator[int]) -> Expr:
+        """A function of a piece as a piece of functions; raises _TooManyError if these are many."""
+        if next(branches) > _MOST_BRANCHES:
+            raise _TooManyError
         operand = node.args[0]
         if any(self._is_gap(operand, number) for number in range(len(self._gaps))):
             return node
         outer = _outermost_bit(operand)
         if outer is None:
             return node
-        branches = []
+        both = []
         for value in (True, False):
             inner = assuming(operand, outer, value)
             new = ex.rebuild(node, (inner, *node.args[1:]), node.payload)
-            branches.append(self._spread(new) if new.op == node.op else new)
-        return ex.select(Bit(outer), *branches)
+            both.append(self._spread(new, branches) if new.op == node.op else new)
+        return ex.select(Bit(outer), *both)
+
+
+def _one_by_one(node: Expr) -> Expr:
+    """A function of a sum of many pieces, each zero on one side: apart where one of them acts
+    alone, since only there it may vanish on a boundary, and where none does.
+    """
+    operand, acts = node.args[0], dict[Condition, None]()
+    for below in ex.walk(operand):
+        if (acting := _acting(below)) is not None:
+            acts[acting] = None
+
+    def where(one: Condition | None) -> Expr:
+        """The function where one of the pieces acts, or none."""
+        new: dict[Expr, Expr] = {}
+        for below in ex.walk(operand):
+            acting, args = _acting(below), tuple(new[child] for child in below.args)
+            if acting is None:
+                new[below] = ex.rebuild(below, args, below.payload)
+            else:
+                new[below] = args[args[0] is _ZERO] if acting is one else _ZERO
+        return ex.rebuild(node, (new[operand], *node.args[1:]), node.payload)
+
+    none = where(None)
+    if none.op != "const":
+        return node
+    lifted = ex.select(reduce(Or, acts), node, none)
+    for one in acts:
+        rest = [Not(other) for other in acts if other is not one]
+        lifted = ex.select(reduce(And, rest, one), where(one), lifted)
+    return lifted
+
+
+def _acting(node: Expr) -> Condition | None:
+    """The condition in which a piece isn't zero, if it is elsewhere."""
+    if node.op != "select" or all(one is not _ZERO for one in node.args):
+        return None
+    return node.payload if node.args[1] is _ZERO else Not(node.payload)
+
+
+class _TooManyError(Exception):
+    """A function would have more branches than are looked at."""
 
 
 def _outermost_bit(node: Expr) -> int | None:
     """A bit of the first piece on the way down."""
-    stack = [node]
-    while stack:
-        top = stack.pop(0)
-        if top.op == "select" and (
-            bits := bits_in([ex.Expr("select", (ex.constant(0.0), ex.constant(1.0)), top.payload)])
-        ):
-            return min(bits)
-        stack.extend(top.args)
+    queue, seen = deque([node]), {node}
+    while queue:
+        top = queue.popleft()
+        if top.op == "select" and top.payload.bits:
+            bits = top.payload.bits
+            return (bits & -bits).bit_length() - 1
+        for child in top.args:
+            if child.bits and child not in seen:
+                seen.add(child)
+                queue.append(child)
     return None
-
-
-def _states_in(node: Expr) -> set[str]:
-    return {below.payload for below in ex.walk(node) if below.op == "state"}
 
 
 def _order_of_power(base: Order, exponent: Expr) -> Order:

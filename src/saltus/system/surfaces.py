@@ -17,7 +17,7 @@ from saltus.system import expression as ex
 from saltus.system.canonical import Canonical, is_multiple
 from saltus.system.derivatives import differentiate, gradient
 from saltus.system.evaluate import evaluate
-from saltus.system.expression import Bit, Expr, Not
+from saltus.system.expression import Bit, Expr
 from saltus.system.guards import Guard, bits_in
 from saltus.system.singular import assuming
 
@@ -150,21 +150,25 @@ def _jumps(
     }
     t = random.uniform(0.0, 1.5, _PLACES)
 
-    def sides() -> list[np.ndarray]:
-        bits: list[np.ndarray] = []
-        for guard in guards:
-            (value,) = evaluate([guard.gap], t=t, states=at, values=values, bits=bits)
-            bits.append(np.broadcast_to(value > 0, (_PLACES,)))
+    def sides(roots: Sequence[Expr]) -> dict[int, np.ndarray]:
+        """Sides of the guards whose bits stand in some expressions, and in the gaps of those."""
+        needed, bits = bits_in(roots), dict[int, np.ndarray]()
+        for other in range(len(guards) - 1, -1, -1):
+            needed |= bits_in([guards[other].gap]) if other in needed else set()
+        for other in sorted(needed):
+            (value,) = evaluate([guards[other].gap], t=t, states=at, values=values, bits=bits)
+            bits[other] = np.broadcast_to(value > 0, (_PLACES,))
         return bits
 
     slopes = gradient(gap, states)
+    moving = (gap, *slopes)
     for _ in range(_STEPS):
-        value, *slope = evaluate([gap, *slopes], t=t, states=at, values=values, bits=sides())
+        value, *slope = evaluate(moving, t=t, states=at, values=values, bits=sides(moving))
         with np.errstate(all="ignore"):
             step = value / np.asarray(sum(np.square(one) for one in slope))
             at = {name: at[name] - step * one for name, one in zip(states, slope, strict=True)}
     terms = [node for node in ex.walk(jump) if node.op in ("add", "sub", "mul", "div")] or [jump]
-    found, *sizes = evaluate([jump, *terms], t=t, states=at, values=values, bits=sides())
+    found, *sizes = evaluate([jump, *terms], t=t, states=at, values=values, bits=sides([jump]))
     size = np.max([np.abs(np.broadcast_to(one, (_PLACES,))) for one in sizes], axis=0)
     with np.errstate(invalid="ignore"):
         return bool(np.any(np.abs(found) > _ROUNDING * size))
@@ -176,7 +180,7 @@ def split(number: int, field: Sequence[Expr], place: OnSurface) -> Surface:
     spread: dict[Expr, Expr] = {}
     for node in ex.walk(*field, conditions=False):
         spread[node] = ex.rebuild(node, tuple(spread[child] for child in node.args), node.payload)
-        if node.op == "select" and node.payload in (Bit(number), Not(Bit(number))):
+        if node.op == "select" and node.payload.bits >> number & 1:
             up, down = (assuming(node, number, side) for side in (True, False))
             half = _ZERO if place.is_zero(ex.sub(up, down)) else _half(up, down, place)
             pieces[node] = (_mean(up, down, place), half)
@@ -241,9 +245,8 @@ def with_held_signs(root: Expr, guards: Sequence[Guard], states: Sequence[str]) 
     return root
 
 
-def averaged(entry: Expr, number: int, hold: int) -> Expr:
+def averaged(entry: Expr, number: int, hold: int, place: OnSurface) -> Expr:
     """An expression with the mean of its two sides where a surface is held."""
     if number not in bits_in([entry]):
         return entry
-    up, down = (assuming(entry, number, side) for side in (True, False))
-    return ex.select(Bit(hold), ex.mul(0.5, ex.add(up, down)), entry)
+    return held_at([entry], split(number, [entry], place), hold)[0]

@@ -17,6 +17,7 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
+from saltus.announce import working
 from saltus.errors import (
     ParameterError,
     TraceError,
@@ -193,21 +194,22 @@ def system(
             key: checks.resolve_one(key, value, known_units[key], forced_at)
             for key, value in defaults.items()
         }
-        dimensions = DimensionCheck(names, known_units) if check_units else None
-        field, found = _traced(function, names, tuple(defaults), title, dimensions)
-        _warn_of_unused(field, found, defaults, forced_at, title)
-        made = System(
-            name=title,
-            states=names,
-            field=field,
-            guards=found,
-            values=values,
-            units=known_units,
-            forced_at=forced_at,
-            source=source,
-            description=description,
-        )
-        return with_guard_names(made, guards) if guards else made
+        with working(lambda: f"tracing {title}"):
+            dimensions = DimensionCheck(names, known_units) if check_units else None
+            field, found = _traced(function, names, tuple(defaults), title, dimensions)
+            _warn_of_unused(field, found, defaults, forced_at, title)
+            made = System(
+                name=title,
+                states=names,
+                field=field,
+                guards=found,
+                values=values,
+                units=known_units,
+                forced_at=forced_at,
+                source=source,
+                description=description,
+            )
+            return with_guard_names(made, guards) if guards else made
 
     return decorate
 

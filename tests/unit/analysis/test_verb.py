@@ -5,7 +5,7 @@ import pytest
 
 import saltus as sl
 from saltus.analysis.verb import verb
-from saltus.codegen.announce import announce
+from saltus.announce import announce
 from saltus.flow.progress import Lines, reporting
 
 rig = sl.models.delangre("b")

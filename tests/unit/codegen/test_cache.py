@@ -20,7 +20,7 @@ import pytest
 from saltus import cache
 from saltus.cache import entry
 from saltus.codegen import building, machine, templates
-from saltus.codegen.announce import silent
+from saltus.announce import silent
 from saltus.codegen.building import Order
 from saltus.errors import CacheError, SaltusWarning
 from saltus.interrupt import Interrupted, Stop

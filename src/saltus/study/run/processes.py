@@ -169,7 +169,7 @@ def _without_ctrl_c() -> Iterator[None]:
 
 def _work(pipe: Connection, plan: BasinPlan, found: AttractorSet) -> None:
     """The life of a process: chunks come, answers go, until the other end of the pipe is closed."""
-    from saltus.codegen.announce import silent
+    from saltus.announce import silent
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with suppress(EOFError, OSError), silent():
