@@ -76,6 +76,15 @@ def has_mask(value: Any, depth: int = 3) -> bool:
     return depth > 0 and any(has_mask(one, depth - 1) for one in inside)
 
 
+#: Examples of mappings that stand for one argument.
+_EXAMPLES = {
+    "units": "{'x': 'mm'}",
+    "vary": "{'force': ('1 N', '9 N')}",
+    "values": "{'force': '4 N'}",
+    "box": "{'x': ('-5 mm', '5 mm')}",
+}
+
+
 class Kinds:
     """The kinds of a function's arguments, so far as they are plain and the function doesn't say it
     better itself.
@@ -113,6 +122,8 @@ class Kinds:
             kinds = self._of.get(name)
             if kinds and not any(_KINDS[kind][0](value) for kind in kinds):
                 words = [_KINDS[kind][1] for kind in kinds if kind != "None"]
+                if name in _EXAMPLES:
+                    words = [word.replace("{'name': ...}", _EXAMPLES[name]) for word in words]
                 if words[-1] == "a text" and len(words) > 1:
                     words[-1] = "a text with its unit"
                 default = " Leave it out for the default." if "None" in kinds else ""

@@ -257,8 +257,9 @@ def single(system: System, name: str, value: Any) -> float:
     number = system.resolve(name, value)
     if np.ndim(number):
         raise ParameterError(
-            f"{name} = {shown(value)} must be one number, or a text with a unit, where it is an "
-            f"end of a range or in a list."
+            f"{name} = {shown(value)}, but here it has one value: a number, or text with a unit. "
+            f"Call it once for each value, or vary it by sl.bifurcation_diagram(system, "
+            f"{{{name!r}: (first, last, number)}}), alone or with a second parameter."
         )
     return float(number)
 
@@ -272,7 +273,10 @@ def range_of(system: System, name: Any, ends: Any) -> tuple[float, float]:
             f"{system.name} has no parameter {shown(name)}. {nearest(name, system.values)}"
         )
     if not isinstance(ends, list | tuple | np.ndarray) or len(ends) != 2:
-        raise ParameterError(f"the range of {name} must be (low, high), not {shown(ends)}.")
+        raise ParameterError(
+            f"the range of {name} must be (low, high), not {shown(ends)}: the steps between are "
+            f"chosen as the curve needs them."
+        )
     low, high = (single(system, name, end) for end in ends)
     if not low < high:
         raise ParameterError(f"the range of {name} must ascend, not {shown(ends)}.")

@@ -253,6 +253,13 @@ class _LeavesOpen(Protocol):
 
 
 # -- conditions ------------------------------------------------------------------------------------
+#: Where a comparison stands for 0 or 1, as it does in MATLAB.
+_NO_NUMBER = (
+    "a comparison was used as a number. Write sl.piecewise((1, x > gap), otherwise=0), or the "
+    "whole term in place of the 1: sl.piecewise((k*(x - gap), x > gap), otherwise=0)."
+)
+
+
 class Condition:
     """A truth value that depends on the state: sides of guards, joined by ``&``,
     ``|`` and ``~``.
@@ -275,6 +282,14 @@ class Condition:
             "otherwise=...); join conditions with "
             "& | ~; use sl.min and sl.max."
         )
+
+    def __neg__(self, *_others: object) -> Expr:
+        """Refused, as every operation that would need a number."""
+        raise TraceError(_NO_NUMBER)
+
+    __pos__ = __abs__ = __float__ = __int__ = __neg__
+    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __neg__
+    __truediv__ = __rtruediv__ = __pow__ = __rpow__ = __neg__
 
 
 @dataclass(frozen=True, eq=False)
@@ -363,9 +378,7 @@ def as_expr(value: Operand) -> Expr:
     if isinstance(value, Expr):
         return value
     if isinstance(value, Condition):
-        raise TraceError(
-            "a comparison was used as a number. Write sl.piecewise((1, x > gap), otherwise=0)."
-        )
+        raise TraceError(_NO_NUMBER)
     if isinstance(value, str | bytes):
         raise TraceError(
             f"an equation holds the text {shown(value)}. Text with units is for parameter values; "

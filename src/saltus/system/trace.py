@@ -1,4 +1,5 @@
-"""Tracing: the user's function is called once, with symbols, and its operations are recorded.
+"""Tracing: the user's function is called with symbols, and its operations are recorded. It is
+called twice: what differs isn't an equation.
 
 Whatever goes wrong inside the function becomes a TraceError that names its file and line and says
 what to write instead.
@@ -12,6 +13,7 @@ import sysconfig
 import traceback
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
@@ -101,8 +103,9 @@ def system(
 
     The function takes the time, the states, and after a ``*`` the parameters with their default
     values; it returns the time derivative of each state. Where the states are many, ``*y`` after
-    the time takes them all, in their order. The function is called once, with symbols. Comparisons
-    inside :func:`piecewise` become the contacts.
+    the time takes them all, in their order. The function is called with symbols, not with numbers,
+    and twice, to see that it gives the same. Comparisons inside :func:`piecewise` become the
+    contacts.
 
     Parameters
     ----------
@@ -346,11 +349,11 @@ def _traced(
     """Field and guards."""
     try:
         with observed(dimensions), declarations() as made:
-            returned = function(
-                TIME, *map(state, states), **{name: parameter(name) for name in parameters}
-            )
-            derivatives, laws = _as_derivatives(returned, states)
+            derivatives, laws = _called(function, states, parameters)
         _check_returned(made, laws)
+        if not isinstance(function, Formula | Equations):
+            with observed(None), declarations():
+                _check_same((derivatives, laws), _called(function, states, parameters))
         if dimensions is not None:
             dimensions.check_rates(derivatives)
             for law in laws:
@@ -362,6 +365,37 @@ def _traced(
         return find_contacts(derivatives, laws, states)
     except TraceError as error:
         raise TraceError(f"{title} ({place(function)}): {error}") from error
+
+
+def _called(
+    function: Callable[..., Any], states: tuple[str, ...], parameters: tuple[str, ...]
+) -> tuple[list[Expr], list[Declared]]:
+    """What the function returns when it is called with symbols."""
+    returned = function(TIME, *map(state, states), **{name: parameter(name) for name in parameters})
+    return _as_derivatives(returned, states)
+
+
+def _check_same(
+    first: tuple[list[Expr], list[Declared]], second: tuple[list[Expr], list[Declared]]
+) -> None:
+    """Raise a TraceError unless two calls gave the same equation."""
+    one, two = (
+        [
+            (node.op, None if node.op == "select" else node.payload)
+            for node in walk(*rates, *(root for law in laws for root in law.roots()))
+        ]
+        for rates, laws in (first, second)
+    )
+    for a, b in zip_longest(one, two):
+        if a == b:
+            continue
+        plain = a is not None and b is not None and a[0] == b[0] == "const"
+        what = f": it holds {a[1]:.6g}, then {b[1]:.6g}" if plain else ""
+        raise TraceError(
+            f"the function gives another equation each time it is called{what}. Random numbers, "
+            f"the clock and counters would be frozen at one value. Of noise draw the numbers once, "
+            f"outside: noise = sl.recorded(times, values), and in the equation noise(t)."
+        )
 
 
 def _warn_of_unused(
