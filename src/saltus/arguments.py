@@ -19,7 +19,7 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from saltus.errors import ParameterError, shown
+from saltus.errors import ParameterError, nearest, shown
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -132,19 +132,28 @@ class Kinds:
                 )
 
 
-def checked(function: Callable[P, R]) -> Callable[P, R]:
-    """Make a function one that asks what kinds of arguments it is given. Verbs ask
-    that themselves.
+def checked(
+    function: Callable[P, R], elsewhere: Mapping[str, str] | None = None
+) -> Callable[P, R]:
+    """Make a function one that asks what kinds of arguments it is given, and answers those that it
+    doesn't have: by a sentence of ``elsewhere``, or the nearest that it has. Verbs ask that
+    themselves.
     """
     signature, kinds = inspect.signature(function), Kinds(function)
+    known = signature.parameters
     caller = (
         f"{function.__module__.split('.')[1]}.{function.__qualname__}"
         if ".plot." in function.__module__
         else function.__qualname__
     )
+    open_ = any(parameter.kind == parameter.VAR_KEYWORD for parameter in known.values())
 
     @functools.wraps(function)
     def called(*args: P.args, **kwargs: P.kwargs) -> R:
+        for word in kwargs:
+            if word not in known and not open_:
+                advice = (elsewhere or {}).get(word) or nearest(word, known)
+                raise ParameterError(f"{caller} has no argument {shown(word)}. {advice}")
         try:
             given = signature.bind(*args, **kwargs).arguments
         except TypeError as error:
