@@ -132,9 +132,7 @@ class Kinds:
                 )
 
 
-def checked(
-    function: Callable[P, R], elsewhere: Mapping[str, str] | None = None
-) -> Callable[P, R]:
+def checked(function: Callable[P, R], elsewhere: Mapping[str, str] | None = None) -> Callable[P, R]:
     """Make a function one that asks what kinds of arguments it is given, and answers those that it
     doesn't have: by a sentence of ``elsewhere``, or the nearest that it has. Verbs ask that
     themselves.

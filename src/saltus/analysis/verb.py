@@ -35,7 +35,8 @@ _ELSEWHERE: Mapping[str, str] = {
     ),
     **dict.fromkeys(("y0", "x0", "u0", "initial", "initial_state", "ic"), "start="),
     **dict.fromkeys(
-        ("rtol", "atol", "tol", "tolerance", "reltol", "abstol"), "method=sl.ODE45(rtol=..., atol=...), or sl.Taylor(), which needs none"
+        ("rtol", "atol", "tol", "tolerance", "reltol", "abstol"),
+        "method=sl.ODE45(rtol=..., atol=...), or sl.Taylor(), which needs none",
     ),
     **dict.fromkeys(("params", "parameters", "args", "p"), "values="),
     **dict.fromkeys(("n_jobs", "workers", "cores"), "threads="),

@@ -145,7 +145,8 @@ _PICTURES: dict[str, str] = {
         "Write sl.plot.phase(run)."),
     **dict.fromkeys(("frf", "bode", "resonance", "response", "sweep"),
         "Write sl.plot.frequency_response(response)."),
-    **dict.fromkeys(("poincare", "poincaresection", "stroboscope"), "Write sl.plot.section(points)."),
+    **dict.fromkeys(("poincare", "poincaresection", "stroboscope"),
+        "Write sl.plot.section(points)."),
     **dict.fromkeys(("fft", "psd", "waterfall"), "Write sl.plot.spectrum(spectrum)."),
     **dict.fromkeys(("lyapunov", "lyapunovexponents"), "Write sl.plot.exponents(exponents)."),
     **dict.fromkeys(("orbitdiagram", "continuation"), "Write sl.plot.bifurcation_diagram(diagram) "

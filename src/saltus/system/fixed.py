@@ -20,10 +20,10 @@ class Fixed(dict[str, Any]):
     def __delitem__(self, name: Any) -> None:
         raise self._why(name)
 
-    def __ior__(self, _: Any) -> Any:  # type: ignore[misc,override]
+    def __ior__(self, _: Any) -> Any:  # type: ignore[misc]
         raise self._why(None)
 
-    def update(self, *_: Any, **changes: Any) -> None:  # type: ignore[override]
+    def update(self, *_: Any, **changes: Any) -> None:
         """Refused."""
         raise self._why(next(iter(changes), None))
 
@@ -57,7 +57,7 @@ class Values(Fixed):
 class Units(Fixed):
     """Units of states and parameters."""
 
-    def _why(self, name: Any) -> ParameterError:
+    def _why(self, _name: Any) -> ParameterError:
         return ParameterError(
             "a System is never changed. Give units where its equation is made, "
             '@sl.system(units={"x": "m"}); a value may be written in any unit that fits.'

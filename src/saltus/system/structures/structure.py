@@ -33,7 +33,8 @@ MOST_COORDINATES = 128
 _ELSEWHERE = {
     **dict.fromkeys(("zeta", "xi", "loss_factor"), "Write damping_ratio=, such as \"2 %\"."),
     **dict.fromkeys(("n_modes", "nmodes", "modes_kept", "number"), "Write modes=."),
-    **dict.fromkeys(("c", "C"), "Write damping=."), **dict.fromkeys(("k", "K"), "Write stiffness=."),
+    **dict.fromkeys(("c", "C"), "Write damping=."),
+    **dict.fromkeys(("k", "K"), "Write stiffness=."),
     **dict.fromkeys(("m", "M"), "Write mass=."),
     **dict.fromkeys(("dofs", "dof", "nodes", "labels", "states"), "Write names=."),
     **dict.fromkeys(("freq", "f", "forcing", "forced_at"), "Write frequency=."),
