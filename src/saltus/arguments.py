@@ -132,6 +132,16 @@ class Kinds:
                 )
 
 
+#: What isn't said to a picture but to its axes.
+_OF_AXES = dict.fromkeys(
+    ("xlim", "ylim", "title", "xlabel", "ylabel", "grid", "xscale", "yscale", "log", "logx",
+        "logy", "figsize", "color", "c", "lw", "linewidth", "marker", "label", "show", "save",
+        "filename", "fontsize"),
+    "A picture gives its matplotlib axes: axes.set_xlim(...), axes.set_title(...), "
+    "axes.figure.savefig(path); it takes others by ax=.",
+)  # fmt: skip
+
+
 def checked(function: Callable[P, R], elsewhere: Mapping[str, str] | None = None) -> Callable[P, R]:
     """Make a function one that asks what kinds of arguments it is given, and answers those that it
     doesn't have: by a sentence of ``elsewhere``, or the nearest that it has. Verbs ask that
@@ -150,7 +160,8 @@ def checked(function: Callable[P, R], elsewhere: Mapping[str, str] | None = None
     def called(*args: P.args, **kwargs: P.kwargs) -> R:
         for word in kwargs:
             if word not in known and not open_:
-                advice = (elsewhere or {}).get(word) or nearest(word, known)
+                own = elsewhere or (_OF_AXES if caller.startswith("plot.") else {})
+                advice = own.get(word) or nearest(word, known)
                 raise ParameterError(f"{caller} has no argument {shown(word)}. {advice}")
         try:
             given = signature.bind(*args, **kwargs).arguments

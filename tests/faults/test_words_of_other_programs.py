@@ -154,11 +154,13 @@ def test_what_is_advised_exists():
         ({"freq": 15.0}, r"Did you mean 'frequency'\? .*values=\{'frequency'"),
         ({"omega": 15.0}, r"Did you mean 'frequency'"),
         ({"stiffness": 1.0}, r"values=\{'contact_stiffness'"),
+        ({"samples": [0.0, 0.1]}, r"samples is a number: .*run\.x\.interp"),
+        ({"start": "random 20"}, r"default_rng\(1\)\.uniform\(low, high, \(n, 2\)\)"),
     ],
 )
 def test_arguments_that_a_run_has_not(given, words):
     with pytest.raises(sl.SaltusError, match=words):
-        sl.simulate(rig, (0, 0), periods=1, **given)
+        sl.simulate(rig, **{"start": (0, 0), "periods": 1, **given})
 
 
 PAIR = {"mass": ("1 kg", "2 kg"), "force": ("1 N", "2 N")}
@@ -185,6 +187,9 @@ PAIR = {"mass": ("1 kg", "2 kg"), "force": ("1 N", "2 N")}
         (lambda: setattr(rig, "mass", 5.0), r"system = system\.with_values\(mass=\.\.\.\)"),
         (lambda: set_item(rig.units, "x"), r"@sl\.system\(units="),
         (lambda: sl.simulate(rig, {"xdot": 1, "v": 0}, periods=1), "Known: x, v"),
+        (lambda: sl.RK4(), r"Write sl\.RK4\(step="),
+        (lambda: sl.plot.history(rig, xlim=(0, 1)), r"axes\.set_xlim"),
+        (lambda: sl.plot.phase(rig, title="a"), r"axes\.set_title"),
         (lambda: beam(damping_ratio=["2 %", "wide"]), "damping_ratio"),
         (lambda: beam(damping_ratio="2 mm"), "damping_ratio"),
         (lambda: beam(zeta=0.02), "damping_ratio="),
@@ -214,6 +219,29 @@ def test_many_names_are_listed_in_their_order_and_shortened():
     assert "Known: x1, x2, x3, " in str(told.value)
     assert str(told.value).endswith("..., x120 (120 in all).")
     assert len(str(told.value)) < 150
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("simulate", r"sl\.simulate\(delangre, \.\.\.\)"),
+        ("plot", r"sl\.plot\.phase\(sl\.simulate\(delangre"),
+        ("copy", r"delangre\.with_values\(name="),
+        ("parameters", r"delangre\.values"),
+    ],
+)
+def test_what_a_system_does_not_do_itself(name, words):
+    with pytest.raises(AttributeError, match=words):
+        getattr(rig, name)
+
+
+def test_what_results_of_other_programs_are_asked():
+    run = sl.simulate(rig, (0, 0), periods=1)
+    for name, words in (("t", r"run\.time"), ("y", r"run\.x"), ("te", r"run\.contact_time"),
+                        ("sol", r"interp\(time=")):  # fmt: skip
+        with pytest.raises(AttributeError, match=words):
+            getattr(run, name)
+    assert not hasattr(run, "zzz")
 
 
 # -- equations -------------------------------------------------------------------------------------
@@ -257,6 +285,44 @@ def test_what_differs_from_call_to_call_is_no_equation(drawn):
 def test_a_law_that_differs_from_call_to_call_is_none():
     with pytest.raises(sl.SaltusError, match="another equation each time"):
         equation(lambda t, x, v: (v, -x, sl.impact(x < next(COUNT), v, restitution=0.8)))
+
+
+RECORD = sl.recorded([0, 1], [0, 1])
+
+
+def with_a_vector(t, y):
+    return y[1], -y[0]
+
+
+def with_a_record(t, x, v):
+    return v, -x + RECORD
+
+
+def with_half_a_choice(t, x, v):
+    return v, -sl.where(x > 1, x - 1)
+
+
+def with_a_mapping(t, x, v):
+    return {"x": v, "v": -x}
+
+
+@pytest.mark.parametrize(
+    ("function", "words"),
+    [
+        (with_a_vector, r"\*y, \.\.\.\) for all states"),
+        (with_a_record, r"'record' of 2 points.*Call it: of a record record\(t\)"),
+        (with_half_a_choice, r"Write sl\.where\(condition, value, otherwise\)"),
+        (with_a_mapping, "in the order of the states: return dx/dt, dv/dt"),
+    ],
+)
+def test_equations_written_as_elsewhere(function, words):
+    with pytest.raises(sl.SaltusError, match=words):
+        equation(function)
+
+
+def test_parameters_are_arguments_of_the_function():
+    with pytest.raises(sl.SaltusError, match=r"after a \* in the function"):
+        sl.system(states="x v", params={"k": 1.0})
 
 
 def test_the_advice_for_a_step_gives_the_step():

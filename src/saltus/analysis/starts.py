@@ -302,10 +302,16 @@ def _columns(system: System, start: Any) -> dict[str, np.ndarray]:
     rows = start if isinstance(start, np.ndarray) else _as_array(start)
     if rows.shape == () or rows.shape[-1] != len(system.states) or rows.ndim > 2:
         this = f"has shape {rows.shape}" if rows.shape else f"is {shown(start)}"
+        drawn = (
+            " Random starts are NumPy's here: np.random.default_rng(1).uniform(low, high, (n, "
+            f"{len(system.states)}))."
+            if isinstance(start, str) and start.startswith("random")
+            else ""
+        )
         raise ParameterError(
             f"a start of {system.name} is {len(system.states)} numbers "
             f"({', '.join(system.states)}), or an array of such rows; "
-            f"this one {this}."
+            f"this one {this}.{drawn}"
         )
     return {name: _numbers(system, name, rows[..., i]) for i, name in enumerate(system.states)}
 

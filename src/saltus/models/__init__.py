@@ -139,8 +139,8 @@ def __getattr__(name: str) -> Any:
     if name.startswith("__"):
         raise AttributeError(name)
     raise AttributeError(
-        f"no model is called {shown(name)}. Models: {', '.join(MODELS)}. Write "
-        f"your own equation with @sl.system."
+        f"no model is called {shown(name)}. {nearest(name.lower(), MODELS, 0.7).replace('Known', 'Models')} saltus models "
+        f"lists all in a terminal. Write your own equation with @sl.system."
     )
 
 

@@ -395,6 +395,11 @@ def as_expr(value: Operand) -> Expr:
             "an equation holds an array. A traced value is a single number: write out "
             "the components."
         )
+    if callable(value):
+        raise TraceError(
+            f"an equation holds the function {shown(value)} itself. Call it: of a record "
+            f"record(t), of a table sl.table(t, points, values)."
+        )
     try:
         return constant(value)
     except (TypeError, ValueError, OverflowError):

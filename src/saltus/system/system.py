@@ -303,10 +303,22 @@ class System:
             return (
                 f"{shown(name)} is a state. Its motion is sl.simulate({self.name}, ...)[{name!r}]."
             )
+        if among(name, _DONE_ELSEWHERE):
+            return f"write {_DONE_ELSEWHERE[name].format(self.name)}."
         return (
             f"its parameters are in {self.name}.values, its states in {self.name}.states. "
             f"{nearest(name, [*self.values, *self.states])}"
         )
+
+
+#: What people ask of a System, and what does it.
+_DONE_ELSEWHERE = {
+    **dict.fromkeys(("simulate", "solve", "run", "integrate", "compute"), "sl.simulate({}, ...)"),
+    **dict.fromkeys(("copy", "set", "update", "replace"), "{}.with_values(name=...)"),
+    **dict.fromkeys(("parameters", "params", "pars", "p"), "{}.values"),
+    **dict.fromkeys(("plot", "show", "draw"), "sl.plot.phase(sl.simulate({}, ...))"),
+    **dict.fromkeys(("f", "fun", "field_at"), "{}.rhs(t, y)"),
+}
 
 
 def _refuse_change(self: System, name: str, _value: Any) -> None:

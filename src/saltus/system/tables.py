@@ -69,6 +69,9 @@ class Table:
     def __hash__(self) -> int:
         return hash(self.fingerprint)
 
+    def __repr__(self) -> str:
+        return f"<table {self.name!r} of {len(self.points)} points>"
+
     @functools.cached_property
     def degree(self) -> int:
         """Highest power that any piece has."""

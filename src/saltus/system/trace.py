@@ -53,6 +53,10 @@ _CALLS = {
     "friction": "sl.friction(v, slip=..., stick=...)",
     "impact": "sl.impact(x < gap, v, restitution=0.8), after the rates",
     "piecewise": "sl.piecewise((value, condition), ..., otherwise=value)",
+    "where": "sl.where(condition, value, otherwise)",
+    "pulse": "sl.pulse(t, duration, start=..., every=..., shape=...)",
+    "mod": "sl.mod(t, T)",
+    "clip": "sl.clip(x, low, high)",
     "table": 'sl.table(t, points, values, kind="linear", outside="hold")',
 }
 _HOW_TO = (
@@ -66,6 +70,7 @@ def _known_words(function: Callable[P, R]) -> Callable[P, R]:
     """Answer arguments that :func:`system` doesn't have by those that it has."""
     known = inspect.signature(function).parameters
     elsewhere = dict.fromkeys(("forcing", "forced", "drive", "frequency", "period"), "forced_at")
+    values = ("params", "parameters", "pars", "args", "values", "constants", "p")
 
     @functools.wraps(function)
     def called(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -78,7 +83,12 @@ def _known_words(function: Callable[P, R]) -> Callable[P, R]:
                         f'{there}="frequency".'
                     )
                     if there
-                    else ""
+                    else (
+                        "Parameters stand after a * in the function, with their values: "
+                        'def rig(t, x, v, *, mass="3 kg"): ...'
+                        if word in values
+                        else ""
+                    )
                 )
                 raise TraceError(
                     f"sl.system has no argument {word!r}. {advice or nearest(word, known)}"
@@ -285,9 +295,11 @@ def _parameters(
             f"{title}: put a * between the states and the parameters, so that "
             f"parameters are given by name. Write {wanted}."
         )
+    vector = len(names) == 2 and len(states) > 1
     raise TraceError(
         f"{title}: states={' '.join(states)!r}, but the function takes "
-        f"({', '.join(names)}). Write {wanted}."
+        f"({', '.join(names)}). Write {wanted}"
+        f"{f', or def {title}(t, *{names[1]}, ...) for all states in a row' if vector else ''}."
     )
 
 
@@ -425,6 +437,11 @@ def _as_derivatives(returned: Any, states: tuple[str, ...]) -> tuple[list[Expr],
         )
     if isinstance(returned, Expr | int | float | Declared):
         returned = (returned,)
+    if isinstance(returned, Mapping):
+        raise TraceError(
+            "it returns a mapping. Return the time derivatives in the order of the states: return "
+            + ", ".join(f"d{name}/dt" for name in states)
+        )
     try:
         returned = list(returned)
         last = max(
