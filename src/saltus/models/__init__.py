@@ -138,9 +138,10 @@ def describe() -> dict[str, str]:
 def __getattr__(name: str) -> Any:
     if name.startswith("__"):
         raise AttributeError(name)
+    near = nearest(name.lower(), MODELS, 0.7).replace("Known", "Models")
     raise AttributeError(
-        f"no model is called {shown(name)}. {nearest(name.lower(), MODELS, 0.7).replace('Known', 'Models')} saltus models "
-        f"lists all in a terminal. Write your own equation with @sl.system."
+        f"no model is called {shown(name)}. {near} saltus models lists all in a terminal. Write "
+        f"your own equation with @sl.system."
     )
 
 
