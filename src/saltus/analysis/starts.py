@@ -246,7 +246,12 @@ def at_values(system: System, values: Mapping[str, Any] | None) -> System:
     if not isinstance(values, Mapping):
         raise ParameterError('values must be a mapping, such as values={"force": "4 N"}.')
     for name, value in values.items():
-        single(system, name, value)
+        if np.ndim(system.resolve(name, value)):
+            raise ParameterError(
+                f"{name} = {shown(value)}, but here it has one value: a number, or text with a "
+                f"unit. Call it once for each value, or vary it by sl.bifurcation_diagram(system, "
+                f"{{{name!r}: (first, last, number)}}), alone or with a second parameter."
+            )
     return system.with_values(**values)
 
 
@@ -257,9 +262,8 @@ def single(system: System, name: str, value: Any) -> float:
     number = system.resolve(name, value)
     if np.ndim(number):
         raise ParameterError(
-            f"{name} = {shown(value)}, but here it has one value: a number, or text with a unit. "
-            f"Call it once for each value, or vary it by sl.bifurcation_diagram(system, "
-            f"{{{name!r}: (first, last, number)}}), alone or with a second parameter."
+            f"{name} = {shown(value)} must be one number, or a text with a unit: it is one end of "
+            f"a range, or one of a list."
         )
     return float(number)
 
