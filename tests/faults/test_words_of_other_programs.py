@@ -133,7 +133,6 @@ def test_what_is_advised_exists():
         for inside, picture in re.findall(r"\bsl\.(\w+)(?:\.(\w+))?", sentence):
             assert hasattr(sl, inside), sentence
             assert not picture or hasattr(sl.plot, picture), sentence
-    assert not set(sl.__all__) & set(elsewhere._ADVICE), "these are never told"
 
 
 # -- arguments -------------------------------------------------------------------------------------
