@@ -220,6 +220,13 @@ def _no_number() -> str:
     return OWN_FUNCTIONS
 
 
+#: Where a comparison stands for 0 or 1, as it does in MATLAB.
+_NO_NUMBER = (
+    "a comparison was used as a number. Write sl.piecewise((1, x > gap), otherwise=0), or the "
+    "whole term in place of the 1: sl.piecewise((k*(x - gap), x > gap), otherwise=0)."
+)
+
+
 @contextmanager
 def observed(observer: Callable[[Expr], None] | None) -> Iterator[None]:
     """Every node that is asked for inside is shown to the observer, which may raise: the error then
@@ -253,13 +260,6 @@ class _LeavesOpen(Protocol):
 
 
 # -- conditions ------------------------------------------------------------------------------------
-#: Where a comparison stands for 0 or 1, as it does in MATLAB.
-_NO_NUMBER = (
-    "a comparison was used as a number. Write sl.piecewise((1, x > gap), otherwise=0), or the "
-    "whole term in place of the 1: sl.piecewise((k*(x - gap), x > gap), otherwise=0)."
-)
-
-
 class Condition:
     """A truth value that depends on the state: sides of guards, joined by ``&``,
     ``|`` and ``~``.
