@@ -169,7 +169,10 @@ def _by_name(
             f"start, t_end=10). "
             f"periods can't be {shown(given['periods'])}."
         )
-    if "t_end" in known and np.ndim(given.get("samples", 0)):
+    samples = given.get("samples")
+    if "t_end" in known and (
+        isinstance(samples, list | tuple) or getattr(samples, "shape", ()) != ()
+    ):
         raise ParameterError(
             f"sl.{name}: samples is a number: how many in a forcing period, or in the whole run of "
             f"a system without forcing. run.x.interp(time=[...]) reads a state at given times."

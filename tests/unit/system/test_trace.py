@@ -311,7 +311,7 @@ def of_parameters(t, x, v, *, a=1.0, b=2.0):
         (nothing, "", "returns nothing. End it with: return dx/dt, dv/dt"),
         (an_object, "", "in place of the time derivatives of x, v"),
         (text, "", "the text 'v'"),
-        (a_dict, "", "the text 'x'"),
+        (a_dict, "", "in the order of the states"),
         (of_time, "", "depends on time only"),
         (of_parameters, "", "depends on parameters only"),
     ],
