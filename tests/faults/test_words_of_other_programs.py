@@ -364,6 +364,8 @@ def test_a_damping_ratio_in_per_cent():
     one, other = beam(damping_ratio="2 %", modes=2), beam(damping_ratio=0.02, modes=2)
     assert one.fingerprint() == other.fingerprint()
     assert beam(damping_ratio=["2 %", 0.05], modes=2).fingerprint() != one.fingerprint()
+    with pytest.warns(SaltusWarning, match="write '2 %'"):
+        beam(damping_ratio=2.0)
 
 
 # -- studies ---------------------------------------------------------------------------------------

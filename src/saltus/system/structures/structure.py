@@ -266,6 +266,13 @@ def _ratio(ratio: Any, modes: Modes, count: int) -> np.ndarray:
         ) from None
     if not (np.isfinite(ratios).all() and (ratios >= 0).all()):
         raise ParameterError(f"damping_ratio must be 0 or more, not {shown(ratio)}.")
+    if (ratios > 1).any():
+        warnings.warn(
+            f"damping_ratio = {ratios.max():g} is more than critical damping, 1: such modes don't "
+            f"vibrate. Of per cent write '{ratios.max():g} %'.",
+            SaltusWarning,
+            stacklevel=4,
+        )
     return np.diag(2 * ratios * modes.angular[:count])
 
 
