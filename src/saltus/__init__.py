@@ -238,12 +238,9 @@ def __getattr__(name: str) -> Any:
         with ctrl_c_waits():
             return importlib.import_module(f"saltus.{name}")
     if name not in _HOMES:
-        from saltus.errors import nearest
-        from saltus.system.foreign import ADVICE
+        from saltus.system.elsewhere import instead
 
-        raise AttributeError(
-            f"saltus has no {name!r}. {ADVICE.get(name) or nearest(name, __all__)}"
-        )
+        raise AttributeError(f"saltus has no {name!r}. {instead(name, __all__)}")
     with ctrl_c_waits():
         value = getattr(importlib.import_module(_HOMES[name]), name)
     globals()[name] = value

@@ -19,7 +19,7 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from saltus.errors import ParameterError, shown
+from saltus.errors import ParameterError, nearest, shown
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -76,6 +76,15 @@ def has_mask(value: Any, depth: int = 3) -> bool:
     return depth > 0 and any(has_mask(one, depth - 1) for one in inside)
 
 
+#: Examples of mappings that stand for one argument.
+_EXAMPLES = {
+    "units": "{'x': 'mm'}",
+    "vary": "{'force': ('1 N', '9 N')}",
+    "values": "{'force': '4 N'}",
+    "box": "{'x': ('-5 mm', '5 mm')}",
+}
+
+
 class Kinds:
     """The kinds of a function's arguments, so far as they are plain and the function doesn't say it
     better itself.
@@ -113,6 +122,8 @@ class Kinds:
             kinds = self._of.get(name)
             if kinds and not any(_KINDS[kind][0](value) for kind in kinds):
                 words = [_KINDS[kind][1] for kind in kinds if kind != "None"]
+                if name in _EXAMPLES:
+                    words = [word.replace("{'name': ...}", _EXAMPLES[name]) for word in words]
                 if words[-1] == "a text" and len(words) > 1:
                     words[-1] = "a text with its unit"
                 default = " Leave it out for the default." if "None" in kinds else ""
@@ -121,19 +132,37 @@ class Kinds:
                 )
 
 
-def checked(function: Callable[P, R]) -> Callable[P, R]:
-    """Make a function one that asks what kinds of arguments it is given. Verbs ask
-    that themselves.
+#: What isn't said to a picture but to its axes.
+_OF_AXES = dict.fromkeys(
+    ("xlim", "ylim", "title", "xlabel", "ylabel", "grid", "xscale", "yscale", "log", "logx",
+        "logy", "figsize", "color", "c", "lw", "linewidth", "marker", "label", "show", "save",
+        "filename", "fontsize"),
+    "A picture gives its matplotlib axes: axes.set_xlim(...), axes.set_title(...), "
+    "axes.figure.savefig(path); it takes others by ax=.",
+)  # fmt: skip
+
+
+def checked(function: Callable[P, R], elsewhere: Mapping[str, str] | None = None) -> Callable[P, R]:
+    """Make a function one that asks what kinds of arguments it is given, and answers those that it
+    doesn't have: by a sentence of ``elsewhere``, or the nearest that it has. Verbs ask that
+    themselves.
     """
     signature, kinds = inspect.signature(function), Kinds(function)
+    known = signature.parameters
     caller = (
         f"{function.__module__.split('.')[1]}.{function.__qualname__}"
         if ".plot." in function.__module__
         else function.__qualname__
     )
+    open_ = any(parameter.kind == parameter.VAR_KEYWORD for parameter in known.values())
 
     @functools.wraps(function)
     def called(*args: P.args, **kwargs: P.kwargs) -> R:
+        for word in kwargs:
+            if word not in known and not open_:
+                own = elsewhere or (_OF_AXES if caller.startswith("plot.") else {})
+                advice = own.get(word) or nearest(word, known)
+                raise ParameterError(f"{caller} has no argument {shown(word)}. {advice}")
         try:
             given = signature.bind(*args, **kwargs).arguments
         except TypeError as error:

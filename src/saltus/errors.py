@@ -14,6 +14,8 @@ from typing import Any
 LONGEST = 2000
 #: Digits up to which a whole number is written out. Python refuses to write those of 4300 or more.
 _DIGITS = 60
+#: Most names that a message lists.
+MOST_NAMES = 24
 
 
 class SaltusError(Exception):
@@ -138,11 +140,13 @@ def among(value: object, words: Iterable[str]) -> bool:
     return isinstance(value, str) and value in words
 
 
-def nearest(name: object, known: Iterable[str]) -> str:
-    """A sentence that offers the nearest known name, or lists all of them."""
-    known = list(known)
+def nearest(name: object, known: Iterable[str], cutoff: float = 0.5) -> str:
+    """A sentence that offers the nearest known name, or lists them in their order, many of them
+    shortened; ``cutoff`` is the likeness from which on a name is near.
+    """
+    known = sorted(known) if isinstance(known, set | frozenset) else list(dict.fromkeys(known))
     if not isinstance(name, str):
-        return f"Known: {', '.join(sorted(known))}."
+        return f"Known: {_listed(known)}."
     alike = unicodedata.normalize("NFKC", name)
     if alike != name and alike in known:
         return (
@@ -150,5 +154,11 @@ def nearest(name: object, known: Iterable[str]) -> str:
             f"in the "
             f"function: they only appear alike."
         )
-    close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-    return f"Did you mean {close[0]!r}?" if close else f"Known: {', '.join(sorted(known))}."
+    close = difflib.get_close_matches(name, known, n=1, cutoff=cutoff)
+    return f"Did you mean {close[0]!r}?" if close else f"Known: {_listed(known)}."
+
+
+def _listed(names: list[str]) -> str:
+    if len(names) <= MOST_NAMES:
+        return ", ".join(names)
+    return f"{', '.join(names[: MOST_NAMES // 2])}, ..., {names[-1]} ({len(names)} in all)"

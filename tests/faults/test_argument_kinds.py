@@ -157,11 +157,11 @@ def test_arguments_of_another_kind_are_refused_in_words(only_arguments, seed, tr
         ),
         (
             lambda: sl.plot.history(sine_run(), units="mm"),
-            "plot.history: units must be a mapping such as",
+            "plot.history: units must be a mapping such as {'x': 'mm'}",
         ),
         (
             lambda: sl.plot.history(sine_run(), stat="x"),
-            "plot.history: got an unexpected keyword argument 'stat'",
+            "plot.history has no argument 'stat'. Did you mean 'state'?",
         ),
         (lambda: sl.sqrt(-1.0), r"sl.sqrt\(-1.0\) has no finite real value"),
         (lambda: sl.sin([1.0]), "an equation holds"),

@@ -265,7 +265,7 @@ def test_every_refusal_is_in_words(only_arguments, seed, trials):
         (lambda: sl.system(states="x v")(dict), "Python doesn't know the arguments"),
         (lambda: rig.with_values(force=np.datetime64("2020-01-01", "ns")), "is not a number"),
         (lambda: sl.simulate(rig, (np.timedelta64(1, "ns"), 0.0), periods=1), "is not a number"),
-        (lambda: sl.simulate(rig, {5: 1.0}, periods=1), "has no state 5. Known: v, x"),
+        (lambda: sl.simulate(rig, {5: 1.0}, periods=1), "has no state 5. Known: x, v"),
         (lambda: sl.simulate(rig, (0, 0), periods=1, values={"force": ([1, 2], 2, 3)}),
             r"force = \[1, "
             r"2\] must be one number"),

@@ -266,7 +266,12 @@ def at_values(system: System, values: Mapping[str, Any] | None) -> System:
     if not isinstance(values, Mapping):
         raise ParameterError('values must be a mapping, such as values={"force": "4 N"}.')
     for name, value in values.items():
-        single(system, name, value)
+        if np.ndim(system.resolve(name, value)):
+            raise ParameterError(
+                f"{name} = {shown(value)}, but here it has one value: a number, or text with a "
+                f"unit. Call it once for each value, or vary it by sl.bifurcation_diagram(system, "
+                f"{{{name!r}: (first, last, number)}}), alone or with a second parameter."
+            )
     return system.with_values(**values)
 
 
@@ -277,8 +282,8 @@ def single(system: System, name: str, value: Any) -> float:
     number = system.resolve(name, value)
     if np.ndim(number):
         raise ParameterError(
-            f"{name} = {shown(value)} must be one number, or a text with a unit, where it is an "
-            f"end of a range or in a list."
+            f"{name} = {shown(value)} must be one number, or a text with a unit: it is one end of "
+            f"a range, or one of a list."
         )
     return float(number)
 
@@ -292,7 +297,10 @@ def range_of(system: System, name: Any, ends: Any) -> tuple[float, float]:
             f"{system.name} has no parameter {shown(name)}. {nearest(name, system.values)}"
         )
     if not isinstance(ends, list | tuple | np.ndarray) or len(ends) != 2:
-        raise ParameterError(f"the range of {name} must be (low, high), not {shown(ends)}.")
+        raise ParameterError(
+            f"the range of {name} must be (low, high), not {shown(ends)}: the steps between are "
+            f"chosen as the curve needs them."
+        )
     low, high = (single(system, name, end) for end in ends)
     if not low < high:
         raise ParameterError(f"the range of {name} must ascend, not {shown(ends)}.")
@@ -318,10 +326,16 @@ def _columns(system: System, start: Any) -> dict[str, np.ndarray]:
     rows = start if isinstance(start, np.ndarray) else _as_array(start)
     if rows.shape == () or rows.shape[-1] != len(system.states) or rows.ndim > 2:
         this = f"has shape {rows.shape}" if rows.shape else f"is {shown(start)}"
+        drawn = (
+            " Random starts are NumPy's here: np.random.default_rng(1).uniform(low, high, (n, "
+            f"{len(system.states)}))."
+            if isinstance(start, str) and start.startswith("random")
+            else ""
+        )
         raise ParameterError(
             f"a start of {system.name} is {len(system.states)} numbers "
             f"({', '.join(system.states)}), or an array of such rows; "
-            f"this one {this}."
+            f"this one {this}.{drawn}"
         )
     return {name: _numbers(system, name, rows[..., i]) for i, name in enumerate(system.states)}
 

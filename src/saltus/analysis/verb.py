@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from contextvars import ContextVar
 from typing import Any, ParamSpec, TypeVar
@@ -35,13 +35,56 @@ _ELSEWHERE: Mapping[str, str] = {
     ),
     **dict.fromkeys(("y0", "x0", "u0", "initial", "initial_state", "ic"), "start="),
     **dict.fromkeys(
-        ("rtol", "atol"), "method=sl.ODE45(rtol=..., atol=...), or sl.Taylor(), which needs none"
+        ("rtol", "atol", "tol", "tolerance", "reltol", "abstol"),
+        "method=sl.ODE45(rtol=..., atol=...), or sl.Taylor(), which needs none",
     ),
     **dict.fromkeys(("params", "parameters", "args", "p"), "values="),
     **dict.fromkeys(("n_jobs", "workers", "cores"), "threads="),
     **dict.fromkeys(("n", "n_periods", "nperiods", "cycles"), "periods="),
     **dict.fromkeys(("solver", "integrator"), "method="),
 }
+_STEPS = (
+    "The method chooses its steps, and no contact is stepped over; a fixed step is "
+    "method=sl.RK4(step)."
+)
+_NOT_NEEDED = "It isn't needed: saltus reads the equation itself."
+_RECORDS = (
+    "Contacts are comparisons in the equation, and a run records them all: run.contact_time. "
+    "sl.poincare(system, start, surface) records other crossings."
+)
+#: What people write who come from elsewhere, and why there is no such argument.
+_MISSING: Mapping[str, str] = {
+    **dict.fromkeys(("events", "event", "callback"), _RECORDS),
+    **dict.fromkeys(
+        ("terminal", "stop", "stop_at", "until"),
+        "To stop at an event isn't possible: run on, and cut the result at run.contact_time.",
+    ),
+    "outputs": (
+        "sl.frequency_response, sl.bifurcation_diagram and sl.branches know outputs; of a run "
+        "compute them from its states, such as 1e3*run.x."
+    ),
+    **dict.fromkeys(("max_step", "first_step", "min_step", "hmax", "h0", "options"), _STEPS),
+    **dict.fromkeys(("jac", "jacobian", "vectorized", "mass_matrix"), _NOT_NEEDED),
+    "dense_output": "Write samples= for more samples; run.x.interp(time=...) reads between them.",
+    **dict.fromkeys(
+        ("transient", "discard", "settle", "skip"),
+        "Write keep=, how many of the last periods are kept.",
+    ),
+    "noise": (
+        "Draw the numbers once, outside the equation: noise = sl.recorded(times, values), and in "
+        "the equation noise(t)."
+    ),
+    **dict.fromkeys(
+        ("plot", "show"), "A picture is drawn of the result: sl.plot.history(run) and others."
+    ),
+    "units": (
+        "Results are in SI. Pictures take units, sl.plot.history(run, units={'x': 'mm'}), and "
+        "values any unit that fits, start={'x': '1 mm', 'v': 0}."
+    ),
+    "values": "Give other values by system.with_values(name=...), and call it once for each.",
+}
+#: What people write for the forcing frequency.
+_FREQUENCY = ("freq", "frequency", "omega", "w", "f", "forcing_frequency")
 #: What verbs take for states that the user names, as one would write it.
 _RANGES = {
     "axes": 'x=("-5 mm", "5 mm", 400), v=("-1 m/s", "1 m/s", 400)',
@@ -126,6 +169,14 @@ def _by_name(
             f"start, t_end=10). "
             f"periods can't be {shown(given['periods'])}."
         )
+    samples = given.get("samples")
+    if "t_end" in known and (
+        isinstance(samples, list | tuple) or getattr(samples, "shape", ()) != ()
+    ):
+        raise ParameterError(
+            f"sl.{name}: samples is a number: how many in a forcing period, or in the whole run of "
+            f"a system without forcing. run.x.interp(time=[...]) reads a state at given times."
+        )
     return given
 
 
@@ -172,7 +223,24 @@ def _instead(
         return f"Write {there}."
     if there.partition("=")[0] in _LENGTHS:
         return _length(known)
+    missing = _MISSING.get(there.partition("=")[0] or word.lower(), "")
+    if missing and ("keep=" not in missing or "keep" in known):
+        return missing
+    if isinstance(system, System) and "values" in known:
+        meant = system.forced_at if word.lower() in _FREQUENCY else _like(word, system.values)
+        if meant:
+            return (
+                f"Did you mean {meant!r}? It is a parameter of {system.name}: "
+                f"values={{{meant!r}: ...}} or system.with_values({meant}=...)."
+            )
     return nearest(word, known)
+
+
+def _like(word: str, names: Iterable[str]) -> str | None:
+    """The name that begins or ends with a word."""
+    return next((name for name in names if len(word) > 1 and name.startswith(word)), None) or next(
+        (name for name in names if name.endswith(f"_{word}")), None
+    )
 
 
 def _length(known: Mapping[str, inspect.Parameter]) -> str:

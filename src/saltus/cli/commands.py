@@ -159,8 +159,9 @@ def run(
 
     Example: `saltus run replications/saunders2021/fig6b.toml --workers 2`
     """
-    from saltus.cli.own_system import own_system
+    from saltus.cli.own_system import check_beside, own_system
     from saltus.results import usable_folder
+    from saltus.results.files.atomic import no_folder_left
     from saltus.study.setting.inputs import Inputs
     from saltus.study.tables.read import read
 
@@ -169,19 +170,15 @@ def run(
         if not place.is_dir():
             raise StudyError(f"--inputs {place}: there is no such folder.")
     own = own_system(system) if system else None
-    folder = usable_folder(out or Path("saltus-runs") / study.stem)
+    if own is None and spec.system.model is None and not spec.system.rates:
+        check_beside(study)
     resources = _resources(spec, threads, workers, scheduler, shard)
-    _run(
-        spec,
-        text,
-        folder,
-        Inputs(study.parent, inputs or []),
-        own,
-        only or [],
-        resources,
-        progress,
-        _again(folder, system),
-    )
+    folder = out or Path("saltus-runs") / study.stem
+    found = Inputs(study.parent, inputs or [])
+    again = _again(folder, system)
+    with no_folder_left(folder):
+        usable_folder(folder)
+        _run(spec, text, folder, found, own, only or [], resources, progress, again)
 
 
 def _resources(

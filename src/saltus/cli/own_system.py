@@ -5,13 +5,16 @@ runs a file of the user's.
 from __future__ import annotations
 
 import importlib.util
+import re
+import shlex
 import sys
 import traceback
+from contextlib import suppress
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-from saltus.errors import ParameterError, SaltusError, nearest
+from saltus.errors import ParameterError, SaltusError, StudyError, nearest
 
 if TYPE_CHECKING:
     from saltus.system import System
@@ -57,6 +60,19 @@ def own_system(reference: str) -> System:
             f"--system {file}:{next(iter(found))}"
         )
     return next(iter(found.values()))
+
+
+def check_beside(study: Path) -> None:
+    """Raise a StudyError for a study without a system of its own beside which a Python file lies
+    that may hold it: says how the two are run together.
+    """
+    for file in sorted(study.parent.glob("*.py")):
+        with suppress(OSError, UnicodeDecodeError):
+            if re.search(r"\bsl\.(system|structure)\(|from saltus import", file.read_text("utf-8")):
+                raise StudyError(
+                    f"{study}: [system] names no model, and {file} lies beside it. Write: "
+                    f"{shlex.join(['saltus', 'run', str(study), '--system', str(file)])}"
+                )
 
 
 def _module(path: Path) -> ModuleType:

@@ -68,6 +68,13 @@ def explain_unknown_options(cls: type[_M]) -> type[_M]:
                 f"{', '.join(f'{name}=' for name in known)}, not {len(args)} "
                 f"values in a row."
             )
+        try:
+            signature.bind(*args, **kwargs)
+        except TypeError as error:
+            raise ParameterError(
+                f"sl.{cls.__name__}: {error}. Write sl.{cls.__name__}"
+                f"({', '.join(f'{name}=...' for name in list(known)[:2])})."
+            ) from None
         made(self, *args, **kwargs)
 
     cls.__init__ = init  # type: ignore[assignment, method-assign]

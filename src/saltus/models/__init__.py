@@ -138,8 +138,9 @@ def describe() -> dict[str, str]:
 def __getattr__(name: str) -> Any:
     if name.startswith("__"):
         raise AttributeError(name)
+    near = nearest(name.lower(), MODELS, 0.7).replace("Known", "Models")
     raise AttributeError(
-        f"no model is called {shown(name)}. Models: {', '.join(MODELS)}. Write "
+        f"no model is called {shown(name)}. {near} saltus models lists all in a terminal. Write "
         f"your own equation with @sl.system."
     )
 

@@ -4,7 +4,7 @@ the caller.
 
 from typing import Any
 
-from saltus.errors import nearest, shown
+from saltus.errors import shown
 from saltus.plot.agreement import agreement
 from saltus.plot.backbone import backbone
 from saltus.plot.basins import basins
@@ -23,6 +23,7 @@ from saltus.plot.section import section
 from saltus.plot.spectrum import spectrum
 from saltus.plot.style import OKABE_ITO, style
 from saltus.plot.type_map import type_map
+from saltus.system.elsewhere import picture_instead
 
 __all__ = [
     "OKABE_ITO", "agreement", "backbone", "basins", "bifurcation_curves", "bifurcation_diagram",
@@ -34,4 +35,4 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name.startswith("__"):
         raise AttributeError(name)
-    raise AttributeError(f"no picture is called {shown(name)}. {nearest(name, __all__)}")
+    raise AttributeError(f"no picture is called {shown(name)}. {picture_instead(name, __all__)}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import math
 import re
+import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
@@ -18,6 +19,8 @@ from saltus.units import from_si
 if TYPE_CHECKING:
     from saltus.system.system import System
 
+#: How the description of a structure begins.
+STRUCTURE = "Structure of"
 _GREEK = frozenset(
     [
         "alpha",
@@ -93,6 +96,7 @@ def system_text(system: System) -> str:
     ]
     blocks = [
         [head],
+        _about(system),
         [f"states      {', '.join(states)}"],
         _labelled("equations", equation_lines(system)),
     ]
@@ -103,6 +107,12 @@ def system_text(system: System) -> str:
     if system.source:
         blocks.append([f"source      {system.source}"])
     return "\n".join(line for block in blocks for line in block)
+
+
+def _about(system: System) -> list[str]:
+    """What is said of a structure, whose equations alone don't tell its frequencies."""
+    words = system.description if system.description.startswith(STRUCTURE) else ""
+    return textwrap.wrap(f"{'about':<12}{words}", 100, subsequent_indent=" " * 12) if words else []
 
 
 def _boundaries(system: System) -> int:

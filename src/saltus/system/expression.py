@@ -242,6 +242,13 @@ def _no_number() -> str:
     return OWN_FUNCTIONS
 
 
+#: Where a comparison stands for 0 or 1, as it does in MATLAB.
+_NO_NUMBER = (
+    "a comparison was used as a number. Write sl.piecewise((1, x > gap), otherwise=0), or the "
+    "whole term in place of the 1: sl.piecewise((k*(x - gap), x > gap), otherwise=0)."
+)
+
+
 @contextmanager
 def observed(observer: Callable[[Expr], None] | None) -> Iterator[None]:
     """Every node that is asked for inside is shown to the observer, which may raise: the error then
@@ -338,6 +345,14 @@ class Condition:
             "otherwise=...); join conditions with "
             "& | ~; use sl.min and sl.max."
         )
+
+    def __neg__(self, *_others: object) -> Expr:
+        """Refused, as every operation that would need a number."""
+        raise TraceError(_NO_NUMBER)
+
+    __pos__ = __abs__ = __float__ = __int__ = __neg__
+    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __neg__
+    __truediv__ = __rtruediv__ = __pow__ = __rpow__ = __neg__
 
 
 @dataclass(frozen=True, eq=False)
@@ -449,9 +464,7 @@ def as_expr(value: Operand) -> Expr:
     if isinstance(value, Expr):
         return value
     if isinstance(value, Condition):
-        raise TraceError(
-            "a comparison was used as a number. Write sl.piecewise((1, x > gap), otherwise=0)."
-        )
+        raise TraceError(_NO_NUMBER)
     if isinstance(value, str | bytes):
         raise TraceError(
             f"an equation holds the text {shown(value)}. Text with units is for parameter values; "
@@ -467,6 +480,11 @@ def as_expr(value: Operand) -> Expr:
         raise TraceError(
             "an equation holds an array. A traced value is a single number: write out "
             "the components."
+        )
+    if callable(value):
+        raise TraceError(
+            f"an equation holds the function {shown(value)} itself. Call it: of a record "
+            f"record(t), of a table sl.table(t, points, values)."
         )
     try:
         return constant(value)

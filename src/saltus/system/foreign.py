@@ -56,39 +56,8 @@ ADVICE: dict[str, str] = {
     "expm1": "Write sl.exp(x) - 1.", "log1p": "Write sl.log(1 + x).",
     "restitution": "Return sl.impact(x < gap, v, restitution=0.8) after the rates.",
     "delay": "There are no delays: a rate depends on the states at the time t only.",
-    "continuation": "There is no continuation by arc length; sl.frequency_response and "
-                    "sl.bifurcation_diagram follow branches.",
-    "solve": "Write sl.simulate(system, start, t_end=...).",
-    "solve_ivp": "Write sl.simulate(system, "
-        "start, t_end=...).",
-    **dict.fromkeys(("sim", "simulation", "integrate", "odeint", "run", "solve_ode"),
-        "Write sl.simulate(system, "
-        "start, t_end=...)."),
-    **dict.fromkeys(("ode45", "RK45", "DOP853"), "Write sl.simulate(system, "
-        "start, t_end=..., method=sl.ODE45())."),
-    **dict.fromkeys(("ode23", "RK23"), "Write sl.simulate(system, start, t_end=..., "
-                                       "method=sl.ODE23())."),
-    **dict.fromkeys(("ode113", "LSODA"), "Write sl.simulate(system, start, t_end=..., "
-                                         "method=sl.ODE113())."),
-    **dict.fromkeys(("ode15s", "BDF"), "Write sl.simulate(system, start, t_end=..., "
-                                       "method=sl.ODE15s())."),
-    **dict.fromkeys(("rk4", "rungekutta", "runge_kutta"), "Write sl.simulate(system, start, "
-                                                          "t_end=..., method=sl.RK4(step))."),
-    **dict.fromkeys(("transmission", "transmissibilities"), "Write sl.transmissibility(response, "
-        "output, input)."),
     **dict.fromkeys(("interp1d", "interp1", "lookup"), "Write sl.table(x, points, values)."),
-    **dict.fromkeys(("fft", "psd", "periodogram", "welch"), "Write sl.spectrum(run)."),
-    **dict.fromkeys(("frf", "FRF", "bode", "sweep"), "Write sl.frequency_response(system, (first, "
-                                                     "last, number))."),
-    "backbone": "Write sl.frequency_response for each of several forces: the backbone joins the "
-                "peaks.",
     "chirp": "Write sl.sin(2*sl.pi*(f0*t + rate*t**2/2)) in the equation.",
-    **dict.fromkeys(("orbit_diagram", "orbitdiagram", "bifurcation"),
-        "Write sl.bifurcation_diagram(system, "
-        "{name: (low, high, number)})."),
-    **dict.fromkeys(("lyapunovspectrum", "lyapunov_spectrum", "lyapunov_exponent"),
-        "Write sl.lyapunov(system, "
-        "start, periods=...)."),
 }  # fmt: skip
 
 

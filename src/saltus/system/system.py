@@ -6,7 +6,6 @@ import functools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from saltus.errors import ParameterError, among, nearest, shown
 from saltus.system import checks, serial
 from saltus.system.derivatives import gradient
 from saltus.system.expression import Expr
+from saltus.system.fixed import Units, Values, no_change
 from saltus.system.guards import Guard
 from saltus.system.periodic import check_periodic
 
@@ -59,8 +59,8 @@ class System:
     tangent_of: System | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "values", MappingProxyType(dict(self.values)))
-        object.__setattr__(self, "units", MappingProxyType(dict(self.units)))
+        object.__setattr__(self, "values", Values(self.values))
+        object.__setattr__(self, "units", Units(self.units))
         for name, value in self.values.items():
             checks.check_range(name, value, self.forced_at)
         checks.check_guards(self.name, len(self.guards))
@@ -303,17 +303,26 @@ class System:
             return (
                 f"{shown(name)} is a state. Its motion is sl.simulate({self.name}, ...)[{name!r}]."
             )
+        if among(name, _DONE_ELSEWHERE):
+            return f"write {_DONE_ELSEWHERE[name].format(self.name)}."
         return (
             f"its parameters are in {self.name}.values, its states in {self.name}.states. "
             f"{nearest(name, [*self.values, *self.states])}"
         )
 
 
+#: What people ask of a System, and what does it.
+_DONE_ELSEWHERE = {
+    **dict.fromkeys(("simulate", "solve", "run", "integrate", "compute"), "sl.simulate({}, ...)"),
+    **dict.fromkeys(("copy", "set", "update", "replace"), "{}.with_values(name=...)"),
+    **dict.fromkeys(("parameters", "params", "pars", "p"), "{}.values"),
+    **dict.fromkeys(("plot", "show", "draw"), "sl.plot.phase(sl.simulate({}, ...))"),
+    **dict.fromkeys(("f", "fun", "field_at"), "{}.rhs(t, y)"),
+}
+
+
 def _refuse_change(self: System, name: str, _value: Any) -> None:
-    change = f"system.with_values({name}=...)" if name in self.values else "system.with_values(...)"
-    raise ParameterError(
-        f"a System is never changed. Write system = {change}, a copy with other values."
-    )
+    raise no_change(name, self.values)
 
 
 System.__setattr__ = _refuse_change  # type: ignore[assignment]  # in place of dataclass's own refusal, which doesn't say what to do

@@ -69,6 +69,9 @@ class Table:
     def __hash__(self) -> int:
         return hash(self.fingerprint)
 
+    def __repr__(self) -> str:
+        return f"<table {self.name!r} of {len(self.points)} points>"
+
     @functools.cached_property
     def degree(self) -> int:
         """Highest power that any piece has."""
@@ -240,7 +243,7 @@ def curve(points: Any, values: Any, kind: str, outside: str, name: str, unit: st
         i = int(np.flatnonzero(np.diff(x) <= 0)[0]) + 1
         raise TraceError(
             f"sl.table: points must ascend, but points[{i}] = {x[i]:g} follows "
-            f"{x[i - 1]:g}. Sort them, and drop repeats."
+            f"{x[i - 1]:g}. {_ascending(x, y, i)}"
         )
     if outside == "periodic" and y[0] != y[-1]:
         raise TraceError(
@@ -248,6 +251,20 @@ def curve(points: Any, values: Any, kind: str, outside: str, name: str, unit: st
             f"{y[0]:g} and {y[-1]:g}."
         )
     return Table(x, _pieces(x, y, kind, outside), outside == "periodic", name, unit)
+
+
+def _ascending(x: np.ndarray, y: np.ndarray, i: int) -> str:
+    """What to do about point number i, which doesn't lie after the one before it."""
+    if (np.diff(x) < 0).any():
+        return "Sort them."
+    if y[i] == y[i - 1]:
+        return "Drop one of the two."
+    return (
+        f"A step, from {y[i - 1]:g} to {y[i]:g}, is made of two curves: of a time, before = "
+        f"sl.recorded(...) of the points up to number {i - 1} and after = sl.recorded(...) of "
+        f"those from number {i} on, and in the equation sl.where(t < {float(x[i])!r}, before(t), "
+        f"after(t))."
+    )
 
 
 def _pieces(x: np.ndarray, y: np.ndarray, kind: str, outside: str) -> np.ndarray:

@@ -1,4 +1,5 @@
-"""Tracing: the user's function is called once, with symbols, and its operations are recorded.
+"""Tracing: the user's function is called with symbols, and its operations are recorded. It is
+called twice: what differs isn't an equation.
 
 Whatever goes wrong inside the function becomes a TraceError that names its file and line and says
 what to write instead.
@@ -12,6 +13,7 @@ import sysconfig
 import traceback
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
@@ -52,6 +54,10 @@ _CALLS = {
     "friction": "sl.friction(v, slip=..., stick=...)",
     "impact": "sl.impact(x < gap, v, restitution=0.8), after the rates",
     "piecewise": "sl.piecewise((value, condition), ..., otherwise=value)",
+    "where": "sl.where(condition, value, otherwise)",
+    "pulse": "sl.pulse(t, duration, start=..., every=..., shape=...)",
+    "mod": "sl.mod(t, T)",
+    "clip": "sl.clip(x, low, high)",
     "table": 'sl.table(t, points, values, kind="linear", outside="hold")',
 }
 _HOW_TO = (
@@ -65,6 +71,7 @@ def _known_words(function: Callable[P, R]) -> Callable[P, R]:
     """Answer arguments that :func:`system` doesn't have by those that it has."""
     known = inspect.signature(function).parameters
     elsewhere = dict.fromkeys(("forcing", "forced", "drive", "frequency", "period"), "forced_at")
+    values = ("params", "parameters", "pars", "args", "values", "constants", "p")
 
     @functools.wraps(function)
     def called(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -77,7 +84,12 @@ def _known_words(function: Callable[P, R]) -> Callable[P, R]:
                         f'{there}="frequency".'
                     )
                     if there
-                    else ""
+                    else (
+                        "Parameters stand after a * in the function, with their values: "
+                        'def rig(t, x, v, *, mass="3 kg"): ...'
+                        if word in values
+                        else ""
+                    )
                 )
                 raise TraceError(
                     f"sl.system has no argument {word!r}. {advice or nearest(word, known)}"
@@ -102,8 +114,9 @@ def system(
 
     The function takes the time, the states, and after a ``*`` the parameters with their default
     values; it returns the time derivative of each state. Where the states are many, ``*y`` after
-    the time takes them all, in their order. The function is called once, with symbols. Comparisons
-    inside :func:`piecewise` become the contacts.
+    the time takes them all, in their order. The function is called with symbols, not with numbers,
+    and twice, to see that it gives the same. Comparisons inside :func:`piecewise` become the
+    contacts.
 
     Parameters
     ----------
@@ -284,9 +297,11 @@ def _parameters(
             f"{title}: put a * between the states and the parameters, so that "
             f"parameters are given by name. Write {wanted}."
         )
+    vector = len(names) == 2 and len(states) > 1
     raise TraceError(
         f"{title}: states={' '.join(states)!r}, but the function takes "
-        f"({', '.join(names)}). Write {wanted}."
+        f"({', '.join(names)}). Write {wanted}"
+        f"{f', or def {title}(t, *{names[1]}, ...) for all states in a row' if vector else ''}."
     )
 
 
@@ -348,11 +363,11 @@ def _traced(
     """Field and guards."""
     try:
         with observed(dimensions), declarations() as made:
-            returned = function(
-                TIME, *map(state, states), **{name: parameter(name) for name in parameters}
-            )
-            derivatives, laws = _as_derivatives(returned, states)
+            derivatives, laws = _called(function, states, parameters)
         _check_returned(made, laws)
+        if not isinstance(function, Formula | Equations):
+            with observed(None), declarations():
+                _check_same((derivatives, laws), _called(function, states, parameters))
         if dimensions is not None:
             dimensions.check_rates(derivatives)
             for law in laws:
@@ -364,6 +379,37 @@ def _traced(
         return find_contacts(derivatives, laws, states)
     except TraceError as error:
         raise TraceError(f"{title} ({place(function)}): {error}") from error
+
+
+def _called(
+    function: Callable[..., Any], states: tuple[str, ...], parameters: tuple[str, ...]
+) -> tuple[list[Expr], list[Declared]]:
+    """What the function returns when it is called with symbols."""
+    returned = function(TIME, *map(state, states), **{name: parameter(name) for name in parameters})
+    return _as_derivatives(returned, states)
+
+
+def _check_same(
+    first: tuple[list[Expr], list[Declared]], second: tuple[list[Expr], list[Declared]]
+) -> None:
+    """Raise a TraceError unless two calls gave the same equation."""
+    one, two = (
+        [
+            (node.op, None if node.op == "select" else node.payload)
+            for node in walk(*rates, *(root for law in laws for root in law.roots()))
+        ]
+        for rates, laws in (first, second)
+    )
+    for a, b in zip_longest(one, two):
+        if a == b:
+            continue
+        plain = a is not None and b is not None and a[0] == b[0] == "const"
+        what = f": it holds {a[1]:.6g}, then {b[1]:.6g}" if plain else ""
+        raise TraceError(
+            f"the function gives another equation each time it is called{what}. Random numbers, "
+            f"the clock and counters would be frozen at one value. Of noise draw the numbers once, "
+            f"outside: noise = sl.recorded(times, values), and in the equation noise(t)."
+        )
 
 
 def _warn_of_unused(
@@ -393,6 +439,11 @@ def _as_derivatives(returned: Any, states: tuple[str, ...]) -> tuple[list[Expr],
         )
     if isinstance(returned, Expr | int | float | Declared):
         returned = (returned,)
+    if isinstance(returned, Mapping):
+        raise TraceError(
+            "it returns a mapping. Return the time derivatives in the order of the states: return "
+            + ", ".join(f"d{name}/dt" for name in states)
+        )
     try:
         returned = list(returned)
         last = max(

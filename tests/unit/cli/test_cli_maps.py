@@ -311,7 +311,7 @@ def test_plot_of_a_motion_as_a_map(study, tmp_path, kind):
             "[basins]\nperiod = 3",
             "[basins] has no key 'period'. Did you mean 'periods'?",
         ),
-        ("axes.v", "axes.w", "[basins.axes] 'w' is unknown to delangre. Known: v, x."),
+        ("axes.v", "axes.w", "[basins.axes] 'w' is unknown to delangre. Known: x, v."),
         ('"-5 mm"', "-5", "[basins.axes] x.first = -5 has no unit."),
         (
             "\n[basins]",

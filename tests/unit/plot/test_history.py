@@ -220,7 +220,7 @@ def test_missing_samples_leave_a_hole(run):
         ({"periods": (5, 3)}, "begin and end"),
         ({"periods": (30, 40)}, "outside this run, which holds periods 0 to 20"),
         ({"periods": "all"}, "number of last periods"),
-        ({"units": {"X": "mm"}}, "no state 'X'. Known: v, x"),
+        ({"units": {"X": "mm"}}, "no state 'X'. Known: x, v"),
         ({"time": "ms"}, "Known: 'both', 's', 'T'"),
         ({"ax": "here"}, "Give matplotlib Axes"),
         ({"trajectory": []}, "1 to 8 trajectories"),

@@ -153,7 +153,7 @@ def test_limit_cycles_are_tabulated_with_their_period(tmp_path):
         (BACKBONE, '["0.1 mm", "2 mm"]', "[0.1, 2]", "no unit"),
         (BACKBONE, "amplitude =", "amplitud =", "amplitude"),
         (BACKBONE, "damping_ratio", "damping_ration", "damping_ratio"),
-        (BACKBONE, "values =", 'state = "y"\nvalues =', "'y' is unknown to delangre. Known: v, x"),
+        (BACKBONE, "values =", 'state = "y"\nvalues =', "'y' is unknown to delangre. Known: x, v"),
         (ORBITS, "periods =", "perods =", "periods"),
         (ORBITS, "periods = 1", 'period = "1 s"', "is forced"),
         (LIMIT_CYCLES, '"2 s", "20 s"', "2, 20", "no unit"),

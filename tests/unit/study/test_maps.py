@@ -110,7 +110,7 @@ def test_at_for_an_axis_is_refused():
                                        "map of this study"),
         (MAPS + 'compare = "second"\n', "which is no other map of this study"),
         (replaced("axes.v", "axes.w"), r"\[basins\.axes\] 'w' is unknown to delangre\. Known: "
-                                       r"v, x\."),
+                                       r"x, v\."),
         (replaced('"-5 mm"', "-5"), r"\[basins\.axes\] x\.first = -5 has no unit\."),
         (BASE + "every = 1\n", r'\[basins\] every = 1 has no unit.*every = "1 s"'),
         (BASE + 'every = "1 s"\n', r"delangre is forced.*Leave every out"),

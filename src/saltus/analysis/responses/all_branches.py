@@ -199,8 +199,14 @@ def _range(system: System, vary: Any) -> tuple[str, tuple[float, float]]:
     """The parameter and its range [SI]."""
     example = next(iter(system.values), "name")
     if not isinstance(vary, Mapping) or len(vary) != 1:
+        two = (
+            " Two parameters: sl.bifurcation_curve follows a bifurcation over both, and "
+            "sl.bifurcation_diagram(system, {one: (low, high, number), two: (low, high, number)}) "
+            "maps the kinds of motion."
+        )
         raise ParameterError(
             f"sl.branches follows one parameter: {{{example!r}: (low, high)}}, not {shown(vary)}."
+            f"{two if isinstance(vary, Mapping) and len(vary) > 1 else ''}"
         )
     ((name, ends),) = vary.items()
     return name, range_of(system, name, ends)

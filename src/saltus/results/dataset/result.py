@@ -11,6 +11,16 @@ import xarray as xr
 
 from saltus.errors import ParameterError
 
+_CONTACTS = "Write run.contact_time, or sl.contacts(run) for a table."
+#: What results of other programs are asked, and what it is called here.
+_ELSEWHERE = {
+    "t": "Write run.time.",
+    **dict.fromkeys(("y", "ys", "u"), "Each state has its name: run.x, or run['x'].values."),
+    **dict.fromkeys(("te", "t_events", "ye", "y_events", "ie", "events_time"), _CONTACTS),
+    **dict.fromkeys(("success", "message"), "Write run.status, or sl.describe(run)."),
+    **dict.fromkeys(("sol", "interp_at"), "Write run.x.interp(time=[...])."),
+}
+
 
 class Result(xr.Dataset):
     """A Dataset in every respect but one: what would make the product of all its dims is refused.
@@ -65,6 +75,14 @@ class Result(xr.Dataset):
             If a dim has two lengths.
         """
         return cls._construct_direct(variables, set(coords), attrs=attrs, indexes=dict(indexes))
+
+    def __getattr__(self, name: str) -> Any:
+        try:
+            return super().__getattr__(name)
+        except AttributeError as error:
+            if (words := _ELSEWHERE.get(name)) is None:
+                raise
+            raise AttributeError(f"{error}. {words}") from None
 
     def to_dataframe(self, dim_order: Sequence[Hashable] | None = None) -> Any:
         """A pandas.DataFrame with a row for each point of the dims, as that of a Dataset; of one

@@ -103,6 +103,19 @@ def remove_old_drafts(folder: Path) -> None:
                 draft.unlink()
 
 
+@contextmanager
+def no_folder_left(path: Path) -> Iterator[None]:
+    """Folders that are made inside are taken away again if an error leaves them empty."""
+    missing = [one for one in (path, *path.parents) if not one.exists()]
+    try:
+        yield
+    except Exception:
+        with suppress(OSError):  # one that holds something stays, and those around it
+            for one in missing:
+                one.rmdir()
+        raise
+
+
 def usable_folder(path: Path) -> Path:
     """A folder that can be written to, made if it isn't there: asked before long work, not after
     it.

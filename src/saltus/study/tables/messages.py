@@ -39,6 +39,53 @@ _EXPECTED = {
 }
 
 
+_SWEPT = (
+    'Write [frequency_response] with frequency = { first = "2 Hz", last = "30 Hz", count = 281 }.'
+)
+_DRAWN = (
+    'Lists are a batch, one value for each trajectory: [simulate] with values = { gap = ["1 mm", '
+    '"1.1 mm"] }. Draw many in Python: sl.simulate(..., values={"gap": array}).'
+)
+#: Tables that people write, and what is written here.
+_ELSEWHERE = {
+    **dict.fromkeys(
+        ("monte_carlo", "montecarlo", "sensitivity", "ensemble", "sampling", "parameters_sweep"),
+        _DRAWN,
+    ),
+    **dict.fromkeys(
+        ("continuation", "arclength"), 'Write [branches] with vary.gap = ["1 mm", "2 mm"].'
+    ),
+    **dict.fromkeys(("sweep", "frf", "resonance"), _SWEPT),
+    **dict.fromkeys(("solver", "integrator"), 'Write [method] with name = "Taylor".'),
+    **dict.fromkeys(
+        ("parameters", "values", "model", "equations"),
+        "Write [system]: its keys are the parameters.",
+    ),
+    **dict.fromkeys(
+        ("events", "contacts"),
+        "Contacts are comparisons in the rates of [system]; [poincare] records other crossings.",
+    ),
+    **dict.fromkeys(
+        ("plot", "pictures", "output"),
+        "Pictures and tables are made of every question; saltus plot draws others.",
+    ),
+    "units": 'Write [system.units], such as x = "m".',
+}
+
+
+def _instead(place: tuple) -> str:
+    """What to write for a key or a table that isn't there."""
+    key, known = str(place[-1]), list(_known(place[:-1]))
+    if len(place) == 1 and key in _ELSEWHERE:
+        return _ELSEWHERE[key]
+    near = nearest(key, known, 0.7)
+    there = [name for name, table in QUESTIONS.items() if key in table.model_fields]
+    question = QUESTIONS.get(str(place[0]))
+    if there and question is not None and _table(place[:-1]) is question and "Did you" not in near:
+        return f"It is a key of {', '.join(f'[{name}]' for name in there)}."
+    return nearest(key, known)
+
+
 def _given(value: Any) -> str:
     """A value as a message repeats it: as TOML would write it, cut if it is long."""
     whole = toml(value)
@@ -103,7 +150,7 @@ def _fault(place: tuple, details: list[dict], data: Any) -> str:
     if kind == "extra_forbidden":
         return (
             f"{where or 'the file '}has no {'key' if tables else 'table'} {key!r}. "
-            f"{nearest(key, _known(place[:-1]))}"
+            f"{_instead(place)}"
         )
     if kind == "missing":
         return (

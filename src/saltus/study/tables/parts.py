@@ -29,8 +29,27 @@ Quantity = float | str
 Start = Quantity | list[Quantity]
 #: A formula as written: ``"k*(x - gap)"``.
 Formula = str
-#: Lower and upper end.
-Interval = Annotated[list[Quantity], Field(min_length=2, max_length=2)]
+
+
+def _ends(given: Any) -> Any:
+    """The ends of an interval, which may be written as those of a range: first and last."""
+    if not isinstance(given, dict):
+        return given
+    if "count" in given or "scale" in given:
+        raise ValueError(
+            "takes first and last only: how many points lie between follows from the curve"
+        )
+    if set(given) != {"first", "last"}:
+        raise ValueError('takes { first = "2 Hz", last = "30 Hz" }, or ["2 Hz", "30 Hz"]')
+    return [given["first"], given["last"]]
+
+
+#: Lower and upper end: ``["2 Hz", "30 Hz"]``, or as those of a range, first and last.
+Interval = Annotated[
+    list[Quantity],
+    Field(min_length=2, max_length=2),
+    BeforeValidator(_ends, json_schema_input_type=list[Quantity] | dict[str, Quantity]),
+]
 
 
 def slug(name: str) -> str:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import keyword
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import MISSING, dataclass, fields
 from typing import Any, TypeVar
 
 import numpy as np
@@ -16,6 +17,60 @@ SIDES = ("upper", "lower", "both")
 P = TypeVar("P", "Contact", "Force")
 
 
+#: How to write what is no part of a structure.
+BY_HAND = (
+    "Write the equations of the modes with @sl.system: sl.structure_modes(mass, stiffness, "
+    "modes) gives their frequencies and shapes."
+)
+#: What people ask of a contact or a force that has no such argument, and what to do.
+_ELSEWHERE = {
+    "restitution": "A contact is a spring, and loses energy by damping=. " + BY_HAND.replace(
+        "Write", "For a rigid stop, sl.impact, write"),
+    "friction": "A contact pushes along its degree of freedom only. " + BY_HAND.replace(
+        "Write", "For sl.friction write"),
+    **dict.fromkeys(("power", "exponent"), "Its spring is linear. " + BY_HAND.replace(
+        "Write", "For sl.hertz write")),
+    "preload": "Its force begins at zero. A preload is a constant force, "
+        "sl.Force(at, amplitude, harmonic=0), or a negative gap=.",
+    "phase_deg": "Write phase=\"90 deg\".",
+    "frequency": "All forces have the frequency= of sl.structure, or a multiple of it, harmonic=.",
+    "direction": "Give one sl.Force for each degree of freedom.",
+    "node": "Write at=, the name of a degree of freedom.",
+    "dof": "Write at=, the name of a degree of freedom.",
+    "k": "Write stiffness=.", "c": "Write damping=.", "clearance": "Write gap=.",
+}  # fmt: skip
+
+
+def _answered(kind: type[P]) -> type[P]:
+    """A part whose wrong arguments are answered in words."""
+    made = kind.__init__
+
+    @functools.wraps(made)
+    def called(self: Any, *args: Any, **given: Any) -> None:
+        _check_names(kind, given, len(args))
+        made(self, *args, **given)
+
+    kind.__init__ = called  # type: ignore[method-assign]
+    return kind
+
+
+def _check_names(kind: type[Any], given: Mapping[Any, Any], places: int = 0) -> None:
+    """Raise a ParameterError for arguments that a part hasn't, or that it needs."""
+    allowed = [field.name for field in fields(kind)]
+    for name in given:
+        if not among(name, allowed):
+            advice = _ELSEWHERE.get(name) if isinstance(name, str) else None
+            raise ParameterError(
+                f"a {kind.__name__} has no {shown(name)}. {advice or nearest(name, allowed)}"
+            )
+    if places > len(allowed) or set(given) & set(allowed[:places]):
+        raise ParameterError(f"write sl.{kind.__name__}({', '.join(allowed[:3])}, ...).")
+    needed = [field.name for field in fields(kind) if field.default is MISSING]
+    if missing := [name for name in needed[places:] if name not in given]:
+        raise ParameterError(f"a {kind.__name__} needs {', '.join(missing)}.")
+
+
+@_answered
 @dataclass(frozen=True)
 class Contact:
     """A spring behind a gap, with or without a damper, between a degree of freedom and the ground
@@ -51,6 +106,7 @@ class Contact:
     name: str | None = None
 
 
+@_answered
 @dataclass(frozen=True)
 class Force:
     """A harmonic force ``amplitude*cos(2*pi*harmonic*frequency*t + phase)`` on a degree of freedom.
@@ -127,15 +183,8 @@ def _made(kind: type[P], given: Any) -> P:
             f"write sl.{kind.__name__}({', '.join(allowed[:3])}, ...), or a mapping of these "
             f"names, not {shown(given)}."
         )
-    for name in given:
-        if not among(name, allowed):
-            raise ParameterError(f"a {kind.__name__} has no {shown(name)}. "
-                                 f"{nearest(name, allowed)}")  # fmt: skip
-    try:
-        return kind(**given)
-    except TypeError:
-        missing = [name for name in allowed[: 3 if kind is Contact else 2] if name not in given]
-        raise ParameterError(f"a {kind.__name__} needs {', '.join(missing)}.") from None
+    _check_names(kind, given)
+    return kind(**given)
 
 
 def _check(name: str, one: Contact | Force, known: list[str]) -> None:
@@ -144,10 +193,15 @@ def _check(name: str, one: Contact | Force, known: list[str]) -> None:
     for place in places:
         if not among(place, known):
             raise ParameterError(
-                f"{name}: {shown(place)} is no degree of freedom. {nearest(place, known)}"
+                f"{name}: {shown(place)} is no degree of freedom. {_named(place, known)}"
             )
     if len(places) == 2 and places[0] == places[1]:
         raise ParameterError(f"{name}: at and to are both {places[0]!r}.")
+    if isinstance(one, Force) and callable(one.amplitude):
+        raise ParameterError(
+            f"{name}: a structure takes harmonic forces, amplitude*cos(2*pi*frequency*t), and no "
+            f"record or function of the time. {BY_HAND}"
+        )
     if isinstance(one, Contact) and not among(one.side, SIDES):
         raise ParameterError(f"{name}: side={shown(one.side)}. {nearest(one.side, SIDES)}")
     if isinstance(one, Force) and (
@@ -156,6 +210,14 @@ def _check(name: str, one: Contact | Force, known: list[str]) -> None:
         or one.harmonic < 0
     ):
         raise ParameterError(f"{name}: harmonic must be a whole number, 0 or more.")
+
+
+def _named(place: Any, known: list[str]) -> str:
+    """What to write for a degree of freedom, given by its number or misspelt."""
+    number = isinstance(place, int | np.integer) and not isinstance(place, bool)
+    if number and 1 <= place <= len(known):
+        return f"They are given by name: number {place} is {known[place - 1]!r}, counted from 1."
+    return nearest(place, known)
 
 
 def direction(one: Contact | Force, names: list[str]) -> np.ndarray:

@@ -4,25 +4,55 @@ given as data.
 
 from __future__ import annotations
 
+import functools
+import math
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from saltus.errors import ParameterError, among, shown
-from saltus.system.functions import pi
+from saltus.arguments import checked
+from saltus.errors import ParameterError, SaltusWarning, among, shown
+from saltus.system.display import STRUCTURE
 from saltus.system.guards import number_of
 from saltus.system.structures import matrices
 from saltus.system.structures.equations import UNITS, Coordinates, traced
-from saltus.system.structures.parts import Contact, Force, direction, parts
+from saltus.system.structures.matrices import ASYMMETRY
+from saltus.system.structures.parts import BY_HAND, Contact, Force, direction, parts
 from saltus.system.structures.reduction import Modes, flexibility, modal_damping, modes_of
 from saltus.system.system import System
+from saltus.units import to_si
 
 #: Most coordinates of a system: what is compiled grows with them.
 MOST_COORDINATES = 128
 
 
+#: What people ask of a structure by another name, or that it hasn't.
+_ELSEWHERE = {
+    **dict.fromkeys(("zeta", "xi", "loss_factor"), "Write damping_ratio=, such as \"2 %\"."),
+    **dict.fromkeys(("n_modes", "nmodes", "modes_kept", "number"), "Write modes=."),
+    **dict.fromkeys(("c", "C"), "Write damping=."),
+    **dict.fromkeys(("k", "K"), "Write stiffness=."),
+    **dict.fromkeys(("m", "M"), "Write mass=."),
+    **dict.fromkeys(("dofs", "dof", "nodes", "labels", "states"), "Write names=."),
+    **dict.fromkeys(("freq", "f", "forcing", "forced_at"), "Write frequency=."),
+    **dict.fromkeys(("base", "support", "ground", "excitation"),
+        "Of a base that shakes harmonically the forces are -mass @ direction times its "
+        "acceleration: one sl.Force for each degree of freedom. " + BY_HAND.replace(
+        "Write", "For a record, sl.recorded, write")),
+    **dict.fromkeys(("outputs", "sensors", "output"), "An output is a formula of "
+        "the coordinates: outputs= of sl.frequency_response and others, with the mode shapes of "
+        "sl.structure_modes."),
+}  # fmt: skip
+#: Natural frequencies [Hz] below which a structure is none: mass and stiffness may be swapped.
+_ABSURD = 3e-2
+#: How many natural frequencies are told.
+_TOLD = 6
+
+
+@functools.partial(checked, elsewhere=_ELSEWHERE)
 def structure(
     mass: Any,
     stiffness: Any,
@@ -56,8 +86,9 @@ def structure(
         Harmonic forces, such as ``sl.Force("x1", "2 N", phase="90 deg")``.
     frequency : float or str, optional
         Forcing frequency [Hz]; needed with forces that oscillate.
-    damping_ratio : float or sequence, optional
-        In place of ``damping``: the ratio of every mode, or one each for the lowest of them.
+    damping_ratio : float, str or sequence, optional
+        In place of ``damping``: the ratio of every mode, such as 0.02 or ``"2 %"``, or one each for
+        the lowest of them.
     modes : int, optional
         How many of the lowest modes are kept; the states are then their coordinates. Default: all
         degrees of freedom, as they are. ``modes=n`` loses nothing, and makes a full mass matrix
@@ -124,12 +155,13 @@ def structure(
             shapes = matrices.dense(mass) @ known.shapes
             damping = shapes @ damping @ shapes.T
         moving = _physical(mass, stiffness, damping, degrees)
-        words = f"Structure of {size} degrees of freedom."
+        words = f"{STRUCTURE} {size} degrees of freedom{_told(_angular(moving, stiffness))}."
     else:
         if damping is not None and damping_ratio is None:
             damping = modal_damping(damping, known, count)
         moving = _modal(known.kept(count), damping)
         words = _words(stiffness, known, count, degrees, touching)
+    _doubt_swapped(known.angular if known is not None else _angular(moving, stiffness))
     made, sides = traced(
         moving, degrees, touching, driving, frequency, unit=unit, name=name, source=source
     )
@@ -192,17 +224,61 @@ def _modal(kept: Modes, damping: Any) -> Coordinates:
     )  # fmt: skip
 
 
+def _angular(moving: Coordinates, stiffness: Any) -> np.ndarray:
+    """Angular natural frequencies [rad/s], ascending; none of a stiffness that isn't symmetric."""
+    full = matrices.dense(stiffness)
+    if moving.inverse is None or np.abs(full - full.T).max() > ASYMMETRY * np.abs(full).max():
+        return np.zeros(0)
+    squares = np.linalg.eigvals(moving.inverse @ full).real
+    return np.asarray(np.sqrt(np.sort(np.maximum(squares, 0.0))))
+
+
+def _told(angular: np.ndarray) -> str:
+    """The lowest natural frequencies, as the end of a sentence."""
+    if not len(angular):
+        return ""
+    lowest = ", ".join(f"{one:.4g}" for one in angular[:_TOLD] / (2 * math.pi))
+    return f"; natural frequencies {lowest}{', ...' if len(angular) > _TOLD else ''} Hz"
+
+
+def _doubt_swapped(angular: np.ndarray) -> None:
+    """Warn of natural frequencies that no structure has."""
+    highest = angular.max(initial=0.0) / (2 * math.pi)
+    if 0 < highest < _ABSURD:
+        warnings.warn(
+            f"the highest natural frequency of this structure is {highest:.3g} Hz. The mass comes "
+            f"first, sl.structure(mass, stiffness, ...): with the two swapped the lowest would be "
+            f"{1 / (4 * math.pi**2 * highest):.4g} Hz.",
+            SaltusWarning,
+            stacklevel=4,
+        )
+
+
 def _ratio(ratio: Any, modes: Modes, count: int) -> np.ndarray:
     """The damping matrix of modes with given damping ratios."""
     try:
-        ratios = np.broadcast_to(np.asarray(ratio, float), count)
+        several = isinstance(ratio, list | tuple)
+        plain = [_share(one) for one in ratio] if several else _share(ratio)
+        ratios = np.broadcast_to(np.asarray(plain, float), count)
     except (TypeError, ValueError, OverflowError):
         raise ParameterError(
             f"damping_ratio must be one number or {count} of them, not {shown(ratio)}."
         ) from None
     if not (np.isfinite(ratios).all() and (ratios >= 0).all()):
         raise ParameterError(f"damping_ratio must be 0 or more, not {shown(ratio)}.")
+    if (ratios > 1).any():
+        warnings.warn(
+            f"damping_ratio = {ratios.max():g} is more than critical damping, 1: such modes don't "
+            f"vibrate. Of per cent write '{ratios.max():g} %'.",
+            SaltusWarning,
+            stacklevel=4,
+        )
     return np.diag(2 * ratios * modes.angular[:count])
+
+
+def _share(ratio: Any) -> Any:
+    """A ratio as a number; a text such as ``"2 %"`` has its unit taken off."""
+    return to_si(ratio, "1", "damping_ratio") if isinstance(ratio, str) else ratio
 
 
 def _words(
@@ -211,8 +287,8 @@ def _words(
 ) -> str:  # fmt: skip
     """What is said of a reduction."""
     words = (
-        f"Structure of {len(degrees)} degrees of freedom, by its lowest {count} modes, up to "
-        f"{modes.angular[count - 1] / (2 * pi):.6g} Hz."
+        f"{STRUCTURE} {len(degrees)} degrees of freedom, by its lowest {count} modes, up to "
+        f"{modes.angular[count - 1] / (2 * math.pi):.6g} Hz{_told(modes.angular)}."
     )
     if not contacts:
         return words

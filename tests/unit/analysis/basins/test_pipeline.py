@@ -119,7 +119,7 @@ def test_a_list_holds_the_starts_and_a_tuple_is_a_range():
 @pytest.mark.parametrize(
     ("axes", "message"),
     [
-        ({"y": X, "v": V}, r"no state 'y'\. Known: v, x"),
+        ({"y": X, "v": V}, r"no state 'y'\. Known: x, v"),
         ({"xx": X, "v": V}, r"no state 'xx'\. Did you mean 'x'\?"),
         ({"x": X}, "two axes, not 1.*400"),
         ({}, "two axes, not 0"),

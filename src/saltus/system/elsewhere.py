@@ -1,0 +1,184 @@
+"""What people type who come from other programs, and what to write here: a sentence for each name
+that saltus hasn't.
+"""
+
+from __future__ import annotations
+
+from saltus.errors import nearest
+from saltus.system.foreign import ADVICE
+
+_RUN = "Write sl.simulate(system, start, t_end=...)."
+_PAIR = "sl.simulate(system, start, t_end=..., method={})."
+_ARRAYS = (
+    'Draw the values with NumPy and give them to one call: sl.simulate(..., values={"gap": '
+    "array}); start= takes arrays as well."
+)
+_EVENTS = (
+    "Contacts are comparisons in the equation, such as sl.piecewise((k*(x - gap), x > gap), "
+    "otherwise=0), and a run holds them all: run.contact_time. sl.poincare(system, start, surface) "
+    "records other crossings."
+)
+_FIT = (
+    "There is none: give scipy.optimize.least_squares a function that calls "
+    "sl.simulate(system.with_values(...), ...)."
+)
+_NOISE = (
+    "Draw the numbers once, outside the equation: noise = sl.recorded(times, values), and in the "
+    "equation noise(t)."
+)
+_STEPS = "The steps are chosen by the method, such as sl.Taylor() or sl.ODE45(rtol=..., atol=...)."
+_BRANCHES = "Write sl.branches(system, {name: (low, high)})."
+_SHAPES = (
+    "Write sl.structure(mass, stiffness, ...), or sl.structure_modes(mass, stiffness, modes) for "
+    "frequencies and mode shapes."
+)
+_MERGE = (
+    "One call takes many starts and values and gives one result; of several results "
+    "xarray.concat([a.x, b.x], dim) joins what they have in common."
+)
+_EQUATION = "Write the equation as a function, with @sl.system(states=...) above it."
+_ANIMATED = (
+    "There are no animations; matplotlib.animation.FuncAnimation can draw run.x and run.v, "
+    "the samples of a run."
+)
+
+#: What to write for a name, in small letters and without _.
+_ADVICE: dict[str, str] = {
+    **dict.fromkeys(
+        ("continuation", "continue", "arclength", "pseudoarclength", "contclass", "auto", "matcont",
+            "coco", "bifurcationkit", "harmonicbalance", "hb", "hbm"),
+        _BRANCHES,
+    ),
+    **dict.fromkeys(("nnm", "freevibration"),
+        "Write sl.backbone(system, ...), of free vibrations."),
+    **dict.fromkeys(("montecarlo", "sampling", "ensemble", "ensembleproblem", "parametersweep",
+        "parameterscan", "scan", "uncertainty"), _ARRAYS),
+    "sensitivity": f"There is none by name; differences of runs show it. {_ARRAYS}",
+    **dict.fromkeys(("events", "event", "eventlocation", "odezero", "makezerocrossevent",
+        "terminal", "callback", "continuouscallback", "zerocrossing"), _EVENTS),
+    **dict.fromkeys(("concat", "merge", "combine", "join", "append"), _MERGE),
+    **dict.fromkeys(("fit", "optimize", "optimise", "minimize", "leastsquares", "identify",
+        "calibrate", "curvefit"), _FIT),
+    **dict.fromkeys(("noise", "whitenoise", "random", "randn", "rand", "normal", "wiener"), _NOISE),
+    **dict.fromkeys(("solve", "solveivp", "sim", "simulation", "integrate", "odeint", "run",
+        "solveode", "compute", "generator", "vodeodesystem", "radauodesystem",
+        "dopriodesystem"), _RUN),
+    **dict.fromkeys(("rk45", "dop853", "dopri5", "ode78", "ode89", "tsit5"),
+        f"Write {_PAIR.format('sl.ODE45()')}"),
+    "rk23": f"Write {_PAIR.format('sl.ODE23()')}",
+    "lsoda": f"Write {_PAIR.format('sl.ODE113()')}",
+    **dict.fromkeys(("bdf", "radau", "ode23s", "ode23t", "ode23tb", "cvode", "vode"),
+        f"Write {_PAIR.format('sl.ODE15s()')}"),
+    **dict.fromkeys(("rk4", "rungekutta", "euler", "newmark", "newmarkbeta", "hht",
+        "generalizedalpha", "centraldifference", "verlet"),
+        f"Of fixed steps there is {_PAIR.format('sl.RK4(step)')}"),
+    **dict.fromkeys(("odeset", "odeget", "options"), _STEPS),
+    **dict.fromkeys(("deval", "odextend", "odeextend"),
+        "Write samples= for more samples a period; run.x.interp(time=...) reads between them."),
+    **dict.fromkeys(("args", "par", "pars", "param", "params", "parameter", "parameters"),
+        "Parameters stand after the * of the equation; other values are "
+        "system.with_values(name=...) or values=."),
+    **dict.fromkeys(("model", "ode", "odesystem", "odeproblem", "symbols", "var", "fun"),
+        _EQUATION),
+    **dict.fromkeys(("linspace", "logspace", "geomspace", "array", "zeros"),
+        "It is NumPy's. A range is a tuple here: (first, last, number)."),
+    **dict.fromkeys(("topandas", "todataframe", "dataframe"),
+        "Write sl.samples(run), sl.contacts(run) or sl.to_csv(run, path)."),
+    **dict.fromkeys(("animate", "animation", "movie"), _ANIMATED),
+    **dict.fromkeys(("fft", "psd", "periodogram", "welch"), "Write sl.spectrum(run)."),
+    **dict.fromkeys(("frf", "bode", "sweep", "resonance", "nonlinearfrf"),
+        "Write sl.frequency_response(system, (first, last, number))."),
+    **dict.fromkeys(("orbitdiagram", "bifurcation"),
+        "Write sl.bifurcation_diagram(system, {name: (low, high, number)})."),
+    **dict.fromkeys(("lyapunovspectrum", "lyapunovexponent", "lyapunovexponents", "ftle"),
+        "Write sl.lyapunov(system, start, periods=...)."),
+    **dict.fromkeys(("transmission", "transmissibilities"),
+        "Write sl.transmissibility(response, output, input)."),
+    **dict.fromkeys(("eigenvalues", "eig", "modes", "modal", "modeshapes", "eigenmodes"), _SHAPES),
+    **dict.fromkeys(("base", "baseexcitation"),
+        "Of a structure give the forces of a moving base, -mass @ direction * acceleration, by "
+        "sl.Force; of an equation write the acceleration into it."),
+    **dict.fromkeys(("sensor", "output", "outputs", "observer"),
+        "Outputs are formulas: outputs={name: lambda x: ...} of sl.frequency_response and "
+        "sl.bifurcation_diagram; of a run compute them from its states, such as 1e3*run.x."),
+    **dict.fromkeys(("fixedpoint", "fixedpoints", "steadystate"),
+        "Write sl.equilibria(system), or sl.periodic_orbits(system, start) for points of the map."),
+    **dict.fromkeys(("limitcycle", "limitcycles", "shooting", "floquet", "monodromy"),
+        "Write sl.periodic_orbits(system, start), or sl.branches(system, {name: (low, high)}); "
+        "both give the Floquet multipliers."),
+    "stability": "Attractors, orbits and branches hold their multipliers; sl.lyapunov gives "
+        "exponents.",
+    "cellmapping": "Write sl.basins(system, x=(low, high, number), v=(low, high, number)).",
+    **dict.fromkeys(("boucwen", "hysteresis", "jenkins", "iwan", "play"),
+        "Write its state as one more state of the equation, and its rate by sl.piecewise."),
+    **dict.fromkeys(("coulomb", "stribeck", "dryfriction"),
+        "Write sl.friction(v, slip=..., stick=...)."),
+    **dict.fromkeys(("gap", "stop", "spring", "backlash", "deadzone", "deadband"),
+        "Write sl.freeplay(x, stiffness=..., gap=...), or sl.impact(x < gap, v, restitution=0.8) "
+        "for a rigid stop."),
+    **dict.fromkeys(("saturation", "saturate"), "Write sl.clip(x, low, high)."),
+    "relay": "Write sl.sign(x); with hysteresis a state of -1 and 1 and sl.jump.",
+    **dict.fromkeys(("dirac", "impulse", "delta", "shock"),
+        "Write sl.pulse(t, duration, shape='half_sine'), or give the start its velocity."),
+    **dict.fromkeys(("integral", "cumtrapz"),
+        "Make it a state, whose rate is what is integrated."),
+    **dict.fromkeys(("diff", "derivative", "ddt", "der", "gradient"),
+        "A rate is what the function returns: return v for dx/dt."),
+    **dict.fromkeys(("ifelse", "cond", "select", "when"),
+        "Write sl.where(x > gap, value, other) or sl.piecewise((value, x > gap), ..., "
+        "otherwise=...)."),
+    "version": "Write sl.__version__, or saltus doctor in a terminal.",
+    **dict.fromkeys(("show", "plt", "figure"),
+        "Pictures are in sl.plot, such as sl.plot.phase(run); the caller shows or saves them."),
+    **dict.fromkeys(("attractor", "findattractors"), "Write sl.attractors(system, starts)."),
+    **dict.fromkeys(("dde", "delays", "history"),
+        "There are no delays: a rate depends on the states at the time t only. A picture over "
+        "time is sl.plot.history(run)."),
+}  # fmt: skip
+
+#: Pictures that are called otherwise here, in small letters and without _.
+_PICTURES: dict[str, str] = {
+    **dict.fromkeys(("animate", "animation", "movie"), _ANIMATED),
+    **dict.fromkeys(("plot", "timehistory", "timeseries", "time", "displacement", "waveform"),
+        "Write sl.plot.history(run)."),
+    **dict.fromkeys(("phaseportrait", "phaseplane", "trajectory", "orbit"),
+        "Write sl.plot.phase(run)."),
+    **dict.fromkeys(("frf", "bode", "resonance", "response", "sweep"),
+        "Write sl.plot.frequency_response(response)."),
+    **dict.fromkeys(("poincare", "poincaresection", "stroboscope"),
+        "Write sl.plot.section(points)."),
+    **dict.fromkeys(("fft", "psd", "waterfall"), "Write sl.plot.spectrum(spectrum)."),
+    **dict.fromkeys(("lyapunov", "lyapunovexponents"), "Write sl.plot.exponents(exponents)."),
+    **dict.fromkeys(("orbitdiagram", "continuation"), "Write sl.plot.bifurcation_diagram(diagram) "
+        "or sl.plot.branches(branches)."),
+    **dict.fromkeys(("attractors", "map"), "Write sl.plot.basins(map) or sl.plot.gallery(found)."),
+    **dict.fromkeys(("show", "savefig", "figure"), "A picture gives its axes: "
+        "axes.figure.savefig(path), or matplotlib.pyplot.show()."),
+    **dict.fromkeys(("amplitude", "heatmap", "contour", "surface"), "Of two parameters "
+        "sl.plot.type_map(diagram) draws the kinds of motion, and diagram.peak.plot() the peaks."),
+}  # fmt: skip
+
+
+def _plain(name: str) -> str:
+    return name.lower().replace("_", "")
+
+
+def instead(name: str, known: list[str]) -> str:
+    """A sentence for a name that saltus hasn't, which has the names ``known``."""
+    advice = _ADVICE.get(_plain(name)) or ADVICE.get(name)
+    return advice or near(name, known, "dir(saltus) and docs/api.md list all.")
+
+
+def picture_instead(name: str, known: list[str]) -> str:
+    """The same for the name of a picture."""
+    return _PICTURES.get(_plain(name)) or nearest(name, known, _NEAR)
+
+
+def near(name: str, known: list[str], otherwise: str) -> str:
+    """The nearest of many names, or what to do if none is near."""
+    found = nearest(name, known, _NEAR)
+    return found if found.startswith("Did you mean") else otherwise
+
+
+#: Likeness from which on a name among many is a slip of the pen: 0.5 is "montecarlo", "poincare".
+_NEAR = 0.7
