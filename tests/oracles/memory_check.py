@@ -145,6 +145,7 @@ def main(arguments=None) -> int:
     signal.signal(signal.SIGALRM, _late)
     seeds = [given.seed] if "." in given.seed else [f"{given.seed}.{i}" for i in range(given.count)]
     count, began = collections.Counter(), time.process_time()
+    found = collections.defaultdict(list)
     for i, seed in enumerate(seeds):
         that, judged, ours = _one(seed, given.kind == "conditions")
         count[f"{ours.status}: {ours.verdict}"] += 1
@@ -152,10 +153,13 @@ def main(arguments=None) -> int:
             count["judges differ"] += 1
         if ours.verdict not in ("same", "undecidable") or judged.apart > 1.0:
             print(report(seed, that, judged, ours), flush=True)
+            found[f"{ours.status}: {ours.verdict}"].append((len(that.source), seed, that.name))
         if i % 50 == 49:
             print(
                 f"# {i + 1} systems, {time.process_time() - began:.0f} s: {dict(count)}", flush=True
             )
+    for what, those in found.items():
+        print(f"# {what}, shortest first: {[one[1:] for one in sorted(those)[:8]]}")
     print(f"# {len(seeds)} systems: {dict(count)}")
     return int(any(not name.endswith(("same", "undecidable")) for name in count))
 
