@@ -55,6 +55,8 @@ class Part:
         Text of jumps.
     port : Port or None
         What a further element may be attached to.
+    watched : str or None
+        The state that a jump watches: it begins below the level.
     """
 
     name: str
@@ -68,6 +70,7 @@ class Part:
     pushes: list[str] = field(default_factory=list)
     laws: list[str] = field(default_factory=list)
     port: Port | None = None
+    watched: str | None = None
 
 
 def text(form: Form, names: dict[str, str] | None = None) -> str:
@@ -376,6 +379,7 @@ def latch(rng: Random, m: str, port: Port, pushed: str | None) -> Part:
         states={m: 0.0},
         texts={m: "0.0"},
         pushes=[f"- {force}*{m}"] if pushed else [],
+        watched=next(iter(port.x)),
         laws=[f"sl.jump({port.x_text} > {a}, {m}=1)", f"sl.jump({port.x_text} < {b}, {m}=0)"],
     )
 

@@ -188,8 +188,8 @@ def random_case(rng: Random) -> Case:
     start = {name: rng.choice((0.0, _number(rng, -0.8, 0.8))) for name in rates}
     for part in parts:
         start |= part.states
-        if part.name == "latch" and "x" in start:
-            start["x"] = min(start["x"], 0.0)  # what a jump has missed isn't said by an equation
+        if part.watched:  # what a jump has missed isn't said by an equation
+            start[part.watched] = min(start[part.watched], 0.0)
     return Case(
         f"{host.name}: {', '.join(part.name for part in parts)}",
         " ".join(start),
