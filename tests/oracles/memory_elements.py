@@ -55,6 +55,8 @@ class Part:
         Text of jumps.
     port : Port or None
         What a further element may be attached to.
+    watched : str or None
+        The state that a jump watches: it begins below the level.
     """
 
     name: str
@@ -68,6 +70,7 @@ class Part:
     pushes: list[str] = field(default_factory=list)
     laws: list[str] = field(default_factory=list)
     port: Port | None = None
+    watched: str | None = None
 
 
 def text(form: Form, names: dict[str, str] | None = None) -> str:
@@ -304,10 +307,18 @@ def integrator(rng: Random, z: str, port: Port, pushed: str | None) -> Part:
     high = (reaches(rng, z, repr(limit)), positive(rng, port.x_text))
     low = (reaches(rng, f"-{z}", repr(limit)), negative(rng, port.x_text))
     forces = {pushed: {z: -k}} if pushed else {}
+    rates = {"free": {z: error}, "high": {z: {}}, "low": {z: {}}}
+    states = {z: rng.choice((0.0, limit, _number(rng, -limit, limit)))}
+    texts = {z: chosen(rng, [("0.0", high), ("0.0", low)], e)}
+    if rng.random() < 0.3:  # the time at the upper limit is counted
+        q = f"{z}t"
+        states[q], texts[q] = 0.0, f"sl.piecewise((1.0, {z} >= {limit}), otherwise=0.0)"
+        for mode, rate in rates.items():
+            rate[q] = ONE if mode == "high" else {}
     return Part(
         "integrator",
         "free",
-        {"free": {z: error}, "high": {z: {}}, "low": {z: {}}},
+        rates,
         {
             "free": (
                 Exit(({z: 1.0, "1": -limit}, error), "high", snap={z: {"1": limit}}),
@@ -317,8 +328,8 @@ def integrator(rng: Random, z: str, port: Port, pushed: str | None) -> Part:
             "low": (Exit((error,), "free"),),
         },
         dict.fromkeys(("free", "high", "low"), forces),
-        states={z: rng.choice((0.0, limit, _number(rng, -limit, limit)))},
-        texts={z: chosen(rng, [("0.0", high), ("0.0", low)], e)},
+        states=states,
+        texts=texts,
         pushes=[f"- {k}*{z}"] if pushed else [],
     )
 
@@ -368,6 +379,7 @@ def latch(rng: Random, m: str, port: Port, pushed: str | None) -> Part:
         states={m: 0.0},
         texts={m: "0.0"},
         pushes=[f"- {force}*{m}"] if pushed else [],
+        watched=next(iter(port.x)),
         laws=[f"sl.jump({port.x_text} > {a}, {m}=1)", f"sl.jump({port.x_text} < {b}, {m}=0)"],
     )
 

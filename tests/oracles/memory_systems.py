@@ -7,7 +7,7 @@ motion and cease to be surfaces: RK4 alone judges them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from random import Random
 
 import numpy as np
@@ -112,6 +112,13 @@ def _first_order(rng):
     return _Host("first order", {"x": rate}, {"x": text(rate, _DRIVE)}, [port], "x", w, [])
 
 
+def _by_speed(rng):
+    """An oscillator whose elements follow its speed: their rates hold its acceleration."""
+    host = _oscillator(rng)
+    port = Port({"v": 1.0}, {"d:v": 1.0}, "v", "r")
+    return replace(host, name="speed of an oscillator", ports=[port])
+
+
 def _prescribed(rng):
     w, a, b = _number(rng, 0.4, 2.5), _number(rng, 0.5, 1.5), _number(rng, -0.2, 0.2)
     x, v = {"sin": a, "1": b}, {"cos": a * w}
@@ -133,6 +140,8 @@ def _two_masses(rng):
 def _kind(rng, host, room):
     """An element that the host can bear, or None."""
     others = {"v": elements.OTHERS, "x": (elements.stop,), None: ()}[host.pushed]
+    if host.name.startswith("speed"):
+        others = (elements.stop,)
     kinds = elements.MEMORIES if room and (not others or rng.random() < 0.75) else others
     kind = rng.choice(kinds) if kinds else None
     return elements.play if kind is elements.jenkins and not host.pushed else kind
@@ -165,7 +174,9 @@ def random_case(rng: Random) -> Case:
     kind = rng.random()
     if kind < 0.06:
         return random_drift(rng, jumps=kind < 0.03)
-    host = rng.choice((_oscillator,) * 3 + (_first_order, _prescribed, _two_masses))(rng)
+    if kind < 0.1:
+        return random_held(rng)
+    host = rng.choice((_oscillator,) * 3 + (_first_order, _prescribed, _two_masses, _by_speed))(rng)
     parts = _parts(rng, host)
     while not parts:
         parts = _parts(rng, host)
@@ -177,8 +188,8 @@ def random_case(rng: Random) -> Case:
     start = {name: rng.choice((0.0, _number(rng, -0.8, 0.8))) for name in rates}
     for part in parts:
         start |= part.states
-        if part.name == "latch" and "x" in start:
-            start["x"] = min(start["x"], 0.0)  # what a jump has missed isn't said by an equation
+        if part.watched:  # what a jump has missed isn't said by an equation
+            start[part.watched] = min(start[part.watched], 0.0)
     return Case(
         f"{host.name}: {', '.join(part.name for part in parts)}",
         " ".join(start),
@@ -192,9 +203,9 @@ def random_case(rng: Random) -> Case:
 def _source(host, rates, parts):
     """The equation as text."""
     lines = [f"w = {host.frequency}", *host.lines]
-    if host.name == "first order":
-        lines.append(f"r = {rates['x']}")
-        rates = {"x": "r"}
+    if host.ports[0].v_text == "r":
+        lines.append(f"r = {rates[host.pushed]}")
+        rates = rates | {host.pushed: "r"}
     own = {name: line for part in parts for name, line in part.texts.items()}
     lines += [f"d{name} = {line}" for name, line in own.items()]
     returned = [*rates.values(), *(f"d{name}" for name in own)]
@@ -202,6 +213,34 @@ def _source(host, rates, parts):
     body = "".join(f"    {line}\n" for line in lines)
     ends = "".join(f"        {line},\n" for line in returned)
     return f"def equation(t, {', '.join((*rates, *own))}):\n{body}    return (\n{ends}    )\n"
+
+
+def random_held(rng: Random) -> Case:
+    """x is held at a stop while c pushes on; y counts the time at the stop, as a state of its own.
+    c turns by itself, and x may leave in any order of its derivatives.
+    """
+    w, amplitude, leak = _number(rng, 0.4, 2.5), _number(rng, 0.5, 2.0), _number(rng, 0.0, 0.5)
+    stop, mean = _number(rng, -0.2, 0.5), _number(rng, -0.2, 0.2)
+    rate: Form = {"cos": amplitude, "c": -leak, "1": mean}
+    held = f"{rng.choice(('x >= ', 'x > '))}{stop}"
+    push = rng.choice((f"({held}) & (c > 0)", f"(c > 0) & ({held})", f"~((x < {stop}) | (c <= 0))"))
+    source = f"""def equation(t, x, c, y):
+    w = {w}
+    rate = sl.piecewise((0.0, {push}), otherwise=c)
+    return rate, {text(rate, _DRIVE)}, sl.piecewise((1.0, x >= {stop}), otherwise=0.0)
+"""
+    c, place = {"c": 1.0}, {"x": {"1": stop}}
+    contact = Part(
+        "held",
+        "free",
+        {"free": {"x": c, "y": {}}, "held": {"x": {}, "y": {"1": 1.0}}},
+        {
+            "free": (Exit(({"x": 1.0, "1": -stop}, c), "held", snap=place),),
+            "held": (Exit((times(-1, c),), "free"),),
+        },
+    )
+    start = (_number(rng, -1.0, -0.3), _number(rng, -0.5, 1.0), 0.0)
+    return Case("held", "x c y", source, start, 20.0, Automaton({"c": rate}, [contact], w))
 
 
 def random_drift(rng: Random, jumps: bool) -> Case:

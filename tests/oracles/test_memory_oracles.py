@@ -43,7 +43,7 @@ def test_the_drifting_oscillator_is_met_where_other_solvers_meet_it():
     assert np.round(found[:5], 6).tolist() == [0.316238, 5.800793, 6.970981, 11.719788, 15.397322]
 
 
-@pytest.mark.parametrize("seed", [f"3.{i}" for i in range(20)])
+@pytest.mark.parametrize("seed", [f"3.{i}" for i in range(12)])
 def test_machines_and_rk4_agree(seed):
     assert memory_check.judge(memory_check.case(seed)).apart < 1.0
 
