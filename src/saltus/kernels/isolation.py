@@ -155,13 +155,13 @@ def is_rounding(q, degree, noise):
 
 
 @kernel
-def side_of_leaving(q, degree, noise):
-    """Sign of ``x * q(x)`` where it can first be told from zero on [0, 1] (0: nowhere). Leading terms
-    of the other sign are rounding, and made zero.
+def side_of_leaving(q, degree, shifted, noise):
+    """Sign of a gap, q(x) or ``x * q(x)`` if it is shifted, where it can first be told from zero on
+    [0, 1] (0: nowhere). Leading terms of the other sign are rounding, and made zero.
     """
     side, x = 0, 2.0**-DEEPEST
     while side == 0 and x <= 1.0:
-        value = x * polynomial(q, degree, x)
+        value = polynomial(q, degree, x) * (x if shifted else 1.0)
         if abs(value) > noise:
             side = 1 if value > 0.0 else -1
         x *= 2.0

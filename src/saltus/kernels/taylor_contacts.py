@@ -92,7 +92,9 @@ def first_place(lanes, lane, g, h, slow, count):
     if fresh and is_rounding(slow.q, ORDER, noise):
         sign = 0
     elif lanes.fresh[g, lane] == RIDDEN:  # nothing leaves it by rounding
-        sign = side_of_leaving(slow.q, ORDER, noise)
+        sign = side_of_leaving(slow.q, ORDER, True, noise)
+    elif not fresh and sign < 0 and slow.q[0] > -noise:  # it may have turned about at the node
+        sign = 1 if side_of_leaving(slow.q, ORDER, False, noise) > 0 else -1
     if sign == 0:
         lanes.memo[lane, RESTS] |= 1 << g  # it is ridden
         return 2.0 * h, count
@@ -461,8 +463,9 @@ def land(lanes, lane, batch, g, rate, slow):
     record. A boundary on which the state stood is left because it came to another.
     """
     before, crossed = mode_of(lanes, lane), g
-    if lanes.found[DELTA, lane] == 0.0 and lanes.fresh[g, lane] > 0.5 and lanes.run[CAUSE, lane] >= 0.0:
-        crossed = int(lanes.run[CAUSE, lane])
+    if lanes.found[DELTA, lane] == 0.0 and lanes.fresh[g, lane] > 0.5:
+        if lanes.run[CAUSE, lane] >= 0.0 or lanes.fresh[g, lane] == RIDDEN:
+            crossed = int(lanes.run[CAUSE, lane])
     snap(lanes, lane, g)
     change_side(lanes, lane, batch, g, rate, before, crossed, slow)
 

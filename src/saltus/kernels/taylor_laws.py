@@ -270,7 +270,8 @@ def caught(lanes, lane, batch, g, slow):
     snap(lanes, lane, g)
     gaps_here(lanes, lane, batch, slow)
     if slow.gaps[NGUARDS + g] == 0.0 and slow.gaps[2 * NGUARDS + g] == 0.0:
-        return holds_any(lanes, lane)  # another contact holds what this one could
+        # another contact may hold what this one could
+        return lanes.fresh[g, lane] != RIDDEN and holds_any(lanes, lane)
     if slow.gaps[2 * NGUARDS + g] < 0.0 and slow.gaps[PARTNER[g]] > 0.0:
         hold(lanes, lane, batch, g, 0.0, slow)
         return True
