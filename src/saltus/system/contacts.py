@@ -24,6 +24,7 @@ from saltus.system.guards import (
     relations,
 )
 from saltus.system.reduction import Elimination, Held, dot, held_contact, hold_gap, with_pivots
+from saltus.system.roots import with_root
 from saltus.system.singular import assuming, check_finite, check_gaps, lifted
 from saltus.system.surfaces import (
     OnSurface,
@@ -427,7 +428,8 @@ def _check_velocity(met: _Met, guard: Guard, field: Field, states: Sequence[str]
             f"{met.law!r}: the place of the stop holds a clock (sl.mod, sl.table, or a comparison "
             f"of time), so it may jump. Write a stop that moves with functions such as sl.cos."
         )
-    rate = ex.add(dot(gradient(guard.gap, states), field), time_derivative(guard.gap))
+    gap = with_root(guard.gap)
+    rate = ex.add(dot(gradient(gap, states), field), time_derivative(gap))
     closing = ex.neg(rate) if met.positive else rate
     canonical = Canonical()
     sign = proportion(canonical.polynomial(w), canonical.polynomial(closing))
