@@ -22,8 +22,8 @@ from saltus.system import clearance, cos, hypot, pi, piecewise, sin
 @model(
     states={"x": "m", "y": "m", "u": "m/s", "v": "m/s"},
     forced_at="speed",
-    source="F. Chu, Z. Zhang, Bifurcation and chaos in a rub-impact Jeffcott rotor system, J. Sound "
-    "Vib. 210(1), 1-18 (1998); own values.",
+    source="F. Chu, Z. Zhang, Bifurcation and chaos in a rub-impact Jeffcott rotor system, J. "
+    "Sound Vib. 210(1), 1-18 (1998); own values.",
 )
 def jeffcott_rotor(
     t, x, y, u, v, *, mass="2 kg", damping="60 N*s/m", stiffness="50 kN/m",

@@ -52,9 +52,9 @@ from saltus.system.tables import table
 from saltus.system.trace import system
 
 __all__ = [
-    "Contact", "Force", "Guard", "System", "abs", "acos", "asin", "atan", "atan2", "clearance", "clip", "cos",
-    "cosh", "exp", "flores", "freeplay", "friction", "heaviside", "hertz", "hunt_crossley", "hypot",
-    "impact", "jump", "lankarani_nikravesh", "log", "max",
+    "Contact", "Force", "Guard", "System", "abs", "acos", "asin", "atan", "atan2", "clearance",
+    "clip", "cos", "cosh", "exp", "flores", "freeplay", "friction", "heaviside", "hertz",
+    "hunt_crossley", "hypot", "impact", "jump", "lankarani_nikravesh", "log", "max",
     "min", "mod", "pi", "piecewise", "pulse", "recorded", "regularise", "sawtooth", "sign", "sin",
     "sinh", "sqrt", "square", "structure", "system", "table", "tan", "tanh", "where",
 ]  # fmt: skip
