@@ -24,7 +24,7 @@ from saltus.system.guards import (
     relations,
 )
 from saltus.system.reduction import Elimination, Held, dot, held_contact, hold_gap, with_pivots
-from saltus.system.roots import with_root
+from saltus.system.roots import with_root, zero_where_idle
 from saltus.system.singular import assuming, check_finite, check_gaps, lifted
 from saltus.system.surfaces import (
     OnSurface,
@@ -115,7 +115,7 @@ def find_contacts(
             levels[number] = (*levels.get(number, ()), *forces)
             if friction.limit is not None:
                 _add_limit(limits, number, limit, guards)
-    field = lifted(found[: len(rates)], guards)
+    field = lifted(zero_where_idle(found[: len(rates)]), guards)
     check_finite(field, guards, states)
     check_gaps(guards)
     return with_laws(field, guards, states, met, limits, levels)

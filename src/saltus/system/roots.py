@@ -8,7 +8,7 @@ signs of c and d are; the second has a series wherever u has one.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from saltus.system import expression as ex
 from saltus.system.expression import Expr
@@ -23,10 +23,16 @@ def without_root(gap: Expr) -> Expr:
 
     With numbers and parameters d it is ``(u - d*|d|)/(2*|d|)``, which differs from ``sqrt(u) - d``
     in the second order of the distance only: margins and speeds of contact stay what they were.
+    ``1 - d/sqrt(u)`` and ``(sqrt(u) - d)/sqrt(u)`` have the sign of ``sqrt(u) - d``.
     Any other gap is returned as it is: d may change its sign while a motion goes on.
     """
     if (inner := _within_factor(gap, without_root)) is not None:
         return inner
+    match gap.op, gap.args:  # a root is positive
+        case "div", (inner, Expr(op="sqrt")):
+            return without_root(inner)
+        case "sub", (c, Expr(op="div", args=(d, Expr(op="sqrt") as root))) if not ex.varies(c):
+            return without_root(ex.sub(ex.mul(c, root), d))
     roots, level = _split(gap)
     zero = level.op == "const" and level.payload == 0
     if len(roots) == 2 and zero:
@@ -35,9 +41,13 @@ def without_root(gap: Expr) -> Expr:
     if len(roots) != 1 or zero or ex.varies(level):
         return gap
     ((c, u),) = roots
-    if c.op == "const" and c.payload < 0:
-        return ex.neg(_regular(ex.neg(c), u, ex.neg(level)))
-    return _regular(c, u, level)
+    if c.op != "const":
+        return _regular(c, u, level)
+    one, size, positive = ex.constant(1.0), abs(c.payload), c.payload > 0
+    if not positive:
+        _, level = _split(gap, -1.0)
+    regular = ex.mul(size, _regular(one, u, ex.div(level, size)))
+    return regular if positive else ex.neg(regular)
 
 
 def with_root(gap: Expr) -> Expr:
@@ -57,6 +67,16 @@ def with_root(gap: Expr) -> Expr:
     if _regular(c, above, level) is not gap:
         return gap
     return ex.sub(ex.mul(c, ex.elementary("sqrt", above)), level)
+
+
+def root_name(root: Expr) -> str:
+    """A root as people write it, such as ``hypot(x, y)``."""
+    match root.args[0]:
+        case Expr(op="add", args=(Expr(op="mul", args=(a, b)), Expr(op="mul", args=(c, d)))) if (
+            a is b and c is d
+        ):
+            return f"hypot({a!r}, {c!r})"
+    return repr(root)
 
 
 def _within_factor(gap: Expr, change: Callable[[Expr], Expr]) -> Expr | None:
@@ -87,11 +107,11 @@ def _is_square(node: Expr) -> bool:
     return node.op == "mul" and node.args[1] is ex.absolute(node.args[0])
 
 
-def _split(gap: Expr) -> tuple[list[tuple[Expr, Expr]], Expr]:
-    """The terms ``c*sqrt(u)`` of a sum, as pairs (c, u), and minus the sum of all others."""
+def _split(gap: Expr, sign: float = 1.0) -> tuple[list[tuple[Expr, Expr]], Expr]:
+    """The terms ``c*sqrt(u)`` of a sum, or of minus it, as pairs (c, u), and minus all others."""
     roots: list[tuple[Expr, Expr]] = []
     level: Expr = ex.constant(0.0)
-    stack = [(gap, 1.0)]
+    stack = [(gap, sign)]
     while stack:
         node, sign = stack.pop()
         if node.op in ("add", "sub"):
@@ -120,3 +140,47 @@ def _root(node: Expr) -> tuple[Expr, Expr] | None:
         case "div", (inner, factor) if not ex.varies(factor) and (found := _root(inner)):
             return ex.div(found[0], factor), found[1]
     return None
+
+
+def zero_where_idle(field: Iterable[Expr]) -> tuple[Expr, ...]:
+    """The same field with products of a piece that is zero somewhere as pieces of products, if they
+    divide by a root: ``sl.max(r - gap, 0)*x/r`` is zero within the gap, at r = 0 too.
+    """
+    memo: dict[Expr, Expr] = {}
+    rooted, divided = set[Expr](), set[Expr]()  # nodes that hold roots, and quotients by such
+    roots = tuple(field)
+    for node in ex.walk(*roots):
+        if not rooted.isdisjoint(node.args) or (node.op == "sqrt" and ex.varies(node)):
+            rooted.add(node)
+        if not divided.isdisjoint(node.args) or (node.op == "div" and node.args[1] in rooted):
+            divided.add(node)
+        new = ex.rebuild(node, tuple(memo[child] for child in node.args), node.payload)
+        memo[node] = _spread(new) if node in divided and new.op in ("mul", "div") else new
+    return tuple(memo[root] for root in roots)
+
+
+def _spread(product: Expr) -> Expr:
+    """A product as a piece of products, if a factor of it is a piece that is zero somewhere."""
+    piece = _idle_factor(product)
+    if piece is None:
+        return product
+    branches = (_spread(ex.substituted(product, {piece: branch})) for branch in piece.args)
+    return ex.select(piece.payload, *branches)
+
+
+def _idle_factor(product: Expr) -> Expr | None:
+    """A piece that is zero somewhere among the factors of a product."""
+    stack = [product]
+    while stack:
+        node = stack.pop()
+        if node.op in ("mul", "div", "neg"):
+            stack += node.args if node.op == "mul" else node.args[:1]
+        elif node.op == "select" and _is_zero_somewhere(node):
+            return node
+    return None
+
+
+def _is_zero_somewhere(node: Expr) -> bool:
+    if node.op == "select":
+        return any(map(_is_zero_somewhere, node.args))
+    return node.op == "const" and node.payload == 0

@@ -43,8 +43,9 @@ def clearance(
         Velocity at which the rotor's surface slides over the stator, positive from x to y [m/s]:
         the friction has its sign. Default 1: a rotor that turns from x to y so fast that the slip
         never reverses, as the literature has it; -1 for one that turns the other way. Of a slow
-        rotor it is ``spin*radius + (x*v - y*u)/r`` with the velocity (u, v) of its centre and
-        ``r = gap`` or ``sl.hypot(x, y)``; where that is zero the rotor may stick, and roll.
+        rotor it is ``spin*radius + (x*v - y*u)/gap``, with the velocity (u, v) of its centre; where
+        that is zero the rotor may stick, and roll. (Divided by ``sl.hypot(x, y)`` in place of the
+        gap it isn't a number at rest.)
 
     Returns
     -------
