@@ -20,7 +20,9 @@ from saltus.system.quantity import quantity
 
 #: What the sums of a balance may lose: some hundred roundings of the largest part.
 ROUNDING = 1e-13
-SCALES = {"delangre": 1e-3, "chain": 2e-3, "gear_pair": 4e-5, "aeroelastic": 0.03}
+SCALES = {
+    "delangre": 1e-3, "chain": 2e-3, "gear_pair": 4e-5, "aeroelastic": 0.03, "jeffcott_rotor": 4e-4
+}  # fmt: skip
 
 
 # -- the published models --------------------------------------------------------------------------

@@ -13,6 +13,8 @@ from saltus.analysis.starts import Span
 from saltus.errors import SaltusWarning
 from saltus.kernels import status as st
 from saltus.system.evaluate import evaluate, sides
+from saltus.system.expression import varies, walk
+from saltus.system.roots import root_name
 from saltus.system.system import System
 from saltus.units import from_si
 
@@ -86,6 +88,8 @@ def messages(run: xr.Dataset, asked: Span | None = None, system: System | None =
             if code == st.BUDGET_STEPS and asked is not None:
                 stuck = "" if system is None else _singular(run, asked, int(here[0]), system)
                 advice = stuck or f"{_outlook(run, asked, int(here[0]))} {advice}"
+            if code == st.NONFINITE and system is not None:
+                advice = _root(run, int(here[0]), system) or advice
             if code == st.NONFINITE and run.attrs.get("method", "Taylor") != "Taylor":
                 advice += _BELOW_A_ROOT.format(method=run.attrs["method"])
             if code == st.INVALID and _is_finite(run, int(here[0]), system):
@@ -135,15 +139,7 @@ def _singular(run: xr.Dataset, asked: Span, index: int, system: System) -> str:
     """That no number of steps leads on, if the equations change far faster where a trajectory
     stands than the rest of its time is long.
     """
-    place = run.isel(trajectory=index) if "trajectory" in run.dims else run
-    values = {
-        name: place[name].item() if name in place.variables else value
-        for name, value in system.values.items()
-    }
-    time, state = (
-        place["end_time"].item(),
-        {name: place[f"end_{name}"].item() for name in system.states},
-    )
+    place, time, state, values = _end(run, index, system)
     rest = asked.t_start + asked.count[index] * asked.period[index] + asked.phase[index] - time
     bits = sides(system, time, list(state.values()), values)
     entries = evaluate(
@@ -166,6 +162,47 @@ def _singular(run: xr.Dataset, asked: Span, index: int, system: System) -> str:
         "before it, as "
         "sl.piecewise((-c*sl.sqrt(h), h > 1e-9), otherwise=0.0) does."
     )
+
+
+def _root(run: xr.Dataset, index: int, system: System) -> str:
+    """That a root of the equations is zero where a trajectory stands, and what to write instead."""
+    _, time, state, values = _end(run, index, system)
+    gaps = set(walk(*(guard.gap for guard in system.guards)))
+    roots = [node for node in walk(*gaps, *system.field) if node.op == "sqrt" and varies(node)]
+    bits = sides(system, time, list(state.values()), values)
+    sizes = evaluate(roots, t=time, states=state, values=values, bits=bits)
+    zero = [root for root, size in zip(roots, sizes, strict=True) if size == 0]
+    if not zero:
+        return ""
+    compared = [root for root in zero if root in gaps]
+    root, *_ = compared or zero
+    found = f"{root_name(root)} is 0 there, where it has no derivative"
+    if not compared:
+        return (
+            f"{found}, and nothing can be divided by it. Divide only where it is greater than 0, "
+            f"as in sl.piecewise((k*(r - d)/r, r > d), otherwise=0) or sl.clearance(x, y, ...), or "
+            f"add a small number under the root."
+        )
+    if any(node.op == "div" and root in set(walk(node.args[1])) for node in gaps):
+        return (
+            f"{found}, and a comparison divides by it, which is asked outside of its piece, too. "
+            f"Divide by the gap in its place, or start a little beside."
+        )
+    return (
+        f"{found}, and a comparison holds it. Compare squares, which have one: write "
+        f"{root.args[0]!r} > d**2 in place of {root_name(root)} > d."
+    )
+
+
+def _end(run: xr.Dataset, index: int, system: System) -> tuple[xr.Dataset, float, dict, dict]:
+    """A trajectory, the time and state at its end, and its parameters."""
+    place = run.isel(trajectory=index) if "trajectory" in run.dims else run
+    values = {
+        name: place[name].item() if name in place.variables else value
+        for name, value in system.values.items()
+    }
+    state = {name: place[f"end_{name}"].item() for name in system.states}
+    return place, place["end_time"].item(), state, values
 
 
 def _duration(seconds: float) -> str:

@@ -30,6 +30,7 @@ from saltus.models.falling_ball import falling_ball
 from saltus.models.gear_pair import gear_pair
 from saltus.models.hertz_stop import hertz_stop
 from saltus.models.impact_oscillator import impact_oscillator
+from saltus.models.jeffcott_rotor import jeffcott_rotor
 from saltus.models.one_sided_spring import one_sided_spring
 from saltus.models.painleve_rod import painleve_rod
 from saltus.models.pulled_pair import pulled_pair
@@ -53,6 +54,7 @@ MODELS: dict[str, Callable[..., System]] = {
         chain,
         gear_pair,
         aeroelastic,
+        jeffcott_rotor,
         bilinear_rig,
         soft_stop,
         one_sided_spring,
@@ -169,6 +171,7 @@ __all__ = [
     "has_energy",
     "hertz_stop",
     "impact_oscillator",
+    "jeffcott_rotor",
     "one_sided_spring",
     "painleve_rod",
     "pulled_pair",

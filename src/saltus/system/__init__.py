@@ -45,15 +45,16 @@ from saltus.system.guards import Guard
 from saltus.system.inputs import pulse, recorded, sawtooth, square
 from saltus.system.laws import flores, freeplay, hertz, hunt_crossley, lankarani_nikravesh
 from saltus.system.regularisation import regularise
+from saltus.system.rotors import clearance
 from saltus.system.structures import Contact, Force, structure
 from saltus.system.system import System
 from saltus.system.tables import table
 from saltus.system.trace import system
 
 __all__ = [
-    "Contact", "Force", "Guard", "System", "abs", "acos", "asin", "atan", "atan2", "clip", "cos",
-    "cosh", "exp", "flores", "freeplay", "friction", "heaviside", "hertz", "hunt_crossley", "hypot",
-    "impact", "jump", "lankarani_nikravesh", "log", "max",
+    "Contact", "Force", "Guard", "System", "abs", "acos", "asin", "atan", "atan2", "clearance",
+    "clip", "cos", "cosh", "exp", "flores", "freeplay", "friction", "heaviside", "hertz",
+    "hunt_crossley", "hypot", "impact", "jump", "lankarani_nikravesh", "log", "max",
     "min", "mod", "pi", "piecewise", "pulse", "recorded", "regularise", "sawtooth", "sign", "sin",
     "sinh", "sqrt", "square", "structure", "system", "table", "tan", "tanh", "where",
 ]  # fmt: skip

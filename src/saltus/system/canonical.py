@@ -10,6 +10,7 @@ from __future__ import annotations
 from fractions import Fraction
 
 from saltus.system.expression import Expr, walk
+from saltus.system.roots import with_root
 
 #: A monomial: atoms, by number, with their exponents.
 Monomial = frozenset[tuple[int, int]]
@@ -63,6 +64,8 @@ class Canonical:
 
     # -- one node ----------------------------------------------------------------------------------
     def _normal(self, node: Expr) -> Polynomial:
+        if (rooted := with_root(node)) is not node:
+            return self.polynomial(rooted)
         parts = [self._memo[child] for child in node.args]
         match node.op:
             case "const":

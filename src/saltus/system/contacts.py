@@ -24,6 +24,7 @@ from saltus.system.guards import (
     relations,
 )
 from saltus.system.reduction import Elimination, Held, dot, held_contact, hold_gap, with_pivots
+from saltus.system.roots import with_root, zero_where_idle
 from saltus.system.singular import assuming, check_finite, check_gaps, lifted
 from saltus.system.surfaces import (
     OnSurface,
@@ -114,7 +115,7 @@ def find_contacts(
             levels[number] = (*levels.get(number, ()), *forces)
             if friction.limit is not None:
                 _add_limit(limits, number, limit, guards)
-    field = lifted(found[: len(rates)], guards)
+    field = lifted(zero_where_idle(found[: len(rates)]), guards)
     check_finite(field, guards, states)
     check_gaps(guards)
     return with_laws(field, guards, states, met, limits, levels)
@@ -458,7 +459,8 @@ def _check_velocity(met: _Met, guard: Guard, field: Field, states: Sequence[str]
             f"{met.law!r}: the place of the stop holds a clock (sl.mod, sl.table, or a comparison "
             f"of time), so it may jump. Write a stop that moves with functions such as sl.cos."
         )
-    rate = ex.add(dot(gradient(guard.gap, states), field), time_derivative(guard.gap))
+    gap = with_root(guard.gap)
+    rate = ex.add(dot(gradient(gap, states), field), time_derivative(gap))
     closing = ex.neg(rate) if met.positive else rate
     canonical = Canonical()
     sign = proportion(canonical.polynomial(w), canonical.polynomial(closing))

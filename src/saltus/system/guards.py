@@ -18,6 +18,7 @@ from saltus.system import expression as ex
 from saltus.system.canonical import ONE, Canonical, Polynomial, is_multiple, proportion
 from saltus.system.clocks import of_time_only, switch
 from saltus.system.expression import And, Bit, Condition, Expr, Not, Or, Relation
+from saltus.system.roots import without_root
 from saltus.system.text import Writer
 
 
@@ -118,7 +119,7 @@ class Guard:
         boundary.
     gap : Expr
         Distance from the boundary, signed. It may hold bits of guards earlier in the list (``abs(x)
-        - gap``).
+        - gap``). A distance that holds a root is there as :func:`without_root` makes it.
     state : str or None
         The state that the boundary is a level of: ``gap = state - boundary``. None for any other
         boundary.
@@ -183,15 +184,15 @@ def join_guards(
 
 
 def surface_guard(gap: Expr, name: str) -> Guard:
-    """The guard of a surface: its gap is the expression as it stands, sign and scale included;
-    conditions in it hold bits.
+    """The guard of a surface: its gap is the expression as it stands, sign and scale included, but
+    for a root (:func:`without_root`); conditions in it hold bits.
 
     Raises
     ------
     TraceError
         If the expression doesn't depend on a state.
     """
-    canonical = Canonical()
+    canonical, gap = Canonical(), without_root(gap)
     _check_moves(gap, canonical.kinds(canonical.polynomial(gap)))
     level, positive = _guard(gap, canonical)
     return replace(
@@ -266,6 +267,7 @@ class _Finder:
         if of_time_only(gap) and not bits_in([gap]):
             self.outcome[relation] = switch(gap)
             return
+        gap = without_root(gap)
         polynomial = self._canonical.polynomial(gap)
         if polynomial.keys() <= {ONE}:
             if not polynomial:

@@ -14,6 +14,7 @@ from collections.abc import Iterable, Sequence
 from typing import Protocol
 
 from saltus.system.expression import And, Bit, Condition, Expr, Not, Or, Relation, operands, walk
+from saltus.system.roots import with_root
 
 _ATOM, _POWER, _NEGATIVE, _PRODUCT, _SUM = 5, 4, 3, 2, 1
 _INFIX = {
@@ -248,6 +249,7 @@ class Writer:
         return self._compare(guard.gap, True), self._compare(guard.gap, False)
 
     def _compare(self, gap: Expr, positive: bool) -> str:
+        gap = with_root(gap)
         left, right = gap.args if gap.op == "sub" else (gap, None)
         return (
             self.text(left)

@@ -57,3 +57,34 @@ def test_a_law_that_ends_before_is_no_longer_singular():
     (text,) = messages(stopped(1e-10, 2.0), asked, drained)
     assert "Raise max_steps" in text
     assert np.all(drained.rhs(0.0, [1e-10]) == 0.0)
+
+
+# -- roots that are zero ---------------------------------------------------------------------------
+def at_rest(force):
+    """What is said of a motion that ended where x = y = 0."""
+
+    def rates(t, x, y, *, d=0.5):
+        return force(x, y, d), 0.0
+
+    system = sl.system(states="x y")(rates)
+    end = {f"end_{name}": xr.Variable((), 0.0, {"units": ""}) for name in "xy"}
+    run = xr.Dataset({"status": "nonfinite", "end_time": 0.0, **end}, attrs={"states": "x y"})
+    (text,) = messages(run, None, system)
+    return text
+
+
+def test_a_root_of_zero_is_named_with_what_to_write():
+    divided = at_rest(lambda x, y, d: d * x / sl.hypot(x, y))
+    assert "hypot(x, y) is 0 there" in divided
+    assert "sl.clearance(x, y, ...)" in divided
+    varying = at_rest(lambda x, y, d: sl.piecewise((1, sl.hypot(x, y) > d + x), otherwise=0))
+    assert "write x*x + y*y > d**2 in place of hypot(x, y) > d." in varying
+    quotient = at_rest(lambda x, y, d: sl.piecewise((1, x / sl.hypot(x, y) > y - d), otherwise=0))
+    assert "a comparison divides by it" in quotient
+    assert "sqrt(x*x + y*y + d*x) is 0" in at_rest(
+        lambda x, y, d: 1 / sl.sqrt(x * x + y * y + d * x)
+    )
+
+
+def test_where_no_root_is_zero_the_range_of_numbers_is_told():
+    assert "left the range of numbers" in at_rest(lambda x, y, d: d / (x * x + y * y))
