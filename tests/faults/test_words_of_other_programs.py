@@ -120,12 +120,13 @@ def test_pictures_that_saltus_has_not(name, words):
 def test_what_is_advised_exists():
     """No sentence names a function of saltus that isn't there."""
     from saltus.analysis import verb
+    from saltus.plot import elsewhere as pictures
     from saltus.system import elsewhere, foreign
     from saltus.system.structures import parts
 
     structure = importlib.import_module("saltus.system.structures.structure")
     told = itertools.chain(
-        elsewhere._ADVICE.values(), elsewhere._PICTURES.values(), foreign.ADVICE.values(),
+        elsewhere._ADVICE.values(), pictures._PICTURES.values(), foreign.ADVICE.values(),
         verb._MISSING.values(), verb._ELSEWHERE.values(), parts._ELSEWHERE.values(),
         structure._ELSEWHERE.values(),
     )  # fmt: skip

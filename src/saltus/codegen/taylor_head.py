@@ -34,9 +34,10 @@ def gaps_function(system: System, clocks: Clocks) -> str:
     clocks hold.
 
     Whether a contact is held, and the side of a gap that is zero or on whose boundary the state is
-    known to stand (twice the side), are taken from out. Behind the gaps come, for a guard whose contact can be held, the rate at which its constraint is left
-    without its own force, what that force changes of it (of an impact, over what it changes without
-    friction), and the constraint itself.
+    known to stand (twice the side), are taken from out. Behind the gaps come, for a guard whose
+    contact can be held, the rate at which its constraint is left without its own force, what that
+    force changes of it (of an impact, over what it changes without friction), and the constraint
+    itself.
     """
     laws = any(guard.law for guard in system.guards)
     code = ScalarCode(
@@ -134,8 +135,8 @@ def _state_boundary(form: Linear) -> tuple[str, float, Expr] | None:
 
 def _gap_form(builder: SeriesBuilder, number: int, guard: Guard, gap: Expr) -> Linear:
     """The series of a gap. While the contact is held its gap stays zero, and a difference of states
-    and times would leave rounding in its place, whose series allows no step: there it is zero. So is
-    how far a contact that isn't held is from its release, where that may have poles.
+    and times would leave rounding in its place, whose series allows no step: there it is zero. So
+    is how far a contact that isn't held is from its release, where that may have poles.
     """
     form = builder.form(gap)
     if guard.law is None or guard.law.partner < 0:

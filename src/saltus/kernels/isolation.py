@@ -147,7 +147,7 @@ def leading_sign(q, degree):
 
 @kernel
 def is_rounding(q, degree, noise):
-    """Whether all terms together are within the noise: on [0, 1] the gap can't be told from zero."""
+    """Whether all terms together are noise: on [0, 1] the gap can't be told from zero."""
     total = 0.0
     for k in range(degree + 1):
         total += abs(q[k])

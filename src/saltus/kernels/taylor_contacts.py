@@ -19,7 +19,6 @@ from saltus.kernels.isolation import (
     polynomial,
     side_of_leaving,
 )
-from saltus.kernels.lanes import lowest_bit
 from saltus.kernels.status import (
     BUDGET_EVENTS,
     CROSSING,
@@ -463,9 +462,9 @@ def land(lanes, lane, batch, g, rate, slow):
     record. A boundary on which the state stood is left because it came to another.
     """
     before, crossed = mode_of(lanes, lane), g
-    if lanes.found[DELTA, lane] == 0.0 and lanes.fresh[g, lane] > 0.5:
-        if lanes.run[CAUSE, lane] >= 0.0 or lanes.fresh[g, lane] == RIDDEN:
-            crossed = int(lanes.run[CAUSE, lane])
+    stood = lanes.found[DELTA, lane] == 0.0 and lanes.fresh[g, lane] > 0.5
+    if stood and (lanes.run[CAUSE, lane] >= 0.0 or lanes.fresh[g, lane] == RIDDEN):
+        crossed = int(lanes.run[CAUSE, lane])
     snap(lanes, lane, g)
     change_side(lanes, lane, batch, g, rate, before, crossed, slow)
 

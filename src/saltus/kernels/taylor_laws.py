@@ -289,8 +289,9 @@ def holds_any(lanes, lane):
 
 @kernel
 def gives_way(lanes, lane, batch, slow):
-    """Let go of the surfaces that are held where nothing holds them any more, because the state came
-    to another boundary: the equations reduced by them are no numbers. Returns whether there is one.
+    """Let go of the surfaces that are held where nothing holds them any more, because the state
+    came to another boundary: the equations reduced by them are no numbers. Returns whether there is
+    one.
     """
     if lanes.memo[lane, BROKEN] == 0 or not holds_any(lanes, lane):
         return False
@@ -309,7 +310,7 @@ def gives_way(lanes, lane, batch, slow):
 
 @kernel
 def strays(lanes, lane, batch, slow):
-    """Whether a contact that is held isn't on its boundary: then its reduced equations are wrong."""
+    """Whether a contact that is held isn't on its boundary: its equations are wrong then."""
     if not holds_any(lanes, lane):
         return False
     gaps_here(lanes, lane, batch, slow)

@@ -11,6 +11,7 @@ from saltus.plot.basins import basins
 from saltus.plot.bifurcation import bifurcation_diagram
 from saltus.plot.bifurcation_curves import bifurcation_curves
 from saltus.plot.branches import branches
+from saltus.plot.elsewhere import picture_instead
 from saltus.plot.exponents import exponents
 from saltus.plot.frequency_response import frequency_response
 from saltus.plot.gallery import gallery
@@ -23,7 +24,6 @@ from saltus.plot.section import section
 from saltus.plot.spectrum import spectrum
 from saltus.plot.style import OKABE_ITO, style
 from saltus.plot.type_map import type_map
-from saltus.system.elsewhere import picture_instead
 
 __all__ = [
     "OKABE_ITO", "agreement", "backbone", "basins", "bifurcation_curves", "bifurcation_diagram",

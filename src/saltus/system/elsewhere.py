@@ -37,11 +37,6 @@ _MERGE = (
     "xarray.concat([a.x, b.x], dim) joins what they have in common."
 )
 _EQUATION = "Write the equation as a function, with @sl.system(states=...) above it."
-_ANIMATED = (
-    "There are no animations; matplotlib.animation.FuncAnimation can draw run.x and run.v, "
-    "the samples of a run."
-)
-
 #: What to write for a name, in small letters and without _.
 _ADVICE: dict[str, str] = {
     **dict.fromkeys(
@@ -84,7 +79,9 @@ _ADVICE: dict[str, str] = {
         "It is NumPy's. A range is a tuple here: (first, last, number)."),
     **dict.fromkeys(("topandas", "todataframe", "dataframe"),
         "Write sl.samples(run), sl.contacts(run) or sl.to_csv(run, path)."),
-    **dict.fromkeys(("animate", "animation", "movie"), _ANIMATED),
+    **dict.fromkeys(("animate", "animation", "movie"),
+        "There are no animations; matplotlib.animation.FuncAnimation can draw run.x and run.v, "
+        "the samples of a run."),
     **dict.fromkeys(("fft", "psd", "periodogram", "welch"), "Write sl.spectrum(run)."),
     **dict.fromkeys(("frf", "bode", "sweep", "resonance", "nonlinearfrf"),
         "Write sl.frequency_response(system, (first, last, number))."),
@@ -136,28 +133,6 @@ _ADVICE: dict[str, str] = {
         "time is sl.plot.history(run)."),
 }  # fmt: skip
 
-#: Pictures that are called otherwise here, in small letters and without _.
-_PICTURES: dict[str, str] = {
-    **dict.fromkeys(("animate", "animation", "movie"), _ANIMATED),
-    **dict.fromkeys(("plot", "timehistory", "timeseries", "time", "displacement", "waveform"),
-        "Write sl.plot.history(run)."),
-    **dict.fromkeys(("phaseportrait", "phaseplane", "trajectory", "orbit"),
-        "Write sl.plot.phase(run)."),
-    **dict.fromkeys(("frf", "bode", "resonance", "response", "sweep"),
-        "Write sl.plot.frequency_response(response)."),
-    **dict.fromkeys(("poincare", "poincaresection", "stroboscope"),
-        "Write sl.plot.section(points)."),
-    **dict.fromkeys(("fft", "psd", "waterfall"), "Write sl.plot.spectrum(spectrum)."),
-    **dict.fromkeys(("lyapunov", "lyapunovexponents"), "Write sl.plot.exponents(exponents)."),
-    **dict.fromkeys(("orbitdiagram", "continuation"), "Write sl.plot.bifurcation_diagram(diagram) "
-        "or sl.plot.branches(branches)."),
-    **dict.fromkeys(("attractors", "map"), "Write sl.plot.basins(map) or sl.plot.gallery(found)."),
-    **dict.fromkeys(("show", "savefig", "figure"), "A picture gives its axes: "
-        "axes.figure.savefig(path), or matplotlib.pyplot.show()."),
-    **dict.fromkeys(("amplitude", "heatmap", "contour", "surface"), "Of two parameters "
-        "sl.plot.type_map(diagram) draws the kinds of motion, and diagram.peak.plot() the peaks."),
-}  # fmt: skip
-
 
 def _plain(name: str) -> str:
     return name.lower().replace("_", "")
@@ -167,11 +142,6 @@ def instead(name: str, known: list[str]) -> str:
     """A sentence for a name that saltus hasn't, which has the names ``known``."""
     advice = _ADVICE.get(_plain(name)) or ADVICE.get(name)
     return advice or near(name, known, "dir(saltus) and docs/api.md list all.")
-
-
-def picture_instead(name: str, known: list[str]) -> str:
-    """The same for the name of a picture."""
-    return _PICTURES.get(_plain(name)) or nearest(name, known, _NEAR)
 
 
 def near(name: str, known: list[str], otherwise: str) -> str:

@@ -18,9 +18,9 @@ from pathlib import Path
 import pytest
 
 from saltus import cache
+from saltus.announce import silent
 from saltus.cache import entry
 from saltus.codegen import building, machine, templates
-from saltus.announce import silent
 from saltus.codegen.building import Order
 from saltus.errors import CacheError, SaltusWarning
 from saltus.interrupt import Interrupted, Stop
