@@ -253,7 +253,8 @@ def _orbits(ds: xr.Dataset) -> list[str]:
         lines.append(
             f"given up {counted(dropped, 'start')}: the motion took more steps or contacts than "
             f"allowed. Start nearer to where the system moves, or allow more: "
-            f"method=sl.Taylor(max_steps=...)"
+            f"method=sl.Taylor(max_steps=..., max_events=...); impacts written as impact(...) in "
+            f"place of jump(...) come to rest"
         )
     return lines
 
