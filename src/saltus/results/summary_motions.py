@@ -4,6 +4,7 @@ few lines, for ``describe``.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -182,11 +183,21 @@ def _branches(ds: xr.Dataset) -> list[str]:
 
 def _stopped(branch: xr.Dataset, ends: np.ndarray) -> str:
     """Where a branch ends within the range though it goes on."""
-    words = {"points": "stopped by points=", "lost": "lost"}
-    why = (branch["branch_begin"].item(), branch["branch_end"].item())
-    return "".join(
-        f", {words[one]} at {at:.6g}" for one, at in zip(why, ends, strict=True) if one in words
-    )
+    words = {
+        "points": "stopped by points=",
+        "lost": "lost",
+        "held": "ends where the chatter before a held contact changes",
+    }
+    text = ""
+    for side, last in zip(("begin", "end"), ends, strict=True):
+        why = branch[f"branch_{side}"].item()
+        if why == "accumulates":
+            limit = float(branch[f"branch_{side}_limit"])
+            places = max(0, -math.floor(math.log10(abs(last - limit))))  # see ladders.STEADY
+            text += f", its grazes accumulate at {limit:.{places}f}"
+        elif why in words:
+            text += f", {words[why]} at {last:.6g}"
+    return text
 
 
 def _curve(ds: xr.Dataset) -> list[str]:
