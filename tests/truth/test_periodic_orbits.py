@@ -207,7 +207,8 @@ def test_starts_that_chatter_without_end_are_given_up(monkeypatch):
     found = sl.periodic_orbits(table, "random 40", box=box, periods=1)
     assert 0 < found.search_given_up.item() < 20
     most = np.max(counted, axis=0)
-    assert most[st.EVENTS] <= CONTACTS + 1 and most[st.STEPS] <= STEPS + 1
+    assert most[st.EVENTS] <= CONTACTS + 1
+    assert most[st.STEPS] <= STEPS + 1
     lift = 0.3 * np.sin(np.arccos(np.pi * 0.1 / (1.9 * 0.3)))
     assert np.sort(found.orbit_peak) == pytest.approx(np.pi**2 / 2 + lift * np.array([-1, 1]))
     assert sorted(found.orbit_stable.values.tolist()) == [0, 1]

@@ -1,5 +1,5 @@
-"""Ladders of grazes: a branch that gains one contact after the other at values of the parameter that
-approach a limit, at which the orbit chatters.
+"""Ladders of grazes: a branch that gains one contact after the other at values of the parameter
+that approach a limit, at which the orbit chatters.
 
 The times between the contacts of a chatter are nearly a geometric sequence, so its grazes are one
 too. The limit is extrapolated: A. C. Aitken, Proc. R. Soc. Edinburgh 46 (1926) 289-305.

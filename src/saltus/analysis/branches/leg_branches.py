@@ -125,7 +125,9 @@ def leg_branch(plan: Plan, start: Start) -> Branch | None:
     sequence = sequences(orbits, start.z[None])[0]
     if sequence is not None and sequence.flies:
         return _branch(plan, orbits, start)
-    branch = both_ways(plan, start) if start.n <= plan.longest else None  # a chatter of many periods
+    if start.n > plan.longest:  # a chatter of many periods
+        return None
+    branch = both_ways(plan, start)
     if branch is not None:
         branch.ends = _where_held(branch)
     return branch

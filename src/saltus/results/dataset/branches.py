@@ -29,8 +29,8 @@ BRANCH_ENDS = {
 }
 
 #: Variables of what ``branches`` returns. ``<first>``: the unit of the first state; ``<gap>``: that
-#: of the gaps; ``<varied>``: that of the parameter; ``<output>``: that in ``output_units``, which an
-#: output has of its own.
+#: of the gaps; ``<varied>``: that of the parameter; ``<output>``: that in ``output_units``, which
+#: an output has of its own.
 BRANCHES_VARIABLES = {
     "point": Variable(_POINT, "1", "point of a branch", "i8", coord=True),
     "point_branch": Variable(_POINT, "1", "branch that the point lies on", "i8"),
