@@ -103,6 +103,16 @@ def test_reading_that_comes_to_no_end_is_stopped(saved, monkeypatch):
         load(saved)
 
 
+def test_reading_that_lasts_says_so_before_it_is_given_up(saved, monkeypatch, capfd):
+    saved.write_bytes(saved.read_bytes()[:-ENDING])
+    monkeypatch.setattr(ending, "_TRIAL", "while True: pass")
+    monkeypatch.setattr(ending, "PATIENCE", 1.0)
+    monkeypatch.setattr(ending, "SILENT", 0.0)
+    with pytest.raises(ResultFileError, match="came to no end"):
+        load(saved)
+    assert f"saltus tries {saved} in another process first: at most 1 s" in capfd.readouterr().err
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="pipes are POSIX")
 def test_what_is_no_file_is_told_apart(tmp_path):
     os.mkfifo(tmp_path / "pipe.nc")

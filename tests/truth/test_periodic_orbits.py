@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 
 import impact_orbits
 import saltus as sl
-from saltus.analysis.basins.periodic_orbits import STEPS
+from saltus.analysis.basins.periodic_orbits import CONTACTS, STEPS
 from saltus.flow.maps import Stroboscope
 from saltus.kernels import status as st
 
@@ -182,6 +182,54 @@ def test_a_search_has_a_budget_of_its_own(monkeypatch):
     found = sl.periodic_orbits(hardening, {"x": 1e4, "v": 0.0}, periods=1)
     assert found.search_given_up.values.tolist() == [1]
     assert max(one[:, st.STEPS].max() for one in steps) <= 13 * STEPS + 1
+
+
+@sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
+def table(t, x, v, *, a=0.3, e=0.9, w=1.0):
+    """A ball on a table whose impacts are jumps: nothing says that it may come to rest there."""
+    up = a * w * sl.cos(w * t)
+    return v, -1.0, sl.jump(x < a * sl.sin(w * t), v=up - e * (v - up))
+
+
+def test_starts_that_chatter_without_end_are_given_up(monkeypatch):
+    """With one impact a period the ball leaves with the velocity pi, at the phase p of the table
+    where pi (1 - e) = (1 + e) a cos p; it rises to a sin p + pi^2 / 2.
+    """
+    counted, launched = [], Stroboscope.launch
+
+    def watched(map_, start, longest):
+        flight = launched(map_, start, longest)
+        counted.append(flight._arrays["counters"])
+        return flight
+
+    monkeypatch.setattr(Stroboscope, "launch", watched)
+    box = {"x": (0.3, 5.3), "v": (-3, 6)}
+    found = sl.periodic_orbits(table, "random 40", box=box, periods=1)
+    assert 0 < found.search_given_up.item() < 20
+    assert max(one[:, st.EVENTS].max() for one in counted) <= 13 * CONTACTS + 1
+    lift = 0.3 * np.sin(np.arccos(np.pi * 0.1 / (1.9 * 0.3)))
+    assert np.sort(found.orbit_peak) == pytest.approx(np.pi**2 / 2 + lift * np.array([-1, 1]))
+    assert sorted(found.orbit_stable.values.tolist()) == [0, 1]
+    assert "or allow more: method=sl.Taylor(max_steps=..., max_events=...)" in sl.describe(found)
+
+
+def test_newton_s_method_has_a_budget_for_one_period(monkeypatch):
+    """It is led into chatters that none of the starts ends in: the table throws the ball."""
+    counted, with_tangent = [], Stroboscope._with_tangent
+
+    def watched(map_, *arguments):
+        outcome = with_tangent(map_, *arguments)
+        counted.append(outcome.counters.max(axis=0, initial=0))
+        return outcome
+
+    monkeypatch.setattr(Stroboscope, "_with_tangent", watched)
+    box = {"x": (1.2, 6.2), "v": (-3, 6)}
+    thrown = table.with_values(a=1.2)
+    found = sl.periodic_orbits(thrown, "random 50", box=box, periods=1)
+    assert found.search_given_up.item() == 0
+    most = np.max(counted, axis=0)
+    assert most[st.EVENTS] <= CONTACTS + 1
+    assert most[st.STEPS] <= STEPS + 1
 
 
 def test_limit_cycles_are_looked_for_from_motions_that_can_be_followed():

@@ -61,3 +61,17 @@ def test_a_run_imports_what_it_needs(start):
 def test_other_verbs_leave_out_what_is_for_others():
     modules = imported("sl.basins, sl.attractors, sl.stroboscope, sl.load, sl.save")
     assert not modules & (HEAVY - {"scipy.optimize", "scipy.spatial"})
+
+
+def test_colours_come_without_matplotlib():
+    modules = imported("from saltus.plot.palette import hues\nassert hues(3).shape == (3, 3)")
+    assert not modules & HEAVY
+
+
+@pytest.mark.parametrize("first", ["saltus.plot.basins", "saltus.plot.style", "saltus.plot"])
+def test_a_picture_is_itself_whether_or_not_its_file_is_imported_first(first):
+    imported(
+        f"import {first}\nfrom saltus import plot\n"
+        "assert all(callable(getattr(plot, one)) for one in plot.__all__ if one != 'OKABE_ITO')\n"
+        "assert plot.basins.__name__ == 'basins' and 'blue' in plot.OKABE_ITO"
+    )

@@ -137,7 +137,7 @@ def _pyplot() -> Any:
     matplotlib.use("Agg")
     import matplotlib.pyplot
 
-    import saltus.plot  # noqa: F401
+    from saltus.plot import history, phase, style  # noqa: F401
 
     return matplotlib.pyplot
 

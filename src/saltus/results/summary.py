@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.errors import counted
-from saltus.results.dataset.kinds import Kind
+from saltus.results.dataset.kinds import LONGER, Kind
 from saltus.results.dataset.schema import (
     AGREEMENT,
     BASINS,
@@ -28,7 +28,6 @@ from saltus.results.wording import kind_texts, tally, unit_of
 _LINES = 12
 #: Trust numbers of a map, and what they are called in the text.
 _TRUST = {
-    "smallest_basin_seen": "smallest basin seen",
     "basin_entropy": "basin entropy",
     "boundary_basin_entropy": "on the boundary",
     "uncertainty_exponent": "uncertainty exponent",
@@ -44,6 +43,8 @@ def summary(ds: xr.Dataset) -> list[str]:
             f"extent   {_span(ds, parameters_of(ds), 'values')}, "
             f"{counted(ds.sizes['start'], 'start')} at each",
             *_responses(ds),
+            *_untyped(ds["response_of"], Kind.UNCONVERGED, Kind.FAILED),
+            *_missed(ds.sizes["start"], " at each"),
         ]
     if kind_of(ds) == AGREEMENT:
         return [f"extent   {_axes(ds)}", *_agreement(ds)]
@@ -55,8 +56,25 @@ def summary(ds: xr.Dataset) -> list[str]:
         lines.append(f"settled  {_unsettled(ds['basin'])}")
         words = own_errors(ds.attrs) if (ds["basin"].values == Kind.UNCONVERGED).any() else ""
         lines += [f"noise    {words}"] if words else []
+        lines += _untyped(ds["basin"], Kind.UNCONVERGED)
+        lines += _missed(int((ds["basin"].values != Kind.NOT_COMPUTED).sum()))
     trust = [f"{words} {ds.attrs[name]:.3g}" for name, words in _TRUST.items() if name in ds.attrs]
     return lines + ([f"trust    {', '.join(trust)}"] if trust else [])
+
+
+def _missed(starts: int, where: str = "") -> list[str]:
+    """A line on what so many starts may have missed: by the rule of three a basin above 3/N of
+    their box is met with 95 %. Hanley & Lippman-Hand, J. Am. Med. Assoc. 249 (1983) 1743.
+    """
+    if not starts:
+        return []
+    size = f" with a basin below {300 / starts:.2g} % of where they lie" if starts > 3 else ""
+    return [f"missed   {counted(starts, 'start')}{where}: other attractors{size} may be missed"]
+
+
+def _untyped(labels: xr.DataArray, *codes: Kind) -> list[str]:
+    """A line on starts whose motion has no type: those with one of some codes."""
+    return [f"untyped  {LONGER}"] if np.isin(labels.values, codes).any() else []
 
 
 def own_errors(attrs: Mapping[Any, Any]) -> str:
@@ -203,6 +221,8 @@ def _exponents(ds: xr.Dataset) -> list[str]:
         kind = kind_text(str(one["kind"].item()), int(one["response_period"]))
         lines.append(f"  {i}: {kind}, {values} {unit}, the first +- {width:.1e}{graze}")
     lines += _more(count)
+    if (ds["kind"].values == "unclear").any():
+        lines.append(f"untyped  {LONGER}")
     if np.isneginf(ds["lyapunov_exponent"].values).any():
         lines.append("-inf     where a contact sticks or rests, nothing is left of a deviation")
     return lines

@@ -4,6 +4,7 @@ few lines, for ``describe``.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -182,11 +183,21 @@ def _branches(ds: xr.Dataset) -> list[str]:
 
 def _stopped(branch: xr.Dataset, ends: np.ndarray) -> str:
     """Where a branch ends within the range though it goes on."""
-    words = {"points": "stopped by points=", "lost": "lost"}
-    why = (branch["branch_begin"].item(), branch["branch_end"].item())
-    return "".join(
-        f", {words[one]} at {at:.6g}" for one, at in zip(why, ends, strict=True) if one in words
-    )
+    words = {
+        "points": "stopped by points=",
+        "lost": "lost",
+        "held": "ends where the chatter before a held contact changes",
+    }
+    text = ""
+    for side, last in zip(("begin", "end"), ends, strict=True):
+        why = branch[f"branch_{side}"].item()
+        if why == "accumulates":
+            limit = float(branch[f"branch_{side}_limit"])
+            places = max(0, -math.floor(math.log10(abs(last - limit))))  # see ladders.STEADY
+            text += f", its grazes accumulate at {limit:.{places}f}"
+        elif why in words:
+            text += f", {words[why]} at {last:.6g}"
+    return text
 
 
 def _curve(ds: xr.Dataset) -> list[str]:
@@ -253,7 +264,8 @@ def _orbits(ds: xr.Dataset) -> list[str]:
         lines.append(
             f"given up {counted(dropped, 'start')}: the motion took more steps or contacts than "
             f"allowed. Start nearer to where the system moves, or allow more: "
-            f"method=sl.Taylor(max_steps=...)"
+            f"method=sl.Taylor(max_steps=..., max_events=...); impacts written as impact(...) in "
+            f"place of jump(...) come to rest"
         )
     return lines
 

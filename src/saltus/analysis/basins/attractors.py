@@ -89,7 +89,9 @@ def attractors(
         ``attractor_margin``, multipliers, exponent, and its states at whole periods. Of a noisy one
         these are the exact orbit's, and ``attractor_scatter`` [unit of the first state] says how
         far from it the points lie. Dim ``trajectory``: ``basin``, the attractor of each start (-2:
-        none was established), ``periods_to_settle``.
+        none was established), ``periods_to_settle``. ``smallest_basin_seen``: of starts that were
+        drawn at random from a box, an attractor with a basin of a smaller share of it may be missed
+        (rule of three).
 
     Raises
     ------
@@ -127,6 +129,7 @@ def attractors(
         provenance(system, map_.method, system.values)
         | looked(periods, map_)
         | stray_attrs(found.astray)
+        | {"smallest_basin_seen": uncertainty.smallest_basin(group.size)}
     )
     return attractors_dataset(subject(system, attrs), portraits(map_, found), starts)
 

@@ -54,7 +54,10 @@ class Branch:
     ends : (str, str)
         Why it ends at its first and at its last point: see :class:`Curve`; ``period_doubling``
         where it becomes an orbit of half the period, ``hopf`` where a limit cycle shrinks to an
-        equilibrium, ``boundary_equilibrium`` where an equilibrium meets a boundary.
+        equilibrium, ``boundary_equilibrium`` where an equilibrium meets a boundary; ``accumulates``
+        where its grazes do, ``held`` where it is lost with contacts that are held.
+    limits : (float, float)
+        The parameter at which they do, at either end; NaN otherwise.
     events : list of SpecialPoint
         In the order of the branch.
     unexplained : list of int
@@ -75,6 +78,7 @@ class Branch:
     events: list[SpecialPoint] = field(default_factory=list)
     unexplained: list[int] = field(default_factory=list)
     parent: tuple[int, int] | None = None
+    limits: tuple[float, float] = (np.nan, np.nan)
 
     @property
     def closed(self) -> bool:

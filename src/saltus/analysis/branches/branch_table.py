@@ -48,7 +48,8 @@ def table_of(
     unit = outputs.units[0] if len(set(outputs.units)) == 1 else ""
     when = "at whole forcing periods" if system.forced_at else "in equal steps of time"
     about = subject(system, attrs, guards_over(system, system.values, ()))
-    return build(schema.BRANCHES, about, values, words={"<when>": when, "<output>": unit})
+    words = {"<when>": when, "<output>": unit, "<varied>": system.units[name]}
+    return build(schema.BRANCHES, about, values, words=words)
 
 
 def attributes_of(
@@ -163,6 +164,8 @@ def _branches(branches: Sequence[Branch]) -> dict[str, Any]:
         "branch_twin": np.array([has_twin(branch) for branch in branches], bool),
         "branch_begin": [branch.ends[0] for branch in branches],
         "branch_end": [branch.ends[1] for branch in branches],
+        "branch_begin_limit": np.array([branch.limits[0] for branch in branches], float),
+        "branch_end_limit": np.array([branch.limits[1] for branch in branches], float),
         "branch_unexplained": np.array([len(b.unexplained) for b in branches], np.int64),
     }
 

@@ -125,17 +125,33 @@ def leg_branch(plan: Plan, start: Start) -> Branch | None:
     sequence = sequences(orbits, start.z[None])[0]
     if sequence is not None and sequence.flies:
         return _branch(plan, orbits, start)
-    return both_ways(plan, start) if start.n <= plan.longest else None  # a chatter of many periods
+    if start.n > plan.longest:  # a chatter of many periods
+        return None
+    branch = both_ways(plan, start)
+    if branch is not None:
+        branch.ends = _where_held(branch)
+    return branch
+
+
+def _where_held(branch: Branch) -> tuple[str, str]:
+    """Why a branch ends, with ``held`` for ``lost`` where contacts of its last orbit are held."""
+    last = sequences(branch.orbits, branch.z[[0, -1]])
+    begin, end = (
+        "held" if why == "lost" and not (one is not None and one.flies) else why
+        for why, one in zip(branch.ends, last, strict=True)
+    )
+    return begin, end
 
 
 def _branch(plan: Plan, orbits: PeriodicOrbits, start: Start) -> Branch | None:
     """The branch of a start in both directions, or in the one in which it leaves another."""
     z, scale = start.z, start.scale
-    ways: list[tuple[list[Piece], str]] = []
+    ways: list[tuple[list[Piece], str, float]] = []
     for along in start.sides:
         if not ways or ways[0][1] != "closed":
             ways.append(follow_legs(orbits, z, scale, along, plan.limits, plan.points, start.first))
     ends = (ways[-1][1], ways[0][1]) if len(ways) == 2 else ("branch", ways[0][1])
+    limits = (ways[-1][2] if len(ways) == 2 else np.nan, ways[0][2])
     if ways[0][1] == "closed":
         ends = ("closed", "closed")
     forwards = [_as_branch(piece, False) for piece in ways[0][0] if piece.curve.z]
@@ -145,7 +161,7 @@ def _branch(plan: Plan, orbits: PeriodicOrbits, start: Start) -> Branch | None:
     none = np.zeros(0)
     result = LegBranch(
         orbits, 0, none, none, none, none, none, ends, parent=start.seed.parent,
-        pieces=[*back[::-1], *forwards], backwards=len(back),
+        limits=limits, pieces=[*back[::-1], *forwards], backwards=len(back),
     )  # fmt: skip
     result.join()
     return result

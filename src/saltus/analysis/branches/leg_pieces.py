@@ -10,6 +10,7 @@ import numpy as np
 
 from saltus.analysis.branches.arclength import FIRST, Curve, correct, follow, tangents
 from saltus.analysis.branches.contact_sequences import sequences
+from saltus.analysis.branches.ladders import accumulation
 from saltus.analysis.branches.leg_ends import End, end_of
 from saltus.analysis.branches.legs import Legs
 from saltus.analysis.branches.shooting import PeriodicOrbits
@@ -84,6 +85,7 @@ class _Way:
     home: tuple[Legs, np.ndarray]
     pieces: list[Piece] = field(default_factory=list)
     end: str = ""
+    limit: float = np.nan
 
     def follow(self, legs: Legs, z: np.ndarray, along: np.ndarray) -> None:
         """Follow the branch from an orbit on, piece by piece."""
@@ -94,8 +96,18 @@ class _Way:
             if end.onto is None:
                 self.end = end.event.kind
                 return
+            self.limit = self._accumulation()
+            if np.isfinite(self.limit):
+                self.end = "accumulates"
+                return
             legs, z, along = end.onto, end.start, end.along
         self.end = "points"
+
+    def _accumulation(self) -> float:
+        """The parameter at which the events behind the pieces accumulate; NaN if they don't."""
+        ends = [piece.end for piece in self.pieces if piece.end is not None]
+        contacts = [len(piece.legs.contacts) for piece in self.pieces]
+        return accumulation(contacts, [float(end.event.z[-1]) for end in ends])
 
     def _piece(self, legs: Legs, z: np.ndarray, along: np.ndarray) -> End | None:
         """One contact sequence, and where it ends if that is at an event."""
@@ -158,7 +170,7 @@ def follow_legs(
     limits: tuple[float, float],
     points: int,
     first: float = FIRST,
-) -> tuple[list[Piece], str]:
+) -> tuple[list[Piece], str, float]:
     """A branch of periodic orbits in one direction, contact by contact.
 
     Parameters
@@ -178,14 +190,15 @@ def follow_legs(
 
     Returns
     -------
-    list of Piece, str
+    list of Piece, str, float
         The contact sequences one after the other, and why the branch ends: see
         :class:`saltus.analysis.branches.arclength.Curve`; ``graze`` or ``corner`` where it isn't
-        known how it goes on.
+        known how it goes on; ``accumulates`` where its grazes do, and at which value of the
+        parameter, NaN otherwise.
     """
     sequence = sequences(orbits, z[None])[0]
     if sequence is None:
-        return [], "lost"
+        return [], "lost", np.nan
     legs, start = Legs.of(orbits, sequence, z, scale)
     legs.accepted(start[None], _ROW)
     tangent = legs.tangent(start)
@@ -194,4 +207,4 @@ def follow_legs(
     side = 1.0 if (moved / scale) @ along > 0 else -1.0
     way = _Way(limits, points, first, (legs, start))
     way.follow(legs, start, side * tangent)
-    return way.pieces, way.end
+    return way.pieces, way.end, way.limit

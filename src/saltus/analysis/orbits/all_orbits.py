@@ -159,6 +159,7 @@ def all_orbits(
     longest: int,
     scale: np.ndarray,
     progress: Callable[[float], None] | None = None,
+    before: Map | None = None,
 ) -> OrbitSet:
     """The periodic orbits that starts lead to, up to a period.
 
@@ -174,6 +175,9 @@ def all_orbits(
         Range of each state.
     progress : callable, optional
         Called with the share done.
+    before : Map, optional
+        The map by which starts are followed before Newton's method begins: the same, but for the
+        budget of its motions, which last longer.
 
     Returns
     -------
@@ -181,7 +185,7 @@ def all_orbits(
         Ordered by period.
     """
     result = OrbitSet(scale)
-    iterates = _guesses(map_, start, longest)
+    iterates = _guesses(before or map_, start, longest)
     for n in range(1, longest + 1):
         search = Search(n, len(start), given_up=len(start) - len(iterates))
         show = stage(progress, *(m * (m + 1) / (longest * (longest + 1)) for m in (n - 1, n)))

@@ -5,9 +5,11 @@ Distances are in units of the range of each state.
 
 from __future__ import annotations
 
+from saltus.results.dataset import kinds
+
 # -- periods ---------------------------------------------------------------------------------------
 #: Longest period looked for [iterates].
-LONGEST = 64
+LONGEST = kinds.LONGEST
 #: Iterates between two tests for recurrence: two of the longest periods.
 ROUND = 2 * LONGEST
 #: Recurrence that is worth a try by Newton's method: a wrong try costs time only where the orbit

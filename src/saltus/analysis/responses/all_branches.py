@@ -121,7 +121,9 @@ def branches(
         ``point_output_maximum`` and so on of each state and output. On branch:
         ``branch_kind`` (``periodic``, ``limit_cycle``, ``equilibrium``; these have
         ``point_eigenvalue_real`` and ``_imag`` [1/s] in place of multipliers and a period),
-        ``branch_periods``, ``branch_closed``, ``branch_parent``, ``branch_begin``, ``branch_end``,
+        ``branch_periods``, ``branch_closed``, ``branch_parent``, ``branch_begin``, ``branch_end``
+        (``accumulates``: its grazes do, at ``branch_begin_limit`` or ``branch_end_limit``;
+        ``held``: the chatter before a held contact changes, which isn't followed),
         ``branch_twin``: whether its mirror image, in symmetric equations, is a branch of its own,
         which isn't listed. On event: ``event_kind`` (``fold``, ``period_doubling``,
         ``branch_point``, ``neimark_sacker``; ``hopf`` and ``boundary_equilibrium`` of equilibria;

@@ -23,11 +23,14 @@ BRANCH_ENDS = {
     "lost": "no step leads on, however short",
     "graze": "a graze behind which it isn't known how it goes on",
     "corner": "two contacts at once, behind which it isn't known how it goes on",
+    "held": "where the impacts that chatter before a contact is held become others",
+    "accumulates": "before the value at which its grazes accumulate: an orbit that chatters",
     "interrupted": "interrupted",
 }
 
 #: Variables of what ``branches`` returns. ``<first>``: the unit of the first state; ``<gap>``: that
-#: of the gaps; ``<output>``: that in ``output_units``, which an output has of its own.
+#: of the gaps; ``<varied>``: that of the parameter; ``<output>``: that in ``output_units``, which
+#: an output has of its own.
 BRANCHES_VARIABLES = {
     "point": Variable(_POINT, "1", "point of a branch", "i8", coord=True),
     "point_branch": Variable(_POINT, "1", "branch that the point lies on", "i8"),
@@ -101,6 +104,12 @@ BRANCHES_VARIABLES = {
     ),
     "branch_begin": Variable(_BRANCH, "", "why it ends at its first point", "str"),
     "branch_end": Variable(_BRANCH, "", "why it ends at its last point", "str"),
+    "branch_begin_limit": Variable(
+        _BRANCH, "<varied>", "parameter at which its grazes accumulate beyond its first point"
+    ),
+    "branch_end_limit": Variable(
+        _BRANCH, "<varied>", "parameter at which its grazes accumulate beyond its last point"
+    ),
     "branch_unexplained": Variable(
         _BRANCH, "1", "changes of stability that its events don't explain", "i8"
     ),

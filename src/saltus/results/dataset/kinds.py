@@ -31,6 +31,13 @@ class Kind(IntEnum):
         return self.name.lower()
 
 
+#: Longest period at which a motion is known to repeat [forcing periods]; no argument raises it.
+LONGEST = 64
+#: Of motions without a type, in the words of every result.
+LONGER = (
+    f"An orbit is recognised up to {LONGEST} periods, which no argument raises: a longer one has "
+    "no type. sl.stroboscope and sl.poincare show its points."
+)
 #: Kinds that Newton's method closes.
 CLOSED = (Kind.PERIODIC, Kind.EQUILIBRIUM, Kind.LIMIT_CYCLE)
 #: What became of starts that lead to no attractor, as the end of a sentence.

@@ -14,6 +14,7 @@ import os
 import re
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 from saltus.fence import printable, shown
@@ -24,6 +25,8 @@ _LENGTH = 80
 #: Time that reading a file without an ending may take [s], and how much of it is read in a second
 #: at the least [byte].
 PATIENCE, SLOWEST = 60.0, 1e7
+#: Time after which a line says what is being done [s].
+SILENT = 2.0
 #: Memory that it may take: multiple of its size, and least value [byte].
 TIMES, LEAST = 8, 4 << 30
 #: What xarray reads by is tried, without xarray, which takes longer to load than most files.
@@ -112,6 +115,10 @@ def try_elsewhere(path: Path, engine: str) -> None:
         str(max(TIMES * size, LEAST)),
     ]
     known = os.pathsep.join(place for place in sys.path if place)
+    line = f"saltus tries {path} in another process first: at most {patience:.0f} s"
+    word = threading.Timer(SILENT, print, (line,), {"file": sys.stderr, "flush": True})
+    word.daemon = True
+    word.start()
     try:
         done = subprocess.run(
             command,
@@ -130,6 +137,8 @@ def try_elsewhere(path: Path, engine: str) -> None:
         raise ResultFileError(
             f"{path} can't be tried: {error.strerror or error}. Compute it again."
         ) from error
+    finally:
+        word.cancel()
     if done.returncode:
         why = (done.stderr.decode(errors="replace").strip().splitlines() or ["the reader crashed"])[
             -1

@@ -290,6 +290,10 @@ def test_describe_tells_what_a_map_holds():
         "  1: periodic 3T, peak 0.002 m, 25.00% of the starts",
         "  2: chaotic, peak 0.003 m, 0.00% of the starts",
         "settled  3 of 6 starts, 1 not_computed, 1 unconverged, 1 escaped",
+        "untyped  An orbit is recognised up to 64 periods, which no argument raises: a longer one "
+        "has no type. sl.stroboscope and sl.poincare show its points.",
+        "missed   5 starts: other attractors with a basin below 60 % of where they lie may be "
+        "missed",
         "trust    basin entropy 0.25, uncertainty exponent nan",
         f"hash     {basins().attrs['result_hash'][:16]}",
     ]

@@ -1,0 +1,59 @@
+"""Ladders of grazes: where they accumulate."""
+
+import math
+
+import numpy as np
+import pytest
+
+import saltus as sl
+from saltus.analysis.branches.ladders import accumulation
+
+
+@pytest.mark.nojit
+@pytest.mark.parametrize("ratio", [0.3, 0.7, 0.95])
+def test_a_geometric_ladder_has_its_limit(ratio):
+    values = 2.0 - 0.3 * ratio ** np.arange(5)
+    assert accumulation([2, 3, 4, 5, 6], values) == pytest.approx(2.0, abs=1e-12)
+
+
+@pytest.mark.nojit
+@pytest.mark.parametrize(
+    ("contacts", "values"),
+    [
+        ([2, 3, 4, 5], 0.5 ** np.arange(4)),  # too short to tell
+        ([2, 3, 4, 3, 4], 0.5 ** np.arange(5)),  # contacts come and go
+        ([6, 5, 4, 3, 2], 0.5 ** np.arange(5)),  # away from a chatter
+        ([2, 3, 4, 5, 6], 2.0 ** np.arange(5)),  # grows
+        ([2, 3, 4, 5, 6], 1.0 / np.arange(1, 6)),  # slower than a geometric one
+        ([2, 3, 4, 5, 6], (-0.5) ** np.arange(5)),
+        ([2, 3, 4, 5, 6], [1.0, 1.0, 1.0, 1.0, 1.0]),
+    ],
+)
+def test_what_is_no_ladder(contacts, values):
+    assert math.isnan(accumulation(contacts, values))
+
+
+def test_a_branch_ends_before_its_grazes_accumulate():
+    """The ladder of ever more impacts in two periods, each kept for 0.7 of its speed. Followed to
+    16 impacts, its grazes are 2.9973952943520854, 2.997369120902456, 2.9973554207981943,
+    2.9973484715919883, 2.997345156781613: the limit lies beyond them by less than their steps.
+    """
+    stop = sl.models.impact_oscillator(damping=0, gap=0, restitution=0.7, frequency=2.8)
+    vary = {"frequency": ("2.7 rad/s", "3.1 rad/s")}
+    found = sl.branches(stop, vary, (0.0, -0.5), at=2, switch=(), progress=False)
+    ends = np.stack([found.branch_begin, found.branch_end])
+    limits = np.stack([found.branch_begin_limit, found.branch_end_limit])
+    assert (np.isfinite(limits) == (ends == "accumulates")).all()
+    assert np.abs(limits[ends == "accumulates"] - 2.9973453).min() < 1e-5
+    assert found.branch_begin_limit.attrs["units"] == "rad/s"
+    assert "its grazes accumulate at 2.99734" in sl.describe(found)
+    assert found.sizes["point"] < 500
+
+
+def test_a_branch_that_is_lost_in_a_chatter_says_so():
+    """Where one of the impacts before the rest is grazed; resting on the stop it goes on at 0.2."""
+    chatter = sl.models.impact_oscillator("chatter")
+    vary = {"frequency": ("0.3 rad/s", "0.4 rad/s")}
+    found = sl.branches(chatter, vary, at=2, switch=(), progress=False)
+    assert "held" in {*found.branch_begin.values, *found.branch_end.values}
+    assert "the chatter before a held contact changes" in sl.describe(found)
