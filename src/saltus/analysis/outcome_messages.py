@@ -14,14 +14,17 @@ from saltus.errors import SaltusWarning
 from saltus.kernels import status as st
 from saltus.system.evaluate import evaluate, sides
 from saltus.system.expression import varies, walk
+from saltus.system.guards import is_hold
 from saltus.system.roots import root_name
 from saltus.system.system import System
 from saltus.units import from_si
 
 #: Statuses after which a trajectory's end is missing, each with advice.
 _ADVICE = {
-    st.SLIDING: "sl.Taylor() follows friction that sticks. If it ended this one, make the force "
-    "continuous there: friction as mu*N*sl.tanh(v/eps), eps small.",
+    st.SLIDING: "Begin beside it, or give one of these forces a slope there: friction as "
+    "mu*N*sl.tanh(v/eps) with a small eps, a stop as a stiff spring.",
+    st.MODE_VIOLATION: "This is a fault of saltus: please report the equation, the values and the "
+    "start. Another method, such as sl.ODE45(), may follow this motion.",
     st.BUDGET_STEPS: "Raise max_steps of the method, say Taylor(max_steps=10**10); if steps shrink "
     "towards one place, the equations are "
     "singular there.",
@@ -58,6 +61,8 @@ _BELOW_A_ROOT = (
 SECONDS_PER_STEP = 1e-6
 
 
+#: Gap, as a part of the largest state, below which a motion stands on a boundary.
+ON_IT = 1e-9
 #: Times the fastest rate of the equations that the rest of a run is long, from which on they count
 #: as singular where it stands.
 SINGULAR = 1e9
@@ -92,6 +97,8 @@ def messages(run: xr.Dataset, asked: Span | None = None, system: System | None =
                 advice = _root(run, int(here[0]), system) or advice
             if code == st.NONFINITE and run.attrs.get("method", "Taylor") != "Taylor":
                 advice += _BELOW_A_ROOT.format(method=run.attrs["method"])
+            if code == st.SLIDING:
+                advice = _surfaces(run, int(here[0]), system) + advice
             if code == st.INVALID and _is_finite(run, int(here[0]), system):
                 meaning = "the start lies beyond a stop"
             if code == st.NONFINITE and run.attrs.get("method") == "RK4":
@@ -162,6 +169,23 @@ def _singular(run: xr.Dataset, asked: Span, index: int, system: System) -> str:
         "before it, as "
         "sl.piecewise((-c*sl.sqrt(h), h > 1e-9), otherwise=0.0) does."
     )
+
+
+def _surfaces(run: xr.Dataset, index: int, system: System | None) -> str:
+    """On which boundaries a trajectory stands at its end, and what would follow it."""
+    if run.attrs.get("method", "Taylor") != "Taylor":
+        return "sl.Taylor(), the default, follows the motion along such a boundary. "
+    if system is None:
+        return ""
+    _, time, state, values = _end(run, index, system)
+    size = max(1.0, *(abs(one) for one in state.values()))
+    bits = sides(system, time, list(state.values()), values)
+    own = [guard for guard in system.guards if not is_hold(guard)]
+    gaps = evaluate([one.gap for one in own], t=time, states=state, values=values, bits=bits)
+    names = [
+        one.name for one, gap in zip(own, gaps, strict=True) if abs(float(gap)) < ON_IT * size
+    ]
+    return f"It stands on {' and '.join(names)}, and every side leads back. " if names else ""
 
 
 def _root(run: xr.Dataset, index: int, system: System) -> str:

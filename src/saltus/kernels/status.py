@@ -41,8 +41,8 @@ STATUS = {
     ),
     SLIDING: (
         "sliding",
-        "both sides push onto a boundary: the solution slides along it, which "
-        "this version doesn't follow",
+        "all sides push onto a boundary, or onto several that meet, and nothing was found that "
+        "leads on",
     ),
     BUDGET_STEPS: ("budget_steps", "the step budget was used up"),
     BUDGET_EVENTS: ("budget_events", "the event budget was used up: contacts accumulate"),

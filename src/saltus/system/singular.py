@@ -171,7 +171,8 @@ def _is_whole(exponent: Expr) -> bool:
 
 def assuming(root: Expr, bit: int, value: bool) -> Expr:
     """The expression with one bit known. What it rules out isn't looked at: it may
-    divide by zero.
+    divide by zero. A quotient by what the bit makes zero is zero: it is the force of a contact that
+    can't be held then, and is let go.
     """
     memo: dict[Expr, Expr] = {}
     stack = [root]
@@ -189,11 +190,12 @@ def assuming(root: Expr, bit: int, value: bool) -> Expr:
             continue
         stack.pop()
         new = tuple(memo[child] for child in args)
-        memo[node] = (
-            new[0]
-            if decided
-            else ex.rebuild(node, new, node.payload if condition is None else condition)
-        )
+        if decided:
+            memo[node] = new[0]
+        elif node.op == "div" and new[1].op == "const" and new[1].payload == 0:
+            memo[node] = ex.constant(0.0)
+        else:
+            memo[node] = ex.rebuild(node, new, node.payload if condition is None else condition)
     return memo[root]
 
 
