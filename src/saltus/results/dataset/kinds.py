@@ -20,6 +20,8 @@ class Kind(IntEnum):
     LIMIT_CYCLE = 4
     #: An orbit that errors of the method keep from closing.
     NOISY_PERIODIC = 5
+    #: It hasn't repeated, and what was spent on its exponent didn't tell what it is.
+    NOT_REPEATING = 6
     ESCAPED = -1
     UNCONVERGED = -2
     FAILED = -3
