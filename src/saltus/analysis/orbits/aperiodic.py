@@ -257,7 +257,7 @@ def _measurements(map_: Map, size: int, budget: float) -> Iterator[int]:
     whole, left = BLOCK * growth_cost(map_, size), budget
     lengths = ([FIRST_LOOK] if size > MOST_STATES else []) + [BLOCKS] * MEASURED
     for blocks in lengths:
-        blocks = min(blocks, int(min(left // whole, BLOCKS)))
+        blocks = min(blocks, int(min(left / whole, BLOCKS)))
         if blocks < FIRST_LOOK:
             return
         yield blocks

@@ -42,6 +42,12 @@ WITHOUT: Mapping[Kind, str] = {
     Kind.FAILED: "failed: they begin beyond a stop or ended early, and status says why",
     Kind.NOT_COMPUTED: "weren't computed: the run was stopped",
 }
+#: What was left out where motions were not typed, and what pays for it, as the end of a sentence.
+OPEN = (
+    "haven't repeated, and their exponents don't say yet whether they are quasi-periodic or "
+    "chaotic: numbers are those of 64 periods. A larger periods= spends more on it; sl.lyapunov "
+    "tells all exponents of one."
+)
 #: The words for them by their codes.
 WITHOUT_WORDS = {int(kind): kind.word for kind in WITHOUT}
 
