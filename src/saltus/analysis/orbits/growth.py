@@ -70,9 +70,7 @@ def growth_rates(
     return state, np.array(growths[blocks // ALIGNING :])
 
 
-def _tangents(
-    map_: Map, start: np.ndarray, direction: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _tangents(map_: Map, start: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Where a block leads from float64[k, D], and what becomes of a direction of each."""
     k, size = start.shape
     directions = np.zeros((k, size, size))
