@@ -182,9 +182,7 @@ def _surfaces(run: xr.Dataset, index: int, system: System | None) -> str:
     bits = sides(system, time, list(state.values()), values)
     own = [guard for guard in system.guards if not is_hold(guard)]
     gaps = evaluate([one.gap for one in own], t=time, states=state, values=values, bits=bits)
-    names = [
-        one.name for one, gap in zip(own, gaps, strict=True) if abs(float(gap)) < ON_IT * size
-    ]
+    names = [one.name for one, gap in zip(own, gaps, strict=True) if abs(float(gap)) < ON_IT * size]
     return f"It stands on {' and '.join(names)}, and every side leads back. " if names else ""
 
 

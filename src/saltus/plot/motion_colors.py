@@ -20,16 +20,28 @@ LONG, QUASI_PERIODIC, CHAOTIC = OWN_HUES + 1, OWN_HUES + 2, OWN_HUES + 3
 #: Of systems without forcing; a limit cycle has the hue of period 1, as there is no other, an
 #: equilibrium that of period 2.
 LIMIT_CYCLE, EQUILIBRIUM = OWN_HUES + 4, OWN_HUES + 5
+#: Motion that hasn't repeated, and whose exponent says nothing.
+NOT_REPEATING = OWN_HUES + 6
 _HUE_OF = {LIMIT_CYCLE: 1, EQUILIBRIUM: 2}
 _NAMES = {
     QUASI_PERIODIC: "quasi-periodic",
     CHAOTIC: "chaotic",
     LIMIT_CYCLE: "limit cycle",
     EQUILIBRIUM: "equilibrium",
+    NOT_REPEATING: "not repeating",
 }
-_OWN = {"quasi_periodic": QUASI_PERIODIC, "limit_cycle": LIMIT_CYCLE, "equilibrium": EQUILIBRIUM}
+_OWN = {
+    "quasi_periodic": QUASI_PERIODIC,
+    "limit_cycle": LIMIT_CYCLE,
+    "equilibrium": EQUILIBRIUM,
+    "not_repeating": NOT_REPEATING,
+}
 #: Motion that never repeats is grey, so that no period is taken for it.
-_GREYS = {QUASI_PERIODIC: (0.70, 0.70, 0.70), CHAOTIC: (0.20, 0.20, 0.20)}
+_GREYS = {
+    QUASI_PERIODIC: (0.70, 0.70, 0.70),
+    CHAOTIC: (0.20, 0.20, 0.20),
+    NOT_REPEATING: (0.45, 0.45, 0.45),
+}
 #: Markers of the periods 1, 2, ..., and of longer ones.
 _MARKERS = dict(enumerate("osD^vPX*p", start=1))
 #: The shade of a hue for small dots and thin lines on white; the hue itself is for areas.
@@ -45,7 +57,7 @@ def codes(kind: Sequence[str] | np.ndarray, period: Sequence[int] | np.ndarray) 
 
 def repeats(code: int) -> bool:
     """Whether motions of a kind repeat, or rest: their branches are lines."""
-    return code not in (QUASI_PERIODIC, CHAOTIC)
+    return code not in _GREYS
 
 
 def color(code: int, dots: bool = True) -> np.ndarray:

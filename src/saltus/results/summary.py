@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.errors import counted
-from saltus.results.dataset.kinds import LONGER, Kind
+from saltus.results.dataset.kinds import LONGER, OPEN, Kind
 from saltus.results.dataset.schema import (
     AGREEMENT,
     BASINS,
@@ -196,6 +196,9 @@ def _responses(ds: xr.Dataset) -> list[str]:
     lines = [f"{found}: {_tally(kinds)}" if kinds else found]
     if ds.sizes.get("event"):
         lines.append(f"events   {_tally(ds['event_kind'].values.tolist())}")
+    left = int((ds["response_type"].values == Kind.NOT_REPEATING.word).sum())
+    if left:
+        lines.append(f"open     {counted(left, 'response')} {OPEN}")
     return [*lines, f"settled  {_unsettled(ds['response_of'])}"]
 
 

@@ -1,30 +1,28 @@
 """Attractors that never repeat: quasi-periodic and chaotic ones, distinguished by their largest
 Lyapunov exponent, known by the region that they visit.
-
-Exponents: Benettin, Galgani, Giorgilli & Strelcyn, Meccanica 15 (1980), one direction renormalised
-at every block.
 """
 
 from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from saltus.analysis.orbits.growth import BLOCK, BLOCKS, MOST_STATES, growth_cost, growth_rates
 from saltus.analysis.statistics import BOUNDED, UNCLEAR
 from saltus.flow.maps import Map
 from saltus.results.dataset.kinds import Kind
 
-#: Iterates of one block of the exponent, blocks, and those of them in which the direction finds its
-#: way.
-BLOCK, BLOCKS, ALIGNING = 8, 192, 48
 #: Times that the exponent is measured at most, each time going on from where the last ended, until
 #: it says what the motion is.
 MEASURED = 4
+#: Blocks of a first look at a motion of many states, a fifth of a measurement: it is enough to tell
+#: strong chaos.
+FIRST_LOOK = BLOCKS // 5
 #: Standard errors that an exponent must be from zero.
 SURE = 4.0
 #: Exponent [per iterate] that is taken for zero whatever its error.
@@ -156,7 +154,7 @@ def survey(
     return [
         SampledAttractor(*kind, points[usable[group[0]]], scale)
         for group, kind in zip(groups, kinds, strict=True)
-        if kind is not None
+        if kind is not None and kind[0] != Kind.NOT_REPEATING.word
     ]
 
 
@@ -199,10 +197,14 @@ def kind_of_growth(blocks: np.ndarray) -> tuple[str, float, float] | None:
 
 
 def kinds_of(
-    map_: Map, start: np.ndarray, scale: np.ndarray, groups: Sequence[Sequence[int]]
+    map_: Map,
+    start: np.ndarray,
+    scale: np.ndarray,
+    groups: Sequence[Sequence[int]],
+    budget: float = math.inf,
 ) -> tuple[np.ndarray, list[tuple[str, float, float] | None]]:
     """What motions that never repeat are: their exponents are measured for longer while they could
-    be zero as well as positive.
+    be zero as well as positive, and the budget lasts.
 
     Parameters
     ----------
@@ -212,50 +214,63 @@ def kinds_of(
         Where trajectories stand, and the range of each state.
     groups : sequence of sequence of int
         Trajectories that are on one attractor.
+    budget : float
+        What the exponents of a trajectory may cost (see growth.py) [iterates].
 
     Returns
     -------
     end : float64[k, D]
         Where they stand then.
     kinds : list
-        (kind, exponent, its standard error) of each group; None if they don't say even then.
+        (kind, exponent, its standard error) of each group. ``"not_repeating"`` if the exponents
+        don't say even then, None if they say that deviations die out, or where there are none.
     """
-    state, blocks = growth_rates(map_, start, scale)
-    rates = list(blocks.T)
-    kinds = [kind_of_growth(np.stack([rates[i] for i in group], axis=1)) for group in groups]
-    for _ in range(MEASURED - 1):
+    state, rates = np.array(start), [np.zeros(0)] * len(start)
+    kinds: list[tuple[str, float, float] | None] = [None] * len(groups)
+    again = list(range(len(groups)))
+    for blocks in _measurements(map_, start.shape[1], budget):
+        rows = np.concatenate([groups[n] for n in again])
+        state[rows], more = growth_rates(map_.rows(rows), state[rows], scale[rows], blocks)
+        for i, one in zip(rows.tolist(), more.T, strict=True):
+            rates[i] = np.append(rates[i], one)
+        for n in again:
+            kind = kind_of_growth(np.stack([rates[i] for i in groups[n]], axis=1))
+            # for so short a time a weak decay looks like a torus
+            short = blocks == FIRST_LOOK and kind is not None and kind[0] != Kind.CHAOTIC.word
+            kinds[n] = None if short else kind
         again = [
             n
-            for n, kind in enumerate(kinds)
-            if kind is None and all(np.isfinite(rates[i]).all() for i in groups[n])
+            for n in again
+            if kinds[n] is None and all(np.isfinite(rates[i]).all() for i in groups[n])
         ]
         if not again:
             break
-        rows = np.concatenate([groups[n] for n in again])
-        state[rows], blocks = growth_rates(map_.rows(rows), state[rows], scale[rows])
-        for i, more in zip(rows.tolist(), blocks.T, strict=True):
-            rates[i] = np.append(rates[i], more)
-        for n in again:
-            kinds[n] = kind_of_growth(np.stack([rates[i] for i in groups[n]], axis=1))
+    for n in again:
+        kinds[n] = _undecided(np.stack([rates[i] for i in groups[n]], axis=1))
     return state, kinds
 
 
-def growth_rates(map_: Map, start: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Ends float64[k, D] of trajectories, and growth rates per iterate of their largest direction,
-    block by block, float64[blocks, k].
+def _measurements(map_: Map, size: int, budget: float) -> Iterator[int]:
+    """Blocks of one measurement after the other: of many states a first look comes before them; the
+    last is shorter where the budget ends.
     """
-    k, size = start.shape
-    direction = np.zeros((k, size, size))
-    direction[:, :, 0] = scale / math.sqrt(size)
-    state, growths = start, []
-    for _ in range(BLOCKS):
-        state, image = map_.tangent(state, BLOCK, direction)
-        length = np.linalg.norm(image[:, :, 0] / scale, axis=1)
-        with np.errstate(all="ignore"):
-            growths.append(np.log(length) / BLOCK)
-            direction = np.zeros((k, size, size))
-            direction[:, :, 0] = image[:, :, 0] / length[:, None]
-    return state, np.array(growths[ALIGNING:])
+    whole, left = BLOCK * growth_cost(map_, size), budget
+    lengths = ([FIRST_LOOK] if size > MOST_STATES else []) + [BLOCKS] * MEASURED
+    for blocks in lengths:
+        blocks = min(blocks, int(min(left / whole, BLOCKS)))
+        if blocks < FIRST_LOOK:
+            return
+        yield blocks
+        left -= whole * blocks
+
+
+def _undecided(blocks: np.ndarray) -> tuple[str, float, float] | None:
+    """As :func:`kind_of_growth`, of growth that says neither: None where deviations die out."""
+    if not blocks.size or not np.isfinite(blocks).all():
+        return None
+    exponent, error = blocks.mean(), blocks.mean(axis=1).std(ddof=1) / math.sqrt(len(blocks))
+    dies_out = exponent < -max(SURE * error, FLOOR)
+    return None if dies_out else (Kind.NOT_REPEATING.word, float(exponent), float(error))
 
 
 def alike(one: SampledAttractor, other: SampledAttractor) -> bool:

@@ -5,6 +5,10 @@ A basin map asks one system of a great many starts, and capture by known attract
 every trajectory may have an attractor of its own: each is followed until it nearly recurs, Newton's
 method closes the orbit, its multipliers say that it attracts, and the trajectory must lie beside
 it. What never recurs is typed by its largest Lyapunov exponent.
+
+All this is bounded by a budget, in iterates of the motion itself (growth.py): closing orbits and
+measuring exponents may each cost BUDGET times the iterates that a motion is followed for. What
+isn't typed by then is not_repeating, with where it goes.
 """
 
 from __future__ import annotations
@@ -17,6 +21,7 @@ import numpy as np
 from saltus.analysis.orbits import unforced
 from saltus.analysis.orbits.aperiodic import kinds_of
 from saltus.analysis.orbits.equilibria import autonomous
+from saltus.analysis.orbits.growth import BUDGET
 from saltus.analysis.orbits.orbits import OrbitBatch
 from saltus.analysis.orbits.recurrence import recurrence, recurring_orbits
 from saltus.analysis.orbits.tolerances import BESIDE, NEAR, RESTS, ROUND, SETTLED
@@ -26,8 +31,12 @@ from saltus.flow.threads import on_threads
 from saltus.kernels import status as st
 from saltus.results.dataset.kinds import Kind
 
-#: Trajectories that one thread follows at a time.
-PIECE = 512
+#: Trajectories that one thread follows at a time: so many, or fewer where each takes longer, so
+#: that all threads have work, and Ctrl-C finds some done. At least what fills the lanes.
+PIECE, PIECE_STATES, LANES = 512, 2048, 8
+#: Share of the work on a trajectory that is done when it has been followed, its growth is measured,
+#: and its iterates are known.
+FOLLOWED, MEASURED, KEPT = 0.4, 0.6, 0.7
 #: Periods, and samples in each, from which the range of a motion is taken.
 RANGE_PERIODS, SAMPLES_PER_PERIOD = 4, 32
 #: Iterates that are kept of a motion that never repeats.
@@ -54,6 +63,8 @@ class SettledMotions:
         Points of those that never repeat.
     end : float64[k, D]
         Where the trajectory stood last.
+    share : float64[k]
+        Share of the work on each that is done; 1 where it is known.
     """
 
     kind: np.ndarray
@@ -64,6 +75,7 @@ class SettledMotions:
     scale: np.ndarray
     iterates: dict[int, np.ndarray]
     end: np.ndarray
+    share: np.ndarray
 
     @classmethod
     def empty(cls, count: int, size: int) -> SettledMotions:
@@ -73,12 +85,12 @@ class SettledMotions:
             np.full(count, Kind.NOT_COMPUTED, np.int64), OrbitBatch.none(count, size),
             nothing.copy(), nothing.copy(),
             np.full(count, -1, np.int64), np.ones((count, size)), {},
-            np.full((count, size), np.nan),
+            np.full((count, size), np.nan), np.zeros(count),
         )  # fmt: skip
 
     def put(self, where: np.ndarray, other: SettledMotions) -> None:
         """Write another's results to the rows int64[m]."""
-        for name in ("kind", "exponent", "exponent_error", "settled", "scale", "end"):
+        for name in ("kind", "exponent", "exponent_error", "settled", "scale", "end", "share"):
             getattr(self, name)[where] = getattr(other, name)
         self.orbits.put(where, other.orbits)
         self.iterates.update({int(where[i]): iterates for i, iterates in other.iterates.items()})
@@ -96,33 +108,41 @@ def find_responses(
     ``most`` iterates at the longest.
 
     What is known when Ctrl-C ends it stands in ``result``, if that is given. The result doesn't
-    depend on the other trajectories, nor on threads.
+    depend on the other trajectories, nor on threads. ``progress`` counts trajectories, and of each
+    the stages that it went through.
     """
-    result = SettledMotions.empty(len(start), start.shape[1]) if result is None else result
-    pieces = [
-        np.arange(first, min(first + PIECE, len(start))) for first in range(0, len(start), PIECE)
-    ]
+    result = SettledMotions.empty(*start.shape) if result is None else result
+    size = min(PIECE, max(LANES, PIECE_STATES // start.shape[1] ** 2))
+    pieces = np.split(np.arange(len(start)), range(size, len(start), size))
+    parts = [SettledMotions.empty(len(piece), start.shape[1]) for piece in pieces]
 
-    def work(piece: np.ndarray) -> SettledMotions:
-        return _settle(map_.rows(piece, threads=1), start[piece], most)
+    def work(number: int) -> None:
+        piece = pieces[number]
+        try:
+            _settle(map_.rows(piece, threads=1), start[piece], most, parts[number])
+            parts[number].share[:] = 1.0
+        finally:  # each writes to rows of its own
+            result.put(piece, parts[number])
 
-    on_threads(work, pieces, result.put, threads, progress)
+    def show(_: float) -> None:
+        assert progress is not None
+        progress(float(sum(part.share.sum() for part in parts)) / max(len(start), 1))
+
+    on_threads(work, range(len(pieces)), lambda *_: None, threads, show if progress else None)
     return result
 
 
-def _settle(map_: Stroboscope, start: np.ndarray, most: int) -> SettledMotions:
+def _settle(map_: Stroboscope, start: np.ndarray, most: int, result: SettledMotions) -> None:
     """One piece, on one thread."""
-    result = SettledMotions.empty(*start.shape)
-    who = _follow(map_, start, np.arange(len(start)), most, result, SETTLED)
+    who = _follow(map_, start, np.arange(len(start)), most, result, SETTLED, FOLLOWED)
     if len(who):
         result.scale[who] = motion_range(map_.rows(who), result.end[who])
-        who = _follow(map_, result.end, who, ROUND, result, NEAR)
+        who = _follow(map_, result.end, who, ROUND, result, NEAR, FOLLOWED)
     if len(who):
-        who = _classify_aperiodic(map_, result.end, who, result)
+        who, open_ = _classify_aperiodic(map_, result.end, who, most, result)
     if len(who):  # neither a recurrence nor an exponent: once more as long, and from farther away
-        who = _follow(map_, result.end, who, most, result, NEAR)
-        result.kind[who] = Kind.UNCONVERGED
-    return result
+        who = _follow(map_, result.end, who, most, result, NEAR, 1.0)
+        _leave_open(map_, who, open_, result)
 
 
 def _follow(
@@ -132,11 +152,13 @@ def _follow(
     most: int,
     result: SettledMotions,
     near: float,
+    share: float,
 ) -> np.ndarray:
-    """Follow trajectories until they settle on an orbit; writes what is known, returns those that
-    haven't.
+    """Follow trajectories until they settle on an orbit, or this share of the work is done; writes
+    what is known, returns those that haven't.
     """
-    flight = map_.rows(who).launch(start[who], most + ROUND)
+    flight, begun = map_.rows(who).launch(start[who], most + ROUND), result.share[who]
+    purse = np.zeros(len(start))
     while len(who) and flight.age < most:
         points = flight.advance(ROUND)
         going = flight.going
@@ -150,22 +172,31 @@ def _follow(
             rows = np.flatnonzero(going)
             if flight.age == ROUND:
                 result.scale[who[rows]] = motion_range(map_.rows(who[rows]), flight.state[rows])
-            stay[rows[_settled(map_, points[rows], who[rows], near, result)]] = False
+            purse[who[rows]] += BUDGET * ROUND
+            stay[rows[_settled(map_, points[rows], who[rows], near, result, purse)]] = False
             result.settled[who[going & ~stay]] = flight.age
+        result.share[who] = np.where(stay, begun + (share - begun) * min(flight.age / most, 1), 1)
         flight.keep(stay)
-        who = who[stay]
+        who, begun = who[stay], begun[stay]
     return who
 
 
 def _settled(
-    map_: Stroboscope, points: np.ndarray, who: np.ndarray, near: float, result: SettledMotions
+    map_: Stroboscope,
+    points: np.ndarray,
+    who: np.ndarray,
+    near: float,
+    result: SettledMotions,
+    purse: np.ndarray,
 ) -> np.ndarray:
     """Which of the trajectories float64[k, ROUND, D] lie on an attracting orbit, bool[k]; writes
-    the orbits.
+    the orbits. ``purse``: what closing them may cost yet.
     """
     if autonomous(map_.system):
         return _settled_unforced(map_.rows(who), points, who, near, result)
-    orbits, apart, noise = recurring_orbits(map_.rows(who), points, result.scale[who], near)
+    left = purse[who]
+    orbits, apart, noise = recurring_orbits(map_.rows(who), points, result.scale[who], near, left)
+    purse[who] = left
     beside = orbits.distance(points[:, -1], result.scale[who]) <= BESIDE * np.maximum(apart, noise)
     done = orbits.stable & beside
     result.orbits.put(who[done], orbits.rows(done))
@@ -202,37 +233,77 @@ def _settled_unforced(
 
 
 def _classify_aperiodic(
-    map_: Stroboscope, start: np.ndarray, who: np.ndarray, result: SettledMotions
-) -> np.ndarray:
+    map_: Stroboscope, start: np.ndarray, who: np.ndarray, most: int, result: SettledMotions
+) -> tuple[np.ndarray, dict[int, tuple[float, float]]]:
     """Classify trajectories that don't recur by their exponents; writes what is known, returns
-    those that stay unclear.
+    those that stay unclear, and the exponents, with their errors, that don't say what a motion is.
     """
-    maps = map_.rows(who)
-    state, kinds = kinds_of(maps, start[who], result.scale[who], [[i] for i in range(len(who))])
+    maps, groups = map_.rows(who), [[i] for i in range(len(who))]
+    state, kinds = kinds_of(maps, start[who], result.scale[who], groups, BUDGET * most)
+    result.share[who] = MEASURED
+    iterates, recurs = _watched(maps, state, who, result)
+    result.share[who], unclear = KEPT, np.ones(len(who), bool)
+    if autonomous(map_.system):  # a limit cycle that is reached slowly, and no torus
+        recurs |= unforced.nearly_recurs(maps, result.end[who], ROUND * float(map_.period[0]))
+        away = unforced.runs_away(iterates)
+        result.kind[who[away]], result.share[who[away]] = Kind.ESCAPED, 1.0
+    open_: dict[int, tuple[float, float]] = {}
+    for i in np.flatnonzero(np.isfinite(iterates).all(axis=(1, 2))):
+        kind, row = kinds[i], int(who[i])
+        if result.kind[row] == Kind.ESCAPED or kind is None:
+            continue
+        if kind[0] == Kind.NOT_REPEATING.word:
+            open_[row] = kind[1:]
+        elif not (recurs[i] and (kind[0] != Kind.CHAOTIC.word or not autonomous(map_.system))):
+            unclear[i] = False
+            _put_aperiodic(result, row, Kind[kind[0].upper()], kind[1:], iterates[i])
+    return who[unclear & (result.kind[who] != Kind.ESCAPED)], open_
+
+
+def _watched(
+    maps: Stroboscope, state: np.ndarray, who: np.ndarray, result: SettledMotions
+) -> tuple[np.ndarray, np.ndarray]:
+    """Iterates float64[k, KEPT_ITERATES, D] from states on, and which of them nearly recur by their
+    end, bool[k].
+    """
     flight = maps.launch(state, KEPT_ITERATES)
     iterates = flight.advance(KEPT_ITERATES)
-    # by now
-    recurs = recurrence(iterates[:, -ROUND:], result.scale[who])[1] < np.maximum(
-        NEAR, maps.noise_of(result.scale[who])
-    )
     result.end[who] = flight.state
-    unclear = np.ones(len(who), bool)
-    if autonomous(map_.system):  # a limit cycle that is reached slowly, and no torus
-        recurs |= unforced.nearly_recurs(maps, flight.state, ROUND * float(map_.period[0]))
-        away = unforced.runs_away(iterates)
-        result.kind[who[away]] = Kind.ESCAPED
-    for i in np.flatnonzero(np.isfinite(iterates).all(axis=(1, 2))):
-        kind = kinds[i]
-        if (
-            result.kind[who[i]] != Kind.ESCAPED
-            and kind is not None
-            and not (recurs[i] and (kind[0] != Kind.CHAOTIC.word or not autonomous(map_.system)))
-        ):
-            unclear[i], row = False, who[i]
-            result.kind[row] = Kind[kind[0].upper()]
-            result.exponent[row], result.exponent_error[row] = kind[1:]
-            result.iterates[int(row)], result.settled[row] = iterates[i], -1
-    return who[unclear & (result.kind[who] != Kind.ESCAPED)]
+    apart = recurrence(iterates[:, -ROUND:], result.scale[who])[1]
+    return iterates, apart < np.maximum(NEAR, maps.noise_of(result.scale[who]))
+
+
+def _leave_open(
+    map_: Stroboscope,
+    who: np.ndarray,
+    exponents: dict[int, tuple[float, float]],
+    result: SettledMotions,
+) -> None:
+    """What trajectories are that nothing has told: those whose exponents are open and which don't
+    recur don't repeat; of the others more iterates may tell.
+    """
+    result.kind[who] = Kind.UNCONVERGED
+    rows = np.array([row for row in who.tolist() if row in exponents], np.int64)
+    if not len(rows):
+        return
+    iterates, recurs = _watched(map_.rows(rows), result.end[rows], rows, result)
+    finite = np.isfinite(iterates).all(axis=(1, 2))
+    for i in np.flatnonzero(finite & ~recurs):
+        row = int(rows[i])
+        _put_aperiodic(result, row, Kind.NOT_REPEATING, exponents[row], iterates[i])
+
+
+def _put_aperiodic(
+    result: SettledMotions,
+    row: int,
+    kind: Kind,
+    exponent: tuple[float, float],
+    iterates: np.ndarray,
+) -> None:
+    """Write what a motion that never repeats is."""
+    result.kind[row], result.settled[row], result.share[row] = kind, -1, 1.0
+    result.exponent[row], result.exponent_error[row] = exponent
+    result.iterates[row] = iterates
 
 
 def motion_range(map_: Stroboscope, state: np.ndarray) -> np.ndarray:

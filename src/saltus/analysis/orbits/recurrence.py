@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from saltus.analysis.orbits.growth import NEWTON, tangent_cost
 from saltus.analysis.orbits.orbits import OrbitBatch, find_orbits
 from saltus.flow.maps import Map
 
@@ -33,7 +34,7 @@ def recurrence(points: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def recurring_orbits(
-    map_: Map, points: np.ndarray, scale: np.ndarray, near: float
+    map_: Map, points: np.ndarray, scale: np.ndarray, near: float, purse: np.ndarray | None = None
 ) -> tuple[OrbitBatch, np.ndarray, np.ndarray]:
     """The orbits of trajectories that nearly recur.
 
@@ -48,6 +49,9 @@ def recurring_orbits(
     near : float
         Recurrence that is worth a try by Newton's method; more where errors of the map keep orbits
         from closing.
+    purse : float64[k], optional
+        What closing orbits may cost [iterates]. What it costs is taken off; a trajectory that can't
+        pay isn't tried.
 
     Returns
     -------
@@ -58,7 +62,10 @@ def recurring_orbits(
     """
     period, apart = recurrence(points, scale)
     noise, result = map_.noise_of(scale), OrbitBatch.none(len(points), points.shape[2])
-    ready = np.flatnonzero(apart < np.maximum(near, noise))
+    price = NEWTON * period * tangent_cost(points.shape[2])
+    purse = np.full(len(points), np.inf) if purse is None else purse
+    ready = np.flatnonzero((apart < np.maximum(near, noise)) & (price <= purse))
+    purse[ready] -= price[ready]
     result.put(
         ready,
         find_orbits(map_.rows(ready), points[ready, -1], period[ready], scale[ready], noise[ready]),

@@ -72,7 +72,10 @@ def frequency_response(
     method : Method
         Default :class:`saltus.Taylor`.
     periods : int
-        Forcing periods after which a trajectory that hasn't settled is looked at for chaos.
+        Forcing periods after which a trajectory that hasn't settled is looked at for chaos. It
+        bounds the work: closing orbits and measuring exponents may each cost ten times as many
+        periods of the motion. What isn't typed by then is ``not_repeating``; more periods spend
+        more on it, and :func:`saltus.lyapunov` tells all exponents of one motion.
     seed : int
         Of random starts.
     threads : int, optional
@@ -102,7 +105,8 @@ def frequency_response(
     ParameterError, UnitError
         If an argument can't be used.
     Interrupted
-        On Ctrl-C; its ``partial`` is the Dataset of what was finished.
+        On Ctrl-C; its ``partial`` is the Dataset of the frequencies and starts that were finished;
+        the others are of type ``not_computed``.
 
     References
     ----------

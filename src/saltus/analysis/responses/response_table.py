@@ -51,13 +51,14 @@ def respond(
         found = find(grid, method, periods, threads, stage(show, 0.0, 0.4) if unstable else show)
         if not found.complete:
             raise Interrupted(lambda: part(found, threads, sample, wanted))
-        if not unstable:
-            return part(found, threads, sample, wanted)
         try:
+            if not unstable:
+                return part(found, threads, sample, wanted)
             more = continued(found, grid, method, wanted, threads, stage(show, 0.4, 0.95))
+            return part(found, threads, sample, wanted, more)
         except KeyboardInterrupt:
+            found.complete = False  # the responses are known, their branches aren't
             raise Interrupted(lambda: part(found, threads, sample, wanted)) from None
-        return part(found, threads, sample, wanted, more)
 
 
 def _dataset(

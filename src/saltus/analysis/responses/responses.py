@@ -18,6 +18,7 @@ from saltus.analysis.outputs import Outputs
 from saltus.analysis.responses.grid import Grid
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
+from saltus.flow.progress import stage
 from saltus.intervals import wilson
 from saltus.results import AttractorTable
 from saltus.results.dataset.kinds import CLOSED, Kind
@@ -130,7 +131,8 @@ def _sweep(
     """Each start along the axis: where it stands at one value is where it starts at the next."""
     count = len(grid.starts)
     for k in range(grid.places):
-        for way in dict.fromkeys(grid.sweeps):
+        ways = list(dict.fromkeys(grid.sweeps))
+        for n, way in enumerate(ways):
             who = np.array([i for i, sweep in enumerate(grid.sweeps) if sweep == way])
             place, before = (k, k - 1) if way == "up" else (grid.places - 1 - k, grid.places - k)
             start = result.end[before * count + who] if k else grid.starts[who]
@@ -142,6 +144,7 @@ def _sweep(
                     np.where(np.isfinite(start), start, 0.0),
                     most,
                     threads,
+                    stage(progress, (k + n / len(ways)) / grid.places, (k + 1) / grid.places),
                 ),
             )
         if progress:

@@ -20,6 +20,8 @@ class Kind(IntEnum):
     LIMIT_CYCLE = 4
     #: An orbit that errors of the method keep from closing.
     NOISY_PERIODIC = 5
+    #: It hasn't repeated, and what was spent on its exponent didn't tell what it is.
+    NOT_REPEATING = 6
     ESCAPED = -1
     UNCONVERGED = -2
     FAILED = -3
@@ -47,6 +49,12 @@ WITHOUT: Mapping[Kind, str] = {
     Kind.FAILED: "failed: they begin beyond a stop or ended early, and status says why",
     Kind.NOT_COMPUTED: "weren't computed: the run was stopped",
 }
+#: What was left out where motions were not typed, and what pays for it, as the end of a sentence.
+OPEN = (
+    "haven't repeated, and their exponents don't say yet whether they are quasi-periodic or "
+    "chaotic: numbers are those of 64 periods. A larger periods= spends more on it; sl.lyapunov "
+    "tells all exponents of one."
+)
 #: The words for them by their codes.
 WITHOUT_WORDS = {int(kind): kind.word for kind in WITHOUT}
 

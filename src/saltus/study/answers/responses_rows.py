@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.results.dataset.kinds import sentences
+from saltus.results.dataset.kinds import OPEN, Kind, sentences
 from saltus.results.dataset.schema import (
     event_name,
     parameters_of,
@@ -110,6 +110,9 @@ def _notes(ds: xr.Dataset, more: int) -> tuple[str, ...]:
     ]
     if more:
         notes.append(f"{more} shorter branches are in the file.")
+    left = int((ds["response_type"].values == Kind.NOT_REPEATING.word).sum())
+    if left:
+        notes.append(f"{left} responses {OPEN}")
     return (*notes, *sentences(of))
 
 

@@ -1,0 +1,90 @@
+"""How fast small deviations from a motion grow, and what it costs to measure that.
+
+Costs are counted in iterates of the motion itself. D + 1 of them is what an iterate of the tangent
+flow costs, which carries D deviations of D states. Of many states the distance from a neighbour is
+measured instead, which costs two, and compiles nothing. Both are renormalised at every block:
+Benettin, Galgani & Strelcyn, Phys. Rev. A 14 (1976) 2338-2345; Benettin, Galgani, Giorgilli &
+Strelcyn, Meccanica 15 (1980) 9-20.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from saltus.flow.maps import Map, Stroboscope
+
+#: Iterates of one block, and blocks of one measurement.
+BLOCK, BLOCKS = 8, 192
+#: Part of a measurement in which the direction finds its way: 1 in so many blocks.
+ALIGNING = 4
+#: Most states whose deviations the tangent flow carries: it costs up to 5 times the motion.
+MOST_STATES = 4
+#: Distance of a neighbour, in units of the scale. Rounding is 1e-8 of it; growth by 1e7 in a block
+#: still is that of a small deviation.
+APART = 1e-8
+#: Iterates of the tangent flow that closing an orbit of period 1 takes, its multipliers included.
+NEWTON = 5
+#: What telling the kind of a motion may cost at most, in multiples of the iterates that it was
+#: followed for: four measurements of a motion of two states.
+BUDGET = 10
+
+
+def tangent_cost(size: int) -> int:
+    """What an iterate of the tangent flow of so many states costs [iterates]."""
+    return 1 + size
+
+
+def growth_cost(map_: Map, size: int) -> int:
+    """What growth over an iterate costs [iterates]."""
+    return 2 if by_neighbours(map_, size) else tangent_cost(size)
+
+
+def by_neighbours(map_: Map, size: int) -> bool:
+    """Whether growth is that of the distance from a neighbour: with many states, errors of rounding
+    only, and no law at a contact, which could take a neighbour for a start behind its wall.
+    """
+    return (
+        size > MOST_STATES
+        and isinstance(map_, Stroboscope)
+        and map_.exact
+        and all(guard.law is None for guard in map_.system.guards)
+    )
+
+
+def growth_rates(
+    map_: Map, start: np.ndarray, scale: np.ndarray, blocks: int = BLOCKS
+) -> tuple[np.ndarray, np.ndarray]:
+    """Ends float64[k, D] of trajectories, and growth rates per iterate of their largest direction,
+    block by block, float64[blocks, k]: those after it has found its way.
+    """
+    stretched = _neighbours if by_neighbours(map_, start.shape[1]) else _tangents
+    state, direction, growths = start, scale / math.sqrt(start.shape[1]), []
+    for _ in range(blocks):
+        state, image = stretched(map_, state, direction)
+        length = np.linalg.norm(image / scale, axis=1)
+        with np.errstate(all="ignore"):
+            growths.append(np.log(length) / BLOCK)
+            direction = image / length[:, None]
+    return state, np.array(growths[blocks // ALIGNING :])
+
+
+def _tangents(map_: Map, start: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where a block leads from float64[k, D], and what becomes of a direction of each."""
+    k, size = start.shape
+    directions = np.zeros((k, size, size))
+    directions[:, :, 0] = direction
+    state, image = map_.tangent(start, BLOCK, directions)
+    return state, image[:, :, 0]
+
+
+def _neighbours(
+    map_: Map, start: np.ndarray, direction: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """As :func:`_tangents`, by the distance from a neighbour."""
+    k = len(start)
+    pairs = map_.rows(np.tile(np.arange(k), 2))
+    both = np.concatenate([start, start + APART * direction])
+    ends = pairs.launch(both, BLOCK).advance(BLOCK)[:, -1]
+    return ends[:k], (ends[k:] - ends[:k]) / APART
