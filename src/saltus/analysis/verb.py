@@ -218,6 +218,8 @@ def _instead(
             f"It is a state of {system.name}: give it by "
             f"start={{{', '.join(f'{state!r}: ...' for state in system.states)}}}."
         )
+    if word.rstrip("s") in known:  # one letter too many
+        return nearest(word, known)
     there = _ELSEWHERE.get(word.lower(), f"{word}=" if word in _LENGTHS else "")
     if there.partition("=")[0] in known:
         return f"Write {there}."

@@ -63,6 +63,12 @@ def scaled_gap(lanes, lane, g, h, slow):
             slow.q[k] = slow.q[k + known]
         for k in range(ORDER + 1 - known, ORDER + 1):
             slow.q[k] = 0.0
+    return rounding_at(lanes, lane, g)
+
+
+@inner
+def rounding_at(lanes, lane, g):
+    """Rounding error of a gap at the start of the step."""
     return ROUNDING * (lanes.work[SCALE_ROW + g, lane] + lanes.prior[PRIOR_ROWS * g + OLD, lane])
 
 
@@ -599,7 +605,7 @@ def land_all(lanes, lane, batch, hits, slow):
             if (
                 d == 0.0
                 and lanes.fresh[g, lane] < 0.5
-                and past > ROUNDING * lanes.work[SCALE_ROW + g, lane]
+                and past > rounding_at(lanes, lane, g)
             ):
                 if arrived:
                     batch.counters[who, VIOLATIONS] += 1

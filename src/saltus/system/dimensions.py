@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 from saltus.errors import UnitError
 from saltus.system.declared import FRICTION, Declared, Jump
 from saltus.system.expression import ELEMENTARY, Expr, walk
+from saltus.system.reduction import free_field
 from saltus.system.roots import with_root
 from saltus.system.text import PI_MULTIPLES
 from saltus.units import dimension, unit_text
@@ -256,7 +257,7 @@ def gap_units(system: System) -> list[str]:
 @lru_cache(maxsize=256)  # the same for all values, and as long to find as a short run
 def _gap_units(system: System) -> tuple[str, ...]:
     gaps = [with_root(guard.gap) for guard in system.guards]
-    found = units_of(system.states, system.units, system.field, gaps)
+    found = units_of(system.states, system.units, free_field(system.field, system.guards), gaps)
     return tuple(
         unit if guard.state is None else system.units[guard.state]
         for guard, unit in zip(system.guards, found, strict=True)
