@@ -118,3 +118,27 @@ def test_a_large_batch_violates_nothing():
     assert set(run.status.values.tolist()) <= {"ok", "graze_unresolved"}
     # no graze within rounding among them
     assert run.sizes["contact"] == int(run.events.sum() + run.grazes.sum())
+
+
+def test_a_side_that_lies_ends_the_run():
+    """A trajectory that is taken up on the wrong side of a boundary, or as standing on one that is
+    far away, isn't followed by equations that aren't its own.
+    """
+    from saltus.flow.flight import Flight
+    from saltus.kernels import status as st
+
+    system = sl.models.impact_oscillator()
+    rig = sl.models.delangre("b")
+    for model, lie in ((rig, "mode"), (system, "mode"), (system, "fresh")):
+        start = np.zeros((2, 2)) + [[-1e-5, 0.0], [-2e-5, 0.0]]
+        values = np.array([list(model.values.values())])
+        flight = Flight(model, sl.Taylor(), start, values, np.full(2, model.period()), 10)
+        flight.advance(1)
+        assert flight.status.tolist() == [st.OK, st.OK]
+        if lie == "mode":
+            flight._arrays["mode"][1] ^= 1
+        else:
+            flight._arrays["carry"][1, -len(model.guards)] = 1.0
+        flight.advance(1)
+        assert flight.status.tolist() == [st.OK, st.MODE_VIOLATION]
+        assert st.STATUS[st.MODE_VIOLATION][0] == "mode_violation"
