@@ -130,7 +130,7 @@ def test_a_side_that_lies_ends_the_run():
     system = sl.models.impact_oscillator()
     rig = sl.models.delangre("b")
     for model, lie in ((rig, "mode"), (system, "mode"), (system, "fresh")):
-        start = np.zeros((2, 2)) + [[-1e-5, 0.0], [-2e-5, 0.0]]
+        start = np.array([[-1e-5, 0.0], [-2e-5, 0.0]])
         values = np.array([list(model.values.values())])
         flight = Flight(model, sl.Taylor(), start, values, np.full(2, model.period()), 10)
         flight.advance(1)

@@ -316,6 +316,7 @@ def _columns(system: System, start: Any) -> dict[str, np.ndarray]:
                 f"{system.name} has no state {shown(unknown[0])}. "
                 f"{nearest(unknown[0], system.states)}"
             )
+        start = {**dict.fromkeys(_made(system), 0.0), **start}
         missing = [name for name in system.states if name not in start]
         if missing:
             raise ParameterError(
@@ -324,6 +325,8 @@ def _columns(system: System, start: Any) -> dict[str, np.ndarray]:
             )
         return {name: _numbers(system, name, start[name]) for name in system.states}
     rows = start if isinstance(start, np.ndarray) else _as_array(start)
+    if system.made and rows.shape and rows.shape[-1] == len(system.states) - system.made:
+        rows = np.concatenate([rows, np.zeros((*rows.shape[:-1], system.made))], axis=-1)
     if rows.shape == () or rows.shape[-1] != len(system.states) or rows.ndim > 2:
         this = f"has shape {rows.shape}" if rows.shape else f"is {shown(start)}"
         drawn = (
@@ -338,6 +341,11 @@ def _columns(system: System, start: Any) -> dict[str, np.ndarray]:
             f"this one {this}.{drawn}"
         )
     return {name: _numbers(system, name, rows[..., i]) for i, name in enumerate(system.states)}
+
+
+def _made(system: System) -> tuple[str, ...]:
+    """The states that elements with a memory have brought."""
+    return system.states[len(system.states) - system.made :]
 
 
 def _as_array(start: Any) -> np.ndarray:

@@ -602,11 +602,7 @@ def land_all(lanes, lane, batch, hits, slow):
             past = -lanes.side[g, lane] * lanes.work[GAP_ROW + g, lane]
             if LAWS and meet(lanes, lane, batch, g, rate, slow):
                 continue
-            if (
-                d == 0.0
-                and lanes.fresh[g, lane] < 0.5
-                and past > rounding_at(lanes, lane, g)
-            ):
+            if d == 0.0 and lanes.fresh[g, lane] < 0.5 and past > rounding_at(lanes, lane, g):
                 if arrived:
                     batch.counters[who, VIOLATIONS] += 1
                     return MODE_VIOLATION

@@ -24,6 +24,7 @@ from saltus.models.chattering_pair import chattering_pair
 from saltus.models.delangre import delangre
 from saltus.models.den_hartog import den_hartog
 from saltus.models.double_scroll import double_scroll
+from saltus.models.drifting_oscillator import drifting_oscillator
 from saltus.models.dropped_oscillator import dropped_oscillator
 from saltus.models.dry_friction import dry_friction
 from saltus.models.falling_ball import falling_ball
@@ -31,8 +32,11 @@ from saltus.models.gear_pair import gear_pair
 from saltus.models.hertz_stop import hertz_stop
 from saltus.models.impact_oscillator import impact_oscillator
 from saltus.models.jeffcott_rotor import jeffcott_rotor
+from saltus.models.jenkins_oscillator import jenkins_oscillator
+from saltus.models.latch import latch
 from saltus.models.one_sided_spring import one_sided_spring
 from saltus.models.painleve_rod import painleve_rod
+from saltus.models.play import play
 from saltus.models.pulled_pair import pulled_pair
 from saltus.models.relief_valve import relief_valve
 from saltus.models.rocking_block import rocking_block
@@ -82,6 +86,10 @@ MODELS: dict[str, Callable[..., System]] = {
         shaken_belt,
         pulled_pair,
         chattering_pair,
+        play,
+        jenkins_oscillator,
+        latch,
+        drifting_oscillator,
     )
 }
 

@@ -44,6 +44,7 @@ from saltus.system.functions import (
 from saltus.system.guards import Guard
 from saltus.system.inputs import pulse, recorded, sawtooth, square
 from saltus.system.laws import flores, freeplay, hertz, hunt_crossley, lankarani_nikravesh
+from saltus.system.memory import iwan, play, slider
 from saltus.system.regularisation import regularise
 from saltus.system.rotors import clearance
 from saltus.system.structures import Contact, Force, structure
@@ -54,9 +55,10 @@ from saltus.system.trace import system
 __all__ = [
     "Contact", "Force", "Guard", "System", "abs", "acos", "asin", "atan", "atan2", "clearance",
     "clip", "cos", "cosh", "exp", "flores", "freeplay", "friction", "heaviside", "hertz",
-    "hunt_crossley", "hypot", "impact", "jump", "lankarani_nikravesh", "log", "max",
-    "min", "mod", "pi", "piecewise", "pulse", "recorded", "regularise", "sawtooth", "sign", "sin",
-    "sinh", "sqrt", "square", "structure", "system", "table", "tan", "tanh", "where",
+    "hunt_crossley", "hypot", "impact", "iwan", "jump", "lankarani_nikravesh", "log", "max",
+    "min", "mod", "pi", "piecewise", "play", "pulse", "recorded", "regularise", "sawtooth", "sign",
+    "sin", "sinh", "slider", "sqrt", "square", "structure", "system", "table", "tan", "tanh",
+    "where",
 ]  # fmt: skip
 
 

@@ -106,8 +106,10 @@ _ADVICE: dict[str, str] = {
     "stability": "Attractors, orbits and branches hold their multipliers; sl.lyapunov gives "
         "exponents.",
     "cellmapping": "Write sl.basins(system, x=(low, high, number), v=(low, high, number)).",
-    **dict.fromkeys(("boucwen", "hysteresis", "jenkins", "iwan", "play"),
-        "Write its state as one more state of the equation, and its rate by sl.piecewise."),
+    **dict.fromkeys(("hysteresis", "jenkins", "masing", "prandtl"),
+        "Write sl.slider(x, stiffness=..., limit=...), sl.iwan(x, stiffnesses=..., limits=...) or "
+        "sl.play(x, gap=...)."),
+    "boucwen": "Write its state as one more state of the equation.",
     **dict.fromkeys(("coulomb", "stribeck", "dryfriction"),
         "Write sl.friction(v, slip=..., stick=...)."),
     **dict.fromkeys(("gap", "stop", "spring", "backlash", "deadzone", "deadband"),

@@ -22,6 +22,7 @@ from saltus.system.clocks import mod
 from saltus.system.expression import Condition
 from saltus.system.inputs import pulse, sawtooth, square
 from saltus.system.laws import flores, freeplay, hertz, hunt_crossley, lankarani_nikravesh
+from saltus.system.memory import play, slider
 from saltus.system.names import why_no_name
 from saltus.system.tables import Table, look_up
 
@@ -61,7 +62,8 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     **{name: getattr(functions, name) for name in _SIMPLE},
     **{name: getattr(compositions, name) for name in _COMPOSED},
     "freeplay": freeplay, "hertz": hertz, "hunt_crossley": hunt_crossley,
-    "lankarani_nikravesh": lankarani_nikravesh, "flores": flores, "mod": mod,
+    "lankarani_nikravesh": lankarani_nikravesh, "flores": flores, "mod": mod, "play": play,
+    "slider": slider,
     "square": square, "sawtooth": sawtooth, "pulse": pulse,
 }  # fmt: skip
 _CONSTANTS = {"pi": functions.pi}

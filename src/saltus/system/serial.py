@@ -65,6 +65,7 @@ def to_dict(system: System) -> dict[str, Any]:
         "source": system.source,
         "values": dict(system.values),
         "units": dict(system.units),
+        **({"made": system.made} if system.made else {}),
         **_equations(system),
     }
 
@@ -258,6 +259,8 @@ def _read(data: Mapping[str, Any]) -> dict[str, Any]:
     _require(
         data["forced_at"] is None or data["forced_at"] in parameters, "forced_at is no parameter"
     )
+    made = data.get("made", 0)
+    _require(type(made) is int and 0 <= made < len(states) + 1, "its made states are no number")
     return {
         "name": data["name"],
         "description": data["description"],
@@ -270,6 +273,7 @@ def _read(data: Mapping[str, Any]) -> dict[str, Any]:
         "forced_at": data["forced_at"],
         "field": field,
         "guards": guards,
+        "made": made,
     }
 
 

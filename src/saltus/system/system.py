@@ -45,6 +45,9 @@ class System:
     tangent_of : System or None
         The system whose variational equations this one carries (see tangent.py); None for any
         other.
+    made : int
+        How many of the last states elements with a memory have brought (see memory.py); a start
+        that doesn't give them is zero.
     """
 
     name: str
@@ -57,6 +60,7 @@ class System:
     source: str = ""
     description: str = ""
     tangent_of: System | None = None
+    made: int = 0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "values", Values(self.values))

@@ -36,6 +36,7 @@ from saltus.system.expression import TIME, Expr, as_expr, observed, parameter, s
 from saltus.system.foreign import OWN_FUNCTIONS
 from saltus.system.formula import Equations, Formula
 from saltus.system.guards import expressions_of
+from saltus.system.memory import Element, elements, rates_of
 from saltus.system.names import why_no_name, why_no_text, why_no_title, why_not_together
 from saltus.system.system import System
 from saltus.units import check_declared, coherent_unit
@@ -209,18 +210,21 @@ def system(
         }
         with working(lambda: f"tracing {title}"):
             dimensions = DimensionCheck(names, known_units) if check_units else None
-            field, found = _traced(function, names, tuple(defaults), title, dimensions)
+            field, found, remembered = _traced(
+                function, names, tuple(defaults), title, dimensions, known_units
+            )
             _warn_of_unused(field, found, defaults, forced_at, title)
             made = System(
                 name=title,
-                states=names,
+                states=(*names, *remembered),
                 field=field,
                 guards=found,
                 values=values,
-                units=known_units,
+                units={**known_units, **remembered},
                 forced_at=forced_at,
                 source=source,
                 description=description,
+                made=len(remembered),
             )
             return with_guard_names(made, guards) if guards else made
 
@@ -359,26 +363,44 @@ def _traced(
     parameters: tuple[str, ...],
     title: str,
     dimensions: DimensionCheck | None,
-) -> tuple[Any, Any]:
-    """Field and guards."""
+    units: Mapping[str, str],
+) -> tuple[Any, Any, dict[str, str]]:
+    """Field and guards; the states that elements with a memory bring, with their units."""
     try:
-        with observed(dimensions), declarations() as made:
+        with observed(dimensions), declarations() as made, elements() as remembered:
             derivatives, laws = _called(function, states, parameters)
         _check_returned(made, laws)
+        _check_elements(remembered, (*states, *parameters))
         if not isinstance(function, Formula | Equations):
-            with observed(None), declarations():
+            with observed(None), declarations(), elements():
                 _check_same((derivatives, laws), _called(function, states, parameters))
         if dimensions is not None:
             dimensions.check_rates(derivatives)
             for law in laws:
                 dimensions.check_law(law)
+        derivatives += rates_of(remembered, states, derivatives).values()
     except Exception as error:
         kind = UnitError if isinstance(error, UnitError) else TraceError
         raise kind(explained(error, function, title)) from error
+    own = {
+        one.name: units.get(one.x.payload, "") if one.x.op == "state" else "" for one in remembered
+    }
     try:
-        return find_contacts(derivatives, laws, states)
+        return *find_contacts(derivatives, laws, (*states, *own)), own
     except TraceError as error:
         raise TraceError(f"{title} ({place(function)}): {error}") from error
+
+
+def _check_elements(made: Sequence[Element], known: Sequence[str]) -> None:
+    """Raise a TraceError for the state of an element that has the name of another state, or of a
+    parameter.
+    """
+    for one in made:
+        if one.name in known:
+            raise TraceError(
+                f"an element with a memory would bring a state {one.name!r}, and there is one of "
+                f"this name, or a parameter. Give the element another: name='...'."
+            )
 
 
 def _called(
