@@ -184,3 +184,49 @@ def test_an_older_processor_gives_the_same_bits(processor, lanes):
         command, env=environment, capture_output=True, text=True, check=True
     ).stdout
     assert json.loads(said.splitlines()[-1]) == here
+
+
+SHORT = """
+import os, sys, time
+import saltus as sl
+from saltus.codegen import kernels
+
+kernels.STEADY_AFTER = 0.0
+force = lambda x: sl.piecewise((9.5 * x, x > 0.25), otherwise=0)
+system = sl.system(states="x v")(lambda t, x, v: (v, -x - force(x)))
+method = sl.Taylor(lanes=2)
+flow = method.kernels(system.origin)
+print(flow.tier)
+sl.simulate(system, (1.0, 0.0), t_end=9.0, method=method)
+if sys.argv[1:]:  # until its order is written, and not a moment longer
+    from saltus.codegen import building
+
+    while not os.path.exists(sys.argv[1]):
+        time.sleep(0.01)
+    os._exit(0)
+"""
+
+
+def test_what_a_short_process_began_to_compile_serves_the_next(tmp_path):
+    """A process that ends while its full tier is compiled: the next begins with that."""
+    begun, kept = tmp_path / "begun", tmp_path / "cache"
+    wrapper = f"""
+import saltus.codegen.building as building
+
+given = building._given
+building._given = lambda order: (given(order), open({str(begun)!r}, "w").close())[0]
+"""
+    environment = {**os.environ, "SALTUS_CACHE": str(kept)}
+
+    def run(*arguments):
+        command = [sys.executable, "-c", wrapper + SHORT, *arguments]
+        return subprocess.run(
+            command, env=environment, capture_output=True, text=True, timeout=300, check=True
+        ).stdout.split()[0]
+
+    assert run(str(begun)) == GENERIC
+    generic, end = len(list(kept.glob("*.kernel"))), time.monotonic() + 300
+    while len(list(kept.glob("*.kernel"))) == generic:
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    assert run() == FULL

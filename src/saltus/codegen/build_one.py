@@ -1,7 +1,7 @@
 """Compile one object: what a process does that another one started for it (building.py).
 
 Reads ``[template, texts, called symbols, target, whether sizes are open]`` as JSON from standard
-input; writes the object to standard output.
+input; writes the object to standard output, or, given a key and a title, to the cache.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import json
 import os
 import sys
 
+from saltus import cache
 from saltus.codegen import building, machine
 from saltus.codegen.asker import end_with_asker
 
@@ -19,9 +20,10 @@ if __name__ == "__main__":
     os.dup2(2, 1)  # what anything prints is no part of the answer
     template, texts, called, target, open_sizes = json.load(sys.stdin)
     code = building.bitcode(template) if template else None
+    made = machine.object_code(
+        code, texts, frozenset(called), machine.Target(*target), open_sizes=open_sizes
+    )
+    if sys.argv[1:]:
+        cache.keep(*sys.argv[1:3], made)
     with answer:
-        answer.write(
-            machine.object_code(
-                code, texts, frozenset(called), machine.Target(*target), open_sizes=open_sizes
-            )
-        )
+        answer.write(made)

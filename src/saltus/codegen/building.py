@@ -122,6 +122,18 @@ def built(order: Order) -> bytes:
         return found
 
 
+def built_to_keep(order: Order) -> bytes:
+    """As :func:`built`, by a process that goes on when this one ends: what took a while to be worth
+    it stands on disk for the next, however short this one was.
+    """
+    with _held(_LOCKS[order.key]):
+        found = _OBJECTS.get(order.key) or cache.read(order.key)
+        if found is None:
+            _kept_elsewhere(order)
+            found = cache.read(order.key)
+    return built(order) if found is None else found
+
+
 def made(order: Order) -> bytes:
     """Compile in this process."""
     template = bitcode(order.template) if order.template else None
@@ -185,22 +197,45 @@ def _made_elsewhere(order: Order) -> bytes | None:
     Interrupted
         If the work that this thread does a part of was asked to stop.
     """
+    return _answer_of("saltus.codegen.build_one", (), _given(order), order.title)
+
+
+def _kept_elsewhere(order: Order) -> None:
+    """Compile and store in a process of its own, which nobody ends; returns when it has ended."""
+    with contextlib.suppress(OSError), tempfile.TemporaryFile() as file:
+        file.write(_given(order))
+        file.seek(0)
+        process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "saltus.codegen.build_one", order.key, order.title],
+            stdin=file, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            env=_environment(), start_new_session=True,
+        )  # fmt: skip
+        process.wait()
+
+
+def _given(order: Order) -> bytes:
+    """An order as build_one.py reads it."""
     if order.template:
         bitcode(order.template)  # made first if it isn't current
-    given = json.dumps(
-        [order.template, order.texts, order.called, machine.target(), order.open_sizes]
+    target = machine.target()
+    return json.dumps(
+        [order.template, order.texts, order.called, target, order.open_sizes]
     ).encode()
-    return _answer_of("saltus.codegen.build_one", (), given, order.title)
+
+
+def _environment() -> dict[str, str]:
+    """The environment of a process that imports this saltus."""
+    path = os.pathsep.join(
+        [str(Path(__file__).parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])]
+    )
+    return {**os.environ, "PYTHONPATH": path}
 
 
 def _answer_of(module: str, options: tuple[str, ...], given: bytes, title: str) -> bytes | None:
     """What a module writes when it is run by another process and given these bytes; None if there
     is none, or it doesn't succeed.
     """
-    path = os.pathsep.join(
-        [str(Path(__file__).parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])]
-    )
-    environment = {**os.environ, "PYTHONPATH": path, PARENT_ID: str(os.getpid())}
+    environment = {**_environment(), PARENT_ID: str(os.getpid())}
     process: subprocess.Popen | None = None
     try:
         # a pipe is full after 64 kB, and communicate() doesn't go on filling it after a timeout

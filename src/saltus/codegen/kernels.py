@@ -8,7 +8,8 @@ generic   the templates' machine code serves all equations and is on disk; only 
 full      sizes, tables and the equation are known to the compiler: one piece of code
 
 A flow begins generic. After `STEADY_AFTER` seconds of work another process compiles the full tier,
-stores it on disk, and the flow changes to it between two calls. The next process begins with it.
+stores it on disk, and the flow changes to it between two calls. The next process begins with it:
+also where this one has ended before, for the one that compiles goes on.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ import numpy as np
 
 from saltus import cache
 from saltus.codegen import machine, templates
-from saltus.codegen.building import Order, built
+from saltus.codegen.building import Order, built, built_to_keep
 from saltus.codegen.head import Constant, Head
 from saltus.codegen.interface import BATCH, Interface
 from saltus.codegen.lane_ir import constants_ir, equation_ir
@@ -35,7 +36,7 @@ GENERIC, FULL = TIERS = ("generic", "full")
 #: Final tier of a flow.
 STEADY = FULL
 #: Seconds of work before the full tier is compiled: that takes some three seconds of another
-#: processor, and gains a tenth.
+#: processor, and gains a tenth (the rig) to a half (five modes with two stops).
 STEADY_AFTER = 2.0
 #: Constants that the generic code knows too: loops over them are unrolled.
 _BAKED = (
@@ -214,7 +215,7 @@ class Kernels:
         no result.
         """
         with contextlib.suppress(Exception):
-            self.exchange(STEADY)
+            self._begin(STEADY, [built_to_keep(order) for order in self._orders(STEADY)])
 
     def _begin(self, tier: str, objects: list[bytes]) -> None:
         loaded = machine.loaded(objects, f"saltus_{self.interface.entry}")

@@ -76,7 +76,7 @@ class Taylor(Method):
         """With few lanes for few trajectories, unless the user has chosen."""
         return (
             replace(self, lanes=min(SMALL_BATCH, lane_width()))
-            if self.lanes is None and count <= SMALL_BATCH
+            if self.lanes is None and count <= 2 * SMALL_BATCH
             else self
         )
 

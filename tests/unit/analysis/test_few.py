@@ -32,8 +32,9 @@ def falling(length: str) -> sl.System:
 
 
 def test_few_trajectories_take_few_lanes_unless_the_user_chose():
-    assert sl.Taylor().suited_to(SMALL_BATCH) == sl.Taylor(lanes=min(SMALL_BATCH, lane_width()))
-    assert sl.Taylor().suited_to(SMALL_BATCH + 1) == sl.Taylor()
+    for count in (1, SMALL_BATCH, 2 * SMALL_BATCH):  # twice four cost less than half of sixteen
+        assert sl.Taylor().suited_to(count) == sl.Taylor(lanes=min(SMALL_BATCH, lane_width()))
+    assert sl.Taylor().suited_to(2 * SMALL_BATCH + 1) == sl.Taylor()
     assert sl.Taylor(lanes=16).suited_to(1) == sl.Taylor(lanes=16)
     assert sl.ODE45().suited_to(1) == sl.ODE45()
 
