@@ -23,7 +23,7 @@ if __name__ == "__main__":
     made = machine.object_code(
         code, texts, frozenset(called), machine.Target(*target), open_sizes=open_sizes
     )
-    if sys.argv[1:]:
-        cache.keep(*sys.argv[1:3], made)
+    if len(sys.argv) > 2:
+        cache.keep(sys.argv[1], sys.argv[2], made)
     with answer:
         answer.write(made)
