@@ -194,16 +194,18 @@ def press_when(event):
 def test_work_inside_a_piece_of_work_ends_too(inner):
     """A piece that would go on for ever: what it calls is asked to stop, at whatever depth."""
     rig = sl.models.delangre("b", force="4 N", frequency="15 Hz")
-    begun, ended = threading.Event(), []
+    begun, running, ended = threading.Event(), set(), []
 
-    def endless(_):
+    def endless(item):
         flight = Stroboscope(rig, sl.Taylor()).launch(np.array([[1e-3, 0.0]]), 1e9)
         while True:
             if inner == "a flight":
                 flight.advance(1000)
             else:
                 sl.stroboscope(rig, START, periods=200, keep=1, progress=False)
-            begun.set()
+            running.add(item)
+            if len(running) == 2:  # a piece that hasn't begun never does
+                begun.set()
 
     def work(item):
         try:

@@ -88,6 +88,7 @@ def bifurcation_diagram(
             if not one.name and "point_branch" in one.ds:
                 named |= _continued(panel, one, state, across, scale, events)
         _frame(panel, datasets, variables, state, scale, across)
+        points.say_if_empty(panel, datasets)
         if events:
             points.draw_events(
                 panel, [one for one in datasets if "point_branch" not in one.ds], across

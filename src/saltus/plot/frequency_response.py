@@ -110,6 +110,7 @@ def frequency_response(
                 marks[datasets[0].axis].values * across.factor,
                 marks["amplitude"].values * up.factor,
             )
+        points.say_if_empty(panel, datasets)
         if quantity in _SIZES:
             panel.set_ylim(bottom=0)
         if quantity == "phase":

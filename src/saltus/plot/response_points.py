@@ -17,6 +17,7 @@ from saltus.errors import ParameterError
 from saltus.plot import motion_colors
 from saltus.plot.picture import caller, check
 from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
+from saltus.results.dataset.kinds import WITHOUT_WORDS
 from saltus.results.dataset.schema import RESPONSES, event_name, parameters_of, response_name
 
 #: What a picture of responses takes: a Dataset, or several by their names.
@@ -280,6 +281,21 @@ def _raise_titles(ax: Axes) -> None:
         [" "],
     )
     top.minorticks_off()
+
+
+def say_if_empty(ax: Axes, datasets: Sequence[Shown]) -> None:
+    """Where there is nothing to draw, say so in the picture, and what became of the starts."""
+    if any(one.ds.sizes["response"] for one in datasets):
+        return
+    labels = np.concatenate([one.ds["response_of"].values.ravel() for one in datasets])
+    ends = [
+        f"{count} {WITHOUT_WORDS[code].replace('_', ' ')}"
+        for code in sorted(WITHOUT_WORDS, reverse=True)
+        if (count := int(np.count_nonzero(labels == code)))
+    ]
+    values = sum(one.ds.sizes[one.axis] for one in datasets)
+    text = f"no response at any of {values} values" + (f":\n{', '.join(ends)}" if ends else "")
+    ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center")
 
 
 def legend(ax: Axes, named: Mapping[str, Any], left: float = 1.02) -> None:

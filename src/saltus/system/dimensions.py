@@ -122,6 +122,10 @@ class DimensionCheck:
             else unit_text(found)
         )
 
+    def declared(self, node: Expr) -> str:
+        """As :meth:`unit`, and ``"1"`` of what is known to be a plain number."""
+        return "1" if self._dimension(node) == _PLAIN else self.unit(node)
+
     # -- one node ----------------------------------------------------------------------------------
     def _dimension(self, node: Expr) -> Dimension | None:
         self(node)

@@ -382,13 +382,21 @@ def _traced(
     except Exception as error:
         kind = UnitError if isinstance(error, UnitError) else TraceError
         raise kind(explained(error, function, title)) from error
-    own = {
-        one.name: units.get(one.x.payload, "") if one.x.op == "state" else "" for one in remembered
-    }
+    own = {one.name: _unit_of(one.x, states, units, dimensions) for one in remembered}
     try:
         return *find_contacts(derivatives, laws, (*states, *own)), own
     except TraceError as error:
         raise TraceError(f"{title} ({place(function)}): {error}") from error
+
+
+def _unit_of(
+    x: Expr, states: Sequence[str], units: Mapping[str, str], dimensions: DimensionCheck | None
+) -> str:
+    """Unit of what drives an element; of a system without units that of all its states."""
+    if x.op == "state" and x.payload in units:
+        return units[x.payload]
+    plain = "1" if all(units[name] == "1" for name in states) else ""
+    return (dimensions.declared(x) if dimensions is not None else "") or plain
 
 
 def _check_elements(made: Sequence[Element], known: Sequence[str]) -> None:

@@ -453,3 +453,16 @@ def test_lines_of_stable_orbits_end_where_stability_does():
     assert axes.get_ylabel() == "frequency [Hz]"
     heights = np.concatenate([line.get_ydata() for line in axes.lines if line.get_gid()])
     assert heights[np.isfinite(heights)] == pytest.approx(17.0)
+
+
+def test_an_empty_picture_says_why():
+    @sl.system(states="x v", forced_at="f", units={"f": "Hz"})
+    def away(t, x, v, *, f=1.0, k=3.0):
+        stop = sl.piecewise((0.1 * (x - 1), x > 1), otherwise=0)
+        return v, k * x + sl.cos(2 * sl.pi * f * t) - stop
+
+    said = "no response at any of 3 values:\n3 escaped"
+    found = sl.bifurcation_diagram(away, {"k": (2.0, 4.0, 3)})
+    assert said in [text.get_text() for text in bifurcation_diagram(found).texts]
+    found = sl.frequency_response(away, (0.5, 2.0, 3))
+    assert said in [text.get_text() for text in frequency_response(found).texts]

@@ -13,6 +13,8 @@ import h5py
 import xarray as xr
 from xarray.backends import H5NetCDFStore
 
+from saltus.interrupt import ctrl_c_waits
+
 
 def content(ds: xr.Dataset) -> bytes:
     """The bytes of a file, those that ``ds.to_netcdf(engine="h5netcdf")`` gives."""
@@ -30,12 +32,12 @@ def dataset(path: str | os.PathLike[str]) -> xr.Dataset:
 
 @contextmanager
 def _store(place: Any, mode: str) -> Iterator[H5NetCDFStore]:
-    with (
-        # variables in the order in which they were written: h5netcdf asks for that too
-        _File(place, mode, track_order=True) as file,
-        h5netcdf.File(file, mode, decode_vlen_strings=True) as netcdf,
-    ):
-        yield H5NetCDFStore(netcdf)
+    # variables in the order in which they were written: h5netcdf asks for that too
+    with _File(place, mode, track_order=True) as file:
+        with ctrl_c_waits():  # h5netcdf can't close what is half open
+            netcdf = h5netcdf.File(file, mode, decode_vlen_strings=True)
+        with netcdf:
+            yield H5NetCDFStore(netcdf)
 
 
 class _File(h5py.File):
