@@ -13,6 +13,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.legend import Legend
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import BboxBase
@@ -239,15 +240,27 @@ def _name_gaps(
 
 def legend(ax: Axes, regions: Regions, **place: Any) -> None:
     """Name the colours and markers: regions from the top of the picture to its bottom, then the
-    rest.
+    rest, in as many of the columns as the figure is wide enough for.
     """
     handles, labels = ax.get_legend_handles_labels()
     # a picture of several trajectories names each thing once
     first = dict(zip(labels[::-1], handles[::-1], strict=True))
-    order = [region.label for region in regions.regions[::-1] if region.label in first]
-    order += [label for label in dict.fromkeys(labels) if label not in order]
+    known = [region.label for region in regions.regions[::-1] if region.label in first]
+    if regions.state is None:
+        known.sort(key=lambda label: (label != "free", label))
+    order = list(dict.fromkeys([*known, *labels]))
     if order:
-        ax.legend([first[label] for label in order], order, **place)
+        columns = place.pop("ncols", 1)
+        shown = ax.legend([first[label] for label in order], order, ncols=columns, **place)
+        while columns > 1 and not _fits(ax, shown):
+            columns = min(columns, len(order)) - 1
+            shown = ax.legend([first[label] for label in order], order, ncols=columns, **place)
+
+
+def _fits(ax: Axes, shown: Legend) -> bool:
+    """Whether a legend is no wider than the figure."""
+    figure = ax.get_figure(root=True)
+    return figure is None or shown.get_window_extent().width <= figure.bbox.width
 
 
 def status_text(ds: xr.Dataset) -> str:

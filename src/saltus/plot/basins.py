@@ -369,7 +369,7 @@ def _legend(
                 shares_of_ticks,
             )
         )
-        texts.append("periods to settle" if every is None else "s to settle")
+        texts.append(f"shade: {'periods' if every is None else 's'} to settle")
     for code, unsettled in maps.UNSETTLED.items():
         if code in shares:
             handles.append(_Ramp(np.array([to_rgb(unsettled.color)])))

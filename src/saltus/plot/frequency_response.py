@@ -27,7 +27,7 @@ Quantity = Literal[
     "phase", "transmissibility"
 ]  # fmt: skip
 _LABELS = {
-    "rms": "steady rms of {}", "peak": "peak |{}|", "maximum": "largest {}",
+    "rms": "rms of {}", "peak": "peak |{}|", "maximum": "largest {}",
     "minimum": "smallest {}", "peak_to_peak": "peak to peak of {}",
     "mean": "mean of {}", "rms_about_mean": "rms of {} about its mean",
     "amplitude": "first harmonic of {}", "phase": "phase of {} [deg]",
@@ -45,6 +45,7 @@ def frequency_response(
     quantity: Quantity = "rms",
     output: str | None = None,
     measured: Measured = None,
+    log: bool = False,
     events: bool = True,
     legend: bool = True,
     ax: Any = None,
@@ -69,6 +70,9 @@ def frequency_response(
     measured : path or Dataset, optional
         Measured points to draw with it: a CSV with the columns ``frequency [Hz]`` and ``amplitude
         [mm]``, any units, or a Dataset with these two variables and their attribute ``units``.
+    log : bool
+        Whether the sizes stand on a logarithmic axis, on which small responses can be read beside
+        large ones.
     events : bool
         Whether to mark grazes, period doublings and folds above the picture.
     legend : bool
@@ -89,6 +93,11 @@ def frequency_response(
     """
     if not among(quantity, get_args(Quantity)):
         raise ParameterError(f"quantity={shown(quantity)}. Known: {', '.join(get_args(Quantity))}.")
+    if log and quantity not in _SIZES:
+        raise ParameterError(
+            f"log=True with quantity={quantity!r}, which has a sign. Choose one of "
+            f"{', '.join(_SIZES)}."
+        )
     datasets = [_chosen(one, quantity, output) for one in points.shown(ds, [])]
     variable = "drawn"
     marks = None if measured is None else _measured(measured, datasets[0], variable)
@@ -111,7 +120,9 @@ def frequency_response(
                 marks["amplitude"].values * up.factor,
             )
         points.say_if_empty(panel, datasets)
-        if quantity in _SIZES:
+        if log:
+            panel.set_yscale("log")
+        elif quantity in _SIZES:
             panel.set_ylim(bottom=0)
         if quantity == "phase":
             panel.yaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 1.5, 3, 4.5, 9, 10]))

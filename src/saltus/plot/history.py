@@ -28,8 +28,10 @@ _MARKERS: dict[str, dict[str, Any]] = {
     "crossing": {"marker": "o", "mfc": OKABE_ITO["black"], "label": "contact"},
     "impact": {"marker": "o", "mfc": OKABE_ITO["black"], "label": "impact"},
     "graze": {"marker": "D", "mfc": OKABE_ITO["orange"], "label": "graze"},
-    "graze_unresolved": {"marker": "o", "mfc": "white", "label": "graze, unresolved"},
+    "graze_unresolved": {"marker": "o", "mfc": "white", "label": "unresolved graze"},
 }
+#: More contacts than these would be a band of marks over the width of a picture.
+_MOST_MARKED = 120
 
 
 @picture(TRAJECTORY)
@@ -44,9 +46,10 @@ def history(
     units: Mapping[str, str] | None = None,
     legend: bool = True,
 ) -> Any:
-    """Time history of one state, coloured by region, every contact marked.
+    """Time history of one state, coloured by region, contacts marked.
 
-    Gap lines are dashed, contact regions lightly shaded. Colours change exactly at the contacts. A
+    Gap lines are dashed, contact regions lightly shaded. Colours change exactly at the contacts.
+    More than 120 contacts aren't marked; choose fewer periods to see them. A
     trajectory that did not reach its end says so in the picture.
 
     Parameters
@@ -181,12 +184,16 @@ def _note_contacts(ax: Axes, table: xr.Dataset, owners: Mapping[str, str], x: Sc
 
 
 def _mark_contacts(ax: Axes, table: xr.Dataset, state: str, x: Scale, y: Scale) -> None:
-    """A marker for each contact, by its kind; smaller where they are many."""
+    """A marker for each contact, by its kind; smaller where they are many. The legend counts those
+    that would be a band.
+    """
     kinds = table["contact_kind"].values.astype(str)
-    size = 3.4 if kinds.size <= 40 else 2.4 if kinds.size <= 150 else 1.5
+    size = 3.4 if kinds.size <= 40 else 2.4
     for kind, marker in _MARKERS.items():
         rows = np.flatnonzero(kinds == kind)
-        if rows.size:
+        if rows.size > _MOST_MARKED:
+            ax.plot([], [], " ", label=f"{rows.size} {marker['label']}s, too many to mark")
+        elif rows.size:
             grow = 1.5 if kind.startswith("graze") else 1.0
             at = (
                 table["contact_time"].values[rows] * x.factor,

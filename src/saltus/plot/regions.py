@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 
 from saltus.plot.style import CYCLE, OKABE_ITO
+from saltus.results.dataset.schema import equations_of
 
 #: Outwards from the free region; a contact with more stages repeats the last colour.
 _ABOVE = (OKABE_ITO["vermillion"], OKABE_ITO["orange"])
 _BELOW = (OKABE_ITO["blue"], OKABE_ITO["sky blue"])
 _FREE = OKABE_ITO["green"]
+#: Sets of touching contacts with a colour each; of more sets the number of contacts is told apart.
+_OWN_SETS = 5
 #: How the guards end that say whether a contact is held.
 _HELD = (" at rest", " held")
 
@@ -191,9 +194,15 @@ def _contact_label(boundary: Boundary) -> str:
 
 
 def _by_mode(ds: xr.Dataset) -> Regions:
-    """A colour for every combination of sides that occurs, named after the sides."""
+    """A colour for every combination of sides that occurs, named after the sides; where all guards
+    are contacts of a structure, after those that touch.
+    """
     names = ds["guard"].values.tolist()
     codes = np.unique(_modes(ds))
+    touching = _touching_sides(ds)
+    changing = _changing(codes.tolist(), len(names))
+    if changing and all(i in touching for i in changing):
+        return _by_touching(codes, names, touching)
     regions = []
     for color, label in zip(
         _mode_colors(codes.tolist()), _mode_labels(codes.tolist(), names), strict=True
@@ -202,6 +211,41 @@ def _by_mode(ds: xr.Dataset) -> Regions:
     if not names:
         regions = [Region(CYCLE[0], "", contact=False)]
         codes = np.zeros(1, dtype=np.int64)
+    return Regions(tuple(regions), (), None, tuple(range(len(names))), codes)
+
+
+def _touching_sides(ds: xr.Dataset) -> dict[int, int]:
+    """Of each guard that is a contact of `sl.structure` the bit with which it touches."""
+    equations = " ".join(equations_of(ds))
+    sides = {}
+    for i, name in enumerate(map(str, ds["guard"].values)):
+        label, _, side = name.partition(" ")
+        if f"{label}_stiffness*" in equations and side in ("", "lower", "upper"):
+            sides[i] = int(f"< -{label}_gap" not in equations if side == "" else side == "upper")
+    return sides
+
+
+def _by_touching(codes: np.ndarray, names: Sequence[str], touching: Mapping[int, int]) -> Regions:
+    """A colour for every set of contacts that touch together, or for their number."""
+    sets = [
+        [names[bit] for bit, side in touching.items() if int(code) >> bit & 1 == side]
+        for code in codes
+    ]
+    if len({tuple(one) for one in sets}) > _OWN_SETS:
+        keys = [f"{len(one)} contacts" if len(one) > 1 else "1 contact" for one in sets]
+    else:
+        keys = [" and ".join(one) + (" touch" if len(one) > 1 else " touches") for one in sets]
+    labels = [key if one else "free" for key, one in zip(keys, sets, strict=True)]
+    ranked = sorted(
+        {label: len(one) for label, one in zip(labels, sets, strict=True)}.items(),
+        key=lambda item: item[1],
+    )
+    others = [color for color in (*_ABOVE, *_BELOW, *CYCLE) if color != _FREE]
+    colors = dict(
+        zip([label for label, count in ranked if count], dict.fromkeys(others), strict=False)
+    )
+    colors["free"] = _FREE
+    regions = [Region(colors.get(label, others[-1]), label, contact=False) for label in labels]
     return Regions(tuple(regions), (), None, tuple(range(len(names))), codes)
 
 
@@ -245,12 +289,17 @@ def _mode_labels(codes: Sequence[int], names: Sequence[str]) -> list[str]:
     differ; a single one has no name.
     """
     places = _freeplay(codes)
-    changing = [bit for bit in range(len(names)) if len({code >> bit & 1 for code in codes}) > 1]
+    changing = _changing(codes, len(names))
     if places and len(changing) == 2:
         free = codes[places[0]]
         met = [names[(code ^ free).bit_length() - 1] if code != free else None for code in codes]
         return ["free" if name is None else f"beyond {name.replace('_', ' ')}" for name in met]
     return [", ".join(_side(names[bit], code >> bit & 1) for bit in changing) for code in codes]
+
+
+def _changing(codes: Sequence[int], count: int) -> list[int]:
+    """The guards that don't have the same side in all modes."""
+    return [bit for bit in range(count) if len({code >> bit & 1 for code in codes}) > 1]
 
 
 def _side(name: str, positive: int) -> str:

@@ -35,6 +35,8 @@ _EVENTS = {
 }  # fmt: skip
 #: Where the marks of events stand, in heights of the Axes.
 _EVENTS_AT = 1.025
+#: Marks that would overlap stand above each other, so many sizes apart, in up to so many rows.
+_ROW, _MOST_ROWS = 1.3, 3
 #: Mark of the empty axis that keeps the title clear of them.
 _ROOM = "saltus-room-of-events"
 #: Values this even in their logarithms, and not in themselves, are drawn over a logarithmic axis.
@@ -227,42 +229,68 @@ def draw_events(ax: Axes, datasets: Sequence[Shown], scale: Scale) -> None:
     """Marks above the picture, clear of its ticks, where something happens to a branch; each kind
     is named once.
     """
-    marked = False
+    rows = 0
     for one in datasets:
         name = event_name(one.axis)
         if name not in one.ds or not one.ds.sizes.get("event"):
             continue
         values, words = one.ds[name].values * scale.factor, one.ds["event_kind"].values
         low, high = ax.get_xlim()
+        drawn = np.isin(words, list(_EVENTS)) & (values >= low) & (values <= high)
+        values, words = values[drawn], words[drawn]
+        size, width = (4.5, 0.8) if values.size <= _MANY_EVENTS else (3.0, 0.5)
+        row = _rows(ax, values, size)
+        rows = max(rows, int(row.max(initial=-1)) + 1)
         for word, (text, marker) in _EVENTS.items():
-            here = values[(words == word) & (values >= low) & (values <= high)]
-            if here.size:
-                marked = True
-                size, width = (4.5, 0.8) if values.size <= _MANY_EVENTS else (3.0, 0.5)
-                above = np.full(here.size, _EVENTS_AT)
-                if values.size <= _FEW_EVENTS:
-                    stems = ax.vlines(
-                        here,
-                        0,
-                        _EVENTS_AT,
-                        transform=ax.get_xaxis_transform(),
-                        color=QUIET,
-                        lw=0.5,
-                        ls=":",
-                        clip_on=False,
-                    )
-                    stems.set(zorder=1, gid=f"line of event {word}")
-                ax.plot(
-                    here, above, transform=ax.get_xaxis_transform(), ls="none", marker=marker,
-                    ms=size, mfc="white",
-                    mec=dataset_color(one) if one.name else QUIET, mew=width, clip_on=False,
-                    zorder=5, label=text, gid=f"event {word}",
-                )  # fmt: skip
-    if marked:
-        _raise_titles(ax)
+            here = words == word
+            if not here.any():
+                continue
+            above = _EVENTS_AT + row[here] * size * _ROW / _points(ax)[1]
+            if values.size <= _FEW_EVENTS:
+                stems = ax.vlines(
+                    values[here],
+                    0,
+                    above,
+                    transform=ax.get_xaxis_transform(),
+                    color=QUIET,
+                    lw=0.5,
+                    ls=":",
+                    clip_on=False,
+                )
+                stems.set(zorder=1, gid=f"line of event {word}")
+            ax.plot(
+                values[here], above, transform=ax.get_xaxis_transform(), ls="none", marker=marker,
+                ms=size, mfc="white",
+                mec=dataset_color(one) if one.name else QUIET, mew=width, clip_on=False,
+                zorder=5, label=text, gid=f"event {word}",
+            )  # fmt: skip
+    if rows:
+        _raise_titles(ax, rows)
 
 
-def _raise_titles(ax: Axes) -> None:
+def _points(ax: Axes) -> np.ndarray:
+    """About the width and the height of an Axes [1/72 inch]."""
+    figure = ax.get_figure(root=True)
+    size = (6.3, 3.4) if figure is None else figure.get_size_inches()
+    return np.asarray(72.0 * np.multiply(size, ax.get_position().bounds[2:]))
+
+
+def _rows(ax: Axes, values: np.ndarray, size: float) -> np.ndarray:
+    """In which row each mark of a size [1/72 inch] stands, the lowest in which none of up to
+    _MOST_ROWS overlaps it: int64[e].
+    """
+    place = ax.transAxes.inverted().transform(
+        ax.transData.transform(np.stack([values, np.zeros(len(values))], axis=1))
+    )[:, 0]
+    apart, ends = size * _ROW / _points(ax)[0], np.full(_MOST_ROWS, -np.inf)
+    row = np.zeros(len(values), np.int64)
+    for i in np.argsort(place, kind="stable"):
+        row[i] = int(np.argmax(free)) if (free := place[i] - ends >= apart).any() else 0
+        ends[row[i]] = place[i]
+    return row
+
+
+def _raise_titles(ax: Axes, rows: int) -> None:
     """Make room for the marks below a title, which may be given later: titles keep clear of what an
     axis at the top says.
     """
@@ -271,7 +299,7 @@ def _raise_titles(ax: Axes) -> None:
     top = ax.secondary_xaxis("top")
     top.set_gid(_ROOM)
     top.spines[:].set_visible(False)
-    top.tick_params(length=0, pad=4, labelsize=8)
+    top.tick_params(length=0, pad=4 + (rows - 1) * 4.5 * _ROW, labelsize=8)
     top.set_xticks(
         [
             float(np.sqrt(np.prod(ax.get_xlim())))

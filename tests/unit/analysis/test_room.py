@@ -150,7 +150,10 @@ def test_contacts_without_end_stop_in_time_with_what_came_before(monkeypatch):
     monkeypatch.setattr(
         room, "free", lambda: 2 * 20_000 * (room.CONTACT + 2 * room.CONTACT_OF_A_STATE)
     )
-    with pytest.warns(SaltusWarning, match="filled half of the free memory.*keep="):
+    with (
+        pytest.warns(SaltusWarning, match="12 of 12 trajectories: budget_events"),
+        pytest.warns(SaltusWarning, match="filled half of the free memory.*keep="),
+    ):
         part = sl.simulate(rig, START, periods=1500, **options)
     assert 20_000 <= part.sizes["contact"] < whole.sizes["contact"]
     assert set(part.status.values.tolist()) <= {"ok", "budget_events"}

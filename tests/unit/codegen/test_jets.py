@@ -20,7 +20,11 @@ from saltus.system import System
 from saltus.system.guards import is_hold
 from saltus.system.tangent import tangent_system
 
-pytestmark = pytest.mark.nojit
+pytestmark = [
+    pytest.mark.nojit,
+    # most of the equations below use none of a and b, or one
+    pytest.mark.filterwarnings("ignore::saltus.errors.UnusedParameterWarning"),
+]
 LANES, ORDER = 4, 12
 EPS = 2.0**-52
 TAU, BASE = 0, 1

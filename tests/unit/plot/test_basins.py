@@ -206,7 +206,7 @@ def test_legend_says_what_each_attractor_is():
     ax = basins(basins_map(np.array([[0, 1], [1, 1]]), np.array([[1, 3], [9, 30]]), known=known))
     assert texts(ax) == [
         "24T, 60 contacts, 31.2 %", "chaotic, 2.41 contacts per T, 68.8 %",
-        "quasi-periodic, < 0.1 %", "periods to settle",
+        "quasi-periodic, < 0.1 %", "shade: periods to settle",
         "Poincaré points of the attractors",
     ]  # fmt: skip
     ax.figure.canvas.draw()
@@ -239,7 +239,7 @@ def test_scale_of_lightness_is_labelled_with_its_ends_and_middle():
     ]
     assert list(dict.fromkeys(numbers)) == ["0", "3", "15"]
     same = basins(basins_map(np.zeros((2, 2), dtype=int), np.full((2, 2), 7)))
-    assert "periods to settle" not in texts(same)
+    assert "shade: periods to settle" not in texts(same)
 
 
 def test_alike_attractors_are_told_apart_by_their_peaks():

@@ -9,7 +9,7 @@ from matplotlib.colors import to_hex
 
 import saltus as sl
 from saltus.errors import ParameterError
-from saltus.plot import OKABE_ITO, history, phase, style
+from saltus.plot import OKABE_ITO, history, phase, regions, style
 
 from .conftest import GAPS, PERIOD, rig_run
 
@@ -159,7 +159,7 @@ def test_grazes_have_markers_of_their_own():
         periods=3, kinds=["graze", "graze_unresolved", "graze"], status="graze_unresolved"
     )
     ax = history(run)
-    graze, open_ = line(ax, "graze"), line(ax, "graze, unresolved")
+    graze, open_ = line(ax, "graze"), line(ax, "unresolved graze")
     assert (len(graze.get_xdata()), len(open_.get_xdata())) == (2, 1)
     assert len(line(ax, "contact").get_xdata()) == run.sizes["contact"] - 3
     assert graze.get_marker() != line(ax, "contact").get_marker()
@@ -297,3 +297,49 @@ def test_a_state_that_jumps_does_so_upright():
         assert free[at, 0].tolist() == free[at - 1, 0].tolist()
         assert set(free[at, 0]) <= set(place)
         assert free[at, 1].tolist() == (-0.6 * free[at - 1, 1]).tolist()
+
+
+def chain_with_stops(**contacts):
+    """Eight masses by five modes, a stop on both sides of the last and one above the fourth."""
+    stiffness = 4e4 * np.eye(8) - 2e4 * (np.eye(8, k=1) + np.eye(8, k=-1))
+    return sl.structure(
+        0.1 * np.eye(8), stiffness, damping_ratio=0.02, modes=5, frequency="24 Hz",
+        contacts=[
+            sl.Contact("x8", stiffness="200 kN/m", gap="0.4 mm", side="both", name="left"),
+            sl.Contact("x4", stiffness="100 kN/m", gap="0.4 mm", name="right", **contacts),
+        ],
+        forces=[sl.Force("x2", "20 N")],
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("side", ["upper", "lower"])
+def test_contacts_of_a_structure_touch_in_the_words_of_its_user(side):
+    """The legend says what touches, on whichever side, and stays within the figure."""
+    run = sl.simulate(chain_with_stops(side=side), periods=4)
+    for picture in (history, phase):
+        axes = picture(run)
+        axes.figure.canvas.draw()
+        shown = axes.get_legend()
+        words = [text.get_text() for text in shown.get_texts()]
+        assert words[:3] == ["free", "1 contact", "2 contacts"]
+        assert len(words) == len(set(words))
+        assert shown.get_window_extent().width <= axes.figure.bbox.width
+    until = run["time"].values[np.flatnonzero(np.diff(run["mode"].values))[1]]
+    few = run.isel(time=run["time"].values <= until, contact=run["contact_time"].values <= until)
+    words = {region.label for region in regions.find(few, ["q1"]).regions}
+    touched = {f"{guard} touches" for guard in few["contact_guard"].values.astype(str)}
+    assert "free" in words
+    assert words & touched
+    assert all("above" not in word and "below" not in word for word in words)
+
+
+def test_more_contacts_than_can_be_told_apart_are_counted(run):
+    """A legend of one line says how many; grazes keep their marks."""
+    many = sl.simulate(
+        sl.models.delangre("b", force="4 N", frequency="15 Hz"), (1e-3, 0), periods=60
+    )
+    count = many.sizes["contact"]
+    assert count > 120
+    words = [text.get_text() for text in history(many).get_legend().get_texts()]
+    assert f"{count} contacts, too many to mark" in words
+    assert "contact" in [text.get_text() for text in history(run).get_legend().get_texts()]

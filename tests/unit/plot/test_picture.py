@@ -20,6 +20,7 @@ def texts(axes):
     return [text.get_text() for text in axes.findobj(Text)]
 
 
+@pytest.mark.filterwarnings("ignore:constrained_layout not applied")  # the longest name fills it
 @pytest.mark.parametrize("name", ["$a^$", "a $^$ b", "$" + "{" * 90 + "x" + "}" * 90 + "$"])
 def test_what_is_no_formula_is_drawn_as_it_is_written(name):
     drawn = texts(plot.frequency_response({name: resonance(20), "other": resonance(20, shift=2.0)}))

@@ -102,7 +102,7 @@ def test_every_response_is_drawn_once(peak):
     )
     assert np.allclose(all_points(ax), expected)
     assert texts(ax) == ["T", "3T", "24T", "chaotic", "fold", "onset of chaos", "graze"]
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("frequency [Hz]", "steady rms of x [mm]")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("frequency [Hz]", "rms of x [mm]")
     assert ax.get_ylim()[0] == 0
 
 
@@ -466,3 +466,28 @@ def test_an_empty_picture_says_why():
     assert said in [text.get_text() for text in bifurcation_diagram(found).texts]
     found = sl.frequency_response(away, (0.5, 2.0, 3))
     assert said in [text.get_text() for text in frequency_response(found).texts]
+
+
+def test_marks_of_events_that_lie_close_stand_above_each_other(peak):
+    """Three folds within a hair: three rows, no mark on another."""
+    close = peak.assign(event_frequency=("event", np.array([15.0, 15.01, 15.02, 19.0])))
+    axes = frequency_response(close)
+    axes.figure.canvas.draw()
+    marks = np.concatenate(
+        [
+            line.get_transform().transform(line.get_xydata())
+            for line in axes.lines
+            if str(line.get_gid()).startswith("event ")
+        ]
+    )
+    apart = np.linalg.norm(marks[:, None] - marks, axis=2)[np.triu_indices(len(marks), 1)]
+    assert len(marks) == peak.sizes["event"] > 1
+    assert (apart >= 4.5 * axes.figure.dpi / 72).all()
+
+
+def test_small_responses_are_read_on_a_logarithmic_axis(peak):
+    axes = frequency_response(peak, log=True)
+    assert axes.get_yscale() == "log"
+    assert frequency_response(peak).get_yscale() == "linear"
+    with pytest.raises(ParameterError, match="log=True with quantity='mean', which has a sign"):
+        frequency_response(peak, log=True, quantity="mean")

@@ -10,6 +10,9 @@ from saltus.errors import TraceError
 from saltus.system import cos, exp, freeplay, mod, periodic, pi, piecewise, sin, system
 from saltus.system.periodic import check_periodic, timing_of
 
+# equations that use some of their parameters only
+pytestmark = pytest.mark.filterwarnings("ignore::saltus.errors.UnusedParameterWarning")
+
 
 def forced(law, **options):
     def rig(t, x, v, *, amplitude=1e-3, stiffness=1e4, frequency=15.0, other=30.0):

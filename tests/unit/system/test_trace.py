@@ -11,6 +11,9 @@ from saltus.errors import ParameterError, SaltusError, TraceError, UnitError
 from saltus.system import cos, freeplay, pi, piecewise, sin, system
 from saltus.system.text import to_text
 
+# equations that use some of their parameters only
+pytestmark = pytest.mark.filterwarnings("ignore::saltus.errors.UnusedParameterWarning")
+
 
 def test_many_states_come_together():
     def row(t, *y, spring=4.0):

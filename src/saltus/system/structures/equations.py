@@ -26,6 +26,8 @@ UNITS = {
     "rad": ("rad/s", "N*m", "N*m/rad", "N*m*s/rad"),
     "": ("", "", "", ""),
 }
+#: Of coordinates of modes of unit modal mass, and of their rates.
+MODAL = ("kg^0.5*m", "kg^0.5*m/s")
 
 
 @dataclass(frozen=True)
@@ -70,8 +72,8 @@ def traced(
     defaults, units = _parameters(contacts, forces, unit)
     if forced:
         defaults["frequency"] = frequency
-    if moving.transform is None:  # coordinates of modes of unit mass have a unit of their own
-        units |= dict.fromkeys(moving.names, unit) | dict.fromkeys(moving.rates, UNITS[unit][0])
+    own = (unit, UNITS[unit][0]) if moving.transform is None or not unit else MODAL
+    units |= dict.fromkeys(moving.names, own[0]) | dict.fromkeys(moving.rates, own[1])
     sides: dict[str, Relation] = {}
     k = len(moving.names)
 
