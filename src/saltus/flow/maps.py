@@ -21,6 +21,9 @@ from saltus.system.checks import check_values
 from saltus.system.system import System
 from saltus.system.tangent import tangent_system
 
+#: Step of differences, relative to the range of a state: errors of rounding and of the fourth order
+#: are both some 1e-11 where a contact is a hundredth as deep as the motion is wide.
+STEP = 2e-5
 #: Samples of the mode in each period, where contacts aren't located.
 MODE_SAMPLES = 32
 #: End of the message for a system without forcing.
@@ -255,11 +258,44 @@ class Stroboscope:
         self, start: np.ndarray, count: np.ndarray | int, directions: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """See :class:`Map`."""
+        if self.system.is_steep:
+            return self._by_differences(start, count, directions)
         k, size = start.shape
         outcome = self._with_tangent(start, directions, count)
         status = outcome.status
         outcome.state[(status != st.OK) & (status != st.GRAZE_UNRESOLVED)] = np.nan
         return outcome.state[:, :size], outcome.state[:, size:].reshape(k, size, size)
+
+    def _by_differences(
+        self, start: np.ndarray, count: np.ndarray | int, directions: np.ndarray | None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """What :meth:`tangent` returns, by central differences of fourth order (Abramowitz and
+        Stegun, 25.3.6), of steps relative to the range of each state over an iterate. The flow is smooth
+        where its equations are steep: how a motion leaves a boundary depends on the speed there.
+        """
+        k, size = start.shape
+        way = np.broadcast_to(np.eye(size) if directions is None else directions, (k, size, size))
+        seen = self.run(start, 1, Schedule.even(1, MODE_SAMPLES)).samples
+        ranges = np.where(np.isfinite(seen), np.abs(seen), 0.0).max(axis=1, initial=0.0)
+        ranges[ranges == 0.0] = 1.0
+        with np.errstate(divide="ignore"):
+            step = STEP / (np.abs(way) / ranges[..., None]).max(axis=1)  # of each direction
+        step[~np.isfinite(step)] = 0.0
+        shifts = step[..., None] * np.array([-2.0, -1.0, 1.0, 2.0])
+        points = start[:, None, None] + shifts[..., None] * np.swapaxes(way, 1, 2)[:, :, None]
+        each = np.repeat(np.arange(k), 4 * size)
+        counts = np.broadcast_to(count, k)
+        outcomes = [
+            self.run(start, counts),
+            self.rows(each).run(points.reshape(-1, size), counts[each]),
+        ]
+        for outcome in outcomes:
+            stopped = (outcome.status != st.OK) & (outcome.status != st.GRAZE_UNRESOLVED)
+            outcome.state[stopped] = np.nan
+        ends = outcomes[1].state.reshape(k, size, 4, size)
+        slopes = np.einsum("s,kjsi->kij", np.array([1.0, -8.0, 8.0, -1.0]) / 12.0, ends)
+        still = step[:, None] == 0.0
+        return outcomes[0].state, np.where(still, 0.0, slopes / np.where(still, 1.0, step[:, None]))
 
     def tangent_samples(
         self, start: np.ndarray, count: np.ndarray | int, schedule: Schedule

@@ -54,8 +54,10 @@ def leg(system: System, mode: int) -> System:
 
 
 def has_legs(system: System) -> bool:
-    """Whether the system has legs: its equations are smooth in time within every mode."""
-    return all(_smooth_in_time(entry) for entry in system.field)
+    """Whether the system has legs: its equations are smooth in time within every mode, up to its
+    boundaries.
+    """
+    return not system.is_steep and all(_smooth_in_time(entry) for entry in system.field)
 
 
 def _smooth_in_time(entry: Expr) -> bool:

@@ -108,6 +108,22 @@ def check_finite(field: Sequence[Expr], guards: Sequence[Guard], states: Sequenc
                 )
 
 
+def is_steep(jacobian: Iterable[Expr], guards: Sequence[Guard]) -> bool:
+    """Whether a derivative of the field is infinite on a boundary where its piece begins, as that
+    of ``d**0.25`` is: no tangent can be integrated through there.
+    """
+    entries = [entry for entry in jacobian if entry.op != "const"]
+    if not _may_break(entries):
+        return False
+    boundaries = _Boundaries(guards)
+    return any(
+        orders[entry].singular and orders[entry].order < 0 and number in bits_in([entry])
+        for number in range(len(guards))
+        for orders in [boundaries.orders(entries, number)]
+        for entry in entries
+    )
+
+
 def check_gaps(guards: Sequence[Guard]) -> None:
     """Raise a TraceError if a gap has a power, root or logarithm of a piece that vanishes: there
     the gap is zero, and on no side.

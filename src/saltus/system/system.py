@@ -17,6 +17,7 @@ from saltus.system.expression import Expr
 from saltus.system.fixed import Units, Values, no_change
 from saltus.system.guards import Guard
 from saltus.system.periodic import check_periodic
+from saltus.system.singular import is_steep
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -175,6 +176,15 @@ class System:
         frozen mode.
         """
         return tuple(gradient(entry, self.states) for entry in self.field)
+
+    @functools.cached_property
+    def is_steep(self) -> bool:
+        """Whether an entry of the Jacobian is infinite where a contact begins, as that of
+        ``depth**0.25`` is: derivatives of the flow are differences then.
+        """
+        if self.origin is not self:
+            return self.origin.is_steep
+        return is_steep((entry for row in self.jacobian for entry in row), self.guards)
 
     @functools.cached_property
     def guard_gradients(self) -> tuple[tuple[Expr, ...], ...]:

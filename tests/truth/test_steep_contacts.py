@@ -1,0 +1,94 @@
+"""Contacts whose force is steep where they begin, as ``depth**0.25``: no tangent passes, the flow
+is smooth all the same. Its derivatives are held against Liouville's formula and exact tangents.
+"""
+
+import itertools
+
+import numpy as np
+import pytest
+
+import saltus as sl
+from saltus.flow.engine import Schedule
+from saltus.flow.maps import Stroboscope
+
+HERTZ = sl.models.hertz_stop()
+BRANCH = {"frequency": (12.6, 15.4)}
+
+
+def test_where_the_derivative_of_a_force_is_infinite_is_known():
+    """Of powers below one of the depth only: not of depth**1.5, nor of a root elsewhere."""
+
+    def of(power):
+        @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
+        def stop(t, x, v, *, gap=0.5, w=1.0):
+            depth = x - gap
+            return v, sl.cos(w * t) - x - sl.piecewise((depth**power, depth > 0), otherwise=0)
+
+        return stop
+
+    assert [of(power).is_steep for power in (0.25, 0.5, 1.5, 2.5)] == [True, True, False, False]
+    assert HERTZ.is_steep
+    assert HERTZ.with_values(gap=0.004).is_steep
+    assert not sl.models.delangre("b", force="4 N").is_steep
+
+    @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
+    def rooted(t, x, v, *, gap=0.5, w=1.0):
+        force = sl.piecewise((x - gap, x > gap), otherwise=0)
+        return v, sl.cos(w * t) - x - force * sl.sqrt(1.0 + x**2)
+
+    assert not rooted.is_steep
+
+
+def test_the_flow_contracts_areas_as_liouville_says():
+    """det of the derivative over five periods = exp of the integral of the divergence, by Gauss'
+    rule between the contacts, in depth**0.25 about them.
+    """
+    run = sl.simulate(HERTZ, (0.0, 0.02), periods=5, samples=4, time_errors="local")
+    edges = np.concatenate([[0.0], run.contact_time.values, [run.time.values[-1]]])
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+    # t = a + (b - a) s(u), flat at both ends: the depth**0.25 of a contact is smooth in u
+    u = 0.5 * (nodes + 1.0)
+    share = u**4 * (35.0 - 84.0 * u + 70.0 * u**2 - 20.0 * u**3)
+    slope = 140.0 * u**3 * (1.0 - u) ** 3
+    values, total, start = HERTZ.values, 0.0, np.array([[0.0, 0.02]])
+    flow = Stroboscope(HERTZ, sl.Taylor())
+    for a, b in itertools.pairwise(edges):
+        if b - a < 1e-12:
+            continue
+        count, fraction = np.divmod((a + (b - a) * share) / flow.period, 1.0)
+        seen = flow.run(start, 5, Schedule(count.astype(np.int64), fraction))
+        x, v = seen.samples[0].T
+        depth = np.maximum(x - values["gap"], 0.0)
+        damper = values["loss"] * np.sqrt(values["mass"] * values["stop_stiffness"]) * depth**0.25
+        divergence = -(values["damping"] + np.where(v > 0, damper, 0.0)) / values["mass"]
+        total += (b - a) * 0.5 * float(np.sum(weights * slope * divergence))
+    _, derivative = flow.tangent(start, 5)
+    # the determinant is a difference of products some 1e4 times larger
+    assert np.linalg.det(derivative[0]) == pytest.approx(np.exp(total), rel=1e-6)
+
+
+def test_differences_are_the_tangents_where_there_are_some():
+    rig = Stroboscope(sl.models.delangre("b", force="4 N", frequency="15 Hz"), sl.Taylor())
+    start = np.array([[0.001, 0.02], [-0.002, 0.1]])
+    directions = np.array([[[1.0, 0.3], [0.0, 40.0]], [[1.0, 0.0], [0.0, 1.0]]])
+    end, exact = rig.tangent(start, 2, directions)
+    same, differences = rig._by_differences(start, 2, directions)
+    np.testing.assert_allclose(end, same, rtol=1e-12)
+    size = np.abs(exact).max(axis=(1, 2), keepdims=True)
+    np.testing.assert_allclose(differences / size, exact / size, atol=1e-9)
+
+
+def test_responses_and_branches_of_a_damped_hertz_stop_are_found():
+    """They were `failed` after 30 s, and "no periodic orbit is known"."""
+    settled = sl.stroboscope(HERTZ, (0.0, 0.0), 60, keep=1)
+    found = sl.frequency_response(HERTZ, [13.0, 14.0], (0.0, 0.0), progress=False)
+    assert found.response_type.values.tolist() == ["periodic", "periodic"]
+    assert found.response_period.values.tolist() == [1, 1]
+    orbits = sl.periodic_orbits(HERTZ, (0.001, 0.0), periods=1, progress=False)
+    at = [orbits[name].values.ravel()[0] for name in ("orbit_x", "orbit_v")]
+    np.testing.assert_allclose(
+        at, [settled.x.values[-1, 0], settled.v.values[-1, 0]], rtol=1e-11, atol=1e-14
+    )
+    branches = sl.branches(HERTZ, BRANCH, (0.0, 0.0), at=14.0, progress=False)
+    assert branches.sizes["branch"] == 1
+    assert bool(branches.point_stable.all())
