@@ -46,6 +46,18 @@ _BAKED = (
 _DTYPES = {"float64": np.dtype(np.float64), "int64": np.dtype(np.int64)}
 
 
+#: Where a contiguous array lies, in a quarter of the time of ``array.ctypes``: a call has fifty.
+_beginning: Callable[[Any], Any] = ctypes.c_char.from_buffer
+_place: Callable[[Any], int] = ctypes.addressof
+
+
+def _refused(array: np.ndarray, dtype: np.dtype, axes: int) -> TypeError:
+    return TypeError(
+        f"a kernel takes a contiguous array of {dtype} with {axes} "
+        f"axes, not of {array.dtype} {array.shape}."
+    )
+
+
 class Call:
     """The arguments of a compiled function as one block of numbers: of each array where it lies,
     its shape and its strides.
@@ -81,13 +93,19 @@ class Call:
                 numbers.append(int(value))
                 continue
             shape = value.shape
-            if value.dtype != dtype or len(shape) != axes or not value.flags.c_contiguous:
-                raise TypeError(
-                    f"a kernel takes a contiguous array of {dtype} with {axes} "
-                    f"axes, not of {value.dtype} {shape}."
-                )
-            numbers.append(_address(value, shape))
+            own = value.dtype
+            if (own is not dtype and own != dtype) or len(shape) != axes:
+                raise _refused(value, dtype, axes)
             shapes.append(shape)
+            if 0 in shape:
+                numbers.append(0)
+                continue
+            try:
+                numbers.append(_place(_beginning(value)))
+            except TypeError:  # it is read-only, or not contiguous
+                if not value.flags.c_contiguous:
+                    raise _refused(value, dtype, axes) from None
+                numbers.append(int(value.ctypes.data))
         block = self._shaped(tuple(shapes)).copy()
         block[self._places] = numbers
         return block
@@ -104,23 +122,6 @@ class Call:
                 strides = [8 * math.prod(shape[i + 1 :]) for i in range(len(shape))]
                 numbers += (0, 0, math.prod(shape), 8, 0, *shape, *strides)
         return np.array(numbers, np.int64)
-
-
-def _address(
-    array: np.ndarray,
-    shape: tuple[int, ...],
-    beginning: Callable[[Any], Any] = ctypes.c_char.from_buffer,
-    place: Callable[[Any], int] = ctypes.addressof,
-) -> int:
-    """Where a contiguous array of a shape lies, in a quarter of the time of ``array.ctypes``: a
-    call asks for fifty. Nothing lies in an empty one.
-    """
-    if 0 in shape:
-        return 0
-    try:
-        return place(beginning(array))
-    except TypeError:  # read-only
-        return int(array.ctypes.data)
 
 
 class Kernels:
@@ -184,7 +185,7 @@ class Kernels:
         """Call the kernel, without the GIL; kernels/batch.py describes its arrays."""
         block = self._block(values)
         begun = time.perf_counter()
-        answer = int(self._entry(block.ctypes.data))
+        answer = int(self._entry(_place(_beginning(block))))
         self._worked += time.perf_counter() - begun
         if (
             self._worked > STEADY_AFTER

@@ -288,15 +288,15 @@ def allocate(
         system, request.start, request.parameters, request.origin, request.period
     )
     finite &= ~beyond
-    zeros, counts = np.zeros((2, n)), np.zeros((3, n), np.int64)
-    counts[2] = -1
+    zeros, counts = np.zeros((2, n)), np.zeros((4, n), np.int64)
+    counts[2, sampled:] = counts[3] = -1
     whole = {
         "period": request.period,
         "origin": zeros[0] + request.origin,
         "state": start,
         "count": counts[0],
         "phase": zeros[1],
-        "mode": counts[2],
+        "mode": counts[3],
         "fresh": counts[1],
         "carry": np.zeros((n, module.CARRY)),
         "status": np.where(finite, st.RUNNING, st.INVALID),
@@ -304,7 +304,7 @@ def allocate(
         "end_phase": request.end_phase,
         "counters": np.zeros((n, len(st.COUNTERS)), np.int64),
         "minima": np.full((n, len(st.MINIMA)), np.inf),
-        "cursor": np.repeat([0, -1], [sampled, request.checks]),
+        "cursor": counts[2],
         "samples": np.full((sampled, m, states), np.nan),
         "sample_mode": np.full((sampled, m), -1, np.int64),
         **marks(n),

@@ -270,8 +270,8 @@ class Stroboscope:
         self, start: np.ndarray, count: np.ndarray | int, directions: np.ndarray | None
     ) -> tuple[np.ndarray, np.ndarray]:
         """What :meth:`tangent` returns, by central differences of fourth order (Abramowitz and
-        Stegun, 25.3.6), of steps relative to the range of each state over an iterate. The flow is smooth
-        where its equations are steep: how a motion leaves a boundary depends on the speed there.
+        Stegun, 25.3.6), of steps relative to the range of each state over an iterate. The flow is
+        smooth where its equations are steep: how a motion leaves a boundary depends on its speed.
         """
         k, size = start.shape
         way = np.broadcast_to(np.eye(size) if directions is None else directions, (k, size, size))
