@@ -169,19 +169,25 @@ def test_starts_that_are_given_up_change_nothing(from_far_away_too):
     assert from_far_away_too.sizes["orbit"] == alone.sizes["orbit"] == 3
 
 
-def test_a_search_has_a_budget_of_its_own(monkeypatch):
-    """From 1e4 a period is 5300 swings, some hundred thousand steps; thirteen are followed."""
-    steps, launched = [], Stroboscope.launch
+@pytest.fixture
+def counters(monkeypatch):
+    """Those of all flights that are launched."""
+    counted, launched = [], Stroboscope.launch
 
     def watched(map_, start, longest):
         flight = launched(map_, start, longest)
-        steps.append(flight._arrays["counters"])
+        counted.append(flight._arrays["counters"])
         return flight
 
     monkeypatch.setattr(Stroboscope, "launch", watched)
+    return counted
+
+
+def test_a_search_has_a_budget_of_its_own(counters):
+    """From 1e4 a period is 5300 swings, some hundred thousand steps; thirteen are followed."""
     found = sl.periodic_orbits(hardening, {"x": 1e4, "v": 0.0}, periods=1)
     assert found.search_given_up.values.tolist() == [1]
-    assert max(one[:, st.STEPS].max() for one in steps) <= 13 * STEPS + 1
+    assert max(one[:, st.STEPS].max() for one in counters) <= 13 * STEPS + 1
 
 
 @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
@@ -191,22 +197,14 @@ def table(t, x, v, *, a=0.3, e=0.9, w=1.0):
     return v, -1.0, sl.jump(x < a * sl.sin(w * t), v=up - e * (v - up))
 
 
-def test_starts_that_chatter_without_end_are_given_up(monkeypatch):
+def test_starts_that_chatter_without_end_are_given_up(counters):
     """With one impact a period the ball leaves with the velocity pi, at the phase p of the table
     where pi (1 - e) = (1 + e) a cos p; it rises to a sin p + pi^2 / 2.
     """
-    counted, launched = [], Stroboscope.launch
-
-    def watched(map_, start, longest):
-        flight = launched(map_, start, longest)
-        counted.append(flight._arrays["counters"])
-        return flight
-
-    monkeypatch.setattr(Stroboscope, "launch", watched)
     box = {"x": (0.3, 5.3), "v": (-3, 6)}
     found = sl.periodic_orbits(table, "random 40", box=box, periods=1)
     assert 0 < found.search_given_up.item() < 20
-    assert max(one[:, st.EVENTS].max() for one in counted) <= 13 * CONTACTS + 1
+    assert max(one[:, st.EVENTS].max() for one in counters) <= 13 * CONTACTS + 1
     lift = 0.3 * np.sin(np.arccos(np.pi * 0.1 / (1.9 * 0.3)))
     assert np.sort(found.orbit_peak) == pytest.approx(np.pi**2 / 2 + lift * np.array([-1, 1]))
     assert sorted(found.orbit_stable.values.tolist()) == [0, 1]

@@ -6,9 +6,9 @@ They are plain values: a law that isn't returned does nothing, and the trace say
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 from saltus.errors import TraceError, shown
 from saltus.system.expression import Condition, Expr, Operand, Relation, as_expr, select, walk
@@ -16,6 +16,8 @@ from saltus.system.expression import Condition, Expr, Operand, Relation, as_expr
 #: Names of the parts of an impact with friction: its coefficient, the velocity of sliding, and the
 #: sign of that.
 FRICTION, SLIP, FACING = "friction", "slip_velocity", "the sign of slip_velocity"
+
+Made = TypeVar("Made")
 
 _MADE: ContextVar[list[Declared] | None] = ContextVar("made", default=None)
 
@@ -87,14 +89,19 @@ class Jump(Declared):
 
 
 @contextmanager
-def declarations() -> Iterator[list[Declared]]:
-    """The laws that are made inside."""
-    made: list[Declared] = []
-    token = _MADE.set(made)
+def gathered(made: ContextVar[list[Made] | None]) -> Iterator[list[Made]]:
+    """What is added to the list of a context variable inside."""
+    found: list[Made] = []
+    token = made.set(found)
     try:
-        yield made
+        yield found
     finally:
-        _MADE.reset(token)
+        made.reset(token)
+
+
+def declarations() -> AbstractContextManager[list[Declared]]:
+    """The laws that are made inside."""
+    return gathered(_MADE)
 
 
 def impact(

@@ -13,8 +13,8 @@ equation is: so the state is made while the equation is called, and its rate add
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any
@@ -22,6 +22,7 @@ from typing import Any
 from saltus.errors import TraceError, shown
 from saltus.system import expression as ex
 from saltus.system.canonical import ONE, Canonical
+from saltus.system.declared import gathered
 from saltus.system.derivatives import gradient, time_derivative
 from saltus.system.expression import Condition, Expr, Operand, as_expr
 from saltus.system.functions import piecewise
@@ -40,15 +41,9 @@ class Element:
 _MADE: ContextVar[list[Element] | None] = ContextVar("elements", default=None)
 
 
-@contextmanager
-def elements() -> Iterator[list[Element]]:
+def elements() -> AbstractContextManager[list[Element]]:
     """The elements that are made inside."""
-    made: list[Element] = []
-    token = _MADE.set(made)
-    try:
-        yield made
-    finally:
-        _MADE.reset(token)
+    return gathered(_MADE)
 
 
 def play(x: Operand, *, gap: Operand, name: str | None = None) -> Any:

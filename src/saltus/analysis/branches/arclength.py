@@ -279,7 +279,7 @@ class _Fronts:
         guess, normal, outside = self._predicted(going)
         scale, length = self.equations.scale[going], self.length[going]
         trial = correct(self.equations, guess, normal, going, ASTRAY * length)
-        for j in np.flatnonzero(~trial.found & (length < 100 * SHORTEST)):
+        for j in np.flatnonzero(~trial.found & (length < 100 * SHORTEST)).tolist():
             self._beside(trial, j, guess[j], normal[j], going[j], length[j])
         tangent = tangents(_finite(trial.derivative), self.tangent[going])
         step = (trial.z - self.z[going]) / scale
@@ -294,7 +294,7 @@ class _Fronts:
         smooth = (turn > TURN) & (trial.contraction < CONTRACTS) & stays & foreseen
         counts = trial.found & (smooth | (length < 100 * SHORTEST))
         easy = counts & (trial.evaluations <= EASY) & (turn > STRAIGHT)
-        for j in np.flatnonzero(counts):
+        for j in np.flatnonzero(counts).tolist():
             curve = self.curves[going[j]]
             _add(curve, trial.z[j], tangent[j], trial.derivative[j], moved[j])
             curve.end = "range" if outside[j] else ""

@@ -16,6 +16,8 @@ from saltus.results import content_hash, load, save, to_csv, to_mat
 from saltus.results.files import export
 from unit.results.conftest import PROVENANCE, sine_points, sine_run
 
+# exact in every version of pandas, and the default from version 4 on
+pytestmark = pytest.mark.filterwarnings("ignore:The 'float_precision' argument is deprecated")
 CASES = {
     "single": sine_run,
     "batch": lambda: sine_run((2e-3, 0.5e-3), batch=True),
@@ -94,7 +96,7 @@ def test_only_results_are_written(write, tmp_path):
 
 # -- CSV -------------------------------------------------------------------------------------------
 def read(path):
-    return pd.read_csv(path, comment="#", engine="python")
+    return pd.read_csv(path, comment="#", float_precision="round_trip")
 
 
 def test_csv_has_units_and_all_digits(run, tmp_path):
