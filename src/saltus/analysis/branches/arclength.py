@@ -21,6 +21,8 @@ from saltus.flow.polynomials import between
 MOST_ITERATIONS = 7
 #: A residual so small, in units of the scale, is rounding; one so small that stalls is accepted.
 CLOSED, STALLED = 1e-14, 1e-9
+#: Two steps of one length, to so much: Newton's method goes to and fro across a corner.
+TO_AND_FRO = 1e-3
 #: Cosine of the angle between tangents at the ends of a step, and between it and each of them: less
 #: halves the step. A step to another curve that runs alongside is at an angle to both.
 TURN = 0.97
@@ -279,7 +281,8 @@ class _Fronts:
         guess, normal, outside = self._predicted(going)
         scale, length = self.equations.scale[going], self.length[going]
         trial = correct(self.equations, guess, normal, going, ASTRAY * length)
-        for j in np.flatnonzero(~trial.found & (length < 100 * SHORTEST)).tolist():
+        cycles = np.abs(trial.contraction - 1.0) < TO_AND_FRO
+        for j in np.flatnonzero(~trial.found & cycles & (length < 100 * SHORTEST)).tolist():
             self._beside(trial, j, guess[j], normal[j], going[j], length[j])
         tangent = tangents(_finite(trial.derivative), self.tangent[going])
         step = (trial.z - self.z[going]) / scale
