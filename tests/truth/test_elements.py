@@ -152,24 +152,3 @@ def test_what_is_refused(make, words):
 def test_outside_an_equation():
     with pytest.raises(SaltusError, match="inside the function"):
         sl.play(1.0, gap=1.0)
-
-
-def test_a_branch_goes_on_where_slip_begins_at_the_instant_of_its_points():
-    """There the curve of the points has a corner: the joint's deflection stays at its limit, then
-    falls. It ended `lost` at 0.925701 rad/s, from both sides.
-    """
-    system = sl.models.jenkins_oscillator()
-    found = sl.branches(system, {"frequency": (0.7, 1.2)}, progress=False)
-    assert found.sizes["branch"] == 1
-    assert set(found.branch_begin.values) | set(found.branch_end.values) == {"range"}
-    w, joint = found.point_frequency.values, found.point_joint.values[:, 0]
-    limit = system.values["joint_limit"] / system.values["joint_stiffness"]
-    np.testing.assert_allclose(joint[w < 0.9257], limit, rtol=1e-12)
-    assert (joint[w > 0.9258] < limit).all()
-    for at in (2, -3):
-        orbit = {"x": found.point_x.values[at, 0], "v": found.point_v.values[at, 0]}
-        end = sl.stroboscope(
-            system.with_values(frequency=w[at]), orbit | {"joint": joint[at]}, 1, keep=1
-        )
-        for name in ("x", "v"):
-            assert float(end[name].values.ravel()[-1]) == pytest.approx(orbit[name], abs=1e-12)

@@ -39,32 +39,67 @@ def test_where_the_derivative_of_a_force_is_infinite_is_known():
     assert not rooted.is_steep
 
 
-def test_the_flow_contracts_areas_as_liouville_says():
-    """det of the derivative over five periods = exp of the integral of the divergence, by Gauss'
-    rule between the contacts, in depth**0.25 about them.
+def contraction(system, start, periods, divergence):
+    """exp of the integral of the divergence: by Gauss' rule between the contacts, in a variable
+    that is flat at both ends, in which their powers of the depth are smooth.
     """
-    run = sl.simulate(HERTZ, (0.0, 0.02), periods=5, samples=4, time_errors="local")
+    flow = Stroboscope(system, sl.Taylor())
+    run = sl.simulate(system, tuple(start[0]), periods=periods, samples=4, time_errors="local")
     edges = np.concatenate([[0.0], run.contact_time.values, [run.time.values[-1]]])
     nodes, weights = np.polynomial.legendre.leggauss(40)
-    # t = a + (b - a) s(u), flat at both ends: the depth**0.25 of a contact is smooth in u
-    u = 0.5 * (nodes + 1.0)
+    u, total = 0.5 * (nodes + 1.0), 0.0
     share = u**4 * (35.0 - 84.0 * u + 70.0 * u**2 - 20.0 * u**3)
     slope = 140.0 * u**3 * (1.0 - u) ** 3
-    values, total, start = HERTZ.values, 0.0, np.array([[0.0, 0.02]])
-    flow = Stroboscope(HERTZ, sl.Taylor())
     for a, b in itertools.pairwise(edges):
-        if b - a < 1e-12:
-            continue
-        count, fraction = np.divmod((a + (b - a) * share) / flow.period, 1.0)
-        seen = flow.run(start, 5, Schedule(count.astype(np.int64), fraction))
-        x, v = seen.samples[0].T
-        depth = np.maximum(x - values["gap"], 0.0)
-        damper = values["loss"] * np.sqrt(values["mass"] * values["stop_stiffness"]) * depth**0.25
-        divergence = -(values["damping"] + np.where(v > 0, damper, 0.0)) / values["mass"]
-        total += (b - a) * 0.5 * float(np.sum(weights * slope * divergence))
-    _, derivative = flow.tangent(start, 5)
+        if b - a > 1e-12:
+            count, fraction = np.divmod((a + (b - a) * share) / flow.period, 1.0)
+            seen = flow.run(start, periods, Schedule(count.astype(np.int64), fraction))
+            total += (b - a) * 0.5 * float(weights * slope @ divergence(*seen.samples[0].T))
+    return np.exp(total)
+
+
+def test_the_flow_contracts_areas_as_liouville_says():
+    values, start = HERTZ.values, np.array([[0.0, 0.02]])
+    loss = values["loss"] * np.sqrt(values["mass"] * values["stop_stiffness"])
+
+    def divergence(x, v):
+        damper = loss * np.maximum(x - values["gap"], 0.0) ** 0.25 * (v > 0)
+        return -(values["damping"] + damper) / values["mass"]
+
+    _, derivative = Stroboscope(HERTZ, sl.Taylor()).tangent(start, 5)
     # the determinant is a difference of products some 1e4 times larger
-    assert np.linalg.det(derivative[0]) == pytest.approx(np.exp(total), rel=1e-6)
+    assert np.linalg.det(derivative[0]) == pytest.approx(
+        contraction(HERTZ, start, 5, divergence), rel=1e-6
+    )
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_random_steep_dampers(seed):
+    """Stops from soft to hard, dampers of any power below one: Liouville's formula again."""
+    random = np.random.default_rng(seed)
+    power, gap = random.choice([0.2, 0.25, 0.4, 0.5, 0.75]), random.uniform(-0.3, 0.5)
+    hardness, loss = 10 ** random.uniform(0, 6), 10 ** random.uniform(-1, 2)
+
+    @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
+    def stop(t, x, v, *, k=float(hardness), c=float(loss), gap=float(gap), w=1.3):
+        depth = x - gap
+        force = sl.piecewise(
+            (k * depth**1.5 + c * depth ** float(power) * v, depth > 0), otherwise=0
+        )
+        return v, sl.cos(w * t) - 0.2 * v - x - force
+
+    def divergence(x, v):
+        return -(0.2 + loss * np.maximum(x - gap, 0.0) ** power + 0.0 * v)
+
+    start = np.array([[gap - random.uniform(0.1, 1.0), random.uniform(-1.0, 0.2)]])
+    assert stop.is_steep
+    _, derivative = Stroboscope(stop, sl.Taylor()).tangent(start, 2)
+    noise = 1e-9 * (1.0 + np.abs(derivative).max())
+    assert np.linalg.det(derivative[0]) == pytest.approx(
+        contraction(stop, start, 2, divergence),
+        rel=1e-9,
+        abs=noise * np.abs(derivative).max() + noise**2,
+    )
 
 
 def test_differences_are_the_tangents_where_there_are_some():

@@ -21,8 +21,6 @@ from saltus.flow.polynomials import between
 MOST_ITERATIONS = 7
 #: A residual so small, in units of the scale, is rounding; one so small that stalls is accepted.
 CLOSED, STALLED = 1e-14, 1e-9
-#: Two steps of one length, to so much: Newton's method goes to and fro across a corner.
-TO_AND_FRO = 1e-3
 #: Cosine of the angle between tangents at the ends of a step, and between it and each of them: less
 #: halves the step. A step to another curve that runs alongside is at an angle to both.
 TURN = 0.97
@@ -281,9 +279,6 @@ class _Fronts:
         guess, normal, outside = self._predicted(going)
         scale, length = self.equations.scale[going], self.length[going]
         trial = correct(self.equations, guess, normal, going, ASTRAY * length)
-        cycles = np.abs(trial.contraction - 1.0) < TO_AND_FRO
-        for j in np.flatnonzero(~trial.found & cycles & (length < 100 * SHORTEST)).tolist():
-            self._beside(trial, j, guess[j], normal[j], going[j], length[j])
         tangent = tangents(_finite(trial.derivative), self.tangent[going])
         step = (trial.z - self.z[going]) / scale
         moved = np.linalg.norm(step, axis=1)
@@ -297,7 +292,7 @@ class _Fronts:
         smooth = (turn > TURN) & (trial.contraction < CONTRACTS) & stays & foreseen
         counts = trial.found & (smooth | (length < 100 * SHORTEST))
         easy = counts & (trial.evaluations <= EASY) & (turn > STRAIGHT)
-        for j in np.flatnonzero(counts).tolist():
+        for j in np.flatnonzero(counts):
             curve = self.curves[going[j]]
             _add(curve, trial.z[j], tangent[j], trial.derivative[j], moved[j])
             curve.end = "range" if outside[j] else ""
@@ -312,27 +307,6 @@ class _Fronts:
             self.curves[i].end = "lost"
         self._close(taken)
         return taken
-
-    def _beside(
-        self, trial: Corrected, j: int, guess: np.ndarray, normal: np.ndarray, i: int, length: float
-    ) -> None:
-        """Correct a very short step from beside its guess, to either side along each unknown.
-
-        At a corner of the map, where an event passes the instant of its points, the curve is bent
-        and the derivative at the guess may be that of another piece: Newton's method goes to and
-        fro between two of them.
-        """
-        ways = np.concatenate([np.eye(len(guess)), -np.eye(len(guess))])
-        ways -= np.outer(ways @ normal, normal)
-        rows = np.full(len(ways), i)
-        around = guess + length * ways * self.equations.scale[i]
-        found = correct(self.equations, around, normal[None].repeat(len(ways), 0), rows, ASTRAY)
-        apart = np.linalg.norm((found.z - guess) / self.equations.scale[i], axis=1)
-        apart[~found.found] = np.inf
-        best = int(np.argmin(apart))
-        if apart[best] < 0.5 * length:
-            for name in ("z", "derivative", "found", "evaluations", "contraction"):
-                getattr(trial, name)[j] = getattr(found, name)[best]
 
     def _longest(self, going: np.ndarray) -> np.ndarray:
         """The longest steps of curves, which grow where these are far from where they began; those
