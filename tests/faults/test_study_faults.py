@@ -110,6 +110,7 @@ def serve(out, study):
         if child == 0:
             os.setsid()  # what is sent to the group of a run reaches its workers, and not the tests
             os.environ.update(environment)
+            committed.clear()  # what the first run did is not the child's
             signal.signal(signal.SIGINT, signal.default_int_handler)  # else ignored
             to = os.open(log, os.O_CREAT | os.O_WRONLY | os.O_APPEND)
             os.dup2(to, 1)
