@@ -289,8 +289,9 @@ class _Fronts:
         stays = (side * self.side[going] >= 0) | (length < PASSING)
         off = np.linalg.norm((trial.z - guess) / scale, axis=1)
         foreseen = (off < PREDICTED * length) | (length < SHORT)
-        smooth = (turn > TURN) & (trial.contraction < CONTRACTS) & stays & foreseen
-        counts = trial.found & (smooth | (length < 100 * SHORTEST))
+        converges = trial.found & (trial.contraction < CONTRACTS)
+        smooth = (turn > TURN) & stays & foreseen
+        counts = converges & (smooth | (length < 100 * SHORTEST))  # a short one may turn a corner
         easy = counts & (trial.evaluations <= EASY) & (turn > STRAIGHT)
         for j in np.flatnonzero(counts):
             curve = self.curves[going[j]]

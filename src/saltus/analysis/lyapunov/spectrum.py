@@ -106,7 +106,7 @@ def spectrum(
             continue
         kinds.append((Kind.PERIODIC if forced else Kind.EQUILIBRIUM).word)
         volume[i], zeros = _volume(flow, i, orbit)
-        exponents[i], errors[i] = _of_orbit(flow, i, orbit, growth.scale[i], volume[i])
+        exponents[i], errors[i] = _of_orbit(flow, i, orbit, growth.scale[i], volume[i], zeros > 0)
         _vanish(zeros, exponents[i], errors[i])
         half_width[i], batches[i] = errors[i], 0
     return Spectrum(
@@ -162,13 +162,14 @@ def _arrives(points: np.ndarray, orbit: Orbit, scale: np.ndarray, noise: float) 
 
 
 def _of_orbit(
-    flow: TangentFlow, i: int, orbit: Orbit, scale: np.ndarray, volume: float
+    flow: TangentFlow, i: int, orbit: Orbit, scale: np.ndarray, volume: float, vanish: bool
 ) -> tuple[np.ndarray, np.ndarray]:
     """Exponents of an orbit per block, and what the map's own errors make of them (Bauer & Fike:
     times the condition of the eigenvectors).
 
     Multipliers that are lost in the rounding of the largest are found as growth round the orbit,
-    block by block; one that is lost in a single block, from the mean growth of volumes.
+    block by block; one that is lost in a single block, from the mean growth of volumes. A growth of
+    zero is true where volumes ``vanish``, and rounding elsewhere.
     """
     map_, n = flow.map.rows(np.array([i])), orbit.period
     noise, monodromy = map_.noise, map_.tangent(orbit.points[:1], n)[1][0] * scale / scale[:, None]
@@ -184,8 +185,8 @@ def _of_orbit(
     if lost.any():
         exponents[lost], errors[lost] = (part[lost] for part in _round_trips(flow, i, orbit, scale))
         last = len(exponents) - 1
-        with np.errstate(invalid="ignore"):  # -inf is known: nothing is left there
-            known = np.isneginf(exponents) | (exponents[0] - exponents < LOST)
+        with np.errstate(invalid="ignore"):
+            known = (np.isneginf(exponents) & vanish) | (exponents[0] - exponents < LOST)
         if known[:last].all() and not known[last]:
             exponents[last] = volume - exponents[:last].sum()
             errors[last] = errors[:last].sum() + flow.map.noise * (1.0 + abs(volume))
