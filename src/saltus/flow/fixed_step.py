@@ -81,7 +81,7 @@ class RK4(OneByOne):
         if float(self.step) > longest * (1 + 1e-9):
             raise ParameterError(
                 f"RK4's step of {float(self.step):g} s is longer than a tenth of the forcing's "
-                f"period of {period:g} s, which it doesn't see so. Take at most "
+                f"period of {period:g} s: too long to follow it. Take at most "
                 f"RK4({longest:.3g}), or sl.Taylor(), which finds its steps itself."
             )
 

@@ -160,8 +160,12 @@ def strike(lanes, lane, batch, g, rate, slow):
 @kernel
 def mode_behind(lanes, lane, batch, struck, slow):
     """The mode where a jump has put the state: it may have carried it over other boundaries."""
+    mode, others = mode_of(lanes, lane), False
+    for g in range(NGUARDS):
+        others = others or (g != struck and (LAW[g] == NO_LAW or LAW[g] == SURFACE_LAW))
+    if not others:
+        return mode
     gaps_here(lanes, lane, batch, slow)
-    mode = mode_of(lanes, lane)
     for g in range(NGUARDS):
         plain = LAW[g] == NO_LAW or LAW[g] == SURFACE_LAW
         watched = lanes.side[WATCHED + g, lane] > 0.5
@@ -203,7 +207,11 @@ def loosen(lanes, lane, batch, struck, closing, slow):
     """Let go of the contacts that are held and that feel the blow of another: their surfaces slide
     then, their stops are struck or left. A stop that had nothing to leave it closes or opens now.
     """
-    mode = mode_of(lanes, lane)
+    mode, others = mode_of(lanes, lane), False
+    for g in range(NGUARDS):
+        others = others or (g != struck and PARTNER[g] >= 0 and LAW[g] != HOLD_LAW)
+    if not others:
+        return
     gaps_here(lanes, lane, batch, slow)
     for g in range(NGUARDS):
         if g != struck and PARTNER[g] >= 0 and LAW[g] != HOLD_LAW:
