@@ -24,7 +24,8 @@ import saltus as sl
 from . import written_equations
 from .memory_systems import Case, random_case, random_conditions
 
-REACHED = ("ok", "graze_unresolved")
+#: Statuses with which a motion has come to the end; `resting`: on a boundary since the start.
+REACHED = ("ok", "graze_unresolved", "resting")
 SHIFT = 1e-7
 STEPS_A_SECOND = (10_007, 7_001, 3_001)  # no common nodes
 UNDECIDABLE = 0.05  # of motions of order one
