@@ -21,6 +21,7 @@ from conformance.systems import latch, pair, slider, walls
 from saltus.codegen.kernels import FULL, GENERIC, TIERS, Kernels
 from saltus.codegen.module import jit_disabled
 from saltus.flow import engine
+from saltus.flow.request import Request, Schedule
 from saltus.kernels import status as st
 from saltus.system.tangent import tangent_system
 
@@ -60,10 +61,10 @@ def request(system, spread, periods=8, count=24):
     rng = np.random.default_rng(7)
     start = rng.uniform(-spread, spread, (count, len(system.states)))
     start[:4, 0] = [0.0, 0.3, -0.0, 1.0]  # 1: the stop of the first mass of `tangent`
-    schedule = engine.Schedule(np.repeat(np.arange(periods), 2), np.tile([0.0, 0.3], periods))
+    schedule = Schedule(np.repeat(np.arange(periods), 2), np.tile([0.0, 0.3], periods))
     period = np.full(count, system.period() or 1.0)
     values = np.array([list(system.values.values())])
-    whole = engine.Request.periods(start, values, period, periods, schedule=schedule, record_from=0)
+    whole = Request.periods(start, values, period, periods, schedule=schedule, record_from=0)
     return replace(whole, end_phase=0.3 * period)
 
 

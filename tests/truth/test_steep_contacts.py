@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import saltus as sl
-from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
+from saltus.flow.request import Schedule
 
 HERTZ = sl.models.hertz_stop()
 BRANCH = {"frequency": (12.6, 15.4)}

@@ -11,8 +11,8 @@ import numpy as np
 
 from saltus.analysis.starts import Ensemble
 from saltus.flow.contact_table import ContactTable
-from saltus.flow.engine import Outcome
 from saltus.flow.methods import Method
+from saltus.flow.request import Outcome
 from saltus.kernels import status as st
 from saltus.results import Guards, Subject, attributes
 from saltus.system.dimensions import gap_units

@@ -12,7 +12,7 @@ import numpy as np
 from saltus.analysis.axes import along, axes_of, count_along
 from saltus.errors import ParameterError, SaltusError, among, nearest, shown
 from saltus.flow.counts import whole
-from saltus.flow.engine import Request, Schedule
+from saltus.flow.request import Request, Schedule
 from saltus.flow.room import check_room
 from saltus.system import expression as ex
 from saltus.system.checks import check_values

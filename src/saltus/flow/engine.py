@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from saltus.flow.counts import whole as whole_number
 from saltus.flow.growth import mark_growth
 from saltus.flow.methods import Method
 from saltus.flow.pace import marks, resume
+from saltus.flow.request import Outcome, Request
 from saltus.flow.room import Contacts
 from saltus.flow.stops import on_allowed_sides
 from saltus.flow.threads import may_wait, on_threads, usable_processors
@@ -40,134 +40,6 @@ MOST_THREADS = 4096
 SLICE = 50_000
 #: Contacts that a chunk's table holds before it is emptied, besides room for those of one step.
 RECORDS = 8192
-
-
-@dataclass(frozen=True)
-class Schedule:
-    """When states are wanted: at ``(count + fraction)`` periods after the start, ascending.
-
-    Attributes
-    ----------
-    count : int64[M]
-    fraction : float64[M], in [0, 1)
-    """
-
-    count: np.ndarray
-    fraction: np.ndarray
-
-    @classmethod
-    def none(cls) -> Schedule:
-        """No samples."""
-        return cls(np.zeros(0, np.int64), np.zeros(0))
-
-    @classmethod
-    def even(cls, periods: int, per_period: int, first: int = 0, beyond: int = 0) -> Schedule:
-        """``per_period`` equidistant samples in each of ``periods`` from ``first`` on, and
-        ``beyond`` more after them.
-        """
-        index = first * per_period + np.arange(periods * per_period + beyond)
-        return cls(index // per_period, (index % per_period) / per_period)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Request:
-    """What to compute. n trajectories, D states, P parameters.
-
-    Attributes
-    ----------
-    start : float64[n, D]
-        States at the start.
-    parameters : float64[n or 1, P]
-        Values in the order of ``system.values``; one row for all, or one each.
-    period : float64[n]
-        Forcing period [s]; for an unforced system the span.
-    origin : float
-        Time at the start [s].
-    end_count : int
-        Whole periods to run,
-    end_phase : float64[n]
-        and the time after them [s].
-    schedule : Schedule
-        When samples are taken.
-    record_from : int or None
-        First period since the start whose contacts are recorded; None records none.
-    t_end : float
-        End that the user gave [s]: sums of periods that exceed it by rounding are cut off.
-    checks : int
-        Number of trajectories at the end that check the others. The method's companion moves them,
-        with the same kernels, and takes no samples of them.
-    """
-
-    start: np.ndarray
-    parameters: np.ndarray
-    period: np.ndarray
-    end_count: np.ndarray
-    end_phase: np.ndarray
-    origin: float = 0.0
-    schedule: Schedule = field(default_factory=Schedule.none)
-    record_from: int | None = None
-    t_end: float = np.inf
-    checks: int = 0
-
-    @classmethod
-    def periods(
-        cls,
-        start: np.ndarray,
-        parameters: np.ndarray,
-        period: float | np.ndarray,
-        count: int | np.ndarray,
-        **more: Any,
-    ) -> Request:
-        """Whole periods from time zero, one period and count for all or one each; ``more`` as
-        above.
-        """
-        n = len(start)
-        return cls(
-            start=start,
-            parameters=parameters,
-            period=np.full(n, period, float),
-            end_count=np.full(n, count, np.int64),
-            end_phase=np.zeros(n),
-            **more,
-        )
-
-
-@dataclass
-class Outcome:
-    """What came out; arrays have the trajectory first. Contacts are sorted by trajectory, then
-    time.
-    """
-
-    state: np.ndarray
-    time: np.ndarray
-    status: np.ndarray
-    mode: np.ndarray
-    counters: np.ndarray
-    minima: np.ndarray
-    samples: np.ndarray
-    sample_mode: np.ndarray
-    contacts: ContactTable
-    complete: bool = True
-
-    def reached(self) -> int:
-        """How many samples there are: of a run that was interrupted those that some trajectory has
-        reached.
-        """
-        if self.complete:
-            return self.samples.shape[1]
-        return int(np.flatnonzero((self.sample_mode >= 0).any(axis=0)).max(initial=0)) + 1
-
-    def of(self, first: int, last: int) -> Outcome:
-        """That of some of the trajectories, as if they had been moved alone."""
-        begins = self.contacts.begins(last - first, first)
-        each = {name: getattr(self, name)[first:last] for name in _EACH}
-        return replace(
-            self, **each, contacts=self.contacts.rows(slice(begins[0], begins[-1])).moved(-first)
-        )
-
-
-#: Arrays of an outcome that have a row for each trajectory.
-_EACH = ("state", "time", "status", "mode", "counters", "minima", "samples", "sample_mode")
 
 
 class RunInterrupted(Interrupted):

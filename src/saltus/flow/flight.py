@@ -7,17 +7,10 @@ from __future__ import annotations
 import numpy as np
 
 from saltus.flow.contact_table import ContactTable
-from saltus.flow.engine import (
-    ARGUMENTS,
-    Request,
-    allocate,
-    check_steps,
-    options_of,
-    slice_of,
-    tables_of,
-)
+from saltus.flow.engine import ARGUMENTS, allocate, check_steps, options_of, slice_of, tables_of
 from saltus.flow.methods import Method
 from saltus.flow.pace import marks, resume
+from saltus.flow.request import Request
 from saltus.interrupt import check_stop
 from saltus.kernels import status as st
 from saltus.system.system import System

@@ -13,7 +13,7 @@ import numpy as np
 from saltus.kernels import status as st
 
 if TYPE_CHECKING:
-    from saltus.flow.engine import Outcome, Request
+    from saltus.flow.request import Outcome, Request
 
 #: A motion that ends at a state of so many SI units, or times its start, is computed again.
 LARGE = 1e3

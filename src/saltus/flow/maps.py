@@ -13,9 +13,9 @@ import numpy as np
 
 from saltus.errors import ParameterError, shown
 from saltus.flow import engine
-from saltus.flow.engine import Request, Schedule
 from saltus.flow.flight import Flight
 from saltus.flow.methods import Method
+from saltus.flow.request import Outcome, Request, Schedule
 from saltus.kernels import status as st
 from saltus.system.checks import check_values
 from saltus.system.system import System
@@ -240,7 +240,7 @@ class Stroboscope:
         periods: np.ndarray | int,
         schedule: Schedule | None = None,
         record: int | None = None,
-    ) -> engine.Outcome:
+    ) -> Outcome:
         """Trajectories over ``periods`` each, with samples at a schedule and the contacts from
         period ``record`` on.
         """
@@ -312,7 +312,7 @@ class Stroboscope:
         directions: np.ndarray | None,
         count: np.ndarray | int,
         schedule: Schedule | None = None,
-    ) -> engine.Outcome:
+    ) -> Outcome:
         k, size = start.shape
         first = np.eye(size) if directions is None else directions
         extended = np.empty((k, size + size**2))

@@ -18,9 +18,9 @@ from functools import lru_cache
 import numpy as np
 
 from saltus.flow import polynomials
-from saltus.flow.engine import Outcome, Schedule
 from saltus.flow.maps import Stroboscope
 from saltus.flow.motion_series import MotionSeries, Nodes, Pieces
+from saltus.flow.request import Outcome, Schedule
 from saltus.system.expression import Expr
 from saltus.system.guards import Guard
 from saltus.system.system import System

@@ -15,6 +15,7 @@ from saltus.analysis.motion import time_errors
 from saltus.codegen.module import lane_width
 from saltus.flow import engine
 from saltus.flow.maps import Stroboscope
+from saltus.flow.request import Request, Schedule
 from saltus.flow.taylor import SMALL_BATCH
 from saltus.interrupt import Interrupted
 from saltus.kernels import status as st
@@ -83,13 +84,13 @@ def test_checks_move_as_the_companion_moves_them_and_are_not_sampled(method):
     bit; the loose steps are longer.
     """
     start = np.array([[1e-3, 0.0], [2e-3, 0.0], [-1e-3, 0.5]])
-    schedule = engine.Schedule(np.arange(8), np.full(8, 0.25))
+    schedule = Schedule(np.arange(8), np.full(8, 0.25))
     values, period, count = (
         np.array([list(RIG.values.values())]),
         np.full(3, RIG.period()),
         np.full(3, 8),
     )
-    request = engine.Request.periods(
+    request = Request.periods(
         start, values, period, count, schedule=schedule, record_from=0, checks=2
     )
     whole = engine.run(RIG, method, request)

@@ -23,10 +23,10 @@ from saltus.analysis.starts import check_system, ensemble, fill, fixed_states
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, shown
 from saltus.flow.counts import whole
-from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporting
+from saltus.flow.request import Schedule
 from saltus.flow.room import check_room
 from saltus.results import AttractorTable, Subject, build
 from saltus.results.dataset import schema

@@ -18,9 +18,9 @@ from saltus.analysis.branches.special_points import outside
 from saltus.analysis.dataset_parts import guards_over, provenance, subject
 from saltus.analysis.orbits.orbit_measures import Measures, measure, unknown
 from saltus.analysis.outputs import Outputs
-from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
+from saltus.flow.request import Schedule
 from saltus.results import build
 from saltus.results.dataset import schema
 from saltus.results.dataset.attractors import padded

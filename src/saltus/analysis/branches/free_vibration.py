@@ -18,8 +18,8 @@ import numpy as np
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.orbits.equilibria import autonomous, field_of, jacobian_of
 from saltus.errors import ParameterError
-from saltus.flow.engine import Schedule
 from saltus.flow.methods import Method
+from saltus.flow.request import Schedule
 from saltus.system import expression as ex
 from saltus.system.expression import Expr
 from saltus.system.guards import Guard

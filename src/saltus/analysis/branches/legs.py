@@ -20,8 +20,8 @@ from saltus.analysis.branches.contact_sequences import ContactSequence, sequence
 from saltus.analysis.branches.contacts_along import At, Jumps
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.orbits.floquet import across, multipliers
-from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
+from saltus.flow.request import Schedule
 from saltus.kernels import status as st
 from saltus.system.leg import leg
 

@@ -19,9 +19,9 @@ import numpy as np
 from saltus.analysis.orbits.equilibria import field_of
 from saltus.analysis.orbits.floquet import across, multipliers
 from saltus.analysis.orbits.newton import leading_first
-from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
+from saltus.flow.request import Schedule
 from saltus.flow.stops import on_allowed_sides
 from saltus.system.parametric import parametric
 from saltus.system.system import System

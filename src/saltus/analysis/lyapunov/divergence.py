@@ -18,8 +18,8 @@ import numpy as np
 
 from saltus.analysis.dataset_parts import before_jumps
 from saltus.flow.contact_table import ContactTable
-from saltus.flow.engine import Outcome
 from saltus.flow.maps import Stroboscope
+from saltus.flow.request import Outcome
 from saltus.kernels import status as st
 from saltus.system.derivatives import gradient, time_derivative
 from saltus.system.evaluate import evaluate

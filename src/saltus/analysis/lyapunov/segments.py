@@ -10,8 +10,8 @@ from typing import Self
 import numpy as np
 
 from saltus.analysis.lyapunov.divergence import Divergence
-from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
+from saltus.flow.request import Schedule
 from saltus.kernels import status as st
 
 #: Blocks whose motion is sampled for its size, and samples in each.

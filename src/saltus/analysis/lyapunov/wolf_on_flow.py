@@ -14,8 +14,8 @@ from saltus.analysis.lyapunov.algorithm import Algorithm
 from saltus.analysis.lyapunov.qr import GOOD
 from saltus.analysis.recorded.wolf import NOTHING, Growing, default_search, measure, replaced
 from saltus.analysis.statistics import CONFIDENCE, RUNNING
-from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
+from saltus.flow.request import Schedule
 from saltus.flow.room import check_room
 from saltus.kernels import status as st
 

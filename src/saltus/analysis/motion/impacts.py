@@ -16,8 +16,8 @@ from saltus.analysis.starts import check_system
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, nearest, shown
 from saltus.flow.counts import whole
-from saltus.flow.engine import Outcome, Schedule
 from saltus.flow.methods import Method, check_method
+from saltus.flow.request import Outcome, Schedule
 from saltus.flow.room import check_room
 from saltus.results.dataset import schema
 from saltus.system.evaluate import evaluate

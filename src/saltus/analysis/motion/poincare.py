@@ -15,8 +15,8 @@ from saltus.analysis.outcome_messages import warn
 from saltus.analysis.starts import check_system
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, among, nearest, shown
-from saltus.flow.engine import Outcome, Schedule
 from saltus.flow.methods import Method, check_method
+from saltus.flow.request import Outcome, Schedule
 from saltus.kernels import status as st
 from saltus.results.dataset import schema
 from saltus.system.guards import equation_of

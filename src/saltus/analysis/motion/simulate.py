@@ -18,9 +18,9 @@ from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, among, shown
 from saltus.flow import engine
 from saltus.flow.counts import whole
-from saltus.flow.engine import Outcome, Request, Schedule
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporting
+from saltus.flow.request import Outcome, Request, Schedule
 from saltus.flow.room import check_room
 from saltus.interrupt import Interrupted
 from saltus.results import build

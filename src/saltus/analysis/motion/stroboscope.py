@@ -16,8 +16,8 @@ from saltus.analysis.starts import check_system, ensemble, span, trajectories
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
 from saltus.flow.counts import whole
-from saltus.flow.engine import Outcome, Schedule
 from saltus.flow.methods import Method, check_method
+from saltus.flow.request import Outcome, Schedule
 from saltus.flow.room import check_room
 from saltus.results import build
 from saltus.results.dataset import schema

@@ -11,8 +11,9 @@ from functools import lru_cache
 import numpy as np
 
 from saltus.flow import engine
-from saltus.flow.engine import Outcome, Request, RunInterrupted, Schedule
+from saltus.flow.engine import RunInterrupted
 from saltus.flow.methods import Method
+from saltus.flow.request import Outcome, Request, Schedule
 from saltus.kernels import status as st
 from saltus.system import expression as ex
 from saltus.system.evaluate import evaluate

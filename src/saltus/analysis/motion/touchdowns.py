@@ -9,7 +9,7 @@ import numpy as np
 
 from saltus.analysis.motion.window import Stretch
 from saltus.flow.contact_table import ContactTable
-from saltus.flow.engine import Outcome
+from saltus.flow.request import Outcome
 from saltus.kernels import status as st
 from saltus.system.evaluate import evaluate
 from saltus.system.system import System

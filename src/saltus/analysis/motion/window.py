@@ -16,9 +16,9 @@ from saltus.analysis.starts import Ensemble, Span, ensemble, span
 from saltus.errors import ParameterError, shown
 from saltus.flow import engine
 from saltus.flow.counts import whole
-from saltus.flow.engine import Outcome, Request, Schedule
 from saltus.flow.methods import Method
 from saltus.flow.progress import reporting
+from saltus.flow.request import Outcome, Request, Schedule
 from saltus.results import build
 from saltus.system.system import System
 from saltus.units import to_si

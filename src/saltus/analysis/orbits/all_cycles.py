@@ -29,9 +29,9 @@ from saltus.analysis.orbits.equilibria import field_of
 from saltus.analysis.orbits.floquet import nontrivial
 from saltus.analysis.orbits.newton import Equations
 from saltus.analysis.orbits.tolerances import AMPLIFIED, CONVERGED, LONGEST, SAME
-from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
 from saltus.flow.polynomials import between
+from saltus.flow.request import Schedule
 
 #: Turns that starts are followed before a return is looked for, in turn: none, so that cycles are
 #: found which nothing comes near; some, so that a chaotic set is reached.

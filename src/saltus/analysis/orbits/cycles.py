@@ -21,9 +21,9 @@ from saltus.analysis.orbits.floquet import across
 from saltus.analysis.orbits.newton import leading_first, newton
 from saltus.analysis.orbits.orbits import OrbitBatch
 from saltus.analysis.orbits.tolerances import AMPLIFIED, BESIDE, CONVERGED, LONGEST, RESTS, ROUNDING
-from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
 from saltus.flow.polynomials import between
+from saltus.flow.request import Schedule
 
 #: Samples of the motion in which a return is searched; ratio of the lengths of two windows.
 SAMPLES, ZOOM = 4096, 8

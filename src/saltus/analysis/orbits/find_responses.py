@@ -25,8 +25,8 @@ from saltus.analysis.orbits.growth import BUDGET
 from saltus.analysis.orbits.orbits import OrbitBatch
 from saltus.analysis.orbits.recurrence import recurrence, recurring_orbits
 from saltus.analysis.orbits.tolerances import BESIDE, NEAR, RESTS, ROUND, SETTLED
-from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
+from saltus.flow.request import Schedule
 from saltus.flow.threads import on_threads
 from saltus.kernels import status as st
 from saltus.results.dataset.kinds import Kind

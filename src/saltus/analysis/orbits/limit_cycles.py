@@ -10,8 +10,8 @@ from saltus.analysis.orbits.aperiodic import SURVEY_ITERATES, SampledAttractor
 from saltus.analysis.orbits.cycles import attracting_cycles
 from saltus.analysis.orbits.orbits import OrbitBatch
 from saltus.analysis.orbits.tolerances import NEAR, ROUND
-from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
+from saltus.flow.request import Schedule
 from saltus.results.dataset.kinds import Kind
 
 #: Places on a cycle, as shares of its time, from which it is looked for.

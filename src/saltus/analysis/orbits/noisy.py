@@ -17,8 +17,8 @@ import numpy as np
 
 from saltus.analysis.orbits.aperiodic import SURVEY_ITERATES, SampledAttractor
 from saltus.analysis.orbits.orbits import Orbit
-from saltus.flow.engine import Schedule
 from saltus.flow.maps import Map, Stroboscope
+from saltus.flow.request import Schedule
 from saltus.results.dataset.kinds import Kind
 from saltus.results.dataset.schema import period_text
 

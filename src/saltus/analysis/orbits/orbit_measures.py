@@ -16,10 +16,10 @@ import numpy as np
 
 from saltus.analysis.outputs import Outputs, outputs_of
 from saltus.flow import polynomials
-from saltus.flow.engine import Outcome
 from saltus.flow.maps import Stroboscope
 from saltus.flow.motion_series import Pieces
 from saltus.flow.pieces import nodes_of, pieces
+from saltus.flow.request import Outcome
 from saltus.flow.threads import on_threads
 from saltus.kernels import status as st
 

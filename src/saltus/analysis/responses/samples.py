@@ -15,9 +15,9 @@ from saltus.analysis.responses.responses import (
     spans_of,
 )
 from saltus.errors import ParameterError, among, nearest, shown
-from saltus.flow.engine import Outcome
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
+from saltus.flow.request import Outcome
 from saltus.kernels import status as st
 from saltus.system.system import System
 
