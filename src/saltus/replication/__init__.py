@@ -7,8 +7,9 @@ and limits. Nothing here knows a result in advance.
 """
 
 from saltus.replication.job import Job
+from saltus.replication.outcome import Replication
 from saltus.replication.papers import Claim, Numbers, Paper, Picture, find, folder_of, names
-from saltus.replication.run import Replication, reproduce
+from saltus.replication.run import reproduce
 from saltus.replication.tables import claims_table, verdict_table
 from saltus.replication.verdict import Check, Finding
 

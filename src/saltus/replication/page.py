@@ -26,8 +26,8 @@ from saltus.results.files.atomic import replacing
 from saltus.results.provenance import versions
 
 if TYPE_CHECKING:
+    from saltus.replication.outcome import Replication
     from saltus.replication.papers import Claim, Picture
-    from saltus.replication.run import Replication
     from saltus.study.table import TextTable
 
 #: Class in the style sheet, and sign, of each verdict: colour never stands alone.

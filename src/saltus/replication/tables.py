@@ -8,7 +8,7 @@ from saltus.replication.verdict import VERDICTS
 from saltus.study.table import TextTable
 
 if TYPE_CHECKING:
-    from saltus.replication.run import Replication
+    from saltus.replication.outcome import Replication
 
 
 def verdict_table(result: Replication) -> TextTable:
