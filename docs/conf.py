@@ -19,7 +19,7 @@ version = release = saltus.__version__
 extensions = [
     "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax", "myst_nb",
     "glossary_terms", "decision_notes", "study_tables", "result_tables", "measured", "claims",
-    "offline",
+    "floors", "offline",
 ]  # fmt: skip
 # pictures/ holds those of the README, comparison/ and replication/ data that pages read.
 exclude_patterns = ["_build", "_ext", "pictures", "comparison", "replication"]

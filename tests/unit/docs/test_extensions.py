@@ -155,3 +155,19 @@ def test_a_record_is_written_and_shown(root, tmp_path, monkeypatch):
     assert "| a\\|b | 1.23 | - |" in text
     assert "A setting. Measured on " in text
     assert "Left out: one isn't installed." in text
+
+
+def test_the_picture_of_the_floors_shows_every_room(root):
+    from floors import floors, picture
+
+    rooms = [room for floor in floors("saltus") for room in floor]
+    there = {
+        path.stem
+        for path in (root / "src/saltus").iterdir()
+        if (path.is_dir() or path.suffix == ".py") and not path.name.startswith("_")
+    }
+    assert set(rooms) == there
+    drawn = picture("saltus")
+    assert all(f">{room}</text>" in drawn for room in rooms)
+    with pytest.raises(LookupError, match="no contract of layers"):
+        floors("saltus.nothing")
