@@ -54,13 +54,14 @@ class Judged:
 
 @dataclass(frozen=True)
 class Answer:
-    """What saltus says: status (or error), end, verdict."""
+    """What saltus says: status (or error), end, verdict, contacts on the way."""
 
     status: str
     verdict: str
     off: float
     end: np.ndarray | None = None
     words: str = ""
+    contacts: int = 0
 
 
 class LateError(Exception):
@@ -109,7 +110,8 @@ def answer(case: Case, judged: Judged) -> Answer:
         return Answer(status, "dead end", off, end, f"at t = {run.end_time.item()}")
     if judged.allowed > UNDECIDABLE:
         return Answer(status, "undecidable", off, end)
-    return Answer(status, "same" if off <= judged.allowed else "differs", off, end)
+    verdict = "same" if off <= judged.allowed else "differs"
+    return Answer(status, verdict, off, end, contacts=run.sizes["contact"])
 
 
 def _one(seed: str, conditions: bool) -> tuple[Case, Judged, Answer]:
@@ -145,11 +147,12 @@ def main(arguments=None) -> int:
     given = parser.parse_args(arguments)
     signal.signal(signal.SIGPROF, _late)
     seeds = [given.seed] if "." in given.seed else [f"{given.seed}.{i}" for i in range(given.count)]
-    count, began = collections.Counter(), time.process_time()
+    count, contacts, began = collections.Counter(), 0, time.process_time()
     found = collections.defaultdict(list)
     for i, seed in enumerate(seeds):
         that, judged, ours = _one(seed, given.kind == "conditions")
         count[f"{ours.status}: {ours.verdict}"] += 1
+        contacts += ours.contacts
         if judged.apart > 1.0:
             count["judges differ"] += 1
         if ours.verdict not in ("same", "undecidable") or judged.apart > 1.0:
@@ -161,7 +164,7 @@ def main(arguments=None) -> int:
             )
     for what, those in found.items():
         print(f"# {what}, shortest first: {[one[1:] for one in sorted(those)[:8]]}")
-    print(f"# {len(seeds)} systems: {dict(count)}")
+    print(f"# {len(seeds)} systems, {contacts} contacts in those that are decided: {dict(count)}")
     return int(any(not name.endswith(("same", "undecidable")) for name in count))
 
 
