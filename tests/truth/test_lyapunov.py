@@ -528,6 +528,27 @@ def test_a_direction_that_is_lost_in_rounding_has_its_exponent():
     assert found[:, :2] == pytest.approx(-0.1, rel=1e-11)
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+def test_random_directions_that_shrink_fast_have_their_exponents(seed):
+    """From 1 to 1600 times a second, behind random oscillators: -c/2 twice, and -rate."""
+
+    @sl.system(states="x v z", forced_at="f")
+    def behind(t, x, v, z, *, f=0.2, rate=1.0, c=0.2, k=1.0, into=1.0):
+        return v, sl.cos(2 * sl.pi * f * t) - c * v - k * x, -rate * (z - into * x)
+
+    draw, n = np.random.default_rng(seed), 24
+    values = {"rate": 10 ** draw.uniform(0, 3.2, n), "f": 10 ** draw.uniform(-1, 0.3, n)}
+    values |= {"c": draw.uniform(0.1, 0.5, n), "k": draw.uniform(0.5, 4, n)}
+    values |= {"into": draw.uniform(-2, 2, n)}
+    ds = sl.lyapunov(behind, values=values, periods=64, transient=200)
+    periodic = ds["kind"].values == "periodic"
+    assert periodic.sum() > n // 2
+    true = np.stack([-values["c"] / 2, -values["c"] / 2, -values["rate"]], axis=1)
+    allowed = np.maximum(10 * ds["lyapunov_error"], 1e-9 * (1 + values["rate"])[:, None])
+    assert (np.abs(ds["lyapunov_exponent"] - true) <= allowed).values[periodic].all()
+    assert np.isfinite(ds["lyapunov_error"].values[periodic]).all()
+
+
 def test_the_fast_chamber_of_a_relief_valve():
     """The third exponent of its limit cycle, lost in the rounding of a turn, beside that from
     blocks a tenth as long, in which it isn't: the second way knows it from the tangent.

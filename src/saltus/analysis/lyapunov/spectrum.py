@@ -175,7 +175,7 @@ def _of_orbit(
     noise, monodromy = map_.noise, map_.tangent(orbit.points[:1], n)[1][0] * scale / scale[:, None]
     condition = min(np.linalg.cond(np.linalg.eig(monodromy)[1]), 1.0 / noise)
     magnitudes = -np.sort(-np.abs(orbit.multipliers))
-    with np.errstate(divide="ignore", invalid="ignore"):  # a multiplier may be 0
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # a multiplier may be 0
         exponents, amplified = (
             np.log(magnitudes) / n,
             condition * np.linalg.norm(monodromy, 2) / magnitudes,
