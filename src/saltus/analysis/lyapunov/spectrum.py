@@ -168,8 +168,9 @@ def _of_orbit(
     times the condition of the eigenvectors).
 
     Multipliers that are lost in the rounding of the largest are found as growth round the orbit,
-    block by block; one that is lost in a single block, from the mean growth of volumes. A growth of
-    zero is true where volumes ``vanish``, and rounding elsewhere.
+    block by block; the last one, if the others are known, from the mean growth of volumes, which
+    rounding hides nothing of. A growth of zero is true where volumes ``vanish``, and rounding
+    elsewhere.
     """
     map_, n = flow.map.rows(np.array([i])), orbit.period
     noise, monodromy = map_.noise, map_.tangent(orbit.points[:1], n)[1][0] * scale / scale[:, None]
@@ -187,7 +188,7 @@ def _of_orbit(
         last = len(exponents) - 1
         with np.errstate(invalid="ignore"):
             known = (np.isneginf(exponents) & vanish) | (exponents[0] - exponents < LOST)
-        if known[:last].all() and not known[last]:
+        if lost[last] and known[:last].all() and np.isfinite(volume):
             exponents[last] = volume - exponents[:last].sum()
             errors[last] = errors[:last].sum() + flow.map.noise * (1.0 + abs(volume))
         else:
