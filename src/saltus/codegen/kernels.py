@@ -183,7 +183,19 @@ class Kernels:
 
     def propagate(self, *values: Any) -> int:
         """Call the kernel, without the GIL; kernels/batch.py describes its arrays."""
+        return self._run(self._block(values))
+
+    def bound(self, *values: Any) -> Callable[[], int]:
+        """The call with these arrays, as often as it is wanted, on this thread."""
         block = self._block(values)
+
+        def call() -> int:
+            return self._run(block, values)
+
+        return call
+
+    def _run(self, block: np.ndarray, _: tuple = ()) -> int:
+        """Call with a block of arguments; the arrays that it names are alive meanwhile."""
         begun = time.perf_counter()
         answer = int(self._entry(_place(_beginning(block))))
         self._worked += time.perf_counter() - begun

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib import resources
 from types import ModuleType
 from typing import Any, Protocol
@@ -44,6 +44,9 @@ class Flow(Protocol):
 
     def propagate(self, *values: Any) -> int:
         """Move the trajectories of a batch (kernels/batch.py)."""
+
+    def bound(self, *values: Any) -> Callable[[], int]:
+        """The same with these arrays, as often as it is wanted, on this thread."""
 
 
 def jit_disabled() -> bool:
@@ -160,5 +163,6 @@ def _interpreted(interface: Interface, head: Head) -> ModuleType:
     for name in filter(None, (interface.layout, *interface.templates)):
         path = str(resources.files("saltus.kernels").joinpath(f"{name}.py"))
         exec(compile(templates.text(name), path, "exec"), module.__dict__)
-    module.__dict__["propagate"] = module.__dict__[interface.entry]
+    module.__dict__["propagate"] = propagate = module.__dict__[interface.entry]
+    module.__dict__["bound"] = partial(partial, propagate)
     return module

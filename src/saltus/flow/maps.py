@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import copy
 import functools
+import threading
 from collections.abc import Mapping
 from typing import Protocol
 
@@ -16,6 +17,7 @@ from saltus.flow import engine
 from saltus.flow.flight import Flight
 from saltus.flow.methods import Method
 from saltus.flow.request import Outcome, Request, Schedule
+from saltus.flow.shots import Shots
 from saltus.kernels import status as st
 from saltus.system.checks import check_values
 from saltus.system.system import System
@@ -40,6 +42,10 @@ FORCED = "is forced: it is looked at once a forcing period. Leave every= out."
 BOX_PER_MOTION = 10.0
 #: Share of the range of a motion beyond which a mismatch is no noise.
 MAX_NOISE = 0.03
+#: Starts that are few: one thread moves them, and what stands around the kernel takes its time.
+FEW = 64
+#: Kinds of short runs whose arrays a map keeps.
+KEPT = 64
 
 
 class Travel(Protocol):
@@ -218,7 +224,7 @@ class Stroboscope:
 
     def _with(self, **changed: object) -> Stroboscope:
         other = copy.copy(self)  # the checked arguments don't change
-        for derived in ("exact_map", "_tangent_map"):
+        for derived in ("exact_map", "_tangent_map", "_shots"):
             other.__dict__.pop(derived, None)
         other.__dict__.update(changed)
         return other
@@ -254,6 +260,27 @@ class Stroboscope:
         )
         return engine.run(self.system, self.method, request, self.threads)
 
+    def ends(self, start: np.ndarray, count: np.ndarray | int) -> tuple[np.ndarray, np.ndarray]:
+        """States float64[k, D] after ``count`` periods, and the status of each, int64[k]: as
+        :meth:`run` has them, with little besides the kernel's own time where they are few.
+        """
+        k, periods = len(start), count if isinstance(count, int) else int(np.max(count, initial=0))
+        if k > FEW or self.method.fixed:
+            outcome = self.run(start, count)
+            return outcome.state, outcome.status
+        key = threading.get_ident(), k, periods
+        if key not in self._shots:
+            if len(self._shots) >= KEPT:
+                self._shots.clear()
+            period = np.broadcast_to(self.period, k)
+            self._shots[key] = Shots(self.system, self.method, self.parameters, period, periods)
+        return self._shots[key].run(start, count)
+
+    @functools.cached_property
+    def _shots(self) -> dict[tuple[int, int, int], Shots]:
+        """Runs that were asked for before, by thread, number of starts and periods."""
+        return {}
+
     def tangent(
         self, start: np.ndarray, count: np.ndarray | int, directions: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
@@ -261,10 +288,11 @@ class Stroboscope:
         if self.system.is_steep:
             return self._by_differences(start, count, directions)
         k, size = start.shape
-        outcome = self._with_tangent(start, directions, count)
-        status = outcome.status
-        outcome.state[(status != st.OK) & (status != st.GRAZE_UNRESOLVED)] = np.nan
-        return outcome.state[:, :size], outcome.state[:, size:].reshape(k, size, size)
+        state, status = self._tangent_map.ends(_with_tangent(start, directions), count)
+        stopped = (status != st.OK) & (status != st.GRAZE_UNRESOLVED)
+        if stopped.any():
+            state[stopped] = np.nan
+        return state[:, :size], state[:, size:].reshape(k, size, size)
 
     def _by_differences(
         self, start: np.ndarray, count: np.ndarray | int, directions: np.ndarray | None
@@ -303,21 +331,8 @@ class Stroboscope:
         """States at the times of a schedule, float64[k, M, D], by the flow that :meth:`tangent`
         runs: no other one is compiled for them.
         """
-        outcome = self._with_tangent(start, None, count, schedule)
+        outcome = self._tangent_map.run(_with_tangent(start, None), count, schedule)
         return outcome.samples[:, :, : start.shape[1]]
-
-    def _with_tangent(
-        self,
-        start: np.ndarray,
-        directions: np.ndarray | None,
-        count: np.ndarray | int,
-        schedule: Schedule | None = None,
-    ) -> Outcome:
-        k, size = start.shape
-        first = np.eye(size) if directions is None else directions
-        extended = np.empty((k, size + size**2))
-        extended[:, :size], extended[:, size:] = start, first.reshape(-1, size**2)
-        return self._tangent_map.run(extended, count, schedule)
 
     @functools.cached_property
     def _tangent_map(self) -> Stroboscope:
@@ -339,3 +354,12 @@ class Stroboscope:
             (len(st.CONTACT_KIND), 3, 2**31),
         )
         return outcome.state, np.split(codes, contacts.begins(len(start))[1:-1])
+
+
+def _with_tangent(start: np.ndarray, directions: np.ndarray | None) -> np.ndarray:
+    """States of the system with its tangents, float64[k, D + D D]."""
+    k, size = start.shape
+    extended = np.empty((k, size + size**2))
+    extended[:, :size] = start
+    extended[:, size:] = (np.eye(size) if directions is None else directions).reshape(-1, size**2)
+    return extended

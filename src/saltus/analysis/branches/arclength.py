@@ -20,7 +20,8 @@ from saltus.flow.polynomials import between
 #: Iterations of the corrector: more mean that the step was too long.
 MOST_ITERATIONS = 7
 #: A residual so small, in units of the scale, is rounding; one so small that stalls is accepted.
-CLOSED, STALLED = 1e-14, 1e-9
+#: One that quadratic convergence foresees to be smaller than this isn't waited for.
+CLOSED, STALLED, FORESEEN = 1e-14, 1e-9, 1e-17
 #: Cosine of the angle between tangents at the ends of a step, and between it and each of them: less
 #: halves the step. A step to another curve that runs alongside is at an angle to both.
 TURN = 0.97
@@ -46,8 +47,9 @@ ASTRAY = 0.6
 #: Points after which a curve may be found to be closed, and the cosine of the angle at which it
 #: then passes its start.
 LEAST_CLOSED, AGAIN = 8, 0.9
-#: Farthest that a step lies from a point that it passes, in steps.
-PASSED = 0.02
+#: Farthest that a step lies from a point that it passes, and from the line between its ends, in
+#: steps.
+PASSED, BENDS = 0.02, 0.1
 
 
 class Equations(Protocol):
@@ -71,7 +73,7 @@ class Equations(Protocol):
 
     def alike(self, z: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """Other unknowns that mean the same points float64[r, m + 1], float64[r, s, m + 1]; the
-        first are these.
+        first are these. The last unknown of them all is the same.
         """
 
 
@@ -91,8 +93,8 @@ class Curve:
         Arclength from the start, in units of the scale.
     end : str
         ``range``: the end of the range was reached; ``closed``; ``points``: as many as asked for;
-        ``lost``: no step however short; ``stopped``: another curve of
-        the group is closed; or what the caller says.
+        ``lost``: no step however short; ``stopped``: another curve of the group is closed;
+        ``met``: another group goes on along the same curve; or what the caller says.
     """
 
     z: list[np.ndarray] = field(default_factory=list)
@@ -121,6 +123,7 @@ def correct(
     normal: np.ndarray,
     rows: np.ndarray,
     astray: np.ndarray | float = np.inf,
+    foresee: bool = False,
 ) -> Corrected:
     """Newton's method from guesses float64[k, m + 1] in the planes across float64[k, m + 1].
 
@@ -134,13 +137,16 @@ def correct(
         Which curves.
     astray : float or float64[k]
         Farthest from the guess, in units of the scale.
+    foresee : bool
+        Leave out the evaluation that would only confirm a last step: the derivative is that before
+        it then.
     """
     k, size = guess.shape
     scale, limit = equations.scale[rows], np.broadcast_to(astray, k)
     z, derivative = guess.copy(), np.full((k, size - 1, size), np.nan)
     found, count = np.zeros(k, bool), np.zeros(k, np.int64)
     before, left = np.full(k, np.inf), np.arange(k)
-    steps = np.zeros((2, k))
+    steps, lately = np.zeros((2, k)), np.zeros(k)
     for iteration in range(MOST_ITERATIONS):
         if not len(left):
             break
@@ -156,10 +162,17 @@ def correct(
         whole, right = np.empty((len(left), size, size)), np.zeros((len(left), size))
         whole[:, :-1], whole[:, -1], right[:, :-1] = matrix[going], normal[left], residual[going]
         step = -solved(whole, right)
+        length, earlier = np.linalg.norm(step, axis=1), lately[left]
+        lately[left] = length
         if iteration < len(steps):
-            steps[iteration, left] = np.linalg.norm(step, axis=1)
+            steps[iteration, left] = length
         z[left] += step * scale[left]
         near = np.linalg.norm((z[left] - guess[left]) / scale[left], axis=1) <= limit[left]
+        if foresee and iteration:
+            sure = near & (before[left] * (length / earlier) ** 2 < FORESEEN)
+            derivative[left[sure]], found[left[sure]] = matrix[going[sure]], True
+            count[left[sure]] += 1
+            near &= ~sure
         left = left[near]  # no step is NaN, then
     contraction = steps[1] / np.maximum(steps[0], STALLED)
     return Corrected(z, derivative, found, count, contraction)
@@ -198,6 +211,7 @@ def follow(
     ends: Callable[[Curve], str] | None = None,
     group: np.ndarray | None = None,
     longest: float = LONGEST,
+    foresee: bool = False,
 ) -> list[Curve]:
     """Curves from points float64[k, m + 1] on them, until they leave the range of an unknown, are
     closed or have ``points`` points.
@@ -218,13 +232,17 @@ def follow(
         Why a curve ended before its last point, empty where it didn't: the curve then ends within
         ENDING of there.
     group : int64[k], optional
-        Curves that are one: where one of them is closed, the others go no farther.
+        Curves that are one: where one of them is closed, the others go no farther. Of two groups of
+        which one passes where the other began, only the first goes on.
     longest : float
         Longest step, in units of the scale.
+    foresee : bool
+        See :func:`correct`: the derivatives of the curves, and their tangents, are good for
+        following them only.
     """
     rows = np.arange(len(start))
     here = correct(equations, start, tangents_at(equations, start, along, rows), rows, 1.0)
-    fronts = _Fronts(equations, bounds, [Curve() for _ in rows], first, longest)
+    fronts = _Fronts(equations, bounds, [Curve() for _ in rows], first, longest, foresee, group)
     fronts.begin(here, tangents(_finite(here.derivative), along))
     while len(fronts.going):
         taken = fronts.step()
@@ -234,10 +252,6 @@ def follow(
         for i in taken:
             if ends is not None and (why := ends(fronts.curves[i])):
                 fronts.undo(i, why)
-        if group is not None:
-            shut = {group[i] for i in rows if fronts.curves[i].end == "closed"}
-            for i in fronts.going:
-                fronts.curves[i].end = "stopped" if group[i] in shut else ""
     return fronts.curves
 
 
@@ -251,15 +265,20 @@ class _Fronts:
         curves: list[Curve],
         first: float | np.ndarray,
         longest: float = LONGEST,
+        foresee: bool = False,
+        group: np.ndarray | None = None,
     ) -> None:
         self.equations, self.bounds, self.curves = equations, bounds, curves
-        self.longest = longest
+        self.longest, self.foresee = longest, foresee
+        self.group = np.arange(len(curves)) if group is None else group
+        self.firsts = np.zeros(0, np.int64) if group is None else np.unique(group, True)[1]
         self.length = np.broadcast_to(first, len(curves)).astype(float)
 
     def begin(self, here: Corrected, tangent: np.ndarray) -> None:
         """The first points."""
         self.z, self.tangent = here.z.copy(), tangent
         self.side = _orientation(here.derivative, tangent)
+        self.began = here.z.copy()
         self.before = np.full((2, *tangent.shape), np.nan)  # the points before these, and tangents
         for i, curve in enumerate(self.curves):
             if here.found[i]:
@@ -278,7 +297,7 @@ class _Fronts:
         going = self.going
         guess, normal, outside = self._predicted(going)
         scale, length = self.equations.scale[going], self.length[going]
-        trial = correct(self.equations, guess, normal, going, ASTRAY * length)
+        trial = correct(self.equations, guess, normal, going, ASTRAY * length, self.foresee)
         tangent = tangents(_finite(trial.derivative), self.tangent[going])
         step = (trial.z - self.z[going]) / scale
         moved = np.linalg.norm(step, axis=1)
@@ -306,7 +325,7 @@ class _Fronts:
         self.length[going] = np.minimum(factor * length, self._longest(going))
         for i in going[~counts & (self.length[going] < SHORTEST)]:
             self.curves[i].end = "lost"
-        self._close(taken)
+        self._meet(taken)
         return taken
 
     def _longest(self, going: np.ndarray) -> np.ndarray:
@@ -345,6 +364,8 @@ class _Fronts:
                 with np.errstate(invalid="ignore", divide="ignore"):
                     reach = (bound - here[:, column]) / (ahead - here[:, column])
                 nearer = (bound != ahead) & (reach < share)
+                if not nearer.any():
+                    continue
                 share[nearer], at[nearer] = reach[nearer], column
                 guess[nearer] = here[nearer] + self._ahead(going[nearer], share[nearer])
                 guess[nearer, column], normal[nearer] = bound[nearer], np.eye(len(here[0]))[column]
@@ -363,17 +384,43 @@ class _Fronts:
             far = between(0.0 * back, back, -chord * here, -chord * slope, -length / chord)
         return np.asarray(np.where(np.isfinite(far), far, length * here) * scale)
 
-    def _close(self, taken: np.ndarray) -> None:
-        """Close the curves that have passed their start as they left it."""
-        for i in taken:
-            curve = self.curves[i]
-            if len(curve.z) < LEAST_CLOSED or not _has_returned(self.equations, curve, i):
-                continue
-            for kept in (curve.z, curve.tangent, curve.derivative, curve.length):
-                kept.pop()
-            apart = (curve.z[0] - curve.z[-1]) / self.equations.scale[i]
-            _add(curve, curve.z[0], curve.tangent[0], curve.derivative[0], _size(apart))
-            curve.end = "closed"
+    def _meet(self, taken: np.ndarray) -> None:
+        """Close the curves that have passed their start as they left it, and stop those of their
+        groups; of two groups of which one has passed the start of the other, stop the later.
+        """
+        for i, j in self._come_by(taken):
+            curve, other = self.curves[i], self.curves[j]
+            if self.group[i] != self.group[j]:
+                if other.z and _has_passed(self.equations, curve, other, i, either_way=True):
+                    self._stop(max(self.group[i], self.group[j]), "met")
+            elif len(curve.z) >= LEAST_CLOSED and _has_passed(self.equations, curve, curve, i):
+                for kept in (curve.z, curve.tangent, curve.derivative, curve.length):
+                    kept.pop()
+                apart = (curve.z[0] - curve.z[-1]) / self.equations.scale[i]
+                _add(curve, curve.z[0], curve.tangent[0], curve.derivative[0], _size(apart))
+                self._stop(self.group[i], "stopped")
+                curve.end = "closed"
+
+    def _come_by(self, taken: np.ndarray) -> list[tuple[int, int]]:
+        """Curves whose last step may have passed the start of a curve: by their last unknown."""
+        unit = self.equations.scale[taken, -1]
+        here, before = self.z[taken, -1], self.before[0, taken, -1]
+        bend = BENDS * np.linalg.norm(
+            (self.z[taken] - self.before[0, taken]) / self.equations.scale[taken], axis=1
+        )
+        low, high = np.minimum(here, before) - bend * unit, np.maximum(here, before) + bend * unit
+        own, began = self.group[taken, None] == self.group[self.firsts], self.began[:, -1]
+        near = (low[:, None] <= began[self.firsts]) & (began[self.firsts] <= high[:, None]) & ~own
+        others = [
+            (int(taken[i]), int(self.firsts[j])) for i, j in zip(*np.nonzero(near), strict=True)
+        ]
+        mine = (low <= began[taken]) & (began[taken] <= high)
+        return [*others, *((int(i), int(i)) for i in taken[mine])]
+
+    def _stop(self, group: int, why: str) -> None:
+        """Curves of a group go no farther."""
+        for i in np.flatnonzero(self.group == group):
+            self.curves[i].end = self.curves[i].end or why
 
 
 def passes(curve: Curve, point: np.ndarray, scale: np.ndarray) -> bool:
@@ -388,14 +435,17 @@ def passes(curve: Curve, point: np.ndarray, scale: np.ndarray) -> bool:
     return _size(way - on) < PASSED * length
 
 
-def _has_returned(equations: Equations, curve: Curve, row: int) -> bool:
-    """Whether a curve has passed its start in the direction in which it left."""
+def _has_passed(
+    equations: Equations, curve: Curve, other: Curve, row: int, either_way: bool = False
+) -> bool:
+    """Whether a curve has passed the start of another, in the direction in which that one left."""
     scale, one = equations.scale[row], np.array([row])
-    starts = equations.alike(curve.z[0][None], one)[0]
-    ways = equations.alike(curve.tangent[0][None] * scale, one)[0] / scale
+    starts = equations.alike(other.z[0][None], one)[0]
+    ways = equations.alike(other.tangent[0][None] * scale, one)[0] / scale
+    along = ways @ curve.tangent[-1]
     return any(
-        way @ curve.tangent[-1] >= AGAIN and passes(curve, same, scale)
-        for same, way in zip(starts, ways, strict=True)
+        (abs(size) if either_way else size) >= AGAIN and passes(curve, same, scale)
+        for same, size in zip(starts, along, strict=True)
     )
 
 

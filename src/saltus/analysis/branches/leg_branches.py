@@ -9,6 +9,7 @@ They go on from one another in the parameter, *persistence*, or both lie on one 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -117,17 +118,21 @@ def _by_points(legs: Legs, z: np.ndarray) -> np.ndarray:
     return legs.orbit(z, legs.begin(z))
 
 
-def leg_branch(plan: Plan, start: Start) -> Branch | None:
-    """The branch of a start, see :class:`Plan`: contact by contact if its orbit has impacts, as
-    others if contacts are held.
+def leg_branches(plan: Plan, starts: Sequence[Start]) -> list[Branch | None]:
+    """The branches of starts, see :class:`Plan`: contact by contact if their orbits have impacts,
+    as others if contacts are held.
     """
+    return [_leg_branch(plan, start) for start in starts]
+
+
+def _leg_branch(plan: Plan, start: Start) -> Branch | None:
     orbits = plan.make(start.n, start.scale[None])
     sequence = sequences(orbits, start.z[None])[0]
     if sequence is not None and sequence.flies:
         return _branch(plan, orbits, start)
     if start.n > plan.longest:  # a chatter of many periods
         return None
-    branch = both_ways(plan, start)
+    (branch,) = both_ways(plan, [start])
     if branch is not None:
         branch.ends = _where_held(branch)
     return branch
@@ -160,7 +165,7 @@ def _branch(plan: Plan, orbits: PeriodicOrbits, start: Start) -> Branch | None:
         return None
     none = np.zeros(0)
     result = LegBranch(
-        orbits, 0, none, none, none, none, none, ends, parent=start.seed.parent,
+        orbits, 0, none, none, none, none, none, ends,
         limits=limits, pieces=[*back[::-1], *forwards], backwards=len(back),
     )  # fmt: skip
     result.join()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from saltus.analysis.branches.leg_branches import leg_branch
+from saltus.analysis.branches.leg_branches import leg_branches
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.tracing import Plan, both_ways
 from saltus.flow.methods import Method
@@ -34,5 +34,5 @@ def plan_of(
     return Plan(
         lambda n, scale: PeriodicOrbits(system, (name,), n, scale, method, threads, symmetric),
         limits, points, longest, frozenset(switch),
-        leg_branch if jumps and has_legs(system) else both_ways,
+        leg_branches if jumps and has_legs(system) else both_ways,
     )  # fmt: skip

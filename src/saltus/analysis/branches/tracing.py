@@ -5,13 +5,14 @@ branches, each once.
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from saltus.analysis.branches.arclength import FIRST, Curve, correct, follow
+from saltus.analysis.branches.arclength import ENDING, FIRST, Curve, correct, follow, tangents
 from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.same_branch import SAME, branch_of
 from saltus.analysis.branches.shooting import PeriodicOrbits
@@ -25,6 +26,8 @@ ASIDE = (1e-3, 2e-4, 4e-5)
 SHRUNK = 0.005
 #: Farthest that a seed lies from its orbit, in units of the scale.
 ASTRAY = 0.5
+#: Branches that are followed side by side, times the square of the unknowns of their orbits.
+ABREAST = 1024
 
 
 @dataclass(frozen=True)
@@ -44,7 +47,8 @@ class Plan:
     switch : set of str
         Kinds of events at which the branches that leave are followed.
     follow : callable
-        The branch of a start, such as :func:`both_ways`; None where there is none.
+        The branches of starts of one shape, such as :func:`both_ways`; None where there is none, or
+        it is that of a start before.
     leave : callable
         Seeds of the branches that leave one: see :func:`children`.
     crossed : bool
@@ -57,7 +61,7 @@ class Plan:
     points: int
     longest: int
     switch: frozenset[str]
-    follow: Callable[[Plan, Start], Branch | None]
+    follow: Callable[[Plan, Sequence[Start]], list[Branch | None]]
     leave: Callable[[Any, int, frozenset[str], int], Iterator[Seed]] = children
     crossed: bool = False
 
@@ -74,17 +78,48 @@ def trace(
     """
     waiting, begun = list(seeds), 0
     while waiting:
-        seed, begun = waiting.pop(0), begun + 1
-        start = Start.of(plan, seed)
-        known = start is None or branch_of(start.z, start.n, branches) >= 0
-        if start is not None and not known and not ends_there(seed, branches):
-            branch = plan.follow(plan, start)
-            if branch is not None and not _was_followed(plan, branch, branches):
-                branch.find_events()
-                number = _place(branch, branches, waiting)
-                waiting += plan.leave(branch, number, plan.switch, plan.longest)
+        abreast = _abreast(waiting)
+        beside, waiting[:abreast] = waiting[:abreast], []
+        begun += abreast
+        found = [Start.of(plan, seed) for seed in beside]
+        starts = [one for one in found if one is not None and not _is_known(one, branches)]
+        beside = [start.seed for start in starts]
+        for start, branch in zip(starts, plan.follow(plan, starts), strict=True):
+            seed = beside.pop(0)
+            if _is_known(start, branches):
+                continue
+            if branch is None and start is not starts[0]:
+                (branch,) = plan.follow(plan, [start])  # those beside it only seemed to be it
+            if branch is None or _was_followed(plan, branch, branches):
+                continue
+            branch.parent = seed.parent
+            branch.find_events()
+            number = _place(branch, branches, beside, waiting)
+            waiting += plan.leave(branch, number, plan.switch, plan.longest)
         if progress is not None:
             progress(begun / (begun + len(waiting)))
+
+
+def _abreast(waiting: Sequence[Seed]) -> int:
+    """How many of the first seeds are followed side by side, which costs little more than one where
+    orbits have few unknowns. Several may lie on one branch: limit cycles aren't known again by
+    those who pass them.
+    """
+    first = waiting[0]
+    free = len(first.own) > 1
+    most = 1 if free and first.along is None else ABREAST // first.points.size**2
+    alike = itertools.takewhile(
+        lambda seed: (seed.along is None) == (first.along is None)
+        and seed.points.shape == first.points.shape
+        and (not free or np.array_equal(seed.scale, first.scale)),
+        waiting[: max(most, 1)],
+    )
+    return sum(1 for _ in alike)
+
+
+def _is_known(start: Start, branches: Sequence[Branch]) -> bool:
+    """Whether an orbit lies on a branch already followed, or leaves where one was seen to end."""
+    return branch_of(start.z, start.n, branches) >= 0 or ends_there(start.seed, branches)
 
 
 def _was_followed(plan: Plan, branch: Branch, branches: Sequence[Branch]) -> bool:
@@ -92,7 +127,7 @@ def _was_followed(plan: Plan, branch: Branch, branches: Sequence[Branch]) -> boo
     return plan.crossed and branch_of(middle, branch.orbits.n, branches) >= 0
 
 
-def _place(branch: Branch, branches: list[Branch], waiting: list[Seed]) -> int:
+def _place(branch: Branch, branches: list[Branch], *waiting: list[Seed]) -> int:
     """Add a branch to a list and return its number: that of the first one that it holds from end to
     end. Those stepped over where the new one began, or were lost on the way, and leave the list.
     """
@@ -113,7 +148,8 @@ def _place(branch: Branch, branches: list[Branch], waiting: list[Seed]) -> int:
 
     for one in branches:
         one.parent = now(one.parent)
-    waiting[:] = [replace(seed, parent=now(seed.parent)) for seed in waiting]
+    for seeds in waiting:
+        seeds[:] = [replace(seed, parent=now(seed.parent)) for seed in seeds]
     return number
 
 
@@ -196,38 +232,45 @@ def _halved(orbits: PeriodicOrbits, curve: Curve) -> str:
 
 def both_ways(
     plan: Plan,
-    start: Start,
+    starts: Sequence[Start],
     ends: Callable[[Any, Curve], str] = _halved,
     kind: type[Branch] = Branch,
-) -> Branch | None:
-    """The branch of an orbit over one period; None if there is none."""
-    sides = start.sides
-    rows = np.arange(len(sides))
-    z = np.tile(start.z, (len(sides), 1))
-    orbits = plan.make(start.n, np.tile(start.scale, (len(sides), 1)))
+) -> list[Branch | None]:
+    """The branches of orbits over one period, side by side: see :class:`Plan`."""
+    if not starts:
+        return []
+    which = np.repeat(np.arange(len(starts)), [len(one.sides) for one in starts])
+    rows = np.arange(len(which))
+    z = np.array([starts[i].z for i in which])
+    orbits = plan.make(starts[0].n, np.array([starts[i].scale for i in which]))
     orbits.accepted(z, rows)
     curves = follow(
-        orbits, z, sides, {orbits.width - 1: plan.limits}, plan.points, start.first,
-        ends=functools.partial(ends, orbits), group=0 * rows,
+        orbits, z, np.concatenate([one.sides for one in starts]),
+        {orbits.width - 1: plan.limits}, plan.points, np.array([starts[i].first for i in which]),
+        ends=functools.partial(ends, orbits), group=which, foresee=True,
     )  # fmt: skip
     for curve in curves:
         shrunk = curve.end == "lost" and orbits.free and len(curve.z) > 1
         if shrunk and orbits.radius(curve.z[-1]) < SHRUNK:
             curve.end = "hopf"
-    return _joined(orbits, [curve for curve in curves if curve.z], start.seed, kind)
+    result = []
+    for i in range(len(starts)):
+        mine = np.flatnonzero(which == i)
+        own = orbits.near(z[mine], mine) if len(starts) > 1 else orbits
+        met = any(curves[j].end == "met" for j in mine)
+        result.append(None if met else _joined(own, [curves[j] for j in mine if curves[j].z], kind))
+    return result
 
 
-def _joined(
-    orbits: PeriodicOrbits, curves: list[Curve], seed: Seed, kind: type[Branch]
-) -> Branch | None:
+def _joined(orbits: PeriodicOrbits, curves: list[Curve], kind: type[Branch]) -> Branch | None:
     """One branch from the curves to both sides."""
     if not curves:
         return None
     for curve in curves:
         if curve.end == "closed":
-            return _of(orbits, curve, ("closed", "closed"), seed, kind)
+            return _of(orbits, curve, ("closed", "closed"), kind)
     if len(curves) == 1:
-        return _of(orbits, curves[0], ("branch", curves[0].end), seed, kind)
+        return _of(orbits, curves[0], ("branch", curves[0].end), kind)
     up, down = curves
     whole = Curve(
         down.z[:0:-1] + up.z,
@@ -235,17 +278,17 @@ def _joined(
         down.derivative[:0:-1] + up.derivative,
         [-length for length in down.length[:0:-1]] + up.length,
     )
-    return _of(orbits, whole, (down.end, up.end), seed, kind)
+    return _of(orbits, whole, (down.end, up.end), kind)
 
 
-def _of(
-    orbits: PeriodicOrbits,
-    curve: Curve,
-    ends: tuple[str, str],
-    seed: Seed,
-    kind: type[Branch],
-) -> Branch:
+def _of(orbits: PeriodicOrbits, curve: Curve, ends: tuple[str, str], kind: type[Branch]) -> Branch:
+    """The branch of a curve, with the derivatives at its points themselves."""
     z, tangent, derivative = (np.array(one) for one in (curve.z, curve.tangent, curve.derivative))
     length = np.array(curve.length) - curve.length[0]
-    own = orbits.multipliers(z, derivative, np.zeros(len(z), np.int64))
-    return kind(orbits, 0, z, tangent, derivative, length, own, ends, parent=seed.parent)
+    here, rows = orbits.near(z, np.zeros(len(z), np.int64)), np.arange(len(z))
+    point = correct(here, z, tangent, rows, ENDING)
+    good = point.found
+    z[good], derivative[good] = point.z[good], point.derivative[good]
+    tangent[good] = tangents(derivative[good], tangent[good])
+    own = here.multipliers(z, derivative, rows)
+    return kind(orbits, 0, z, tangent, derivative, length, own, ends)

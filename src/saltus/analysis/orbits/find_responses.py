@@ -27,13 +27,14 @@ from saltus.analysis.orbits.recurrence import recurrence, recurring_orbits
 from saltus.analysis.orbits.tolerances import BESIDE, NEAR, RESTS, ROUND, SETTLED
 from saltus.flow.maps import Stroboscope
 from saltus.flow.request import Schedule
-from saltus.flow.threads import on_threads
+from saltus.flow.threads import on_threads, usable_processors
 from saltus.kernels import status as st
 from saltus.results.dataset.kinds import Kind
 
 #: Trajectories that one thread follows at a time: so many, or fewer where each takes longer, so
-#: that all threads have work, and Ctrl-C finds some done. At least what fills the lanes.
-PIECE, PIECE_STATES, LANES = 512, 2048, 8
+#: that all threads have work, and Ctrl-C finds some done. At least what fills the lanes; few are
+#: shared among all threads if each gets enough to fill its lanes some times.
+PIECE, PIECE_STATES, LANES, SHARED = 512, 2048, 8, 64
 #: Share of the work on a trajectory that is done when it has been followed, its growth is measured,
 #: and its iterates are known.
 FOLLOWED, MEASURED, KEPT = 0.4, 0.6, 0.7
@@ -112,8 +113,7 @@ def find_responses(
     the stages that it went through.
     """
     result = SettledMotions.empty(*start.shape) if result is None else result
-    size = min(PIECE, max(LANES, PIECE_STATES // start.shape[1] ** 2))
-    pieces = np.split(np.arange(len(start)), range(size, len(start), size))
+    pieces = _pieces(*start.shape, threads or usable_processors())
     parts = [SettledMotions.empty(len(piece), start.shape[1]) for piece in pieces]
 
     def work(number: int) -> None:
@@ -130,6 +130,17 @@ def find_responses(
 
     on_threads(work, range(len(pieces)), lambda *_: None, threads, show if progress else None)
     return result
+
+
+def _pieces(count: int, states: int, threads: int) -> list[np.ndarray]:
+    """Trajectories piece by piece, int64[..] each: in their order, so that Ctrl-C finds the first
+    ones done; all that are under way at once have some of every place, as hard ones stand together.
+    """
+    size = min(PIECE, max(LANES, PIECE_STATES // states**2))
+    every = np.arange(count)
+    if (at_once := min(threads, count // SHARED)) * size > count:
+        return [every[first::at_once] for first in range(at_once)]
+    return np.split(every, range(size, count, size))
 
 
 def _settle(map_: Stroboscope, start: np.ndarray, most: int, result: SettledMotions) -> None:
