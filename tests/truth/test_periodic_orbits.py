@@ -14,6 +14,7 @@ import impact_orbits
 import saltus as sl
 from saltus.analysis.basins.periodic_orbits import CONTACTS, STEPS
 from saltus.flow.maps import Stroboscope
+from saltus.flow.shots import Shots
 from saltus.kernels import status as st
 
 RIG_BOX = {"x": ("-5 mm", "5 mm"), "v": ("-1 m/s", "1 m/s")}
@@ -213,14 +214,14 @@ def test_starts_that_chatter_without_end_are_given_up(counters):
 
 def test_newton_s_method_has_a_budget_for_one_period(monkeypatch):
     """It is led into chatters that none of the starts ends in: the table throws the ball."""
-    counted, with_tangent = [], Stroboscope._with_tangent
+    counted, run = [], Shots.run
 
-    def watched(map_, *arguments):
-        outcome = with_tangent(map_, *arguments)
-        counted.append(outcome.counters.max(axis=0, initial=0))
-        return outcome
+    def watched(shots, *arguments):
+        ends = run(shots, *arguments)
+        counted.append(shots.counters.max(axis=0, initial=0))
+        return ends
 
-    monkeypatch.setattr(Stroboscope, "_with_tangent", watched)
+    monkeypatch.setattr(Shots, "run", watched)
     box = {"x": (1.2, 6.2), "v": (-3, 6)}
     thrown = table.with_values(a=1.2)
     found = sl.periodic_orbits(thrown, "random 50", box=box, periods=1)

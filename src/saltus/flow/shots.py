@@ -51,13 +51,16 @@ class Shots:
         module = method.kernels(system.origin)
         request = Request.periods(np.zeros((k, states)), parameters, period, periods)
         _, arrays = allocate(request, system, module)
-        arrays.update(
-            param=np.ascontiguousarray(parameters, float),
-            stride=np.int64(0 if len(parameters) == 1 else 1),
-            sample_count=request.schedule.count, sample_fraction=request.schedule.fraction,
-            rec_first=np.zeros(k, np.int64), rec_used=np.zeros(1, np.int64),
-            options=options_of(method, periods, k), data=tables_of(system.origin),
-        )  # fmt: skip
+        arrays |= {
+            "param": np.ascontiguousarray(parameters, float),
+            "stride": np.int64(0 if len(parameters) == 1 else 1),  # type: ignore[dict-item]
+            "sample_count": request.schedule.count,
+            "sample_fraction": request.schedule.fraction,
+            "rec_first": np.zeros(k, np.int64),
+            "rec_used": np.zeros(1, np.int64),
+            "options": options_of(method, periods, k),
+            "data": tables_of(system.origin),
+        }
         arrays["rec_i"], arrays["rec_f"] = ContactTable.empty(0, states).arrays
         self._system, self._request, self._arrays = system, request, arrays
         self._begun = [(arrays[name], arrays[name].copy()) for name in _LEFT]
@@ -66,6 +69,11 @@ class Shots:
         self._move = module.bound(
             *(arrays[name] for name in ARGUMENTS), slice_of(states), *module.workspace()
         )
+
+    @property
+    def counters(self) -> np.ndarray:
+        """What the last run counted, int64[k, ..]: see kernels/status.py."""
+        return self._arrays["counters"]
 
     def run(self, start: np.ndarray, count: np.ndarray | int) -> tuple[np.ndarray, np.ndarray]:
         """States float64[k, D] after ``count`` periods from others, and the status of each,

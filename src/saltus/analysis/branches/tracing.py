@@ -109,9 +109,11 @@ def _abreast(waiting: Sequence[Seed]) -> int:
     free = len(first.own) > 1
     most = 1 if free and first.along is None else ABREAST // first.points.size**2
     alike = itertools.takewhile(
-        lambda seed: (seed.along is None) == (first.along is None)
-        and seed.points.shape == first.points.shape
-        and (not free or np.array_equal(seed.scale, first.scale)),
+        lambda seed: (
+            (seed.along is None) == (first.along is None)
+            and seed.points.shape == first.points.shape
+            and (not free or np.array_equal(seed.scale, first.scale))
+        ),
         waiting[: max(most, 1)],
     )
     return sum(1 for _ in alike)
@@ -239,26 +241,29 @@ def both_ways(
     """The branches of orbits over one period, side by side: see :class:`Plan`."""
     if not starts:
         return []
-    which = np.repeat(np.arange(len(starts)), [len(one.sides) for one in starts])
-    rows = np.arange(len(which))
-    z = np.array([starts[i].z for i in which])
-    orbits = plan.make(starts[0].n, np.array([starts[i].scale for i in which]))
+    sides = [(number, one, side) for number, one in enumerate(starts) for side in one.sides]
+    which, rows = np.array([number for number, _, _ in sides]), np.arange(len(sides))
+    z = np.array([one.z for _, one, _ in sides])
+    orbits = plan.make(starts[0].n, np.array([one.scale for _, one, _ in sides]))
     orbits.accepted(z, rows)
     curves = follow(
-        orbits, z, np.concatenate([one.sides for one in starts]),
-        {orbits.width - 1: plan.limits}, plan.points, np.array([starts[i].first for i in which]),
+        orbits, z, np.array([side for _, _, side in sides]), {orbits.width - 1: plan.limits},
+        plan.points, np.array([one.first for _, one, _ in sides]),
         ends=functools.partial(ends, orbits), group=which, foresee=True,
     )  # fmt: skip
     for curve in curves:
         shrunk = curve.end == "lost" and orbits.free and len(curve.z) > 1
         if shrunk and orbits.radius(curve.z[-1]) < SHRUNK:
             curve.end = "hopf"
-    result = []
-    for i in range(len(starts)):
-        mine = np.flatnonzero(which == i)
+    result: list[Branch | None] = []
+    for number in range(len(starts)):
+        mine = np.flatnonzero(which == number)
+        ways = [curves[row] for row in mine]
+        if any(way.end == "met" for way in ways):
+            result.append(None)
+            continue
         own = orbits.near(z[mine], mine) if len(starts) > 1 else orbits
-        met = any(curves[j].end == "met" for j in mine)
-        result.append(None if met else _joined(own, [curves[j] for j in mine if curves[j].z], kind))
+        result.append(_joined(own, [way for way in ways if way.z], kind))
     return result
 
 

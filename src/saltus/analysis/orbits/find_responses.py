@@ -113,7 +113,7 @@ def find_responses(
     the stages that it went through.
     """
     result = SettledMotions.empty(*start.shape) if result is None else result
-    pieces = _pieces(*start.shape, threads or usable_processors())
+    pieces = _pieces(len(start), start.shape[1], threads or usable_processors())
     parts = [SettledMotions.empty(len(piece), start.shape[1]) for piece in pieces]
 
     def work(number: int) -> None:

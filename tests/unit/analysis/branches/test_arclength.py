@@ -42,6 +42,59 @@ def test_closed_curves_are_closed_whatever_their_size():
         assert curve.length[-1] == pytest.approx(np.sum(np.hypot(*np.diff(z, axis=0).T)))
 
 
+class Circles(Ellipses):
+    """x**2 + y**2 = r**2 for r = 1 and 2: two curves of one equation."""
+
+    def evaluate(self, z, rows):
+        square = (z**2).sum(axis=1)
+        value, slope = (square - 1) * (square - 4), 2 * square - 5
+        return value[:, None], (2 * slope[:, None] * z)[:, None]
+
+
+def test_of_curves_that_begin_on_the_same_one_the_first_goes_on():
+    """Two groups on one circle, begun in opposite directions too, and one on the other."""
+    starts = np.array([[1.0, 0.0], [1.0, 0.0], [0.6, 0.8], [0.6, 0.8], [2.0, 0.0]])
+    along = np.array([[0.0, 1.0], [0.0, -1.0], [0.8, -0.6], [-0.8, 0.6], [0.0, 1.0]])
+    curves = follow(
+        Circles([1.0] * 5), starts, along, {1: (-10, 10)}, 2000, group=np.array([0, 0, 1, 1, 2])
+    )
+    ends = [curve.end for curve in curves]
+    assert "closed" in ends[:2]
+    assert ends[2:] == ["met", "met", "closed"]
+    assert all(len(curve.z) < 20 for curve in curves[2:4])
+
+
+def test_curves_that_cross_a_start_are_not_taken_for_one():
+    """The ellipse x**2 + (y/3)**2 = 1 passes (1, 0) upright; the other curve leaves it aslant."""
+
+    class Crossing(Ellipses):
+        def evaluate(self, z, rows):
+            value, derivative = super().evaluate(z, rows)
+            slanted = np.flatnonzero(rows > 1)
+            value[slanted, 0] = z[slanted, 1] - (z[slanted, 0] - 1.0)
+            derivative[slanted, 0] = [-1.0, 1.0]
+            return value, derivative
+
+    curves = follow(
+        Crossing([3.0] * 4), np.array([[0.8, -1.8], [0.8, -1.8], [1.0, 0.0], [1.0, 0.0]]),
+        np.array([[1.0, 4.0], [-1.0, -4.0], [1.0, 1.0], [-1.0, -1.0]]), {1: (-2, 10)}, 2000,
+        group=np.array([0, 0, 1, 1]),
+    )  # fmt: skip
+    assert "met" not in [curve.end for curve in curves]
+
+
+def test_a_last_step_that_is_foreseen_is_as_exact_as_one_that_is_checked():
+    guess, normal = np.array([[1.2, 0.1], [1.0, 0.3]]), np.array([[0.0, 1.0]] * 2)
+    each = [
+        correct(Ellipses([1.0, 2.0]), guess, normal, np.arange(2), foresee=foresee)
+        for foresee in (False, True)
+    ]
+    assert all(one.found.all() for one in each)
+    np.testing.assert_allclose(each[1].z, each[0].z, rtol=2.0**-52)
+    np.testing.assert_array_equal(each[1].evaluations, each[0].evaluations)
+    assert np.abs(each[1].derivative - each[0].derivative).max() > 0  # that of the step before
+
+
 def test_a_curve_ends_exactly_at_the_end_of_the_range():
     (curve,) = follow(
         Ellipses([1.0]), np.array([[1.0, 0.0]]), np.array([[0.0, 1.0]]), {1: (-0.5, 0.5)}, 2000

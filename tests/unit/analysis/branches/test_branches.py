@@ -13,6 +13,10 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import saltus as sl
+from saltus.analysis.branches import arclength, tracing
+from saltus.analysis.branches.plans import plan_of
+from saltus.analysis.branches.seeds import scaled, seeds_of
+from saltus.analysis.branches.tracing import trace
 from saltus.errors import ParameterError, SaltusError
 
 REFERENCE = Path(__file__).parents[3] / "reference"
@@ -50,6 +54,7 @@ def rig(case, frequency, stiffness, low, high, start, at):
 
 
 HIGH = (5e-3, 0.0)
+DELANGRE = sl.models.delangre("b", force="4 N")
 FOUND = {
     "G02": ("a", 17.0, 14e3, 15.0, 28.5, (-4e-4, 0.0125), 16.0),
     "G05": ("b", 15.0, 14e3, 12.0, 18.5, HIGH, 15.0),
@@ -444,3 +449,49 @@ def test_the_ball_that_chatters_and_rests_at_whole_periods_is_one_branch():
     np.testing.assert_allclose(found.point_x, 0.0, atol=1e-13)
     np.testing.assert_allclose(found.point_v[:, 0], found.point_amplitude, rtol=1e-13)
     assert np.abs(found.point_multiplier_real).max() < 1e-6  # a double zero: roots of rounding
+
+
+@cache
+def seeds():
+    """Orbits of one to eight periods, several on a branch."""
+    found = sl.frequency_response(
+        DELANGRE, ("13 Hz", "16 Hz", 4), {"x": [5e-3, 0.0], "v": [0.0, 0.0]}, progress=False
+    )
+    return scaled(DELANGRE, "frequency", seeds_of(DELANGRE, "frequency", found), sl.Taylor())
+
+
+def test_derivatives_of_a_branch_are_those_at_its_own_points():
+    """Its curve was followed by derivatives a step of Newton's method away."""
+    plan = plan_of(DELANGRE, "frequency", (10.0, 20.0), sl.Taylor(), 1, 200, 1, ())
+    branches = []
+    trace(plan, seeds()[:1], branches)
+    (branch,) = branches
+    assert len(branch.z) > 50
+    residual, derivative = branch.orbits.evaluate(branch.z, np.zeros(len(branch.z), np.int64))
+    assert np.abs(residual).max() < 1e-13
+    np.testing.assert_allclose(branch.derivative, derivative, atol=1e-12)
+
+
+def test_branches_followed_side_by_side_are_those_followed_one_after_the_other(monkeypatch):
+    """Also if whoever comes by where another began is taken to be on its branch."""
+    doubled = frozenset({"period_doubling"})
+    plan = plan_of(DELANGRE, "frequency", (13.0, 16.0), sl.Taylor(), 1, 400, 2, doubled)
+    found, passed = [], arclength._has_passed
+    for name in ("", "alone", "blind"):
+        with monkeypatch.context() as patched:
+            if name == "alone":
+                patched.setattr(tracing, "ABREAST", 0)
+            if name == "blind":
+                patched.setattr(
+                    arclength, "_has_passed", lambda *a, either_way=False: either_way or passed(*a)
+                )
+            branches = []
+            trace(plan, seeds(), branches)
+        found.append(branches)
+    assert len(found[0]) > 2
+    for other in found[1:]:
+        assert [one.ends for one in other] == [one.ends for one in found[0]]
+        assert [one.parent for one in other] == [one.parent for one in found[0]]
+        for one, same in zip(other, found[0], strict=True):
+            places = [[event.z[-1] for event in branch.events] for branch in (one, same)]
+            np.testing.assert_allclose(places[0], places[1], rtol=1e-10)
