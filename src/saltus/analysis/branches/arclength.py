@@ -332,8 +332,8 @@ class _Fronts:
         """The longest steps of curves, which grow where these are far from where they began; those
         of unknowns with a range don't.
         """
-        begun = np.array([self.curves[i].z[0] for i in going])
-        away = np.linalg.norm((self.z[going] - begun) / self.equations.scale[going], axis=1)
+        way = (self.z[going] - self.began[going]) / self.equations.scale[going]
+        away = np.linalg.norm(way, axis=1)
         within = np.abs(self.tangent[going][:, list(self.bounds)]).max(axis=1, initial=TINY)
         return self.longest * np.clip(away / FAR, 1.0, 1.0 / within)
 

@@ -88,7 +88,7 @@ def sequences(orbits: PeriodicOrbits, z: np.ndarray) -> list[ContactSequence | N
         ])[:, rows]  # fmt: skip
         result.append(
             ContactSequence(
-                tuple(Contact(*map(int, one)) for one in what.T),
+                tuple(Contact(*one) for one in what.T.tolist()),
                 phase[rows],
                 table.state[rows][:, : orbits.size],
                 table.velocity[rows],

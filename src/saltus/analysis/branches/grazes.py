@@ -89,7 +89,9 @@ class Gap:
         """
         named = dict(zip(self._system.states, states.T, strict=True))
         values = evaluate(self._entries, t=time, states=named, values=self._system.values)
-        columns = np.stack(np.broadcast_arrays(time, *values)[1:], axis=-1)
+        columns = np.empty((len(time), len(values)))
+        for column, value in zip(columns.T, values, strict=True):
+            column[:] = value
         return columns.reshape(len(time), 2, -1)
 
 

@@ -361,8 +361,9 @@ class Legs:
             segments = self.segments(at, derivative[i], i, int(rows[i]))
             if self.free:
                 segments = across(product(segments), at.rate[i, 0])[None]
-            result.append(multipliers(segments))
-        return np.array(result)
+            result.append(segments)
+        count, size = (1, self.size - 1) if self.free else (self.count, self.size)
+        return multipliers(np.array(result).reshape(len(z), count, size, size))
 
     def segments(self, at: At, derivative: np.ndarray, i: int, row: int) -> np.ndarray:
         """The tangent map from each contact to the next one, both before them, float64[m, D, D]."""

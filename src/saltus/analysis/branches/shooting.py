@@ -18,7 +18,6 @@ import numpy as np
 
 from saltus.analysis.orbits.equilibria import field_of
 from saltus.analysis.orbits.floquet import across, multipliers
-from saltus.analysis.orbits.newton import leading_first
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.flow.request import Schedule
@@ -240,30 +239,22 @@ class PeriodicOrbits:
         return np.concatenate([-points.reshape(len(z), -1), rest], axis=1)
 
     # -- what an orbit is --------------------------------------------------------------------------
-    def segments(self, derivative: np.ndarray, row: int) -> np.ndarray:
-        """The tangent map of each period from a derivative of the equations, float64[n, D, D]."""
-        size, unit = self.size, self.scale[row]
-        result = np.empty((self.n, size, size))
+    def segments(self, derivative: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """The tangent map of each period from derivatives of the equations, float64[r, n, D, D]."""
+        size, unit = self.size, self.scale[rows]
+        result = np.empty((len(rows), self.n, size, size))
         for i in range(self.n):
-            rows = slice(i * size, (i + 1) * size)
-            block = derivative[rows, rows] * unit[rows][:, None] / unit[None, rows]
-            result[i] = block + np.eye(size) if self.n == 1 else block
-        return result
+            own = slice(i * size, (i + 1) * size)
+            result[:, i] = derivative[:, own, own] * unit[:, own, None] / unit[:, None, own]
+        return result + np.eye(size) if self.n == 1 else result
 
     def multipliers(self, z: np.ndarray, derivative: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """Floquet multipliers of orbits float64[r, z], the largest first, without the trivial one
         of a system without forcing; complex128[r, D] or [r, D - 1].
         """
-        if self.n == 1 and not self.free:
-            unit = self.scale[rows, : self.size]
-            own = derivative[:, : self.size, : self.size] * unit[:, :, None] / unit[:, None]
-            return leading_first(own + np.eye(self.size))
-        flows = self._flow(z) if self.free else None
-        result = []
-        for i, row in enumerate(rows):
-            segments = self.segments(derivative[i], row)
-            if flows is not None:
-                whole = np.linalg.multi_dot([*segments[::-1], np.eye(self.size)])
-                segments = across(whole, flows[i])[None]
-            result.append(multipliers(segments))
-        return np.array(result)
+        segments = self.segments(derivative, rows)
+        if self.free:
+            wholes = [np.linalg.multi_dot([*one[::-1], np.eye(self.size)]) for one in segments]
+            parts = [across(*one) for one in zip(wholes, self._flow(z), strict=True)]
+            segments = np.array(parts).reshape(len(rows), 1, self.size - 1, self.size - 1)
+        return multipliers(segments)

@@ -83,7 +83,7 @@ def children(branch: Branch, number: int, switch: frozenset[str], longest: int) 
 
 def _doubled(branch: Branch, event: SpecialPoint) -> np.ndarray:
     """The direction of the branch of twice the period."""
-    segments = branch.orbits.segments(event.derivative, branch.row)
+    (segments,) = branch.orbits.segments(event.derivative[None], np.array([branch.row]))
     product = np.eye(branch.orbits.size)
     for one in segments:
         product = one @ product

@@ -5,7 +5,6 @@ branches, each once.
 from __future__ import annotations
 
 import functools
-import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -78,15 +77,14 @@ def trace(
     """
     waiting, begun = list(seeds), 0
     while waiting:
-        abreast = _abreast(waiting)
-        beside, waiting[:abreast] = waiting[:abreast], []
-        begun += abreast
+        beside = _abreast(waiting)
+        begun += len(beside)
         found = [Start.of(plan, seed) for seed in beside]
         starts = [one for one in found if one is not None and not _is_known(one, branches)]
         beside = [start.seed for start in starts]
         for start, branch in zip(starts, plan.follow(plan, starts), strict=True):
             seed = beside.pop(0)
-            if _is_known(start, branches):
+            if start is not starts[0] and _is_known(start, branches):
                 continue
             if branch is None and start is not starts[0]:
                 (branch,) = plan.follow(plan, [start])  # those beside it only seemed to be it
@@ -100,23 +98,38 @@ def trace(
             progress(begun / (begun + len(waiting)))
 
 
-def _abreast(waiting: Sequence[Seed]) -> int:
-    """How many of the first seeds are followed side by side, which costs little more than one where
-    orbits have few unknowns. Several may lie on one branch: limit cycles aren't known again by
-    those who pass them.
+def _abreast(waiting: list[Seed]) -> list[Seed]:
+    """Take the seeds that are followed side by side, which costs little more than one where orbits
+    have few unknowns.
+
+    Several may lie on one branch: limit cycles aren't known again by those who pass them. Of
+    neighbours on a branch the second stays behind, since most often it is the other end of what
+    leaves at the first.
     """
     first = waiting[0]
     free = len(first.own) > 1
-    most = 1 if free and first.along is None else ABREAST // first.points.size**2
-    alike = itertools.takewhile(
-        lambda seed: (
+    most = 1 if free and first.along is None else max(ABREAST // first.points.size**2, 1)
+    taken, left = list[Seed](), list[Seed]()
+    for place, seed in enumerate(waiting):
+        alike = (
             (seed.along is None) == (first.along is None)
             and seed.points.shape == first.points.shape
             and (not free or np.array_equal(seed.scale, first.scale))
-        ),
-        waiting[: max(most, 1)],
-    )
-    return sum(1 for _ in alike)
+        )
+        if not alike or len(taken) == most:
+            left += waiting[place:]
+            break
+        if place > 0 and waiting[place - 1] is taken[-1] and _leave_one(taken[-1], seed):
+            left.append(seed)
+        else:
+            taken.append(seed)
+    waiting[:] = left
+    return taken
+
+
+def _leave_one(seed: Seed, other: Seed) -> bool:
+    """Whether two seeds leave one branch."""
+    return None not in (seed.parent, other.parent) and seed.parent[0] == other.parent[0]  # type: ignore[index]
 
 
 def _is_known(start: Start, branches: Sequence[Branch]) -> bool:

@@ -40,39 +40,42 @@ def nontrivial(segments: np.ndarray, flows: np.ndarray) -> np.ndarray:
     if segments.shape[1] == 1:
         return np.zeros(1, complex)
     ahead = np.roll(flows, -1, axis=0)
-    return multipliers(np.array([across(*one) for one in zip(segments, flows, ahead, strict=True)]))
+    parts = [across(*one) for one in zip(segments, flows, ahead, strict=True)]
+    return multipliers(np.array(parts)[None])[0]
 
 
 def multipliers(segments: np.ndarray) -> np.ndarray:
-    """Floquet multipliers of float64[n, D, D], the largest first, complex128[D].
+    """Floquet multipliers of float64[r, n, D, D], the largest first, complex128[r, D]; NaN where a
+    segment isn't finite.
 
     Eigenvalues of the cyclic block matrix are their n-th roots: the product isn't multiplied out,
     so that small ones keep their digits. Kressner, Numerical Methods for General and Structured
     Eigenvalue Problems (2005), section 3.
     """
-    n, size = segments.shape[:2]
+    r, n, size = segments.shape[:3]
     if n == 1:
-        return leading_first(segments)[0]
-    if not np.isfinite(segments).all():
-        return np.full(size, np.nan + 0j)
-    cyclic = np.zeros((n * size, n * size))
+        return leading_first(segments[:, 0])
+    good = np.isfinite(segments).all(axis=(1, 2, 3))
+    cyclic = np.zeros((np.count_nonzero(good), n, size, n, size))
     for i in range(n):
-        j = (i + 1) % n
-        cyclic[j * size : (j + 1) * size, i * size : (i + 1) * size] = segments[i]
-    roots = np.linalg.eigvals(cyclic)
-    powers = roots**n
-    order = np.argsort(-np.abs(powers))
-    return _grouped(powers[order], n)
+        cyclic[:, (i + 1) % n, :, i] = segments[good, i]
+    roots = np.linalg.eigvals(cyclic.reshape(len(cyclic), n * size, n * size))
+    result = np.full((r, size), np.nan + 0j)
+    result[good] = _grouped(roots**n, n)
+    return result
 
 
 def _grouped(powers: np.ndarray, n: int) -> np.ndarray:
-    """One of each n equal values."""
-    left, result = list(powers), []
-    while left:
-        first = left[0]
-        nearest = sorted(range(len(left)), key=lambda i: abs(left[i] - first))[:n]
-        mean = np.mean([left[i] for i in nearest])
-        result.append(mean if abs(mean.imag) > 1e-9 * abs(mean) else complex(mean.real))
-        left = [value for i, value in enumerate(left) if i not in set(nearest)]
-    values = np.array(result)
-    return values[np.lexsort((-values.imag, -np.round(np.abs(values), 12)))]
+    """One of each n equal values of complex128[r, n D], the largest first."""
+    means, left = [], np.ones(powers.shape, bool)
+    while left[:1].any():
+        first = np.where(left, np.abs(powers), -1.0).argmax(axis=1)[:, None]
+        apart = np.abs(powers - np.take_along_axis(powers, first, axis=1))
+        nearest = np.argsort(np.where(left, apart, np.inf), axis=1, kind="stable")[:, :n]
+        means.append(np.take_along_axis(powers, nearest, axis=1).mean(axis=1))
+        np.put_along_axis(left, nearest, False, axis=1)
+    values = np.array(means, complex).reshape(-1, len(powers)).T
+    real = np.abs(values.imag) <= 1e-9 * np.abs(values)
+    values = np.where(real, values.real, values)
+    order = np.lexsort((-values.imag, -np.round(np.abs(values), 12)), axis=1)
+    return np.take_along_axis(values, order, axis=1)
