@@ -18,8 +18,9 @@ import pytest
 
 import saltus as sl
 from conformance.systems import latch, pair, slider, walls
+from saltus.codegen import machine
 from saltus.codegen.kernels import FULL, GENERIC, TIERS, Kernels
-from saltus.codegen.module import jit_disabled
+from saltus.codegen.module import jit_disabled, taylor_module
 from saltus.flow import engine
 from saltus.flow.request import Request, Schedule
 from saltus.kernels import status as st
@@ -90,6 +91,21 @@ def test_all_tiers_give_the_same_bits(case):
         assert len(outcome.contacts) > 20
     if case == "sticks":
         assert {st.HOLD, st.RELEASE} <= set(outcome.contacts.kind.tolist())
+
+
+@pytest.mark.parametrize("case", ["walls", "tangent", "chain"])
+def test_registers_one_after_the_other_give_the_same_bits(monkeypatch, case):
+    """Two, four or all eight lanes in one."""
+    chain = (sl.models.chain(), 1e-3, TAYLOR)
+    system, spread, _ = CASES.get(case, chain)
+    found = []
+    for register in (2, 4, 8):
+        monkeypatch.setattr(machine, "register_width", lambda r=register: r)
+        flow = taylor_module.__wrapped__(system.origin, 20, 8)
+        flow.exchange(GENERIC)
+        monkeypatch.setattr(sl.Taylor, "kernels", lambda *_, f=flow: f)
+        found.append(bits(engine.run(system, TAYLOR, request(system, spread), threads=1)))
+    assert found[0] == found[1] == found[2]
 
 
 def test_an_exchange_between_two_calls_changes_nothing(monkeypatch):

@@ -265,7 +265,9 @@ class Kernels:
 
     @cached_property
     def _equation_text(self) -> str:
-        return equation_ir(self._functions, self._constants, self.interface, self._lanes)
+        return equation_ir(
+            self._functions, self._constants, self.interface, self._lanes, machine.register_width()
+        )
 
 
 def layout_of(interface: Interface, constants: dict[str, Constant]) -> dict[str, Any]:

@@ -236,7 +236,7 @@ class _Body:
         """A function of kernels/lanes.py, of trigonometry.py, or of Python."""
         if name == "load":
             table, row, *_ = arguments
-            place = self._place(table.id, row, self.lanes)  # type: ignore[attr-defined]
+            place = self._place(table.id, row, self.row)  # type: ignore[attr-defined]
             return self.new(LANE, f"load {self.types[LANE]}, ptr {place}, align 8")
         values = [
             self.value(a) for a in arguments if not (isinstance(a, ast.Name) and a.id == "LANES")
@@ -331,7 +331,7 @@ class _Body:
                     found = self.lane(self.value(value))
                     self.do(
                         f"store {self.types[LANE]} {found.text}, ptr "
-                        f"{self._place(array, row, self.lanes)}, align 8"
+                        f"{self._place(array, row, self.row)}, align 8"
                     )
                 case ast.Expr(value=ast.Call(func=ast.Name(id=function), args=arguments)) if (
                     function in self.helpers
@@ -497,7 +497,7 @@ def _function(
     declared: set[str],
     helpers: Helpers,
 ) -> str:
-    """One function as IR text, in blocks if it is long."""
+    """One function as IR text for some lanes of each row, in blocks if it is long."""
     kinds = {WHOLE: INTEGER, REAL: NUMBER}
     arguments = list(
         zip((argument.arg for argument in tree.args.args), signature.arguments, strict=True)
@@ -516,6 +516,22 @@ def _function(
     return in_blocks(
         f"saltus_{tree.name}", signature.result, parameters, signature.attributes, body.lines, lanes
     )
+
+
+def _part_by_part(tree: ast.FunctionDef, signature: _Signature, lanes: int, name: str) -> str:
+    """A function that calls another for so many lanes of each row after the other."""
+    arguments = [argument.arg for argument in tree.args.args]
+    lines = []
+    for first in range(0, signature.row, lanes):
+        places = [f"%{argument}.{first}" for argument in arguments]
+        lines += [
+            f"{place} = getelementptr i8, ptr %{argument}, i64 {8 * first}"
+            for place, argument in zip(places, arguments, strict=True)
+        ]
+        lines.append(f"call void @saltus_{name}({', '.join(f'ptr {one}' for one in places)})")
+    given = ", ".join(f"ptr %{argument}" for argument in arguments)
+    body = "".join(f"  {line}\n" for line in [*lines, "ret void"])
+    return f"define void @saltus_{tree.name}({given}) {signature.attributes} {{\n{body}}}\n"
 
 
 @cache
@@ -573,8 +589,12 @@ def equation_ir(
     constants: Mapping[str, int | float | bool | tuple],
     interface: Interface,
     lanes: int,
+    register: int | None = None,
 ) -> str:
     """The functions of a head as LLVM IR, named ``saltus_NAME``.
+
+    Those of lanes work off one register after the other, by the same code: with all lanes at once
+    it is so long that a step doesn't fit the cache of instructions. docs/decisions/0051.
 
     Parameters
     ----------
@@ -585,9 +605,12 @@ def equation_ir(
     interface : Interface
         What the templates call.
     lanes : int
-        Width of a lane.
+        Trajectories in a row.
+    register : int, optional
+        How many of them a register holds. Default: all.
     """
-    shared, declared = _trigonometry(lanes)
+    part = min(register or lanes, lanes)
+    shared, declared = _trigonometry(part)
     known = {
         name: Value(INTEGER, str(int(v))) for name, v in constants.items() if isinstance(v, int)
     }
@@ -598,22 +621,23 @@ def equation_ir(
         if isinstance(node, ast.FunctionDef)
     }
     texts = []
-    for name in interface.functions:
-        attributes, row = (
-            ("nounwind alignstack(64)", lanes) if name in OF_LANES else ("nounwind", 1)
-        )
+    for name, arguments in interface.functions.items():
+        of_lanes, tree = name in OF_LANES, trees[name]
+        width, attributes = (part, "nounwind alignstack(64)") if of_lanes else (lanes, "nounwind")
         signature = _Signature(
-            interface.functions[name],
-            "i64" if name in interface.truths else "void",
-            attributes,
-            row,
-        )
+            arguments, "i64" if name in interface.truths else "void", attributes,
+            lanes if of_lanes else 1,
+        )  # fmt: skip
+        if width < signature.row:
+            texts.append(_part_by_part(tree, signature, width, f"part_of_{name}"))
+            tree = ast.FunctionDef(f"part_of_{name}", tree.args, tree.body, [])
+            signature = signature._replace(attributes=f"noinline {attributes}")
         helpers: Helpers = {other: None for other in trees if other not in interface.functions}
-        texts.append(_function(trees[name], signature, lanes, known, needed, helpers))
-        for helper, arguments in helpers.items():
-            if arguments is not None:
-                signature = _Signature(arguments, "void", attributes, row)
-                texts.append(_function(trees[helper], signature, lanes, known, needed, {}))
+        texts.append(_function(tree, signature, width, known, needed, helpers))
+        for helper, given in helpers.items():
+            if given is not None:
+                signature = _Signature(given, "void", attributes, signature.row)
+                texts.append(_function(trees[helper], signature, width, known, needed, {}))
     return "\n".join([shared, *texts, *sorted(needed)]) + "\n"
 
 

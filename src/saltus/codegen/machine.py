@@ -70,6 +70,15 @@ def target() -> Target:
     return Target(triple, chosen, "")
 
 
+def register_width() -> int:
+    """Doubles that a register of the target holds."""
+    _, processor, listed = target()
+    features = set(listed.split(","))
+    if features >= {"+avx512f", "+avx512dq"} or processor == "x86-64-v4":
+        return 8
+    return 4 if features >= {"+avx2", "+fma"} or processor == "x86-64-v3" else 2
+
+
 def versions() -> tuple[str, ...]:
     """Versions of what makes the code."""
     import llvmlite

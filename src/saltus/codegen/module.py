@@ -64,18 +64,9 @@ def lane_width() -> int:
     lanes 2.06, 1.87, 2.05; without fused multiply-add 2 and 4 lanes 17.7, 23.8. NEON has registers
     of 2, so 4 lanes; nobody has measured it.
     """
-    return _lanes_of(machine.target())
-
-
-@lru_cache(maxsize=1)
-def _lanes_of(target: machine.Target) -> int:
-    triple, processor, listed = target
-    features = set(listed.split(","))
-    if features >= {"+avx512f", "+avx512dq"} or processor == "x86-64-v4":
-        return 16
-    if features >= {"+avx2", "+fma"} or processor == "x86-64-v3":
-        return 8
-    return 4 if triple.startswith(("aarch64", "arm64")) else 2
+    register = machine.register_width()
+    arm = machine.target().triple.startswith(("aarch64", "arm64"))
+    return 2 * register if register > 2 or arm else register
 
 
 @lru_cache(maxsize=256)

@@ -26,7 +26,7 @@ SHRUNK = 0.005
 #: Farthest that a seed lies from its orbit, in units of the scale.
 ASTRAY = 0.5
 #: Branches that are followed side by side, times the square of the unknowns of their orbits.
-ABREAST = 1024
+ABREAST = 512
 
 
 @dataclass(frozen=True)
