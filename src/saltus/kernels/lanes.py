@@ -85,25 +85,16 @@ def spacing(number):
     return np.spacing(number)
 
 
-#: Bits of 2^52.
-TWO_52 = 0x4330000000000000
-
-
 def coarse_log2(a):
     """log2|a| to 0.09 from the bits of the number; about -1023 for zero. Enough for a step-size
     rule, which needs two digits.
-
-    The upper 51 bits are made the fraction of a number between 2^52 and 2^53: AVX2 and NEON have no
-    instruction that converts integers in lanes.
     """
-    upper = np.abs(np.asarray(a)).view(np.int64) >> 12
-    return ((upper | TWO_52).view(np.float64) - 2.0**52) * 2.0**-40 - 1023.0
+    return np.abs(np.asarray(a)).view(np.int64) * 2.0**-52 - 1023.0
 
 
 def coarse_exp2(a):
     """The inverse of :func:`coarse_log2`."""
-    upper = (np.clip(a, -1000.0, 1000.0) + 1023.0) * 2.0**40 + 2.0**52
-    return (np.asarray(upper).view(np.int64) << 12).view(np.float64)
+    return ((np.clip(a, -1000.0, 1000.0) + 1023.0) * 2.0**52).astype(np.int64).view(np.float64)
 
 
 def libm_sin(a):

@@ -97,7 +97,7 @@ def test_wherever_a_function_is_cut_its_numbers_are_the_same(monkeypatch):
         f"{2 * i + 1}, c{i})"
         for i in range(6)
     ]
-    text = "def turns(a, out):\n    y = load(a, 0, LANES)\n" + "".join(
+    text = "def rates(a, out):\n    y = load(a, 0, LANES)\n" + "".join(
         f"    {line}\n" for call in calls for line in call.split("\n")
     )
     angles, wanted = np.array([[0.1, 0.7, -2.0, 30.0]]), np.zeros((12, 4))

@@ -15,7 +15,6 @@ from numba.extending import lower_builtin, models, register_model
 from numba.np.arrayobj import make_array, populate_array
 
 from saltus.kernels.lanes import (
-    TWO_52,
     any_lane,
     bits,
     coarse_exp2,
@@ -270,9 +269,7 @@ def _lower_coarse_log2(builder, sig, v):
     vector = v[0].type
     integer = ir.VectorType(ir.IntType(64), vector.count)
     pattern = builder.and_(builder.bitcast(v[0], integer), _constant(integer, 0x7FFFFFFFFFFFFFFF))
-    upper = builder.or_(builder.lshr(pattern, _constant(integer, 12)), _constant(integer, TWO_52))
-    upper = builder.fsub(builder.bitcast(upper, vector), _constant(vector, 2.0**52))
-    scaled = builder.fmul(upper, _constant(vector, 2.0**-40))
+    scaled = builder.fmul(builder.sitofp(pattern, vector), _constant(vector, 2.0**-52))
     return builder.fsub(scaled, _constant(vector, 1023.0))
 
 
@@ -283,9 +280,8 @@ def _lower_coarse_exp2(builder, sig, v):
     for sign, limit in (("<", 1000.0), (">", -1000.0)):
         bound = _constant(vector, limit)
         x = builder.select(builder.fcmp_ordered(sign, x, bound), x, bound)
-    scaled = builder.fmul(builder.fadd(x, _constant(vector, 1023.0)), _constant(vector, 2.0**40))
-    upper = builder.bitcast(builder.fadd(scaled, _constant(vector, 2.0**52)), integer)
-    return builder.bitcast(builder.shl(upper, _constant(integer, 12)), vector)
+    scaled = builder.fmul(builder.fadd(x, _constant(vector, 1023.0)), _constant(vector, 2.0**52))
+    return builder.bitcast(builder.fptosi(scaled, integer), vector)
 
 
 _lower(coarse_log2, 1, _lower_coarse_log2)
