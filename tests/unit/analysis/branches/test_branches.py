@@ -495,3 +495,23 @@ def test_branches_followed_side_by_side_are_those_followed_one_after_the_other(m
         for one, same in zip(other, found[0], strict=True):
             places = [[event.z[-1] for event in branch.events] for branch in (one, same)]
             np.testing.assert_allclose(places[0], places[1], rtol=1e-10)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_random_ranges_have_the_same_events_side_by_side_and_alone(monkeypatch, seed):
+    """The rig in one of its three cases, with a random force, over a random range."""
+    rng = np.random.default_rng(seed)
+    system = sl.models.delangre(str(rng.choice(["a", "b", "c"])), force=float(rng.uniform(1.5, 5)))
+    low = float(rng.uniform(5.0, 18.0))
+    found = []
+    for abreast in (tracing.ABREAST, 0):
+        monkeypatch.setattr(tracing, "ABREAST", abreast)
+        found.append(sl.frequency_response(
+            system, (low, low + 1.5, 4), "random 6",
+            box={"x": ("-5 mm", "5 mm"), "v": ("-0.5 m/s", "0.5 m/s")}, unstable=True,
+            progress=False,
+        ))  # fmt: skip
+    beside, alone = found
+    for name in ("branch_periods", "branch_closed", "event_kind", "branch_unexplained"):
+        np.testing.assert_array_equal(beside[name].values, alone[name].values)
+    np.testing.assert_allclose(beside.event_frequency, alone.event_frequency, rtol=1e-9)
