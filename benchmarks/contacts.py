@@ -14,7 +14,6 @@ programs follow the same motion.
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 from statistics import median
@@ -77,17 +76,6 @@ def ours(system: sl.System, start: np.ndarray, periods: int) -> engine.Outcome:
     return engine.run(system, sl.Taylor(), request, threads=1)
 
 
-def alternating(jobs: list[Callable[[], object]], repeats: int) -> list[float]:
-    """Median CPU time of each job [s], one after the other in every round."""
-    taken: list[list[float]] = [[] for _ in jobs]
-    for _ in range(repeats):
-        for job, times in zip(jobs, taken, strict=True):
-            began = time.process_time()
-            job()
-            times.append(time.process_time() - began)
-    return [median(times) for times in taken]
-
-
 def line(row: tuple[str | float | None, ...]) -> str:
     """A row of the table, as text."""
     cells = [
@@ -121,7 +109,7 @@ def main() -> None:
     kept: list[tuple[str | float | None, ...]] = []
     for title, system, problem, scale in problems():
         start = np.random.default_rng(5).uniform(-1.0, 1.0, (STARTS, len(system.states))) * scale
-        warm(system, start)
+        rig.warm(system, sl.Taylor())
         jobs: list[Callable[[], object]] = [lambda s=system, at=start: ours(s, at, PERIODS)]
         difference = None
         if rival is not None:
@@ -132,7 +120,10 @@ def main() -> None:
         contacts = float(ours(system, start, PERIODS).counters[:, engine.st.EVENTS].sum()) / (
             STARTS * PERIODS
         )
-        us = [seconds / (STARTS * PERIODS) * 1e6 for seconds in alternating(jobs, options.repeats)]
+        us = [
+            median(seconds) / (STARTS * PERIODS) * 1e6
+            for seconds in rig.alternating(jobs, options.repeats)
+        ]
         theirs_us = us[1] if rival is not None else None
         kept.append(
             (
@@ -151,13 +142,6 @@ def main() -> None:
             Table("One trajectory, one forcing period, several contacts", COLUMNS, kept)
         )
         print(f"kept in {record.write(options.write)}")
-
-
-def warm(system: sl.System, start: np.ndarray) -> None:
-    """Let the kernels with the sizes baked in take over before the clock runs."""
-    kernels = sl.Taylor().kernels(system.origin)
-    ours(system, start, 1)
-    kernels.exchange("full")
 
 
 if __name__ == "__main__":

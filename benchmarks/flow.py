@@ -63,6 +63,7 @@ def ours(
             system, {"x": x, "v": v}, PERIODS, keep=1, method=method, threads=1, progress=False
         )
 
+    rig.warm(system, method)
     events = float(job().events.sum()) / (len(x) * PERIODS)  # type: ignore[attr-defined]
     seconds = rig.cpu_seconds(job)
     x0, v0, exact = reference()

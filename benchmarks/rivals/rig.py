@@ -10,6 +10,7 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -71,9 +72,24 @@ def one_core() -> Iterator[None]:
 
 def cpu_seconds(job: Callable[[], object], repeats: int = 3) -> float:
     """Smallest CPU time of a job over some repeats [s]."""
-    taken = []
+    return min(alternating([job], repeats)[0])
+
+
+def alternating(jobs: list[Callable[[], object]], repeats: int) -> list[list[float]]:
+    """CPU times of each job [s], one job after the other in every round."""
+    taken: list[list[float]] = [[] for _ in jobs]
     for _ in range(repeats):
-        began = time.process_time()
-        job()
-        taken.append(time.process_time() - began)
-    return min(taken)
+        for job, times in zip(jobs, taken, strict=True):
+            began = time.process_time()
+            job()
+            times.append(time.process_time() - began)
+    return taken
+
+
+def warm(system: Any, method: Any) -> None:
+    """Let the code that long work ends with take over before the clock runs: saltus compiles it
+    beside the first seconds of work.
+    """
+    kernels = method.kernels(system.origin)
+    if kernels.tier != "full":
+        kernels.exchange("full")
