@@ -91,7 +91,9 @@ def bifurcation_diagram(
         points.say_if_empty(panel, datasets)
         if events:
             points.draw_events(
-                panel, [one for one in datasets if "point_branch" not in one.ds], across
+                panel,
+                [one for one in datasets if one.name or not one.ds.attrs.get("unstable")],
+                across,
             )
         if legend:
             points.legend(panel, named, _BESIDE_GAPS if panel.texts else 1.02)
@@ -155,7 +157,7 @@ def _continued(
     named: dict[str, Any] = {}
     for values in curves:
         named |= draw_branches(ax, ds, values, across, up)
-        if events:
+        if events and ds.attrs.get("unstable"):
             draw_marks(ax, ds, values, across, up)
     return named
 

@@ -13,8 +13,8 @@ from matplotlib.axes import Axes
 from saltus.errors import ParameterError, shown
 from saltus.plot import axes as draw
 from saltus.plot import response_points as points
-from saltus.plot.branches import MARKS
 from saltus.plot.picture import caller, check, picture
+from saltus.plot.response_points import MARKS
 from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
 from saltus.plot.type_map import type_map
 from saltus.results.dataset import schema

@@ -30,13 +30,6 @@ _LABELS = {
     "rms_about_mean": "rms of {} about its mean", "amplitude": "first harmonic of {}",
     "phase": "phase of {}", "period": "period", "frequency": "frequency",
 }  # fmt: skip
-#: Name and marker of the bifurcations.
-MARKS = {
-    "fold": ("fold", ">"), "period_doubling": ("period doubling", "D"),
-    "branch_point": ("branch point", "X"), "neimark_sacker": ("Neimark-Sacker", "h"),
-    "hopf": ("Hopf", "p"), "graze": ("graze", "^"), "corner": ("two contacts at once", "v"),
-    "boundary_equilibrium": ("boundary equilibrium", "P"),
-}  # fmt: skip
 #: Quantities that begin at zero.
 _SIZES = ("peak", "rms", "peak_to_peak", "rms_about_mean", "amplitude", "period")
 #: Dashes of what is unstable.
@@ -126,8 +119,8 @@ def draw_branches(
 ) -> dict[str, Any]:
     """Lines along the branches; the entries of the legend."""
     kind = ds["branch_kind"].values
-    periods = np.where(kind == "periodic", ds["branch_periods"].values, 0)
-    drawn = motion_colors.codes(kind, periods)
+    drawn = motion_colors.codes(kind, np.where(kind == "periodic", ds["branch_periods"].values, 0))
+    periods = points.periods_of(ds)
     place, height, of, stable = _with_events(ds, values)
     place, height = place * across.factor, height * up.factor
     named: dict[str, Any] = {}
@@ -141,7 +134,7 @@ def draw_branches(
                 zorder=3 if solid else 2, gid=f"{'stable' if solid else 'unstable'} {code}",
             )  # fmt: skip
         named[motion_colors.label(int(code), periods)] = Line2D([], [], color=color, lw=1.3)
-    if not stable.all():
+    if (ds["point_unstable_multipliers"].values > 0).any():
         named["unstable"] = Line2D([], [], color=QUIET, lw=0.9, ls=_DASHES)
     return named
 
@@ -201,7 +194,7 @@ def draw_marks(ax: Axes, ds: xr.Dataset, values: np.ndarray, across: Scale, up: 
         return
     at, height = _heights(ds, values)
     size = 4.5 if len(at) <= 40 else 3.2
-    for kind, (text, marker) in MARKS.items():
+    for kind, (text, marker) in points.MARKS.items():
         here = ds["event_kind"].values == kind
         if here.any():
             ax.plot(

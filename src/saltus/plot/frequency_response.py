@@ -134,7 +134,9 @@ def frequency_response(
         )
         if events:
             points.draw_events(
-                panel, [one for one in datasets if "point_branch" not in one.ds], across
+                panel,
+                [one for one in datasets if one.name or not one.ds.attrs.get("unstable")],
+                across,
             )
         if legend:
             points.legend(panel, named)
@@ -226,7 +228,7 @@ def _continued(
     values = one.ds[f"point_output_{quantity}"].sel(output=name).values
     values = np.rad2deg(values) if quantity == "phase" else values
     named = draw_branches(ax, one.ds, values, across, up)
-    if events:
+    if events and one.ds.attrs.get("unstable"):
         draw_marks(ax, one.ds, values, across, up)
     return named
 

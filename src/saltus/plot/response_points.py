@@ -26,12 +26,12 @@ Source = xr.Dataset | Mapping[str, xr.Dataset]
 NEEDS = ("response_of", "response_branch", "response_type", "response_period")
 #: Markers of Datasets that are drawn over each other.
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
-#: Name and marker of what happens to a branch between two values. That a branch isn't found any
-#: more is no mark: the picture shows it.
-_EVENTS = {
-    "hopf": ("Hopf", "p"), "fold": ("fold", ">"), "period_doubling": ("period doubling", "D"),
-    "neimark_sacker": ("Neimark-Sacker", "h"),
-    "chaos": ("onset of chaos", "s"), "graze": ("graze", "^"),
+#: Name and marker of each event on a branch.
+MARKS = {
+    "fold": ("fold", ">"), "period_doubling": ("period doubling", "D"),
+    "branch_point": ("branch point", "X"), "neimark_sacker": ("Neimark-Sacker", "h"),
+    "hopf": ("Hopf", "p"), "graze": ("graze", "^"), "corner": ("two contacts at once", "v"),
+    "boundary_equilibrium": ("boundary equilibrium", "P"),
 }  # fmt: skip
 #: Where the marks of events stand, in heights of the Axes.
 _EVENTS_AT = 1.025
@@ -216,13 +216,22 @@ def kind_handles(one: Shown, of: np.ndarray, markers: bool = False) -> dict[str,
     """The kinds that occur, in the order of the legend, with their colours, and their markers if
     asked for.
     """
-    periods = one.ds["response_period"].values
+    periods = periods_of(one.ds)
     return {
         motion_colors.label(code, periods): dot(
             motion_colors.color(code), motion_colors.marker(code) if markers else "o"
         )
         for code in np.unique(of).tolist()
     }
+
+
+def periods_of(ds: xr.Dataset) -> np.ndarray:
+    """Periods of the responses and of the branches, 0 of what doesn't follow a forcing."""
+    parts = [ds["response_period"].values] if "response_period" in ds else []
+    if "branch_periods" in ds:
+        forced = ds["branch_kind"].values == "periodic"
+        parts.append(np.where(forced, ds["branch_periods"].values, 0))
+    return np.concatenate(parts)
 
 
 def draw_events(ax: Axes, datasets: Sequence[Shown], scale: Scale) -> None:
@@ -236,12 +245,12 @@ def draw_events(ax: Axes, datasets: Sequence[Shown], scale: Scale) -> None:
             continue
         values, words = one.ds[name].values * scale.factor, one.ds["event_kind"].values
         low, high = ax.get_xlim()
-        drawn = np.isin(words, list(_EVENTS)) & (values >= low) & (values <= high)
+        drawn = np.isin(words, list(MARKS)) & (values >= low) & (values <= high)
         values, words = values[drawn], words[drawn]
         size, width = (4.5, 0.8) if values.size <= _MANY_EVENTS else (3.0, 0.5)
         row = _rows(ax, values, size)
         rows = max(rows, int(row.max(initial=-1)) + 1)
-        for word, (text, marker) in _EVENTS.items():
+        for word, (text, marker) in MARKS.items():
             here = words == word
             if not here.any():
                 continue

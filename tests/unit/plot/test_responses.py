@@ -408,7 +408,7 @@ def test_a_title_stands_above_the_marks_of_events_and_every_mark_is_its_own():
         axes.figure.canvas.draw()
         title = axes._left_title.get_window_extent()
         assert all(line.get_window_extent().y1 < title.y0 for line in marks)
-    looks = [marker for _, marker in response_points._EVENTS.values()]
+    looks = [marker for _, marker in response_points.MARKS.values()]
     assert len(set(looks)) == len(looks)
     assert not set(looks) & set(response_points.MARKERS[:1])  # the first of several Datasets
 

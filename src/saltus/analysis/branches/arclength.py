@@ -94,7 +94,8 @@ class Curve:
     end : str
         ``range``: the end of the range was reached; ``closed``; ``points``: as many as asked for;
         ``lost``: no step however short; ``stopped``: another curve of the group is closed;
-        ``met``: another group goes on along the same curve; or what the caller says.
+        ``met``: another group goes on along the same curve; ``enough``: the caller needs no more;
+        or what the caller says.
     """
 
     z: list[np.ndarray] = field(default_factory=list)
@@ -212,6 +213,7 @@ def follow(
     group: np.ndarray | None = None,
     longest: float = LONGEST,
     foresee: bool = False,
+    enough: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray] | None = None,
 ) -> list[Curve]:
     """Curves from points float64[k, m + 1] on them, until they leave the range of an unknown, are
     closed or have ``points`` points.
@@ -239,6 +241,9 @@ def follow(
     foresee : bool
         See :func:`correct`: the derivatives of the curves, and their tangents, are good for
         following them only.
+    enough : callable, optional
+        Which curves go no farther, bool[r], from points float64[r, m + 1] that were reached, the
+        derivatives there and their curves int64[r].
     """
     rows = np.arange(len(start))
     here = correct(equations, start, tangents_at(equations, start, along, rows), rows, 1.0)
@@ -252,6 +257,8 @@ def follow(
         for i in taken:
             if ends is not None and (why := ends(fronts.curves[i])):
                 fronts.undo(i, why)
+        if enough is not None:
+            fronts.halt(taken, enough)
     return fronts.curves
 
 
@@ -312,6 +319,10 @@ class _Fronts:
         smooth = (turn > TURN) & stays & foreseen
         counts = converges & (smooth | (length < 100 * SHORTEST))  # a short one may turn a corner
         easy = counts & (trial.evaluations <= EASY) & (turn > STRAIGHT)
+        there = counts & outside & (moved < SHORTEST)  # it began at that end of the range
+        for i in going[there]:
+            self.curves[i].end = "range"
+        counts &= ~there
         for j in np.flatnonzero(counts):
             curve = self.curves[going[j]]
             _add(curve, trial.z[j], tangent[j], trial.derivative[j], moved[j])
@@ -323,7 +334,7 @@ class _Fronts:
         self.equations.accepted(self.z[taken], taken)
         factor = np.where(counts, np.where(easy, 2.0, 1.0), 0.5)
         self.length[going] = np.minimum(factor * length, self._longest(going))
-        for i in going[~counts & (self.length[going] < SHORTEST)]:
+        for i in going[~counts & ~there & (self.length[going] < SHORTEST)]:
             self.curves[i].end = "lost"
         self._meet(taken)
         return taken
@@ -336,6 +347,18 @@ class _Fronts:
         away = np.linalg.norm(way, axis=1)
         within = np.abs(self.tangent[going][:, list(self.bounds)]).max(axis=1, initial=TINY)
         return self.longest * np.clip(away / FAR, 1.0, 1.0 / within)
+
+    def halt(
+        self,
+        taken: np.ndarray,
+        enough: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray],
+    ) -> None:
+        """End the curves of which there is enough; see :func:`follow`."""
+        rows = np.array([i for i in taken if not self.curves[i].end], np.int64)
+        if len(rows):
+            derivative = np.array([self.curves[i].derivative[-1] for i in rows])
+            for i in rows[enough(self.z[rows], derivative, rows)]:
+                self.curves[i].end = "enough"
 
     def undo(self, i: int, why: str) -> None:
         """Take the last point of a curve back: it lies beyond the end."""

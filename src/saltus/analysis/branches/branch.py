@@ -55,7 +55,8 @@ class Branch:
         Why it ends at its first and at its last point: see :class:`Curve`; ``period_doubling``
         where it becomes an orbit of half the period, ``hopf`` where a limit cycle shrinks to an
         equilibrium, ``boundary_equilibrium`` where an equilibrium meets a boundary; ``accumulates``
-        where its grazes do, ``held`` where it is lost with contacts that are held.
+        where its grazes do, ``held`` where it is lost with contacts that are held; ``unstable``
+        where its orbits lose stability, and no more was asked for.
     limits : (float, float)
         The parameter at which they do, at either end; NaN otherwise.
     events : list of SpecialPoint
@@ -105,6 +106,35 @@ class Branch:
             self._halve()
         self.unexplained = _unexplained(self, turning=True)
         self.events = _in_order(self, [*self.events, *self._contacts()])
+
+    def cut_unstable(self) -> None:
+        """Let a branch that ends because its orbits lose stability end with the orbit at which they
+        do.
+        """
+        attract = np.flatnonzero(~outside(self.multipliers).any(axis=1))
+        if not len(attract):
+            return
+        first, last = attract[[0, -1]]
+        for side, after, place in ((1, last, last + 1), (0, first - 1, first)):
+            mine = [event for event in self.events if event.after == after]
+            mine = [event for event in mine if event.kind in _LOSES_STABILITY] or mine
+            if self.ends[side] == "unstable" and mine:
+                self._end_with(mine[side - 1], side, place)
+
+    def _end_with(self, event: SpecialPoint, side: int, place: int) -> None:
+        """Let the branch begin (side 0) or end (side 1) with an event, in front of a point."""
+        step = (event.z - self.z[place - side]) / self.scale
+        length = self.length[place - side] + (1 if side else -1) * np.linalg.norm(step)
+        kept = slice(0, place) if side else slice(place, None)
+        new = {"z": event.z, "tangent": event.tangent, "derivative": event.derivative}
+        for name, value in {**new, "multipliers": event.multipliers, "length": length}.items():
+            column = getattr(self, name)[kept]
+            setattr(self, name, np.insert(column, len(column) if side else 0, value, axis=0))
+        which, shift = self.events.index(event), 0 if side else place - 1
+        events = self.events[: which + 1] if side else self.events[which:]
+        self.events = [replace(one, after=one.after - shift) for one in events]
+        left = [one - shift for one in self.unexplained]
+        self.unexplained = [one for one in left if 0 <= one < len(self.z) - 1]
 
     def _halve(self) -> None:
         """Locate bifurcations; halve the intervals in which they don't explain what changes."""
@@ -211,6 +241,8 @@ def _ahead(branch: Branch, point: SpecialPoint) -> float:
     return float(step @ branch.tangent[point.after])
 
 
+#: Events at which orbits lose stability, before those at which they may.
+_LOSES_STABILITY = ("fold", "branch_point", "period_doubling", "neimark_sacker", "hopf")
 #: How many multipliers cross the unit circle at each kind of event.
 _CROSSING = {"fold": 1, "branch_point": 1, "period_doubling": 1, "neimark_sacker": 2}
 

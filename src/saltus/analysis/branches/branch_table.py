@@ -86,7 +86,7 @@ def values_of(
     return {
         "point": np.arange(len(points)),
         "point_branch": np.repeat(np.arange(len(branches)), counts),
-        "point_<parameter>": {name: np.array([z[-1] for _, z in points])},
+        "point_<parameter>": {name: _parameter(points)},
         "point_arclength": np.concatenate([b.length for b in branches] or [np.zeros(0)]),
         "point_stable": np.nanmax(np.abs(multipliers), axis=1, initial=0.0) < 1.0 - MARGINAL,
         "point_unstable_multipliers": outside(multipliers).sum(axis=1),
@@ -115,13 +115,18 @@ def values_of(
         "event_sqrt_coefficient": np.array([event.sqrt_coefficient for _, event in events], float),
         "event_branch": np.array([number for number, _ in events], np.int64),
         "event_point": np.array([begins[i] + event.after for i, event in events], np.int64),
-        "event_<parameter>": {name: np.array([event.z[-1] for _, event in events], float)},
+        "event_<parameter>": {name: _parameter(at_events)},
         "event_peak": event_numbers.peak[:, 0],
         "event_rms": event_numbers.rms[:, 0],
         **_complex("event_multiplier", np.where(event_rests[:, None], np.nan, event_multipliers)),
         **_complex("event_eigenvalue", event_own),
         "event_<state>": states[len(points) :],
     }
+
+
+def _parameter(points: Sequence[tuple[Branch, np.ndarray]]) -> np.ndarray:
+    """The parameter at points of branches [SI]."""
+    return np.array([branch.orbits.values(z)[-1] for branch, z in points], float)
 
 
 def _complex(name: str, values: np.ndarray) -> dict[str, np.ndarray]:

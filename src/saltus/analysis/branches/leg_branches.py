@@ -154,7 +154,11 @@ def _branch(plan: Plan, orbits: PeriodicOrbits, start: Start) -> Branch | None:
     ways: list[tuple[list[Piece], str, float]] = []
     for along in start.sides:
         if not ways or ways[0][1] != "closed":
-            ways.append(follow_legs(orbits, z, scale, along, plan.limits, plan.points, start.first))
+            ways.append(
+                follow_legs(
+                    orbits, z, scale, along, plan.limits, plan.points, start.first, plan.stable
+                )
+            )
     ends = (ways[-1][1], ways[0][1]) if len(ways) == 2 else ("branch", ways[0][1])
     limits = (ways[-1][2] if len(ways) == 2 else np.nan, ways[0][2])
     if ways[0][1] == "closed":

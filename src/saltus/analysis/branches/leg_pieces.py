@@ -4,6 +4,7 @@ each, up to the events at which one becomes another.
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,6 +15,7 @@ from saltus.analysis.branches.ladders import accumulation
 from saltus.analysis.branches.leg_ends import End, end_of
 from saltus.analysis.branches.legs import Legs
 from saltus.analysis.branches.shooting import PeriodicOrbits
+from saltus.analysis.branches.special_points import unstable
 
 #: Contact sequences of one branch in one direction.
 MOST_PIECES = 40
@@ -83,6 +85,7 @@ class _Way:
     points: int
     first: float
     home: tuple[Legs, np.ndarray]
+    stable: bool
     pieces: list[Piece] = field(default_factory=list)
     end: str = ""
     limit: float = np.nan
@@ -107,7 +110,8 @@ class _Way:
         """The parameter at which the events behind the pieces accumulate; NaN if they don't."""
         ends = [piece.end for piece in self.pieces if piece.end is not None]
         contacts = [len(piece.legs.contacts) for piece in self.pieces]
-        return accumulation(contacts, [float(end.event.z[-1]) for end in ends])
+        values = [float(end.event.legs.values(end.event.z)[-1]) for end in ends]
+        return accumulation(contacts, values)
 
     def _piece(self, legs: Legs, z: np.ndarray, along: np.ndarray) -> End | None:
         """One contact sequence, and where it ends if that is at an event."""
@@ -124,7 +128,11 @@ class _Way:
         left = self.points - sum(len(piece.curve.z) for piece in self.pieces)
         step = AFTER if again else self.first
         limits = {legs.width - 1: self.limits}
-        curve = follow(legs, z[None], along[None], limits, max(left, 2), step, ends=ends)[0]
+        enough = functools.partial(unstable, legs.multipliers) if self.stable else None
+        (curve,) = follow(
+            legs, z[None], along[None], limits, max(left, 2), step, ends=ends, enough=enough
+        )
+        curve.end = "unstable" if curve.end == "enough" else curve.end
         piece = Piece(legs, curve, again)
         self.pieces.append(piece)
         if curve.end != "virtual":
@@ -170,6 +178,7 @@ def follow_legs(
     limits: tuple[float, float],
     points: int,
     first: float = FIRST,
+    stable: bool = False,
 ) -> tuple[list[Piece], str, float]:
     """A branch of periodic orbits in one direction, contact by contact.
 
@@ -187,6 +196,8 @@ def follow_legs(
         Most points.
     first : float
         First step, in units of the scale.
+    stable : bool
+        See :class:`saltus.analysis.branches.tracing.Plan`.
 
     Returns
     -------
@@ -205,6 +216,6 @@ def follow_legs(
     step = 1e-6 * tangent * legs.scale[0]
     moved = np.subtract(*legs.orbit(np.array([start + step, start - step])))
     side = 1.0 if (moved / scale) @ along > 0 else -1.0
-    way = _Way(limits, points, first, (legs, start))
+    way = _Way(limits, points, first, (legs, start), stable)
     way.follow(legs, start, side * tangent)
     return way.pieces, way.end, way.limit

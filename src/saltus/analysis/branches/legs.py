@@ -36,7 +36,8 @@ class Legs:
 
     Unknowns z: the time of each contact in periods since the orbit's first point and the state
     before it, one contact after the other; the period [s] of a system without forcing; the
-    parameters [SI]. An orbit without contacts has its first point in their place, at time 0.
+    parameters, as those of ``orbits``. An orbit without contacts has its first point in their
+    place, at time 0.
 
     Parameters
     ----------
@@ -111,7 +112,8 @@ class Legs:
 
     def values(self, z: np.ndarray) -> np.ndarray:
         """The parameters of orbits float64[..., z], float64[..., names]."""
-        return z[..., self.count * (self.size + 1) + self.free :]
+        values = z[..., self.count * (self.size + 1) + self.free :]
+        return np.exp(values) if self.orbits.log else values
 
     def spans(self, phase: np.ndarray) -> np.ndarray:
         """How long the leg behind each contact lasts, in periods."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 from saltus.analysis.branches.leg_branches import leg_branches
@@ -11,6 +12,9 @@ from saltus.flow.methods import Method
 from saltus.system.leg import has_legs
 from saltus.system.symmetry import is_symmetric
 from saltus.system.system import System
+
+#: Over a range of which the ends have a larger ratio a parameter is followed by its logarithm.
+DECADES = 100.0
 
 
 def plan_of(
@@ -22,17 +26,23 @@ def plan_of(
     points: int,
     longest: int,
     switch: Iterable[str],
+    *,
+    stable: bool = False,
+    twins: bool = False,
 ) -> Plan:
     """The plan of the branches of a system over a parameter ``name``; the rest is as in
-    :class:`Plan`.
+    :class:`Plan`. ``twins``: mirror images are followed too.
 
     Where states jump at contacts, branches are followed from contact to contact: the map over a
     period jumps when a contact crosses the whole period, and has a square root at a graze.
     """
     jumps = any(guard.law is not None and guard.law.reset for guard in system.guards)
-    symmetric = is_symmetric(system, {name: limits})
+    symmetric = not twins and is_symmetric(system, {name: limits})
+    log = limits[0] > 0 and limits[1] > DECADES * limits[0]
+    ends = (math.log(limits[0]), math.log(limits[1])) if log else limits
     return Plan(
-        lambda n, scale: PeriodicOrbits(system, (name,), n, scale, method, threads, symmetric),
-        limits, points, longest, frozenset(switch),
+        lambda n, scale: PeriodicOrbits(system, (name,), n, scale, method, threads, symmetric, log),
+        ends, points, longest, frozenset(switch),
         leg_branches if jumps and has_legs(system) else both_ways,
+        stable=stable, log=log,
     )  # fmt: skip

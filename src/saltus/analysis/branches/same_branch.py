@@ -20,59 +20,74 @@ def branch_of(z: np.ndarray, n: int, branches: Sequence[Branch]) -> int:
     """The branch on which an orbit of n periods or its mirror image lies, -1 if it is none of
     these.
     """
-    mine = [
-        i
-        for i, branch in enumerate(branches)
-        if branch.orbits.n == n and branch.z.shape[1] == len(z)  # equilibria are no limit cycles
-    ]
+    mine = [i for i, branch in enumerate(branches) if _is_alike(branch, n, len(z))]
     same = [z]
     if mine and branches[mine[0]].orbits.symmetric:
         same.append(branches[mine[0]].orbits.mirrored(z[None])[0])
-    there = (i for one in same for i in mine if _lies_on(one, branches[i]))
+    there = (i for one in same for i in mine if _on(one[None], branches[i])[0])
     return next(there, -1)
+
+
+def on_branch(z: np.ndarray, n: int, branch: Branch) -> np.ndarray:
+    """Which orbits of n periods float64[r, z] lie on a branch, bool[r]."""
+    return _on(z, branch) if _is_alike(branch, n, z.shape[1]) else np.zeros(len(z), bool)
 
 
 def has_twin(branch: Branch) -> bool:
     """Whether the mirror image of a branch is another one."""
     middle = branch.z[len(branch.z) // 2][None]
-    return branch.orbits.symmetric and not _lies_on(branch.orbits.mirrored(middle)[0], branch)
+    return branch.orbits.symmetric and not _on(branch.orbits.mirrored(middle), branch)[0]
 
 
-def _lies_on(z: np.ndarray, branch: Branch) -> bool:
-    normal = np.zeros((1, len(z)))
-    normal[0, -1] = 1.0
-    for guess in _passes(branch, float(z[-1])):
-        if _apart(z, guess, branch) > PASSES:
-            continue
-        orbits = branch.orbits.near(guess[None], np.array([branch.row]))
-        point = correct(orbits, guess[None], normal, np.array([0]), 2 * PASSES)
-        if point.found[0] and _apart(z, point.z[0], branch, exact=True) < SAME:
-            return True
-    return False
+def _is_alike(branch: Branch, n: int, width: int) -> bool:
+    """Whether orbits of n periods may lie on a branch; equilibria are no limit cycles."""
+    return branch.orbits.n == n and branch.z.shape[1] == width
 
 
-def _passes(branch: Branch, value: float) -> np.ndarray:
-    """Where a branch passes a value of the parameter, float64[g, z]: by cubics between its points,
-    which turn back beyond a fold as it does.
+def _on(z: np.ndarray, branch: Branch) -> np.ndarray:
+    """Which orbits float64[r, z] lie on a branch of their kind, bool[r]."""
+    result, (guess, which) = np.zeros(len(z), bool), _passes(branch, z[:, -1])
+    near = [_apart(z[i], one, branch) <= PASSES for i, one in zip(which, guess, strict=True)]
+    guess, which = guess[near], which[near]
+    if not len(guess):
+        return result
+    normal = np.zeros(guess.shape)
+    normal[:, -1] = 1.0
+    orbits = branch.orbits.near(guess, np.full(len(guess), branch.row))
+    point = correct(orbits, guess, normal, np.arange(len(guess)), 2 * PASSES)
+    for i, found in zip(which[point.found], point.z[point.found], strict=True):
+        result[i] = result[i] or _apart(z[i], found, branch, exact=True) < SAME
+    return result
+
+
+def _passes(branch: Branch, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where a branch passes values of the parameter float64[r], and which of them: float64[g, z],
+    int64[g]. By cubics between its points, which turn back beyond a fold as it does.
     """
     step = np.diff(branch.z, axis=0) / branch.scale
     length = np.append(0.0, np.cumsum(np.linalg.norm(step, axis=1)))
     each = np.append(True, np.diff(length) > 0.0)
+    none = np.zeros((0, len(branch.scale))), np.zeros(0, np.int64)
     if each.sum() < 2:
-        return np.zeros((0, len(branch.scale)))
+        return none
     curve = CubicHermiteSpline(
         length[each], branch.z[each] / branch.scale, branch.tangent[each], extrapolate=False
     )
     own = CubicHermiteSpline(
         curve.x, branch.z[each, -1] / branch.scale[-1], branch.tangent[each, -1]
     )
-    level = value / branch.scale[-1]
-    places = own.solve(level, extrapolate=False)
     ends = curve.x[[0, -1]]  # of which rounding would say whether they are passed
-    ends = ends[np.abs(own(ends) - level) < SAME]
-    result = curve(np.append(places[np.isfinite(places)], ends)) * branch.scale
-    result[:, -1] = value
-    return np.asarray(result)
+    found, which = list[np.ndarray](), list[int]()
+    for i, level in enumerate(values / branch.scale[-1]):
+        places = own.solve(level, extrapolate=False)
+        places = np.append(places[np.isfinite(places)], ends[np.abs(own(ends) - level) < SAME])
+        found.append(places)
+        which += [i] * len(places)
+    if not which:
+        return none
+    result = np.asarray(curve(np.concatenate(found)) * branch.scale)
+    result[:, -1] = values[which]
+    return result, np.array(which, np.int64)
 
 
 def _apart(a: np.ndarray, b: np.ndarray, branch: Branch, exact: bool = False) -> float:

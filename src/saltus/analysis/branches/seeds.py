@@ -21,6 +21,8 @@ from saltus.system.system import System
 
 #: Values of a parameter at which equilibria are looked for, and random starts at each.
 RESTING_VALUES, RESTING_STARTS = 3, 64
+#: An equilibrium so near to zero is there, in units of the starts.
+NOTHING = 1e-8
 #: Names of what a Dataset knows of its orbits: points, period, limit cycles' time.
 _PREFIX = {
     schema.RESPONSES: "response", schema.ATTRACTORS: "attractor", schema.BASINS: "attractor",
@@ -112,11 +114,12 @@ def rests_at(
     places: np.ndarray, values: np.ndarray, starts: np.ndarray | None = None
 ) -> list[Seed]:
     """Seeds at equilibria float64[k, D] of the parameter's values float64[k]; their common unit is
-    their size, or where it is zero that of starts float64[s, D].
+    their size, or where it is nothing beside that of starts float64[s, D], theirs.
     """
     unit = np.abs(places).max(axis=0, initial=0.0)
     if starts is not None:
-        unit = np.where(unit > 0, unit, np.abs(starts).max(axis=0, initial=0.0))
+        usual = np.abs(starts).max(axis=0, initial=0.0)
+        unit = np.where(unit > NOTHING * usual, unit, usual)
     unit = np.where(unit > 0, unit, 1.0)
     return [Seed(one[None], np.array([v]), unit) for one, v in zip(places, values, strict=True)]
 

@@ -248,3 +248,13 @@ def outside(multipliers: np.ndarray) -> np.ndarray:
         (far & real & (multipliers.real < 0)).sum(axis=1),
         (far & ~real).sum(axis=1),
     ], axis=1)  # fmt: skip
+
+
+def unstable(
+    multipliers: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray],
+    z: np.ndarray,
+    derivative: np.ndarray,
+    rows: np.ndarray,
+) -> np.ndarray:
+    """Which orbits float64[r, z] don't attract, bool[r]; ``multipliers``: those of equations."""
+    return np.asarray(outside(multipliers(z, derivative, rows)).any(axis=1))

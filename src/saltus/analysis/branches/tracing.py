@@ -5,6 +5,7 @@ branches, each once.
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -15,7 +16,7 @@ from saltus.analysis.branches.arclength import ENDING, FIRST, Curve, correct, fo
 from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.same_branch import SAME, branch_of
 from saltus.analysis.branches.shooting import PeriodicOrbits
-from saltus.analysis.branches.special_points import SpecialPoint
+from saltus.analysis.branches.special_points import SpecialPoint, unstable
 from saltus.analysis.branches.switching import Seed, children, ends_there
 
 #: How far a new branch begins from the point where it leaves another, in units of the scale: the
@@ -38,7 +39,7 @@ class Plan:
     make : callable
         The equations of orbits of n periods with a scale float64[k, z].
     limits : (float, float)
-        Range of the parameter.
+        Range of the parameter, or of its logarithm.
     points : int
         Most points of a branch in each direction.
     longest : int
@@ -53,6 +54,10 @@ class Plan:
     crossed : bool
         A branch may have been followed through where another one crosses it, which can't be known
         from where they cross: what was followed is compared with the others once more.
+    stable : bool
+        Branches are followed up to where their orbits lose stability.
+    log : bool
+        The last unknown of all orbits is the logarithm of the parameter.
     """
 
     make: Callable[[int, np.ndarray], PeriodicOrbits]
@@ -63,6 +68,12 @@ class Plan:
     follow: Callable[[Plan, Sequence[Start]], list[Branch | None]]
     leave: Callable[[Any, int, frozenset[str], int], Iterator[Seed]] = children
     crossed: bool = False
+    stable: bool = False
+    log: bool = False
+
+    def unknown(self, value: float) -> float:
+        """The last unknown of orbits at a value of the parameter [SI]."""
+        return math.log(value) if self.log else value
 
 
 def trace(
@@ -73,9 +84,10 @@ def trace(
 ) -> None:
     """Add all branches that seeds lie on, and those that leave them at their events, to a list.
 
-    Seeds that lie on a branch already followed, or on its mirror image, are not followed again.
+    Seeds are at values of the parameter [SI]. Those that lie on a branch already followed, or on
+    its mirror image, are not followed again.
     """
-    waiting, begun = list(seeds), 0
+    waiting, begun = [seed.at(plan.unknown(seed.own[-1])) for seed in seeds], 0
     while waiting:
         beside = _abreast(waiting)
         begun += len(beside)
@@ -263,8 +275,10 @@ def both_ways(
         orbits, z, np.array([side for _, _, side in sides]), {orbits.width - 1: plan.limits},
         plan.points, np.array([one.first for _, one, _ in sides]),
         ends=functools.partial(ends, orbits), group=which, foresee=True,
+        enough=functools.partial(unstable, orbits.multipliers) if plan.stable else None,
     )  # fmt: skip
     for curve in curves:
+        curve.end = "unstable" if curve.end == "enough" else curve.end
         shrunk = curve.end == "lost" and orbits.free and len(curve.z) > 1
         if shrunk and orbits.radius(curve.z[-1]) < SHRUNK:
             curve.end = "hopf"

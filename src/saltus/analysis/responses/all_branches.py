@@ -15,12 +15,18 @@ from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.branch_table import table_of
 from saltus.analysis.branches.plans import plan_of
 from saltus.analysis.branches.rest_branches import trace_rests
-from saltus.analysis.branches.seeds import resting_between, resting_seeds, scaled, seeds_of
+from saltus.analysis.branches.seeds import (
+    resting_between,
+    resting_seeds,
+    scaled,
+    seeds_at,
+    seeds_of,
+)
 from saltus.analysis.branches.switching import Seed
 from saltus.analysis.branches.tracing import trace
 from saltus.analysis.orbits.equilibria import autonomous
 from saltus.analysis.outputs import outputs_of
-from saltus.analysis.responses.continued import LONGEST_DOUBLED, POINTS, SWITCHES, seeds_of_grid
+from saltus.analysis.responses.arcs import LONGEST_DOUBLED, POINTS, SWITCHES
 from saltus.analysis.responses.grid import Grid, check_grid, grid_of
 from saltus.analysis.responses.responses import find
 from saltus.analysis.starts import at_values, check_system, range_of
@@ -232,4 +238,8 @@ def _found_in(grid: Grid, method: Method, periods: int, threads: int | None) -> 
     found = find(grid, method, periods, threads, None)
     if not found.complete:
         raise KeyboardInterrupt
-    return seeds_of_grid(found, grid, method)
+    ((name, values),) = grid.axes.items()
+    orbits = found.motions.orbits.rows(found.row)
+    place = values[found.place]
+    seeds = seeds_at(grid.system, orbits.points, orbits.period, orbits.time, place)
+    return scaled(grid.system, name, list(seeds), method)

@@ -13,11 +13,9 @@ import xarray as xr
 
 from saltus.analysis.dataset_parts import guards_over, provenance, subject
 from saltus.analysis.outputs import Outputs, outputs_of
-from saltus.analysis.responses import branches
-from saltus.analysis.responses.bifurcations import Event
-from saltus.analysis.responses.continued import check_continued, continued
-from saltus.analysis.responses.followed import Followed
+from saltus.analysis.responses.arcs import Arcs, arc_values, check_unstable, follow_arcs
 from saltus.analysis.responses.grid import Grid
+from saltus.analysis.responses.matching import matched
 from saltus.analysis.responses.responses import GridResponses, find, numbers_of, table_of
 from saltus.analysis.responses.samples import sampled
 from saltus.flow.counts import whole
@@ -40,46 +38,47 @@ def respond(
     outputs: Mapping[str, Any] | None = None,
     unstable: bool = False,
 ) -> xr.Dataset:
-    """The Dataset of a grid's responses, with the branches that they lie on if ``unstable``. Raises
-    Interrupted, with the Dataset of what is known, on Ctrl-C.
+    """The Dataset of a grid's responses, with the branches that they lie on if it has one axis.
+    Raises Interrupted, with the Dataset of what is known, on Ctrl-C.
     """
     method, periods = check_method(method), whole(periods, "periods")
-    check_continued(unstable, grid, method)
-    wanted = outputs_of(grid.system, outputs)
-    part = functools.partial(_dataset, grid, method, periods)
+    check_unstable(unstable, grid, method)
+    arcs = Arcs(unstable=unstable)
+    part = functools.partial(
+        _dataset, grid, method, periods, sample, outputs_of(grid.system, outputs), threads, arcs
+    )
+    share = 0.4 if unstable else 0.8
     with reporting(progress) as show:
-        found = find(grid, method, periods, threads, stage(show, 0.0, 0.4) if unstable else show)
+        found = find(grid, method, periods, threads, stage(show, 0.0, share))
         if not found.complete:
-            raise Interrupted(lambda: part(found, threads, sample, wanted))
+            raise Interrupted(lambda: part(found))
         try:
-            if not unstable:
-                return part(found, threads, sample, wanted)
-            more = continued(found, grid, method, wanted, threads, stage(show, 0.4, 0.95))
-            return part(found, threads, sample, wanted, more)
+            if len(grid.axes) == 1 and grid.places > 1:
+                rest = stage(show, share, 0.95)
+                follow_arcs(found, grid, method, arcs, threads, rest)
+            return part(found)
         except KeyboardInterrupt:
-            found.complete = False  # the responses are known, their branches aren't
-            raise Interrupted(lambda: part(found, threads, sample, wanted)) from None
+            found.complete = False  # the responses are known, not all of their branches
+            raise Interrupted(lambda: part(found)) from None
 
 
 def _dataset(
     grid: Grid,
     method: Method,
     periods: int,
-    found: GridResponses,
-    threads: int | None,
     sample: str,
     outputs: Outputs,
-    more: tuple[dict[str, Any], dict[str, Any], np.ndarray] | None = None,
+    threads: int | None,
+    arcs: Arcs,
+    found: GridResponses,
 ) -> xr.Dataset:
     numbers = numbers_of(found, outputs, grid, method, threads)
     table = table_of(found, numbers, grid, method)
-    branch, happened = np.full(len(found), -1, np.int64), []
-    if more is not None:
-        branch = more[2]
-    elif len(grid.axes) == 1 and found.complete:  # after Ctrl-C nothing more is computed
-        followed = Followed(found, grid, method, threads)
-        branch = branches.follow(found, followed, grid.places)
-        happened = branches.events(found, table, branch, followed, grid, method.exact)
+    on, branch = np.full(len(found), -1, np.int64), np.full(len(found), -1, np.int64)
+    on[: len(arcs.of)] = arcs.of
+    if len(grid.axes) == 1 and (found.complete or len(arcs.of)):
+        branch = matched(found, on, grid.places, len(arcs.branches))
+    followed, about_branches = arc_values(arcs, grid, method, outputs)
     system, size = grid.system, len(grid.system.states)
     fixed = {key: value for key, value in system.values.items() if key not in grid.axes}
     varied = dict(zip(grid.axes, np.meshgrid(*grid.axes.values(), indexing="ij"), strict=True))
@@ -102,16 +101,14 @@ def _dataset(
             if sample
             else {}
         ),
-        # netCDF-3 has room for one empty dim only
-        **(_events(happened, grid) if len(table) and more is None else {}),
-        **(more[0] if more is not None else {}),
+        **followed,
     }
     output = outputs.units[0] if len(set(outputs.units)) == 1 else ""
     words = {"<when>": table.points_when, "<output>": output, "<sampled>": SAMPLES.get(sample, "")}
     attrs = provenance(system, method, fixed, grid.axes) | {
         "periods": periods,
         "random_starts": int(grid.drawn),
-        **(more[1] if more is not None else {}),
+        **about_branches,
     }
     about = subject(
         system,
@@ -119,15 +116,3 @@ def _dataset(
         guards_over(system, fixed | varied, grid.shape) if system.guards else None,
     )
     return build(schema.RESPONSES, about, values, grid=tuple(grid.axes), words=words)
-
-
-def _events(happened: list[Event], grid: Grid) -> dict[str, Any]:
-    """What happens to the branches between neighbouring values."""
-    return {
-        "event": np.arange(len(happened)),
-        "event_kind": [event.kind for event in happened],
-        "event_branch": np.array([event.branch for event in happened], np.int64),
-        "event_<parameter>": {
-            name: np.array([event.value for event in happened], float) for name in grid.axes
-        },
-    }

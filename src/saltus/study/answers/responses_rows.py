@@ -13,7 +13,6 @@ import numpy as np
 
 from saltus.results.dataset.kinds import OPEN, Kind, sentences
 from saltus.results.dataset.schema import (
-    event_name,
     parameters_of,
     response_name,
     states_of,
@@ -35,9 +34,7 @@ def tables(title: str, ds: xr.Dataset) -> list[TextTable]:
         return [_kinds(title, ds)]
     if not ds.sizes.get("event"):
         return [_branches(title, ds)]
-    if "point_branch" in ds:  # of branches that were continued
-        return [_branches(title, ds), events(f"{title}: bifurcations", ds)]
-    return [_branches(title, ds), _events(title, ds)]
+    return [_branches(title, ds), events(f"{title}: bifurcations", ds)]
 
 
 # -- one parameter ---------------------------------------------------------------------------------
@@ -114,33 +111,6 @@ def _notes(ds: xr.Dataset, more: int) -> tuple[str, ...]:
     if left:
         notes.append(f"{left} responses {OPEN}")
     return (*notes, *sentences(of))
-
-
-def _events(title: str, ds: xr.Dataset) -> TextTable:
-    """A row for what happens to a branch between two values."""
-    (axis,) = parameters_of(ds)
-    unit = unit_of(ds[axis])
-    columns = (axis.replace("_", " "), "branch", "what happens")
-    found = list(
-        zip(
-            ds[event_name(axis)].values,
-            ds["event_branch"].values,
-            ds["event_kind"].values.tolist(),
-            strict=True,
-        )
-    )
-    found.sort(key=lambda one: (one[0], one[1]))
-    rows = tuple(
-        (from_si(float(value), unit, 5), str(branch), kind.replace("_", " "))
-        for value, branch, kind in found[:ROWS]
-    )
-    notes = ("Each lies between two neighbouring values.",)
-    return TextTable(
-        f"{title}: on the way",
-        columns,
-        rows,
-        notes + ((f"{len(found) - ROWS} more are in the file.",) * (len(found) > ROWS)),
-    )
 
 
 # -- two parameters --------------------------------------------------------------------------------

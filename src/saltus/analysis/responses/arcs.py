@@ -1,0 +1,277 @@
+"""The branches that the steady responses over one parameter lie on.
+
+1. Some responses that repeat are taken as seeds: at few values of the parameter first, then at
+   those between.
+2. From each a branch is followed by arclength in both directions, up to where its orbits lose
+   stability; with its unstable part, and onto those that leave it, if that is asked for.
+3. All responses on what was followed are told by Newton's method, so that they need no branch of
+   their own. The next seeds are taken from the others.
+
+Whether two responses are one therefore never rests on their amplitudes, which crossing branches
+share, nor on the starts that lead to them. Motions that never repeat aren't followed: see
+matching.py.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from saltus.analysis.branches.branch import Branch
+from saltus.analysis.branches.branch_table import attributes_of, values_of
+from saltus.analysis.branches.plans import plan_of
+from saltus.analysis.branches.rest_branches import trace_rests
+from saltus.analysis.branches.same_branch import on_branch
+from saltus.analysis.branches.seeds import rests_at, scaled, seeds_at
+from saltus.analysis.branches.tracing import Plan, trace
+from saltus.analysis.orbits.orbits import OrbitBatch, find_orbits, phase_distances
+from saltus.analysis.orbits.unforced import close_again
+from saltus.analysis.outputs import Outputs
+from saltus.analysis.responses.grid import Grid
+from saltus.analysis.responses.responses import GridResponses
+from saltus.errors import ParameterError
+from saltus.flow.maps import Stroboscope
+from saltus.flow.methods import Method, exact_method
+from saltus.results.dataset.kinds import CLOSED, Kind
+
+#: Doubled branches are followed to orbits of this number of periods, each way over this number of
+#: points.
+LONGEST_DOUBLED, POINTS = 2, 1000
+#: Events at which the branches that leave are followed.
+SWITCHES = ("period_doubling", "branch_point", "hopf")
+#: Seeds of each number of periods that are taken at a time.
+TAKEN = 8
+#: Farthest that a response of an inexact method lies from the exact orbit that it stands for, in
+#: units of its range.
+INEXACT = 0.05
+
+
+@dataclass
+class Arcs:
+    """Branches that responses lie on.
+
+    Attributes
+    ----------
+    branches : list of Branch
+        Those that were followed, in the order of their first responses.
+    of : int64[m]
+        Branch of each response; -1 of those on none.
+    unstable : bool
+        Whether unstable orbits are followed too, and branches that leave others.
+    """
+
+    branches: list[Branch] = field(default_factory=list)
+    of: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
+    unstable: bool = False
+
+
+def check_unstable(unstable: bool, grid: Grid, method: Method) -> None:
+    """Raise a ParameterError unless branches of these responses have unstable parts to follow."""
+    if unstable and len(grid.axes) != 1:
+        raise ParameterError(
+            "unstable=True follows branches over one parameter; this grid has two."
+        )
+    if unstable and len(next(iter(grid.axes.values()))) < 2:
+        raise ParameterError(
+            "unstable=True follows branches over a range: give two values or more."
+        )
+    if unstable:
+        exact_method(method, "unstable=True")
+
+
+def follow_arcs(
+    found: GridResponses,
+    grid: Grid,
+    method: Method,
+    arcs: Arcs,
+    threads: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> None:
+    """Follow the branches of all responses that repeat, into ``arcs``: after a KeyboardInterrupt it
+    holds those that are done.
+
+    Parameters
+    ----------
+    found : GridResponses
+        The responses of a grid with one axis of two values or more. Those of an inexact method are
+        on the branches of the exact orbits that they stand for.
+    grid, method
+        As they were computed.
+    arcs : Arcs
+        What is asked for; what is found is added to it.
+    threads, progress
+        As for :func:`saltus.frequency_response`.
+    """
+    ((name, values),) = grid.axes.items()
+    exact = method if method.exact else method.companion()
+    plan = plan_of(
+        grid.system, name, (float(values[0]), float(values[-1])), exact, threads, POINTS,
+        LONGEST_DOUBLED, SWITCHES if arcs.unstable else (), stable=not arcs.unstable, twins=True,
+    )  # fmt: skip
+    orbits = _exact_orbits(found, grid, method, threads)
+    arcs.of = np.full(len(found), -1, np.int64)
+    try:
+        _follow_rests(found, orbits, grid, plan, arcs)
+        _follow_orbits(found, orbits, grid, plan, exact, arcs, progress)
+    finally:
+        _in_order(arcs, plan)
+
+
+def _follow_rests(
+    found: GridResponses, orbits: OrbitBatch, grid: Grid, plan: Plan, arcs: Arcs
+) -> None:
+    """The branches of equilibria; if unstable orbits are followed, of the limit cycles that are
+    born at their Hopf points too.
+    """
+    rests = np.flatnonzero((found.kind == Kind.EQUILIBRIUM) & (orbits.period > 0))
+    if not len(rests):
+        return
+    ((name, values),) = grid.axes.items()
+    seeds = rests_at(orbits.points[rests, 0], values[found.place[rests]], grid.starts)
+    born = trace_rests(plan, grid.system, name, seeds, arcs.branches)
+    _number(found, orbits, grid, plan, rests, arcs, 0)
+    if "hopf" in plan.switch:
+        trace(plan, born, arcs.branches)
+
+
+def _follow_orbits(
+    found: GridResponses,
+    orbits: OrbitBatch,
+    grid: Grid,
+    plan: Plan,
+    method: Method,
+    arcs: Arcs,
+    progress: Callable[[float], None] | None,
+) -> None:
+    """The branches of periodic orbits and limit cycles."""
+    ((name, values),) = grid.axes.items()
+    left = np.flatnonzero(
+        np.isin(found.kind, CLOSED) & (found.kind != Kind.EQUILIBRIUM) & (orbits.period > 0)
+    )
+    left = left[np.lexsort((_coarse_first(found.place[left], grid.places), orbits.period[left]))]
+    number, known = len(left), 0
+    while len(left):
+        first = np.flatnonzero(np.append(True, np.diff(orbits.period[left]) != 0))
+        rank = np.arange(len(left)) - np.repeat(first, np.diff(np.append(first, len(left))))
+        some, left = left[rank < TAKEN], left[rank >= TAKEN]
+        seeds = seeds_at(
+            grid.system, orbits.points[some], orbits.period[some], orbits.time[some],
+            values[found.place[some]],
+        )  # fmt: skip
+        trace(plan, scaled(grid.system, name, list(seeds), method), arcs.branches)
+        _number(found, orbits, grid, plan, np.append(some, left), arcs, known)
+        left, known = left[arcs.of[left] < 0], len(arcs.branches)
+        if progress is not None:
+            progress(1.0 - len(left) / number)
+
+
+def _coarse_first(place: np.ndarray, places: int) -> np.ndarray:
+    """The rank of places int64[k] among all, every other one before those between, and so on."""
+    result, left = np.zeros(len(place), np.int64), place.copy()
+    for _ in range(int(places).bit_length()):
+        result, left = 2 * result + left % 2, left // 2
+    return result
+
+
+def _number(
+    found: GridResponses,
+    orbits: OrbitBatch,
+    grid: Grid,
+    plan: Plan,
+    some: np.ndarray,
+    arcs: Arcs,
+    known: int,
+) -> None:
+    """Tell which of some responses int64[k] lie on the branches behind the first ``known``."""
+    (values,) = grid.axes.values()
+    for z, n, which in _unknowns(found, orbits, values, plan, some):
+        for number, branch in enumerate(arcs.branches[known:], known):
+            mine = which[arcs.of[which] < 0]
+            if len(mine):
+                here = on_branch(z[arcs.of[which] < 0], n, branch)
+                arcs.of[mine[here]] = number
+
+
+def _unknowns(
+    found: GridResponses, orbits: OrbitBatch, values: np.ndarray, plan: Plan, some: np.ndarray
+) -> Iterator[tuple[np.ndarray, int, np.ndarray]]:
+    """Responses by their number of points: their unknowns float64[r, z], that number, and which
+    they are, int64[r].
+    """
+    times, free = orbits.time[some], np.isfinite(orbits.time[some])
+    points = np.where(free, 1, orbits.period[some])
+    for n in np.unique(points):
+        for cycles in (False, True):
+            which = some[(points == n) & ((times > 0) == cycles)]
+            if not len(which):
+                continue
+            parts = [orbits.points[which, :n].reshape(len(which), -1)]
+            parts += [orbits.time[which, None]] if cycles else []
+            last = [plan.unknown(float(value)) for value in values[found.place[which]]]
+            yield np.concatenate([*parts, np.array(last)[:, None]], axis=1), int(n), which
+
+
+def _in_order(arcs: Arcs, plan: Plan) -> None:
+    """Number branches in the order of their first responses, those without one last; end what was
+    followed as far as it is stable there.
+    """
+    first = np.full(len(arcs.branches), len(arcs.of))
+    for response in np.flatnonzero(arcs.of >= 0)[::-1]:
+        first[arcs.of[response]] = response
+    order = np.argsort(first, kind="stable")
+    rank = np.argsort(order)
+    arcs.of = np.where(arcs.of >= 0, np.append(rank, -1)[arcs.of], -1)
+    arcs.branches[:] = [arcs.branches[i] for i in order]
+    for branch in arcs.branches:
+        if branch.parent is not None:
+            branch.parent = (int(rank[branch.parent[0]]), branch.parent[1])
+        if plan.stable:
+            branch.cut_unstable()
+
+
+# -- inexact methods -------------------------------------------------------------------------------
+def _exact_orbits(
+    found: GridResponses, grid: Grid, method: Method, threads: int | None
+) -> OrbitBatch:
+    """The orbit of each response; of an inexact method the exact one near it, with period 0 where
+    there is none.
+    """
+    orbits = found.motions.orbits.rows(found.row)
+    closed = np.flatnonzero(np.isin(found.kind, CLOSED))
+    if method.exact or not len(closed):
+        return orbits
+    map_ = Stroboscope(
+        grid.system, method.companion(), grid.rows[found.place[closed]], grid.every, threads
+    )
+    scale, mine = found.motions.scale[found.row[closed]], orbits.rows(closed)
+    if grid.every is None:
+        exact = find_orbits(
+            map_, mine.points[:, 0], mine.period, scale, map_.noise_of(scale), max_slow=1
+        )
+    else:
+        exact = close_again(map_, mine.points[:, 0], mine.time, scale)
+    for i, n in enumerate(mine.period.tolist()):
+        if exact.period[i] != n or (
+            phase_distances(mine.points[i, :n], exact.points[i, :n], scale[i]).min() > INEXACT
+        ):
+            exact.period[i] = 0
+    orbits.put(closed, exact)
+    return orbits
+
+
+# -- the Dataset -----------------------------------------------------------------------------------
+def arc_values(
+    arcs: Arcs, grid: Grid, method: Method, outputs: Outputs
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The variables and attributes of the branches, empty where there are none."""
+    if not arcs.branches or not method.exact:
+        return {}, {}
+    ((name, values),) = grid.axes.items()
+    limits = float(values[0]), float(values[-1])
+    return (
+        values_of(grid.system, name, arcs.branches, outputs, method),
+        attributes_of(name, limits, arcs.branches) | {"unstable": int(arcs.unstable)},
+    )

@@ -1,0 +1,72 @@
+"""Motions at neighbouring values of a parameter that are one, where no branch can be followed: of
+those that never repeat, the ones that lie in the same place.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from saltus.analysis.responses.responses import GridResponses
+
+#: Values over which a motion that never repeats may be missing.
+MISSED = 3
+#: Farthest that such a motion moves from one value to the next, in units of its own range.
+MOVED = 0.35
+#: What is farther apart than any two responses.
+_NEVER = 1e6
+
+
+def matched(found: GridResponses, of: np.ndarray, places: int, known: int) -> np.ndarray:
+    """Branch of every response of a grid with one axis, int64[m].
+
+    Parameters
+    ----------
+    found : GridResponses
+        The responses.
+    of : int64[m]
+        The branches of those that lie on one that was followed, -1 of the others.
+    places, known : int
+        Values of the parameter; branches that were followed, from which number on the others are
+        counted in the order in which they begin.
+    """
+    branch, heads = of.copy(), list[int]()  # response that a branch ends with so far
+    for place in range(places):
+        here = np.flatnonzero((found.place == place) & (of < 0))
+        near = [i for i, last in enumerate(heads) if place - found.place[last] <= MISSED]
+        for i, response in _matches(found, [heads[i] for i in near], here):
+            branch[response] = known + near[i]
+        for response in here.tolist():
+            if branch[response] < 0:
+                branch[response] = known + len(heads)
+                heads.append(response)
+            heads[int(branch[response]) - known] = response
+    return branch
+
+
+def _matches(found: GridResponses, before: list[int], here: np.ndarray) -> list[tuple[int, int]]:
+    """Pairs (index into before, response) of motions that are one, each used once, the nearest
+    first.
+    """
+    cost = np.array([[_distance(found, a, int(b)) for b in here] for a in before]).reshape(
+        len(before), len(here)
+    )
+    rows, columns = linear_sum_assignment(np.minimum(cost, _NEVER))
+    pairs = zip(rows, columns, strict=True)
+    return [(int(i), int(here[j])) for i, j in pairs if cost[i, j] < MOVED]
+
+
+def _distance(found: GridResponses, a: int, b: int) -> float:
+    """How far two motions at different values lie apart, in units of their range; inf if they
+    differ in kind.
+    """
+    if found.kind[a] != found.kind[b] or found.period[a] != found.period[b]:
+        return np.inf
+    scale = np.maximum(found.motions.scale[found.row[a]], found.motions.scale[found.row[b]])
+    p, q = found.points(a), found.points(b)
+    return float(
+        max(
+            np.abs((p.mean(axis=0) - q.mean(axis=0)) / scale).max(),
+            np.abs((p.std(axis=0) - q.std(axis=0)) / scale).max(),
+        )
+    )
