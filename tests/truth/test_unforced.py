@@ -322,7 +322,7 @@ def test_a_fold_is_where_an_independent_solver_finds_it(system, name, values, st
         last[f"response_{name}"].item(),
         place,
     )
-    print(place, exact, abs(place-exact))
+    print(place, exact, abs(place - exact))
     assert abs(place - exact) < 1e-9 * exact
 
 

@@ -54,7 +54,7 @@ def bifurcation_diagram(
     state : str, optional
         Which state; by default the first.
     events : bool
-        Whether to mark grazes, period doublings and the onset of chaos above the picture.
+        Whether to mark grazes, folds, period doublings and so on above the picture.
     legend : bool
         Whether to draw the legend.
     ax : Axes, optional

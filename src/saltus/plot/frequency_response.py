@@ -74,7 +74,7 @@ def frequency_response(
         Whether the sizes stand on a logarithmic axis, on which small responses can be read beside
         large ones.
     events : bool
-        Whether to mark grazes, period doublings and folds above the picture.
+        Whether to mark grazes, folds, period doublings and so on above the picture.
     legend : bool
         Whether to draw the legend.
     ax : Axes, optional

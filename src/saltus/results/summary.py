@@ -196,6 +196,13 @@ def _responses(ds: xr.Dataset) -> list[str]:
     lines = [f"{found}: {_tally(kinds)}" if kinds else found]
     if ds.sizes.get("event"):
         lines.append(f"events   {_tally(ds['event_kind'].values.tolist())}")
+    if "branch_end" in ds:
+        ends = np.concatenate([ds["branch_begin"].values, ds["branch_end"].values])
+        if lost := int(np.isin(ends, ("lost", "points")).sum()):
+            lines.append(
+                f"unsure   {counted(lost, 'end')} of branches where no more orbits were found: "
+                "a narrower range gives shorter steps"
+            )
     left = int((ds["response_type"].values == Kind.NOT_REPEATING.word).sum())
     if left:
         lines.append(f"open     {counted(left, 'response')} {OPEN}")

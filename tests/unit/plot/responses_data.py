@@ -77,7 +77,7 @@ def resonance(count=141, shift=0.0):
             rows.append((i, 3, "periodic", 24, 8e-4, [1e-4] * 24))
     events = Events(
         {"frequency": np.array([15.0, 19.0, 22.5, 24.0])},
-        ["fold", "fold", "graze", "chaos"],
+        ["fold", "fold", "graze", "period_doubling"],
         np.array([1, 1, 2, 0]),
     )
     return responses(f, rows, events=events)

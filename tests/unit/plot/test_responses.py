@@ -100,7 +100,7 @@ def test_every_response_is_drawn_once(peak):
         peak["response_frequency"].values + 1e3j * peak["response_rms"].values
     )
     assert np.allclose(all_points(ax), expected)
-    assert texts(ax) == ["T", "3T", "24T", "chaotic", "fold", "onset of chaos", "graze"]
+    assert texts(ax) == ["T", "3T", "24T", "chaotic", "fold", "period doubling", "graze"]
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("frequency [Hz]", "rms of x [mm]")
     assert ax.get_ylim()[0] == 0
 

@@ -107,34 +107,51 @@ class Branch:
         self.unexplained = _unexplained(self, turning=True)
         self.events = _in_order(self, [*self.events, *self._contacts()])
 
-    def cut_unstable(self) -> None:
-        """Let a branch that ends because its orbits lose stability end with the orbit at which they
-        do.
+    def stable_parts(self) -> list[Branch]:
+        """The stretches of orbits that attract, each up to the orbits at which stability is lost;
+        the branch itself where none does.
         """
-        attract = np.flatnonzero(~outside(self.multipliers).any(axis=1))
-        if not len(attract):
-            return
-        first, last = attract[[0, -1]]
-        for side, after, place in ((1, last, last + 1), (0, first - 1, first)):
-            mine = [event for event in self.events if event.after == after]
-            mine = [event for event in mine if event.kind in _LOSES_STABILITY] or mine
-            if self.ends[side] == "unstable" and mine:
-                self._end_with(mine[side - 1], side, place)
+        attract = ~outside(self.multipliers).any(axis=1)
+        turns = np.flatnonzero(np.diff(np.concatenate([[False], attract, [False]])))
+        parts = [self._part(int(a), int(b)) for a, b in turns.reshape(-1, 2)]
+        return parts or [self]
 
-    def _end_with(self, event: SpecialPoint, side: int, place: int) -> None:
-        """Let the branch begin (side 0) or end (side 1) with an event, in front of a point."""
-        step = (event.z - self.z[place - side]) / self.scale
-        length = self.length[place - side] + (1 if side else -1) * np.linalg.norm(step)
-        kept = slice(0, place) if side else slice(place, None)
-        new = {"z": event.z, "tangent": event.tangent, "derivative": event.derivative}
-        for name, value in {**new, "multipliers": event.multipliers, "length": length}.items():
-            column = getattr(self, name)[kept]
-            setattr(self, name, np.insert(column, len(column) if side else 0, value, axis=0))
-        which, shift = self.events.index(event), 0 if side else place - 1
-        events = self.events[: which + 1] if side else self.events[which:]
-        self.events = [replace(one, after=one.after - shift) for one in events]
-        left = [one - shift for one in self.unexplained]
-        self.unexplained = [one for one in left if 0 <= one < len(self.z) - 1]
+    def _part(self, first: int, behind: int) -> Branch:
+        """The points from a first one on, with the events at which stability is lost on both
+        sides; where no event explains it, with the next point.
+        """
+        begin = self._loss(first - 1, -1) if first else None
+        end = self._loss(behind - 1, 0) if behind < len(self.z) else None
+        low = first - int(first > 0 and begin is None)
+        kept = slice(low, behind + int(behind < len(self.z) and end is None))
+        new = {name: getattr(self, name)[kept] for name in _COLUMNS}
+        for event, place in ((begin, 0), (end, len(new["z"]))):
+            if event is not None:
+                beside = new["z"][min(place, len(new["z"]) - 1)]
+                step = float(np.linalg.norm((event.z - beside) / self.scale))
+                length = new["length"][-1] + step if place else new["length"][0] - step
+                for name in _COLUMNS:
+                    value = length if name == "length" else getattr(event, name)
+                    at = len(new[name]) if place else 0
+                    new[name] = np.insert(new[name], at, value, axis=0)
+        shift = low - int(begin is not None)
+        mine = [e for e in self.events if low - int(begin is not None) <= e.after < kept.stop]
+        mine = mine[mine.index(begin) if begin else 0 : mine.index(end) + 1 if end else None]
+        return replace(
+            self, **new,
+            events=[replace(one, after=one.after - shift) for one in mine],
+            unexplained=[i - shift for i in self.unexplained if low <= i < kept.stop - 1],
+            ends=(
+                "unstable" if first else self.ends[0],
+                "unstable" if behind < len(self.z) else self.ends[1],
+            ),
+        )  # fmt: skip
+
+    def _loss(self, after: int, which: int) -> SpecialPoint | None:
+        """The event behind a point at which stability is lost, the first (0) or the last (-1)."""
+        mine = [event for event in self.events if event.after == after]
+        mine = [event for event in mine if event.kind in _LOSES_STABILITY] or mine
+        return mine[which] if mine else None
 
     def _halve(self) -> None:
         """Locate bifurcations; halve the intervals in which they don't explain what changes."""
@@ -241,6 +258,8 @@ def _ahead(branch: Branch, point: SpecialPoint) -> float:
     return float(step @ branch.tangent[point.after])
 
 
+#: What a branch knows of each of its points.
+_COLUMNS = ("z", "tangent", "derivative", "length", "multipliers")
 #: Events at which orbits lose stability, before those at which they may.
 _LOSES_STABILITY = ("fold", "branch_point", "period_doubling", "neimark_sacker", "hopf")
 #: How many multipliers cross the unit circle at each kind of event.

@@ -17,6 +17,7 @@ import numpy as np
 
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.orbits.equilibria import autonomous, field_of, jacobian_of
+from saltus.analysis.orbits.newton import newton
 from saltus.errors import ParameterError
 from saltus.flow.methods import Method
 from saltus.flow.request import Schedule
@@ -27,8 +28,6 @@ from saltus.system.system import System
 
 #: Samples among which a first return is looked for.
 SAMPLES = 1024
-#: Steps of Newton's method to the place of rest, and the last one's share of the largest state.
-MOST_STEPS, CONVERGED = 60, 1e-13
 #: Periods of small vibrations within which a motion returns: where it rests on a contact, small
 #: vibrations to its other side are slower.
 LONGEST = 12.0
@@ -140,19 +139,22 @@ class FreeOrbits(PeriodicOrbits):
 def place_of_rest(system: System) -> np.ndarray:
     """Where the field vanishes, by Newton's method from zero."""
     values = {name: np.array([value]) for name, value in system.values.items()}
-    state = np.zeros((1, len(system.states)))
-    for _ in range(MOST_STEPS):
-        rates, matrix = field_of(system, state, values), jacobian_of(system, state, values)
-        step = -np.linalg.lstsq(matrix[0], rates[0], rcond=None)[0]
-        state = state + step
-        if not np.isfinite(state).all():
-            break
-        if np.abs(step).max() <= CONVERGED * np.abs(state).max(initial=0.0):
-            return np.asarray(state[0])
-    raise ParameterError(
-        f"no place of rest of {system.name} was found from zero: a backbone begins with small "
-        "vibrations about one."
+    zero, units = np.zeros((1, len(system.states))), np.ones((1, len(system.states)))
+    size = np.abs(jacobian_of(system, zero, values)).max(axis=2)
+    size = np.where(size > 0, size, 1.0)
+
+    def equations(x: np.ndarray, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return field_of(system, x, values) / size, jacobian_of(system, x, values) / size[..., None]
+
+    state, found = newton(
+        equations, zero, units, enough=0.0, longest_step=np.inf, least_squares=True
     )
+    if not found[0]:
+        raise ParameterError(
+            f"no place of rest of {system.name} was found from zero: a backbone begins with small "
+            "vibrations about one."
+        )
+    return np.asarray(state[0])
 
 
 def linear_mode(system: System, rest: np.ndarray, mode: int) -> tuple[float, np.ndarray, int]:

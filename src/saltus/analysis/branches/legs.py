@@ -425,7 +425,7 @@ class Legs:
         span = np.take_along_axis(since, last[..., None], axis=2)[..., 0]
         start = self._states(self.at(z).after[rows, last], rest, phase[rows, last], span)
         points = self._ends(start, np.array(self._modes)[last])[0]
-        return np.concatenate([points.reshape(len(z), -1), rest], axis=1)
+        return np.concatenate([points.reshape(len(z), self.n * self.size), rest], axis=1)
 
     def admissible(self, z: np.ndarray) -> np.ndarray:
         """Whether the free flow makes the orbits float64[r, z]: they meet these contacts and no

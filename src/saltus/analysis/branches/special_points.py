@@ -18,7 +18,7 @@ from scipy.optimize import elementwise
 
 from saltus.analysis.branches.arclength import correct, tangents
 from saltus.analysis.branches.shooting import PeriodicOrbits
-from saltus.analysis.orbits.tolerances import SINGULAR
+from saltus.analysis.orbits.newton import newton
 from saltus.flow.polynomials import between
 
 #: Tests in the order in which they are made.
@@ -28,9 +28,9 @@ KINDS = ("fold", "branch_point", "period_doubling", "neimark_sacker")
 COMPLEX = 1e-7
 #: Distance of a multiplier from the unit circle within which it isn't counted.
 ON_CIRCLE = 1e-9
-#: Newton's method at branch points: steps, length of the last one, and distance of two derivatives
-#: whose difference is their slope, in units of the scale.
-MOST_STEPS, CONVERGED, ASIDE = 20, 1e-11, 1e-5
+#: Newton's method at branch points: length of the last step, and distance of two derivatives whose
+#: difference is their slope, in units of the scale.
+CONVERGED, ASIDE = 1e-11, 1e-5
 #: Farthest that a branch point lies from where it was seen, in units of the scale.
 FARTHEST = 0.3
 
@@ -199,33 +199,34 @@ def _branch_point(
     There the derivative J has a left null vector u, and Newton's method on F alone fails; on
     ``F + b u = 0, J'u = 0, u'u = 1`` it doesn't. Kuznetsov, section 10.5.2.
     """
-    unit, z, one = orbits.scale[row], start.copy(), np.array([row])
-    size = len(z)
-    _, derivative = orbits.evaluate(z[None], one)
+    unit, one = orbits.scale[row], np.array([row])
+    size = len(start)
+    _, derivative = orbits.evaluate(start[None], one)
     if not np.isfinite(derivative).all():
         return None
-    null, b = np.linalg.svd(derivative[0])[0][:, -1], 0.0
-    for _ in range(MOST_STEPS):
-        ends, matrices = orbits.evaluate(
-            z + np.concatenate([np.zeros((1, size)), ASIDE * np.eye(size), -ASIDE * np.eye(size)])
-            * unit, np.full(2 * size + 1, row),
-        )  # fmt: skip
+    sides = np.concatenate([np.zeros((1, size)), ASIDE * np.eye(size), -ASIDE * np.eye(size)])
+
+    def equations(x: np.ndarray, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        z, b, null = np.split(x[0], [size, size + 1])
+        ends, matrices = orbits.evaluate(z + sides * unit, np.full(2 * size + 1, row))
         jacobian = matrices[0]
         bends = np.einsum("jmi,m->ij", matrices[1 : size + 1] - matrices[size + 1 :], null)
-        residual = np.concatenate([ends[0] + b * null, jacobian.T @ null, [null @ null - 1.0]])
         whole = np.zeros((2 * size, 2 * size))
         whole[: size - 1, :size], whole[: size - 1, size] = jacobian, null
         whole[: size - 1, size + 1 :] = b * np.eye(size - 1)
         whole[size - 1 : -1, :size] = bends / (2 * ASIDE)
         whole[size - 1 : -1, size + 1 :] = jacobian.T
         whole[-1, size + 1 :] = 2 * null
-        if not np.isfinite(whole).all() or np.linalg.cond(whole) > SINGULAR:
-            return None
-        step = -np.linalg.solve(whole, residual)
-        z, b, null = z + step[:size] * unit, b + step[size], null + step[size + 1 :]
-        if np.abs(step[:size]).max() < CONVERGED:
-            break
-    else:
+        residual = np.concatenate([ends[0] + b * null, jacobian.T @ null, [null @ null - 1.0]])
+        return residual[None], whole[None]
+
+    null = np.linalg.svd(derivative[0])[0][:, -1]
+    x, found = newton(
+        equations, np.concatenate([start, [0.0], null])[None],
+        np.concatenate([unit, np.ones(size)])[None], CONVERGED, longest_step=np.inf,
+    )  # fmt: skip
+    z = x[0, :size]
+    if not found[0]:
         return None
     if np.linalg.norm((z - start) / unit) > FARTHEST:
         return None

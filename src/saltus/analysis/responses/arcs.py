@@ -117,7 +117,7 @@ def follow_arcs(
         _follow_rests(found, orbits, grid, plan, arcs)
         _follow_orbits(found, orbits, grid, plan, exact, arcs, progress)
     finally:
-        _in_order(arcs, plan)
+        _in_order(arcs)
 
 
 def _follow_rests(
@@ -185,8 +185,14 @@ def _number(
     arcs: Arcs,
     known: int,
 ) -> None:
-    """Tell which of some responses int64[k] lie on the branches behind the first ``known``."""
+    """Tell which of some responses int64[k] lie on the branches behind the first ``known``, which
+    come apart into their stable parts if no more was asked for.
+    """
     (values,) = grid.axes.values()
+    if plan.stable:
+        for number in range(known, len(arcs.branches)):
+            arcs.branches[number], *others = arcs.branches[number].stable_parts()
+            arcs.branches += others
     for z, n, which in _unknowns(found, orbits, values, plan, some):
         for number, branch in enumerate(arcs.branches[known:], known):
             mine = which[arcs.of[which] < 0]
@@ -214,10 +220,8 @@ def _unknowns(
             yield np.concatenate([*parts, np.array(last)[:, None]], axis=1), int(n), which
 
 
-def _in_order(arcs: Arcs, plan: Plan) -> None:
-    """Number branches in the order of their first responses, those without one last; end what was
-    followed as far as it is stable there.
-    """
+def _in_order(arcs: Arcs) -> None:
+    """Number branches in the order of their first responses, those without one last."""
     first = np.full(len(arcs.branches), len(arcs.of))
     for response in np.flatnonzero(arcs.of >= 0)[::-1]:
         first[arcs.of[response]] = response
@@ -228,8 +232,6 @@ def _in_order(arcs: Arcs, plan: Plan) -> None:
     for branch in arcs.branches:
         if branch.parent is not None:
             branch.parent = (int(rank[branch.parent[0]]), branch.parent[1])
-        if plan.stable:
-            branch.cut_unstable()
 
 
 # -- inexact methods -------------------------------------------------------------------------------

@@ -38,7 +38,8 @@ def bifurcation_diagram(
     progress: bool | Callable[[float], None] | None = None,
 ) -> xr.Dataset:
     """How the steady responses change with a parameter: their turning points, periods, kinds, and
-    what happens to them on the way.
+    what happens to them on the way, to rounding. For the steps see
+    :func:`saltus.frequency_response`.
 
     Parameters
     ----------
@@ -57,10 +58,8 @@ def bifurcation_diagram(
         Whether each start goes on, from the lowest value upwards, where it stood at the value
         before; otherwise each value starts afresh.
     unstable : bool
-        Whether to follow the branches that the responses lie on by :func:`saltus.branches`, through
-        their unstable parts and onto doubled and crossing branches. Then ``response_branch`` is one
-        of these (-1 of what never repeats), and the Dataset has their variables, on ``point``,
-        ``branch`` and ``event``, too.
+        Whether to follow the branches through their unstable parts too, and onto doubled and
+        crossing ones, as :func:`saltus.branches` does.
     every : float or str, optional
         Time between two samples of the motion of a system without forcing [s]; default about a
         turn of it. Equilibria, limit cycles, their periods, sizes and stability don't depend on it.

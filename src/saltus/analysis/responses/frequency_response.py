@@ -38,10 +38,14 @@ def frequency_response(
     """Steady responses against the forcing frequency: which there are, and which start leads to
     which.
 
-    Every start is followed at every frequency until it has settled on an orbit that is closed by
-    Newton's method and attracts by its Floquet multipliers; what never repeats is typed by its
-    largest Lyapunov exponent. Coexisting responses are distinguished by their orbits, not by their
-    amplitudes, and followed from frequency to frequency as branches.
+    1. Every start is followed at every frequency until it has settled on an orbit that is closed by
+       Newton's method and attracts by its Floquet multipliers. What never repeats is typed by its
+       largest Lyapunov exponent.
+    2. The branch that each response lies on is followed by pseudo-arclength continuation, through
+       the frequencies between, until its orbits lose stability or the range ends. Coexisting
+       responses are distinguished by their orbits, not by their amplitudes.
+    3. The events on these branches - grazes, folds, period doublings and so on - are located to
+       rounding.
 
     Parameters
     ----------
@@ -59,10 +63,8 @@ def frequency_response(
     follow : bool
         Whether given starts are swept upwards too.
     unstable : bool
-        Whether to follow the branches that the responses lie on by :func:`saltus.branches`, through
-        their unstable parts and onto doubled and crossing branches. Then ``response_branch`` is one
-        of these (-1 of what never repeats), and the Dataset has their variables, on ``point``,
-        ``branch`` and ``event``, too.
+        Whether to follow the branches through their unstable parts too, and onto doubled and
+        crossing ones, as :func:`saltus.branches` does.
     values : mapping, optional
         Other values of parameters.
     outputs : mapping of str to callable, or to (callable, unit), optional
@@ -91,8 +93,12 @@ def frequency_response(
         ``contacts_per_period``. On response: ``response_<parameter>``, ``response_branch``,
         ``response_type``, ``response_period``, ``response_rms``, ``response_peak``,
         ``response_margin``, multipliers, exponent, stroboscopic points, and for random starts
-        ``response_share`` with its 95 % Wilson interval. ``event_kind`` and ``event_branch`` tell
-        what happens to branches between two frequencies. On (response, output): ``output_maximum``,
+        ``response_share`` with its 95 % Wilson interval. Over two frequencies or more, and by an
+        exact method, the branches are on ``point``, ``branch`` and ``event``, with the variables of
+        :func:`saltus.branches`; ``branch_begin`` and ``branch_end`` are ``unstable`` where orbits
+        lose stability. ``response_branch`` is a number on ``branch``; numbers behind these are of
+        motions that never repeat, and of equilibria that a contact holds, each matched with its
+        neighbours by where it lies. On (response, output): ``output_maximum``,
         ``_minimum``, ``_peak``, ``_peak_to_peak``, ``_mean``, ``_rms``, ``_rms_about_mean`` of
         every state and output, over whole responses (64 forcing periods of one that never repeats),
         and ``output_amplitude``, ``output_phase`` [rad] of the first harmonic: A cos(2 pi f t +

@@ -50,7 +50,7 @@ RESPONSES_VARIABLES = {
     "response": Variable(_RESPONSE, "1", "response", "i8", coord=True),
     "response_<parameter>": Variable(_RESPONSE, "<parameter>", "<parameter>"),
     "response_branch": Variable(
-        _RESPONSE, "1", "branch: the same orbit, followed from value to value", "i8"
+        _RESPONSE, "1", "branch: orbits that go over into each other", "i8"
     ),
     "response_type": Variable(_RESPONSE, "", "kind of motion", "str"),
     "response_period": Variable(
@@ -108,8 +108,6 @@ RESPONSES_VARIABLES = {
         for name, row in BRANCHES_VARIABLES.items()
         if name not in ("output", "output_units")
     },
-    "event_kind": Variable(("event",), "", "what happens to the branch between two values", "str"),
-    "event_branch": Variable(("event",), "1", "branch to which it happens", "i8"),
     **GUARDS,
     "guard_boundary": replace(GUARDS["guard_boundary"], dims=("guard", "...?")),
 }

@@ -1,0 +1,136 @@
+"""The branches between the responses of a grid: against `sl.branches`, closed forms, and what their
+events are by definition.
+"""
+
+import numpy as np
+import pytest
+
+import saltus as sl
+
+RIG = sl.models.delangre("b", force="4 N")
+BOX = {"x": ("-5 mm", "5 mm"), "v": ("-1 m/s", "1 m/s")}
+BAND = (15.0, 17.0)
+
+
+@pytest.fixture(scope="module")
+def diagram():
+    return sl.frequency_response(RIG, (*BAND, 9), "random 10", box=BOX, progress=False)
+
+
+def test_every_event_is_one_of_the_branches_followed_through_instability(diagram):
+    whole = sl.branches(RIG, {"frequency": BAND}, diagram, switch=(), progress=False)
+    assert diagram.sizes["event"] > 8
+    for kind, at in zip(diagram.event_kind.values, diagram.event_frequency.values, strict=True):
+        same = whole.event_frequency.values[whole.event_kind.values == kind]
+        assert np.abs(same - at).min() < 1e-10 * (BAND[1] - BAND[0])
+
+
+def test_every_response_that_repeats_lies_on_a_branch_that_passes_its_value(diagram):
+    of, kind = diagram.response_branch.values, diagram.response_type.values
+    assert (of[kind == "periodic"] < diagram.sizes["branch"]).all()
+    assert (of[kind != "periodic"] >= diagram.sizes["branch"]).all()
+    for branch, value, period in zip(
+        of, diagram.response_frequency.values, diagram.response_period.values, strict=True
+    ):
+        if period:
+            mine = diagram.point_frequency.values[diagram.point_branch.values == branch]
+            assert mine.min() <= value <= mine.max()
+            assert diagram.branch_periods.values[branch] == period
+
+
+def test_a_branch_ends_with_the_orbit_at_which_stability_is_lost(diagram):
+    points, found = diagram.point_frequency.values, 0
+    for branch in range(diagram.sizes["branch"]):
+        mine = np.flatnonzero(diagram.point_branch.values == branch)
+        events = diagram.event_frequency.values[diagram.event_branch.values == branch]
+        for side, end in ((0, "begin"), (-1, "end")):
+            if diagram[f"branch_{end}"].values[branch] == "unstable":
+                assert points[mine[side]] == events[side]
+                found += 1
+        own = diagram.point_multiplier_real.values + 1j * diagram.point_multiplier_imag.values
+        assert np.nanmax(np.abs(own[mine])) < 1.0 + 1e-9
+    assert found > 4
+
+
+def test_multipliers_at_events_are_those_that_define_them(diagram):
+    own = diagram.event_multiplier_real.values + 1j * diagram.event_multiplier_imag.values
+    for kind, place in (("fold", 1.0), ("period_doubling", -1.0)):
+        mine = diagram.event_kind.values == kind
+        assert mine.any()
+        np.testing.assert_allclose(np.nanmin(np.abs(own[mine] - place), axis=1), 0.0, atol=1e-6)
+
+
+@sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
+def soft(t, x, v, *, stiffness=10.0, gap=0.01, spring=0.0, w=1.0):
+    """A forced linear oscillator that comes to touch a spring of no force."""
+    force = sl.cos(w * t) - 0.2 * v - stiffness * x - spring * sl.max(x - gap, 0)
+    return v, force
+
+
+def test_over_decades_a_branch_is_followed_by_the_logarithm_of_the_parameter():
+    """The amplitude is 1/sqrt((k - 1)^2 + 0.04); the gap is touched where it is 0.01."""
+    found = sl.bifurcation_diagram(soft, {"stiffness": (3.0, 3e4, 9, "log")}, progress=False)
+    assert (found.response_branch.values == 0).all()
+    assert found.event_kind.values.tolist() == ["graze"]
+    assert found.event_stiffness.item() == pytest.approx(1 + np.sqrt(1e4 - 0.04), rel=1e-11)
+    values = found.point_stiffness.values
+    exact = 1 / np.sqrt((values - 1) ** 2 + 0.04)
+    np.testing.assert_allclose(found.point_peak.values, exact, rtol=1e-9)
+    assert len(values) < 200
+    alone = sl.branches(soft, {"stiffness": (3.0, 3e4)}, progress=False)
+    assert alone.event_stiffness.item() == pytest.approx(found.event_stiffness.item(), rel=1e-11)
+
+
+def test_equilibria_over_decades_have_their_hopf_point_where_the_closed_form_says():
+    @sl.system(states="x y")
+    def planar(t, x, y, *, gain=1.0):
+        r = x * x + y * y
+        return (gain - 50.0) * x - y - r * x, x + (gain - 50.0) * y - r * y
+
+    found = sl.bifurcation_diagram(
+        planar, {"gain": (0.1, 40.0, 5, "log")}, {"x": 0.3, "y": 0.1}, periods=400, progress=False
+    )
+    assert found.event_kind.values.tolist() == []
+    assert found.response_branch.values.tolist() == 5 * [0]
+    whole = sl.branches(planar, {"gain": (0.1, 100.0)}, {"x": 0.3, "y": 0.1}, progress=False)
+    assert whole.event_gain.values[whole.event_kind.values == "hopf"] == pytest.approx([50.0])
+
+
+def test_ctrl_c_hands_out_the_branches_that_are_done():
+    shares = []
+
+    def press(share):
+        shares.append(share)
+        if share > 0.81:  # some branches are followed
+            raise KeyboardInterrupt
+
+    with pytest.raises(sl.Interrupted) as stop:
+        sl.frequency_response(RIG, (*BAND, 17), "random 10", box=BOX, progress=press)
+    part = stop.value.partial
+    assert (part.type.values != "not_computed").all()
+    assert part.sizes["branch"] > 0
+    assert part.sizes["event"] > 0
+
+
+def test_responses_of_an_inexact_method_are_on_the_branches_of_the_exact_orbits(diagram):
+    starts = {"x": diagram.start_x.values[:4], "v": diagram.start_v.values[:4]}
+    values = diagram.frequency.values[::4]
+    found = [
+        sl.frequency_response(RIG, values, starts, method=one, progress=False)
+        for one in (sl.Taylor(), sl.ODE45(1e-8, 1e-11))
+    ]
+    assert "point_branch" not in found[1]
+    for value in values:
+        pairs = set()
+        for cell in range(4):
+            both = [one.response_of.sel(frequency=value).values[cell] for one in found]
+            if min(both) < 0 or 0 in [
+                one.response_period.values[i] for one, i in zip(found, both, strict=True)
+            ]:
+                continue
+            pairs.add(
+                tuple(
+                    int(one.response_branch.values[i]) for one, i in zip(found, both, strict=True)
+                )
+            )
+        assert len({a for a, _ in pairs}) == len({b for _, b in pairs}) == len(pairs)
