@@ -1,0 +1,55 @@
+"""Newton's method stands once for each of its uses: who writes another one is told here."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import saltus.analysis
+
+ROOM = Path(saltus.analysis.__file__).parent
+SOLVERS = {"solve", "lstsq", "pinv", "inv"}
+#: Files that solve linear systems, and why.
+WHY = {
+    "orbits/newton.py": "Newton's method",
+    "orbits/damped.py": "Newton's method from far away, with known zeros taken out",
+    "branches/arclength.py": "Newton's method with a border: the corrector of continuation",
+    "orbits/capture.py": "norms in which a neighbourhood shrinks",
+    "orbits/equilibria.py": "points around an equilibrium in such a norm",
+    "orbits/special_equilibria.py": "the Lyapunov coefficient of a Hopf point",
+    "branches/codimension_two.py": "the quadratic part at a fold",
+    "branches/forced_vibration.py": "the answer of a rigid body to a static force",
+}
+
+
+def solves(text: str) -> bool:
+    """Whether a linear system is solved in a text."""
+    return any(
+        isinstance(node, ast.Attribute)
+        and node.attr in SOLVERS
+        and isinstance(node.value, ast.Attribute)
+        and node.value.attr == "linalg"
+        for node in ast.walk(ast.parse(text))
+    )
+
+
+def test_linear_systems_are_solved_where_a_reason_is_written():
+    found = {
+        str(file.relative_to(ROOM))
+        for file in ROOM.rglob("*.py")
+        if solves(file.read_text(encoding="utf-8"))
+    }
+    assert found == set(WHY), "take saltus.analysis.orbits.newton, or write down why not"
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("step = -np.linalg.solve(matrix, residual)", True),
+        ("step = scipy.linalg.lstsq(a, b)[0]", True),
+        ("x = newton(equations, start, scale)", False),
+        ("w = np.linalg.eigvals(matrix)", False),
+    ],
+)
+def test_a_second_newton_would_be_seen(text, expected):
+    assert solves(text) == expected
