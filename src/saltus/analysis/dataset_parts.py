@@ -15,8 +15,8 @@ from saltus.flow.methods import Method
 from saltus.flow.request import Outcome
 from saltus.kernels import status as st
 from saltus.results import Guards, Subject, attributes
-from saltus.system.dimensions import gap_units
 from saltus.system.evaluate import evaluate
+from saltus.system.gap_units import gap_units
 from saltus.system.quantity import jumping_states
 from saltus.system.system import System
 

@@ -12,9 +12,10 @@ import xarray as xr
 from saltus.analysis.starts import Span
 from saltus.errors import SaltusWarning
 from saltus.kernels import status as st
-from saltus.system.evaluate import evaluate, sides
+from saltus.system.evaluate import evaluate
 from saltus.system.expression import varies, walk
 from saltus.system.guards import is_hold
+from saltus.system.modes import sides
 from saltus.system.roots import root_name
 from saltus.system.system import System
 from saltus.units import from_si

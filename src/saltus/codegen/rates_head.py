@@ -24,10 +24,10 @@ from saltus.codegen.taylor_head import (
 )
 from saltus.errors import ParameterError
 from saltus.system import expression as ex
+from saltus.system.assuming import assuming
 from saltus.system.derivatives import differentiate
 from saltus.system.expression import Expr
 from saltus.system.guards import Guard
-from saltus.system.singular import assuming
 from saltus.system.system import System
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.system.evaluate import evaluate, sides
+from saltus.system.evaluate import evaluate
+from saltus.system.modes import sides
 from saltus.system.system import System
 
 EPS = 2.0**-52

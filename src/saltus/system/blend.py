@@ -6,14 +6,12 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from saltus.errors import TraceError
 from saltus.system import expression as ex
+from saltus.system.assuming import assuming
 from saltus.system.contacts import find_contacts, renamed
 from saltus.system.expression import And, Bit, Condition, Expr, Friction, Not, Or, Relation
 from saltus.system.functions import atan, piecewise, sqrt, tanh
 from saltus.system.guards import Guard, Law, number_of
-from saltus.system.singular import assuming
-from saltus.system.system import System
 
 #: A smoothed step of a gap and a width, from 0 far below the boundary to 1 far above.
 Step = Callable[[Any, Any], Any]
@@ -53,21 +51,24 @@ STEPS: dict[str, Step] = {
 
 
 def blended(
-    system: System, step: Step, parameters: Mapping[int, str]
+    field: Sequence[Expr],
+    guards: Sequence[Guard],
+    states: Sequence[str],
+    step: Step,
+    parameters: Mapping[int, str],
 ) -> tuple[tuple[Expr, ...], tuple[Guard, ...]]:
-    """Field and guards of the stand-in."""
+    """Field and guards of the stand-in of a system; the width of each guard that is blended by its
+    number. Raises TraceError if the blends can't be equations.
+    """
     blend = _Blend(step, parameters)
-    for guard in system.guards:
+    for guard in guards:
         blend.add(guard)
-    for number, guard in enumerate(system.guards):
+    for number, guard in enumerate(guards):
         if guard.law is not None:
             blend.keep_friction(number, guard.law)
-    try:
-        rates = [blend.rewrite(entry) for entry in system.field]
-        field, guards = find_contacts(rates, (), system.states)
-    except TraceError as error:
-        raise TraceError(f"{system.name}, regularised: {error}") from error
-    return field, _with_old_names(system.guards, blend.sides, guards)
+    rates = [blend.rewrite(entry) for entry in field]
+    new, found = find_contacts(rates, (), states)
+    return new, _with_old_names(guards, blend.sides, found)
 
 
 def _with_old_names(

@@ -179,6 +179,7 @@ def of_time_only(gap: Expr) -> bool:
     return ex.depends_on(gap, ("time",)) and not ex.depends_on(gap, ("state",))
 
 
+@ex.answers("__mod__")
 def mod(a: Operand, cycle: Operand) -> Any:
     """The remainder of ``a`` by ``cycle``, in [0, cycle): time within the present cycle, for drives
     that repeat.

@@ -9,6 +9,7 @@ import numpy as np
 
 from saltus.errors import TraceError, nearest, shown
 from saltus.system import expression as ex
+from saltus.system.assuming import assuming
 from saltus.system.canonical import Canonical, proportion
 from saltus.system.declared import FACING, FRICTION, SLIP, Declared, Impact, Jump, weight
 from saltus.system.derivatives import gradient, time_derivative
@@ -23,9 +24,10 @@ from saltus.system.guards import (
     is_hold,
     relations,
 )
-from saltus.system.reduction import Elimination, Held, dot, held_contact, hold_gap, with_pivots
+from saltus.system.reduction import Elimination, Held, held_contact, hold_gap, with_pivots
 from saltus.system.roots import with_root, zero_where_idle
-from saltus.system.singular import assuming, check_finite, check_gaps, lifted
+from saltus.system.singular import check_finite, check_gaps, lifted
+from saltus.system.sums import dot, ratio
 from saltus.system.surfaces import (
     OnSurface,
     averaged,
@@ -33,7 +35,6 @@ from saltus.system.surfaces import (
     held_at,
     is_surface,
     level,
-    ratio,
     split,
 )
 

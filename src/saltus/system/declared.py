@@ -11,7 +11,17 @@ from contextvars import ContextVar
 from typing import Any, ClassVar, TypeVar
 
 from saltus.errors import TraceError, shown
-from saltus.system.expression import Condition, Expr, Operand, Relation, as_expr, select, walk
+from saltus.system.dimensions import DimensionCheck
+from saltus.system.expression import (
+    Condition,
+    Expr,
+    Operand,
+    Relation,
+    as_expr,
+    select,
+    state,
+    walk,
+)
 
 #: Names of the parts of an impact with friction: its coefficient, the velocity of sliding, and the
 #: sign of that.
@@ -86,6 +96,21 @@ class Jump(Declared):
     """What :func:`jump` returns."""
 
     name = "sl.jump"
+
+
+def check_law(law: Declared, dimensions: DimensionCheck) -> None:
+    """Raise a UnitError unless the velocity of an impact is the unit of its gap per second, its
+    restitution a plain number, and each new value of a jump in the unit of its state; where they
+    are known.
+    """
+    for name, part in law.parts.items():
+        what = f"{law!r}: {name}"
+        if isinstance(law, Jump):
+            dimensions.check_alike(part, state(name), what)
+        elif name in ("restitution", FRICTION):
+            dimensions.check_plain(part, what)
+        elif name == "velocity":
+            dimensions.check_rate_of(part, law.condition.gap, what)
 
 
 @contextmanager

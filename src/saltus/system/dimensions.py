@@ -11,19 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
-from functools import lru_cache
-from typing import TYPE_CHECKING
 
 from saltus.errors import UnitError
-from saltus.system.declared import FRICTION, Declared, Jump
 from saltus.system.expression import ELEMENTARY, Expr, walk
-from saltus.system.reduction import free_field
-from saltus.system.roots import with_root
 from saltus.system.text import PI_MULTIPLES
 from saltus.units import dimension, unit_text
-
-if TYPE_CHECKING:
-    from saltus.system.system import System
 
 #: Exponents of m, kg, s, A and K.
 Dimension = dict[str, Fraction]
@@ -91,27 +83,31 @@ class DimensionCheck:
                     f"{_missing(found, wanted)}. {_WAY_OUT}"
                 )
 
-    def check_law(self, law: Declared) -> None:
-        """Raise a UnitError unless the velocity of an impact is the unit of its gap per second, its
-        restitution a plain number, and each new value of a jump in the unit of its state; where
-        they are known.
+    def check_plain(self, node: Expr, what: str) -> None:
+        """Raise a UnitError unless a node is a plain number, or of no known unit."""
+        self._check_is(node, _PLAIN, what)
+
+    def check_alike(self, node: Expr, other: Expr, what: str) -> None:
+        """Raise a UnitError unless two nodes have one unit, where both are known."""
+        self._check_is(node, self._dimension(other), what)
+
+    def check_rate_of(self, node: Expr, other: Expr, what: str) -> None:
+        """Raise a UnitError unless a node is in the unit of another per second, where both are
+        known.
         """
-        for name, part in law.parts.items():
-            found, gap = self._dimension(part), self._dimension(law.condition.gap)
-            wanted: Dimension | None = None
-            if name in ("restitution", FRICTION) and not isinstance(law, Jump):
-                wanted = _PLAIN
-            elif name == "velocity" and not isinstance(law, Jump):
-                known = gap is not None and not isinstance(gap, _Number) and self._time is not None
-                wanted = _product(gap, self._time, -1) if known else None  # type: ignore[arg-type]
-            elif isinstance(law, Jump):
-                wanted = self._units.get(name)
-            if wanted is None or found is None or isinstance(found, _Number) or found == wanted:
-                continue
-            raise UnitError(
-                f"{law!r}: {name} is to be {_in(wanted)}, but {_brief(part)} is {_in(found)}. "
-                f"{_WAY_OUT}"
-            )
+        found = self._dimension(other)
+        if found is not None and not isinstance(found, _Number) and self._time is not None:
+            self._check_is(node, _product(found, self._time, -1), what)
+
+    def _check_is(self, node: Expr, wanted: Dimension | None, what: str) -> None:
+        found = self._dimension(node)
+        if wanted is None or found is None or found == wanted:
+            return
+        if isinstance(wanted, _Number) or isinstance(found, _Number):
+            return
+        raise UnitError(
+            f"{what} is to be {_in(wanted)}, but {_brief(node)} is {_in(found)}. {_WAY_OUT}"
+        )
 
     def unit(self, node: Expr) -> str:
         """Coherent SI unit of a node, ``""`` if it isn't known, or may be that of an angle."""
@@ -251,21 +247,6 @@ def units_of(
     except UnitError:
         return [""] * len(formulas)
     return [_unit(check, formula) for formula in formulas]
-
-
-def gap_units(system: System) -> list[str]:
-    """Unit of the gap of each guard of a system, ``""`` where it isn't known."""
-    return list(_gap_units(system.origin))
-
-
-@lru_cache(maxsize=256)  # the same for all values, and as long to find as a short run
-def _gap_units(system: System) -> tuple[str, ...]:
-    gaps = [with_root(guard.gap) for guard in system.guards]
-    found = units_of(system.states, system.units, free_field(system.field, system.guards), gaps)
-    return tuple(
-        unit if guard.state is None else system.units[guard.state]
-        for guard, unit in zip(system.guards, found, strict=True)
-    )
 
 
 def _unit(check: DimensionCheck, formula: Expr) -> str:

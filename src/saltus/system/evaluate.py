@@ -6,14 +6,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from saltus.system.expression import And, Bit, Condition, Expr, Not, Or, Relation, walk
-
-if TYPE_CHECKING:
-    from saltus.system.system import System
 
 _OPERATIONS: dict[str, Any] = {
     "add": np.add, "sub": np.subtract, "mul": np.multiply, "div": np.divide, "neg": np.negative,
@@ -103,84 +100,3 @@ def _program(
         steps.append((node.op, payload, tuple(places[child] for child in node.args)))
         places[node] = len(places)
     return steps, places, [places[one] for one in expressions]
-
-
-def sides(system: System, t: Any, y: Any, values: Mapping[str, Any] | None = None) -> list[Any]:
-    """Side of each guard where the state is: True if the gap is positive.
-
-    On a boundary itself (gap exactly 0) this says False; which side the motion enters is decided by
-    derivatives, in the flow. Contacts that can be held count as not held.
-
-    Parameters
-    ----------
-    system : System
-        Its guards, equations and values.
-    t : float or array
-        Time [s].
-    y : sequence of float or array
-        One entry per state [SI].
-    values : mapping, optional
-        Values that replace the system's own [SI].
-
-    Returns
-    -------
-    list of bool or array of bool
-        One for each guard.
-    """
-    states, values = _arguments(system, y, values)
-    bits: list[Any] = []
-    for guard in system.guards:
-        if guard.law is not None and guard.law.kind == "hold":
-            bits.append(np.zeros(np.shape(bits[guard.law.partner]), dtype=bool)[()])
-            continue
-        (gap,) = evaluate([guard.gap], t=t, states=states, values=values, bits=bits)
-        bits.append(gap > 0)
-    return bits
-
-
-def mode_number(bits: Sequence[Any]) -> Any:
-    """Bits as one integer: bit i is guard i."""
-    return sum(
-        (np.asarray(bit, dtype=np.int64) << i for i, bit in enumerate(bits)), start=np.int64(0)
-    )
-
-
-def field(
-    system: System,
-    t: Any,
-    y: Any,
-    values: Mapping[str, Any] | None = None,
-    bits: Sequence[Any] | None = None,
-) -> np.ndarray:
-    """Time derivatives of the states.
-
-    Parameters
-    ----------
-    system : System
-        Its guards, equations and values.
-    t : float or array
-        Time [s].
-    y : sequence of float or array
-        One entry per state [SI].
-    values : mapping, optional
-        Values that replace the system's own [SI].
-    bits : sequence of bool, optional
-        The mode; taken from the state if not given (:func:`sides`).
-
-    Returns
-    -------
-    ndarray, shape (states, ...)
-        [SI per second].
-    """
-    if bits is None:
-        bits = sides(system, t, y, values)
-    states, values = _arguments(system, y, values)
-    derivatives = evaluate(system.field, t=t, states=states, values=values, bits=bits)
-    return np.array(np.broadcast_arrays(*derivatives))
-
-
-def _arguments(
-    system: System, y: Any, values: Mapping[str, Any] | None
-) -> tuple[dict[str, Any], dict[str, Any]]:
-    """States by name and all parameter values."""
-    return dict(zip(system.states, y, strict=True)), {**system.values, **(values or {})}

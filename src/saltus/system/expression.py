@@ -19,12 +19,21 @@ from collections.abc import Callable, Container, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
-from typing import Any, Protocol, Union, runtime_checkable
+from typing import Any, Protocol, TypeVar, Union, runtime_checkable
 
 from saltus.errors import TraceError, shown
 
 #: Elementary functions that a traced equation may call, in addition to arithmetic.
 ELEMENTARY = ("sqrt", "exp", "log", "sin", "cos", "tan", "atan", "tanh")
+
+#: The functions that an equation may call, as a sentence.
+OWN_FUNCTIONS = (
+    "Use saltus's own: sl.sqrt, sl.exp, sl.log, sl.sin, sl.cos, sl.tan, sl.asin, sl.acos, sl.atan, "
+    "sl.atan2, sl.sinh, sl.cosh, sl.tanh, "
+    "sl.hypot, sl.abs, sl.sign, sl.heaviside, sl.min, sl.max, sl.clip, sl.where, sl.piecewise; "
+    "sl.mod(t, T) for a time that repeats, sl.square, sl.sawtooth, sl.pulse; sl.table(x, points, "
+    "values) for measured points, in place of np.interp or a spline."
+)
 
 _MATH = {name: getattr(math, name) for name in ELEMENTARY}
 _INTERNED: weakref.WeakValueDictionary[tuple, Expr] = weakref.WeakValueDictionary()
@@ -135,15 +144,11 @@ class Expr:
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **keywords: Any) -> Any:
         """A NumPy function of traced values is saltus's own."""
-        from saltus.system.foreign import traced_ufunc  # foreign.py builds on this module
-
-        return traced_ufunc(ufunc, method, inputs, keywords)
+        return _ANSWERS["__array_ufunc__"](ufunc, method, inputs, keywords)
 
     # -- what has no meaning here ------------------------------------------------------------------
     def __mod__(self, other: Operand) -> Expr:
-        from saltus.system.clocks import mod  # clocks.py builds on this module
-
-        return mod(self, other)
+        return _ANSWERS["__mod__"](self, other)
 
     def __rmod__(self, other: Operand) -> Expr:
         raise TraceError(
@@ -212,7 +217,7 @@ class Expr:
             "an equation passed a traced value to a function that needs a plain number (math.cos, "
             "float, int, np.interp, a spline, ...). "
             "Write sl.cos in place of math.cos, sl.atan2 in place of math.atan2, and "
-            "so on. " + _no_number()
+            "so on. " + OWN_FUNCTIONS
         )
 
     __int__ = __float__
@@ -225,9 +230,7 @@ class Expr:
         )
 
     def __repr__(self) -> str:
-        from saltus.system.text import to_text  # text.py builds on this module
-
-        return to_text(self)
+        return _ANSWERS["__repr__"](self)
 
     def __copy__(self) -> Expr:
         return self
@@ -236,10 +239,23 @@ class Expr:
         return self
 
 
-def _no_number() -> str:
-    from saltus.system.foreign import OWN_FUNCTIONS  # foreign.py builds on this module
+#: What answers for an expression where Python asks, by the method: see :func:`answers`.
+_ANSWERS: dict[str, Callable[..., Any]] = {}
+Answer = TypeVar("Answer", bound=Callable[..., Any])
 
-    return OWN_FUNCTIONS
+
+def answers(method: str) -> Callable[[Answer], Answer]:
+    """Let a function answer for every expression: ``__repr__``, ``__mod__``, ``__array_ufunc__``.
+
+    Such a function is built of expressions, so it stands in a file above this one, and is handed
+    in.
+    """
+
+    def handed_in(function: Answer) -> Answer:
+        _ANSWERS[method] = function
+        return function
+
+    return handed_in
 
 
 #: Where a comparison stands for 0 or 1, as it does in MATLAB.

@@ -12,7 +12,7 @@ from saltus.errors import TraceError
 from saltus.system import compositions as made
 from saltus.system import functions as own
 from saltus.system.clocks import mod
-from saltus.system.expression import as_expr
+from saltus.system.expression import OWN_FUNCTIONS, answers, as_expr
 
 #: NumPy's ufuncs that an equation may call, by their names: the traced function that each stands
 #: for.
@@ -61,6 +61,7 @@ ADVICE: dict[str, str] = {
 }  # fmt: skip
 
 
+@answers("__array_ufunc__")
 def traced_ufunc(ufunc: Any, method: str, inputs: tuple[Any, ...], keywords: dict[str, Any]) -> Any:
     """What a NumPy ufunc gives for traced values.
 
@@ -79,13 +80,3 @@ def traced_ufunc(ufunc: Any, method: str, inputs: tuple[Any, ...], keywords: dic
     if name == "heaviside":
         inputs = inputs[:1]
     return UFUNCS[name](*map(as_expr, inputs))
-
-
-#: The functions that an equation may call, as a sentence.
-OWN_FUNCTIONS = (
-    "Use saltus's own: sl.sqrt, sl.exp, sl.log, sl.sin, sl.cos, sl.tan, sl.asin, sl.acos, sl.atan, "
-    "sl.atan2, sl.sinh, sl.cosh, sl.tanh, "
-    "sl.hypot, sl.abs, sl.sign, sl.heaviside, sl.min, sl.max, sl.clip, sl.where, sl.piecewise; "
-    "sl.mod(t, T) for a time that repeats, sl.square, sl.sawtooth, sl.pulse; sl.table(x, points, "
-    "values) for measured points, in place of np.interp or a spline."
-)

@@ -11,8 +11,8 @@ import functools
 
 from saltus.errors import ParameterError
 from saltus.system import expression as ex
+from saltus.system.assuming import assuming
 from saltus.system.expression import Expr
-from saltus.system.singular import assuming
 from saltus.system.system import System
 
 #: Names of the states that a leg adds, in their order.

@@ -10,39 +10,36 @@ stop has a negative one.
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
-from saltus.errors import ParameterError
 from saltus.system.canonical import Canonical
 from saltus.system.evaluate import evaluate
 from saltus.system.expression import Bit, Condition, Expr, Not, add, neg, walk
 from saltus.system.guards import Guard, equation_of, is_hold
 
-if TYPE_CHECKING:
-    from saltus.system.system import System
 
-
-def check_overlaps(system: System, values: Mapping[str, Any]) -> None:
-    """Raise a ParameterError if two pieces, one below a boundary and one above another, overlap.
+def overlapping(
+    field: tuple[Expr, ...],
+    guards: tuple[Guard, ...],
+    states: Sequence[str],
+    values: Mapping[str, Any],
+) -> str | None:
+    """What is wrong if two pieces, one below a boundary and one above another, overlap; None if
+    none do.
 
     Parameters
     ----------
-    system : System
-        Its equations.
+    field, guards, states
+        Of a system.
     values : mapping of str to float or array
         Values of all parameters [SI]; arrays of one length, one for each trajectory.
-
-    Raises
-    ------
-    ParameterError
-        With the boundaries and the values of their parameters.
     """
-    for first, second, width in _opposed(system.field, system.guards):
+    for first, second, width in _opposed(field, guards):
         # states cancel in it
-        (overlap,) = evaluate([width], states=dict.fromkeys(system.states, 0.0), values=values)
+        (overlap,) = evaluate([width], states=dict.fromkeys(states, 0.0), values=values)
         if not np.any(overlap > 0):
             continue
         worst = int(np.argmax(np.ravel(overlap > 0)))
@@ -52,15 +49,16 @@ def check_overlaps(system: System, values: Mapping[str, Any]) -> None:
             for name in names
         )
         entry = f" (trajectory {worst} of {np.size(overlap)})" if np.ndim(overlap) else ""
-        places = " and ".join(equation_of(number, system.guards) for number in (first, second))
-        raise ParameterError(
-            f"{system.name}: with {given}{entry} the contacts at {places} overlap, and the first "
+        places = " and ".join(equation_of(number, guards) for number in (first, second))
+        return (
+            f"with {given}{entry} the contacts at {places} overlap, and the first "
             f"piece would hide the second. A "
             f"clearance can't be negative. Springs that touch on both sides at once are the sum of "
             f"two one-sided contacts: "
             f"sl.freeplay(x, stiffness=k, lower_gap=gap) + sl.freeplay(x, stiffness=k, "
             f"upper_gap=gap)."
         )
+    return None
 
 
 @functools.lru_cache(maxsize=256)

@@ -16,6 +16,7 @@ from dataclasses import replace
 from typing import Any
 
 from saltus.errors import ParameterError, TraceError, nearest, shown
+from saltus.system.explained import explained, place
 from saltus.system.expression import (
     TIME,
     Bit,
@@ -37,7 +38,6 @@ from saltus.system.names import why_no_name
 from saltus.system.singular import lifted
 from saltus.system.surfaces import with_held_signs
 from saltus.system.system import System
-from saltus.system.trace import explained, place
 from saltus.units import check_declared, to_si
 
 #: How the name of a state that is remembered ends: as no user can write it.

@@ -16,12 +16,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from saltus.system import expression as ex
+from saltus.system.assuming import assuming
 from saltus.system.canonical import Canonical
 from saltus.system.derivatives import gradient, time_derivative
 from saltus.system.expression import Bit, Expr
 from saltus.system.guards import Guard, bits_in
-from saltus.system.singular import assuming
-from saltus.system.surfaces import ratio, total
+from saltus.system.sums import dot, ratio, total
 
 _ZERO, _ONE = ex.constant(0.0), ex.constant(1.0)
 #: Most contacts that one rate may hold for its terms to be written for each of them apart, held and
@@ -97,13 +97,6 @@ def _linear_states(one: Held) -> list[int]:
         i for i, slope in enumerate(one.normal) if slope is not _ZERO and not ex.varies(slope)
     ]
     return sorted(linear, key=lambda i: (one.direction[i] is _ZERO, one.normal[i].op != "const"))
-
-
-def dot(a: Sequence[Expr], b: Sequence[Expr]) -> Expr:
-    """Sum of products, without those that are zero."""
-    return total(
-        [ex.mul(x, y) for x, y in zip(a, b, strict=True) if x is not _ZERO and y is not _ZERO]
-    )
 
 
 class Elimination:

@@ -14,12 +14,13 @@ import numpy as np
 
 from saltus.errors import TraceError
 from saltus.system import expression as ex
+from saltus.system.assuming import assuming
 from saltus.system.canonical import Canonical, is_multiple
 from saltus.system.derivatives import differentiate, gradient
 from saltus.system.evaluate import evaluate
 from saltus.system.expression import Bit, Expr
 from saltus.system.guards import Guard, bits_in
-from saltus.system.singular import assuming
+from saltus.system.sums import ratio, total
 
 _SIGMA = ex.parameter("\0sigma")
 _ZERO = ex.constant(0.0)
@@ -72,14 +73,6 @@ def is_surface(
     return not place.is_zero(jump) and _jumps(jump, number, guards, field, states)
 
 
-def total(terms: Sequence[Expr]) -> Expr:
-    """The sum of terms, without those that are zero."""
-    result = _ZERO
-    for term in terms:
-        result = ex.add(result, term)
-    return result
-
-
 class OnSurface:
     """What expressions are where a gap is zero."""
 
@@ -110,13 +103,6 @@ def level(gap: Expr, name: str, slope: Expr) -> Expr:
     """The value of a state at which a gap is zero that is linear in it."""
     rest = ex.substituted(gap, {ex.state(name): _ZERO})
     return ratio(ex.neg(rest), slope)
-
-
-def ratio(a: Expr, b: Expr) -> Expr:
-    """``a / b``, the sign of a unit taken out."""
-    if b.op == "const" and b.payload in (1.0, -1.0):
-        return a if b.payload > 0 else ex.neg(a)
-    return ex.div(a, b)
 
 
 def _is_zero(node: Expr) -> bool:

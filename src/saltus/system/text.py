@@ -13,15 +13,27 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Protocol
 
-from saltus.system.expression import And, Bit, Condition, Expr, Not, Or, Relation, operands, walk
+from saltus.system.expression import (
+    And,
+    Bit,
+    Condition,
+    Expr,
+    Not,
+    Or,
+    Relation,
+    answers,
+    operands,
+    walk,
+)
 from saltus.system.roots import with_root
 
-_ATOM, _POWER, _NEGATIVE, _PRODUCT, _SUM = 5, 4, 3, 2, 1
+#: How strongly a text holds together: where its strength is less than asked for, it is bracketed.
+ATOM, POWER, NEGATIVE, PRODUCT, SUM = 5, 4, 3, 2, 1
 _INFIX = {
-    "add": (" + ", _SUM),
-    "sub": (" - ", _SUM),
-    "mul": ("*", _PRODUCT),
-    "div": ("/", _PRODUCT),
+    "add": (" + ", SUM),
+    "sub": (" - ", SUM),
+    "mul": ("*", PRODUCT),
+    "div": ("/", PRODUCT),
 }
 #: Constants that people write with pi.
 PI_MULTIPLES = {math.pi: "pi", 2 * math.pi: "2*pi", 4 * math.pi: "4*pi", math.pi / 2: "pi/2"}
@@ -142,14 +154,14 @@ class Writer:
     def number(self, value: float) -> tuple[str, int]:
         """A constant and its binding strength."""
         if value in PI_MULTIPLES:
-            return PI_MULTIPLES[value], _ATOM if value == math.pi else _PRODUCT
+            return PI_MULTIPLES[value], ATOM if value == math.pi else PRODUCT
         short = f"{value:.6g}"
         text = re.sub(
             r"e([+-])0*",
             lambda match: "e" + match[1].strip("+"),
             short if float(short) == value else repr(value),
         )
-        return text, _NEGATIVE if text.startswith("-") else _ATOM
+        return text, NEGATIVE if text.startswith("-") else ATOM
 
     def infix(self, op: str, left: Expr, right: Expr) -> tuple[str, int]:
         """A sum, difference, product or quotient and its binding strength."""
@@ -160,7 +172,7 @@ class Writer:
 
     def power(self, base: Expr, exponent: Expr) -> str:
         """A power."""
-        return f"{self.part(base, _ATOM)}**{self.part(exponent, _ATOM)}"
+        return f"{self.part(base, ATOM)}**{self.part(exponent, ATOM)}"
 
     def call(self, function: str, *arguments: Expr) -> str:
         """A function."""
@@ -197,18 +209,18 @@ class Writer:
             case "const":
                 return self.number(node.payload)
             case "param" | "state":
-                return self.name(node.payload), _ATOM
+                return self.name(node.payload), ATOM
             case "time":
-                return self.name("t"), _ATOM
+                return self.name("t"), ATOM
             case "neg":
-                return "-" + self.part(node.args[0], _POWER), _NEGATIVE
+                return "-" + self.part(node.args[0], POWER), NEGATIVE
             case "pow":
-                return self.power(*node.args), _POWER
+                return self.power(*node.args), POWER
             case "select":
-                return self._select(node), _ATOM
+                return self._select(node), ATOM
             case op if op in _INFIX:
                 return self.infix(op, *node.args)
-        return self.call(node.payload.name if node.op == "table" else node.op, *node.args), _ATOM
+        return self.call(node.payload.name if node.op == "table" else node.op, *node.args), ATOM
 
     def _select(self, node: Expr) -> str:
         """A select and those nested in its second branch as one list of pieces."""
@@ -225,7 +237,7 @@ class Writer:
         """The text as it is used from here on: itself, a name, or dots."""
         if self.limit is not None and len(text) > self.limit:
             self._pieces.pop(node, None)
-            return "...", _ATOM
+            return "...", ATOM
         long = len(text) > self.name_from
         if not (
             self._naming and long and (self._uses[node] > 1 or len(text) > 10 * self.name_from)
@@ -238,7 +250,7 @@ class Writer:
         self._taken.add(name)
         self._pieces.pop(node, None)
         self.lines.append(self.line(self.name(name), text))
-        return self.name(name), _ATOM
+        return self.name(name), ATOM
 
     def _guard_sides(self, guard: Boundary) -> tuple[str, str]:
         if getattr(guard.law, "kind", None) == "hold":  # its gap is no boundary that anyone wrote
@@ -261,6 +273,7 @@ class Writer:
         return self.parentheses(text)
 
 
+@answers("__repr__")
 def to_text(node: Expr, limit: int = 300) -> str:
     """An expression as Python would write it; parts longer than ``limit`` characters become
     ``...``.

@@ -20,7 +20,8 @@ from saltus.models import (
     has_energy,
 )
 from saltus.system import functions
-from saltus.system.evaluate import evaluate, field, mode_number, sides
+from saltus.system.evaluate import evaluate
+from saltus.system.modes import field, mode_number, sides
 
 solve_ivp = pytest.importorskip("scipy.integrate").solve_ivp
 brentq = pytest.importorskip("scipy.optimize").brentq

@@ -12,7 +12,8 @@ import saltus as sl
 from saltus.errors import TraceError, UnusedParameterWarning
 from saltus.system import expression as ex
 from saltus.system.derivatives import differentiate
-from saltus.system.evaluate import evaluate, field
+from saltus.system.evaluate import evaluate
+from saltus.system.modes import field
 
 X, Y = ex.state("x"), ex.state("y")
 EPS = 2.0**-52

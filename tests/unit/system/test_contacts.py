@@ -12,8 +12,9 @@ import pytest
 
 import saltus as sl
 from saltus.errors import ParameterError, SaltusError, TraceError, UnitError
-from saltus.system.evaluate import evaluate, field, sides
+from saltus.system.evaluate import evaluate
 from saltus.system.expression import Expr
+from saltus.system.modes import field, sides
 from saltus.system.quantity import acting_guards, quantity, with_integrals, with_surface
 from saltus.system.system import System
 from saltus.system.tangent import tangent_system

@@ -5,7 +5,8 @@ import pytest
 
 from saltus.models import delangre
 from saltus.system import expression as ex
-from saltus.system.evaluate import evaluate, field, mode_number, sides
+from saltus.system.evaluate import evaluate
+from saltus.system.modes import field, mode_number, sides
 
 X = ex.state("x")
 

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 import saltus as sl
 from saltus.system import expression as ex
 from saltus.system.derivatives import gradient
-from saltus.system.dimensions import gap_units
 from saltus.system.evaluate import evaluate
+from saltus.system.gap_units import gap_units
 from saltus.system.guards import find_guards
 from saltus.system.roots import with_root, without_root, zero_where_idle
 

@@ -21,8 +21,8 @@ from saltus.kernels import status as st
 from saltus.results import build
 from saltus.results.dataset.schema import WIDTHS
 from saltus.system.blend import STEPS
-from saltus.system.dimensions import gap_units
 from saltus.system.evaluate import evaluate
+from saltus.system.gap_units import gap_units
 from saltus.system.regularisation import regularise
 from saltus.system.system import System
 from saltus.units import to_si

@@ -15,11 +15,11 @@ import numpy as np
 from saltus.analysis.orbits.newton import newton
 from saltus.analysis.orbits.tolerances import RANK
 from saltus.system import expression as ex
+from saltus.system.assuming import assuming
 from saltus.system.derivatives import gradient
 from saltus.system.evaluate import evaluate
 from saltus.system.expression import Expr, depends_on
 from saltus.system.guards import Guard, Law, is_hold
-from saltus.system.singular import assuming
 from saltus.system.system import System
 
 #: Rounds of deflation, and starts of each but the first.

@@ -15,12 +15,12 @@ import numpy as np
 
 from saltus.analysis.orbits.newton import newton
 from saltus.system import expression as ex
+from saltus.system.assuming import assuming
 from saltus.system.derivatives import gradient
-from saltus.system.evaluate import evaluate, sides
+from saltus.system.evaluate import evaluate
 from saltus.system.expression import Expr
-from saltus.system.reduction import dot
-from saltus.system.singular import assuming
-from saltus.system.surfaces import total
+from saltus.system.modes import sides
+from saltus.system.sums import dot, total
 from saltus.system.system import System
 
 #: Longest step of Newton's method, in units of the unknowns' sizes.
