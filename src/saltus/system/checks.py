@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from saltus.contact.declared import outside, pushes_on
+from saltus.contact.dry_friction import drives, sticks_less
+from saltus.contact.guards import Law
+from saltus.contact.overlaps import overlapping
 from saltus.errors import ParameterError, TraceError
-from saltus.system.compositions import drives, sticks_less
-from saltus.system.declared import outside, pushes_on
+from saltus.language.evaluate import evaluate
+from saltus.language.expression import varies
 from saltus.system.equations_of_motion import EquationsOfMotion
-from saltus.system.evaluate import evaluate
-from saltus.system.expression import varies
-from saltus.system.guards import Law
-from saltus.system.overlaps import overlapping
 from saltus.units import to_si
 
 #: Most boundaries of a system: each is a bit of the mode, and a double holds 53 bits.

@@ -7,14 +7,14 @@ import math
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 
+from saltus.contact.guards import Law, at_equality, is_hold
+from saltus.contact.reduction import free_field
 from saltus.errors import counted
+from saltus.language.evaluate import evaluate
+from saltus.language.expression import Expr, state, varies
+from saltus.language.latex import LatexWriter, latex_name
+from saltus.language.text import Writer
 from saltus.system.equations_of_motion import EquationsOfMotion
-from saltus.system.evaluate import evaluate
-from saltus.system.expression import Expr, state, varies
-from saltus.system.guards import Law, at_equality, is_hold
-from saltus.system.latex import LatexWriter, latex_name
-from saltus.system.reduction import free_field
-from saltus.system.text import Writer
 from saltus.units import from_si
 
 #: How the description of a structure begins.

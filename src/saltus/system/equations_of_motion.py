@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from saltus.contact.guards import Guard
 from saltus.errors import ParameterError, shown
-from saltus.system.expression import Expr
-from saltus.system.guards import Guard
+from saltus.language.expression import Expr
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from saltus.errors import TraceError, UnitError, nearest
-from saltus.system.expression import OWN_FUNCTIONS
+from saltus.language.expression import OWN_FUNCTIONS
 from saltus.system.formula import Equations, Formula
 
 _HERE = str(Path(__file__).parent.parent)

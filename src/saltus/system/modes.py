@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from saltus.language.evaluate import evaluate
 from saltus.system.equations_of_motion import EquationsOfMotion
-from saltus.system.evaluate import evaluate
 
 
 def sides(

@@ -10,12 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from saltus.contact.guards import Guard, is_hold
+from saltus.contact.reduction import free_field
 from saltus.errors import TraceError
-from saltus.system.clocks import cycles_of
-from saltus.system.derivatives import differentiate, time_derivative
-from saltus.system.equations_of_motion import EquationsOfMotion
-from saltus.system.evaluate import evaluate
-from saltus.system.expression import (
+from saltus.language.clocks import cycles_of
+from saltus.language.derivatives import differentiate, time_derivative
+from saltus.language.evaluate import evaluate
+from saltus.language.expression import (
     TIME,
     Expr,
     constant,
@@ -25,9 +26,8 @@ from saltus.system.expression import (
     relations_in,
     walk,
 )
-from saltus.system.guards import Guard, is_hold
+from saltus.system.equations_of_motion import EquationsOfMotion
 from saltus.system.modes import sides
-from saltus.system.reduction import free_field
 
 #: Rounding allowed in the number of cycles in a period: relative, and absolute for a phase
 #: [cycles].

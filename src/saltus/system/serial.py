@@ -7,10 +7,10 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from saltus.contact.guards import Guard, Law, bits_in, expressions_of, is_hold
 from saltus.errors import SaltusError, among, shown
-from saltus.system.clocks import affine, switch
-from saltus.system.equations_of_motion import EquationsOfMotion
-from saltus.system.expression import (
+from saltus.language.clocks import affine, switch
+from saltus.language.expression import (
     ELEMENTARY,
     And,
     Bit,
@@ -23,9 +23,9 @@ from saltus.system.expression import (
     varies,
     walk,
 )
-from saltus.system.guards import Guard, Law, bits_in, expressions_of, is_hold
-from saltus.system.names import why_no_name, why_no_text, why_no_title, why_not_together
-from saltus.system.tables import Table
+from saltus.language.names import why_no_name, why_no_text, why_no_title, why_not_together
+from saltus.language.tables import Table
+from saltus.system.equations_of_motion import EquationsOfMotion
 from saltus.units import check_declared
 
 #: Changes whenever the meaning of the data does. Systems without a law of contact, and with one.

@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 
+from saltus.contact.singular import is_steep
 from saltus.errors import ParameterError, among, nearest, shown
+from saltus.language.derivatives import gradient
+from saltus.language.expression import Expr
 from saltus.system import checks, serial
-from saltus.system.derivatives import gradient
 from saltus.system.display import equation_lines, system_html, system_text
 from saltus.system.equations_of_motion import EquationsOfMotion
-from saltus.system.expression import Expr
 from saltus.system.fixed import Units, Values, no_change
 from saltus.system.modes import field
 from saltus.system.periodic import check_periodic
-from saltus.system.singular import is_steep
 from saltus.units import from_si
 
 
@@ -49,8 +49,8 @@ class System(EquationsOfMotion):
         The system whose variational equations this one carries (see tangent.py); None for any
         other.
     made : int
-        How many of the last states elements with a memory have brought (see memory.py); a start
-        that doesn't give them is zero.
+        How many of the last states elements with a memory have brought (see contact/memory.py); a
+        start that doesn't give them is zero.
     """
 
     tangent_of: System | None = None

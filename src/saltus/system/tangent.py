@@ -12,7 +12,7 @@ from __future__ import annotations
 import functools
 from dataclasses import replace
 
-from saltus.system.expression import Expr, add, constant, mul, state
+from saltus.language.expression import Expr, add, constant, mul, state
 from saltus.system.system import System
 
 

@@ -17,6 +17,10 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 
 from saltus.announce import working
+from saltus.contact.contacts import find_contacts
+from saltus.contact.declared import Declared, check_law, declarations
+from saltus.contact.guards import expressions_of
+from saltus.contact.memory import Element, elements, rates_of
 from saltus.errors import (
     ParameterError,
     TraceError,
@@ -25,17 +29,13 @@ from saltus.errors import (
     nearest,
     shown,
 )
+from saltus.language.dimensions import DimensionCheck
+from saltus.language.expression import TIME, Expr, as_expr, observed, parameter, state, walk
+from saltus.language.names import why_no_name, why_no_text, why_no_title, why_not_together
 from saltus.system import checks
-from saltus.system.contacts import find_contacts
-from saltus.system.declared import Declared, check_law, declarations
-from saltus.system.dimensions import DimensionCheck
 from saltus.system.explained import explained, place
-from saltus.system.expression import TIME, Expr, as_expr, observed, parameter, state, walk
 from saltus.system.formula import Equations, Formula
 from saltus.system.guard_names import with_guard_names
-from saltus.system.guards import expressions_of
-from saltus.system.memory import Element, elements, rates_of
-from saltus.system.names import why_no_name, why_no_text, why_no_title, why_not_together
 from saltus.system.system import System
 from saltus.units import check_declared, coherent_unit
 
