@@ -132,7 +132,7 @@ def system(
 
     Examples
     --------
-    >>> from saltus.system import cos, pi, piecewise
+    >>> from saltus.language import cos, pi, piecewise
     >>> @system(states="x v", forced_at="frequency", units={"x": "m", "v": "m/s"})
     ... def rig(
     ...     t, x, v, *, mass="3 kg", stiffness="14 kN/m", gap="0.4 mm", force="4 N",
