@@ -8,7 +8,7 @@ import pytest
 import saltus as sl
 
 #: Functions that stand for those of mathematics, in equations.
-MATHEMATICS = ("saltus.system.functions", "saltus.system.compositions")
+MATHEMATICS = ("saltus.language.functions", "saltus.language.compositions")
 FUNCTIONS = sorted(
     name
     for name in sl.__all__

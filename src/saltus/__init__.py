@@ -42,60 +42,57 @@ if TYPE_CHECKING:
     from saltus.analysis.responses.all_branches import branches
     from saltus.analysis.responses.bifurcation_diagram import bifurcation_diagram
     from saltus.analysis.responses.frequency_response import frequency_response
+    from saltus.contact import (
+        clearance,
+        flores,
+        freeplay,
+        friction,
+        hertz,
+        hunt_crossley,
+        impact,
+        iwan,
+        jump,
+        lankarani_nikravesh,
+        play,
+        slider,
+    )
     from saltus.errors import SaltusError
     from saltus.flow import ODE23, ODE45, ODE113, RK4, Interrupted, ODE15s, Taylor
     from saltus.interrupt import Stop
-    from saltus.results import contacts, load, samples, save, to_csv, to_mat
-    from saltus.results.describe import describe
-    from saltus.system import (
-        Contact,
-        Force,
-        System,
+    from saltus.language import (
         abs,
         acos,
         asin,
         atan,
         atan2,
-        clearance,
         clip,
         cos,
         cosh,
         exp,
-        flores,
-        freeplay,
-        friction,
         heaviside,
-        hertz,
-        hunt_crossley,
         hypot,
-        impact,
-        iwan,
-        jump,
-        lankarani_nikravesh,
         log,
         max,
         min,
         mod,
         pi,
         piecewise,
-        play,
         pulse,
         recorded,
-        regularise,
         sawtooth,
         sign,
         sin,
         sinh,
-        slider,
         sqrt,
         square,
-        structure,
-        system,
         table,
         tan,
         tanh,
         where,
     )
+    from saltus.results import contacts, load, samples, save, to_csv, to_mat
+    from saltus.results.describe import describe
+    from saltus.system import Contact, Force, System, regularise, structure, system
 
 #: Public name: module that holds it.
 _HOMES = {
@@ -130,19 +127,14 @@ _HOMES = {
         "saltus.flow"),
     **dict.fromkeys(("contacts", "describe", "load", "samples", "save", "to_csv", "to_mat"),
         "saltus.results"),
-    **dict.fromkeys(
-        ("System", "abs", "atan", "cos", "exp", "flores", "freeplay", "hertz",
-            "hunt_crossley", "lankarani_nikravesh", "log", "max", "min", "pi", "piecewise", "sin",
-            "sqrt", "system", "tan", "tanh"),
-        "saltus.system",
-    ),
-    **dict.fromkeys(("acos", "asin", "atan2", "clip", "cosh", "heaviside", "hypot", "mod", "sign",
-        "sinh"), "saltus.system"),
-    **dict.fromkeys(("clearance", "friction", "impact", "iwan", "jump", "play", "slider"),
+    **dict.fromkeys(("abs", "acos", "asin", "atan", "atan2", "clip", "cos", "cosh", "exp",
+        "heaviside", "hypot", "log", "max", "min", "mod", "pi", "piecewise", "pulse", "recorded",
+        "sawtooth", "sign", "sin", "sinh", "sqrt", "square", "table", "tan", "tanh", "where"),
+        "saltus.language"),
+    **dict.fromkeys(("clearance", "flores", "freeplay", "friction", "hertz", "hunt_crossley",
+        "impact", "iwan", "jump", "lankarani_nikravesh", "play", "slider"), "saltus.contact"),
+    **dict.fromkeys(("Contact", "Force", "System", "regularise", "structure", "system"),
         "saltus.system"),
-    **dict.fromkeys(("pulse", "recorded", "regularise", "sawtooth", "square", "table", "where"),
-        "saltus.system"),
-    **dict.fromkeys(("Contact", "Force", "structure"), "saltus.system"),
 }  # fmt: skip
 _MODULES = ("models", "plot")
 

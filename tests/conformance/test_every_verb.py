@@ -19,7 +19,7 @@ from saltus.analysis.basins import pipeline
 from saltus.results.dataset import schema
 from saltus.results.dataset.result import Result
 from saltus.results.provenance import file_hash, to_json, versions
-from saltus.system.system import System
+from saltus.system import System
 
 RIG = sl.models.delangre("a", force="4 N", frequency="17 Hz")
 #: The same start, numbers and names with units; and the same box.

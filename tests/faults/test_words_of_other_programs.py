@@ -120,8 +120,9 @@ def test_pictures_that_saltus_has_not(name, words):
 def test_what_is_advised_exists():
     """No sentence names a function of saltus that isn't there."""
     from saltus.analysis import verb
+    from saltus.language import foreign
     from saltus.plot import elsewhere as pictures
-    from saltus.system import elsewhere, foreign
+    from saltus.system import elsewhere
     from saltus.system.structures import parts
 
     structure = importlib.import_module("saltus.system.structures.structure")

@@ -17,7 +17,7 @@ from oracles import piecewise_linear
 from power_laws import duration_of, power_stop
 from saltus.errors import SaltusWarning
 from saltus.flow import engine
-from saltus.system.evaluate import evaluate
+from saltus.language.evaluate import evaluate
 
 pytestmark = pytest.mark.nojit
 

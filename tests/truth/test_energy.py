@@ -12,10 +12,10 @@ import pytest
 import saltus as sl
 from conformance.systems import lab, pair
 from saltus.errors import ParameterError
+from saltus.language.derivatives import differentiate, time_derivative
+from saltus.language.evaluate import evaluate
+from saltus.language.expression import state
 from saltus.models import MODELS, energy, has_energy
-from saltus.system.derivatives import differentiate, time_derivative
-from saltus.system.evaluate import evaluate
-from saltus.system.expression import state
 from saltus.system.quantity import quantity
 
 #: What the sums of a balance may lose: some hundred roundings of the largest part.

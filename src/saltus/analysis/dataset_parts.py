@@ -14,11 +14,10 @@ from saltus.flow.contact_table import ContactTable
 from saltus.flow.methods import Method
 from saltus.flow.request import Outcome
 from saltus.kernels import status as st
+from saltus.language.evaluate import evaluate
 from saltus.results import Guards, Subject, attributes
-from saltus.system.dimensions import gap_units
-from saltus.system.evaluate import evaluate
+from saltus.system import System, gap_units
 from saltus.system.quantity import jumping_states
-from saltus.system.system import System
 
 
 def shared_values(system: System, group: Ensemble) -> dict[str, float]:

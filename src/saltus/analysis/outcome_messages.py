@@ -10,13 +10,14 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.starts import Span
+from saltus.contact.guards import is_hold
 from saltus.errors import SaltusWarning
 from saltus.kernels import status as st
-from saltus.system.evaluate import evaluate, sides
-from saltus.system.expression import varies, walk
-from saltus.system.guards import is_hold
-from saltus.system.roots import root_name
-from saltus.system.system import System
+from saltus.language import root_name
+from saltus.language.evaluate import evaluate
+from saltus.language.expression import varies, walk
+from saltus.system import System
+from saltus.system.modes import sides
 from saltus.units import from_si
 
 #: Statuses after which a trajectory's end is missing, each with advice.

@@ -8,13 +8,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from saltus.contact.guards import Guard
 from saltus.errors import ParameterError, UnitError, shown
-from saltus.system.dimensions import units_of
-from saltus.system.expression import Expr
-from saltus.system.guards import Guard
-from saltus.system.names import why_no_title
+from saltus.language import units_of, why_no_title
+from saltus.language.expression import Expr
+from saltus.system import System
 from saltus.system.quantity import quantity
-from saltus.system.system import System
 from saltus.units import check_declared, dimension
 
 

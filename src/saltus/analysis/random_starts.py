@@ -11,7 +11,7 @@ import numpy as np
 from saltus.errors import ParameterError, UnitError, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.room import check_room
-from saltus.system.system import System
+from saltus.system import System
 from saltus.units import to_si
 
 _COUNT = re.compile("0*[1-9][0-9]{0,11}")

@@ -14,9 +14,8 @@ from saltus.errors import ParameterError, SaltusError, among, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.request import Request, Schedule
 from saltus.flow.room import check_room
-from saltus.system import expression as ex
-from saltus.system.checks import check_values
-from saltus.system.system import System
+from saltus.language import expression as ex
+from saltus.system import System, check_values
 from saltus.units import to_si
 
 #: Trajectories that a single call may hold before their starts alone fill memory.

@@ -19,7 +19,7 @@ from saltus.errors import ParameterError, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.engine import MOST_THREADS, RunInterrupted
 from saltus.interrupt import Interrupted, no_ctrl_c_is_lost
-from saltus.system.system import System
+from saltus.system import System
 
 P = ParamSpec("P")
 R = TypeVar("R")

@@ -121,7 +121,8 @@ def _probe(**values: float) -> System:
     """A system that is a parabola or an oscillator by its values, so that one compilation serves
     both.
     """
-    from saltus.system import piecewise, system
+    from saltus.language import piecewise
+    from saltus.system import system
 
     @system(states="x v", forced_at=None)
     def probe(t, x, v, *, acceleration=0.0, stiffness=0.0, boundary=1.0, contact=0.0):

@@ -23,12 +23,12 @@ from saltus.kernels.clocks_layout import (
     TABLE,
     WAVE,
 )
-from saltus.system import expression as ex
-from saltus.system.clocks import Level, Pulse, Wave, affine, switch_of
-from saltus.system.derivatives import differentiate
-from saltus.system.expression import Expr, Relation
-from saltus.system.system import System
-from saltus.system.tables import Table
+from saltus.language import Table
+from saltus.language import expression as ex
+from saltus.language.clocks import Level, Pulse, Wave, affine, switch_of
+from saltus.language.derivatives import differentiate
+from saltus.language.expression import Expr, Relation
+from saltus.system import System
 
 _TURN = ex.constant(2 * math.pi)
 

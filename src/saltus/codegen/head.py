@@ -18,7 +18,7 @@ class Head:
     constants : dict
         Sizes, flags and tables.
     functions : str
-        Their text: plain Python, and what lane_ir.py translates.
+        Their text: plain Python, and what function_ir.py translates.
     """
 
     constants: dict[str, Constant]

@@ -20,8 +20,8 @@ from fractions import Fraction
 from saltus.codegen.columns import Lines
 from saltus.codegen.scalar import condition_code
 from saltus.codegen.series import Linear, Series, SeriesBuilder, is_constant
-from saltus.system import expression as ex
-from saltus.system.expression import Expr
+from saltus.language import expression as ex
+from saltus.language.expression import Expr
 
 MASK_WORDS = ("&", "|", "~")
 #: Terms beyond this one are too small, within a step, for the rounding of 1/k to matter.

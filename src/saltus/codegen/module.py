@@ -16,11 +16,11 @@ from saltus.codegen.interface import ADAMS, CAPTURE, FIXED_STEP, NDF, PAIR, TAYL
 from saltus.codegen.kernels import Kernels
 from saltus.codegen.rates_head import rates_head
 from saltus.codegen.taylor_head import taylor_head
+from saltus.contact.guards import expressions_of
 from saltus.errors import TraceError
-from saltus.system.expression import walk
-from saltus.system.guards import expressions_of
+from saltus.language.expression import walk
+from saltus.system import System
 from saltus.system.quantity import acting_guards
-from saltus.system.system import System
 
 #: Above the templates when they are run as plain Python.
 _PREAMBLE = """

@@ -14,7 +14,7 @@ import numpy as np
 from saltus.codegen import templates
 from saltus.codegen.taylor_head import taylor_head
 from saltus.kernels import lanes, marks, trigonometry
-from saltus.system.system import System
+from saltus.system import System
 
 
 @lru_cache(maxsize=256)

@@ -22,13 +22,13 @@ from saltus.codegen.taylor_head import (
     tables,
     tables_of_laws,
 )
+from saltus.contact.guards import Guard
 from saltus.errors import ParameterError
-from saltus.system import expression as ex
-from saltus.system.derivatives import differentiate
-from saltus.system.expression import Expr
-from saltus.system.guards import Guard
-from saltus.system.singular import assuming
-from saltus.system.system import System
+from saltus.language import assuming
+from saltus.language import expression as ex
+from saltus.language.derivatives import differentiate
+from saltus.language.expression import Expr
+from saltus.system import System
 
 
 class _Slots:

@@ -13,12 +13,12 @@ from collections.abc import Callable, Sequence
 
 from saltus.codegen.clocks import Clocks
 from saltus.codegen.scalar import ScalarCode, indented, parameter_leaf
-from saltus.system import expression as ex
-from saltus.system.derivatives import differentiate
-from saltus.system.expression import Expr
-from saltus.system.signs import never_negative_if
-from saltus.system.singular import SetAside, set_aside
-from saltus.system.system import System
+from saltus.contact.signs import never_negative_if
+from saltus.contact.singular import SetAside, set_aside
+from saltus.language import expression as ex
+from saltus.language.derivatives import differentiate
+from saltus.language.expression import Expr
+from saltus.system import System
 from saltus.system.tangent import first_column
 
 #: Part of the size of its terms by which rounding, and a contact met a little beside its boundary,

@@ -6,9 +6,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from saltus.system import expression as ex
-from saltus.system.expression import Expr
-from saltus.system.system import System
+from saltus.language import expression as ex
+from saltus.language.expression import Expr
+from saltus.system import System
 
 _INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
 

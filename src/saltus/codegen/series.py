@@ -14,8 +14,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from saltus.codegen.clocks import Clocks
-from saltus.system import expression as ex
-from saltus.system.expression import Expr
+from saltus.language import expression as ex
+from saltus.language.expression import Expr
 
 #: Series kinds whose value is finite wherever their operands are.
 _TOTAL = ("state", "time", "since", "product", "sin", "cos", "atan", "tanh", "linear")

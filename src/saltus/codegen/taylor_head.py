@@ -16,13 +16,13 @@ from saltus.codegen.saltation import (
 )
 from saltus.codegen.scalar import ScalarCode, indented, parameter_leaf
 from saltus.codegen.series import Linear, SeriesBuilder, is_constant
+from saltus.contact.guards import Guard, is_hold
+from saltus.contact.singular import set_aside
 from saltus.kernels.status import LAW_KINDS, NO_LAW
-from saltus.system import expression as ex
-from saltus.system.expression import Expr
-from saltus.system.guards import Guard, is_hold
+from saltus.language import expression as ex
+from saltus.language.expression import Expr
+from saltus.system import System
 from saltus.system.quantity import is_remembered
-from saltus.system.singular import set_aside
-from saltus.system.system import System
 from saltus.system.tangent import first_column
 
 #: Rows of the clock before the phases of harmonics (kernels/taylor_layout.py: TAU, BASE).

@@ -29,7 +29,7 @@ from saltus.flow.threads import may_wait, on_threads, usable_processors
 from saltus.interrupt import Interrupted, Stop
 from saltus.kernels import status as st
 from saltus.kernels.batch import Batch
-from saltus.system.system import System
+from saltus.system import System
 
 #: Trajectories in a chunk: enough to keep lanes full, few enough to balance threads and to show
 #: progress.

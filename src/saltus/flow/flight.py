@@ -13,7 +13,7 @@ from saltus.flow.pace import marks, resume
 from saltus.flow.request import Request
 from saltus.interrupt import check_stop
 from saltus.kernels import status as st
-from saltus.system.system import System
+from saltus.system import System
 
 #: Per-trajectory arrays of a batch that follow a trajectory when others leave.
 _FOLLOW = (

@@ -19,8 +19,7 @@ from saltus.flow.methods import Method
 from saltus.flow.request import Outcome, Request, Schedule
 from saltus.flow.shots import Shots
 from saltus.kernels import status as st
-from saltus.system.checks import check_values
-from saltus.system.system import System
+from saltus.system import System, check_values
 from saltus.system.tangent import tangent_system
 
 #: Step of differences, relative to the range of a state: errors of rounding and of the fourth order

@@ -16,7 +16,7 @@ import numpy as np
 
 from saltus.codegen.module import Flow
 from saltus.errors import ParameterError, nearest, shown
-from saltus.system.system import System
+from saltus.system import System
 
 #: Steps that a trajectory may take for each of its periods; a healthy one takes ten to a hundred.
 STEPS_PER_PERIOD = 10_000

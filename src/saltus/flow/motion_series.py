@@ -18,7 +18,7 @@ from saltus.flow import polynomials
 from saltus.flow.maps import Stroboscope
 from saltus.flow.set_aside import Boundaries
 from saltus.kernels.isolation import ROUNDING
-from saltus.system.system import System
+from saltus.system import System
 
 #: Order and log2 of the tolerance of the series: their truncation is rounding.
 ORDER, LOG2_TOLERANCE = 20, -50.0

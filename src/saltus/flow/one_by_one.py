@@ -11,7 +11,7 @@ from saltus.errors import ParameterError, shown
 from saltus.flow.counts import whole
 from saltus.flow.method import Method, step_budget
 from saltus.flow.taylor import Taylor
-from saltus.system.system import System
+from saltus.system import System
 
 
 class OneByOne(Method):

@@ -17,13 +17,13 @@ from functools import lru_cache
 
 import numpy as np
 
+from saltus.contact.guards import Guard
 from saltus.flow import polynomials
 from saltus.flow.maps import Stroboscope
 from saltus.flow.motion_series import MotionSeries, Nodes, Pieces
 from saltus.flow.request import Outcome, Schedule
-from saltus.system.expression import Expr
-from saltus.system.guards import Guard
-from saltus.system.system import System
+from saltus.language.expression import Expr
+from saltus.system import System
 
 #: Samples of a period besides the contacts: for an exact method, for another method, and for
 #: cubics.

@@ -14,7 +14,7 @@ from saltus.flow.request import Request
 from saltus.flow.stops import on_allowed_sides
 from saltus.interrupt import check_stop
 from saltus.kernels import status as st
-from saltus.system.system import System
+from saltus.system import System
 
 #: What a run leaves behind in its arrays, besides the states.
 _LEFT = ("count", "phase", "mode", "fresh", "carry", "counters", "minima", "cursor", *marks(0))

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.system.evaluate import evaluate, sides
-from saltus.system.system import System
+from saltus.language.evaluate import evaluate
+from saltus.system import System
+from saltus.system.modes import sides
 
 EPS = 2.0**-52
 #: A start this many roundings beyond a stop lies on it.

@@ -12,7 +12,7 @@ from saltus.errors import ParameterError, shown
 from saltus.flow.counts import whole
 from saltus.flow.method import STEPS_PER_PERIOD, Method, check_positive, explain_unknown_options
 from saltus.flow.pace import CHECK_STEPS, LONG_CHECK_STEPS
-from saltus.system.system import System
+from saltus.system import System
 
 #: Trajectories of a small batch, and its lanes: one and the three copies that measure its errors.
 #: 16 lanes take twice as long (0028).

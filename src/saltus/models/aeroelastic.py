@@ -18,8 +18,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from saltus.contact import freeplay
 from saltus.models.model import model
-from saltus.system import freeplay
 
 
 @model(

@@ -7,8 +7,9 @@ r"""A ball between two walls that shake: the impact damper.
 
 from __future__ import annotations
 
+from saltus.contact import impact
+from saltus.language import cos, sin
 from saltus.models.model import model
-from saltus.system import cos, impact, sin
 
 
 @model(

@@ -8,8 +8,8 @@ The force is :math:`+A` in the first half of each period, :math:`-A` in the seco
 
 from __future__ import annotations
 
+from saltus.language import square
 from saltus.models.model import model
-from saltus.system import square
 
 
 @model(

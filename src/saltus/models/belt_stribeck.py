@@ -8,8 +8,9 @@ r"""A block on a moving belt whose friction falls with the sliding speed.
 
 from __future__ import annotations
 
+from saltus.contact import friction
+from saltus.language import abs
 from saltus.models.model import model
-from saltus.system import abs, friction
 
 
 @model(

@@ -7,8 +7,8 @@ r"""A block on a moving belt whose static friction exceeds the kinetic one.
 
 from __future__ import annotations
 
+from saltus.contact import friction
 from saltus.models.model import model
-from saltus.system import friction
 
 
 @model(

@@ -9,8 +9,9 @@ Time is in units of the reciprocal natural frequency, lengths in units of a refe
 
 from __future__ import annotations
 
+from saltus.contact import freeplay
+from saltus.language import sin
 from saltus.models.model import model
-from saltus.system import freeplay, sin
 
 
 @model(

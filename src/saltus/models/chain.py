@@ -13,8 +13,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from saltus.contact import freeplay
+from saltus.language import cos, pi
 from saltus.models.model import model
-from saltus.system import cos, freeplay, pi
 
 
 @model(

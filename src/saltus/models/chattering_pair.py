@@ -7,8 +7,8 @@ r"""Two rates that depend on which of two states is ahead: a test of chattering.
 
 from __future__ import annotations
 
+from saltus.language import piecewise
 from saltus.models.model import model
-from saltus.system import piecewise
 
 
 @model(

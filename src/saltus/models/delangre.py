@@ -18,8 +18,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from saltus.language import cos, pi, piecewise
 from saltus.models.model import model
-from saltus.system import cos, pi, piecewise
 
 _SOURCE = (
     "Experiment: de Langre et al. Equations and values: B. E. Saunders, R. Vasconcellos, R. J. "

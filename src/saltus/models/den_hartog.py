@@ -8,8 +8,9 @@ The sign is Filippov's: at rest the friction is whatever holds the mass, up to f
 
 from __future__ import annotations
 
+from saltus.contact import friction
+from saltus.language import cos
 from saltus.models.model import model
-from saltus.system import cos, friction
 
 
 @model(

@@ -7,8 +7,8 @@ r"""Chua's circuit.
 
 from __future__ import annotations
 
+from saltus.contact import freeplay
 from saltus.models.model import model
-from saltus.system import freeplay
 
 
 @model(

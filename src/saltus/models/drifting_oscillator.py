@@ -7,8 +7,8 @@ r"""An oscillator that drifts: a mass pushes a slider on a viscoelastic foundati
 
 from __future__ import annotations
 
+from saltus.language import cos, piecewise
 from saltus.models.model import model
-from saltus.system import cos, piecewise
 
 
 @model(

@@ -7,8 +7,8 @@ oscillator.
 
 from __future__ import annotations
 
+from saltus.contact import impact
 from saltus.models.model import model
-from saltus.system import impact
 
 
 @model(

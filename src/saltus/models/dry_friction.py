@@ -6,8 +6,9 @@ r"""The dry-friction oscillator of the theory of sliding bifurcations.
 
 from __future__ import annotations
 
+from saltus.contact import friction
+from saltus.language import sin
 from saltus.models.model import model
-from saltus.system import friction, sin
 
 
 @model(

@@ -6,8 +6,8 @@ r"""A ball that bounces on the ground until it rests.
 
 from __future__ import annotations
 
+from saltus.contact import impact
 from saltus.models.model import model
-from saltus.system import impact
 
 
 @model(

@@ -15,8 +15,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from saltus.contact import freeplay
+from saltus.language import cos, pi, sin, sqrt
 from saltus.models.model import model
-from saltus.system import cos, freeplay, pi, sin, sqrt
 
 
 @model(

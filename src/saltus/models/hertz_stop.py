@@ -9,8 +9,8 @@ DISODE45.
 
 from __future__ import annotations
 
+from saltus.language import piecewise, sin, sqrt
 from saltus.models.model import model
-from saltus.system import piecewise, sin, sqrt
 
 
 @model(

@@ -7,8 +7,9 @@ r"""An oscillator with a rigid stop on one side.
 
 from __future__ import annotations
 
+from saltus.contact import impact
+from saltus.language import cos
 from saltus.models.model import model
-from saltus.system import cos, impact
 
 #: Values of publications.
 CASES = {

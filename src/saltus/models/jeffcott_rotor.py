@@ -15,8 +15,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from saltus.contact import clearance
+from saltus.language import cos, hypot, pi, piecewise, sin
 from saltus.models.model import model
-from saltus.system import clearance, cos, hypot, pi, piecewise, sin
 
 
 @model(

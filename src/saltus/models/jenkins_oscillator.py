@@ -7,8 +7,9 @@ r"""A mass on a bolted joint: a Jenkins element beside a spring and a damper.
 
 from __future__ import annotations
 
+from saltus.contact import slider
+from saltus.language import cos
 from saltus.models.model import model
-from saltus.system import cos, slider
 
 
 @model(

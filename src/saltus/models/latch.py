@@ -7,8 +7,9 @@ r"""An oscillator that a latch holds: a spring engages above one place, and lets
 
 from __future__ import annotations
 
+from saltus.contact import jump
+from saltus.language import cos
 from saltus.models.model import model
-from saltus.system import cos, jump
 
 
 @model(

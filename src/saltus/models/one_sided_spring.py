@@ -6,8 +6,8 @@ r"""A free oscillator with a second spring behind a gap on one side: code_aster'
 
 from __future__ import annotations
 
+from saltus.contact import freeplay
 from saltus.models.model import model
-from saltus.system import freeplay
 
 
 @model(

@@ -10,8 +10,9 @@ where N >= 0 is the force of the floor on the end at :math:`y - l \sin\theta`, w
 
 from __future__ import annotations
 
+from saltus.contact import impact
+from saltus.language import cos, sin
 from saltus.models.model import model
-from saltus.system import cos, impact, sin
 
 
 @model(

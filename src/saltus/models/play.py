@@ -6,9 +6,9 @@ r"""A load that an actuator drives through a play.
 
 from __future__ import annotations
 
+from saltus.contact import play as carried
+from saltus.language import cos
 from saltus.models.model import model
-from saltus.system import cos
-from saltus.system import play as carried
 
 
 @model(

@@ -9,8 +9,9 @@ r"""Two masses on a spring; one rubs on the floor, the other is pulled: code_ast
 
 from __future__ import annotations
 
+from saltus.contact import friction
+from saltus.language import where
 from saltus.models.model import model
-from saltus.system import friction, where
 
 
 @model(

@@ -9,8 +9,9 @@ r"""A pressure relief valve: a spring-loaded disc over a chamber, with impacts o
 
 from __future__ import annotations
 
+from saltus.contact import impact
+from saltus.language import sqrt
 from saltus.models.model import model
-from saltus.system import impact, sqrt
 
 
 @model(

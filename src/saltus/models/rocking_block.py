@@ -11,8 +11,8 @@ back at it.
 
 from __future__ import annotations
 
+from saltus.contact import impact
 from saltus.models.model import model
-from saltus.system import impact
 
 
 @model(

@@ -6,8 +6,9 @@ r"""A damped oscillator on a belt that changes its speed: example 2 of DISODE45.
 
 from __future__ import annotations
 
+from saltus.contact import friction
+from saltus.language import cos
 from saltus.models.model import model
-from saltus.system import cos, friction
 
 
 @model(

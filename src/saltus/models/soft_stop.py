@@ -7,8 +7,9 @@ r"""An oscillator between two soft stops.
 
 from __future__ import annotations
 
+from saltus.contact import freeplay
+from saltus.language import cos
 from saltus.models.model import model
-from saltus.system import cos, freeplay
 
 
 @model(

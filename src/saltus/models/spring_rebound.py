@@ -6,8 +6,8 @@ r"""A mass on a spring that strikes a stop: code_aster's test SDND101.
 
 from __future__ import annotations
 
+from saltus.contact import freeplay
 from saltus.models.model import model
-from saltus.system import freeplay
 
 
 @model(

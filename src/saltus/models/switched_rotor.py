@@ -12,8 +12,8 @@ with :math:`r = \sqrt{x^2 + y^2}`. In polar coordinates both sides have closed s
 
 from __future__ import annotations
 
+from saltus.language import hypot, piecewise
 from saltus.models.model import model
-from saltus.system import hypot, piecewise
 
 
 @model(

@@ -9,8 +9,8 @@ one.
 
 from __future__ import annotations
 
+from saltus.contact import jump
 from saltus.models.model import model
-from saltus.system import jump
 
 
 @model(

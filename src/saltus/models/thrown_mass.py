@@ -6,8 +6,8 @@ r"""A mass that falls onto an elastic stop: code_aster's test SDND108.
 
 from __future__ import annotations
 
+from saltus.contact import freeplay
 from saltus.models.model import model
-from saltus.system import freeplay
 
 
 @model(

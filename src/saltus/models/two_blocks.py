@@ -9,8 +9,9 @@ r"""Two blocks joined by a spring, each on a floor of two kinds: example 1 of DI
 
 from __future__ import annotations
 
+from saltus.contact import friction
+from saltus.language import piecewise
 from saltus.models.model import model
-from saltus.system import friction, piecewise
 
 
 @model(

@@ -11,8 +11,9 @@ with :math:`d = \delta k` for each of the two springs.
 
 from __future__ import annotations
 
+from saltus.contact import freeplay
+from saltus.language import cos
 from saltus.models.model import model
-from saltus.system import cos, freeplay
 
 
 @model(

@@ -20,7 +20,7 @@ PACKAGE = Path(__file__).parents[1]
 #: study files stand in the equations, values and arguments themselves.
 COMPUTING = (
     "fence", "intervals", "interrupt", "unit_table", "units", "whole_files", "cache",
-    "system", "kernels", "codegen", "flow", "results", "analysis",
+    "language", "contact", "system", "kernels", "codegen", "flow", "results", "analysis",
 )  # fmt: skip
 #: Fields of Python's syntax tree without effect on the code.
 _IDLE = ("kind", "type_comment", "ctx")

@@ -1,6 +1,8 @@
-"""The System layer: equations of motion with contacts, traced from a Python function.
+"""The System: equations of motion with contacts, traced from a Python function.
 
->>> from saltus.system import cos, freeplay, pi, system
+>>> from saltus.contact import freeplay
+>>> from saltus.language import cos, pi
+>>> from saltus.system import system
 >>> @system(states="x v", forced_at="frequency")
 ... def rig(t, x, v, *, stiffness=1.4e4, gap=4e-4, force=4.0, frequency=15.0):
 ...     return v, force * cos(2 * pi * frequency * t) - freeplay(x, stiffness=stiffness, gap=gap)
@@ -11,54 +13,15 @@
 import sys
 from types import ModuleType
 
-from saltus.system.clocks import mod
-from saltus.system.compositions import (
-    acos,
-    asin,
-    atan2,
-    clip,
-    cosh,
-    friction,
-    heaviside,
-    hypot,
-    sign,
-    sinh,
-    where,
-)
-from saltus.system.declared import impact, jump
-from saltus.system.functions import (
-    abs,
-    atan,
-    cos,
-    exp,
-    log,
-    max,
-    min,
-    pi,
-    piecewise,
-    sin,
-    sqrt,
-    tan,
-    tanh,
-)
-from saltus.system.guards import Guard
-from saltus.system.inputs import pulse, recorded, sawtooth, square
-from saltus.system.laws import flores, freeplay, hertz, hunt_crossley, lankarani_nikravesh
-from saltus.system.memory import iwan, play, slider
+from saltus.system.checks import check_values
+from saltus.system.guard_units import gap_units
 from saltus.system.regularisation import regularise
-from saltus.system.rotors import clearance
 from saltus.system.structures import Contact, Force, structure
 from saltus.system.system import System
-from saltus.system.tables import table
 from saltus.system.trace import system
 
 __all__ = [
-    "Contact", "Force", "Guard", "System", "abs", "acos", "asin", "atan", "atan2", "clearance",
-    "clip", "cos", "cosh", "exp", "flores", "freeplay", "friction", "heaviside", "hertz",
-    "hunt_crossley", "hypot", "impact", "iwan", "jump", "lankarani_nikravesh", "log", "max",
-    "min", "mod", "pi", "piecewise", "play", "pulse", "recorded", "regularise", "sawtooth", "sign",
-    "sin", "sinh", "slider", "sqrt", "square", "structure", "system", "table", "tan", "tanh",
-    "where",
+    "Contact", "Force", "System", "check_values", "gap_units", "regularise", "structure", "system",
 ]  # fmt: skip
 
 

@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from saltus.contact.declared import outside, pushes_on
+from saltus.contact.dry_friction import drives, sticks_less
+from saltus.contact.guards import Law
+from saltus.contact.overlaps import overlapping
 from saltus.errors import ParameterError, TraceError
-from saltus.system.compositions import drives, sticks_less
-from saltus.system.declared import outside, pushes_on
-from saltus.system.evaluate import evaluate
-from saltus.system.expression import varies
-from saltus.system.guards import Law
-from saltus.system.overlaps import check_overlaps
+from saltus.language.evaluate import evaluate
+from saltus.language.expression import varies
+from saltus.system.equations_of_motion import EquationsOfMotion
 from saltus.units import to_si
-
-if TYPE_CHECKING:
-    from saltus.system.system import System
-
 
 #: Most boundaries of a system: each is a bit of the mode, and a double holds 53 bits.
 MOST_GUARDS = 52
@@ -34,7 +31,7 @@ def check_guards(system: str, count: int) -> None:
         )
 
 
-def check_values(system: System, values: Mapping[str, Any]) -> None:
+def check_values(system: EquationsOfMotion, values: Mapping[str, Any]) -> None:
     """Raise a ParameterError if pieces overlap with some values of the parameters, a restitution is
     outside [0, 1], a coefficient of friction or a force of friction is negative, or friction holds
     less at rest than in motion.
@@ -46,10 +43,12 @@ def check_values(system: System, values: Mapping[str, Any]) -> None:
     values : mapping of str to float or array
         Values of all parameters [SI]; arrays of one length, one for each trajectory.
     """
-    check_overlaps(system, values)
+    why = overlapping(system.field, system.guards, system.states, values)
+    if why is not None:
+        raise ParameterError(f"{system.name}: {why}")
     for guard in system.guards:
         law = guard.law or Law("jump")
-        for part, low, high, why in (
+        for part, low, high, told in (
             (law.restitution, 0.0, 1.0, outside),
             (law.friction, 0.0, np.inf, pushes_on),
             *((level, 0.0, np.inf, drives) for level in law.levels),
@@ -61,7 +60,7 @@ def check_values(system: System, values: Mapping[str, Any]) -> None:
             wrong = ~((found >= low) & (found <= high))
             if wrong.any():
                 raise ParameterError(
-                    f"{system.name}, contact {guard.name!r}: {why(float(found[wrong][0]))}"
+                    f"{system.name}, contact {guard.name!r}: {told(float(found[wrong][0]))}"
                 )
 
 
@@ -116,7 +115,7 @@ def resolve_one(name: str, value: Any, unit: str, forced_at: str | None) -> floa
     return result
 
 
-def point(system: System, t: Any, y: Any) -> tuple[np.ndarray, np.ndarray]:
+def point(system: EquationsOfMotion, t: Any, y: Any) -> tuple[np.ndarray, np.ndarray]:
     """Times and states [SI] as arrays of numbers that fit together; the states come first.
 
     Raises

@@ -4,63 +4,25 @@ from __future__ import annotations
 
 import html
 import math
-import re
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING
 
+from saltus.contact.guards import Law, at_equality, is_hold
+from saltus.contact.reduction import free_field
 from saltus.errors import counted
-from saltus.system.expression import ELEMENTARY, Condition, Expr, state, varies
-from saltus.system.guards import Law, at_equality, is_hold
-from saltus.system.reduction import free_field
-from saltus.system.text import _ATOM, _PRODUCT, PI_MULTIPLES, Writer
+from saltus.language.evaluate import evaluate
+from saltus.language.expression import Expr, state, varies
+from saltus.language.latex import LatexWriter, latex_name
+from saltus.language.text import Writer
+from saltus.system.equations_of_motion import EquationsOfMotion
 from saltus.units import from_si
-
-if TYPE_CHECKING:
-    from saltus.system.system import System
 
 #: How the description of a structure begins.
 STRUCTURE = "Structure of"
-_GREEK = frozenset(
-    [
-        "alpha",
-        "beta",
-        "gamma",
-        "delta",
-        "epsilon",
-        "zeta",
-        "eta",
-        "theta",
-        "iota",
-        "kappa",
-        "lambda",
-        "mu",
-        "nu",
-        "xi",
-        "pi",
-        "rho",
-        "sigma",
-        "tau",
-        "phi",
-        "chi",
-        "psi",
-        "omega",
-        "Gamma",
-        "Delta",
-        "Theta",
-        "Lambda",
-        "Xi",
-        "Pi",
-        "Sigma",
-        "Phi",
-        "Psi",
-        "Omega",
-    ]
-)
 
 
 # -- text ------------------------------------------------------------------------------------------
-def equation_lines(system: System) -> list[str]:
+def equation_lines(system: EquationsOfMotion) -> list[str]:
     """The equations, one line each, named parts first."""
     field = free_field(system.field, system.guards)
     writer = _writer(Writer, system, field)
@@ -75,7 +37,7 @@ def equation_lines(system: System) -> list[str]:
     return writer.lines + lines
 
 
-def _jumps(system: System, writer: Writer) -> Iterator[tuple[str, str, Expr]]:
+def _jumps(system: EquationsOfMotion, writer: Writer) -> Iterator[tuple[str, str, Expr]]:
     """Where the state jumps: the place, a state and its new value."""
     for number, guard in enumerate(system.guards):
         if guard.law is None:
@@ -85,7 +47,7 @@ def _jumps(system: System, writer: Writer) -> Iterator[tuple[str, str, Expr]]:
                 yield writer.side(number, guard.law.side < 0), name, entry
 
 
-def system_text(system: System) -> str:
+def system_text(system: EquationsOfMotion) -> str:
     """The block that ``repr`` shows: equations, guards, parameters."""
     head = (
         f"System {system.name}: {counted(len(system.states), 'state')}, "
@@ -109,30 +71,28 @@ def system_text(system: System) -> str:
     return "\n".join(line for block in blocks for line in block)
 
 
-def _about(system: System) -> list[str]:
+def _about(system: EquationsOfMotion) -> list[str]:
     """What is said of a structure, whose equations alone don't tell its frequencies."""
     words = system.description if system.description.startswith(STRUCTURE) else ""
     return textwrap.wrap(f"{'about':<12}{words}", 100, subsequent_indent=" " * 12) if words else []
 
 
-def _boundaries(system: System) -> int:
+def _boundaries(system: EquationsOfMotion) -> int:
     """How many boundaries there are: hold guards aren't any."""
     return sum(not is_hold(guard) for guard in system.guards)
 
 
-def _forcing(system: System) -> str:
+def _forcing(system: EquationsOfMotion) -> str:
     if system.forced_at is None:
         return ", not forced"
     return (
-        f", forced at {system.forced_at} = {system.parameter_text(system.forced_at)} (T = "
+        f", forced at {system.forced_at} = {_value(system, system.forced_at)} (T = "
         f"{from_si(system.period(), 's')})"
     )
 
 
-def _guard_rows(system: System) -> list[tuple[str, str]]:
+def _guard_rows(system: EquationsOfMotion) -> list[tuple[str, str]]:
     """Name and place of each guard."""
-    from saltus.system.evaluate import evaluate
-
     writer = _writer(Writer, system, free_field(system.field, system.guards))
     rows = []
     for number, guard in enumerate(system.guards):
@@ -150,7 +110,7 @@ def _guard_rows(system: System) -> list[tuple[str, str]]:
     return rows
 
 
-def _by_law(law: Law | None, place: str, system: System, writer: Writer) -> str:
+def _by_law(law: Law | None, place: str, system: EquationsOfMotion, writer: Writer) -> str:
     """What happens at a boundary, and where it is."""
     if law is None:
         return place
@@ -170,19 +130,17 @@ def _by_law(law: Law | None, place: str, system: System, writer: Writer) -> str:
     return f"impact with restitution {_number(law.restitution, system, writer)}{rough} at {place}"
 
 
-def _number(part: Expr, system: System, writer: Writer) -> str:
+def _number(part: Expr, system: EquationsOfMotion, writer: Writer) -> str:
     """A plain number of a law: its value, or how it depends on the state."""
     if varies(part):
         return writer.text(part)
-    from saltus.system.evaluate import evaluate
-
     (value,) = evaluate([part], values=system.values)
     return from_si(float(value) + 0.0, "1")
 
 
-def _parameter_rows(system: System) -> list[tuple[str, str]]:
+def _parameter_rows(system: EquationsOfMotion) -> list[tuple[str, str]]:
     """Name and value of each parameter; an angle in degrees too."""
-    texts = {name: system.parameter_text(name) for name in system.values}
+    texts = {name: _value(system, name) for name in system.values}
     degrees = {
         name: from_si(math.degrees(value), "")
         for name, value in system.values.items()
@@ -194,7 +152,12 @@ def _parameter_rows(system: System) -> list[tuple[str, str]]:
     ]
 
 
-def _writer(kind: type, system: System, field: Sequence[Expr]) -> Writer:
+def _value(system: EquationsOfMotion, parameter: str) -> str:
+    """The value of a parameter as people write it."""
+    return from_si(system.values[parameter], system.units[parameter])
+
+
+def _writer(kind: type, system: EquationsOfMotion, field: Sequence[Expr]) -> Writer:
     roots = [*field, *(guard.gap for guard in system.guards if not is_hold(guard))]
     roots += [entry for guard in system.guards if guard.law for entry in guard.law.reset]
     return kind(system.guards, shared=roots, taken=(*system.states, *system.values, "t"))
@@ -210,109 +173,7 @@ def _aligned(rows: list[tuple[str, str]]) -> list[str]:
 
 
 # -- formulas --------------------------------------------------------------------------------------
-class LatexWriter(Writer):
-    """Writes expressions as LaTeX math."""
-
-    name_from = 200
-    greater, less = r" \gt ", r" \lt "
-
-    def joint(self, both: bool) -> str:
-        """The word between two conditions."""
-        return r" \;\text{and}\; " if both else r" \;\text{or}\; "
-
-    def name(self, name: str) -> str:
-        """A name as a symbol."""
-        return latex_name(name)
-
-    def number(self, value: float) -> tuple[str, int]:
-        """A constant, powers of ten written out."""
-        if value in PI_MULTIPLES:
-            return {"pi": r"\pi", "2*pi": r"2 \pi", "4*pi": r"4 \pi", "pi/2": r"\frac{\pi}{2}"}[
-                PI_MULTIPLES[value]
-            ], _ATOM
-        text, strength = super().number(value)
-        mantissa, _, exponent = text.partition("e")
-        return (
-            (text, strength)
-            if not exponent
-            else (
-                rf"{mantissa} \cdot "
-                rf"10^{{{exponent}}}",
-                min(strength, _PRODUCT),
-            )
-        )
-
-    def infix(self, op: str, left: Expr, right: Expr) -> tuple[str, int]:
-        """Quotients as fractions, products without a sign."""
-        if op == "div":
-            return rf"\frac{{{self.text(left)}}}{{{self.text(right)}}}", _ATOM
-        if op == "mul":
-            return (
-                rf"{self.part(left, _PRODUCT)} \, "
-                rf"{self.part(right, _PRODUCT, after_sign=True)}"
-            ), _PRODUCT
-        return super().infix(op, left, right)
-
-    def power(self, base: Expr, exponent: Expr) -> str:
-        """A superscript."""
-        text = self.part(base, _ATOM)
-        braced = text if base.op in ("state", "param", "time") else f"{{{text}}}"
-        return f"{braced}^{{{self.text(exponent)}}}"
-
-    def call(self, function: str, *arguments: Expr) -> str:
-        """A function or a root."""
-        inner = ", ".join(map(self.text, arguments))
-        if function == "sqrt":
-            return rf"\sqrt{{{inner}}}"
-        if function not in ELEMENTARY:
-            return latex_name(function) + self.parentheses(inner)
-        return rf"\{'arctan' if function == 'atan' else function}{self.parentheses(inner)}"
-
-    def piece(self, value: Expr, condition: Condition) -> str:
-        """One line of cases."""
-        return rf"{self.text(value)} & \text{{if }} {self.condition(condition)} \\"
-
-    def piecewise(self, pieces: list[str], otherwise: Expr) -> str:
-        """Cases."""
-        return (
-            rf"\begin{{cases}} {' '.join(pieces)} {self.text(otherwise)} & \text{{otherwise}} "
-            rf"\end{{cases}}"
-        )
-
-    def parentheses(self, text: str) -> str:
-        """Parentheses that grow."""
-        return rf"\left({text}\right)"
-
-    def line(self, name: str, text: str) -> str:
-        """An aligned line."""
-        return f"{name} &= {text}"
-
-
-def latex_name(name: str) -> str:
-    r"""A name as LaTeX: one letter in italics, Greek letters by name, ``m_1`` with a subscript,
-    words upright.
-    """
-    head, _, rest = name.partition("_")
-    letters = re.fullmatch(r"([A-Za-z]+?)(\d*)", head)
-    if letters is None or not (len(letters[1]) == 1 or letters[1] in _GREEK) or "_" in rest:
-        return (
-            r"\mathrm{"
-            + "".join(
-                c if c.isalnum() and c.isascii() else r"\_" if c == "_" else rf"\text{{{c}}}"
-                for c in name
-            )
-            + "}"
-        )
-    symbol = letters[1] if len(letters[1]) == 1 else "\\" + letters[1]
-    below = rest or letters[2]
-    if letters[2] and rest:  # m2_b
-        return rf"{symbol}_{{\mathrm{{{letters[2]} {rest}}}}}"
-    if not below:
-        return symbol
-    return f"{symbol}_{{{below if below.isdigit() or len(below) == 1 else latex_name(below)}}}"
-
-
-def latex_lines(system: System) -> list[str]:
+def latex_lines(system: EquationsOfMotion) -> list[str]:
     """The equations as LaTeX, aligned at ``&=``."""
     field = free_field(system.field, system.guards)
     writer = _writer(LatexWriter, system, field)
@@ -327,7 +188,7 @@ def latex_lines(system: System) -> list[str]:
     return writer.lines + lines
 
 
-def system_html(system: System) -> str:
+def system_html(system: EquationsOfMotion) -> str:
     """The notebook view: formulas, guards and parameters."""
     formulas = " \\\\ ".join(latex_lines(system))
     parts = [

@@ -5,7 +5,7 @@ that saltus hasn't.
 from __future__ import annotations
 
 from saltus.errors import nearest
-from saltus.system.foreign import ADVICE
+from saltus.language.foreign import ADVICE
 
 _RUN = "Write sl.simulate(system, start, t_end=...)."
 _PAIR = "sl.simulate(system, start, t_end=..., method={})."

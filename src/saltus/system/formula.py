@@ -16,15 +16,15 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import partial, reduce
 from typing import Any
 
+from saltus.contact.forces import flores, freeplay, hertz, hunt_crossley, lankarani_nikravesh
+from saltus.contact.memory import play, slider
 from saltus.errors import SaltusError, TraceError, nearest, shown
-from saltus.system import compositions, functions
-from saltus.system.clocks import mod
-from saltus.system.expression import Condition
-from saltus.system.inputs import pulse, sawtooth, square
-from saltus.system.laws import flores, freeplay, hertz, hunt_crossley, lankarani_nikravesh
-from saltus.system.memory import play, slider
-from saltus.system.names import why_no_name
-from saltus.system.tables import Table, look_up
+from saltus.language import compositions, functions
+from saltus.language.clocks import mod
+from saltus.language.expression import Condition
+from saltus.language.inputs import pulse, sawtooth, square
+from saltus.language.names import why_no_name
+from saltus.language.tables import Table, look_up
 
 #: Longest formula [characters].
 LONGEST = 1000
@@ -50,7 +50,6 @@ _COMPOSED = (
     "atan2",
     "clip",
     "cosh",
-    "friction",
     "heaviside",
     "hypot",
     "sign",

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+from saltus.contact.contacts import renamed
+from saltus.contact.guards import equation_of, is_hold, number_of
 from saltus.errors import TraceError, shown
-from saltus.system.contacts import renamed
-from saltus.system.expression import Condition, Relation
-from saltus.system.guards import equation_of, is_hold, number_of
-from saltus.system.names import why_no_title
+from saltus.language.expression import Condition, Relation
+from saltus.language.names import why_no_title
 from saltus.system.quantity import Quantity, called
 from saltus.system.system import System
 

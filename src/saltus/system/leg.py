@@ -10,9 +10,9 @@ from __future__ import annotations
 import functools
 
 from saltus.errors import ParameterError
-from saltus.system import expression as ex
-from saltus.system.expression import Expr
-from saltus.system.singular import assuming
+from saltus.language import expression as ex
+from saltus.language.expression import Expr
+from saltus.language.known_sides import assuming
 from saltus.system.system import System
 
 #: Names of the states that a leg adds, in their order.

@@ -14,11 +14,11 @@ import functools
 import math
 from dataclasses import dataclass, replace
 
+from saltus.contact.guards import Guard, Law
 from saltus.errors import ParameterError
-from saltus.system import expression as ex
-from saltus.system.derivatives import gradient
-from saltus.system.expression import And, Condition, Expr, Not, Or, Relation
-from saltus.system.guards import Guard, Law
+from saltus.language import expression as ex
+from saltus.language.derivatives import gradient
+from saltus.language.expression import And, Condition, Expr, Not, Or, Relation
 from saltus.system.system import System
 
 #: Name of the state that holds the period [s].

@@ -7,15 +7,16 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from saltus.contact.guards import Guard, is_hold
+from saltus.contact.reduction import free_field
 from saltus.errors import TraceError
-from saltus.system.clocks import cycles_of
-from saltus.system.derivatives import differentiate, time_derivative
-from saltus.system.evaluate import evaluate, sides
-from saltus.system.expression import (
+from saltus.language.clocks import cycles_of
+from saltus.language.derivatives import differentiate, time_derivative
+from saltus.language.evaluate import evaluate
+from saltus.language.expression import (
     TIME,
     Expr,
     constant,
@@ -25,11 +26,8 @@ from saltus.system.expression import (
     relations_in,
     walk,
 )
-from saltus.system.guards import Guard, is_hold
-from saltus.system.reduction import free_field
-
-if TYPE_CHECKING:
-    from saltus.system.system import System
+from saltus.system.equations_of_motion import EquationsOfMotion
+from saltus.system.modes import sides
 
 #: Rounding allowed in the number of cycles in a period: relative, and absolute for a phase
 #: [cycles].
@@ -99,7 +97,7 @@ def _rate(angle: Expr) -> Expr | None:
     return None if depends_on(rate, ("time", "state")) else rate
 
 
-def check_periodic(system: System) -> None:
+def check_periodic(system: EquationsOfMotion) -> None:
     """Raise a TraceError if the equations of a forced system differ after one period of the
     forcing.
 
@@ -120,7 +118,7 @@ def check_periodic(system: System) -> None:
         _check_samples(system, period, unsure)
 
 
-def _entries(system: System) -> list[Expr]:
+def _entries(system: EquationsOfMotion) -> list[Expr]:
     """The field where no contact is held, then the gaps of the guards and what laws set."""
     return list(_written(system.field, system.guards))
 
@@ -132,7 +130,7 @@ def _written(field: tuple[Expr, ...], guards: tuple[Guard, ...]) -> tuple[Expr, 
     return (*free_field(field, guards), *gaps, *resets)
 
 
-def _clocks_repeat(timing: Timing, system: System, period: float) -> bool:
+def _clocks_repeat(timing: Timing, system: EquationsOfMotion, period: float) -> bool:
     """Whether every clock has a whole number of cycles in a period: by formula, since samples miss
     pulses.
     """
@@ -147,13 +145,13 @@ def _clocks_repeat(timing: Timing, system: System, period: float) -> bool:
     )
 
 
-def _phases_repeat(timing: Timing, system: System, period: float) -> bool:
+def _phases_repeat(timing: Timing, system: EquationsOfMotion, period: float) -> bool:
     """Whether every phase has a whole number of cycles in a period."""
     cycles = [rate * period for rate in evaluate(timing.phases, values=system.values)]
     return all(abs(number - np.round(number)) <= PHASE_MISS for number in cycles)
 
 
-def _check_samples(system: System, period: float, unsure: list[int]) -> None:
+def _check_samples(system: EquationsOfMotion, period: float, unsure: list[int]) -> None:
     """Raise a TraceError if one of these entries, or its derivative with respect to t, differs
     after a period.
 
@@ -182,7 +180,7 @@ def _check_samples(system: System, period: float, unsure: list[int]) -> None:
             raise TraceError(_not_periodic(system, unsure[place % len(unsure)], period))
 
 
-def _not_periodic(system: System, entry: int, period: float) -> str:
+def _not_periodic(system: EquationsOfMotion, entry: int, period: float) -> str:
     """The message about the entry of the field or the guard that doesn't repeat."""
     count = len(system.states)
     what = (

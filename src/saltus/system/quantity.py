@@ -15,8 +15,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from saltus.contact.guards import Guard, Law, bits_in, expressions_of, join_guards, surface_guard
+from saltus.contact.singular import lifted
+from saltus.contact.surfaces import with_held_signs
 from saltus.errors import ParameterError, TraceError, nearest, shown
-from saltus.system.expression import (
+from saltus.language.expression import (
     TIME,
     Bit,
     Expr,
@@ -32,12 +35,9 @@ from saltus.system.expression import (
     sub,
     substituted,
 )
-from saltus.system.guards import Guard, Law, bits_in, expressions_of, join_guards, surface_guard
-from saltus.system.names import why_no_name
-from saltus.system.singular import lifted
-from saltus.system.surfaces import with_held_signs
+from saltus.language.names import why_no_name
+from saltus.system.explained import explained, place
 from saltus.system.system import System
-from saltus.system.trace import explained, place
 from saltus.units import check_declared, to_si
 
 #: How the name of a state that is remembered ends: as no user can write it.

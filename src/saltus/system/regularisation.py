@@ -13,15 +13,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
+from saltus.contact.blend import STEPS, Step, blended
+from saltus.contact.guards import is_hold
+from saltus.contact.reduction import free_field
+from saltus.contact.singular import set_aside
 from saltus.errors import ParameterError, TraceError, among, nearest, shown
+from saltus.language import expression as ex
+from saltus.language.names import why_no_name
 from saltus.system import checks
-from saltus.system import expression as ex
-from saltus.system.blend import STEPS, Step, blended
-from saltus.system.dimensions import gap_units
-from saltus.system.guards import is_hold
-from saltus.system.names import why_no_name
-from saltus.system.reduction import free_field
-from saltus.system.singular import set_aside
+from saltus.system.guard_units import gap_units
 from saltus.system.system import System
 from saltus.units import coherent_unit
 
@@ -116,7 +116,10 @@ def regularise(
     parameters, values, units = _parameters(system, named)
     _check_both_sides(system, parameters)
     called = law if isinstance(law, str) else getattr(law, "__name__", "law").strip("<>")
-    field, guards = blended(system, step, parameters)
+    try:
+        field, guards = blended(system.field, system.guards, system.states, step, parameters)
+    except TraceError as error:
+        raise TraceError(f"{system.name}, regularised: {error}") from error
     slips = " Friction slips only: its static limit is left out." if static else ""
     description = (
         f"Regularised: {called} over {', '.join(values)} in place of the boundaries "

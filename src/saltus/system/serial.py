@@ -5,11 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from saltus.contact.guards import Guard, Law, bits_in, expressions_of, is_hold
 from saltus.errors import SaltusError, among, shown
-from saltus.system.clocks import affine, switch
-from saltus.system.expression import (
+from saltus.language.clocks import affine, switch
+from saltus.language.expression import (
     ELEMENTARY,
     And,
     Bit,
@@ -22,13 +23,10 @@ from saltus.system.expression import (
     varies,
     walk,
 )
-from saltus.system.guards import Guard, Law, bits_in, expressions_of, is_hold
-from saltus.system.names import why_no_name, why_no_text, why_no_title, why_not_together
-from saltus.system.tables import Table
+from saltus.language.names import why_no_name, why_no_text, why_no_title, why_not_together
+from saltus.language.tables import Table
+from saltus.system.equations_of_motion import EquationsOfMotion
 from saltus.units import check_declared
-
-if TYPE_CHECKING:
-    from saltus.system.system import System
 
 #: Changes whenever the meaning of the data does. Systems without a law of contact, and with one.
 FORMAT, WITH_LAWS = "saltus-system/1", "saltus-system/2"
@@ -56,7 +54,7 @@ _OPERANDS |= {"mod": 2, "table": 1}
 _OPERANDS |= dict.fromkeys(ELEMENTARY, 1)
 
 
-def to_dict(system: System) -> dict[str, Any]:
+def to_dict(system: EquationsOfMotion) -> dict[str, Any]:
     """A system as JSON-able data; floats are exact."""
     return {
         "format": _format(system),
@@ -70,11 +68,11 @@ def to_dict(system: System) -> dict[str, Any]:
     }
 
 
-def _format(system: System) -> str:
+def _format(system: EquationsOfMotion) -> str:
     return WITH_LAWS if any(guard.law for guard in system.guards) else FORMAT
 
 
-def _equations(system: System) -> dict[str, Any]:
+def _equations(system: EquationsOfMotion) -> dict[str, Any]:
     """The part that the generated code depends on."""
     roots = [*system.field]
     for guard in system.guards:
@@ -120,7 +118,7 @@ def _law_data(law: Law, index: Mapping[Expr, int]) -> dict[str, Any]:
     return data | {name: index[one] for name, one in single.items() if one is not None}
 
 
-def fingerprint(system: System) -> str:
+def fingerprint(system: EquationsOfMotion) -> str:
     """SHA-256 of the equations: field, guards, names of states and parameters, and what sets the
     period. Not of values, name or source.
     """

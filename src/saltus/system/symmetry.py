@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from saltus.system.evaluate import evaluate, sides
-from saltus.system.expression import depends_on
+from saltus.language.evaluate import evaluate
+from saltus.language.expression import depends_on
+from saltus.system.modes import sides
 from saltus.system.system import System
 
 #: States at which both sides are compared, and powers of ten between which their sizes lie.

@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from saltus.contact.singular import is_steep
 from saltus.errors import ParameterError, among, nearest, shown
+from saltus.language.derivatives import gradient
+from saltus.language.expression import Expr
 from saltus.system import checks, serial
-from saltus.system.derivatives import gradient
-from saltus.system.expression import Expr
+from saltus.system.display import equation_lines, system_html, system_text
+from saltus.system.equations_of_motion import EquationsOfMotion
 from saltus.system.fixed import Units, Values, no_change
-from saltus.system.guards import Guard
+from saltus.system.modes import field
 from saltus.system.periodic import check_periodic
-from saltus.system.singular import is_steep
+from saltus.units import from_si
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class System:
+class System(EquationsOfMotion):
     """Equations of motion with contacts. Made by :func:`saltus.system`, not by hand; never changed,
     only copied.
 
@@ -47,21 +49,11 @@ class System:
         The system whose variational equations this one carries (see tangent.py); None for any
         other.
     made : int
-        How many of the last states elements with a memory have brought (see memory.py); a start
-        that doesn't give them is zero.
+        How many of the last states elements with a memory have brought (see contact/memory.py); a
+        start that doesn't give them is zero.
     """
 
-    name: str
-    states: tuple[str, ...]
-    field: tuple[Expr, ...]
-    guards: tuple[Guard, ...]
-    values: Mapping[str, float]
-    units: Mapping[str, str]
-    forced_at: str | None = None
-    source: str = ""
-    description: str = ""
     tangent_of: System | None = None
-    made: int = 0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "values", Values(self.values))
@@ -144,31 +136,6 @@ class System:
             )
         return name
 
-    def period(self, values: Mapping[str, Any] | None = None) -> Any:
-        """Forcing period T [s]; None for a system that isn't forced.
-
-        Parameters
-        ----------
-        values : mapping of str to float or array, optional
-            Values [SI] that replace the system's own; with an array of frequencies the result is an
-            array.
-        """
-        if self.forced_at is None:
-            return None
-        if values is not None and not isinstance(values, Mapping):
-            raise ParameterError(
-                f"values must be a mapping, such as {{{self.forced_at!r}: 15.0}}, "
-                f"not {shown(values)}."
-            )
-        frequency = (values or {}).get(self.forced_at, self.values[self.forced_at])
-        try:
-            return (2 * math.pi if self.units[self.forced_at] == "rad/s" else 1.0) / frequency
-        except (TypeError, ArithmeticError):
-            raise ParameterError(
-                f"{self.forced_at} must be a positive number or an array of them, "
-                f"not {shown(frequency)}."
-            ) from None
-
     # -- equations ---------------------------------------------------------------------------------
     @functools.cached_property
     def jacobian(self) -> tuple[tuple[Expr, ...], ...]:
@@ -216,8 +183,6 @@ class System:
             If ``t`` or ``y`` holds something else than numbers, their shapes don't fit, or ``y``
             has another number of states.
         """
-        from saltus.system.evaluate import field
-
         return field(self, *checks.point(self, t, y))
 
     def equations(self) -> list[str]:
@@ -228,8 +193,6 @@ class System:
 
     @functools.cached_property
     def _lines(self) -> list[str]:
-        from saltus.system.display import equation_lines
-
         return equation_lines(self)
 
     def fingerprint(self) -> str:
@@ -255,18 +218,12 @@ class System:
         """A parameter's value as people write it, such as ``0.4 mm``. Raises ParameterError for an
         unknown parameter.
         """
-        from saltus.units import from_si
-
         return from_si(self.values[self._known(name)], self.units[name])
 
     def __repr__(self) -> str:
-        from saltus.system.display import system_text
-
         return system_text(self)
 
     def _repr_html_(self) -> str:
-        from saltus.system.display import system_html
-
         return system_html(self)
 
     # -- data --------------------------------------------------------------------------------------

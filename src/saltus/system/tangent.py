@@ -12,7 +12,8 @@ from __future__ import annotations
 import functools
 from dataclasses import replace
 
-from saltus.system.expression import Expr, add, constant, mul, state
+from saltus.language.expression import Expr, mul, state
+from saltus.language.sums import total
 from saltus.system.system import System
 
 
@@ -63,7 +64,7 @@ def _extension(
     rows = [[state(derivative_name(a, b)) for b in states] for a in states]
     size = range(len(states))
     rates = tuple(
-        _sum([mul(jacobian[i][k], rows[k][j]) for k in size if not _is_zero(jacobian[i][k])])
+        total([mul(jacobian[i][k], rows[k][j]) for k in size if not _is_zero(jacobian[i][k])])
         for i in size
         for j in size
     )
@@ -73,10 +74,3 @@ def _extension(
 
 def _is_zero(node: Expr) -> bool:
     return node.op == "const" and node.payload == 0
-
-
-def _sum(terms: list[Expr]) -> Expr:
-    total = constant(0.0)
-    for i, term in enumerate(terms):
-        total = add(total, term) if i else term
-    return total

@@ -9,17 +9,18 @@ from __future__ import annotations
 
 import functools
 import inspect
-import sysconfig
-import traceback
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import zip_longest
-from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
 from saltus.announce import working
+from saltus.contact.contacts import find_contacts
+from saltus.contact.declared import Declared, check_law, declarations
+from saltus.contact.guards import expressions_of
+from saltus.contact.memory import Element, elements, rates_of
 from saltus.errors import (
     ParameterError,
     TraceError,
@@ -28,44 +29,18 @@ from saltus.errors import (
     nearest,
     shown,
 )
+from saltus.language.dimensions import DimensionCheck
+from saltus.language.expression import TIME, Expr, as_expr, observed, parameter, state, walk
+from saltus.language.names import why_no_name, why_no_text, why_no_title, why_not_together
 from saltus.system import checks
-from saltus.system.contacts import find_contacts
-from saltus.system.declared import Declared, declarations
-from saltus.system.dimensions import DimensionCheck
-from saltus.system.expression import TIME, Expr, as_expr, observed, parameter, state, walk
-from saltus.system.foreign import OWN_FUNCTIONS
+from saltus.system.explained import explained, place
 from saltus.system.formula import Equations, Formula
-from saltus.system.guards import expressions_of
-from saltus.system.memory import Element, elements, rates_of
-from saltus.system.names import why_no_name, why_no_text, why_no_title, why_not_together
+from saltus.system.guard_names import with_guard_names
 from saltus.system.system import System
 from saltus.units import check_declared, coherent_unit
 
 P = ParamSpec("P")
 R = TypeVar("R")
-
-_HERE = str(Path(__file__).parent.parent)
-_LIBRARIES = tuple(
-    {sysconfig.get_path(key) for key in ("stdlib", "platstdlib", "purelib", "platlib")} - {None}
-)
-#: Calls of functions that are often called with positional arguments.
-_CALLS = {
-    "freeplay": "sl.freeplay(x, stiffness=..., gap=...), or lower_gap= and upper_gap=, damping= "
-    "with velocity=, preload=",
-    "friction": "sl.friction(v, slip=..., stick=...)",
-    "impact": "sl.impact(x < gap, v, restitution=0.8), after the rates",
-    "piecewise": "sl.piecewise((value, condition), ..., otherwise=value)",
-    "where": "sl.where(condition, value, otherwise)",
-    "pulse": "sl.pulse(t, duration, start=..., every=..., shape=...)",
-    "mod": "sl.mod(t, T)",
-    "clip": "sl.clip(x, low, high)",
-    "table": 'sl.table(t, points, values, kind="linear", outside="hold")',
-}
-_HOW_TO = (
-    "Write the equation with + - * / **, comparisons inside sl.piecewise(...), and "
-    "functions "
-    "that can be traced. "
-) + OWN_FUNCTIONS
 
 
 def _known_words(function: Callable[P, R]) -> Callable[P, R]:
@@ -157,7 +132,7 @@ def system(
 
     Examples
     --------
-    >>> from saltus.system import cos, pi, piecewise
+    >>> from saltus.language import cos, pi, piecewise
     >>> @system(states="x v", forced_at="frequency", units={"x": "m", "v": "m/s"})
     ... def rig(
     ...     t, x, v, *, mass="3 kg", stiffness="14 kN/m", gap="0.4 mm", force="4 N",
@@ -179,8 +154,6 @@ def system(
     _check_arguments(units, guards, forced_at, name, check_units)
 
     def decorate(function: Callable[..., Any]) -> System:
-        from saltus.system.guard_names import with_guard_names  # which builds on this module
-
         if not callable(function):
             raise TraceError(
                 f"@sl.system stands above a function, def rig(t, {', '.join(map(str, names))}, *, "
@@ -377,7 +350,7 @@ def _traced(
         if dimensions is not None:
             dimensions.check_rates(derivatives)
             for law in laws:
-                dimensions.check_law(law)
+                check_law(law, dimensions)
         derivatives += rates_of(remembered, states, derivatives).values()
     except Exception as error:
         kind = UnitError if isinstance(error, UnitError) else TraceError
@@ -508,49 +481,3 @@ def _check_returned(made: Sequence[Declared], laws: Sequence[Declared]) -> None:
                 f"{law!r} isn't returned, so it would do nothing. Return it after the rates: "
                 f"return v, force/mass, {law.name}(...)."
             )
-
-
-def explained(error: Exception, function: Callable[..., Any], title: str) -> str:
-    """The message for an error inside the user's function: where, what, and what to
-    write instead.
-    """
-    if isinstance(function, Formula | Equations) and isinstance(error, TraceError | UnitError):
-        return f"{title}: {error}"
-    code = getattr(inspect.unwrap(function), "__code__", None)
-    own_file = code.co_filename if code else ""
-    frames = [
-        frame
-        for frame in traceback.extract_tb(error.__traceback__)
-        if frame.filename == own_file or not frame.filename.startswith((_HERE, *_LIBRARIES))
-    ]
-    where = place(function)
-    if frames:
-        where = f"{frames[-1].filename}, line {frames[-1].lineno}"
-        where += f": {frames[-1].line}" if frames[-1].line else ""
-    if isinstance(error, TraceError | UnitError):
-        return f"{title} ({where}): {error}"
-    if isinstance(error, AttributeError) and str(error).startswith("saltus has no "):
-        return f"{title} ({where}): {error}"
-    if isinstance(error, NameError) and error.name:
-        known = inspect.signature(function).parameters
-        return (
-            f"{title} ({where}): {error.name!r} is no state, no parameter, and not defined "
-            f"outside either. {nearest(error.name, known)}"
-        )
-    for name, call in _CALLS.items():
-        if isinstance(error, TypeError) and str(error).startswith(f"{name}() "):
-            return f"{title} ({where}): sl.{str(error).rstrip('.')}. Write {call}."
-    if isinstance(error, TypeError) and "for ^" in str(error):
-        return f"{title} ({where}): a power is written x**2; ^ is something else in Python."
-    return (
-        f"{title} ({where}) can't be traced: {type(error).__name__}: "
-        f"{str(error).rstrip('.?! ')}. {_HOW_TO}"
-    )
-
-
-def place(function: Callable[..., Any]) -> str:
-    """File and line of a function, or the formula that it is."""
-    if isinstance(function, Formula | Equations):
-        return function.place
-    code = getattr(inspect.unwrap(function), "__code__", None)
-    return f"{code.co_filename}, line {code.co_firstlineno}" if code else "unknown place"

@@ -19,7 +19,7 @@ from saltus.flow.request import Request, Schedule
 from saltus.flow.taylor import SMALL_BATCH
 from saltus.interrupt import Interrupted
 from saltus.kernels import status as st
-from saltus.system.dimensions import gap_units
+from saltus.system import gap_units
 
 RIG = sl.models.delangre("b", force="4 N", frequency="15 Hz")
 

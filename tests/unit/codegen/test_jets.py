@@ -14,10 +14,10 @@ from mpmath import mp, mpf
 
 import saltus as sl
 from saltus.codegen.taylor_head import taylor_head
+from saltus.contact.guards import is_hold
 from saltus.kernels import lanes as lane_operations
 from saltus.kernels import trigonometry
 from saltus.system import System
-from saltus.system.guards import is_hold
 from saltus.system.tangent import tangent_system
 
 pytestmark = [

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from saltus.codegen.series import SeriesBuilder, is_constant
-from saltus.system import expression as ex
-from saltus.system.evaluate import evaluate
+from saltus.language import expression as ex
+from saltus.language.evaluate import evaluate
 
 pytestmark = pytest.mark.nojit
 x, v, t = ex.state("x"), ex.state("v"), ex.TIME

@@ -12,7 +12,7 @@ import saltus as sl
 from saltus.codegen import templates
 from saltus.codegen.clocks import Clocks, table_data
 from saltus.kernels.clocks_layout import C0, HELD, NUMBERS, ON, REF
-from saltus.system.evaluate import evaluate
+from saltus.language.evaluate import evaluate
 
 pytestmark = pytest.mark.filterwarnings("ignore::saltus.errors.UnusedParameterWarning")
 POINTS, VALUES = [-1.0, 0.0, 0.3, 1.1, 2.0], [0.5, 2.0, -1.0, 0.25, 0.5]

@@ -14,6 +14,7 @@ import saltus as sl
 from saltus.analysis.orbits.orbits import find_orbits
 from saltus.errors import SaltusWarning
 from saltus.flow.maps import Stroboscope
+from saltus.language.evaluate import evaluate
 from saltus.models import (
     ball_in_box,
     bouncing_ball,
@@ -24,7 +25,6 @@ from saltus.models import (
     rocking_block,
     thermostat,
 )
-from saltus.system.evaluate import evaluate
 
 ROWS = {}
 for name in ("laws_impact", "laws_ball", "laws_friction", "laws_more"):

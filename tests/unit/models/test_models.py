@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from saltus.errors import ParameterError
+from saltus.language import functions
+from saltus.language.evaluate import evaluate
 from saltus.models import (
     MODELS,
     aeroelastic,
@@ -19,8 +21,7 @@ from saltus.models import (
     gear_pair,
     has_energy,
 )
-from saltus.system import functions
-from saltus.system.evaluate import evaluate, field, mode_number, sides
+from saltus.system.modes import field, mode_number, sides
 
 solve_ivp = pytest.importorskip("scipy.integrate").solve_ivp
 brentq = pytest.importorskip("scipy.optimize").brentq

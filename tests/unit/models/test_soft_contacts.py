@@ -12,6 +12,7 @@ import pytest
 import saltus as sl
 from saltus.analysis.orbits.orbits import find_orbits
 from saltus.flow.maps import Stroboscope
+from saltus.language.evaluate import evaluate
 from saltus.models import (
     bang_bang,
     bilinear_rig,
@@ -23,7 +24,6 @@ from saltus.models import (
     switched_rotor,
     two_masses,
 )
-from saltus.system.evaluate import evaluate
 
 with (Path(__file__).parents[2] / "reference" / "published_models.csv").open() as file:
     ROWS = {(row["model"], row["quantity"]): row for row in csv.DictReader(file)}

@@ -5,9 +5,11 @@ import re
 import pytest
 
 import saltus as sl
+from saltus.language import abs, atan, piecewise, sqrt
+from saltus.language.latex import latex_name
 from saltus.models import MODELS, delangre
-from saltus.system import abs, atan, piecewise, sqrt, system
-from saltus.system.display import latex_lines, latex_name
+from saltus.system import system
+from saltus.system.display import latex_lines
 
 TEXT = """\
 System delangre: 2 states, 2 guards, forced at frequency = 15 Hz (T = 66.6667 ms)

@@ -5,10 +5,10 @@ import pytest
 
 import saltus as sl
 from saltus.errors import TraceError
+from saltus.language import curve
 from saltus.models import MODELS
 from saltus.system.formula import DEPTH, LONGEST, Equations, Formulas
 from saltus.system.quantity import quantity
-from saltus.system.tables import curve
 
 RIG = sl.models.delangre("b")
 
@@ -61,7 +61,7 @@ def test_a_formula_is_what_the_line_of_an_equation_is(text, function):
     random = np.random.default_rng(2)
     values = {name: random.uniform(-2, 2, 40) for name in ("x", "v")}
     ours, theirs = (quantity(RIG, one) for one in (Formulas().formula(text), function))
-    from saltus.system.evaluate import evaluate
+    from saltus.language.evaluate import evaluate
 
     def numbers(found):
         bits = []

@@ -4,9 +4,10 @@ one twice, is refused.
 
 import pytest
 
+from saltus.contact import freeplay
 from saltus.errors import TraceError
-from saltus.system import freeplay, max, system
-from saltus.system.system import System
+from saltus.language import max
+from saltus.system import System, system
 
 
 def pair(t, x1, x2, v1, v2, *, k=1e3, gap=5e-4, wall=1e-3):

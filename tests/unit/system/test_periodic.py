@@ -6,8 +6,10 @@ from dataclasses import replace
 
 import pytest
 
+from saltus.contact import freeplay
 from saltus.errors import TraceError
-from saltus.system import cos, exp, freeplay, mod, periodic, pi, piecewise, sin, system
+from saltus.language import cos, exp, mod, pi, piecewise, sin
+from saltus.system import periodic, system
 from saltus.system.periodic import check_periodic, timing_of
 
 # equations that use some of their parameters only

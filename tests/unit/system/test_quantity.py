@@ -6,7 +6,8 @@ import pytest
 
 import saltus as sl
 from saltus.errors import ParameterError, TraceError, UnitError
-from saltus.system.expression import Bit, Not
+from saltus.language.expression import Bit, Not
+from saltus.language.text import to_text
 from saltus.system.quantity import (
     quantity,
     remembering,
@@ -16,7 +17,6 @@ from saltus.system.quantity import (
     with_surface,
 )
 from saltus.system.tangent import tangent_system
-from saltus.system.text import to_text
 
 
 @sl.system(states="x v", forced_at="frequency", units={"x": "m", "v": "m/s"})

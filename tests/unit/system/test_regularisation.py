@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import saltus as sl
+from saltus.contact import STEPS
 from saltus.errors import ParameterError, TraceError, UnitError
-from saltus.system.blend import STEPS
 
 RIG = sl.models.delangre("b", force="4 N", frequency="15 Hz")
 

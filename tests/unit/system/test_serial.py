@@ -12,11 +12,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from saltus.contact.guards import find_guards
 from saltus.errors import SaltusError, TraceError
+from saltus.language import abs, cos, max, pi, piecewise
+from saltus.language import expression as ex
 from saltus.models import MODELS, delangre
-from saltus.system import System, abs, cos, max, pi, piecewise, system
-from saltus.system import expression as ex
-from saltus.system.guards import find_guards
+from saltus.system import System, system
 
 
 def nested():

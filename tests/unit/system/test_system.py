@@ -13,10 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from saltus.errors import ParameterError, SaltusError, UnitError
+from saltus.language.evaluate import evaluate
 from saltus.models import aeroelastic, chain, delangre, gear_pair
-from saltus.system import system
-from saltus.system.evaluate import evaluate
-from saltus.system.system import System
+from saltus.system import System, system
 from saltus.system.tangent import tangent_system
 
 RIG = delangre()

@@ -7,9 +7,11 @@ import sys
 import numpy as np
 import pytest
 
+from saltus.contact import freeplay
 from saltus.errors import ParameterError, SaltusError, TraceError, UnitError
-from saltus.system import cos, freeplay, pi, piecewise, sin, system
-from saltus.system.text import to_text
+from saltus.language import cos, pi, piecewise, sin
+from saltus.language.text import to_text
+from saltus.system import system
 
 # equations that use some of their parameters only
 pytestmark = pytest.mark.filterwarnings("ignore::saltus.errors.UnusedParameterWarning")

@@ -32,7 +32,7 @@ from saltus.results import AttractorTable, Subject, build
 from saltus.results.dataset import schema
 from saltus.results.dataset.attractors import basin_meanings
 from saltus.results.dataset.kinds import Kind
-from saltus.system.system import System
+from saltus.system import System
 from saltus.units import to_si
 
 #: Iterates after which the range of the states is taken, where no box gives it.

@@ -15,7 +15,7 @@ from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporting, stage
 from saltus.flow.threads import on_threads
 from saltus.interrupt import Interrupted
-from saltus.system.system import System
+from saltus.system import System
 
 #: Share of the progress that the search for attractors takes.
 SCOUTING = 0.05

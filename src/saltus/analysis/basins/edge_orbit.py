@@ -23,7 +23,7 @@ from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.flow.progress import reporting
 from saltus.results.dataset.schema import kind_text
-from saltus.system.system import System
+from saltus.system import System
 from saltus.units import from_si
 
 

@@ -19,8 +19,8 @@ from saltus.errors import ParameterError
 from saltus.flow.counts import whole
 from saltus.results import Subject, attributes, build
 from saltus.results.dataset.schema import EQUILIBRIA
-from saltus.system.evaluate import mode_number
-from saltus.system.system import System
+from saltus.system import System
+from saltus.system.modes import mode_number
 
 #: Magnitudes that starts have where no box is given, as powers of ten [SI].
 MAGNITUDES = (-4.0, 4.0)

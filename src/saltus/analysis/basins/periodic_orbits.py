@@ -31,7 +31,7 @@ from saltus.flow.taylor import Taylor
 from saltus.results import build
 from saltus.results.dataset import schema
 from saltus.results.dataset.orbits import OrbitTable
-from saltus.system.system import System
+from saltus.system import System
 from saltus.units import to_si
 
 #: Steps and contacts for each iterate of a trial's motion, unless the method says how many. The rig

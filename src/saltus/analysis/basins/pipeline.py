@@ -38,7 +38,7 @@ from saltus.results.dataset import schema
 from saltus.results.dataset.attractors import basin_meanings
 from saltus.results.dataset.kinds import Kind
 from saltus.results.provenance import to_json
-from saltus.system.system import System
+from saltus.system import System
 from saltus.units import to_si
 
 #: Starts from which attractors are looked for first; a basin of half a per cent is met with 99.4 %.

@@ -29,7 +29,7 @@ from saltus.flow.methods import Method, exact_method
 from saltus.flow.progress import reporting
 from saltus.results import build
 from saltus.results.dataset import schema
-from saltus.system.system import System
+from saltus.system import System
 from saltus.units import to_si
 
 Orbits = FreeOrbits | QuadratureOrbits

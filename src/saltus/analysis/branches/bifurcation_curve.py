@@ -29,8 +29,8 @@ from saltus.results import build
 from saltus.results.dataset import schema
 from saltus.results.dataset.attractors import padded
 from saltus.results.dataset.schema import event_name, point_name
+from saltus.system import System
 from saltus.system.leg import has_legs
-from saltus.system.system import System
 
 
 @verb

@@ -24,7 +24,7 @@ from saltus.flow.request import Schedule
 from saltus.results import build
 from saltus.results.dataset import schema
 from saltus.results.dataset.attractors import padded
-from saltus.system.system import System
+from saltus.system import System
 
 #: Samples of a period by which branches are resolved.
 SAMPLES = 64

@@ -11,12 +11,12 @@ from functools import lru_cache
 import numpy as np
 
 from saltus.analysis.branches.contact_sequences import Contact
-from saltus.system import expression as ex
-from saltus.system.derivatives import gradient, time_derivative
-from saltus.system.evaluate import evaluate
-from saltus.system.expression import Expr
+from saltus.language import expression as ex
+from saltus.language.derivatives import gradient, time_derivative
+from saltus.language.evaluate import evaluate
+from saltus.language.expression import Expr
+from saltus.system import System
 from saltus.system.leg import frozen
-from saltus.system.system import System
 
 
 @dataclass(frozen=True)

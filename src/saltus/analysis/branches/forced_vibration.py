@@ -25,12 +25,12 @@ from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.orbits.equilibria import jacobian_of
 from saltus.errors import ParameterError, among, nearest, shown
 from saltus.flow.methods import Method
-from saltus.system import expression as ex
-from saltus.system.derivatives import differentiate
-from saltus.system.evaluate import evaluate
-from saltus.system.expression import Expr
+from saltus.language import expression as ex
+from saltus.language.derivatives import differentiate
+from saltus.language.evaluate import evaluate
+from saltus.language.expression import Expr
+from saltus.system import System
 from saltus.system.quantity import with_states
-from saltus.system.system import System
 
 #: Instants of a period at which a force is looked at.
 SAMPLES = 256

@@ -18,13 +18,13 @@ import numpy as np
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.orbits.equilibria import autonomous, field_of, jacobian_of
 from saltus.analysis.orbits.newton import newton
+from saltus.contact.guards import Guard
 from saltus.errors import ParameterError
 from saltus.flow.methods import Method
 from saltus.flow.request import Schedule
-from saltus.system import expression as ex
-from saltus.system.expression import Expr
-from saltus.system.guards import Guard
-from saltus.system.system import System
+from saltus.language import expression as ex
+from saltus.language.expression import Expr
+from saltus.system import System
 
 #: Samples among which a first return is looked for.
 SAMPLES = 1024

@@ -16,11 +16,11 @@ import numpy as np
 
 from saltus.analysis.branches.legs import Legs
 from saltus.analysis.orbits.newton import newton
-from saltus.system.derivatives import gradient, time_derivative
-from saltus.system.evaluate import evaluate
-from saltus.system.expression import Expr, add, mul
+from saltus.language.derivatives import gradient, time_derivative
+from saltus.language.evaluate import evaluate
+from saltus.language.expression import Expr, add, mul
+from saltus.system import System
 from saltus.system.leg import frozen
-from saltus.system.system import System
 
 #: Places along a leg at which its gap is looked at for a first guess.
 LOOKS = 200

@@ -19,8 +19,8 @@ from saltus.analysis.branches.grazes import ContactEvent, Gap, nearest_turn, tou
 from saltus.analysis.branches.legs import Legs, product
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.orbits.newton import newton
-from saltus.system.derivatives import gradient
-from saltus.system.evaluate import evaluate
+from saltus.language.derivatives import gradient
+from saltus.language.evaluate import evaluate
 from saltus.system.leg import frozen
 
 #: Contacts slower than this share of the largest speed, or of that which the acceleration at the

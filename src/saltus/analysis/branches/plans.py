@@ -9,9 +9,9 @@ from saltus.analysis.branches.leg_branches import leg_branches
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.tracing import Plan, both_ways
 from saltus.flow.methods import Method
+from saltus.system import System
 from saltus.system.leg import has_legs
 from saltus.system.symmetry import is_symmetric
-from saltus.system.system import System
 
 #: Over a range of which the ends have a larger ratio a parameter is followed by its logarithm.
 DECADES = 100.0

@@ -27,7 +27,7 @@ from saltus.analysis.orbits.special_equilibria import (
     fold_point,
     hopf_point,
 )
-from saltus.system.system import System
+from saltus.system import System
 
 #: Newton's method on a defining system finds the point that was bracketed, within this distance in
 #: units of the scale.

@@ -15,11 +15,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from saltus.analysis.orbits.newton import leading_first
-from saltus.system.evaluate import evaluate
-from saltus.system.expression import Expr
-from saltus.system.guards import is_hold
+from saltus.contact.guards import is_hold
+from saltus.language.evaluate import evaluate
+from saltus.language.expression import Expr
+from saltus.system import System
 from saltus.system.parametric import parametric
-from saltus.system.system import System
 
 #: Largest real part whose exponential is taken, in units of the rates.
 STEEP = 50.0

@@ -17,7 +17,7 @@ from saltus.errors import ParameterError, shown
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.results.dataset import schema
-from saltus.system.system import System
+from saltus.system import System
 
 #: Values of a parameter at which equilibria are looked for, and random starts at each.
 RESTING_VALUES, RESTING_STARTS = 3, 64

@@ -22,8 +22,8 @@ from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.flow.request import Schedule
 from saltus.flow.stops import on_allowed_sides
+from saltus.system import System
 from saltus.system.parametric import parametric
-from saltus.system.system import System
 
 #: Samples of a limit cycle in which the nearest to a point is looked for, and steps that locate it.
 SAMPLES, LOCATED = 400, 3

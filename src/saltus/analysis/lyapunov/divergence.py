@@ -21,11 +21,11 @@ from saltus.flow.contact_table import ContactTable
 from saltus.flow.maps import Stroboscope
 from saltus.flow.request import Outcome
 from saltus.kernels import status as st
-from saltus.system.derivatives import gradient, time_derivative
-from saltus.system.evaluate import evaluate
-from saltus.system.expression import Expr, add, depends_on, walk
+from saltus.language.derivatives import gradient, time_derivative
+from saltus.language.evaluate import evaluate
+from saltus.language.expression import Expr, add, depends_on, walk
+from saltus.system import System
 from saltus.system.quantity import remembering, with_states
-from saltus.system.system import System
 
 #: Name of a state that is added where an integral is needed, which no user can write.
 _INTEGRAL = "integral of the divergence"

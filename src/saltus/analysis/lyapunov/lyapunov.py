@@ -25,7 +25,7 @@ from saltus.flow.progress import reporting
 from saltus.interrupt import Interrupted
 from saltus.results import build
 from saltus.results.dataset import schema
-from saltus.system.system import System
+from saltus.system import System
 
 METHODS = ("variational", "wolf")
 #: Units in which exponents are given: what one block is worth, and whether the logarithm is

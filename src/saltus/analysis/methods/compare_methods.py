@@ -40,7 +40,7 @@ from saltus.results.dataset.schema import (
     parameters_of,
     states_of,
 )
-from saltus.system.system import System
+from saltus.system import System
 
 #: The question of Saunders et al. (2021): ode45 as it comes, with and without event location.
 USUAL = (ODE45(rtol=1e-4, atol=1e-7), ODE45(rtol=1e-4, atol=1e-7, events="ignore"))

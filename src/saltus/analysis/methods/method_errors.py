@@ -11,7 +11,7 @@ from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.kernels import status as st
 from saltus.results.dataset.schema import parameters_of, response_name, states_of
-from saltus.system.system import System
+from saltus.system import System
 
 #: Orbits of two methods are one if their distance is below this multiple of the method's noise, or
 #: below this part of the motion's range.

@@ -13,18 +13,16 @@ from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.orbits.find_responses import motion_range
 from saltus.analysis.starts import ensemble
 from saltus.analysis.verb import verb
+from saltus.contact import STEPS
 from saltus.errors import ParameterError, among, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import ODE45, Method, Taylor, check_method
 from saltus.kernels import status as st
+from saltus.language.evaluate import evaluate
 from saltus.results import build
 from saltus.results.dataset.schema import WIDTHS
-from saltus.system.blend import STEPS
-from saltus.system.dimensions import gap_units
-from saltus.system.evaluate import evaluate
-from saltus.system.regularisation import regularise
-from saltus.system.system import System
+from saltus.system import System, gap_units, regularise
 from saltus.units import to_si
 
 #: Widths that are tried where none are given, as shares of the largest gap of the motion.

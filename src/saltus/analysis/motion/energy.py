@@ -19,11 +19,11 @@ from saltus.flow.counts import whole
 from saltus.flow.methods import Method, check_method
 from saltus.flow.request import Outcome, Schedule
 from saltus.flow.room import check_room
+from saltus.language.evaluate import evaluate
+from saltus.language.expression import Expr
 from saltus.results.dataset import schema
-from saltus.system.evaluate import evaluate
-from saltus.system.expression import Expr
+from saltus.system import System
 from saltus.system.quantity import Quantity, quantity, with_integrals, with_losses
-from saltus.system.system import System
 
 #: Intervals into which the span of an unforced system is cut.
 INTERVALS = 100

@@ -19,11 +19,11 @@ from saltus.flow.counts import whole
 from saltus.flow.methods import Method, check_method
 from saltus.flow.request import Outcome, Schedule
 from saltus.flow.room import check_room
+from saltus.language.evaluate import evaluate
+from saltus.language.expression import walk
 from saltus.results.dataset import schema
-from saltus.system.evaluate import evaluate
-from saltus.system.expression import walk
+from saltus.system import System
 from saltus.system.quantity import Quantity, with_impulses, with_integrals
-from saltus.system.system import System
 
 #: Blocks from whose scatter a standard error is taken: contacts that follow each other are not
 #: independent, blocks nearly are.

@@ -14,12 +14,13 @@ from saltus.analysis.motion.window import Stretch, computed, dataset, stretch
 from saltus.analysis.outcome_messages import warn
 from saltus.analysis.starts import check_system
 from saltus.analysis.verb import verb
+from saltus.contact.guards import equation_of
 from saltus.errors import ParameterError, among, nearest, shown
 from saltus.flow.methods import Method, check_method
 from saltus.flow.request import Outcome, Schedule
 from saltus.kernels import status as st
 from saltus.results.dataset import schema
-from saltus.system.guards import equation_of
+from saltus.system import System
 from saltus.system.quantity import (
     Quantity,
     acting_guards,
@@ -27,7 +28,6 @@ from saltus.system.quantity import (
     with_level,
     with_surface,
 )
-from saltus.system.system import System
 
 #: Touches that are closer than this are one [forcing periods; the span if unforced]: where a gap is
 #: flat its minimum is that uncertain.

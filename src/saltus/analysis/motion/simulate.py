@@ -25,8 +25,8 @@ from saltus.flow.room import check_room
 from saltus.interrupt import Interrupted
 from saltus.results import build
 from saltus.results.dataset import schema
+from saltus.system import System
 from saltus.system.quantity import remembering
-from saltus.system.system import System
 
 #: Samples per forcing period: contacts are exact anyway, this is what a picture needs.
 PER_PERIOD = 200

@@ -21,7 +21,7 @@ from saltus.flow.request import Outcome, Schedule
 from saltus.flow.room import check_room
 from saltus.results import build
 from saltus.results.dataset import schema
-from saltus.system.system import System
+from saltus.system import System
 
 
 @verb

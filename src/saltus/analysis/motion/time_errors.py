@@ -15,9 +15,9 @@ from saltus.flow.engine import RunInterrupted
 from saltus.flow.methods import Method
 from saltus.flow.request import Outcome, Request, Schedule
 from saltus.kernels import status as st
-from saltus.system import expression as ex
-from saltus.system.evaluate import evaluate
-from saltus.system.system import System
+from saltus.language import expression as ex
+from saltus.language.evaluate import evaluate
+from saltus.system import System
 
 #: Copies of a trajectory whose errors are rounding. Errors soon lie along the one direction that
 #: grows fastest, so the ratio of a trajectory's error to its distance from a copy stays what chance

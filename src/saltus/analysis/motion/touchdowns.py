@@ -11,8 +11,8 @@ from saltus.analysis.motion.window import Stretch
 from saltus.flow.contact_table import ContactTable
 from saltus.flow.request import Outcome
 from saltus.kernels import status as st
-from saltus.system.evaluate import evaluate
-from saltus.system.system import System
+from saltus.language.evaluate import evaluate
+from saltus.system import System
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from saltus.flow.methods import Method
 from saltus.flow.progress import reporting
 from saltus.flow.request import Outcome, Request, Schedule
 from saltus.results import build
-from saltus.system.system import System
+from saltus.system import System
 from saltus.units import to_si
 
 

@@ -19,11 +19,11 @@ import numpy as np
 
 from saltus.analysis.orbits.mode_zeros import Piece, near
 from saltus.analysis.orbits.tolerances import RANK
+from saltus.contact.guards import Guard, Law, is_hold
 from saltus.errors import ParameterError
-from saltus.system.derivatives import gradient
-from saltus.system.expression import Expr
-from saltus.system.guards import Guard, Law, is_hold
-from saltus.system.system import System
+from saltus.language.derivatives import gradient
+from saltus.language.expression import Expr
+from saltus.system import System
 
 #: Modes that are looked at; each boundary doubles them.
 MOST_MODES = 1024

@@ -19,9 +19,9 @@ from saltus.analysis.orbits.capture import RADII, SAFETY, sphere
 from saltus.analysis.orbits.newton import newton
 from saltus.analysis.orbits.orbits import OrbitBatch
 from saltus.flow.maps import Stroboscope
-from saltus.system.evaluate import evaluate
-from saltus.system.expression import Expr, depends_on
-from saltus.system.system import System
+from saltus.language.evaluate import evaluate
+from saltus.language.expression import Expr, depends_on
+from saltus.system import System
 
 #: Longest step of Newton's method, in units of the scale: the field of a motion that has escaped
 #: points anywhere.

@@ -14,13 +14,13 @@ import numpy as np
 
 from saltus.analysis.orbits.newton import newton
 from saltus.analysis.orbits.tolerances import RANK
-from saltus.system import expression as ex
-from saltus.system.derivatives import gradient
-from saltus.system.evaluate import evaluate
-from saltus.system.expression import Expr, depends_on
-from saltus.system.guards import Guard, Law, is_hold
-from saltus.system.singular import assuming
-from saltus.system.system import System
+from saltus.contact.guards import Guard, Law, is_hold
+from saltus.language import assuming
+from saltus.language import expression as ex
+from saltus.language.derivatives import gradient
+from saltus.language.evaluate import evaluate
+from saltus.language.expression import Expr, depends_on
+from saltus.system import System
 
 #: Rounds of deflation, and starts of each but the first.
 ROUNDS, DEFLATED_STARTS = 8, 64

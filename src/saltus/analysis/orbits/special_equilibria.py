@@ -14,14 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from saltus.analysis.orbits.newton import newton
-from saltus.system import expression as ex
-from saltus.system.derivatives import gradient
-from saltus.system.evaluate import evaluate, sides
-from saltus.system.expression import Expr
-from saltus.system.reduction import dot
-from saltus.system.singular import assuming
-from saltus.system.surfaces import total
-from saltus.system.system import System
+from saltus.language import assuming, dot, total
+from saltus.language import expression as ex
+from saltus.language.derivatives import gradient
+from saltus.language.evaluate import evaluate
+from saltus.language.expression import Expr
+from saltus.system import System
+from saltus.system.modes import sides
 
 #: Longest step of Newton's method, in units of the unknowns' sizes.
 LONGEST_STEP = 1e3

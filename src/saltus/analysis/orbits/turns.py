@@ -17,7 +17,7 @@ from saltus.analysis.orbits.equilibria import autonomous, jacobian_of
 from saltus.errors import ParameterError, shown
 from saltus.flow.maps import FORCED, Stroboscope
 from saltus.flow.taylor import Taylor
-from saltus.system.system import System
+from saltus.system import System
 from saltus.units import to_si
 
 #: Motions that are asked, and fastest times of the linear part after which they are.

@@ -12,9 +12,9 @@ from saltus.analysis.orbits.cycles import attracting_cycles, find_cycles, return
 from saltus.analysis.orbits.equilibria import find_equilibria
 from saltus.analysis.orbits.orbit_measures import Measures
 from saltus.analysis.orbits.orbits import OrbitBatch
+from saltus.contact.guards import is_hold
 from saltus.flow.maps import Stroboscope
-from saltus.system.evaluate import evaluate
-from saltus.system.guards import is_hold
+from saltus.language.evaluate import evaluate
 
 #: Parts of a motion that must each be larger than the one before, and how much the last must be
 #: larger than the first, to run away.

@@ -36,7 +36,7 @@ from saltus.flow.counts import whole
 from saltus.flow.methods import Method, exact_method
 from saltus.flow.progress import reporting, stage
 from saltus.interrupt import Interrupted
-from saltus.system.system import System
+from saltus.system import System
 
 
 @verb

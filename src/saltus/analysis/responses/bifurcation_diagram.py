@@ -15,7 +15,7 @@ from saltus.analysis.responses.samples import check_sample, check_unforced_sampl
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
 from saltus.flow.methods import Method, check_method
-from saltus.system.system import System
+from saltus.system import System
 
 
 @verb

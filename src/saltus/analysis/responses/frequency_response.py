@@ -15,7 +15,7 @@ from saltus.analysis.starts import check_system
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
 from saltus.flow.methods import Method
-from saltus.system.system import System
+from saltus.system import System
 
 
 @verb

@@ -20,7 +20,7 @@ from saltus.errors import ParameterError, nearest, shown
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.flow.room import check_room
-from saltus.system.system import System
+from saltus.system import System
 from saltus.units import from_si
 
 #: Directions of a sweep by what users write.

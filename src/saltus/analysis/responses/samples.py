@@ -19,7 +19,7 @@ from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.flow.request import Outcome
 from saltus.kernels import status as st
-from saltus.system.system import System
+from saltus.system import System
 
 #: What may be shown.
 SAMPLES = ("turning_points", "stroboscope", "contacts")

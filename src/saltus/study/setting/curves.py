@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from saltus.errors import SaltusError, StudyError
+from saltus.language import Table, curve
 from saltus.results.files.measured import columns
 from saltus.study.setting.inputs import Input
 from saltus.study.tables.parts import Curve
-from saltus.system.tables import Table, curve
 
 
 def curve_of(file: Input, how: Curve, name: str) -> Table:

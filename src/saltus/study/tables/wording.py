@@ -10,8 +10,9 @@ import re
 from inspect import signature
 from typing import Any
 
+from saltus.contact import freeplay, hunt_crossley
 from saltus.errors import StudyError
-from saltus.system import freeplay, hunt_crossley, piecewise
+from saltus.language import piecewise
 
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 #: Texts in quotes, which repeat what somebody wrote; calls and arguments of Python.

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from saltus.contact.forces import freeplay
 from saltus.errors import ParameterError
-from saltus.system.expression import Expr, Relation, as_expr
-from saltus.system.functions import cos, pi
-from saltus.system.laws import freeplay
+from saltus.language.expression import Expr, Relation, as_expr
+from saltus.language.functions import cos, pi
 from saltus.system.structures import matrices
 from saltus.system.structures.parts import Contact, Force, direction
 from saltus.system.system import System

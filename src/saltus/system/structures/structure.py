@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from saltus.arguments import checked
+from saltus.contact.guards import number_of
 from saltus.errors import ParameterError, SaltusWarning, among, shown
 from saltus.system.display import STRUCTURE
-from saltus.system.guards import number_of
 from saltus.system.structures import matrices
 from saltus.system.structures.equations import UNITS, Coordinates, traced
 from saltus.system.structures.matrices import ASYMMETRY

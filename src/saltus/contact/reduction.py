@@ -1,0 +1,236 @@
+"""Contacts that are held: hold guards, and the field reduced by elimination of contact forces.
+
+A contact j that can be held has a constraint w_j (closing velocity, or a surface's function) and a
+direction D_j: what a unit of its own force adds to the field. While it is held that force keeps
+w_j at zero::
+
+    F <- F - D_j * (n_j . F + dw_j/dt) / (n_j . D_j)          n_j = gradient of w_j
+
+One contact after the other is eliminated, so several contacts that are coupled solve their linear
+system by pivots. See docs/decisions/0040.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from saltus.contact.guards import Guard, bits_in
+from saltus.language import expression as ex
+from saltus.language.canonical import Canonical
+from saltus.language.derivatives import gradient, time_derivative
+from saltus.language.expression import Bit, Expr
+from saltus.language.known_sides import assuming
+from saltus.language.sums import dot, ratio, total
+
+_ZERO, _ONE = ex.constant(0.0), ex.constant(1.0)
+#: Most contacts that one rate may hold for its terms to be written for each of them apart, held and
+#: not: with each the terms double.
+_MOST_KNOWN = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """A contact that can be held.
+
+    Attributes
+    ----------
+    owner, hold : int
+        Numbers of its guard and of its hold guard.
+    constraint : Expr
+        w, zero while it is held.
+    normal : tuple of Expr
+        Gradient of w with respect to the states.
+    drift : Expr
+        Partial derivative of w with respect to t.
+    direction : tuple of Expr
+        What a unit of its force adds to the field.
+    pivot : int or None
+        The state whose rate follows from the constraint, exactly.
+    """
+
+    owner: int
+    hold: int
+    constraint: Expr
+    normal: tuple[Expr, ...]
+    drift: Expr
+    direction: tuple[Expr, ...]
+    pivot: int | None = None
+
+
+def held_contact(
+    owner: int, hold: int, constraint: Expr, direction: Sequence[Expr], states: Sequence[str]
+) -> Held:
+    """A contact that can be held; its pivot is chosen later."""
+    return Held(
+        owner,
+        hold,
+        constraint,
+        gradient(constraint, states),
+        time_derivative(constraint),
+        tuple(direction),
+    )
+
+
+def with_pivots(contacts: Sequence[Held]) -> list[Held]:
+    """The contacts with their pivots: of the states in which a constraint is linear, one that the
+    contact's force moves and that is no other contact's. If that force moves just one state, it is
+    this one: of several that move only the same state one can be held at a time.
+    """
+    chosen: dict[int, int] = {}
+    candidates = {number: _linear_states(one) for number, one in enumerate(contacts)}
+    for number, states in candidates.items():
+        moved = [i for i, by in enumerate(contacts[number].direction) if by is not _ZERO]
+        if len(moved) == 1 and moved[0] in states:
+            chosen[number] = moved[0]
+    waiting = [number for number in candidates if number not in chosen]
+    for number in sorted(waiting, key=lambda number: len(candidates[number])):
+        free = [i for i in candidates[number] if i not in chosen.values()]
+        if free or candidates[number]:
+            chosen[number] = (free or candidates[number])[0]
+    return [replace(one, pivot=chosen.get(number)) for number, one in enumerate(contacts)]
+
+
+def _linear_states(one: Held) -> list[int]:
+    """The states in which a constraint is linear, those that its force moves first."""
+    linear = [
+        i for i, slope in enumerate(one.normal) if slope is not _ZERO and not ex.varies(slope)
+    ]
+    return sorted(linear, key=lambda i: (one.direction[i] is _ZERO, one.normal[i].op != "const"))
+
+
+class Elimination:
+    """A field with the forces of held contacts eliminated.
+
+    Parameters
+    ----------
+    field : sequence of Expr
+        The field without contact forces; the two-valued signs of held surfaces are at their middle.
+    contacts : sequence of Held
+        In the order of elimination, with their pivots.
+    """
+
+    def __init__(self, field: Sequence[Expr], contacts: Sequence[Held]) -> None:
+        self._field, self._contacts = tuple(field), tuple(contacts)
+        self._canonical = Canonical()
+        holds = {one.hold for one in contacts}
+        self._known = all(len(holds & bits_in([entry])) <= _MOST_KNOWN for entry in field)
+
+    def reduced(self) -> tuple[Expr, ...]:
+        """The field: the reduced one where hold guards say so."""
+        field, _ = self._without(None)
+        for one in self._in_order():
+            field = self._put(one, field, one.drift, field)
+        return field
+
+    def own(self, contact: Held) -> tuple[Expr, Expr, tuple[Expr, ...]]:
+        """(N, P, D) of a contact, all others that are held eliminated: the rate of its constraint
+        without its own force, what a unit of that changes, and the change of the field.
+        """
+        field, directions = self._without(contact)
+        field = tuple(assuming(entry, contact.hold, True) for entry in field)
+        direction = tuple(assuming(x, contact.hold, True) for x in directions[contact.hold])
+        drive = ex.add(dot(contact.normal, field), contact.drift)
+        return drive, dot(contact.normal, direction), direction
+
+    def _without(
+        self, left_out: Held | None
+    ) -> tuple[tuple[Expr, ...], dict[int, tuple[Expr, ...]]]:
+        """Field and directions after the elimination of all contacts but one."""
+        field = self._field
+        directions = {one.hold: one.direction for one in self._contacts}
+        for number, one in enumerate(self._contacts):
+            if one is left_out:
+                continue
+            across = dot(one.normal, directions[one.hold])
+            if _is_nothing(across):
+                continue  # with those before it held its force changes nothing: it can't be
+            later = [other for other in self._contacts[number + 1 :] if other is not left_out]
+            later += [left_out] if left_out else []
+            own = directions[one.hold]
+            rate = ex.add(dot(one.normal, field), one.drift)
+            field = self._take(one, field, own, ratio(rate, across), one.drift)
+            for other in later:
+                along = dot(one.normal, directions[other.hold])
+                if self._canonical.polynomial(along):
+                    directions[other.hold] = self._take(
+                        one, directions[other.hold], own, ratio(along, across), _ZERO
+                    )
+        return field, directions
+
+    def _take(
+        self, one: Held, entries: tuple[Expr, ...], own: Sequence[Expr], share: Expr, drift: Expr
+    ) -> tuple[Expr, ...]:
+        """Entries minus a share of a contact's direction, where it is held."""
+        new = tuple(
+            self._held(one, ex.sub(entry, ex.mul(by, share)), entry)
+            if by is not _ZERO and i != one.pivot
+            else entry
+            for i, (entry, by) in enumerate(zip(entries, own, strict=True))
+        )
+        return self._put(one, new, drift, entries) if one.pivot is not None else new
+
+    def _put(
+        self, one: Held, entries: tuple[Expr, ...], drift: Expr, free: tuple[Expr, ...]
+    ) -> tuple[Expr, ...]:
+        """The pivot's entry from the constraint, exactly, where the contact is held."""
+        if one.pivot is None:
+            return entries
+        i = one.pivot
+        others = [
+            ex.mul(slope, entry)
+            for k, (slope, entry) in enumerate(zip(one.normal, entries, strict=True))
+            if k != i and slope is not _ZERO and entry is not _ZERO
+        ]
+        exact = ratio(ex.neg(total([drift, *others])), one.normal[i])
+        return (*entries[:i], self._held(one, exact, free[i]), *entries[i + 1 :])
+
+    def _held(self, one: Held, value: Expr, otherwise: Expr) -> Expr:
+        """``value`` where a contact is held."""
+        if self._known:
+            value, otherwise = (
+                assuming(root, one.hold, side) for root, side in ((value, True), (otherwise, False))
+            )
+        return ex.select(Bit(one.hold), value, otherwise)
+
+    def _in_order(self) -> list[Held]:
+        """The contacts with pivots, each behind those whose pivots its own rate follows from; those
+        that go in a circle are left as they are.
+        """
+        waiting = [one for one in self._contacts if one.pivot is not None]
+        order: list[Held] = []
+        while waiting:
+            ready = [
+                one
+                for one in waiting
+                if not any(
+                    other.pivot != one.pivot and one.normal[other.pivot or 0] is not _ZERO
+                    for other in waiting
+                    if other is not one
+                )
+            ]
+            if not ready:
+                break
+            order += ready
+            waiting = [one for one in waiting if one not in ready]
+        return order
+
+
+def _is_nothing(node: Expr) -> bool:
+    return node.op == "const" and node.payload == 0
+
+
+def hold_gap(kind: str, drive: Expr, pivot: Expr, limit: Expr | None) -> Expr:
+    """How far a held contact is from its release: positive while it stays held."""
+    if kind == "impact":
+        return drive
+    most = pivot if limit is None or limit is _ONE else ex.mul(limit, pivot)
+    return ex.sub(ex.mul(most, most), ex.mul(drive, drive))
+
+
+def free_field(field: Sequence[Expr], guards: Sequence[Guard]) -> tuple[Expr, ...]:
+    """The field as it was written: no contact is held."""
+    for number, guard in enumerate(guards):
+        if guard.law is not None and guard.law.kind == "hold":
+            field = [assuming(entry, number, False) for entry in field]
+    return tuple(field)

@@ -1,0 +1,445 @@
+"""Laws that have no Taylor series on a boundary: ``d**1.5``, ``sqrt(d)``, ``d*log(d)`` where the
+gap d is zero.
+
+Such a term is analytic on either side of its boundary, and small near it. :func:`set_aside` finds
+these terms and gives each a bit that switches it off: a step off the boundary, or onto it, uses the
+rest of the equations only (kernels/taylor_singular.py). :func:`check_finite` refuses terms that are
+infinite there. Both use the *order* of an expression on a boundary: the power of the gap with which
+it goes to zero.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
+from functools import reduce
+from itertools import count
+from operator import or_
+from typing import NamedTuple
+
+from saltus.contact.guards import Guard, bits_in
+from saltus.errors import TraceError
+from saltus.language import expression as ex
+from saltus.language.canonical import Canonical, is_multiple
+from saltus.language.expression import And, Bit, Condition, Expr, Not, Or
+from saltus.language.known_sides import assuming
+
+_ZERO = ex.constant(0.0)
+#: Order of a logarithm: below every power.
+_LOG = -1e-9
+#: Most branches of a function of pieces: a sum of k pieces has 2**k values.
+_MOST_BRANCHES = 256
+
+
+class Order(NamedTuple):
+    """How an expression behaves on a boundary: like gap**order, or smaller; ``singular`` if it has
+    no Taylor series there.
+    """
+
+    order: float
+    singular: bool
+
+
+class SetAside(NamedTuple):
+    """A field whose terms without a series can be switched off.
+
+    Attributes
+    ----------
+    field, gaps : tuple of Expr
+        The bit ``first + j`` switches off what has no series on the boundary ``guards[j]``.
+    guards : tuple of int
+        Numbers of those guards.
+    first : int
+        Number of guards of the system.
+    """
+
+    field: tuple[Expr, ...]
+    gaps: tuple[Expr, ...]
+    guards: tuple[int, ...]
+    first: int
+
+    def without(self, j: int, count: int | None = None) -> tuple[Expr, ...]:
+        """The field, or its first entries, without the terms of ``guards[j]``."""
+        return tuple(assuming(entry, self.first + j, True) for entry in self.field[:count])
+
+
+def set_aside(field: Sequence[Expr], guards: Sequence[Guard]) -> SetAside:
+    """Find the terms of a field and its gaps that have no Taylor series on a boundary; a bit for
+    each such boundary switches them off.
+    """
+    boundaries = _Boundaries(guards)
+    roots = (*field, *(guard.gap for guard in guards))
+    if not _may_break(roots):
+        return SetAside(tuple(field), roots[len(field) :], (), len(guards))
+    broken = {
+        number: nodes
+        for number in range(len(guards))
+        if (nodes := boundaries.singular_terms(roots, number))
+    }
+    terms: dict[Expr, list[int]] = {}
+    for j, nodes in enumerate(broken.values()):
+        for node in nodes:
+            terms.setdefault(node, []).append(len(guards) + j)
+    switched = tuple(_switched(root, terms) for root in roots)
+    return SetAside(switched[: len(field)], switched[len(field) :], tuple(broken), len(guards))
+
+
+def check_finite(field: Sequence[Expr], guards: Sequence[Guard], states: Sequence[str]) -> None:
+    """Raise a TraceError if a piece of the field is infinite on its own boundary: nothing can be
+    said of a motion that meets it.
+    """
+    if not _may_break(field):
+        return
+    boundaries = _Boundaries(guards)
+    for number, guard in enumerate(guards):
+        orders = boundaries.orders(field, number)
+        for name, entry in zip(states, field, strict=True):
+            if orders[entry].singular and orders[entry].order < 0 and number in bits_in([entry]):
+                worst = next(
+                    node
+                    for node in ex.walk(entry)
+                    if orders[node].singular and orders[node].order < 0
+                )
+                raise TraceError(
+                    f"d{name}/dt is infinite on the boundary {guard.name!r}, where its piece "
+                    f"begins: {worst!r}. Write a law that is finite "
+                    f"there, such as one of the depth plus a small length, or begin the piece a "
+                    f"little further in."
+                )
+
+
+def is_steep(jacobian: Iterable[Expr], guards: Sequence[Guard]) -> bool:
+    """Whether a derivative of the field is infinite on a boundary where its piece begins, as that
+    of ``d**0.25`` is: no tangent can be integrated through there.
+    """
+    entries = [entry for entry in jacobian if entry.op != "const"]
+    if not _may_break(entries):
+        return False
+    boundaries = _Boundaries(guards)
+    return any(
+        orders[entry].singular and orders[entry].order < 0 and number in bits_in([entry])
+        for number in range(len(guards))
+        for orders in [boundaries.orders(entries, number)]
+        for entry in entries
+    )
+
+
+def check_gaps(guards: Sequence[Guard]) -> None:
+    """Raise a TraceError if a gap has a power, root or logarithm of a piece that vanishes: there
+    the gap is zero, and on no side.
+    """
+    boundaries = _Boundaries(guards)
+    for guard in guards:
+        for node in ex.walk(guard.gap):
+            whole = (
+                node.op == "pow"
+                and node.args[1].op == "const"
+                and float(node.args[1].payload).is_integer()
+            )
+            if (
+                node.op in ("pow", "sqrt", "log")
+                and not whole
+                and boundaries.lifted(node) is not node
+            ):
+                raise TraceError(
+                    f"the guard {guard.name!r} asks for the sign of a law that has no Taylor "
+                    f"series where its own piece begins. Write it "
+                    f"as one piece with all of its conditions: for a contact without tension, d = "
+                    f"x - gap and "
+                    f"sl.piecewise((K*d**1.5*(1 + c*v), (d > 0) & (1 + c*v > 0)), otherwise=0)."
+                )
+
+
+def lifted(field: Iterable[Expr], guards: Sequence[Guard]) -> tuple[Expr, ...]:
+    """The same field with powers, roots and logarithms of pieces, ``sl.max(d, 0)**1.5``, as pieces
+    of powers.
+
+    Only where a piece is zero on a boundary: the rest stays as it was written.
+    """
+    boundaries = _Boundaries(guards)
+    memo: dict[Expr, Expr] = {}
+    roots = tuple(field)
+    for node in ex.walk(*roots):
+        new = ex.rebuild(node, tuple(memo[child] for child in node.args), node.payload)
+        memo[node] = boundaries.lifted(new) if new.op in ("pow", "sqrt", "log") else new
+    return tuple(memo[root] for root in roots)
+
+
+def _may_break(roots: Iterable[Expr]) -> bool:
+    """Whether anything below the roots could have no Taylor series: only these operations can, and
+    to look for zeros on every boundary takes long in a field of a thousand terms.
+    """
+    for node in ex.walk(*roots):
+        match node.op:
+            case "sqrt" | "log":
+                return True
+            case "pow" if not _is_whole(node.args[1]):
+                return True
+            case "div" if ex.depends_on(node.args[1], ("state",)):
+                return True
+    return False
+
+
+def _is_whole(exponent: Expr) -> bool:
+    """Whether an exponent is a whole number, not negative."""
+    return exponent.op == "const" and exponent.payload >= 0 and exponent.payload % 1 == 0
+
+
+def _switched(root: Expr, terms: dict[Expr, list[int]]) -> Expr:
+    """The expression with zero in place of its singular terms where their bits are set."""
+    memo: dict[Expr, Expr] = {}
+    for node in ex.walk(root):
+        new = ex.rebuild(node, tuple(memo[child] for child in node.args), node.payload)
+        if node in terms:
+            bits: list[Condition] = [Bit(number) for number in terms[node]]
+            new = ex.select(reduce(Or, bits), 0.0, new)
+        memo[node] = new
+    return memo[root]
+
+
+class _Boundaries:
+    """Orders of expressions on the boundaries of a system."""
+
+    def __init__(self, guards: Sequence[Guard]) -> None:
+        self._canonical = Canonical()
+        self._gaps = [self._canonical.polynomial(guard.gap) for guard in guards]
+        self._guards = tuple(guards)
+        self._states: dict[Expr, int] = {}
+        self._one_more = (1 << place for place in count())
+        self._orders: list[dict[Expr, Order]] = [{} for _ in guards]
+        self._there: list[dict[Expr, Expr | None]] = [{} for _ in guards]
+
+    def singular_terms(self, field: Sequence[Expr], number: int) -> list[Expr]:
+        """The nodes at which a series ends to exist on a boundary: powers, roots, logarithms and
+        quotients of what vanishes there.
+        """
+        orders = self.orders(field, number)
+        return [node for node in ex.walk(*field) if self._breaks(node, orders)]
+
+    @staticmethod
+    def _breaks(node: Expr, orders: dict[Expr, Order]) -> bool:
+        if not orders[node].singular or not node.args:
+            return False
+        match node.op:
+            case "pow" | "sqrt" | "log":
+                return 0 < orders[node.args[0]].order < math.inf
+            case "div":
+                return 0 < orders[node.args[1]].order < math.inf
+            case "exp":
+                return _exponent_of_power(node, orders)
+        return False
+
+    def orders(self, field: Sequence[Expr], number: int) -> dict[Expr, Order]:
+        """Order of every node on boundary ``number``, and of those asked for before."""
+        orders = self._orders[number]
+        for node in ex.walk(*field, known=orders):
+            orders[node] = self._order(node, orders, number)
+        return orders
+
+    def _order(self, node: Expr, known: dict[Expr, Order], number: int) -> Order:
+        if node.op == "const":
+            return Order(math.inf if node.payload == 0 else 0.0, False)
+        if node.op in ("state", "add", "sub", "select") and self._vanishes(node, number):
+            return Order(1.0, False)
+        if not node.args:
+            return Order(0.0, False)
+        parts = [known[child] for child in node.args]
+        singular = any(part.singular for part in parts)
+        first = parts[0].order
+        match node.op:
+            case "add" | "sub" | "select":
+                return Order(min(part.order for part in parts), singular)
+            case "neg":
+                return parts[0]
+            case "mul":
+                if any(part.order == math.inf for part in parts):
+                    return Order(math.inf, False)
+                return Order(first + parts[1].order, singular)
+            case "div":
+                below = parts[1].order
+                return (
+                    Order(math.inf, False)
+                    if first == math.inf
+                    else Order(first - below, singular or below > 0)
+                )
+            case "pow":
+                return _order_of_power(parts[0], node.args[1])
+            case "exp" if _exponent_of_power(node, known):
+                return Order(-_LOG, True)
+        return _order_of_function(node.op, parts[0])
+
+    def _vanishes(self, node: Expr, number: int) -> bool:
+        """Whether a node is zero on a boundary: the gap times a factor, or zero once the state is
+        put there.
+        """
+        if not self._states_in(self._guards[number].gap) & self._states_in(node):
+            return False
+        if self._is_gap(node, number):
+            return True
+        there = self._on_boundary(node, number)
+        return there is not None and not self._canonical.polynomial(there)
+
+    def _states_in(self, root: Expr) -> int:
+        """The states below a node, each by a bit of a number."""
+        known = self._states
+        for node in ex.walk(root, known=known):
+            own = next(self._one_more) if node.op == "state" else 0
+            known[node] = reduce(or_, (known[one] for one in ex.operands(node)), own)
+        return known[root]
+
+    def _on_boundary(self, root: Expr, number: int) -> Expr | None:
+        """A node where the state of a boundary is put there; None of a boundary that is no level,
+        and of what is no number there.
+        """
+        guard, known = self._guards[number], self._there[number]
+        if guard.state is None or guard.boundary is None:
+            return None
+        state = ex.state(guard.state)
+        for node in ex.walk(root, known=known):
+            if any(known[one] is None for one in ex.operands(node)):
+                known[node] = None
+            elif node is state:
+                known[node] = guard.boundary
+            else:
+                args = tuple(new for one in node.args if (new := known[one]) is not None)
+                try:
+                    known[node] = ex.rebuild(node, args, node.payload)
+                except TraceError:
+                    known[node] = None
+        return known[root]
+
+    def _is_gap(self, node: Expr, number: int) -> bool:
+        """Whether a node is the gap of a guard times a factor."""
+        return is_multiple(self._canonical.polynomial(node), self._gaps[number])
+
+    def lifted(self, node: Expr) -> Expr:
+        """A function of a piece as a piece of functions, if that shows a zero on a boundary."""
+        try:
+            new = self._spread(node, count(1))
+        except _TooManyError:
+            return _one_by_one(node)
+        if new is node:
+            return node
+        for number in range(len(self._gaps)):
+            orders = self.orders([new], number)
+            if any(
+                below.op == node.op and orders[below.args[0]].order > 0
+                for below in ex.walk(new)
+                if below.args
+            ):
+                return new
+        return (
+            new
+            if any(below.op == "const" and below.payload == 0 for below in ex.walk(new))
+            else node
+        )
+
+    def _spread(self, node: Expr, branches: Iterator[int]) -> Expr:
+        """A function of a piece as a piece of functions; raises _TooManyError if these are many."""
+        if next(branches) > _MOST_BRANCHES:
+            raise _TooManyError
+        operand = node.args[0]
+        if any(self._is_gap(operand, number) for number in range(len(self._gaps))):
+            return node
+        outer = _outermost_bit(operand)
+        if outer is None:
+            return node
+        both = []
+        for value in (True, False):
+            inner = assuming(operand, outer, value)
+            new = ex.rebuild(node, (inner, *node.args[1:]), node.payload)
+            both.append(self._spread(new, branches) if new.op == node.op else new)
+        return ex.select(Bit(outer), *both)
+
+
+def _one_by_one(node: Expr) -> Expr:
+    """A function of a sum of many pieces, each zero on one side: apart where one of them acts
+    alone, since only there it may vanish on a boundary, and where none does.
+    """
+    operand, acts = node.args[0], dict[Condition, None]()
+    for below in ex.walk(operand):
+        if (acting := _acting(below)) is not None:
+            acts[acting] = None
+
+    def where(one: Condition | None) -> Expr:
+        """The function where one of the pieces acts, or none."""
+        new: dict[Expr, Expr] = {}
+        for below in ex.walk(operand):
+            acting, args = _acting(below), tuple(new[child] for child in below.args)
+            if acting is None:
+                new[below] = ex.rebuild(below, args, below.payload)
+            else:
+                new[below] = args[args[0] is _ZERO] if acting is one else _ZERO
+        return ex.rebuild(node, (new[operand], *node.args[1:]), node.payload)
+
+    none = where(None)
+    if none.op != "const":
+        return node
+    lifted = ex.select(reduce(Or, acts), node, none)
+    for one in acts:
+        rest = [Not(other) for other in acts if other is not one]
+        lifted = ex.select(reduce(And, rest, one), where(one), lifted)
+    return lifted
+
+
+def _acting(node: Expr) -> Condition | None:
+    """The condition in which a piece isn't zero, if it is elsewhere."""
+    if node.op != "select" or all(one is not _ZERO for one in node.args):
+        return None
+    return node.payload if node.args[1] is _ZERO else Not(node.payload)
+
+
+class _TooManyError(Exception):
+    """A function would have more branches than are looked at."""
+
+
+def _outermost_bit(node: Expr) -> int | None:
+    """A bit of the first piece on the way down."""
+    queue, seen = deque([node]), {node}
+    while queue:
+        top = queue.popleft()
+        if top.op == "select" and top.payload.bits:
+            bits = top.payload.bits
+            return (bits & -bits).bit_length() - 1
+        for child in top.args:
+            if child.bits and child not in seen:
+                seen.add(child)
+                queue.append(child)
+    return None
+
+
+def _order_of_power(base: Order, exponent: Expr) -> Order:
+    """Of ``base**exponent``; an exponent that is a parameter is taken to be positive, and not
+    whole.
+    """
+    if base.order == math.inf:
+        return Order(math.inf, False)
+    if exponent.op != "const":
+        return Order(base.order, base.singular or base.order > 0)
+    return Order(
+        base.order * exponent.payload,
+        base.singular or (base.order > 0 and not _is_whole(exponent)),
+    )
+
+
+def _order_of_function(op: str, inner: Order) -> Order:
+    if op in ("mod", "table"):  # of time alone
+        return Order(0.0, False)
+    if inner.order == math.inf:
+        return Order(0.0 if op in ("exp", "cos") else math.inf, False)
+    if op == "sqrt":
+        return Order(0.5 * inner.order, inner.singular or inner.order > 0)
+    if op == "log":
+        return Order(_LOG, True) if inner.order > 0 else Order(0.0, inner.singular)
+    if inner.singular and inner.order < 0:
+        return Order(_LOG, True)  # a function of something infinite: no limit is known
+    return Order(0.0 if op in ("exp", "cos") else max(inner.order, 0.0), inner.singular)
+
+
+def _exponent_of_power(node: Expr, orders: dict[Expr, Order]) -> bool:
+    """Whether this is ``exp(y*log(u))``, the form of ``u**y`` with an exponent that varies."""
+    if node.op != "exp" or node.args[0].op != "mul":
+        return False
+    factor = node.args[0].args[1]
+    return factor.op == "log" and 0 < orders[factor.args[0]].order < math.inf

@@ -1,0 +1,102 @@
+"""Numbers from expressions, by NumPy: for tests, checks and pictures. Trajectories are computed by
+generated code, not here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from saltus.language.expression import And, Bit, Condition, Expr, Not, Or, Relation, walk
+
+_OPERATIONS: dict[str, Any] = {
+    "add": np.add, "sub": np.subtract, "mul": np.multiply, "div": np.divide, "neg": np.negative,
+    "pow": np.power, "mod": np.mod,
+    "sqrt": np.sqrt, "exp": np.exp, "log": np.log, "sin": np.sin, "cos": np.cos, "tan": np.tan,
+    "atan": np.arctan, "tanh": np.tanh,
+}  # fmt: skip
+
+
+def evaluate(
+    expressions: Iterable[Expr],
+    *,
+    t: Any = 0.0,
+    states: Mapping[str, Any] | None = None,
+    values: Mapping[str, Any] | None = None,
+    bits: Sequence[Any] | Mapping[int, Any] = (),
+) -> list[Any]:
+    """Values of expressions.
+
+    Parameters
+    ----------
+    expressions : iterable of Expr
+        What to evaluate; parts that they share are computed once.
+    t : float or array
+        Time [s].
+    states, values : mapping of str to float or array
+        States and parameters [SI]. All arrays must broadcast.
+    bits : sequence of bool or array of bool, or mapping
+        Side of each guard, by its number: True where its gap is positive. Those that aren't used
+        may be missing.
+
+    Returns
+    -------
+    list of float64 scalars or arrays
+        One for each expression. Where an operation isn't defined the value is nan or inf, without a
+        warning.
+    """
+    steps, places, wanted = _program(tuple(expressions))
+    known: list[Any] = []
+    leaves = {"state": states or {}, "param": values or {}}
+
+    def truth(condition: Condition) -> Any:
+        match condition:
+            case Bit(guard):
+                return bits[guard]
+            case Relation(gap):
+                return known[places[gap]] > 0
+            case Not(inner):
+                return np.logical_not(truth(inner))
+            case And(left, right):
+                return np.logical_and(truth(left), truth(right))
+            case Or(left, right):
+                return np.logical_or(truth(left), truth(right))
+        raise TypeError(condition)
+
+    with np.errstate(all="ignore"):
+        for op, payload, args in steps:
+            if op == "const":
+                known.append(payload)
+            elif op == "time":
+                known.append(np.asarray(t, dtype=np.float64)[()])
+            elif op in leaves:
+                known.append(np.asarray(leaves[op][payload], dtype=np.float64)[()])
+            elif op == "select":
+                where, otherwise = (known[i] for i in args)
+                known.append(np.where(truth(payload), where, otherwise)[()])
+            else:
+                known.append(payload(*[known[i] for i in args]))
+    return [known[place] for place in wanted]
+
+
+@lru_cache(maxsize=512)
+def _program(
+    expressions: tuple[Expr, ...],
+) -> tuple[list[tuple[str, Any, tuple[int, ...]]], dict[Expr, int], list[int]]:
+    """The operations that make some expressions, each with its payload (a function, if it has
+    operands) and the places of its operands; where each node's value stands; and those wanted.
+    """
+    places: dict[Expr, int] = {}
+    steps: list[tuple[str, Any, tuple[int, ...]]] = []
+    for node in walk(*expressions):
+        payload = node.payload
+        if node.op == "const":
+            payload = np.float64(payload)
+        elif node.op in _OPERATIONS:
+            payload = _OPERATIONS[node.op]
+        steps.append((node.op, payload, tuple(places[child] for child in node.args)))
+        places[node] = len(places)
+    return steps, places, [places[one] for one in expressions]
