@@ -196,6 +196,8 @@ def _responses(ds: xr.Dataset) -> list[str]:
     lines = [f"{found}: {_tally(kinds)}" if kinds else found]
     if ds.sizes.get("event"):
         lines.append(f"events   {_tally(ds['event_kind'].values.tolist())}")
+    if text := ds.attrs.get("branches_refused"):
+        lines.append(f"branches by where responses lie, for {text}")
     if "branch_end" in ds:
         ends = np.concatenate([ds["branch_begin"].values, ds["branch_end"].values])
         if lost := int(np.isin(ends, ("lost", "points")).sum()):

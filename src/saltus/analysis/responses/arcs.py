@@ -36,6 +36,7 @@ from saltus.errors import ParameterError
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method, exact_method
 from saltus.results.dataset.kinds import CLOSED, Kind
+from saltus.system.parametric import parametric
 
 #: Doubled branches are followed to orbits of this number of periods, each way over this number of
 #: points.
@@ -61,11 +62,14 @@ class Arcs:
         Branch of each response; -1 of those on none.
     unstable : bool
         Whether unstable orbits are followed too, and branches that leave others.
+    refused : str
+        Why none can be followed of this system over this parameter; empty if they can.
     """
 
     branches: list[Branch] = field(default_factory=list)
     of: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
     unstable: bool = False
+    refused: str = ""
 
 
 def check_unstable(unstable: bool, grid: Grid, method: Method) -> None:
@@ -111,8 +115,15 @@ def follow_arcs(
         grid.system, name, (float(values[0]), float(values[-1])), exact, threads, POINTS,
         LONGEST_DOUBLED, SWITCHES if arcs.unstable else (), stable=not arcs.unstable, twins=True,
     )  # fmt: skip
-    orbits = _exact_orbits(found, grid, method, threads)
     arcs.of = np.full(len(found), -1, np.int64)
+    try:
+        parametric(grid.system, (name,))
+    except ParameterError as error:
+        if arcs.unstable:
+            raise
+        arcs.refused = str(error)
+        return
+    orbits = _exact_orbits(found, grid, method, threads)
     try:
         _follow_rests(found, orbits, grid, plan, arcs)
         _follow_orbits(found, orbits, grid, plan, exact, arcs, progress)
@@ -270,7 +281,7 @@ def arc_values(
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """The variables and attributes of the branches, empty where there are none."""
     if not arcs.branches or not method.exact:
-        return {}, {}
+        return {}, {"branches_refused": arcs.refused} if arcs.refused else {}
     ((name, values),) = grid.axes.items()
     limits = float(values[0]), float(values[-1])
     return (

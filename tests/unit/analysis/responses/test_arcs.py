@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
+from saltus.errors import ParameterError
 
 RIG = sl.models.delangre("b", force="4 N")
 BOX = {"x": ("-5 mm", "5 mm"), "v": ("-1 m/s", "1 m/s")}
@@ -134,3 +135,13 @@ def test_responses_of_an_inexact_method_are_on_the_branches_of_the_exact_orbits(
                 )
             )
         assert len({a for a, _ in pairs}) == len({b for _, b in pairs}) == len(pairs)
+
+
+def test_where_no_branch_can_be_followed_responses_are_matched_and_the_reason_is_said():
+    play, vary = sl.models.play(), {"frequency": (0.75, 1.3, 4)}
+    found = sl.bifurcation_diagram(play, vary, periods=300, progress=False)
+    assert found.response_branch.values.tolist() == 4 * [0]
+    assert "switches at times that depend on a parameter" in found.attrs["branches_refused"]
+    assert "branches by where responses lie, for play switches" in sl.describe(found)
+    with pytest.raises(ParameterError, match="switches at times that depend"):
+        sl.bifurcation_diagram(play, vary, periods=300, unstable=True, progress=False)
