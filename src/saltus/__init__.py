@@ -18,7 +18,8 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from saltus import models, plot
-    from saltus.analysis.basins.attractors import attractors, basin_fractions
+    from saltus.analysis.basins.attractors import attractors
+    from saltus.analysis.basins.basin_fractions import basin_fractions
     from saltus.analysis.basins.basins import basins
     from saltus.analysis.basins.compare import compare
     from saltus.analysis.basins.edge_orbit import edge_orbit
@@ -97,7 +98,7 @@ if TYPE_CHECKING:
 #: Public name: module that holds it.
 _HOMES = {
     "attractors": "saltus.analysis.basins.attractors",
-    "basin_fractions": "saltus.analysis.basins.attractors",
+    "basin_fractions": "saltus.analysis.basins.basin_fractions",
     "basins": "saltus.analysis.basins.basins",
     "bifurcation_diagram": "saltus.analysis.responses.bifurcation_diagram",
     "compare": "saltus.analysis.basins.compare",

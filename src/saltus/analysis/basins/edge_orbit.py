@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.basins.attractors import spread
 from saltus.analysis.basins.periodic_orbits import exact_method, orbits_dataset
 from saltus.analysis.dataset_parts import provenance
 from saltus.analysis.orbits.attractor_set import AttractorSet
 from saltus.analysis.orbits.edge import MOST, Edge, follow_edge
 from saltus.analysis.orbits.orbit_table import table_of
 from saltus.analysis.orbits.portrait import portraits
+from saltus.analysis.orbits.spread import spread
 from saltus.analysis.starts import check_system, ensemble
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError

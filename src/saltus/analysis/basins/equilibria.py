@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.basins.attractors import box_ranges, draw
 from saltus.analysis.basins.halton import halton
+from saltus.analysis.box import box_ranges, draw
 from saltus.analysis.dataset_parts import gap_unit
 from saltus.analysis.orbits.all_equilibria import Rest, all_equilibria
 from saltus.analysis.orbits.equilibria import autonomous

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.basins.attractors import spread
 from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.orbits.all_cycles import all_cycles
 from saltus.analysis.orbits.all_orbits import AGES, Search, all_orbits
 from saltus.analysis.orbits.equilibria import autonomous
 from saltus.analysis.orbits.orbit_table import table_of, table_of_cycles
+from saltus.analysis.orbits.spread import spread
 from saltus.analysis.orbits.tolerances import LONGEST
 from saltus.analysis.orbits.turns import looks_every
 from saltus.analysis.random_starts import random_count, random_starts
