@@ -9,20 +9,20 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from saltus.analysis.attractors.attractors import attractors_dataset, looked
+from saltus.analysis.attractors.find_attractors import find_attractors
+from saltus.analysis.attractors.noisy import stray_attrs
+from saltus.analysis.attractors.portrait import portraits
 from saltus.analysis.basins import uncertainty
-from saltus.analysis.basins.attractors import attractors_dataset, looked
-from saltus.analysis.basins.halton import halton
 from saltus.analysis.basins.labels import complete, settle_all
 from saltus.analysis.basins.pipeline import SCOUTS, memory
-from saltus.analysis.box import box_ranges, draw
+from saltus.analysis.closed.spread import spread
+from saltus.analysis.closed.turns import looks_every
 from saltus.analysis.dataset_parts import provenance, subject
-from saltus.analysis.orbits.find_attractors import find_attractors
-from saltus.analysis.orbits.noisy import stray_attrs
-from saltus.analysis.orbits.portrait import portraits
-from saltus.analysis.orbits.spread import spread
-from saltus.analysis.orbits.turns import looks_every
-from saltus.analysis.starts import check_system, fill, fixed_states
-from saltus.analysis.verb import verb
+from saltus.analysis.inputs.box import box_ranges, draw
+from saltus.analysis.inputs.halton import halton
+from saltus.analysis.inputs.starts import check_system, fill, fixed_states
+from saltus.analysis.inputs.verb import verb
 from saltus.flow.counts import whole
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method, check_method
