@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from saltus.analysis.lyapunov.lyapunov import lyapunov
     from saltus.analysis.methods.compare_methods import compare_methods
     from saltus.analysis.methods.regularisation_widths import regularisation_widths
-    from saltus.analysis.motion.energy import energy_balance
-    from saltus.analysis.motion.impacts import impact_statistics
+    from saltus.analysis.motion.energy_balance import energy_balance
+    from saltus.analysis.motion.impact_statistics import impact_statistics
     from saltus.analysis.motion.poincare import poincare
     from saltus.analysis.motion.settled import settled
     from saltus.analysis.motion.simulate import simulate
@@ -104,10 +104,10 @@ _HOMES = {
     "compare": "saltus.analysis.basins.compare",
     "compare_methods": "saltus.analysis.methods.compare_methods",
     "edge_orbit": "saltus.analysis.attractors.edge_orbit",
-    "energy_balance": "saltus.analysis.motion.energy",
+    "energy_balance": "saltus.analysis.motion.energy_balance",
     "equilibria": "saltus.analysis.closed.equilibria",
     "frequency_response": "saltus.analysis.responses.frequency_response",
-    "impact_statistics": "saltus.analysis.motion.impacts",
+    "impact_statistics": "saltus.analysis.motion.impact_statistics",
     "lyapunov": "saltus.analysis.lyapunov.lyapunov",
     "periodic_orbits": "saltus.analysis.closed.periodic_orbits",
     "poincare": "saltus.analysis.motion.poincare",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
-from saltus.analysis.motion.impacts import _error_of_row, contact_sides
+from saltus.analysis.motion.impact_statistics import _error_of_row, contact_sides
 from saltus.analysis.motion.touchdowns import Touchdowns, _pairs, _spells
 from saltus.errors import ParameterError
 
