@@ -8,8 +8,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from saltus.analysis.closed.orbits import Orbit, find_orbits
 from saltus.analysis.lyapunov.segments import SAMPLED_BLOCKS, Segment, TangentFlow
-from saltus.analysis.orbits.orbits import Orbit, find_orbits
 from saltus.flow.maps import Map
 from saltus.kernels import status as st
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from saltus.analysis.basins.attractors import attractors_dataset
+from saltus.analysis.attractors.attractors import attractors_dataset
 from saltus.results import Guards, Subject, build
 from saltus.results.dataset import schema
 from saltus.results.dataset.attractors import AttractorTable, basin_meanings, padded

@@ -10,20 +10,20 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.basins.attractors import attractors, attractors_dataset
+from saltus.analysis.attractors.attractor_set import AttractorSet
+from saltus.analysis.attractors.attractors import attractors, attractors_dataset
+from saltus.analysis.attractors.portrait import portraits
 from saltus.analysis.basins.basins import map_of
 from saltus.analysis.basins.pipeline import basin_plan
+from saltus.analysis.branches.branches import branches
+from saltus.analysis.closed.capture import Neighbourhoods
+from saltus.analysis.closed.orbits import Orbit, find_orbits, same
 from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.lyapunov.lyapunov import lyapunov
 from saltus.analysis.methods.compare_methods import compare_methods, methods_dataset
 from saltus.analysis.methods.method_errors import one_period_errors
 from saltus.analysis.motion.simulate import simulate
 from saltus.analysis.motion.stroboscope import stroboscope
-from saltus.analysis.orbits.attractor_set import AttractorSet
-from saltus.analysis.orbits.capture import Neighbourhoods
-from saltus.analysis.orbits.orbits import Orbit, find_orbits, same
-from saltus.analysis.orbits.portrait import portraits
-from saltus.analysis.responses.all_branches import branches
 from saltus.analysis.responses.bifurcation_diagram import bifurcation_diagram
 from saltus.analysis.responses.frequency_response import frequency_response
 from saltus.flow import ODE45, Taylor

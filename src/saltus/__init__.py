@@ -18,19 +18,21 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from saltus import models, plot
-    from saltus.analysis.basins.attractors import attractors, basin_fractions
+    from saltus.analysis.attractors.attractors import attractors
+    from saltus.analysis.attractors.edge_orbit import edge_orbit
+    from saltus.analysis.basins.basin_fractions import basin_fractions
     from saltus.analysis.basins.basins import basins
     from saltus.analysis.basins.compare import compare
-    from saltus.analysis.basins.edge_orbit import edge_orbit
-    from saltus.analysis.basins.equilibria import equilibria
-    from saltus.analysis.basins.periodic_orbits import periodic_orbits
     from saltus.analysis.branches.backbone import backbone
     from saltus.analysis.branches.bifurcation_curve import bifurcation_curve
+    from saltus.analysis.branches.branches import branches
+    from saltus.analysis.closed.equilibria import equilibria
+    from saltus.analysis.closed.periodic_orbits import periodic_orbits
     from saltus.analysis.lyapunov.lyapunov import lyapunov
     from saltus.analysis.methods.compare_methods import compare_methods
     from saltus.analysis.methods.regularisation_widths import regularisation_widths
-    from saltus.analysis.motion.energy import energy_balance
-    from saltus.analysis.motion.impacts import impact_statistics
+    from saltus.analysis.motion.energy_balance import energy_balance
+    from saltus.analysis.motion.impact_statistics import impact_statistics
     from saltus.analysis.motion.poincare import poincare
     from saltus.analysis.motion.settled import settled
     from saltus.analysis.motion.simulate import simulate
@@ -39,7 +41,6 @@ if TYPE_CHECKING:
     from saltus.analysis.motion.structure_modes import structure_modes
     from saltus.analysis.motion.transmissibility import transmissibility
     from saltus.analysis.recorded.wolf import wolf
-    from saltus.analysis.responses.all_branches import branches
     from saltus.analysis.responses.bifurcation_diagram import bifurcation_diagram
     from saltus.analysis.responses.frequency_response import frequency_response
     from saltus.contact import (
@@ -96,19 +97,19 @@ if TYPE_CHECKING:
 
 #: Public name: module that holds it.
 _HOMES = {
-    "attractors": "saltus.analysis.basins.attractors",
-    "basin_fractions": "saltus.analysis.basins.attractors",
+    "attractors": "saltus.analysis.attractors.attractors",
+    "basin_fractions": "saltus.analysis.basins.basin_fractions",
     "basins": "saltus.analysis.basins.basins",
     "bifurcation_diagram": "saltus.analysis.responses.bifurcation_diagram",
     "compare": "saltus.analysis.basins.compare",
     "compare_methods": "saltus.analysis.methods.compare_methods",
-    "edge_orbit": "saltus.analysis.basins.edge_orbit",
-    "energy_balance": "saltus.analysis.motion.energy",
-    "equilibria": "saltus.analysis.basins.equilibria",
+    "edge_orbit": "saltus.analysis.attractors.edge_orbit",
+    "energy_balance": "saltus.analysis.motion.energy_balance",
+    "equilibria": "saltus.analysis.closed.equilibria",
     "frequency_response": "saltus.analysis.responses.frequency_response",
-    "impact_statistics": "saltus.analysis.motion.impacts",
+    "impact_statistics": "saltus.analysis.motion.impact_statistics",
     "lyapunov": "saltus.analysis.lyapunov.lyapunov",
-    "periodic_orbits": "saltus.analysis.basins.periodic_orbits",
+    "periodic_orbits": "saltus.analysis.closed.periodic_orbits",
     "poincare": "saltus.analysis.motion.poincare",
     "regularisation_widths": "saltus.analysis.methods.regularisation_widths",
     "settled": "saltus.analysis.motion.settled",
@@ -118,7 +119,7 @@ _HOMES = {
     "structure_modes": "saltus.analysis.motion.structure_modes",
     "backbone": "saltus.analysis.branches.backbone",
     "bifurcation_curve": "saltus.analysis.branches.bifurcation_curve",
-    "branches": "saltus.analysis.responses.all_branches",
+    "branches": "saltus.analysis.branches.branches",
     "transmissibility": "saltus.analysis.motion.transmissibility",
     "wolf": "saltus.analysis.recorded.wolf",
     "SaltusError": "saltus.errors",

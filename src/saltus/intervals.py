@@ -6,6 +6,8 @@ import numpy as np
 
 #: Two-sided 95 % quantile of the normal distribution.
 QUANTILE_95 = 1.959963984540054
+#: -ln(0.05): a share p stays unseen in N random cells with probability (1-p)^N < 5 % if p > 3/N.
+RULE_OF_THREE = 3.0
 
 
 def wilson(count: np.ndarray | int, cells: np.ndarray | int) -> tuple[np.ndarray, np.ndarray]:
@@ -26,3 +28,14 @@ def wilson(count: np.ndarray | int, cells: np.ndarray | int) -> tuple[np.ndarray
     return np.where(~none & (count == 0), 0.0, centre - half), np.where(
         count == cells, 1.0, centre + half
     )
+
+
+def smallest_seen(cells: int) -> float:
+    """Share above which a basin can't have been missed by this number of starts, with a confidence
+    of 95 %: 3/N, the rule of three.
+
+    Hanley & Lippman-Hand, J. Am. Med. Assoc. 249 (1983) 1743. It holds for starts drawn at random.
+    On a regular grid it says the same of a basin that is scattered finely; a compact one is met for
+    certain as soon as it holds a whole cell, 1/N. 1 if there are fewer than three starts.
+    """
+    return min(RULE_OF_THREE / cells, 1.0) if cells else 1.0

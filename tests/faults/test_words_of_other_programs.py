@@ -119,7 +119,7 @@ def test_pictures_that_saltus_has_not(name, words):
 
 def test_what_is_advised_exists():
     """No sentence names a function of saltus that isn't there."""
-    from saltus.analysis import verb
+    from saltus.analysis.inputs import verb
     from saltus.language import foreign
     from saltus.plot import elsewhere as pictures
     from saltus.system import elsewhere

@@ -81,14 +81,14 @@ def brief(monkeypatch):
     all of it is made.
     """
     monkeypatch.setattr(pipeline, "SCOUTS", 2)
-    monkeypatch.setattr("saltus.analysis.orbits.find_attractors.WATCHING_ITERATES", 256)
-    monkeypatch.setattr("saltus.analysis.orbits.aperiodic.BLOCKS", 64)
+    monkeypatch.setattr("saltus.analysis.attractors.find_attractors.WATCHING_ITERATES", 256)
+    monkeypatch.setattr("saltus.analysis.attractors.aperiodic.BLOCKS", 64)
     for name in (
         "find_attractors.SURVEY_ITERATES",
         "noisy.SURVEY_ITERATES",
         "find_responses.KEPT_ITERATES",
     ):
-        monkeypatch.setattr(f"saltus.analysis.orbits.{name}", 256)
+        monkeypatch.setattr(f"saltus.analysis.attractors.{name}", 256)
 
 
 def test_all_figures_are_here():

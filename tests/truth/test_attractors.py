@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
-from saltus.analysis.basins.attractors import attractors
+from saltus.analysis.attractors.attractors import attractors
 from saltus.flow.maps import Stroboscope
 
 ORBITS = {

@@ -12,12 +12,11 @@ from saltus.analysis.basins.uncertainty import (
     basin_entropy,
     fractions,
     measure,
-    smallest_basin,
     uncertain_share,
     uncertainty_exponent,
 )
 from saltus.errors import ParameterError
-from saltus.intervals import wilson
+from saltus.intervals import smallest_seen, wilson
 
 
 def split(n: int, place: int) -> np.ndarray:
@@ -79,9 +78,9 @@ def test_fractions_count_what_was_computed():
 def test_the_smallest_basin_is_missed_in_one_of_twenty():
     """(1 - 3/N)^N is just below 5 %."""
     for cells in (100, 10_000, 1_000_000):
-        missed = (1 - smallest_basin(cells)) ** cells
+        missed = (1 - smallest_seen(cells)) ** cells
         assert 0.047 < missed < 0.05
-    assert smallest_basin(2) == smallest_basin(0) == 1.0
+    assert smallest_seen(2) == smallest_seen(0) == 1.0
 
 
 # -- closed forms of the entropies -----------------------------------------------------------------

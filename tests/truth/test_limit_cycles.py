@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import saltus as sl
-from saltus.analysis.orbits.turns import looks_every
+from saltus.analysis.closed.turns import looks_every
 
 CHUA = sl.models.double_scroll(alpha=8.0)
 

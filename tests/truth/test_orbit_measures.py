@@ -11,8 +11,8 @@ from scipy.optimize import brentq
 
 import saltus as sl
 from conformance.systems import lab
-from saltus.analysis.orbits.orbit_measures import measure
-from saltus.analysis.outputs import outputs_of
+from saltus.analysis.closed.measures import measure
+from saltus.analysis.inputs.outputs import outputs_of
 from saltus.errors import ParameterError, TraceError
 from saltus.flow.maps import Stroboscope
 

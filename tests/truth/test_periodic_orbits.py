@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 
 import impact_orbits
 import saltus as sl
-from saltus.analysis.basins.periodic_orbits import CONTACTS, STEPS
+from saltus.analysis.closed.periodic_orbits import CONTACTS, STEPS
 from saltus.flow.maps import Stroboscope
 from saltus.flow.shots import Shots
 from saltus.kernels import status as st

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
-from saltus.analysis.orbits.special_equilibria import boundary_equilibrium, fold_point, hopf_point
+from saltus.analysis.branches.special_equilibria import boundary_equilibrium, fold_point, hopf_point
 
 
 @sl.system(states="x y")

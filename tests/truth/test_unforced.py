@@ -8,8 +8,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import root
 
 import saltus as sl
-from saltus.analysis.orbits.cycles import find_cycles, returns
-from saltus.analysis.orbits.equilibria import find_equilibria
+from saltus.analysis.closed.cycles import find_cycles, returns
+from saltus.analysis.closed.field_zeros import find_equilibria
 from saltus.flow.maps import Stroboscope
 
 FAST = sl.Taylor(order=12, lanes=2)

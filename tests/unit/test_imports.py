@@ -1,4 +1,6 @@
-"""Modules import in one direction: no circle, nor one by an import inside a function."""
+"""Modules import in one direction: no circle, nor one by an import inside a function. A verb
+stands in a file of its name.
+"""
 
 import ast
 from graphlib import CycleError, TopologicalSorter
@@ -50,3 +52,9 @@ def test_no_circle_of_imports():
     except CycleError as error:
         raise AssertionError(f"a circle: {' -> '.join(error.args[1])}") from None
     assert len(order) == len(MODULES) > 300
+
+
+def test_a_verb_stands_in_a_file_of_its_name():
+    verbs = [one for one in saltus._HOMES.items() if one[1].startswith("saltus.analysis.")]
+    assert len(verbs) > 20
+    assert [name for name, home in verbs if not home.endswith(f".{name}")] == []

@@ -45,11 +45,12 @@ def test_a_run_imports_what_it_needs(start):
         "motion",
         "motion.simulate",
         "motion.time_errors",
-        "axes",
+        "inputs",
+        "inputs.axes",
+        "inputs.starts",
+        "inputs.verb",
         "dataset_parts",
         "outcome_messages",
-        "starts",
-        "verb",
     }
     assert {name for name in modules if name.startswith("saltus.analysis.")} == {
         f"saltus.analysis.{name}" for name in rooms

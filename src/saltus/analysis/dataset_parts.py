@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.analysis.starts import Ensemble
+from saltus.analysis.inputs.starts import Ensemble
 from saltus.flow.contact_table import ContactTable
 from saltus.flow.methods import Method
 from saltus.flow.request import Outcome

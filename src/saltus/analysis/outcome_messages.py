@@ -9,7 +9,7 @@ import warnings
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.starts import Span
+from saltus.analysis.inputs.starts import Span
 from saltus.contact.guards import is_hold
 from saltus.errors import SaltusWarning
 from saltus.kernels import status as st

@@ -11,12 +11,12 @@ ROOM = Path(saltus.analysis.__file__).parent
 SOLVERS = {"solve", "lstsq", "pinv", "inv"}
 #: Files that solve linear systems, and why.
 WHY = {
-    "orbits/newton.py": "Newton's method",
-    "orbits/damped.py": "Newton's method from far away, with known zeros taken out",
+    "solve/newton.py": "Newton's method",
+    "solve/damped.py": "Newton's method from far away, with known zeros taken out",
     "branches/arclength.py": "Newton's method with a border: the corrector of continuation",
-    "orbits/capture.py": "norms in which a neighbourhood shrinks",
-    "orbits/equilibria.py": "points around an equilibrium in such a norm",
-    "orbits/special_equilibria.py": "the Lyapunov coefficient of a Hopf point",
+    "closed/capture.py": "norms in which a neighbourhood shrinks",
+    "closed/field_zeros.py": "points around an equilibrium in such a norm",
+    "branches/special_equilibria.py": "the Lyapunov coefficient of a Hopf point",
     "branches/codimension_two.py": "the quadratic part at a fold",
     "branches/forced_vibration.py": "the answer of a rigid body to a static force",
 }
@@ -39,7 +39,7 @@ def test_linear_systems_are_solved_where_a_reason_is_written():
         for file in ROOM.rglob("*.py")
         if solves(file.read_text(encoding="utf-8"))
     }
-    assert found == set(WHY), "take saltus.analysis.orbits.newton, or write down why not"
+    assert found == set(WHY), "take saltus.analysis.solve.newton, or write down why not"
 
 
 @pytest.mark.parametrize(

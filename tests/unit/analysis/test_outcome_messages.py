@@ -6,8 +6,8 @@ import numpy as np
 import xarray as xr
 
 import saltus as sl
+from saltus.analysis.inputs.starts import ensemble, span
 from saltus.analysis.outcome_messages import messages
-from saltus.analysis.starts import ensemble, span
 
 
 @sl.system(states="h", units={"h": "m"})

@@ -11,7 +11,7 @@ import pytest
 
 import impact_orbits
 import saltus as sl
-from saltus.analysis.orbits.orbits import find_orbits
+from saltus.analysis.closed.orbits import find_orbits
 from saltus.errors import SaltusWarning
 from saltus.flow.maps import Stroboscope
 from saltus.language.evaluate import evaluate

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
-from saltus.analysis.orbits.orbits import find_orbits
+from saltus.analysis.closed.orbits import find_orbits
 from saltus.flow.maps import Stroboscope
 from saltus.language.evaluate import evaluate
 from saltus.models import (

@@ -5,7 +5,7 @@ import re
 import numpy as np
 
 import saltus as sl
-from saltus.analysis.orbits.tolerances import LONGEST
+from saltus.analysis.solve.tolerances import LONGEST
 
 
 @sl.system(states="x v")

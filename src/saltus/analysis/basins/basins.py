@@ -7,10 +7,10 @@ from typing import Any
 
 import xarray as xr
 
+from saltus.analysis.attractors.attractor_set import AttractorSet
 from saltus.analysis.basins.labels import Settling
 from saltus.analysis.basins.pipeline import BasinPlan, basin_plan
-from saltus.analysis.orbits.attractor_set import AttractorSet
-from saltus.analysis.verb import verb
+from saltus.analysis.inputs.verb import verb
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporting, stage
 from saltus.flow.threads import on_threads

@@ -10,8 +10,8 @@ import numpy as np
 import xarray as xr
 from scipy.optimize import linear_sum_assignment
 
-from saltus.analysis.orbits.orbits import orbit_distance
-from saltus.analysis.verb import verb
+from saltus.analysis.closed.orbits import orbit_distance
+from saltus.analysis.inputs.verb import verb
 from saltus.errors import ParameterError
 from saltus.intervals import wilson
 from saltus.results import Subject, build, made_by

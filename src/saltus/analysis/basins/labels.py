@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from saltus.analysis.orbits.attractor_set import AttractorSet
-from saltus.analysis.orbits.find_attractors import find_attractors, keeps_to_sampled
+from saltus.analysis.attractors.attractor_set import AttractorSet
+from saltus.analysis.attractors.find_attractors import find_attractors, keeps_to_sampled
 from saltus.flow.maps import Map, Travel
 from saltus.flow.threads import on_threads
 from saltus.kernels import status as st

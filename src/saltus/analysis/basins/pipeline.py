@@ -15,17 +15,17 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.axes import along, count_along
+from saltus.analysis.attractors.attractor_set import AttractorSet
+from saltus.analysis.attractors.find_attractors import find_attractors
+from saltus.analysis.attractors.noisy import stray_attrs
+from saltus.analysis.attractors.portrait import portraits
 from saltus.analysis.basins import uncertainty
-from saltus.analysis.basins.halton import halton
 from saltus.analysis.basins.labels import OPEN, Settling, complete, settle
+from saltus.analysis.closed.turns import ASKED, looks_every
 from saltus.analysis.dataset_parts import provenance, subject
-from saltus.analysis.orbits.attractor_set import AttractorSet
-from saltus.analysis.orbits.find_attractors import find_attractors
-from saltus.analysis.orbits.noisy import stray_attrs
-from saltus.analysis.orbits.portrait import portraits
-from saltus.analysis.orbits.turns import ASKED, looks_every
-from saltus.analysis.starts import check_system, fill, fixed_states
+from saltus.analysis.inputs.axes import along, count_along
+from saltus.analysis.inputs.halton import halton
+from saltus.analysis.inputs.starts import check_system, fill, fixed_states
 from saltus.errors import ParameterError
 from saltus.flow.counts import whole
 from saltus.flow.maps import Stroboscope

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from saltus.analysis.attractors.aperiodic import SampledAttractor
+from saltus.analysis.attractors.attractor_set import AttractorSet
+from saltus.analysis.attractors.noisy import Noisy
 from saltus.analysis.basins.labels import Settling
-from saltus.analysis.orbits.aperiodic import SampledAttractor
-from saltus.analysis.orbits.attractor_set import AttractorSet
-from saltus.analysis.orbits.capture import Neighbourhoods
-from saltus.analysis.orbits.noisy import Noisy
-from saltus.analysis.orbits.orbits import Orbit
+from saltus.analysis.closed.capture import Neighbourhoods
+from saltus.analysis.closed.orbits import Orbit
 from saltus.errors import SaltusError
 
 #: What is kept of each cell, beside where it ended.

@@ -14,12 +14,10 @@ import numpy as np
 import xarray as xr
 
 from saltus.errors import ParameterError
-from saltus.intervals import wilson
+from saltus.intervals import smallest_seen, wilson
 from saltus.results.dataset.kinds import Kind
 from saltus.results.dataset.schema import BASINS, check
 
-#: -ln(0.05): a share p stays unseen in N random cells with probability (1-p)^N < 5 % if p > 3/N.
-RULE_OF_THREE = 3.0
 #: Cells along the side of a box; Daza et al. use 5 in all of their figures.
 BOX = 5
 #: The largest distance looked at is this part of the shorter side of the grid: beyond it the sides
@@ -66,17 +64,6 @@ def fractions(labels: np.ndarray, m: int) -> tuple[np.ndarray, np.ndarray, np.nd
         )
     share = count / cells if cells else np.full(m, np.nan)
     return (share, *wilson(count, cells))
-
-
-def smallest_basin(cells: int) -> float:
-    """Share above which a basin can't have been missed by this number of starts, with a confidence
-    of 95 %: 3/N, the rule of three.
-
-    Hanley & Lippman-Hand, J. Am. Med. Assoc. 249 (1983) 1743. It holds for starts drawn at random.
-    On a regular grid it says the same of a basin that is scattered finely; a compact one is met for
-    certain as soon as it holds a whole cell, 1/N. 1 if there are fewer than three starts.
-    """
-    return min(RULE_OF_THREE / cells, 1.0) if cells else 1.0
 
 
 # -- boundaries ------------------------------------------------------------------------------------
@@ -220,7 +207,7 @@ def measure(ds: xr.Dataset) -> dict[str, float | int]:
     entropy, boundary_entropy = basin_entropy(labels)
     exponent, error, dimension = uncertainty_exponent(labels)
     return {
-        "smallest_basin_seen": smallest_basin(int((labels != Kind.NOT_COMPUTED).sum())),
+        "smallest_basin_seen": smallest_seen(int((labels != Kind.NOT_COMPUTED).sum())),
         "basin_entropy": entropy,
         "boundary_basin_entropy": boundary_entropy,
         "uncertainty_exponent": exponent,

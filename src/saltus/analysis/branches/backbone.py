@@ -20,9 +20,9 @@ from saltus.analysis.branches.free_vibration import (
 )
 from saltus.analysis.branches.special_points import zeros
 from saltus.analysis.dataset_parts import provenance, subject
-from saltus.analysis.outputs import outputs_of
-from saltus.analysis.starts import at_values, check_system
-from saltus.analysis.verb import verb
+from saltus.analysis.inputs.outputs import outputs_of
+from saltus.analysis.inputs.starts import at_values, check_system
+from saltus.analysis.inputs.verb import verb
 from saltus.errors import ParameterError, UnitError, among, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.methods import Method, exact_method

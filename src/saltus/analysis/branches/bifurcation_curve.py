@@ -16,11 +16,11 @@ from saltus.analysis.branches.curves import BifurcationCurve, trace_curve
 from saltus.analysis.branches.grazing_orbits import GrazingOrbits
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.singular_orbits import MULTIPLIER, SingularOrbits
+from saltus.analysis.closed.cycles import units
 from saltus.analysis.dataset_parts import provenance, subject
-from saltus.analysis.orbits.cycles import units
-from saltus.analysis.outputs import outputs_of
-from saltus.analysis.starts import check_system, range_of
-from saltus.analysis.verb import verb
+from saltus.analysis.inputs.outputs import outputs_of
+from saltus.analysis.inputs.starts import check_system, range_of
+from saltus.analysis.inputs.verb import verb
 from saltus.errors import ParameterError, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.methods import Method, exact_method

@@ -15,9 +15,9 @@ from saltus.analysis.branches.rests import Rests
 from saltus.analysis.branches.same_branch import has_twin
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.special_points import outside
+from saltus.analysis.closed.measures import Measures, measure, unknown
 from saltus.analysis.dataset_parts import guards_over, provenance, subject
-from saltus.analysis.orbits.orbit_measures import Measures, measure, unknown
-from saltus.analysis.outputs import Outputs
+from saltus.analysis.inputs.outputs import Outputs
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.flow.request import Schedule

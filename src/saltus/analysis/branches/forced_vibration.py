@@ -22,7 +22,7 @@ from saltus.analysis.branches.free_vibration import (
     place_of_rest,
 )
 from saltus.analysis.branches.shooting import PeriodicOrbits
-from saltus.analysis.orbits.equilibria import jacobian_of
+from saltus.analysis.closed.field_zeros import jacobian_of
 from saltus.errors import ParameterError, among, nearest, shown
 from saltus.flow.methods import Method
 from saltus.language import expression as ex

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from saltus.analysis.branches.shooting import PeriodicOrbits
-from saltus.analysis.orbits.equilibria import autonomous, field_of, jacobian_of
-from saltus.analysis.orbits.newton import newton
+from saltus.analysis.closed.field_zeros import autonomous, field_of, jacobian_of
+from saltus.analysis.solve.newton import newton
 from saltus.contact.guards import Guard
 from saltus.errors import ParameterError
 from saltus.flow.methods import Method

@@ -15,7 +15,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from saltus.analysis.branches.legs import Legs
-from saltus.analysis.orbits.newton import newton
+from saltus.analysis.solve.newton import newton
 from saltus.language.derivatives import gradient, time_derivative
 from saltus.language.evaluate import evaluate
 from saltus.language.expression import Expr, add, mul

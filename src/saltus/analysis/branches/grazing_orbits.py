@@ -18,7 +18,7 @@ from saltus.analysis.branches.contact_sequences import sequences, shift, without
 from saltus.analysis.branches.grazes import ContactEvent, Gap, nearest_turn, touch, touching
 from saltus.analysis.branches.legs import Legs, product
 from saltus.analysis.branches.shooting import PeriodicOrbits
-from saltus.analysis.orbits.newton import newton
+from saltus.analysis.solve.newton import newton
 from saltus.language.derivatives import gradient
 from saltus.language.evaluate import evaluate
 from saltus.system.leg import frozen

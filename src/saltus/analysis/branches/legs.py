@@ -19,7 +19,7 @@ import numpy as np
 from saltus.analysis.branches.contact_sequences import ContactSequence, sequences, shift
 from saltus.analysis.branches.contacts_along import At, Jumps
 from saltus.analysis.branches.shooting import PeriodicOrbits
-from saltus.analysis.orbits.floquet import across, multipliers
+from saltus.analysis.solve.floquet import across, multipliers
 from saltus.flow.maps import Stroboscope
 from saltus.flow.request import Schedule
 from saltus.kernels import status as st

@@ -18,15 +18,15 @@ import numpy as np
 from saltus.analysis.branches.arclength import Curve, tangents
 from saltus.analysis.branches.branch import Branch, refine
 from saltus.analysis.branches.rests import Rests
-from saltus.analysis.branches.special_points import SpecialPoint
-from saltus.analysis.branches.switching import Seed, crossing
-from saltus.analysis.branches.tracing import Plan, both_ways, trace
-from saltus.analysis.orbits.special_equilibria import (
+from saltus.analysis.branches.special_equilibria import (
     SpecialEquilibrium,
     boundary_equilibrium,
     fold_point,
     hopf_point,
 )
+from saltus.analysis.branches.special_points import SpecialPoint
+from saltus.analysis.branches.switching import Seed, crossing
+from saltus.analysis.branches.tracing import Plan, both_ways, trace
 from saltus.system import System
 
 #: Newton's method on a defining system finds the point that was bracketed, within this distance in

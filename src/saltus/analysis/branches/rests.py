@@ -14,7 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from saltus.analysis.orbits.newton import leading_first
+from saltus.analysis.solve.newton import leading_first
 from saltus.contact.guards import is_hold
 from saltus.language.evaluate import evaluate
 from saltus.language.expression import Expr

@@ -10,9 +10,9 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.branches.switching import Seed
-from saltus.analysis.orbits.all_equilibria import all_equilibria
-from saltus.analysis.orbits.cycles import units
-from saltus.analysis.orbits.orbit_measures import measure
+from saltus.analysis.closed.all_equilibria import all_equilibria
+from saltus.analysis.closed.cycles import units
+from saltus.analysis.closed.measures import measure
 from saltus.errors import ParameterError, shown
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method

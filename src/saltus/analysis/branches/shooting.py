@@ -16,8 +16,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from saltus.analysis.orbits.equilibria import field_of
-from saltus.analysis.orbits.floquet import across, multipliers
+from saltus.analysis.closed.field_zeros import field_of
+from saltus.analysis.solve.floquet import across, multipliers
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.flow.request import Schedule

@@ -18,7 +18,7 @@ from scipy.optimize import elementwise
 
 from saltus.analysis.branches.arclength import correct, tangents
 from saltus.analysis.branches.shooting import PeriodicOrbits
-from saltus.analysis.orbits.newton import newton
+from saltus.analysis.solve.newton import newton
 from saltus.flow.polynomials import between
 
 #: Tests in the order in which they are made.

@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from saltus.analysis.closed.field_zeros import autonomous, find_equilibria
+from saltus.analysis.closed.measures import measure
+from saltus.analysis.closed.orbits import Orbit
 from saltus.analysis.lyapunov.algorithm import Algorithm
 from saltus.analysis.lyapunov.qr import AT_REST, GOOD, SEGMENT
 from saltus.analysis.lyapunov.segments import TangentFlow
 from saltus.analysis.lyapunov.spectrum import Spectrum, spectrum
-from saltus.analysis.orbits.equilibria import autonomous, find_equilibria
-from saltus.analysis.orbits.orbit_measures import measure
-from saltus.analysis.orbits.orbits import Orbit
-from saltus.analysis.orbits.tolerances import SAME
+from saltus.analysis.solve.tolerances import SAME
 from saltus.analysis.statistics import CONFIDENCE, running_ends
 from saltus.flow.maps import Stroboscope
 from saltus.kernels import status as st

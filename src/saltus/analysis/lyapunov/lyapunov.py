@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from saltus.analysis.closed.turns import looks_every
 from saltus.analysis.dataset_parts import provenance, shared_values, subject
+from saltus.analysis.inputs.starts import Ensemble, check_system, ensemble
+from saltus.analysis.inputs.verb import verb
 from saltus.analysis.lyapunov.algorithm import Algorithm
 from saltus.analysis.lyapunov.exponents import Exponents
 from saltus.analysis.lyapunov.wolf_on_flow import NeighbourExponents
-from saltus.analysis.orbits.turns import looks_every
 from saltus.analysis.outcome_messages import warn
-from saltus.analysis.starts import Ensemble, check_system, ensemble
-from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, among, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.maps import Stroboscope

@@ -13,12 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from saltus.analysis.attractors.aperiodic import SURE
+from saltus.analysis.attractors.recurrence import recurring_orbits
+from saltus.analysis.closed.orbits import Orbit
 from saltus.analysis.lyapunov.qr import GOOD, Growth, carry, grow
 from saltus.analysis.lyapunov.segments import TangentFlow
-from saltus.analysis.orbits.aperiodic import SURE
-from saltus.analysis.orbits.orbits import Orbit
-from saltus.analysis.orbits.recurrence import recurring_orbits
-from saltus.analysis.orbits.tolerances import NEAR, ROUND, SAME
+from saltus.analysis.solve.tolerances import NEAR, ROUND, SAME
 from saltus.analysis.statistics import BOUNDED, UNCLEAR, Means, batch_means, running_ends
 from saltus.results.dataset.kinds import Kind
 

@@ -14,6 +14,8 @@ import xarray as xr
 from saltus.analysis.basins.basins import basins
 from saltus.analysis.basins.compare import compare
 from saltus.analysis.dataset_parts import provenance
+from saltus.analysis.inputs.starts import check_system
+from saltus.analysis.inputs.verb import check_call, verb
 from saltus.analysis.methods.method_errors import (
     cell_agreement,
     one_period_errors,
@@ -22,8 +24,6 @@ from saltus.analysis.methods.method_errors import (
 )
 from saltus.analysis.responses.bifurcation_diagram import bifurcation_diagram
 from saltus.analysis.responses.frequency_response import frequency_response
-from saltus.analysis.starts import check_system
-from saltus.analysis.verb import check_call, verb
 from saltus.errors import ParameterError, among, shown
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import ODE45, Method, Taylor, check_method

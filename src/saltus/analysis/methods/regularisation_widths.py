@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from saltus.analysis.attractors.find_responses import motion_range
 from saltus.analysis.dataset_parts import provenance, subject
-from saltus.analysis.orbits.find_responses import motion_range
-from saltus.analysis.starts import ensemble
-from saltus.analysis.verb import verb
+from saltus.analysis.inputs.starts import ensemble
+from saltus.analysis.inputs.verb import verb
 from saltus.contact import STEPS
 from saltus.errors import ParameterError, among, nearest, shown
 from saltus.flow.counts import whole

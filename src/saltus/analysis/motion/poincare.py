@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from saltus.analysis.inputs.starts import check_system
+from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion.window import Stretch, computed, dataset, stretch
 from saltus.analysis.outcome_messages import warn
-from saltus.analysis.starts import check_system
-from saltus.analysis.verb import verb
 from saltus.contact.guards import equation_of
 from saltus.errors import ParameterError, among, nearest, shown
 from saltus.flow.methods import Method, check_method

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.verb import verb
+from saltus.analysis.inputs.verb import verb
 from saltus.errors import ParameterError
 from saltus.flow.counts import whole as whole_number
 from saltus.flow.method import check_positive

@@ -11,10 +11,10 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis import dataset_parts
+from saltus.analysis.inputs.starts import Ensemble, Span, check_system, ensemble, span, trajectories
+from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion import time_errors as measure
 from saltus.analysis.outcome_messages import warn
-from saltus.analysis.starts import Ensemble, Span, check_system, ensemble, span, trajectories
-from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, among, shown
 from saltus.flow import engine
 from saltus.flow.counts import whole

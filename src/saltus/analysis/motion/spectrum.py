@@ -11,8 +11,8 @@ import numpy as np
 import scipy.fft
 import xarray as xr
 
+from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion.settled import settled
-from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, among, nearest, shown
 from saltus.flow.counts import whole as whole_number
 from saltus.results import Subject, build, inherited

@@ -10,10 +10,10 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis import dataset_parts
+from saltus.analysis.inputs.starts import check_system, ensemble, span, trajectories
+from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion.window import computed
 from saltus.analysis.outcome_messages import warn
-from saltus.analysis.starts import check_system, ensemble, span, trajectories
-from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
 from saltus.flow.counts import whole
 from saltus.flow.methods import Method, check_method

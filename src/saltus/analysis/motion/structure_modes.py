@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.verb import verb
+from saltus.analysis.inputs.verb import verb
 from saltus.errors import ParameterError, shown
 from saltus.flow.counts import whole
 from saltus.results import Subject, build, made_by

@@ -7,7 +7,7 @@ from typing import Literal, get_args
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.verb import verb
+from saltus.analysis.inputs.verb import verb
 from saltus.errors import ParameterError, among, nearest, shown
 from saltus.results.dataset.build import finish
 from saltus.results.dataset.reader import reader

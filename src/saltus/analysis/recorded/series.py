@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.analysis.axes import axes_of
+from saltus.analysis.inputs.axes import axes_of
 from saltus.analysis.statistics import LEAST
 from saltus.errors import ParameterError, shown
 from saltus.flow.counts import whole

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from saltus.analysis.inputs.verb import verb
 from saltus.analysis.recorded.embedding import embed as embedded
 from saltus.analysis.recorded.embedding import (
     false_neighbours,
@@ -28,7 +29,6 @@ from saltus.analysis.recorded.series import (
     samples_of,
 )
 from saltus.analysis.statistics import BOUNDED, CONFIDENCE, UNCLEAR, batch_means, running_ends
-from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, SaltusWarning, among, nearest, shown
 from saltus.flow.counts import whole
 from saltus.results import Subject, build, made_by

@@ -1,1 +1,1 @@
-"""Steady responses against parameters: grids, branches and where they end."""
+"""Steady responses against parameters, and the branches that they lie on."""

@@ -20,29 +20,24 @@ from typing import Any
 
 import numpy as np
 
+from saltus.analysis.attractors.grid import Grid
+from saltus.analysis.attractors.grid_responses import GridResponses
 from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.branch_table import attributes_of, values_of
-from saltus.analysis.branches.plans import plan_of
+from saltus.analysis.branches.plans import LONGEST_DOUBLED, POINTS, SWITCHES, plan_of
 from saltus.analysis.branches.rest_branches import trace_rests
 from saltus.analysis.branches.same_branch import on_branch
 from saltus.analysis.branches.seeds import rests_at, scaled, seeds_at
 from saltus.analysis.branches.tracing import Plan, trace
-from saltus.analysis.orbits.orbits import OrbitBatch, find_orbits, phase_distances
-from saltus.analysis.orbits.unforced import close_again
-from saltus.analysis.outputs import Outputs
-from saltus.analysis.responses.grid import Grid
-from saltus.analysis.responses.responses import GridResponses
+from saltus.analysis.closed.orbits import OrbitBatch, find_orbits, phase_distances
+from saltus.analysis.closed.unforced import close_again
+from saltus.analysis.inputs.outputs import Outputs
 from saltus.errors import ParameterError
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method, exact_method
 from saltus.results.dataset.kinds import CLOSED, Kind
 from saltus.system.parametric import parametric
 
-#: Doubled branches are followed to orbits of this number of periods, each way over this number of
-#: points.
-LONGEST_DOUBLED, POINTS = 2, 1000
-#: Events at which the branches that leave are followed.
-SWITCHES = ("period_doubling", "branch_point", "hopf")
 #: Seeds of each number of periods that are taken at a time.
 TAKEN = 8
 #: Farthest that a response of an inexact method lies from the exact orbit that it stands for, in

@@ -9,10 +9,10 @@ from typing import Any
 
 import xarray as xr
 
-from saltus.analysis.responses.grid import grid_of
+from saltus.analysis.attractors.grid import grid_of
+from saltus.analysis.inputs.verb import verb
 from saltus.analysis.responses.response_table import respond
 from saltus.analysis.responses.samples import check_sample, check_unforced_sample
-from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
 from saltus.flow.methods import Method, check_method
 from saltus.system import System

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from saltus.analysis.responses.responses import GridResponses
+from saltus.analysis.attractors.grid_responses import GridResponses
 
 #: Values over which a motion that never repeats may be missing.
 MISSED = 3

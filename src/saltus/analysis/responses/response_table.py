@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from saltus.analysis.attractors.grid import Grid
+from saltus.analysis.attractors.grid_responses import GridResponses, find, numbers_of, table_of
 from saltus.analysis.dataset_parts import guards_over, provenance, subject
-from saltus.analysis.outputs import Outputs, outputs_of
+from saltus.analysis.inputs.outputs import Outputs, outputs_of
 from saltus.analysis.responses.arcs import Arcs, arc_values, check_unstable, follow_arcs
-from saltus.analysis.responses.grid import Grid
 from saltus.analysis.responses.matching import matched
-from saltus.analysis.responses.responses import GridResponses, find, numbers_of, table_of
 from saltus.analysis.responses.samples import sampled
 from saltus.flow.counts import whole
 from saltus.flow.methods import Method, check_method

@@ -6,14 +6,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.analysis.orbits.orbit_measures import Measures
-from saltus.analysis.responses.grid import Grid
-from saltus.analysis.responses.responses import (
+from saltus.analysis.attractors.grid import Grid
+from saltus.analysis.attractors.grid_responses import (
     APERIODIC_PERIODS,
     GridResponses,
     own_times,
     spans_of,
 )
+from saltus.analysis.closed.measures import Measures
 from saltus.errors import ParameterError, among, nearest, shown
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method

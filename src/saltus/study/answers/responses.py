@@ -30,7 +30,7 @@ class Responses(OneVerb):
 
     def check(self, table: Any, setting: Setting) -> None:  # noqa: ARG002
         """Check the arguments of the analysis before anything is computed."""
-        from saltus.analysis.responses.grid import grid_of
+        from saltus.analysis.attractors.grid import grid_of
 
         start, box, seed, follow = (
             self.arguments[name] for name in ("start", "box", "seed", "follow")

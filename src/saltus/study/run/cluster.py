@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Any
 from saltus.errors import StudyError
 
 if TYPE_CHECKING:
+    from saltus.analysis.attractors.attractor_set import AttractorSet
     from saltus.analysis.basins.labels import Settling
     from saltus.analysis.basins.pipeline import BasinPlan
-    from saltus.analysis.orbits.attractor_set import AttractorSet
 
 #: Chunks handed out at a time, for each worker: enough to keep it busy, few enough that a large map
 #: doesn't fill the scheduler.

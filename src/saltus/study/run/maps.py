@@ -30,7 +30,7 @@ from saltus.study.run.running import Report, Resources
 if TYPE_CHECKING:
     import xarray as xr
 
-    from saltus.analysis.orbits.attractor_set import AttractorSet
+    from saltus.analysis.attractors.attractor_set import AttractorSet
 
 #: Chunks of a map from which its time is estimated.
 LARGE = 20

@@ -18,9 +18,9 @@ from saltus.flow.threads import usable_processors
 from saltus.interrupt import ctrl_c_waits
 
 if TYPE_CHECKING:
+    from saltus.analysis.attractors.attractor_set import AttractorSet
     from saltus.analysis.basins.labels import Settling
     from saltus.analysis.basins.pipeline import BasinPlan
-    from saltus.analysis.orbits.attractor_set import AttractorSet
 
 #: Chunks that a process has at a time: one that it computes, one that it begins while the first is
 #: committed.

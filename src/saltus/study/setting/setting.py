@@ -59,7 +59,7 @@ class Setting:
         """Outputs as the analyses take them, checked now: errors come before anything
         is computed.
         """
-        from saltus.analysis.outputs import outputs_of
+        from saltus.analysis.inputs.outputs import outputs_of
 
         place = f"{place}.outputs"
         outputs = {

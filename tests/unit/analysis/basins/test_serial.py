@@ -10,6 +10,9 @@ import numpy as np
 import pytest
 
 from function_maps import FunctionMap
+from saltus.analysis.attractors.aperiodic import SampledAttractor
+from saltus.analysis.attractors.attractor_set import AttractorSet
+from saltus.analysis.attractors.find_attractors import find_attractors
 from saltus.analysis.basins.labels import Settling, settle
 from saltus.analysis.basins.serial import (
     cell_types,
@@ -18,11 +21,8 @@ from saltus.analysis.basins.serial import (
     settling_arrays,
     settling_from,
 )
-from saltus.analysis.orbits.aperiodic import SampledAttractor
-from saltus.analysis.orbits.attractor_set import AttractorSet
-from saltus.analysis.orbits.capture import Neighbourhoods
-from saltus.analysis.orbits.find_attractors import find_attractors
-from saltus.analysis.orbits.orbits import Orbit
+from saltus.analysis.closed.capture import Neighbourhoods
+from saltus.analysis.closed.orbits import Orbit
 from saltus.errors import SaltusError
 from saltus.whole_files import seal, unseal
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import saltus as sl
-from saltus.analysis.responses.grid import axis, grid_of
-from saltus.analysis.starts import ensemble
+from saltus.analysis.attractors.grid import axis, grid_of
+from saltus.analysis.inputs.starts import ensemble
 from saltus.errors import ParameterError, UnitError
 
 RIG = sl.models.delangre("b", force="4 N", frequency="15 Hz")

@@ -1,0 +1,141 @@
+"""`attractors`: what a system settles to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from saltus.analysis.attractors.find_attractors import find_attractors
+from saltus.analysis.attractors.noisy import stray_attrs
+from saltus.analysis.attractors.portrait import portraits
+from saltus.analysis.closed.spread import spread
+from saltus.analysis.closed.turns import looks_every
+from saltus.analysis.dataset_parts import provenance, subject
+from saltus.analysis.inputs.starts import ensemble
+from saltus.analysis.inputs.verb import verb
+from saltus.flow.counts import whole
+from saltus.flow.maps import Stroboscope
+from saltus.flow.methods import Method, check_method
+from saltus.flow.progress import reporting
+from saltus.intervals import smallest_seen
+from saltus.results import AttractorTable, Subject, build
+from saltus.results.dataset import schema
+from saltus.results.dataset.attractors import basin_meanings
+from saltus.results.dataset.kinds import Kind
+from saltus.system import System
+
+
+@verb
+def attractors(
+    system: System,
+    start: Any,
+    *,
+    method: Method | None = None,
+    periods: int = 2000,
+    every: float | str | None = None,
+    threads: int | None = None,
+    progress: bool | Callable[[float], None] | None = None,
+) -> xr.Dataset:
+    """The attractors that given starts lead to: period, contacts, size, multipliers, margin to the
+    next graze.
+
+    A trajectory is followed until it has settled, not for a fixed number of periods. Periodic
+    responses are polished by Newton's method on the stroboscopic map and verified by their Floquet
+    multipliers; what never repeats is typed by its largest Lyapunov exponent. Where errors of the
+    method keep a motion from closing (ode45 at a loose tolerance), exact integration says which
+    orbit it scatters about.
+
+    Parameters
+    ----------
+    system : System
+        Equations, contacts and values.
+    start : sequence, mapping or array
+        Starts, as for :func:`saltus.simulate`; one or many.
+    method : Method
+        Default :class:`saltus.Taylor`.
+    periods : int
+        Forcing periods after which a trajectory that hasn't settled is looked at for chaos.
+    every : float or str, optional
+        Time between two samples [s] of a system without forcing; default about a turn of its
+        motions.
+    threads : int, optional
+        Default all processors. Results don't depend on it.
+    progress : bool or callable
+        Default: a bar on the terminal if the work lasts more than two seconds.
+
+    Returns
+    -------
+    Dataset
+        Dim ``attractor``: ``attractor_type``, ``attractor_period`` (the n of nT),
+        ``attractor_contacts``, ``attractor_itinerary``, ``attractor_peak``, ``attractor_rms``,
+        ``attractor_margin``, multipliers, exponent, and its states at whole periods. Of a noisy one
+        these are the exact orbit's, and ``attractor_scatter`` [unit of the first state] says how
+        far from it the points lie. Dim ``trajectory``: ``basin``, the attractor of each start (-2:
+        none was established), ``periods_to_settle``. ``smallest_basin_seen``: of starts that were
+        drawn at random from a box, an attractor with a basin of a smaller share of it may be missed
+        (rule of three).
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If an argument can't be used.
+
+    References
+    ----------
+    Nayfeh & Balachandran, Applied Nonlinear Dynamics (1995), chapters 3, 5 and 7.
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> rig = sl.models.delangre("a", force="4 N", frequency="17 Hz")
+    >>> found = sl.attractors(rig, start={"x": ["0 mm", "0.75 mm", "5 mm"], "v": 0})
+    >>> found["attractor_period"].values.tolist(), found["basin"].values.tolist()
+    ([1, 3], [0, 1, 0])
+    """
+    group, periods = ensemble(system, start, None), whole(periods, "periods")
+    map_ = Stroboscope(
+        system,
+        check_method(method),
+        every=looks_every(system, every, group.start),
+        threads=threads,
+    )
+    scale = spread(map_, group.start)
+    with reporting(progress) as show:
+        found, label, settled = find_attractors(map_, group.start, scale, periods, progress=show)
+    starts = {
+        "trajectory": np.arange(group.size),
+        "basin": np.where(label < 0, Kind.UNCONVERGED, label),
+        "periods_to_settle": settled,
+    }
+    attrs = (
+        provenance(system, map_.method, system.values)
+        | looked(periods, map_)
+        | stray_attrs(found.astray)
+        | {"smallest_basin_seen": smallest_seen(group.size)}
+    )
+    return attractors_dataset(subject(system, attrs), portraits(map_, found), starts)
+
+
+def looked(periods: int, map_: Stroboscope) -> dict[str, Any]:
+    """Settings of a result that say how often motions were looked at, and for how long at most."""
+    every = {} if map_.system.forced_at else {"every": float(map_.period[0])}
+    return {"periods": periods} | every
+
+
+def attractors_dataset(
+    subject: Subject, table: AttractorTable, starts: Mapping[str, Any] | None = None
+) -> xr.Dataset:
+    """The Dataset of some attractors, and where they are kept of the starts: ``trajectory``,
+    ``basin``, ``periods_to_settle``.
+    """
+    values = {**(starts or {}), **table.values(len(subject.states))}
+    return build(
+        schema.ATTRACTORS,
+        subject,
+        values,
+        words={"<when>": table.points_when},
+        flags={"basin": basin_meanings(len(table))},
+    )

@@ -1,0 +1,358 @@
+"""From trajectories of a map to its attractors: let them settle, close what recurs, and find out
+what never does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from saltus.analysis.attractors.aperiodic import (
+    REPEATS,
+    SURVEY_ITERATES,
+    SampledAttractor,
+    merge,
+    mismatch,
+    survey,
+)
+from saltus.analysis.attractors.attractor_set import INSIDE, AttractorSet, is_about
+from saltus.analysis.attractors.limit_cycles import limit_cycles
+from saltus.analysis.attractors.noisy import Noisy, Stray, blurred, keep_to, stray_of
+from saltus.analysis.attractors.recurrence import recurrence
+from saltus.analysis.closed.capture import Neighbourhoods
+from saltus.analysis.closed.field_zeros import autonomous
+from saltus.analysis.closed.orbits import Orbit, find_orbits, same
+from saltus.analysis.solve.tolerances import NEAR, ROUND, SAME
+from saltus.flow.maps import Map, Stroboscope, Travel
+from saltus.results.dataset.kinds import Kind
+
+#: Candidates for orbits in one round; what isn't tried has its turn in the next.
+MAX_CANDIDATES = 12
+#: Trajectories that never recur whose motion is surveyed.
+MAX_SURVEYED = 24
+#: Iterates of the survey; recurrence below which its survivor is periodic after all.
+WATCHING_ITERATES, ARRIVED = 32 * 1024, 1e-5
+
+
+def find_attractors(
+    map_: Map,
+    start: np.ndarray,
+    scale: np.ndarray,
+    most: int,
+    known: AttractorSet | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> tuple[AttractorSet, np.ndarray, np.ndarray]:
+    """The attractors that trajectories from given starts settle to.
+
+    Parameters
+    ----------
+    map_ : Map
+        The map.
+    start : float64[k, D]
+        Starts.
+    scale : float64[D]
+        Range of each state.
+    most : int
+        Iterates after which a trajectory that hasn't settled is surveyed for chaos.
+    known : AttractorSet, optional
+        Attractors that are known already.
+    progress : callable, optional
+        Called with the share done.
+
+    Returns
+    -------
+    found : AttractorSet
+        Known and new attractors, in the order of their ids.
+    label : int64[k]
+        The attractor of each start; -1 where none was established.
+    settled : int64[k]
+        Iterates after which it was captured; -1 if it wasn't.
+    """
+    found = known or AttractorSet(Neighbourhoods.none(start.shape[1]))
+    found = AttractorSet(found.near, list(found.orbits), list(found.sampled), list(found.unstable))
+    owner: list[Orbit | SampledAttractor | None] = [None] * len(start)
+    settled = np.full(len(start), -1, np.int64)
+    travel, going = map_.launch(start, most), np.arange(len(start))
+    noisy = Kind.NOISY_PERIODIC.word
+    turns = isinstance(map_, Stroboscope) and autonomous(map_.system)
+    while len(going) and travel.age < most:
+        points = travel.advance(ROUND)
+        here = np.flatnonzero(~_captured(found, points, going, travel.age - ROUND, owner, settled))
+        here = here[~_keeping(found, noisy, points[here], going[here], travel.age, owner, settled)]
+        while len(here) and _add_orbits(map_, points[here], scale, found, most):
+            here = here[
+                ~_keeping(found, noisy, points[here], going[here], travel.age, owner, settled)
+            ]
+            here = here[
+                ~_captured(found, points[here], going[here], travel.age - ROUND, owner, settled)
+            ]
+        if turns and len(here):
+            here = here[
+                ~_on_cycles(
+                    map_, found, points[here], going[here], travel, here, scale, owner, settled
+                )
+            ]
+        stay = np.zeros(len(going), bool)
+        stay[here] = travel.going[here]
+        travel.keep(stay)
+        going = going[stay]
+        if progress:
+            progress(max(1.0 - len(going) / len(start), travel.age / most))
+    if len(going):
+        _survey(map_, travel, going, scale, found, owner, settled, most)
+    result = found.ordered(scale)
+    label = np.array([-1 if one is None else result.index(one) for one in owner], np.int64)
+    return result, label, settled
+
+
+def _captured(
+    found: AttractorSet,
+    points: np.ndarray,
+    who: np.ndarray,
+    age: int,
+    owner: list,
+    settled: np.ndarray,
+) -> np.ndarray:
+    """Note which of the trajectories are captured, and after how many iterates."""
+    label, when = found.near.capture(points)
+    caught = label >= 0
+    for i, orbit, at in zip(who[caught], label[caught], when[caught], strict=True):
+        owner[i], settled[i] = found.orbits[orbit], age + at + 1
+    return caught
+
+
+def _keeping(
+    found: AttractorSet,
+    kind: str,
+    points: np.ndarray,
+    who: np.ndarray,
+    age: int,
+    owner: list,
+    settled: np.ndarray,
+) -> np.ndarray:
+    """Note which trajectories float64[k, m, D] keep to an attractor of a kind that is known by
+    where it goes, bool[k].
+    """
+    ones = [one for one in found.sampled if one.kind == kind]
+    on = keep_to(ones, points, INSIDE)
+    for i in np.flatnonzero(on >= 0):
+        owner[who[i]], settled[who[i]] = ones[on[i]], age
+    return on >= 0
+
+
+def _add_orbits(
+    map_: Map, points: np.ndarray, scale: np.ndarray, found: AttractorSet, most: int
+) -> bool:
+    """Add the attracting orbits not known yet that some of the trajectories float64[k, ROUND, D]
+    follow; whether there are any.
+    """
+    period, apart = recurrence(points, scale)
+    near = max(NEAR, map_.noise)
+    tried: list[int] = []
+    for i in np.argsort(apart, kind="stable")[: np.count_nonzero(apart < near)]:
+        known = any(
+            _lies_on(points[i, -1], orbit, scale, 10 * apart[i]) for orbit in found.unstable
+        )
+        if not known and not any(
+            np.abs((points[i, -1] - points[j, -1]) / scale).max() < near for j in tried
+        ):
+            tried.append(i)
+        if len(tried) == MAX_CANDIDATES:
+            break
+    place, k = points[tried, -1], len(tried)
+    orbits = find_orbits(
+        map_, place, period[tried], np.broadcast_to(scale, place.shape), np.full(k, map_.noise)
+    )
+    right = (orbits.period > 0) & (
+        orbits.distance(place, np.broadcast_to(scale, place.shape)) < 100 * near
+    )
+    added = False
+    for i in np.flatnonzero(right).tolist():
+        orbit = orbits[i]
+        if any(is_about(one, orbit) for one in found.sampled):
+            continue
+        known_ones = found.orbits if orbits.stable[i] else found.unstable
+        if any(same(orbit, one, scale, max(SAME, 4 * map_.noise)) for one in known_ones):
+            continue
+        if not orbits.stable[i]:
+            found.unstable.append(orbit)
+            continue
+        noisy = _behind(map_, orbit, scale, most)
+        if noisy is None:
+            found.add(map_, orbit, scale)
+        else:
+            found.add_sampled(noisy)
+        added = True
+    return added
+
+
+def _behind(map_: Map, orbit: Orbit, scale: np.ndarray, most: int) -> Noisy | None:
+    """The exact orbit of another period about which an inexact map's orbit is scatter: its loops
+    are made, or lost, by errors.
+    """
+    exact = _exactly(map_, orbit.points[:1], scale, most)[0] if _blurs(map_) else None
+    noisy = None if exact is None or exact.period == orbit.period else blurred(map_, exact, scale)
+    return noisy if noisy is not None and is_about(noisy, orbit) else None
+
+
+def _blurs(map_: Map) -> bool:
+    """Whether errors of a map are more than rounding, and periods are there to be blurred."""
+    return map_.exact_map is not None and not (
+        isinstance(map_, Stroboscope) and autonomous(map_.system)
+    )
+
+
+def _exactly(map_: Map, state: np.ndarray, scale: np.ndarray, most: int) -> list[Orbit | None]:
+    """The orbits to which the exact map settles from float64[k, D]."""
+    assert map_.exact_map is not None
+    exact, label, _ = find_attractors(map_.exact_map, state, scale, most)
+    return [exact.orbits[i] if 0 <= i < len(exact.orbits) else None for i in label]
+
+
+def _lies_on(place: np.ndarray, orbit: Orbit, scale: np.ndarray, tolerance: float) -> bool:
+    return bool(np.abs((orbit.points - place) / scale).max(axis=1).min() < tolerance)
+
+
+def _on_cycles(
+    map_: Map, found: AttractorSet, points: np.ndarray, who: np.ndarray, travel: Travel,
+    rows: np.ndarray, scale: np.ndarray, owner: list, settled: np.ndarray,
+) -> np.ndarray:  # fmt: skip
+    """Which trajectories of a flow without forcing go round a limit cycle, bool[k]; new ones are
+    looked for. Notes their owners.
+    """
+    cycles = [one for one in found.sampled if one.kind == Kind.LIMIT_CYCLE.word]
+    alone = np.flatnonzero(keep_to(cycles, points, INSIDE) < 0)
+    some = (
+        alone[
+            np.unique(np.linspace(0, len(alone) - 1, min(MAX_CANDIDATES, len(alone))).astype(int))
+        ]
+        if len(alone)
+        else alone
+    )
+    some = some[travel.going[rows[some]]]
+    if len(some) and isinstance(map_, Stroboscope):
+        fresh = limit_cycles(map_, points[some, -1], ROUND * float(map_.period[0]), scale)
+        found.sampled = merge([*found.sampled, *fresh])
+    return _keeping(found, Kind.LIMIT_CYCLE.word, points, who, travel.age, owner, settled)
+
+
+def _survey(
+    map_: Map, travel: Travel, going: np.ndarray, scale: np.ndarray, found: AttractorSet,
+    owner: list, settled: np.ndarray, most: int
+) -> None:  # fmt: skip
+    """Find out what the trajectories do that never settled: watch them much longer, and call an
+    attractor only what none of them leaves.
+
+    A chaotic saddle holds trajectories for thousands of periods too; what is seen to leave it
+    betrays it.
+    """
+    survivors, points, leavers = _watch(travel, going, found, owner, settled)
+    if not len(survivors):
+        return
+    chosen = np.unique(
+        np.linspace(0, len(survivors) - 1, min(MAX_SURVEYED, len(survivors))).astype(int)
+    )
+    noisy, strays = _blurred(map_, travel.state[chosen], points[chosen], scale, most)
+    keeps = keep_to(noisy, points[chosen], INSIDE) >= 0
+    # stays on an orbit that doesn't attract
+    rests = np.array([mismatch(points[i, -ROUND:], scale) < ARRIVED for i in chosen])
+    free = chosen[~keeps & ~rests]
+    seen = [*noisy, *survey(map_, travel.state[free], points[free], scale)]
+    if seen:
+        moves = chosen[keeps | ~rests]
+        leavers.append(
+            points[moves][_leave(map_, travel.state[moves], found, noisy, scale), -ROUND:]
+        )
+    for one in seen:
+        if not any((one.share(iterates) >= INSIDE).any() for iterates in leavers if len(iterates)):
+            found.add_sampled(one)
+    label = (
+        keeps_to_sampled(found, points[:, -ROUND:], scale)
+        if found.sampled
+        else np.full(len(survivors), -1)
+    )
+    for i, one in zip(going[survivors], label, strict=True):
+        if one >= 0:
+            owner[i] = found.sampled[one]
+    found.astray = (
+        [stray for stray, one in zip(strays, label[chosen], strict=True) if one < 0]
+        if strays
+        else []
+    )
+
+
+def _watch(
+    travel: Travel, going: np.ndarray, found: AttractorSet, owner: list, settled: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:  # fmt: skip
+    """Trajectories that don't settle for SURVEY_ITERATES more, int64[k], their iterates, and those
+    of the ones that do.
+    """
+    survivors = np.arange(len(going))
+    runs: list[np.ndarray] = []
+    leavers: list[np.ndarray] = []
+    for _ in range(SURVEY_ITERATES // ROUND):
+        points = travel.advance(ROUND)
+        caught = _captured(found, points, going[survivors], travel.age - ROUND, owner, settled)
+        leavers += [iterates[caught] for iterates in runs]
+        stays = ~caught & travel.going
+        travel.keep(stays)
+        survivors, runs = survivors[stays], [*(iterates[stays] for iterates in runs), points[stays]]
+        if not len(survivors):
+            break
+    return survivors, np.concatenate(runs, axis=1), leavers
+
+
+def _blurred(
+    map_: Map, state: np.ndarray, runs: np.ndarray, scale: np.ndarray, most: int
+) -> tuple[list[Noisy], list[Stray]]:
+    """The noisy orbits that trajectories float64[k, SURVEY_ITERATES, D] keep to, and how far each
+    strays from an exact one.
+
+    They stand at float64[k, D]. Nothing of an exact map.
+    """
+    if not _blurs(map_):
+        return [], []
+    orbits = _exactly(map_, state, scale, most)
+    strays = [
+        stray_of(map_, orbit, iterates, scale) for orbit, iterates in zip(orbits, runs, strict=True)
+    ]
+    about = [
+        blurred(map_, orbit, scale)
+        for orbit in {id(orbit): orbit for orbit in orbits if orbit is not None}.values()
+    ]
+    return [one for one in about if one is not None and (one.share(runs) >= INSIDE).any()], strays
+
+
+def _leave(
+    map_: Map, state: np.ndarray, found: AttractorSet, noisy: list[Noisy], scale: np.ndarray
+) -> np.ndarray:
+    """Which of some trajectories, watched for very long, come to an orbit after all, bool[k]; those
+    beside a noisy one don't.
+    """
+    travel, going = map_.launch(state, WATCHING_ITERATES), np.arange(len(state))
+    left = np.zeros(len(state), bool)
+    while len(going) and travel.age < WATCHING_ITERATES:
+        points = travel.advance(ROUND)
+        arrives = found.near.capture(points)[0] >= 0
+        if travel.age % (8 * ROUND) == 0:
+            arrives |= [mismatch(iterates, scale) < ARRIVED for iterates in points] & (
+                keep_to(noisy, points, INSIDE) < 0
+            )
+        left[going[arrives]] = True
+        stays = ~arrives & travel.going
+        travel.keep(stays)
+        going = going[stays]
+    return left
+
+
+def keeps_to_sampled(found: AttractorSet, runs: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """For trajectories float64[k, m, D]: which attractor of those that never repeat each keeps to,
+    -1 if none; none if it repeats.
+    """
+    shares = np.stack([one.share(runs) for one in found.sampled], axis=1)
+    _, apart = recurrence(runs, scale)
+    best = shares.argmax(axis=1)
+    recurring = (Kind.LIMIT_CYCLE.word, Kind.NOISY_PERIODIC.word)  # iterates on these may recur
+    turns = np.array([one.kind in recurring for one in found.sampled])
+    return np.where((shares.max(axis=1) >= INSIDE) & ((apart > REPEATS) | turns[best]), best, -1)

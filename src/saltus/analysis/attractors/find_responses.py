@@ -1,0 +1,330 @@
+"""What many trajectories settle to, each with parameter values of its own: the engine of frequency
+responses and bifurcation diagrams.
+
+A basin map asks one system of a great many starts, and capture by known attractors answers. Here
+every trajectory may have an attractor of its own: each is followed until it nearly recurs, Newton's
+method closes the orbit, its multipliers say that it attracts, and the trajectory must lie beside
+it. What never recurs is typed by its largest Lyapunov exponent.
+
+All this is bounded by a budget, in iterates of the motion itself (growth.py): closing orbits and
+measuring exponents may each cost BUDGET times the iterates that a motion is followed for. What
+isn't typed by then is not_repeating, with where it goes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from saltus.analysis.attractors.aperiodic import kinds_of
+from saltus.analysis.attractors.growth import BUDGET
+from saltus.analysis.attractors.recurrence import recurrence, recurring_orbits
+from saltus.analysis.closed import unforced
+from saltus.analysis.closed.field_zeros import autonomous
+from saltus.analysis.closed.orbits import OrbitBatch
+from saltus.analysis.solve.tolerances import BESIDE, NEAR, RESTS, ROUND, SETTLED
+from saltus.flow.maps import Stroboscope
+from saltus.flow.request import Schedule
+from saltus.flow.threads import on_threads, usable_processors
+from saltus.kernels import status as st
+from saltus.results.dataset.kinds import Kind
+
+#: Trajectories that one thread follows at a time: so many, or fewer where each takes longer, so
+#: that all threads have work, and Ctrl-C finds some done. At least what fills the lanes; few are
+#: shared among all threads if each gets enough to fill its lanes some times.
+PIECE, PIECE_STATES, LANES, SHARED = 512, 2048, 8, 64
+#: Share of the work on a trajectory that is done when it has been followed, its growth is measured,
+#: and its iterates are known.
+FOLLOWED, MEASURED, KEPT = 0.4, 0.6, 0.7
+#: Periods, and samples in each, from which the range of a motion is taken.
+RANGE_PERIODS, SAMPLES_PER_PERIOD = 4, 32
+#: Iterates that are kept of a motion that never repeats.
+KEPT_ITERATES = 1024
+
+
+@dataclass
+class SettledMotions:
+    """What k trajectories settle to.
+
+    Attributes
+    ----------
+    kind : int64[k]
+        What it settles to, or why to nothing: :class:`saltus.results.dataset.kinds.Kind`.
+    orbits : OrbitBatch
+        The orbits of the periodic ones, verified; elsewhere nothing.
+    exponent, exponent_error : float64[k]
+        Largest Lyapunov exponent and its standard error [per iterate].
+    settled : int64[k]
+        Iterates after which it was known; -1 if it isn't.
+    scale : float64[k, D]
+        Range of each state in the motion.
+    iterates : dict of int to float64[KEPT_ITERATES, D]
+        Points of those that never repeat.
+    end : float64[k, D]
+        Where the trajectory stood last.
+    share : float64[k]
+        Share of the work on each that is done; 1 where it is known.
+    """
+
+    kind: np.ndarray
+    orbits: OrbitBatch
+    exponent: np.ndarray
+    exponent_error: np.ndarray
+    settled: np.ndarray
+    scale: np.ndarray
+    iterates: dict[int, np.ndarray]
+    end: np.ndarray
+    share: np.ndarray
+
+    @classmethod
+    def empty(cls, count: int, size: int) -> SettledMotions:
+        """Nothing computed yet."""
+        nothing = np.full(count, np.nan)
+        return cls(
+            np.full(count, Kind.NOT_COMPUTED, np.int64), OrbitBatch.none(count, size),
+            nothing.copy(), nothing.copy(),
+            np.full(count, -1, np.int64), np.ones((count, size)), {},
+            np.full((count, size), np.nan), np.zeros(count),
+        )  # fmt: skip
+
+    def put(self, where: np.ndarray, other: SettledMotions) -> None:
+        """Write another's results to the rows int64[m]."""
+        for name in ("kind", "exponent", "exponent_error", "settled", "scale", "end", "share"):
+            getattr(self, name)[where] = getattr(other, name)
+        self.orbits.put(where, other.orbits)
+        self.iterates.update({int(where[i]): iterates for i, iterates in other.iterates.items()})
+
+
+def find_responses(
+    map_: Stroboscope,
+    start: np.ndarray,
+    most: int,
+    threads: int | None = None,
+    progress: Callable[[float], None] | None = None,
+    result: SettledMotions | None = None,
+) -> SettledMotions:
+    """What each trajectory settles to: start float64[k, D], row i by row i of the map, followed for
+    ``most`` iterates at the longest.
+
+    What is known when Ctrl-C ends it stands in ``result``, if that is given. The result doesn't
+    depend on the other trajectories, nor on threads. ``progress`` counts trajectories, and of each
+    the stages that it went through.
+    """
+    result = SettledMotions.empty(*start.shape) if result is None else result
+    pieces = _pieces(len(start), start.shape[1], threads or usable_processors())
+    parts = [SettledMotions.empty(len(piece), start.shape[1]) for piece in pieces]
+
+    def work(number: int) -> None:
+        piece = pieces[number]
+        try:
+            _settle(map_.rows(piece, threads=1), start[piece], most, parts[number])
+            parts[number].share[:] = 1.0
+        finally:  # each writes to rows of its own
+            result.put(piece, parts[number])
+
+    def show(_: float) -> None:
+        assert progress is not None
+        progress(float(sum(part.share.sum() for part in parts)) / max(len(start), 1))
+
+    on_threads(work, range(len(pieces)), lambda *_: None, threads, show if progress else None)
+    return result
+
+
+def _pieces(count: int, states: int, threads: int) -> list[np.ndarray]:
+    """Trajectories piece by piece, int64[..] each: in their order, so that Ctrl-C finds the first
+    ones done; all that are under way at once have some of every place, as hard ones stand together.
+    """
+    size = min(PIECE, max(LANES, PIECE_STATES // states**2))
+    every = np.arange(count)
+    if (at_once := min(threads, count // SHARED)) * size > count:
+        return [every[first::at_once] for first in range(at_once)]
+    return np.split(every, range(size, count, size))
+
+
+def _settle(map_: Stroboscope, start: np.ndarray, most: int, result: SettledMotions) -> None:
+    """One piece, on one thread."""
+    who = _follow(map_, start, np.arange(len(start)), most, result, SETTLED, FOLLOWED)
+    if len(who):
+        result.scale[who] = motion_range(map_.rows(who), result.end[who])
+        who = _follow(map_, result.end, who, ROUND, result, NEAR, FOLLOWED)
+    if len(who):
+        who, open_ = _classify_aperiodic(map_, result.end, who, most, result)
+    if len(who):  # neither a recurrence nor an exponent: once more as long, and from farther away
+        who = _follow(map_, result.end, who, most, result, NEAR, 1.0)
+        _leave_open(map_, who, open_, result)
+
+
+def _follow(
+    map_: Stroboscope,
+    start: np.ndarray,
+    who: np.ndarray,
+    most: int,
+    result: SettledMotions,
+    near: float,
+    share: float,
+) -> np.ndarray:
+    """Follow trajectories until they settle on an orbit, or this share of the work is done; writes
+    what is known, returns those that haven't.
+    """
+    flight, begun = map_.rows(who).launch(start[who], most + ROUND), result.share[who]
+    purse = np.zeros(len(start))
+    while len(who) and flight.age < most:
+        points = flight.advance(ROUND)
+        going = flight.going
+        result.end[who] = flight.state
+        ended = who[~going]
+        result.kind[ended] = np.where(
+            flight.status[~going] == st.NONFINITE, Kind.ESCAPED, Kind.FAILED
+        )
+        stay = going.copy()
+        if going.any():
+            rows = np.flatnonzero(going)
+            if flight.age == ROUND:
+                result.scale[who[rows]] = motion_range(map_.rows(who[rows]), flight.state[rows])
+            purse[who[rows]] += BUDGET * ROUND
+            stay[rows[_settled(map_, points[rows], who[rows], near, result, purse)]] = False
+            result.settled[who[going & ~stay]] = flight.age
+        result.share[who] = np.where(stay, begun + (share - begun) * min(flight.age / most, 1), 1)
+        flight.keep(stay)
+        who, begun = who[stay], begun[stay]
+    return who
+
+
+def _settled(
+    map_: Stroboscope,
+    points: np.ndarray,
+    who: np.ndarray,
+    near: float,
+    result: SettledMotions,
+    purse: np.ndarray,
+) -> np.ndarray:
+    """Which of the trajectories float64[k, ROUND, D] lie on an attracting orbit, bool[k]; writes
+    the orbits. ``purse``: what closing them may cost yet.
+    """
+    if autonomous(map_.system):
+        return _settled_unforced(map_.rows(who), points, who, near, result)
+    left = purse[who]
+    orbits, apart, noise = recurring_orbits(map_.rows(who), points, result.scale[who], near, left)
+    purse[who] = left
+    beside = orbits.distance(points[:, -1], result.scale[who]) <= BESIDE * np.maximum(apart, noise)
+    done = orbits.stable & beside
+    result.orbits.put(who[done], orbits.rows(done))
+    result.kind[who[done]], result.exponent_error[who[done]] = Kind.PERIODIC, 0.0
+    with np.errstate(divide="ignore"):
+        result.exponent[who[done]] = (
+            np.log(np.abs(orbits.multipliers[done, 0])) / orbits.period[done]
+        )
+    return done
+
+
+def _settled_unforced(
+    map_: Stroboscope, points: np.ndarray, who: np.ndarray, near: float, result: SettledMotions
+) -> np.ndarray:
+    """As :func:`_settled` for rows of a system without forcing: which rest, or go round a limit
+    cycle.
+    """
+    state, window = points[:, -1], ROUND * float(map_.period[0])
+    result.scale[who] = np.maximum(result.scale[who], np.ptp(points, axis=1))
+    found = unforced.attracted(map_, state, result.scale[who], window, near)
+    done = found.orbits.period > 0
+    chosen = who[done]
+    result.orbits.put(chosen, found.orbits.rows(done))
+    result.scale[chosen] = found.scale[done]
+    rests = found.orbits.time[done] == 0
+    result.kind[chosen], result.exponent_error[chosen] = (
+        np.where(rests, Kind.EQUILIBRIUM, Kind.LIMIT_CYCLE),
+        0.0,
+    )
+    leading = found.orbits.multipliers[done, 0].real * map_.period[done]
+    # along a limit cycle nothing grows or dies
+    result.exponent[chosen] = np.where(rests, leading, 0.0)
+    return done
+
+
+def _classify_aperiodic(
+    map_: Stroboscope, start: np.ndarray, who: np.ndarray, most: int, result: SettledMotions
+) -> tuple[np.ndarray, dict[int, tuple[float, float]]]:
+    """Classify trajectories that don't recur by their exponents; writes what is known, returns
+    those that stay unclear, and the exponents, with their errors, that don't say what a motion is.
+    """
+    maps, groups = map_.rows(who), [[i] for i in range(len(who))]
+    state, kinds = kinds_of(maps, start[who], result.scale[who], groups, BUDGET * most)
+    result.share[who] = MEASURED
+    iterates, recurs = _watched(maps, state, who, result)
+    result.share[who], unclear = KEPT, np.ones(len(who), bool)
+    if autonomous(map_.system):  # a limit cycle that is reached slowly, and no torus
+        recurs |= unforced.nearly_recurs(maps, result.end[who], ROUND * float(map_.period[0]))
+        away = unforced.runs_away(iterates)
+        result.kind[who[away]], result.share[who[away]] = Kind.ESCAPED, 1.0
+    open_: dict[int, tuple[float, float]] = {}
+    for i in np.flatnonzero(np.isfinite(iterates).all(axis=(1, 2))):
+        kind, row = kinds[i], int(who[i])
+        if result.kind[row] == Kind.ESCAPED or kind is None:
+            continue
+        if kind[0] == Kind.NOT_REPEATING.word:
+            open_[row] = kind[1:]
+        elif not (recurs[i] and (kind[0] != Kind.CHAOTIC.word or not autonomous(map_.system))):
+            unclear[i] = False
+            _put_aperiodic(result, row, Kind[kind[0].upper()], kind[1:], iterates[i])
+    return who[unclear & (result.kind[who] != Kind.ESCAPED)], open_
+
+
+def _watched(
+    maps: Stroboscope, state: np.ndarray, who: np.ndarray, result: SettledMotions
+) -> tuple[np.ndarray, np.ndarray]:
+    """Iterates float64[k, KEPT_ITERATES, D] from states on, and which of them nearly recur by their
+    end, bool[k].
+    """
+    flight = maps.launch(state, KEPT_ITERATES)
+    iterates = flight.advance(KEPT_ITERATES)
+    result.end[who] = flight.state
+    apart = recurrence(iterates[:, -ROUND:], result.scale[who])[1]
+    return iterates, apart < np.maximum(NEAR, maps.noise_of(result.scale[who]))
+
+
+def _leave_open(
+    map_: Stroboscope,
+    who: np.ndarray,
+    exponents: dict[int, tuple[float, float]],
+    result: SettledMotions,
+) -> None:
+    """What trajectories are that nothing has told: those whose exponents are open and which don't
+    recur don't repeat; of the others more iterates may tell.
+    """
+    result.kind[who] = Kind.UNCONVERGED
+    rows = np.array([row for row in who.tolist() if row in exponents], np.int64)
+    if not len(rows):
+        return
+    iterates, recurs = _watched(map_.rows(rows), result.end[rows], rows, result)
+    finite = np.isfinite(iterates).all(axis=(1, 2))
+    for i in np.flatnonzero(finite & ~recurs):
+        row = int(rows[i])
+        _put_aperiodic(result, row, Kind.NOT_REPEATING, exponents[row], iterates[i])
+
+
+def _put_aperiodic(
+    result: SettledMotions,
+    row: int,
+    kind: Kind,
+    exponent: tuple[float, float],
+    iterates: np.ndarray,
+) -> None:
+    """Write what a motion that never repeats is."""
+    result.kind[row], result.settled[row], result.share[row] = kind, -1, 1.0
+    result.exponent[row], result.exponent_error[row] = exponent
+    result.iterates[row] = iterates
+
+
+def motion_range(map_: Stroboscope, state: np.ndarray) -> np.ndarray:
+    """Range of each state in the motion from states float64[k, D] on, float64[k, D]; its size where
+    it rests, 1 where that is 0.
+    """
+    samples = map_.run(
+        state, RANGE_PERIODS, Schedule.even(RANGE_PERIODS, SAMPLES_PER_PERIOD)
+    ).samples
+    with np.errstate(all="ignore"):
+        lengths, sizes = np.ptp(samples, axis=1), np.abs(samples).max(axis=1)
+    scale = np.where(lengths > RESTS * sizes, lengths, sizes)
+    return np.where(np.isfinite(scale) & (scale > 0), scale, 1.0)

@@ -1,0 +1,244 @@
+"""`branches`: all branches of periodic orbits and equilibria over a parameter, stable or not, and
+their bifurcations.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from saltus.analysis.attractors.grid import Grid, check_grid, grid_of
+from saltus.analysis.attractors.grid_responses import find
+from saltus.analysis.branches.branch import Branch
+from saltus.analysis.branches.branch_table import table_of
+from saltus.analysis.branches.plans import LONGEST_DOUBLED, POINTS, SWITCHES, plan_of
+from saltus.analysis.branches.rest_branches import trace_rests
+from saltus.analysis.branches.seeds import (
+    resting_between,
+    resting_seeds,
+    scaled,
+    seeds_at,
+    seeds_of,
+)
+from saltus.analysis.branches.switching import Seed
+from saltus.analysis.branches.tracing import trace
+from saltus.analysis.closed.field_zeros import autonomous
+from saltus.analysis.inputs.outputs import outputs_of
+from saltus.analysis.inputs.starts import at_values, check_system, range_of
+from saltus.analysis.inputs.verb import verb
+from saltus.errors import ParameterError, among, nearest, shown
+from saltus.flow.counts import whole
+from saltus.flow.methods import Method, exact_method
+from saltus.flow.progress import reporting, stage
+from saltus.interrupt import Interrupted
+from saltus.system import System
+
+
+@verb
+def branches(
+    system: System,
+    vary: Mapping[str, Any],
+    start: Any = None,
+    *,
+    box: Mapping[str, Any] | None = None,
+    at: int = 12,
+    switch: Sequence[str] = SWITCHES,
+    longest: int = LONGEST_DOUBLED,
+    points: int = POINTS,
+    values: Mapping[str, Any] | None = None,
+    outputs: Mapping[str, Any] | None = None,
+    every: float | str | None = None,
+    method: Method | None = None,
+    periods: int = 2000,
+    seed: int = 1,
+    threads: int | None = None,
+    progress: bool | Callable[[float], None] | None = None,
+) -> xr.Dataset:
+    """Branches of periodic orbits over a parameter, stable and unstable, with folds, period
+    doublings, branch points, tori and grazes.
+
+    Each branch is followed by pseudo-arclength continuation on the exact flow, in both directions
+    and through its folds, until it leaves the range or closes: an isola. Contacts come and go by
+    themselves; no contact sequence is given. Derivatives, also with respect to the parameter, are
+    those of the tangent flow. Bifurcations are located to rounding; where the number of multipliers
+    outside the unit circle changes otherwise, the step is refined, and what stays unexplained is
+    counted in ``branch_unexplained``. Orbits with impacts are followed from contact to contact,
+    through the grazes at which an impact appears or vanishes.
+
+    Of a system without forcing branches of equilibria are followed too, with their eigenvalues,
+    one branch in each mode, from mode to mode through boundary equilibria, and the limit cycles
+    that are born at their Hopf points. Equilibria that a contact holds aren't followed.
+
+    Parameters
+    ----------
+    system : System
+        Forced, or without forcing: then its equilibria are followed, and its limit cycles, with
+        their period.
+    vary : mapping
+        One parameter and its range, such as ``{"frequency": ("2 Hz", "30 Hz")}``.
+    start : Dataset, or starts
+        What :func:`saltus.frequency_response`, :func:`saltus.bifurcation_diagram`,
+        :func:`saltus.attractors` or :func:`saltus.basins` returned: each of its periodic orbits is
+        followed, and each equilibrium, also of :func:`saltus.equilibria`. Or starts as for these:
+        they are run at ``at`` values of the parameter first, and are where Newton's method looks
+        for equilibria.
+        Default: at rest.
+    box : mapping, optional
+        Range (low, high) of each state for random starts: ``start="random 20"``.
+    at : int
+        Values of the parameter at which starts are run.
+    switch : sequence of str
+        Events at which the branches that leave are followed too.
+    longest : int
+        Doubled branches are followed up to orbits of this number of forcing periods.
+    points : int
+        Most points of a branch in each direction.
+    values : mapping, optional
+        Other values of parameters.
+    outputs : mapping of str to callable, or to (callable, unit), optional
+        What to read off each orbit besides the states, as for :func:`saltus.frequency_response`.
+    every : float or str, optional
+        For starts of a system without forcing: time between two samples [s].
+    method : Method
+        Default :class:`saltus.Taylor`; another one must be exact.
+    periods : int
+        For starts: forcing periods after which a trajectory hasn't settled.
+    seed : int
+        Of random starts.
+    threads : int, optional
+        Default all processors.
+    progress : bool or callable
+        Default: a bar on the terminal if the work lasts more than two seconds.
+
+    Returns
+    -------
+    Dataset
+        Dims ``point``, ``branch``, ``event``, ``multiplier``, ``orbit_point``,
+        ``output``. On point:
+        ``point_branch``, ``point_<parameter>``, ``point_stable``, ``point_unstable_multipliers``,
+        ``point_period`` [s], ``point_peak`` and ``point_rms`` of the first state,
+        ``point_contacts``, ``point_itinerary``, ``point_margin``, multipliers (of a limit cycle
+        without the trivial one), the states at whole forcing periods, ``point_arclength``, and
+        ``point_output_maximum`` and so on of each state and output. On branch:
+        ``branch_kind`` (``periodic``, ``limit_cycle``, ``equilibrium``; these have
+        ``point_eigenvalue_real`` and ``_imag`` [1/s] in place of multipliers and a period),
+        ``branch_periods``, ``branch_closed``, ``branch_parent``, ``branch_begin``, ``branch_end``
+        (``accumulates``: its grazes do, at ``branch_begin_limit`` or ``branch_end_limit``;
+        ``held``: the chatter before a held contact changes, which isn't followed),
+        ``branch_twin``: whether its mirror image, in symmetric equations, is a branch of its own,
+        which isn't listed. On event: ``event_kind`` (``fold``, ``period_doubling``,
+        ``branch_point``, ``neimark_sacker``; ``hopf`` and ``boundary_equilibrium`` of equilibria;
+        ``graze``: a contact appears or vanishes; ``corner``: two contacts come at once),
+        ``event_<parameter>``, its states and multipliers, ``event_guard`` and ``event_phase`` of a
+        graze or corner, ``event_sqrt_coefficient`` of a graze (see
+        :func:`saltus.bifurcation_curve`), and of a graze of orbits with impacts
+        ``event_outcome``: ``persistence``, where orbits with the impact go on from those without
+        it, or ``nonsmooth_fold``, where both lie on one side; the same of equilibria on both sides
+        of a boundary; of a Hopf point ``supercritical`` (stable cycles are born), ``subcritical``,
+        or empty where the linear part doesn't tell.
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If an argument can't be used, or no periodic orbit is found to begin with.
+    Interrupted
+        On Ctrl-C; its ``partial`` is the Dataset of the branches that were finished.
+
+    References
+    ----------
+    Keller, in Applications of Bifurcation Theory (1977) 359-384; Kuznetsov, Elements of Applied
+    Bifurcation Theory (2004), chapter 10; Leine & Nijmeijer, Dynamics and Bifurcations of
+    Non-Smooth Mechanical Systems (2004).
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> rig = sl.models.delangre("a", force="4 N", frequency="17 Hz")
+    >>> start = {"x": "5 mm", "v": 0}
+    >>> found = sl.branches(rig, {"frequency": ("15 Hz", "18 Hz")}, start, at=3)
+    >>> [f"{kind} at {f:.6f} Hz" for kind, f in zip(found.event_kind.values,
+    ...                                              found.event_frequency.values)]
+    ['fold at 17.734087 Hz']
+    """
+    check_system(system)
+    method, system = exact_method(method, "sl.branches"), at_values(system, values)
+    name, limits = _range(system, vary)
+    chosen = frozenset(_kinds(switch))
+    wanted = outputs_of(system, outputs)
+    longest, points = whole(longest, "longest", 1), whole(points, "points", 2)
+    done = list[Branch]()
+    with reporting(progress) as show:
+        try:
+            rests: list[Seed] = []
+            if isinstance(start, xr.Dataset):
+                begins = seeds_of(system, name, start)
+                rests = [] if system.forced_at else resting_seeds(system, name, start)
+            else:
+                check_grid(system, whole(at, "at", 1), start)
+                places = np.linspace(*limits, int(at) + 2)[1:-1]
+                grid = grid_of(system, {name: places}, start, box, None, seed, None, every)
+                if autonomous(system):
+                    rests = resting_between(system, name, limits, grid.starts)
+                begins = _found_in(grid, method, periods, threads)
+            begins = scaled(system, name, _inside(begins, limits), method)
+            rests = _inside(rests, limits)
+            if not begins and not rests:
+                raise ParameterError(
+                    f"no periodic orbit of {system.name} is known between {limits[0]:g} and "
+                    f'{limits[1]:g}: give other starts, more of them (start="random 20" with '
+                    "box=), or longer runs (periods=)."
+                )
+            plan = plan_of(system, name, limits, method, threads, points, longest, chosen)
+            born = trace_rests(plan, system, name, rests, done) if rests else []
+            born = born if "hopf" in chosen else []
+            trace(plan, [*born, *begins], done, stage(show, 0.0, 0.9))
+        except KeyboardInterrupt:
+            partial = functools.partial(table_of, system, name, limits, done, wanted, method)
+            raise Interrupted(partial) from None
+        return table_of(system, name, limits, done, wanted, method)
+
+
+def _range(system: System, vary: Any) -> tuple[str, tuple[float, float]]:
+    """The parameter and its range [SI]."""
+    example = next(iter(system.values), "name")
+    if not isinstance(vary, Mapping) or len(vary) != 1:
+        two = (
+            " Two parameters: sl.bifurcation_curve follows a bifurcation over both, and "
+            "sl.bifurcation_diagram(system, {one: (low, high, number), two: (low, high, number)}) "
+            "maps the kinds of motion."
+        )
+        raise ParameterError(
+            f"sl.branches follows one parameter: {{{example!r}: (low, high)}}, not {shown(vary)}."
+            f"{two if isinstance(vary, Mapping) and len(vary) > 1 else ''}"
+        )
+    ((name, ends),) = vary.items()
+    return name, range_of(system, name, ends)
+
+
+def _kinds(switch: Any) -> Sequence[str]:
+    """Kinds of events, checked."""
+    given = tuple(switch) if isinstance(switch, list | tuple | set | frozenset) else (switch,)
+    for one in given:
+        if not among(one, SWITCHES):
+            raise ParameterError(f"switch={shown(one)} isn't known. {nearest(one, SWITCHES)}")
+    return given
+
+
+def _inside(seeds: list[Seed], limits: tuple[float, float]) -> list[Seed]:
+    return [seed for seed in seeds if limits[0] <= seed.own[-1] <= limits[1]]
+
+
+def _found_in(grid: Grid, method: Method, periods: int, threads: int | None) -> list[Seed]:
+    """Seeds from the attractors that starts lead to at some values of the parameter."""
+    found = find(grid, method, periods, threads, None)
+    if not found.complete:
+        raise KeyboardInterrupt
+    ((name, values),) = grid.axes.items()
+    orbits = found.motions.orbits.rows(found.row)
+    place = values[found.place]
+    seeds = seeds_at(grid.system, orbits.points, orbits.period, orbits.time, place)
+    return scaled(grid.system, name, list(seeds), method)

@@ -1,0 +1,1 @@
+"""Motions that repeat or rest: periodic orbits, limit cycles and equilibria, stable or not."""

@@ -1,0 +1,258 @@
+"""`periodic_orbits`: the periodic orbits of a system, stable and unstable."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from saltus.analysis.closed.all_cycles import all_cycles
+from saltus.analysis.closed.all_orbits import AGES, Search, all_orbits
+from saltus.analysis.closed.field_zeros import autonomous
+from saltus.analysis.closed.orbit_table import table_of, table_of_cycles
+from saltus.analysis.closed.spread import spread
+from saltus.analysis.closed.turns import looks_every
+from saltus.analysis.dataset_parts import provenance, subject
+from saltus.analysis.inputs.random_starts import random_count, random_starts
+from saltus.analysis.inputs.starts import check_system, ensemble, trajectories
+from saltus.analysis.inputs.verb import verb
+from saltus.analysis.solve.tolerances import LONGEST
+from saltus.errors import ParameterError, shown
+from saltus.flow.counts import whole
+from saltus.flow.maps import Stroboscope
+from saltus.flow.methods import Method, check_method
+from saltus.flow.progress import reporting
+from saltus.flow.room import check_room
+from saltus.flow.taylor import Taylor
+from saltus.results import build
+from saltus.results.dataset import schema
+from saltus.results.dataset.orbits import OrbitTable
+from saltus.system import System
+from saltus.units import to_si
+
+#: Steps and contacts for each iterate of a trial's motion, unless the method says how many. The rig
+#: takes 14 steps a period from where it moves, 5 million from a kilometre away; a ball that keeps
+#: 0.9 of its speed comes to rest in 200 contacts, and never where the impacts are written as jumps.
+STEPS, CONTACTS = 10_000, 1000
+
+
+@verb
+def periodic_orbits(
+    system: System,
+    start: Any = "random 1000",
+    *,
+    box: Mapping[str, Any] | None = None,
+    periods: int = 3,
+    period: Any = None,
+    method: Method | None = None,
+    seed: int = 1,
+    threads: int | None = None,
+    progress: bool | Callable[[float], None] | None = None,
+) -> xr.Dataset:
+    """The periodic orbits of a system, stable and unstable: of a forced one those with periods up
+    to a number of forcing periods, of one without forcing its limit cycles.
+
+    Newton's method is started from many states, for each period at once in all of them, with the
+    points of an orbit at whole forcing periods as unknowns (multiple shooting), steps that are
+    shortened until they help, and derivatives of the exact tangent flow. Then it is started again
+    with the orbits that are known deflated: their zeros are divided out, so that only others can be
+    found; also from beside known orbits, where a fold leaves the second of a pair. No search of
+    this kind finds every orbit for sure. What is said of those that it missed: ``search_unseen``.
+
+    Without forcing, the period is one more unknown. Close returns of the motions from the starts,
+    at once and after some turns, are first guesses of a state and a period: a motion on a chaotic
+    set passes near its unstable cycles. A cycle is one whatever its phase, for deflation too.
+    Cycles that lie side by side in families, as where energy is conserved, aren't found.
+
+    Parameters
+    ----------
+    system : System
+        Forced; or nothing in it depends on time.
+    start : sequence, mapping, array or str
+        Where to begin, as for :func:`saltus.simulate`, one or many; ``"random 1000"`` with ``box``.
+    box : mapping, optional
+        Range (low, high) of each state for random starts. Orbits may leave it.
+    periods : int
+        Longest period looked for [forcing periods; about a turn of the motion each, in a system
+        without forcing].
+    period : float, str or pair of them, optional
+        Of a system without forcing, in place of ``periods``: the range of periods looked for,
+        ``("1 s", "5 s")``, or a first guess, which stands for half to twice of it.
+    method : Method
+        Default :class:`saltus.Taylor`; another one has errors that keep unstable orbits from
+        closing. Its budgets, ``max_steps`` and ``max_events``, are those of each motion that is
+        followed; default: 10 000 steps and 1000 contacts for each forcing period or turn, 12 of
+        which a start may be followed before the search begins. Starts that need more, as those
+        that chatter without end, are given up.
+    seed : int
+        Of random starts.
+    threads : int, optional
+        Default all processors. Results don't depend on it.
+    progress : bool or callable
+        Default: a bar on the terminal if the work lasts more than two seconds.
+
+    Returns
+    -------
+    Dataset
+        Dim ``orbit``, each once, by period: ``orbit_period`` (the n of nT, the least; 0 of limit
+        cycles, whose period is ``orbit_cycle`` [s]),
+        ``orbit_stable``, ``orbit_stability`` (``stable node``, ``stable focus``, ``saddle``,
+        ``inverse saddle``, ``unstable node``, ``unstable focus``, ``marginal``),
+        ``orbit_unstable_directions``, ``orbit_found`` (starts that led to it; 0 if only deflation
+        did), ``orbit_mismatch``, and as of attractors ``orbit_contacts``, ``orbit_itinerary``,
+        ``orbit_peak``, ``orbit_rms``, ``orbit_margin``, multipliers, ``orbit_exponent`` [1/s] and
+        its states at whole periods, dims (orbit, phase); of a limit cycle in equal steps of its
+        period, and the multipliers are those beside the trivial 1. Dim ``search_period``, a search
+        each (of limit cycles one, 0):
+        ``search_converged`` of the starts led to an orbit, ``search_found_once`` orbits were found
+        by one start only, ``search_unseen`` is their ratio: the share of converging starts whose
+        orbit isn't known yet, as Good and Turing estimate it; ``search_deflated`` orbits were found
+        by deflation only, ``search_exhausted`` says whether that ended by finding nothing more,
+        and ``search_given_up`` starts were dropped, since their motion used up its budget.
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If an argument can't be used.
+    Interrupted
+        On Ctrl-C.
+
+    References
+    ----------
+    Parker & Chua, Practical Numerical Algorithms for Chaotic Systems (1989), chapter 5; Deuflhard,
+    Newton Methods for Nonlinear Problems (2004), chapter 3; Auerbach, Cvitanovic, Eckmann,
+    Gunaratne & Procaccia, Phys. Rev. Lett. 58 (1987) 2387-2389; Farrell, Birkisson & Funke, SIAM J.
+    Sci. Comput. 37 (2015) A2026-A2045; Good, Biometrika 40 (1953) 237-264.
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> rig = sl.models.delangre("b", force="4 N", frequency="15 Hz")
+    >>> box = {"x": ("-5 mm", "5 mm"), "v": ("-1 m/s", "1 m/s")}
+    >>> orbits = sl.periodic_orbits(rig, "random 200", box=box, periods=1)
+    >>> orbits["orbit_stability"].values.tolist()
+    ['saddle', 'inverse saddle', 'stable focus']
+    """
+    check_system(system)
+    periods = whole(periods, "periods", 1, LONGEST)
+    size = len(system.states)
+    many = random_count(start) if isinstance(start, str) else trajectories(start, None)
+    check_room(many * periods * size * 400.0, f"{many} starts", "Take fewer.")
+    states = (
+        random_starts(system, start, box, seed)
+        if isinstance(start, str)
+        else _given(system, start, box)
+    )
+    method = exact_method(method)
+    attrs = provenance(system, method, system.values) | {"starts": len(states), "seed": seed}
+    if system.forced_at is None:
+        turn = _turn(system, states)
+        limits, guess = _range(period, (0.0, (periods + 0.5) * turn))
+        method = _with_budget(method, max(AGES[-1], limits[1] / turn))
+        looks = Stroboscope(system, method, every=turn, threads=threads)
+        with reporting(progress) as show:
+            cycles = all_cycles(looks, states, limits, guess or turn, show)
+            table = table_of_cycles(looks, cycles.cycles, cycles.found)
+        attrs |= {"shortest_period": limits[0], "longest_period": limits[1]}
+        return orbits_dataset(system, attrs, table, searches([cycles.search]))
+    if period is not None:
+        raise ParameterError(
+            f"{system.name} is forced: its orbits last whole forcing periods. Give periods=, the "
+            f"longest of them, in place of period=."
+        )
+    map_ = Stroboscope(system, _with_budget(method, 1), threads=threads)
+    before = map_.by(_with_budget(method, AGES[-1] + periods))
+    scale = spread(before, states)
+    with reporting(progress) as show:
+        found = all_orbits(map_, states, periods, scale, show, before)
+        table = table_of(map_, found.orbits, found.found)
+    return orbits_dataset(system, attrs | {"periods": periods}, table, searches(found.searches))
+
+
+def _turn(system: System, states: np.ndarray) -> float:
+    """About a turn of the motions of a system without forcing [s]."""
+    if not autonomous(system):
+        raise ParameterError(
+            f"{system.name} depends on time, without a forcing period: none of its motions need "
+            f"repeat. Name the parameter that forces it: forced_at=."
+        )
+    every = looks_every(system, None, states)
+    assert every is not None
+    return every
+
+
+def _range(period: Any, default: tuple[float, float]) -> tuple[tuple[float, float], float | None]:
+    """Shortest and longest period, and a first guess, if there is one [s]."""
+    if period is None:
+        return default, None
+    pair = isinstance(period, (tuple, list)) and len(period) == 2
+    ends = [to_si(one, "s", "period") for one in (period if pair else (period,))]
+    if not (np.isfinite(ends).all() and ends[-1] > 0 and (not pair or 0 <= ends[0] < ends[1])):
+        raise ParameterError(
+            f"period must be a positive time or an ascending range of them, such as "
+            f'period=("1 s", "5 s"), not {shown(period)}.'
+        )
+    if pair:
+        return (ends[0], ends[1]), None
+    return (0.5 * ends[0], 2.0 * ends[0]), ends[0]
+
+
+def exact_method(method: Method | None) -> Method:
+    """The method. Raises ParameterError for one whose errors are more than rounding."""
+    method = check_method(method)
+    if not method.exact:
+        raise ParameterError(
+            f"errors of {method.name} keep unstable orbits from closing. Leave method= out: Taylor "
+            f"integrates to rounding."
+        )
+    return method
+
+
+def _with_budget(method: Method, iterates: float) -> Method:
+    """The method with a budget of steps and contacts for motions that last so many iterates."""
+    if not isinstance(method, Taylor):
+        return method
+    budget = {"max_steps": STEPS, "max_events": CONTACTS}
+    usual = Taylor()
+    return replace(
+        method,
+        **{
+            name: each * math.ceil(iterates)
+            for name, each in budget.items()
+            if getattr(method, name) == getattr(usual, name)
+        },
+    )
+
+
+def _given(system: System, start: Any, box: Any) -> np.ndarray:
+    """The starts that were given, float64[k, D]."""
+    if box is not None:
+        raise ParameterError('box= is for random starts: start="random 1000".')
+    return ensemble(system, start, None).start
+
+
+def searches(each: Sequence[Search]) -> dict[str, Any]:
+    """What the searches came to, by the names of the variables."""
+    return {
+        "search_period": [one.period for one in each],
+        **{
+            f"search_{name}": [getattr(one, name) for one in each]
+            for name in ("converged", "found_once", "unseen", "deflated", "exhausted", "given_up")
+        },
+    }
+
+
+def orbits_dataset(
+    system: System, attrs: Mapping[str, Any], table: OrbitTable, more: Mapping[str, Any]
+) -> xr.Dataset:
+    """The Dataset of periodic orbits, with other variables."""
+    return build(
+        schema.ORBITS,
+        subject(system, attrs),
+        {**table.values(len(system.states)), **more},
+        words={"<when>": table.orbits.points_when},
+    )

@@ -1,0 +1,117 @@
+"""How often motions without forcing are looked at: about once a turn of theirs.
+
+A turn is the time in which the direction of the motion, states in units of their ranges, goes round
+once. It needs no return, so chaotic motions have one too. What is told of attractors doesn't depend
+on it; how long it takes does.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from saltus.analysis.closed.cycles import directions
+from saltus.analysis.closed.field_zeros import autonomous, jacobian_of
+from saltus.errors import ParameterError, shown
+from saltus.flow.maps import FORCED, Stroboscope
+from saltus.flow.taylor import Taylor
+from saltus.system import System
+from saltus.units import to_si
+
+#: Motions that are asked, and fastest times of the linear part after which they are.
+ASKED, SETTLING = 8, 64
+#: Windows that are tried, the next so many times longer or shorter.
+WINDOWS, ZOOM = 8, 8.0
+#: Turns that a window must hold, and the angle between two samples that they can follow [rad].
+TURNS, FOLLOWED = 2.0, 0.3
+#: Share of the steps from sample to sample that must be followed: impacts turn a motion at once.
+SHARE = 0.9
+
+
+def looks_every(
+    system: System, every: Any, start: np.ndarray, parameters: np.ndarray | None = None
+) -> float | None:
+    """Time between two looks at motions [s]; None for a forced system.
+
+    Parameters
+    ----------
+    system : System
+        Equations and values.
+    every : float, str or None
+        What was asked for; None to have a turn of the motions found.
+    start : float64[k, D]
+        Where the motions start.
+    parameters : float64[k, P], optional
+        Values in the order of ``system.values`` of each; default those of the system.
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If it isn't a positive time, the system is forced, or it depends on time without a period.
+    """
+    if system.forced_at is not None:
+        if every is not None:
+            raise ParameterError(f"{system.name} {FORCED}")
+        return None
+    if every is None:
+        if not autonomous(system):
+            raise ParameterError(
+                f"{system.name} depends on time, but no parameter is named as the frequency of its "
+                f"forcing: name it by forced_at= in @sl.system. If the forcing repeats otherwise, "
+                f'give every=, its period, such as every="0.1 s".'
+            )
+        return _turn(system, start, parameters)
+    seconds = to_si(every, "s", "every")
+    if not 0 < seconds < math.inf:
+        raise ParameterError(f"every must be a positive time, not {shown(every)}.")
+    return seconds
+
+
+def _turn(system: System, start: np.ndarray, parameters: np.ndarray | None) -> float:
+    """A turn of the motions from float64[k, D], to two digits: it is the same on every machine."""
+    chosen = np.unique(np.linspace(0, len(start) - 1, min(ASKED, len(start))).astype(int))
+    rows = None if parameters is None else parameters[chosen]
+    begin = np.asarray(start[chosen], float)
+    map_ = Stroboscope(system, Taylor(), rows, 1.0).rows(np.arange(len(chosen)))
+    fastest = _fastest(map_, begin)
+    flight = map_.with_period(fastest).launch(begin, SETTLING)
+    state = flight.advance(SETTLING)[:, -1]
+    kept = np.isfinite(state).all(axis=1)
+    turn = np.where(np.isfinite(fastest), fastest, 1.0)
+    if kept.any():
+        rows_kept = np.flatnonzero(kept)
+        turn[rows_kept] = _turning(map_.rows(rows_kept), state[kept], fastest[kept])
+    return float(f"{float(np.median(turn)):.1e}")
+
+
+def _fastest(map_: Stroboscope, start: np.ndarray) -> np.ndarray:
+    """Time of the fastest eigenvalue at each start [s], float64[k]; 1 where none is known."""
+    matrices = jacobian_of(map_.system, start, map_.values)
+    times = np.ones(len(start))
+    for i, matrix in enumerate(matrices):
+        rate = np.abs(np.linalg.eigvals(matrix)).max() if np.isfinite(matrix).all() else 0.0
+        times[i] = 2.0 * np.pi / rate if rate > 0 else 1.0
+    return times
+
+
+def _turning(map_: Stroboscope, state: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """Time of a turn of the motions from float64[k, D] [s]; that of the first guess where a motion
+    doesn't turn.
+    """
+    length, result = 8.0 * first, first.copy()
+    rows = np.arange(len(state))
+    for _ in range(WINDOWS):
+        toward, _, _ = directions(map_.rows(rows), state[rows], length[rows])
+        angle = np.arccos(np.clip(np.einsum("kij,kij->ki", toward[:, 1:], toward[:, :-1]), -1, 1))
+        with np.errstate(invalid="ignore"):
+            followed = (angle < FOLLOWED).mean(axis=1) >= SHARE
+            turns = np.nansum(angle, axis=1) / (2.0 * np.pi)
+        done = followed & (turns >= TURNS)
+        result[rows[done]] = length[rows[done]] / turns[done]
+        length[rows] *= np.where(followed, ZOOM, 1.0 / ZOOM)
+        rows = rows[~done]
+        if not len(rows):
+            break
+    return result

@@ -1,0 +1,135 @@
+"""What motions without forcing come to: equilibria and limit cycles, found and verified in the same
+way for many trajectories at once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from saltus.analysis.closed.cycles import attracting_cycles, find_cycles, returns
+from saltus.analysis.closed.field_zeros import find_equilibria
+from saltus.analysis.closed.measures import Measures
+from saltus.analysis.closed.orbits import OrbitBatch
+from saltus.contact.guards import is_hold
+from saltus.flow.maps import Stroboscope
+from saltus.language.evaluate import evaluate
+
+#: Parts of a motion that must each be larger than the one before, and how much the last must be
+#: larger than the first, to run away.
+EIGHTHS, GROWN = 8, 3.0
+#: Returns farther than this, in units of the range, are no sign of a limit cycle.
+TORUS = 1e-2
+
+
+@dataclass
+class Attracted:
+    """What k trajectories have come to.
+
+    Attributes
+    ----------
+    orbits : OrbitBatch
+        Their equilibria (time 0) and limit cycles (time > 0); period 0 where there is none yet.
+    scale : float64[k, D]
+        Range of each state on the limit cycle; of an equilibrium that which was given.
+    """
+
+    orbits: OrbitBatch
+    scale: np.ndarray
+
+
+def attracted(
+    map_: Stroboscope, state: np.ndarray, scale: np.ndarray, window: float, near: float
+) -> Attracted:
+    """Which trajectories have come to an equilibrium that captures where they are, or to an
+    attracting limit cycle.
+
+    Parameters
+    ----------
+    map_ : Stroboscope
+        k flows without forcing.
+    state : float64[k, D]
+        Where each trajectory stands.
+    scale : float64[k, D]
+        Range of each state in its motion.
+    window : float
+        Time over which a return is looked for first [s].
+    near : float
+        Distance of a return, in units of the scale, that is worth a try by Newton's method.
+    """
+    result = Attracted(OrbitBatch.none(len(state), state.shape[1]), scale.copy())
+    rest = find_equilibria(map_, state, scale)
+    here = np.flatnonzero(rest.stable & rest.holds(state))
+    result.orbits.put(here, rest.orbits.rows(here))
+    result.scale[here] = np.maximum(scale[here], np.abs(rest.place[here]))
+    rows = np.flatnonzero(result.orbits.period == 0)
+    if not len(rows):
+        return result
+    cycles, beside, own = attracting_cycles(map_.rows(rows), state[rows], window, near)
+    result.orbits.put(rows[beside], cycles.rows(beside))
+    result.scale[rows[beside]] = own[beside]
+    return result
+
+
+def nearly_recurs(map_: Stroboscope, state: np.ndarray, window: float) -> np.ndarray:
+    """Which motions come back so near to where they were that they may be on their way to a limit
+    cycle, bool[k].
+    """
+    return np.asarray(returns(map_, state, window).apart < TORUS)
+
+
+def runs_away(iterates: np.ndarray) -> np.ndarray:
+    """Which motions float64[k, m, D] only grow: in each eighth of them more than before, and much
+    in all, bool[k].
+    """
+    sizes = np.stack(
+        [np.abs(part).max(axis=(1, 2)) for part in np.array_split(iterates, EIGHTHS, axis=1)]
+    )
+    with np.errstate(invalid="ignore"):
+        return np.asarray((np.diff(sizes, axis=0) > 0).all(axis=0) & (sizes[-1] > GROWN * sizes[0]))
+
+
+def rest(map_: Stroboscope, place: np.ndarray, rows: np.ndarray, numbers: Measures) -> None:
+    """Fill in the rows int64[m] of equilibria float64[m, D]: the size of their states, and the
+    distance to the nearest boundary.
+    """
+    size = place.shape[1]
+    numbers.maximum[rows, :size] = numbers.minimum[rows, :size] = numbers.mean[rows, :size] = place
+    numbers.deviation[rows, :size], numbers.span[rows] = 0.0, 0.0
+    states, values = dict(zip(map_.system.states, place.T, strict=True)), map_.values
+    bits: list[np.ndarray] = []
+    nearest = np.full(len(rows), np.inf)
+    for guard in map_.system.guards:
+        if is_hold(guard):
+            continue
+        (gap,) = evaluate([guard.gap], states=states, values=values, bits=bits)
+        bits.append(np.broadcast_to(gap, len(rows)) > 0)
+        nearest = np.minimum(nearest, np.abs(gap))
+    numbers.margin[rows] = nearest
+    for row, one in zip(rows, place, strict=True):
+        numbers.turning[row] = one[None]
+
+
+def multipliers_and_eigenvalues(
+    values: np.ndarray, rests: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Floquet multipliers, and eigenvalues [1/s] of what rests, complex128[m, D]; each NaN where it
+    is the other.
+    """
+    return np.where(rests[:, None], np.nan + 0j, values), np.where(
+        rests[:, None], values, np.nan + 0j
+    )
+
+
+def close_again(
+    map_: Stroboscope, start: np.ndarray, time: np.ndarray, scale: np.ndarray
+) -> OrbitBatch:
+    """Equilibria (time 0) and limit cycles (their period) from those at other parameter values."""
+    result = OrbitBatch.none(len(start), start.shape[1])
+    rests, turns = np.flatnonzero(time == 0), np.flatnonzero(time > 0)
+    if len(rests):
+        result.put(rests, find_equilibria(map_.rows(rests), start[rests], scale[rests]).orbits)
+    if len(turns):
+        result.put(turns, find_cycles(map_.rows(turns), start[turns], time[turns], scale[turns])[0])
+    return result

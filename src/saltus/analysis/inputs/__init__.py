@@ -1,0 +1,1 @@
+"""What every verb takes in: starts, boxes, values along an axis, outputs, arguments."""

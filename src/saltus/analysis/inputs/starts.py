@@ -1,0 +1,457 @@
+"""What users write for starts, values and spans, turned into the arrays of a request."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from saltus.analysis.inputs.axes import along, axes_of, count_along
+from saltus.errors import ParameterError, SaltusError, among, nearest, shown
+from saltus.flow.counts import whole
+from saltus.flow.request import Request, Schedule
+from saltus.flow.room import check_room
+from saltus.language import expression as ex
+from saltus.system import System, check_values
+from saltus.units import to_si
+
+#: Trajectories that a single call may hold before their starts alone fill memory.
+MOST_TRAJECTORIES = 100_000_000
+#: Memory of a trajectory of D states that keeps nothing but its end [bytes]: rows of the engine.
+TRAJECTORY, TRAJECTORY_OF_A_STATE = 200.0, 24.0
+
+#: Different combinations of values whose periodicity is checked; each takes half a millisecond.
+MOST_PERIOD_CHECKS = 2000
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """Trajectories to run.
+
+    Attributes
+    ----------
+    start : float64[n, D]
+        States [SI].
+    parameters : float64[1 or n, P]
+        Values in the order of the system's.
+    varied : mapping of str to float64[n]
+        The parameters that differ between trajectories.
+    batch : bool
+        Whether the user gave many (or an array of one).
+    """
+
+    start: np.ndarray
+    parameters: np.ndarray
+    varied: Mapping[str, np.ndarray]
+    batch: bool
+
+    @property
+    def size(self) -> int:
+        """Number of trajectories."""
+        return len(self.start)
+
+
+def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> Ensemble:
+    """Starts and values of all trajectories, broadcast against each other.
+
+    Parameters
+    ----------
+    system : System
+        Names of states, parameters and their units.
+    start : sequence, mapping or array
+        One number (or text with a unit) per state; a mapping of state names to numbers or arrays;
+        or an array (n, states).
+    values : mapping, optional
+        Parameter values that replace the system's own: one each, or an array of n.
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If a name is unknown, a number isn't finite, or lengths don't match.
+    """
+    check_system(system)
+    if values is not None and not isinstance(values, Mapping):
+        raise ParameterError('values must be a mapping, such as values={"frequency": [5.0, 10.0]}.')
+    _check_labels({**(start if isinstance(start, Mapping) else {}), **(values or {})})
+    _check_count(system, trajectories(start, values))
+    columns = _columns(system, start)
+    given = {name: _values(system, name, value) for name, value in (values or {}).items()}
+    empty = [name for name, value in given.items() if not np.size(value)]
+    if empty:
+        raise ParameterError(f"values of {empty[0]} are empty. Give at least one number.")
+    deep = [name for name, value in given.items() if np.ndim(value) > 1]
+    if deep:
+        raise ParameterError(
+            f"values of {deep[0]} must be one number or a one-dimensional array, "
+            f"one for each trajectory."
+        )
+    sizes = {name: np.size(array) for name, array in {**columns, **given}.items() if np.ndim(array)}
+    count = max(sizes.values(), default=1)
+    wrong = [f"{name} has {size}" for name, size in sizes.items() if size not in (1, count)]
+    if wrong:
+        raise ParameterError(
+            f"starts and values must have one length: {', '.join(wrong)}, the longest has {count}."
+        )
+    states = np.stack(
+        [np.broadcast_to(np.ravel(columns[name]), count) for name in system.states], axis=1
+    ).astype(float)
+    varied = {
+        name: np.broadcast_to(np.ravel(value), count).astype(float)
+        for name, value in given.items()
+        if np.ndim(value)
+    }
+    shared = system.with_values(
+        **{name: value for name, value in given.items() if not np.ndim(value)}
+    ).values
+    if varied:
+        check_values(system, {**shared, **varied})
+        _check_period_of_each(system, shared, varied, count)
+        rows = [varied.get(name, np.full(count, value)) for name, value in shared.items()]
+        return Ensemble(states, np.stack(rows, axis=1), varied, True)
+    return Ensemble(states, np.array([list(shared.values())]), {}, bool(sizes))
+
+
+def trajectories(start: Any, values: Any) -> int:
+    """How many trajectories starts and values ask for, before any array of them is made."""
+    given = [*(start.values() if isinstance(start, Mapping) else ())]
+    given += values.values() if isinstance(values, Mapping) else ()
+    rows = 1 if isinstance(start, Mapping) or axes_of(start) != 2 else max(len(start), 1)
+    return max([rows, *map(count_along, given)])
+
+
+def _check_count(system: System, count: int) -> None:
+    """Raise ParameterError for more trajectories than one call may hold."""
+    if count > MOST_TRAJECTORIES:
+        raise ParameterError(
+            f"{count} trajectories in one call are too many for memory. Split them into calls of "
+            f"{MOST_TRAJECTORIES} at most."
+        )
+    check_room(
+        count * (TRAJECTORY + TRAJECTORY_OF_A_STATE * len(system.states)),
+        f"{count} trajectories",
+        "Split them into calls of fewer.",
+    )
+
+
+def _check_labels(given: Mapping[str, Any]) -> None:
+    """Columns of pandas or xarray are taken row by row, so their labels must be the same, in the
+    same order. Raises ParameterError.
+    """
+    labelled = {
+        name: labels for name, value in given.items() if (labels := _labels(value)) is not None
+    }
+    for name, labels in labelled.items():
+        first = next(iter(labelled))
+        if not labels.equals(labelled[first]):
+            raise ParameterError(
+                f"{first} and {name} have different labels in their index. Align them first, or "
+                f"give plain numbers: .to_numpy()."
+            )
+
+
+def _labels(value: Any) -> Any:
+    """The index of a Series, or of a DataArray with one dim; None where there is none."""
+    if hasattr(value, "iloc"):
+        return value.index
+    return next(iter(value.indexes.values()), None) if hasattr(value, "indexes") else None
+
+
+def check_system(system: Any) -> None:
+    """Raises ParameterError for what isn't a System."""
+    if isinstance(system, System):
+        return
+    name = getattr(system, "__name__", "")
+    if callable(system) and str(getattr(system, "__module__", "")).startswith("saltus.models"):
+        raise ParameterError(
+            f"sl.models.{name} is the function that makes a System. Call it: sl.models.{name}()."
+        )
+    advice = (
+        "Put @sl.system(states=...) above the function."
+        if callable(system)
+        else "Take one of sl.models, such as sl.models.delangre()."
+    )
+    if isinstance(system, Mapping) and "format" in system:
+        advice = "Write sl.System.from_dict(...) of what System.to_dict() gave."
+    raise ParameterError(f"the system must be a System, not {type(system).__name__}. {advice}")
+
+
+def fill(
+    system: System, columns: Mapping[str, np.ndarray], fixed: Mapping[str, float]
+) -> np.ndarray:
+    """States float64[k, D] from float64[k] for some of them; the others are fixed, at zero if
+    nothing is said.
+    """
+    count = len(next(iter(columns.values())))
+    return np.stack(
+        [columns[n] if n in columns else np.full(count, fixed.get(n, 0.0)) for n in system.states],
+        axis=1,
+    ).astype(float)
+
+
+def fixed_states(system: System, at: Any, moving: Iterable[str]) -> dict[str, float]:
+    """Starts [SI] of the states that don't move over a map or a box; default zero.
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If ``at`` isn't a mapping, names an unknown state, or one of those that move; if a name of
+        those isn't a state.
+    """
+    if at is not None and not isinstance(at, Mapping):
+        raise ParameterError(f"at must be a mapping of states to starts, not {shown(at)}.")
+    given, moving = at or {}, list(moving)
+    for name in (*moving, *given):
+        if name not in system.states:
+            raise ParameterError(
+                f"{system.name} has no state {shown(name)}. {nearest(name, system.states)}"
+            )
+    twice = [name for name in moving if name in given]
+    if twice:
+        raise ParameterError(
+            f"{twice[0]} has a range and stands in at= too. Leave it out of one of them."
+        )
+    return {
+        name: to_si(given.get(name, 0.0), system.units[name], name)
+        for name in system.states
+        if name not in moving
+    }
+
+
+def _check_period_of_each(
+    system: System, shared: Mapping[str, float], varied: Mapping[str, np.ndarray], count: int
+) -> None:
+    """The time dependence must repeat with the forcing period for every trajectory, not only for
+    the system's own values.
+
+    Only parameters that the explicit time dependence can see are asked; each different combination
+    once.
+    """
+    if system.forced_at is None:
+        return
+    timed = [
+        node for rate in system.field for node in ex.walk(rate) if ex.depends_on(node, ("time",))
+    ]
+    seen = {leaf.payload for node in timed for leaf in ex.walk(node) if leaf.op == "param"}
+    columns = {name: values for name, values in varied.items() if name in seen}
+    done: set[tuple[float, ...]] = set()
+    for i in range(count if columns else 0):
+        key = tuple(float(values[i]) for values in columns.values())
+        if key in done or len(done) >= MOST_PERIOD_CHECKS:
+            continue
+        done.add(key)
+        try:
+            system.with_values(**{**shared, **dict(zip(columns, key, strict=True))})
+        except SaltusError as error:
+            raise ParameterError(f"trajectory {i}: {error}") from None
+
+
+def _values(system: System, name: str, value: Any) -> Any:
+    """One value of a parameter [SI], or many: a list or array, or a range (first, last, number)."""
+    if not isinstance(value, tuple):
+        return system.resolve(name, value)
+    example = f'values={{"{name}": ("{system.parameter_text(name)}", ..., 20)}}'
+    return along(name, value, lambda one: single(system, name, one), "values", example)
+
+
+def at_values(system: System, values: Mapping[str, Any] | None) -> System:
+    """A system at other values of its parameters, one each. Raises ParameterError or UnitError
+    where one isn't a value.
+    """
+    if values is None:
+        return system
+    if not isinstance(values, Mapping):
+        raise ParameterError('values must be a mapping, such as values={"force": "4 N"}.')
+    for name, value in values.items():
+        if np.ndim(system.resolve(name, value)):
+            raise ParameterError(
+                f"{name} = {shown(value)}, but here it has one value: a number, or text with a "
+                f"unit. Call it once for each value, or vary it by sl.bifurcation_diagram(system, "
+                f"{{{name!r}: (first, last, number)}}), alone or with a second parameter."
+            )
+    return system.with_values(**values)
+
+
+def single(system: System, name: str, value: Any) -> float:
+    """The value of a parameter [SI] at an end of a range, or in a list of them. Raises
+    ParameterError for many in place of one.
+    """
+    number = system.resolve(name, value)
+    if np.ndim(number):
+        raise ParameterError(
+            f"{name} = {shown(value)} must be one number, or a text with a unit: it is one end of "
+            f"a range, or one of a list."
+        )
+    return float(number)
+
+
+def range_of(system: System, name: Any, ends: Any) -> tuple[float, float]:
+    """The range (low, high) of a parameter [SI]. Raises ParameterError if it has none, or it
+    doesn't ascend.
+    """
+    if not among(name, system.values):
+        raise ParameterError(
+            f"{system.name} has no parameter {shown(name)}. {nearest(name, system.values)}"
+        )
+    if not isinstance(ends, list | tuple | np.ndarray) or len(ends) != 2:
+        raise ParameterError(
+            f"the range of {name} must be (low, high), not {shown(ends)}: the steps between are "
+            f"chosen as the curve needs them."
+        )
+    low, high = (single(system, name, end) for end in ends)
+    if not low < high:
+        raise ParameterError(f"the range of {name} must ascend, not {shown(ends)}.")
+    return low, high
+
+
+def _columns(system: System, start: Any) -> dict[str, np.ndarray]:
+    """Each state's start [SI], a scalar or an array."""
+    if isinstance(start, Mapping):
+        unknown = [name for name in start if name not in system.states]
+        if unknown:
+            raise ParameterError(
+                f"{system.name} has no state {shown(unknown[0])}. "
+                f"{nearest(unknown[0], system.states)}"
+            )
+        start = {**dict.fromkeys(_made(system), 0.0), **start}
+        missing = [name for name in system.states if name not in start]
+        if missing:
+            raise ParameterError(
+                f"the start gives no {missing[0]!r}. Write "
+                f"start={{{', '.join(f'{s!r}: 0.0' for s in system.states)}}}."
+            )
+        return {name: _numbers(system, name, start[name]) for name in system.states}
+    rows = start if isinstance(start, np.ndarray) else _as_array(start)
+    if system.made and rows.shape and rows.shape[-1] == len(system.states) - system.made:
+        rows = np.concatenate([rows, np.zeros((*rows.shape[:-1], system.made))], axis=-1)
+    if rows.shape == () or rows.shape[-1] != len(system.states) or rows.ndim > 2:
+        this = f"has shape {rows.shape}" if rows.shape else f"is {shown(start)}"
+        drawn = (
+            " Random starts are NumPy's here: np.random.default_rng(1).uniform(low, high, (n, "
+            f"{len(system.states)}))."
+            if isinstance(start, str) and start.startswith("random")
+            else ""
+        )
+        raise ParameterError(
+            f"a start of {system.name} is {len(system.states)} numbers "
+            f"({', '.join(system.states)}), or an array of such rows; "
+            f"this one {this}.{drawn}"
+        )
+    return {name: _numbers(system, name, rows[..., i]) for i, name in enumerate(system.states)}
+
+
+def _made(system: System) -> tuple[str, ...]:
+    """The states that elements with a memory have brought."""
+    return system.states[len(system.states) - system.made :]
+
+
+def _as_array(start: Any) -> np.ndarray:
+    """Rows as an array; mixed text and numbers stay as they are."""
+    try:
+        rows = np.asarray(start)
+        return rows if rows.dtype.kind in "fiu" else np.asarray(start, dtype=object)
+    except (TypeError, ValueError):
+        raise ParameterError("a start must be a row of numbers, or rows of one length.") from None
+
+
+def _numbers(system: System, name: str, value: Any) -> np.ndarray:
+    if isinstance(value, tuple):
+        example = f'start={{"{name}": (0.0, 1.0, 20), ...}}'
+        return along(
+            name, value, lambda one: to_si(one, system.units[name], name), "starts", example
+        )
+    array = np.asarray(value) if isinstance(value, np.ndarray) else _as_array(value)
+    if array.size == 0:
+        raise ParameterError(f"the start of {name} is empty. Give at least one number.")
+    if array.dtype.kind in "OUS":
+        array = np.array(
+            [to_si(item, system.units[name], name) for item in np.ravel(array).tolist()]
+        ).reshape(array.shape)
+    if array.dtype.kind not in "fiu" or array.ndim > 1:
+        raise ParameterError(
+            f"the start of {name} must be a number or a one-dimensional array of numbers."
+        )
+    if not np.isfinite(array).all():
+        where = "" if array.ndim == 0 else f" (first at index {int(np.argmin(np.isfinite(array)))})"
+        raise ParameterError(
+            f"the start of {name} isn't finite{where}. Every start must be a number."
+        )
+    return array.astype(float)
+
+
+@dataclass(frozen=True)
+class Span:
+    """How long to run: a period for each trajectory, whole periods and the time after them, all
+    since t_start.
+
+    For an unforced system the whole span is one period. ``t_end`` is the time that was asked for
+    [s], infinite if periods were.
+    """
+
+    t_start: float
+    period: np.ndarray
+    count: np.ndarray
+    phase: np.ndarray
+    t_end: float = math.inf
+
+    def request(
+        self, start: np.ndarray, parameters: np.ndarray, schedule: Schedule, record_from: int | None
+    ) -> Request:
+        """A run of this length, with samples at a schedule; contacts from period ``record_from`` on
+        are kept, or none.
+        """
+        return Request(
+            start=start, parameters=parameters, period=self.period, end_count=self.count,
+            end_phase=self.phase, origin=self.t_start,
+            schedule=schedule, record_from=record_from,
+        )  # fmt: skip
+
+
+def span(system: System, group: Ensemble, periods: Any, t_end: Any, t_start: Any) -> Span:
+    """The span of all trajectories.
+
+    Raises
+    ------
+    ParameterError
+        If neither or both of ``periods`` and ``t_end`` are given, or the end isn't after the start.
+    """
+    begin = _time(t_start, "t_start")
+    n = group.size
+    if periods is None and t_end is None and system.forced_at is None:
+        raise ParameterError(
+            f'{system.name} has no forcing period: give t_end=, such as t_end="10 s".'
+        )
+    if (periods is None) == (t_end is None):
+        raise ParameterError(
+            "give periods= (whole forcing periods) or t_end= (seconds), and only one of them."
+        )
+    if periods is not None:
+        if system.forced_at is None:
+            raise ParameterError(
+                f"{system.name} has no forcing period. Give t_end= in place of periods=."
+            )
+        periods = whole(periods, "periods")
+        return Span(begin, _periods(system, group), np.full(n, int(periods), np.int64), np.zeros(n))
+    end = _time(t_end, "t_end")
+    length = end - begin
+    if not length > 0:
+        raise ParameterError(f"t_end = {shown(t_end)} must be after t_start = {shown(t_start)}.")
+    if system.forced_at is None:
+        return Span(begin, np.full(n, length), np.ones(n, np.int64), np.zeros(n), end)
+    period = _periods(system, group)
+    count = np.floor(length / period).astype(np.int64)
+    return Span(begin, period, count, np.maximum(length - count * period, 0.0), end)
+
+
+def _time(value: Any, name: str) -> float:
+    seconds = to_si(value, "s", name)
+    if not math.isfinite(seconds):
+        raise ParameterError(f"{name} must be a finite time, not {shown(value)}.")
+    return seconds
+
+
+def _periods(system: System, group: Ensemble) -> np.ndarray:
+    values = dict(zip(system.values, group.parameters[0], strict=True))
+    return np.broadcast_to(system.period({**values, **group.varied}), group.size).astype(float)

@@ -1,3 +1,0 @@
-"""What trajectories settle to: periodic orbits, equilibria, limit cycles, aperiodic attractors -
-found, verified and described.
-"""

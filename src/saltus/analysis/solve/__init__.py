@@ -1,0 +1,1 @@
+"""Newton's method on many small systems of equations at once, its tolerances, and multipliers."""

@@ -1,0 +1,130 @@
+"""Growth of deviations where there are many states, and what typing a motion may cost."""
+
+import numpy as np
+import pytest
+
+import saltus as sl
+from saltus.analysis.attractors import aperiodic
+from saltus.analysis.attractors.find_responses import KEPT_ITERATES, find_responses
+from saltus.analysis.attractors.growth import BUDGET, by_neighbours, growth_rates, tangent_cost
+from saltus.analysis.solve.tolerances import ROUND
+from saltus.flow.flight import Flight
+from saltus.flow.maps import Stroboscope
+from saltus.results.dataset.kinds import Kind
+
+#: Natural frequencies without a common period [rad/s].
+NATURAL = np.sqrt([40.0, 130.0, 310.0])
+
+
+def oscillators(damping):
+    """Three forced oscillators beside one another: six states."""
+
+    @sl.system(states="a b c da db dc", forced_at="frequency", units={"frequency": "Hz"})
+    def three(t, a, b, c, da, db, dc, *, frequency=1.0, damping=damping):
+        drive = sl.cos(2 * sl.pi * frequency * t)
+        return (
+            da, db, dc,
+            drive - 40.0 * a - 2 * damping * da,
+            drive - 130.0 * b - 2 * damping * db,
+            drive - 310.0 * c - 2 * damping * dc,
+        )  # fmt: skip
+
+    return three
+
+
+def start():
+    return np.array([[0.1, -0.05, 0.02, 0.0, 0.3, 0.0]])
+
+
+@pytest.fixture
+def spent(monkeypatch):
+    """Cost of everything that is integrated [iterates]; a list of the shares shown."""
+    costs = []
+    advance, tangent = Flight.advance, Stroboscope.tangent
+
+    def moved(self, periods):
+        costs.append(periods * len(self))
+        return advance(self, periods)
+
+    def carried(self, state, count, directions=None):
+        costs.append(tangent_cost(state.shape[1]) * int(np.sum(np.broadcast_to(count, len(state)))))
+        return tangent(self, state, count, directions)
+
+    monkeypatch.setattr(Flight, "advance", moved)
+    monkeypatch.setattr(Stroboscope, "tangent", carried)
+    return costs
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.02])
+def test_a_neighbour_comes_nearer_as_damping_says(damping):
+    """All deviations from a linear motion shrink by exp(-damping T)."""
+    map_ = Stroboscope(oscillators(damping), sl.Taylor(), threads=1)
+    assert by_neighbours(map_, 6)
+    scale = np.array([[0.1, 0.1, 0.1, 1.0, 1.0, 1.0]])
+    _, rates = growth_rates(map_, start(), scale)
+    # a block's length swings with the phase; over all blocks that is bounded
+    assert rates.mean() == pytest.approx(-damping, abs=2.0 / (8 * len(rates)))
+
+
+def test_a_neighbour_tells_chaos_at_the_rate_that_the_tangent_flow_tells(monkeypatch):
+    """Duffing's oscillator, beside two more that are at rest."""
+
+    @sl.system(states="x v a b c", forced_at="frequency", units={"frequency": "Hz"})
+    def duffing(t, x, v, a, b, c, *, frequency=1 / (2 * np.pi), force=7.5):
+        return v, force * sl.cos(2 * sl.pi * frequency * t) - 0.05 * v - x * x * x, -a, -b, -c
+
+    map_ = Stroboscope(duffing, sl.Taylor(), threads=1)
+    begin, scale = np.array([[3.0, 4.0, 0.0, 0.0, 0.0]]), np.array([[6.0, 10.0, 1.0, 1.0, 1.0]])
+    _, [kind] = aperiodic.kinds_of(map_, begin, scale, [[0]])
+    monkeypatch.setattr("saltus.analysis.attractors.growth.by_neighbours", lambda *_: False)
+    _, rates = growth_rates(map_, begin, scale)
+    error = np.hypot(kind[2], rates.std() / np.sqrt(len(rates)))
+    assert kind[0] == "chaotic"
+    assert abs(kind[1] - rates.mean()) < 5 * error
+
+
+@pytest.mark.parametrize("most", [200, 400])
+def test_a_motion_that_nothing_tells_costs_what_its_budget_allows(spent, monkeypatch, most):
+    monkeypatch.setattr(aperiodic, "kind_of_growth", lambda _: None)
+    map_ = Stroboscope(oscillators(0.0), sl.Taylor(), threads=1)
+    settled = find_responses(map_, start(), most, 1)
+    assert settled.kind.tolist() == [Kind.NOT_REPEATING]
+    followed = 2 * (most + ROUND) + ROUND
+    assert sum(spent) <= BUDGET * most + followed * (1 + BUDGET) + 2 * KEPT_ITERATES
+
+
+def test_what_was_left_out_is_said(monkeypatch):
+    monkeypatch.setattr(aperiodic, "kind_of_growth", lambda _: None)
+    shares = []
+    ds = sl.frequency_response(
+        oscillators(0.0), [1.0], start=start()[0], periods=200, progress=shares.append, threads=1
+    )
+    assert ds.type.item() == "not_repeating"
+    # cos(wt) of all three: at most the sum of both amplitudes
+    forced = 1.0 / abs(40.0 - (2 * np.pi) ** 2)
+    peak = float(ds.output_peak.sel(output="a").item())
+    assert 0.5 * forced < peak <= (2 * forced + 0.1) * (1 + 1e-9)
+    assert "periods=" in sl.describe(ds)
+    assert shares == sorted(shares)
+
+
+def test_ctrl_c_hands_out_the_frequencies_that_are_done():
+    """One whose motion never repeats is still at work when the others are known."""
+    system = oscillators(0.0).with_values()
+
+    def press(share):
+        if share >= 0.5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(sl.Interrupted) as stop:
+        sl.bifurcation_diagram(
+            system,
+            {"damping": [0.0, 0.5, 0.6]},
+            start=start()[0],
+            periods=20_000,
+            progress=press,
+            threads=1,
+        )
+    part = stop.value.partial
+    assert part.type.values[1:].ravel().tolist() == ["periodic", "periodic"]
+    assert part.type.values[0].item() == "not_computed"
