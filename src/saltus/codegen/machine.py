@@ -194,7 +194,11 @@ def _options(level: int) -> llvm.PipelineTuningOptions:
 
 @cache
 def _jit() -> llvm.LLJIT:
-    return llvm.create_lljit_compiler(_target_machine(target()), use_jit_link=False)
+    """JITLink on arm64: LLVM's older loader aborts where code and the addresses that it reads lie
+    more than 4 GB apart, and asks for memory for both one by one (LLVM issue 71963).
+    """
+    arm64 = target().triple.startswith(("aarch64", "arm64"))
+    return llvm.create_lljit_compiler(_target_machine(target()), use_jit_link=arm64)
 
 
 class Loaded(NamedTuple):

@@ -157,17 +157,22 @@ def _follow_orbits(
     left = np.flatnonzero(
         np.isin(found.kind, CLOSED) & (found.kind != Kind.EQUILIBRIUM) & (orbits.period > 0)
     )
-    left = left[np.lexsort((_coarse_first(found.place[left], grid.places), orbits.period[left]))]
+    # through unstable orbits few branches hold all seeds: they are followed side by side
+    rank, most = found.place[left], len(left)
+    if plan.stable:
+        rank, most = _coarse_first(rank, grid.places), TAKEN
+    left = left[np.lexsort((rank, orbits.period[left]))]
     number, known = len(left), 0
     while len(left):
         first = np.flatnonzero(np.append(True, np.diff(orbits.period[left]) != 0))
         rank = np.arange(len(left)) - np.repeat(first, np.diff(np.append(first, len(left))))
-        some, left = left[rank < TAKEN], left[rank >= TAKEN]
+        some, left = left[rank < most], left[rank >= most]
         seeds = seeds_at(
             grid.system, orbits.points[some], orbits.period[some], orbits.time[some],
             values[found.place[some]],
         )  # fmt: skip
-        trace(plan, scaled(grid.system, name, list(seeds), method), arcs.branches)
+        some_progress = None if plan.stable else progress
+        trace(plan, scaled(grid.system, name, list(seeds), method), arcs.branches, some_progress)
         _number(found, orbits, grid, plan, np.append(some, left), arcs, known)
         left, known = left[arcs.of[left] < 0], len(arcs.branches)
         if progress is not None:
