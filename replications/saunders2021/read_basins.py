@@ -260,7 +260,7 @@ def all_maps(
     """Over all maps: attractors that only one way of integrating has, and how many starts lead to
     the same one.
     """
-    found: dict[str, list] = {"maps": [], "invented": [], "lost": [], "absent": []}
+    found: dict[str, list[Any]] = {"maps": [], "invented": [], "lost": [], "absent": []}
     for figure, some in settings.items():
         for setting in some:
             maps, place = (

@@ -217,7 +217,9 @@ def _root(run: xr.Dataset, index: int, system: System) -> str:
     )
 
 
-def _end(run: xr.Dataset, index: int, system: System) -> tuple[xr.Dataset, float, dict, dict]:
+def _end(
+    run: xr.Dataset, index: int, system: System
+) -> tuple[xr.Dataset, float, dict[str, float], dict[str, float]]:
     """A trajectory, the time and state at its end, and its parameters."""
     place = run.isel(trajectory=index) if "trajectory" in run.dims else run
     values = {

@@ -16,6 +16,7 @@ import math
 import re
 from collections.abc import Callable
 from fractions import Fraction
+from typing import Any
 
 from saltus.codegen.columns import Lines
 from saltus.codegen.scalar import condition_code
@@ -91,7 +92,7 @@ class JetCode:
         )
         self._rows, self._index = list(rows.values()), {name: i for i, name in enumerate(rows)}
         self._constants = constants
-        self._memo: dict[tuple, str | None] = {}
+        self._memo: dict[tuple[Any, ...], str | None] = {}
         self._coefficients: dict[Expr, str] = {}
         self._masks: dict[ex.Condition, str] = {}
         self._depth: dict[str, int] = {}
@@ -247,7 +248,7 @@ class JetCode:
         """
         key = (series, k, part)
         if key not in self._memo:
-            rule: Callable = getattr(self, f"_{series.kind}")
+            rule: Callable[..., str | None] = getattr(self, f"_{series.kind}")
             self._memo[key] = rule(series, k, part) if part else rule(series, k)
         return self._memo[key]
 
@@ -259,7 +260,12 @@ class JetCode:
         return self._memo[key]
 
     def _convolution(
-        self, k: int, left: Callable, right: Callable, first: int, last: int
+        self,
+        k: int,
+        left: Callable[[int], str | None],
+        right: Callable[[int], str | None],
+        first: int,
+        last: int,
     ) -> str | None:
         """``sum(left(i) * right(k - i) for i in first..last)``."""
         products = [(left(i), right(k - i)) for i in range(first, last + 1)]

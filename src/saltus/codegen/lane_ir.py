@@ -18,6 +18,7 @@ from saltus.codegen.function_ir import (
     function_ir,
     literal,
 )
+from saltus.codegen.head import Constant
 from saltus.codegen.interface import REAL, WHOLE, Interface
 
 #: Functions whose arrays hold a lane in each row; those of the others hold numbers.
@@ -92,7 +93,7 @@ def _numbers_of(tree: ast.Module) -> dict[str, Value]:
 
 def equation_ir(
     functions: str,
-    constants: Mapping[str, int | float | bool | tuple],
+    constants: Mapping[str, Constant],
     interface: Interface,
     lanes: int,
     register: int | None = None,
@@ -147,7 +148,7 @@ def equation_ir(
     return "\n".join([shared, *texts, *sorted(needed)]) + "\n"
 
 
-def constants_ir(constants: Mapping[str, int | float | bool | tuple], interface: Interface) -> str:
+def constants_ir(constants: Mapping[str, Constant], interface: Interface) -> str:
     """The sizes and tables of an equation as LLVM constants ``saltus_NAME``."""
     lines = []
     for name, value in constants.items():

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 from saltus.codegen.clocks import Clocks
 from saltus.language import expression as ex
@@ -135,7 +136,7 @@ class SeriesBuilder:
 
     def __init__(self, clocks: Clocks | None = None) -> None:
         self._clocks = clocks
-        self._known: dict[tuple, Series] = {}
+        self._known: dict[tuple[Any, ...], Series] = {}
         self._forms: dict[Expr, Linear] = {}
 
     def form(self, node: Expr) -> Linear:

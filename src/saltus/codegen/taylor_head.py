@@ -227,7 +227,7 @@ def count_moved(system: System) -> int:
     return len([name for name in own if not is_remembered(name)])
 
 
-def tables_of_laws(system: System) -> dict[str, list]:
+def tables_of_laws(system: System) -> dict[str, list[float]]:
     """Tables of the laws of contact, for each guard: its kind, the guard that says whether it is
     held (of that one: whose contact), the one without which it can't be, its side.
     """
@@ -283,7 +283,7 @@ def _jets_functions(code: JetCode, columns: int, handed_row: int, terms: int) ->
     return "".join(texts) + f"@inner\ndef jets(y, side, c, clock, work):\n{indented(lines)}\n"
 
 
-def tables(**rows: list) -> dict[str, Constant]:
+def tables(**rows: Sequence[float]) -> dict[str, Constant]:
     """Tables as they stand in a head: never empty."""
     return {name: tuple(entries) or (0,) for name, entries in rows.items()}
 

@@ -62,7 +62,7 @@ def on_threads(
         if len(items) == 1
         else ThreadPoolExecutor(min(threads or usable_processors(), max(len(items), 1))) as pool
     ):
-        waiting: set[Future] = set()
+        waiting: set[Future[Any]] = set()
         try:
             waiting |= {pool.submit(copy_context().run, one, item) for item in items}
             while waiting:
@@ -125,9 +125,9 @@ class _OneThread(Executor):
 
     _thread: threading.Thread | None = None
 
-    def submit(self, function: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future:
+    def submit(self, function: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Start the piece."""
-        future: Future = Future()
+        future: Future[Any] = Future()
 
         def run() -> None:
             try:

@@ -8,6 +8,7 @@ trajectory.
 from __future__ import annotations
 
 from fractions import Fraction
+from typing import Any
 
 from saltus.language.expression import Expr, walk
 from saltus.language.roots import with_root
@@ -29,7 +30,7 @@ class Canonical:
 
     def __init__(self) -> None:
         self._memo: dict[Expr, Polynomial] = {}
-        self._atoms: dict[tuple, int] = {}
+        self._atoms: dict[tuple[Any, ...], int] = {}
         self._kinds: list[frozenset[str]] = []
 
     def polynomial(self, root: Expr) -> Polynomial:
@@ -87,14 +88,14 @@ class Canonical:
         extra = frozenset(["select"]) if node.op == "select" else frozenset()
         return self._function((node.op, node.payload), parts, extra)
 
-    def _atom(self, key: tuple, kinds: frozenset[str]) -> Polynomial:
+    def _atom(self, key: tuple[Any, ...], kinds: frozenset[str]) -> Polynomial:
         number = self._atoms.setdefault(key, len(self._atoms))
         if number == len(self._kinds):
             self._kinds.append(kinds)
         return {frozenset([(number, 1)]): Fraction(1)}
 
     def _function(
-        self, name: tuple, parts: list[Polynomial], extra: frozenset[str] = frozenset()
+        self, name: tuple[Any, ...], parts: list[Polynomial], extra: frozenset[str] = frozenset()
     ) -> Polynomial:
         """An atom that is a function of normal forms."""
         key = (name, *(frozenset(part.items()) for part in parts))

@@ -24,7 +24,7 @@ _PLAIN: Dimension = {}
 _WAY_OUT = "sl.system(..., check_units=False) leaves units unchecked."
 
 
-class _Number(dict):
+class _Number(dict[str, Fraction]):
     """A number written into the equation: it fits into any sum."""
 
     def __init__(self, plain: bool) -> None:

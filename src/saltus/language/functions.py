@@ -81,7 +81,10 @@ def max(first: Operand, /, *others: Operand) -> Any:
 
 
 def _extreme(
-    name: str, values: tuple[Operand, ...], on_numbers: Callable, larger_first: Callable
+    name: str,
+    values: tuple[Operand, ...],
+    on_numbers: Callable[..., Any],
+    larger_first: Callable[[Expr, Expr], tuple[Expr, Expr]],
 ) -> Any:
     if not any(isinstance(value, Expr) for value in values):
         return of_numbers(name, lambda *numbers: on_numbers(numbers), *values)

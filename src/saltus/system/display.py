@@ -157,7 +157,7 @@ def _value(system: EquationsOfMotion, parameter: str) -> str:
     return from_si(system.values[parameter], system.units[parameter])
 
 
-def _writer(kind: type, system: EquationsOfMotion, field: Sequence[Expr]) -> Writer:
+def _writer(kind: type[Writer], system: EquationsOfMotion, field: Sequence[Expr]) -> Writer:
     roots = [*field, *(guard.gap for guard in system.guards if not is_hold(guard))]
     roots += [entry for guard in system.guards if guard.law for entry in guard.law.reset]
     return kind(system.guards, shared=roots, taken=(*system.states, *system.values, "t"))

@@ -27,6 +27,8 @@ from saltus.analysis.solve.tolerances import NEAR, ROUND, SAME
 from saltus.flow.maps import Map, Stroboscope, Travel
 from saltus.results.dataset.kinds import Kind
 
+#: The attractor of each trajectory, None as long as it isn't known.
+Owners = list[Orbit | SampledAttractor | None]
 #: Candidates for orbits in one round; what isn't tried has its turn in the next.
 MAX_CANDIDATES = 12
 #: Trajectories that never recur whose motion is surveyed.
@@ -71,7 +73,7 @@ def find_attractors(
     """
     found = known or AttractorSet(Neighbourhoods.none(start.shape[1]))
     found = AttractorSet(found.near, list(found.orbits), list(found.sampled), list(found.unstable))
-    owner: list[Orbit | SampledAttractor | None] = [None] * len(start)
+    owner: Owners = [None] * len(start)
     settled = np.full(len(start), -1, np.int64)
     travel, going = map_.launch(start, most), np.arange(len(start))
     noisy = Kind.NOISY_PERIODIC.word
@@ -111,7 +113,7 @@ def _captured(
     points: np.ndarray,
     who: np.ndarray,
     age: int,
-    owner: list,
+    owner: Owners,
     settled: np.ndarray,
 ) -> np.ndarray:
     """Note which of the trajectories are captured, and after how many iterates."""
@@ -128,7 +130,7 @@ def _keeping(
     points: np.ndarray,
     who: np.ndarray,
     age: int,
-    owner: list,
+    owner: Owners,
     settled: np.ndarray,
 ) -> np.ndarray:
     """Note which trajectories float64[k, m, D] keep to an attractor of a kind that is known by
@@ -216,7 +218,7 @@ def _lies_on(place: np.ndarray, orbit: Orbit, scale: np.ndarray, tolerance: floa
 
 def _on_cycles(
     map_: Map, found: AttractorSet, points: np.ndarray, who: np.ndarray, travel: Travel,
-    rows: np.ndarray, scale: np.ndarray, owner: list, settled: np.ndarray,
+    rows: np.ndarray, scale: np.ndarray, owner: Owners, settled: np.ndarray,
 ) -> np.ndarray:  # fmt: skip
     """Which trajectories of a flow without forcing go round a limit cycle, bool[k]; new ones are
     looked for. Notes their owners.
@@ -239,7 +241,7 @@ def _on_cycles(
 
 def _survey(
     map_: Map, travel: Travel, going: np.ndarray, scale: np.ndarray, found: AttractorSet,
-    owner: list, settled: np.ndarray, most: int
+    owner: Owners, settled: np.ndarray, most: int
 ) -> None:  # fmt: skip
     """Find out what the trajectories do that never settled: watch them much longer, and call an
     attractor only what none of them leaves.
@@ -283,7 +285,7 @@ def _survey(
 
 
 def _watch(
-    travel: Travel, going: np.ndarray, found: AttractorSet, owner: list, settled: np.ndarray
+    travel: Travel, going: np.ndarray, found: AttractorSet, owner: Owners, settled: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:  # fmt: skip
     """Trajectories that don't settle for SURVEY_ITERATES more, int64[k], their iterates, and those
     of the ones that do.

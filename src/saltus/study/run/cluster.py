@@ -78,7 +78,7 @@ def _run(
     plan: BasinPlan,
     found: AttractorSet,
     missing: list[int],
-    keep: Callable,
+    keep: Callable[[int, Settling], None],
     show: Callable[[float], None],
 ) -> None:
     """Hand out chunks, keep what comes back, hand out more; a chunk whose worker dies goes to

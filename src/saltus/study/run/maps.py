@@ -109,7 +109,11 @@ def _runner(resources_: Resources) -> AbstractContextManager[Callable[..., None]
         return nullcontext(partial(run_on_processes, resources_.workers))
 
     def run(
-        plan: BasinPlan, found: AttractorSet, missing: list[int], keep: Callable, show: Callable
+        plan: BasinPlan,
+        found: AttractorSet,
+        missing: list[int],
+        keep: Callable[[int, Settling], None],
+        show: Callable[[float], None],
     ) -> None:
         label_all(plan, found, missing, keep, resources_.threads, show)
 

@@ -17,6 +17,8 @@ from saltus.study.tables.questions import Axis, Compare, Map
 from saltus.study.tables.spec import QUESTIONS, Study
 from saltus.study.tables.wording import toml
 
+#: Keys and indices on the way from the study to a value.
+Place = tuple[int | str, ...]
 TABLES: dict[str, type[Table]] = QUESTIONS | {
     "study": Header, "system": SystemTable, "compare": Compare, "map": Map, "axes": Axis,
     "frequency": Range, "vary": Range,
@@ -73,7 +75,7 @@ _ELSEWHERE = {
 }
 
 
-def _instead(place: tuple) -> str:
+def _instead(place: Place) -> str:
     """What to write for a key or a table that isn't there."""
     key, known = str(place[-1]), list(_known(place[:-1]))
     if len(place) == 1 and key in _ELSEWHERE:
@@ -115,7 +117,7 @@ def content_faults(error: ValidationError, data: Any = None) -> list[str]:
     """A sentence for each fault of a study that is TOML, but not a study; ``data`` is what the TOML
     holds.
     """
-    faults: dict[tuple, list[dict]] = {}
+    faults: dict[Place, list[dict[str, Any]]] = {}
     for detail in error.errors():
         place = tuple(
             part
@@ -126,7 +128,7 @@ def content_faults(error: ValidationError, data: Any = None) -> list[str]:
     return [_fault(place, details, data) for place, details in faults.items()]
 
 
-def _path(place: tuple, data: Any) -> list[str]:
+def _path(place: Place, data: Any) -> list[str]:
     """The place as words: tables of an array are counted from 1, ``lyapunov 2``; one that stands
     alone isn't.
     """
@@ -142,7 +144,7 @@ def _path(place: tuple, data: Any) -> list[str]:
     return path
 
 
-def _fault(place: tuple, details: list[dict], data: Any) -> str:
+def _fault(place: Place, details: list[dict[str, Any]], data: Any) -> str:
     first, kind = details[0], details[0]["type"]
     path = _path(place, data)
     *tables, key = path or [""]
@@ -191,7 +193,7 @@ def _fault(place: tuple, details: list[dict], data: Any) -> str:
     return f"{where}{key} = {_given(first['input'])} must be {expected}." + _example(place)
 
 
-def _table(place: tuple) -> type[Table] | None:
+def _table(place: Place) -> type[Table] | None:
     """The class of the table at a place in a study."""
     table: type[Table] | None = Study
     for part in place:
@@ -200,16 +202,16 @@ def _table(place: tuple) -> type[Table] | None:
             or isinstance(part, int)
             or table in (Axis, Range, Output, Curve)
         )
-        table = METHODS.get(part) or TABLES.get(part) or (table if nested else None)
+        table = METHODS.get(str(part)) or TABLES.get(str(part)) or (table if nested else None)
     return table
 
 
-def _known(place: tuple) -> Iterator[str]:
+def _known(place: Place) -> Iterator[str]:
     table = _table(place)
     yield from table.model_fields if table else ()
 
 
-def _example(place: tuple) -> str:
+def _example(place: Place) -> str:
     table = _table(place[:-1])
     field = table.model_fields.get(str(place[-1])) if table else None
     return (
