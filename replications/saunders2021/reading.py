@@ -68,7 +68,10 @@ def by_peak(ds: xr.Dataset) -> list[int]:
 
 def multipliers(ds: xr.Dataset) -> np.ndarray:
     """Magnitudes of the multipliers, float64[attractor, multiplier]."""
-    return np.hypot(ds["attractor_multiplier_real"].values, ds["attractor_multiplier_imag"].values)
+    magnitudes: np.ndarray = np.hypot(
+        ds["attractor_multiplier_real"].values, ds["attractor_multiplier_imag"].values
+    )
+    return magnitudes
 
 
 def certainty(maps: Iterable[xr.Dataset]) -> str:

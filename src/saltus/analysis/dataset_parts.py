@@ -134,7 +134,7 @@ def before_jumps(system: System, table: ContactTable) -> np.ndarray:
     (:func:`saltus.system.quantity.remembering`), float64[c, D]: only impacts and jumps change them.
     """
     names, struck = jumping_states(system), table.kind == st.IMPACT
-    states = table.state[:, : len(system.states)].copy()
+    states: np.ndarray = table.state[:, : len(system.states)].copy()
     for name, was in zip(reversed(names), table.state.T[::-1], strict=False):
         states[struck, system.states.index(name)] = was[struck]
     return states

@@ -37,7 +37,7 @@ OTHER_PROCESS, ANNOUNCEMENT = 0.5, 1.0
 #: Objects in memory.
 _MAX_OBJECTS = 32
 
-_COMPILING: weakref.WeakSet[subprocess.Popen] = weakref.WeakSet()
+_COMPILING: weakref.WeakSet[subprocess.Popen[bytes]] = weakref.WeakSet()
 #: One lock for each object.
 _LOCKS: defaultdict[str, threading.Lock] = defaultdict(threading.Lock)
 _OBJECTS: OrderedDict[str, bytes] = OrderedDict()
@@ -236,7 +236,7 @@ def _answer_of(module: str, options: tuple[str, ...], given: bytes, title: str) 
     is none, or it doesn't succeed.
     """
     environment = {**_environment(), PARENT_ID: str(os.getpid())}
-    process: subprocess.Popen | None = None
+    process: subprocess.Popen[bytes] | None = None
     try:
         # a pipe is full after 64 kB, and communicate() doesn't go on filling it after a timeout
         with tempfile.TemporaryFile() as file:
@@ -264,15 +264,16 @@ def _answer_of(module: str, options: tuple[str, ...], given: bytes, title: str) 
     return data if process.returncode == 0 and data else None
 
 
-def _wait(process: subprocess.Popen) -> bytes:
+def _wait(process: subprocess.Popen[bytes]) -> bytes:
     while True:
         try:
-            return process.communicate(timeout=CHECK_INTERVAL)[0]
+            data: bytes = process.communicate(timeout=CHECK_INTERVAL)[0]
+            return data
         except subprocess.TimeoutExpired:
             check_stop()
 
 
-def _end(process: subprocess.Popen) -> None:
+def _end(process: subprocess.Popen[bytes]) -> None:
     """Whatever has happened, leave no process behind."""
     if process.poll() is None:
         process.kill()

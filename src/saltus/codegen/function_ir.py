@@ -11,7 +11,7 @@ from __future__ import annotations
 import ast
 import math
 import struct
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
 
 from saltus.codegen.blocks import Line, in_blocks
@@ -136,7 +136,8 @@ class _Body:
     # -- expressions -------------------------------------------------------------------------------
     def value(self, node: ast.expr) -> Value:
         """Translate an expression."""
-        rule = getattr(self, f"_{type(node).__name__.lower()}", None)
+        name = f"_{type(node).__name__.lower()}"
+        rule: Callable[[ast.expr], Value] | None = getattr(self, name, None)
         if rule is None:
             raise UntranslatableError(ast.unparse(node))
         return rule(node)

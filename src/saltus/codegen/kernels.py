@@ -79,7 +79,7 @@ class Call:
     def __len__(self) -> int:
         return len(self._kinds)
 
-    def block(self, values: tuple) -> np.ndarray:
+    def block(self, values: tuple[Any, ...]) -> np.ndarray:
         """The arguments as the function reads them. int64[m].
 
         Raises
@@ -171,7 +171,7 @@ class Kernels:
         except KeyError:
             raise AttributeError(f"{type(self).__name__} has no {name!r}") from None
 
-    def workspace(self) -> tuple:
+    def workspace(self) -> tuple[np.ndarray, ...]:
         """The memory that one call works in; one set for each thread, made once: many a call takes
         no longer than making it.
         """
@@ -179,7 +179,8 @@ class Kernels:
         if not hasattr(memory, "arrays"):
             memory.arrays = self._layout["workspace"]()
             memory.block = self._own.block(memory.arrays)
-        return memory.arrays
+        arrays: tuple[np.ndarray, ...] = memory.arrays
+        return arrays
 
     def propagate(self, *values: Any) -> int:
         """Call the kernel, without the GIL; kernels/batch.py describes its arrays."""
@@ -194,7 +195,7 @@ class Kernels:
 
         return call
 
-    def _run(self, block: np.ndarray, _: tuple = ()) -> int:
+    def _run(self, block: np.ndarray, _: tuple[Any, ...] = ()) -> int:
         """Call with a block of arguments; the arrays that it names are alive meanwhile."""
         begun = time.perf_counter()
         answer = int(self._entry(_place(_beginning(block))))
@@ -209,7 +210,7 @@ class Kernels:
             ).start()
         return answer
 
-    def _block(self, values: tuple) -> np.ndarray:
+    def _block(self, values: tuple[Any, ...]) -> np.ndarray:
         """The arguments of a call; where those of the workspace lie is known."""
         rest = len(values) - len(self._own)
         given, own = values[rest:], getattr(self._memory, "arrays", ())

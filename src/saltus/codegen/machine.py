@@ -129,7 +129,8 @@ def object_code(
             _optimise_open(module, machine)
         else:
             _optimise(module, machine, LEVEL_ALONE if alone else LEVEL)
-        return machine.emit_object(module)
+        code: bytes = machine.emit_object(module)
+        return code
 
 
 @lru_cache(maxsize=4)

@@ -9,6 +9,8 @@ from importlib import resources
 from types import ModuleType
 from typing import Any, Protocol
 
+import numpy as np
+
 from saltus.announce import working
 from saltus.codegen import machine, tableaux, templates
 from saltus.codegen.head import Constant, Head
@@ -39,7 +41,7 @@ class Flow(Protocol):
     CARRY: int
     STEP_RECORDS: int
 
-    def workspace(self) -> tuple:
+    def workspace(self) -> tuple[np.ndarray, ...]:
         """The memory that one call works in; one set for each thread."""
 
     def propagate(self, *values: Any) -> int:
@@ -77,7 +79,10 @@ def taylor_module(system: System, order: int, lanes: int) -> Flow:
     title = f"{system.name}, Taylor order {order}, {lanes} lanes"
     with working(lambda: f"compiling {_sized(system)}"):
         head = _printed(system, lambda: taylor_head(system, order, lanes))
-        return _flow(TAYLOR, f"taylor_{lanes}", head, title, f"{_described(system)} for Taylor")
+        flow: Flow = _flow(
+            TAYLOR, f"taylor_{lanes}", head, title, f"{_described(system)} for Taylor"
+        )
+        return flow
 
 
 #: Name of each other method: templates, their bitcode, and the numbers that they are given.
@@ -97,7 +102,8 @@ def steps_module(system: System, method: str) -> Flow:
     jacobian, title = "jacobian" in interface.functions, f"{system.name}, {method}"
     with working(lambda: f"compiling {_sized(system)}"):
         head = _printed(system, lambda: rates_head(system, numbers, jacobian))
-        return _flow(interface, template, head, title, f"{_described(system)} for {method}")
+        flow: Flow = _flow(interface, template, head, title, f"{_described(system)} for {method}")
+        return flow
 
 
 def _printed(system: System, head: Callable[[], Head]) -> Head:

@@ -96,7 +96,7 @@ def manifest() -> dict[str, Any]:
         If it isn't there, or damaged.
     """
     try:
-        known = json.loads(_brought("manifest.json"))
+        known: dict[str, Any] = json.loads(_brought("manifest.json"))
         if all(
             isinstance(known["bitcode"][name][one], str)
             for name in BITCODE
@@ -137,7 +137,7 @@ def bitcode(name: str) -> bytes:
 @cache
 def is_current(name: str) -> bool:
     """Whether a bitcode is what the templates of this installation give."""
-    known = manifest()["bitcode"][name]
+    known: dict[str, str] = manifest()["bitcode"][name]
     return known["texts"] == text_hash(name) or known["sources"] == source_hash(name)
 
 

@@ -400,7 +400,7 @@ def _outermost_bit(node: Expr) -> int | None:
     while queue:
         top = queue.popleft()
         if top.op == "select" and top.payload.bits:
-            bits = top.payload.bits
+            bits: int = top.payload.bits
             return (bits & -bits).bit_length() - 1
         for child in top.args:
             if child.bits and child not in seen:

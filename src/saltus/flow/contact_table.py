@@ -91,19 +91,22 @@ class ContactTable:
     @property
     def kind_name(self) -> np.ndarray:
         """The kind in words, str[c]."""
-        return np.array([st.CONTACT_KIND[i] for i in range(len(st.CONTACT_KIND))])[self.kind]
+        words = np.array([st.CONTACT_KIND[i] for i in range(len(st.CONTACT_KIND))])
+        names: np.ndarray = words[self.kind]
+        return names
 
     @property
     def changes_side(self) -> np.ndarray:
         """Whether the guard's own side changed, bool[c]: it doesn't at a graze."""
-        return ((self.mode_before ^ self.mode_after) >> self.guard) & 1 == 1
+        changes: np.ndarray = ((self.mode_before ^ self.mode_after) >> self.guard) & 1 == 1
+        return changes
 
     @property
     def chatters(self) -> np.ndarray:
         """Whether a contact is one of the impacts, ever smaller, with which one guard's contact
         comes to rest, bool[c]: how many of them there are says nothing.
         """
-        impact = self.kind == st.IMPACT
+        impact: np.ndarray = self.kind == st.IMPACT
         rows = np.flatnonzero(impact)
         if not len(rows):
             return impact

@@ -274,7 +274,8 @@ def _returns_where_sliding_begins(contacts: ContactTable, status: np.ndarray) ->
         & (direction[1:] == -direction[:-1])
         & (time[1:] == time[:-1])
     )
-    return last & np.append(False, back)
+    returns: np.ndarray = last & np.append(False, back)
+    return returns
 
 
 # -- work ------------------------------------------------------------------------------------------
@@ -286,7 +287,7 @@ def slice_of(states: int) -> int:
 def _advance(
     chunk: _Chunk,
     module: Flow,
-    workspace: tuple,
+    workspace: tuple[np.ndarray, ...],
     stop: Stop,
     room: Contacts,
     show: Callable[[float], None] | None = None,

@@ -77,7 +77,9 @@ class Matlab(OneByOne):
 
     def noise_of(self, scale: np.ndarray) -> np.ndarray:
         """The same, with the errors that AbsTol allows to small states."""
-        return self.noise * np.maximum(1.0, self.atol / (self.rtol * scale)).max(axis=1)
+        factor = np.maximum(1.0, self.atol / (self.rtol * scale)).max(axis=1)
+        noise: np.ndarray = self.noise * factor
+        return noise
 
 
 def _documented(cls: type[_M]) -> type[_M]:

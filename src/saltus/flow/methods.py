@@ -47,10 +47,10 @@ def exact_method(method: Any, asked: str) -> Method:
     """The same for what closes orbits by Newton's method, ``asked``: a ParameterError for methods
     whose errors are more than rounding.
     """
-    method = check_method(method)
-    if not method.exact:
+    checked = check_method(method)
+    if not checked.exact:
         raise ParameterError(
-            f"{asked} needs a method whose errors are rounding, not {method.name}: Newton's method "
-            "doesn't close its orbits. Leave method= out."
+            f"{asked} needs a method whose errors are rounding, not {checked.name}: Newton's "
+            "method doesn't close its orbits. Leave method= out."
         )
-    return method
+    return checked

@@ -256,7 +256,7 @@ class MotionSeries:
     def _gap(self, work: np.ndarray, guard: int) -> np.ndarray:
         """Terms of a gap, or of a quantity."""
         module = self._module
-        terms = module.GUARD_SIGN[guard] * self._rows(work, module.GUARD_ROW[guard])
+        terms: np.ndarray = module.GUARD_SIGN[guard] * self._rows(work, module.GUARD_ROW[guard])
         terms[0] = work[module.GAP_ROW + guard]
         return terms
 

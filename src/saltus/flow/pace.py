@@ -77,4 +77,5 @@ def _since(arrays: dict[str, np.ndarray], who: np.ndarray, which: str) -> np.nda
         arrays["count"][who] - arrays[f"{which}_count"][who],
         arrays["phase"][who] - arrays[f"{which}_phase"][who],
     )
-    return whole + phase / arrays["period"][who]
+    periods: np.ndarray = whole + phase / arrays["period"][who]
+    return periods

@@ -24,7 +24,7 @@ def value(terms: np.ndarray, x: np.ndarray) -> np.ndarray:
     """Each polynomial at a place of its own: terms float64[n + 1, ..., p], x float64[p];
     float64[..., p].
     """
-    total = terms[-1]
+    total: np.ndarray = terms[-1]
     for term in terms[-2::-1]:
         total = total * x + term
     return total
@@ -108,7 +108,8 @@ def _refined(terms: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray
     """The one root of each polynomial between low and high, by Newton's method inside a shrinking
     bracket.
     """
-    rates, root = derivative(terms), 0.5 * (low + high)
+    rates = derivative(terms)
+    root: np.ndarray = 0.5 * (low + high)
     rises, which = value(terms, high) > value(terms, low), np.arange(len(root))
     for _ in range(MOST_STEPS):
         x = root[which]
@@ -143,7 +144,9 @@ def between(
     return np.asarray(a + share * (da + share * (bend + share * twist)))
 
 
-def _bends(a: np.ndarray, b: np.ndarray, da: np.ndarray, db: np.ndarray) -> tuple:
+def _bends(
+    a: np.ndarray, b: np.ndarray, da: np.ndarray, db: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     return 3.0 * (b - a) - 2.0 * da - db, 2.0 * (a - b) + da + db
 
 

@@ -122,7 +122,8 @@ class Outcome:
         reached.
         """
         if self.complete:
-            return self.samples.shape[1]
+            count: int = self.samples.shape[1]
+            return count
         return int(np.flatnonzero((self.sample_mode >= 0).any(axis=0)).max(initial=0)) + 1
 
     def of(self, first: int, last: int) -> Outcome:

@@ -83,7 +83,8 @@ class Boundaries:
 
     def _gap(self, work: np.ndarray, j: int) -> np.ndarray:
         g = self._module.SINGULAR_GUARD[j]
-        return np.maximum(self._side[g] * work[self._module.GAP_ROW + g], 0.0)
+        gap: np.ndarray = np.maximum(self._side[g] * work[self._module.GAP_ROW + g], 0.0)
+        return gap
 
     def _way(self, work: np.ndarray, j: int) -> np.ndarray:
         """Time in which the quadratic part of a gap changes by the gap itself."""
@@ -97,13 +98,15 @@ class Boundaries:
         """Contribution of the terms of a boundary to the rates of the states."""
         module = self._module
         first = module.CALM_ROW + j * module.NMOVED
-        return np.abs(
+        forces: np.ndarray = np.abs(
             work[1 : module.NMOVED * _terms(module) : _terms(module)]
             - work[first : first + module.NMOVED]
         )
+        return forces
 
     def _acts(self, work: np.ndarray, j: int) -> np.ndarray:
-        return np.any(~(self._forces(work, j) <= 0.0), axis=0)
+        acts: np.ndarray = np.any(~(self._forces(work, j) <= 0.0), axis=0)
+        return acts
 
     def _near(self, work: np.ndarray, j: int) -> np.ndarray:
         """Motions on the boundary of an acting term up to rounding, or so near that the term
@@ -119,7 +122,8 @@ class Boundaries:
             self._way(work, j) * self._forces(work, j) <= 0.25 * NEGLIGIBLE * size, axis=0
         )
         finite = np.all(np.isfinite(work[: module.NSTATES * count]), axis=0)
-        return (self._acts(work, j) & weak) | ~(nonzero & finite)
+        near: np.ndarray = (self._acts(work, j) & weak) | ~(nonzero & finite)
+        return near
 
     def _negligible(self, work: np.ndarray, h: np.ndarray, which: np.ndarray) -> np.ndarray:
         """Lengths over which the terms set aside change no state by more than NEGLIGIBLE, estimated

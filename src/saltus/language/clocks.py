@@ -139,7 +139,8 @@ def _cases(gap: Expr, whole: Expr, left: list[int]) -> Condition | bool:
     piece = next((node for node in ex.walk(gap) if node.op == "select"), None)
     if piece is None:
         if gap.op == "const" and gap.payload:
-            return gap.payload > 0
+            holds: bool = gap.payload > 0
+            return holds
         left[0] -= 1
         if left[0] < 0 or switch_of(gap) is None:
             raise TraceError(_unsolvable(whole))

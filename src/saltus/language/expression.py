@@ -36,8 +36,8 @@ OWN_FUNCTIONS = (
 )
 
 _MATH = {name: getattr(math, name) for name in ELEMENTARY}
-_INTERNED: weakref.WeakValueDictionary[tuple, Expr] = weakref.WeakValueDictionary()
-_JOINED: weakref.WeakValueDictionary[tuple, Condition] = weakref.WeakValueDictionary()
+_INTERNED: weakref.WeakValueDictionary[tuple[Any, ...], Expr] = weakref.WeakValueDictionary()
+_JOINED: weakref.WeakValueDictionary[tuple[Any, ...], Condition] = weakref.WeakValueDictionary()
 _LOCK = threading.RLock()  # two nodes for one state would make a derivative silently zero
 _OBSERVER: ContextVar[Callable[[Expr], None] | None] = ContextVar("observer", default=None)
 #: Most comparisons in one condition, as they would be written out (a chain in which each condition
@@ -148,7 +148,8 @@ class Expr:
 
     # -- what has no meaning here ------------------------------------------------------------------
     def __mod__(self, other: Operand) -> Expr:
-        return _ANSWERS["__mod__"](self, other)
+        remainder: Expr = _ANSWERS["__mod__"](self, other)
+        return remainder
 
     def __rmod__(self, other: Operand) -> Expr:
         raise TraceError(
@@ -230,12 +231,13 @@ class Expr:
         )
 
     def __repr__(self) -> str:
-        return _ANSWERS["__repr__"](self)
+        text: str = _ANSWERS["__repr__"](self)
+        return text
 
     def __copy__(self) -> Expr:
         return self
 
-    def __deepcopy__(self, memo: dict) -> Expr:
+    def __deepcopy__(self, memo: dict[int, Any]) -> Expr:
         return self
 
 

@@ -139,7 +139,10 @@ class Settling:
         takes none.
         """
         low, high = np.log1p([self.first, self.last])
-        return np.clip((np.log1p(np.maximum(periods, 0)) - low) / (high - low or 1.0), 0.0, 1.0)
+        share: np.ndarray = np.clip(
+            (np.log1p(np.maximum(periods, 0)) - low) / (high - low or 1.0), 0.0, 1.0
+        )
+        return share
 
     def level(self, ds: xr.Dataset) -> np.ndarray:
         """The shade of each cell, 0 to 64."""
@@ -184,7 +187,8 @@ def paint(
     row = {code: code + 4 for code in maps.UNSETTLED} | {key: 4 + i for i, key in enumerate(colors)}
     codes, where = np.unique(np.nan_to_num(np.asarray(basin), nan=-4), return_inverse=True)
     rows = np.array([row.get(int(code), 0) for code in codes])[where.reshape(np.shape(basin))]
-    return maps.as_bytes(table)[rows, _LEVELS // 2 if level is None else level]
+    painted: np.ndarray = maps.as_bytes(table)[rows, _LEVELS // 2 if level is None else level]
+    return painted
 
 
 # -- attractors ------------------------------------------------------------------------------------
@@ -194,7 +198,8 @@ def _stroboscopic(ds: xr.Dataset, pair: tuple[str, str], key: int) -> np.ndarray
     if any(f"attractor_{name}" not in one for name in pair):
         return np.empty((0, 2))
     both = np.stack([np.ravel(one[f"attractor_{name}"].values) for name in pair], axis=-1)
-    return both[np.isfinite(both).all(axis=-1)]
+    finite: np.ndarray = both[np.isfinite(both).all(axis=-1)]
+    return finite
 
 
 def _points(

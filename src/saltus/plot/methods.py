@@ -88,11 +88,12 @@ def _in_pieces(x: np.ndarray, bins: np.ndarray) -> list[np.ndarray]:
 
 
 def _middles(bins: np.ndarray) -> np.ndarray:
-    return (
+    middles: np.ndarray = (
         np.sqrt(bins[1:] * bins[:-1])
         if bins[0] > 0 and bins[-1] > 100 * bins[0]
         else 0.5 * (bins[1:] + bins[:-1])
     )
+    return middles
 
 
 def _over(bins: np.ndarray, values: Any) -> tuple[np.ndarray, np.ndarray]:

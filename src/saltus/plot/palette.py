@@ -62,9 +62,10 @@ def oklab(rgb: np.ndarray) -> np.ndarray:
 def srgb(lab: np.ndarray) -> np.ndarray:
     """OKLab, shape (..., 3), as sRGB in 0 to 1; what no screen can show is clipped."""
     linear = np.clip(_linear(lab), 0.0, 1.0)
-    return np.where(
+    encoded: np.ndarray = np.where(
         linear <= 0.0031308, 12.92 * linear, 1.055 * np.maximum(linear, 1e-9) ** (1 / 2.4) - 0.055
     )
+    return encoded
 
 
 def _lab(linear: np.ndarray) -> np.ndarray:

@@ -49,7 +49,7 @@ def chosen(run: xr.Dataset, trajectory: Any) -> list[int]:
                 f"trajectory. Leave trajectory out."
             )
         return []
-    known = run["trajectory"].values.tolist()
+    known: list[int] = run["trajectory"].values.tolist()
     if trajectory is None:
         labels = known
     else:

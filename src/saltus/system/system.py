@@ -105,7 +105,8 @@ class System(EquationsOfMotion):
         """The system that this one copies with other values, or itself; it holds all that depends
         on the equations alone.
         """
-        return vars(self).get("_origin", self)
+        origin: System = vars(self).get("_origin", self)
+        return origin
 
     def resolve(self, name: str, value: Any) -> Any:
         """A value for a parameter, in SI and checked; the system itself stays as it is.

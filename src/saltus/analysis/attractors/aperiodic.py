@@ -109,7 +109,8 @@ def _inside(points: np.ndarray, scale: np.ndarray, across: int, boxes: np.ndarra
     cells = np.floor(np.where(inside[:, :, None], points, 0.0) / scale * across)
     inside &= (np.abs(cells) < FARTHEST).all(axis=2)
     codes = _codes(np.where(inside[:, :, None], cells, 0).astype(np.int64))
-    return (inside & np.isin(codes, boxes)).mean(axis=1)
+    share: np.ndarray = (inside & np.isin(codes, boxes)).mean(axis=1)
+    return share
 
 
 def _codes(cells: np.ndarray) -> np.ndarray:

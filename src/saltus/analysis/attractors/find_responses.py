@@ -209,7 +209,7 @@ def _settled(
     orbits, apart, noise = recurring_orbits(map_.rows(who), points, result.scale[who], near, left)
     purse[who] = left
     beside = orbits.distance(points[:, -1], result.scale[who]) <= BESIDE * np.maximum(apart, noise)
-    done = orbits.stable & beside
+    done: np.ndarray = orbits.stable & beside
     result.orbits.put(who[done], orbits.rows(done))
     result.kind[who[done]], result.exponent_error[who[done]] = Kind.PERIODIC, 0.0
     with np.errstate(divide="ignore"):

@@ -58,21 +58,24 @@ class GridResponses:
     @property
     def kind(self) -> np.ndarray:
         """Kind of each response, int64[m]."""
-        return self.motions.kind[self.row]
+        kind: np.ndarray = self.motions.kind[self.row]
+        return kind
 
     @property
     def period(self) -> np.ndarray:
         """Points by which each is known: n of an nT, 1 of an equilibrium, 0 if it doesn't repeat,
         int64[m].
         """
-        return self.motions.orbits.period[self.row]
+        period: np.ndarray = self.motions.orbits.period[self.row]
+        return period
 
     @property
     def time(self) -> np.ndarray:
         """Period of each limit cycle [s], 0 of an equilibrium, NaN of what follows a forcing,
         float64[m].
         """
-        return self.motions.orbits.time[self.row]
+        time: np.ndarray = self.motions.orbits.time[self.row]
+        return time
 
     def points(self, response: int) -> np.ndarray:
         """Its stroboscopic points, float64[n, D]."""

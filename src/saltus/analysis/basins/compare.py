@@ -225,7 +225,8 @@ def _level_distances(a: xr.Dataset, b: xr.Dataset) -> np.ndarray:
         / _scales(a, b)[0]
         for ds in (a, b)
     ]
-    return np.abs(levels[0][:, None] - levels[1][None]).max(axis=2)
+    distances: np.ndarray = np.abs(levels[0][:, None] - levels[1][None]).max(axis=2)
+    return distances
 
 
 def _scales(a: xr.Dataset, b: xr.Dataset) -> np.ndarray:
@@ -254,7 +255,8 @@ def _shared_cells(a: xr.Dataset, b: xr.Dataset) -> np.ndarray:
     settled = (first >= 0) & (second >= 0)
     np.add.at(both, (first[settled], second[settled]), 1.0)
     either = _cells(first, size[0])[:, None] + _cells(second, size[1])[None, :] - both
-    return both / np.maximum(either, 1.0)
+    shares: np.ndarray = both / np.maximum(either, 1.0)
+    return shares
 
 
 def _cells(labels: np.ndarray, m: int) -> np.ndarray:

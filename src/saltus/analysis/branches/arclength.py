@@ -327,7 +327,7 @@ class _Fronts:
             curve = self.curves[going[j]]
             _add(curve, trial.z[j], tangent[j], trial.derivative[j], moved[j])
             curve.end = "range" if outside[j] else ""
-        taken = going[counts]
+        taken: np.ndarray = going[counts]
         self.before[:, taken] = self.z[taken], self.tangent[taken]
         self.z[taken], self.tangent[taken] = trial.z[counts], tangent[counts]
         self.side[taken] = side[counts]
@@ -346,7 +346,8 @@ class _Fronts:
         way = (self.z[going] - self.began[going]) / self.equations.scale[going]
         away = np.linalg.norm(way, axis=1)
         within = np.abs(self.tangent[going][:, list(self.bounds)]).max(axis=1, initial=TINY)
-        return self.longest * np.clip(away / FAR, 1.0, 1.0 / within)
+        longest: np.ndarray = self.longest * np.clip(away / FAR, 1.0, 1.0 / within)
+        return longest
 
     def halt(
         self,

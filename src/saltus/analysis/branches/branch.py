@@ -222,7 +222,8 @@ def _vertical(branch: Branch) -> np.ndarray:
     """
     still = np.abs(branch.tangent[:, -1]) < STILL
     beside = np.append(still[1:], False) | np.append(False, still[:-1])
-    return still & beside
+    vertical: np.ndarray = still & beside
+    return vertical
 
 
 def _in_order(branch: Branch, events: Sequence[SpecialPoint]) -> list[SpecialPoint]:

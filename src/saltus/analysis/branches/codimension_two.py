@@ -223,7 +223,8 @@ def _crosses(values: np.ndarray) -> np.ndarray:
     largest = size.max(axis=1, keepdims=True)
     largest[:2] = largest[:2].max()  # of one vector
     ends = np.maximum(size[:, 1:], size[:, :-1])
-    return (values[:, 1:] * values[:, :-1] < 0) & (ends > ROUNDING * largest)
+    crosses: np.ndarray = (values[:, 1:] * values[:, :-1] < 0) & (ends > ROUNDING * largest)
+    return crosses
 
 
 def _ahead(

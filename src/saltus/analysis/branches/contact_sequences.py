@@ -109,7 +109,8 @@ def _reported_before(
     apart = (phase - np.roll(phase, 1)) % n
     same = (guard == np.roll(guard, 1)) & (direction == np.roll(direction, 1))
     at_period = np.abs(phase - np.round(phase)) < ONE
-    return same & at_period & (np.minimum(apart, n - apart) < ONE)
+    reported: np.ndarray = same & at_period & (np.minimum(apart, n - apart) < ONE)
+    return reported
 
 
 def shift(one: ContactSequence, other: ContactSequence, n: int) -> int | None:

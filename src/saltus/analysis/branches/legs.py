@@ -117,7 +117,7 @@ class Legs:
 
     def spans(self, phase: np.ndarray) -> np.ndarray:
         """How long the leg behind each contact lasts, in periods."""
-        span = np.roll(phase, -1, axis=1) - phase
+        span: np.ndarray = np.roll(phase, -1, axis=1) - phase
         span[:, -1] += self.n
         return span
 

@@ -192,4 +192,5 @@ class Rests:
         complex128[r, D].
         """
         own = self.eigenvalues(z, rows) * self.period(z)[:, None]
-        return np.exp(np.minimum(own.real, STEEP) + 1j * own.imag)
+        multipliers: np.ndarray = np.exp(np.minimum(own.real, STEEP) + 1j * own.imag)
+        return multipliers

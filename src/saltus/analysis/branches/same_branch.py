@@ -97,7 +97,7 @@ def _apart(a: np.ndarray, b: np.ndarray, branch: Branch, exact: bool = False) ->
     orbits, row = branch.orbits, branch.row
     size = orbits.n * orbits.size
     if orbits.free:
-        periods = abs(a[size] - b[size]) / abs(b[size])
+        periods: float = abs(a[size] - b[size]) / abs(b[size])
         return max(periods, orbits.beside(b, a[: orbits.size], row) if exact else 0.0)
     others = orbits.alike(a[None], np.array([row]))[0]
     return float(np.abs((others - b)[:, :size] / branch.scale[:size]).max(axis=1).min())

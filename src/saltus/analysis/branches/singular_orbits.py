@@ -167,7 +167,8 @@ class SingularOrbits:
             np.einsum("ri,riz->rz", w, self.bend(z, rows, part)[:, : self.size])
             for part in ((v.real, v.imag) if self.torus else (v,))
         ]
-        return parts[0] + 1j * parts[1] if self.torus else parts[0]
+        slopes: np.ndarray = parts[0] + 1j * parts[1] if self.torus else parts[0]
+        return slopes
 
     def bend(self, z: np.ndarray, rows: np.ndarray, along: np.ndarray) -> np.ndarray:
         """The change of the orbits' derivative along float64[r, k] of the first unknowns, in units
@@ -182,7 +183,8 @@ class SingularOrbits:
         beside = np.concatenate([z + step, z - step])
         _, derivative = self.orbits.evaluate(beside, np.concatenate([rows, rows]))
         ahead, behind = np.split(derivative, 2)
-        return (ahead - behind) / (2 * share)[:, None, None]
+        bend: np.ndarray = (ahead - behind) / (2 * share)[:, None, None]
+        return bend
 
     def accepted(self, z: np.ndarray, rows: np.ndarray) -> None:
         """See :class:`saltus.analysis.branches.arclength.Equations`."""
@@ -205,4 +207,5 @@ def _real(vectors: np.ndarray) -> np.ndarray:
     if np.iscomplexobj(vectors):
         phase = np.angle((vectors * vectors).sum(axis=1)) / 2
         vectors = (vectors * np.exp(-1j * phase)[:, None]).real
-    return vectors / np.linalg.norm(vectors, axis=1)[:, None]
+    unit: np.ndarray = vectors / np.linalg.norm(vectors, axis=1)[:, None]
+    return unit

@@ -210,12 +210,14 @@ class _Smooth:
 
     def _numbers(self, entries: Sequence[Expr], state: np.ndarray, value: float) -> np.ndarray:
         names = [*self.system.states, self.parameter]
-        return self.at(entries, names, np.append(state, value)[None])[0]
+        numbers: np.ndarray = self.at(entries, names, np.append(state, value)[None])[0]
+        return numbers
 
     def _matrix(self, state: np.ndarray, value: float) -> np.ndarray:
         """The scaled Jacobian."""
         flat = self._numbers([one for row in self.slopes for one in row], state, value)
-        return flat.reshape(len(state), -1) * self.scale / self.scale[:, None]
+        scaled: np.ndarray = flat.reshape(len(state), -1) * self.scale / self.scale[:, None]
+        return scaled
 
     # -- first guesses -----------------------------------------------------------------------------
     def _spectrum(self) -> tuple[np.ndarray, np.ndarray] | None:

@@ -100,7 +100,8 @@ class Cycle:
         rate = self.rates[np.round(place).astype(int) % SAMPLES] * (self.time / SAMPLES)
         rate, offset = rate / self.scale, (states - self.at(place)) / self.scale
         size = np.einsum("mj,mj->m", rate, rate)
-        return np.einsum("mj,mj->m", rate, offset) / np.maximum(size, 1e-300)
+        further: np.ndarray = np.einsum("mj,mj->m", rate, offset) / np.maximum(size, 1e-300)
+        return further
 
     def at(self, place: np.ndarray) -> np.ndarray:
         """States at places float64[...] in samples, float64[..., D]: cubics between the samples."""
@@ -153,7 +154,8 @@ class CycleSet:
             number[row] = len(self.cycles)
             self.cycles.append(one)
             self.found.append(0)
-        return np.maximum(number, -1)
+        found: np.ndarray = np.maximum(number, -1)
+        return found
 
     def within(self, limits: tuple[float, float]) -> CycleSet:
         """Those with periods in a range [s], in an order that doesn't depend on discovery: by

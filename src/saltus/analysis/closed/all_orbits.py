@@ -243,7 +243,8 @@ def _beside(known: np.ndarray, random: np.random.Generator) -> np.ndarray:
     size = np.ptp(known, axis=(0, 1))
     around = np.repeat(known, len(BESIDE), axis=0)
     far = np.tile(BESIDE, len(known))[:, None, None] * random.standard_normal(around.shape)
-    return (around + far * size)[:: -(-len(around) // MOST_BESIDE)]
+    beside: np.ndarray = (around + far * size)[:: -(-len(around) // MOST_BESIDE)]
+    return beside
 
 
 def close(
@@ -327,7 +328,8 @@ def _equal(units: np.ndarray, marks: np.ndarray, one: np.ndarray, rows: np.ndarr
     """Those of some rows int64[m] whose orbits are this one, float64[n, D], at some phase."""
     size = 1.0 + np.abs(one).max()
     near = rows[np.abs(marks[rows] - _marks(one)).max(axis=1, initial=0.0) < 4 * SAME * size]
-    return near[[bool(phase_distances(one, units[i]).min() < SAME) for i in near]]
+    equal: np.ndarray = near[[bool(phase_distances(one, units[i]).min() < SAME) for i in near]]
+    return equal
 
 
 def _orbit(map_: Map, points: np.ndarray, scale: np.ndarray) -> Orbit | None:
@@ -353,7 +355,7 @@ def multipliers_of(matrices: np.ndarray) -> np.ndarray:
     product = np.eye(matrices.shape[1])
     for one in matrices:
         product = one @ product
-    values = leading_first(product[None])[0]
+    values: np.ndarray = leading_first(product[None])[0]
     if len(values) == 2 and values[0].imag == 0 and values[0] != 0:
         values[1] = np.prod(np.linalg.det(matrices)) / values[0]
     return values

@@ -163,9 +163,10 @@ def _verified(map_: Map, orbit: Orbit, scale: np.ndarray) -> tuple[np.ndarray, n
                 axis=2,
             )
             nearer = (back <= asked * radius[:, None] * np.linalg.norm(some, axis=1)).all(axis=1)
-        return nearer & [
+        contracting: np.ndarray = nearer & [
             _alike(met[i * len(some) : (i + 1) * len(some)], own[k]) for i, k in enumerate(which)
         ]
+        return contracting
 
     def passes(radius: np.ndarray, which: np.ndarray) -> np.ndarray:
         passed = contracts(radius, which, shell[few])
@@ -240,7 +241,8 @@ def _norm(matrix: np.ndarray, scale: np.ndarray) -> np.ndarray:
     try:
         q = _rate(float(np.abs(np.linalg.eigvals(scaled)).max()))
         gram = solve_discrete_lyapunov((scaled / q).T, np.eye(len(scale)))
-        return np.linalg.cholesky(0.5 * (gram + gram.T)).T / scale[None, :]
+        norm: np.ndarray = np.linalg.cholesky(0.5 * (gram + gram.T)).T / scale[None, :]
+        return norm
     except np.linalg.LinAlgError:  # next to a bifurcation: nothing to be verified
         return np.diag(1.0 / scale)
 
@@ -258,4 +260,5 @@ def sphere(size: int) -> np.ndarray:
     from scipy.stats import qmc  # 0.7 s that systems of one or two states don't need
 
     normal = qmc.MultivariateNormalQMC(np.zeros(size), seed=1).random(count)
-    return normal / np.linalg.norm(normal, axis=1)[:, None]
+    unit: np.ndarray = normal / np.linalg.norm(normal, axis=1)[:, None]
+    return unit

@@ -363,7 +363,7 @@ def first_point(map_: Stroboscope, x: np.ndarray, period: np.ndarray) -> np.ndar
         np.argmax(ranges > RESTS * np.abs(samples).max(axis=1), axis=1),
     )
     least = np.argmin(samples[rows, :, column], axis=1)
-    state = samples[rows, least]
+    state: np.ndarray = samples[rows, least]
     for _ in range(LOCATED):  # where its rate vanishes
         rate = field_of(map_.system, state, map_.values)
         slope = np.einsum(

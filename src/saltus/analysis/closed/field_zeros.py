@@ -65,7 +65,8 @@ class Equilibria:
     @property
     def stable(self) -> np.ndarray:
         """Which attract, bool[k]."""
-        return np.isfinite(self.reach).all(axis=(1, 2))
+        stable: np.ndarray = np.isfinite(self.reach).all(axis=(1, 2))
+        return stable
 
     @property
     def orbits(self) -> OrbitBatch:
@@ -79,10 +80,11 @@ class Equilibria:
     def holds(self, states: np.ndarray) -> np.ndarray:
         """Which of states float64[k, D] lie where their equilibrium captures, bool[k]."""
         with np.errstate(invalid="ignore"):
-            return (
+            inside: np.ndarray = (
                 np.linalg.norm(np.einsum("kij,kj->ki", self.reach, states - self.place), axis=1)
                 <= 1.0
             )
+            return inside
 
 
 def field_of(system: System, states: np.ndarray, values: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -116,7 +118,8 @@ def _modes(
     def vanishes(entry: Expr, gradient: Iterable[Expr]) -> np.ndarray:
         value, *slopes = at(entry, *gradient)
         size = sum(np.abs(slope * y) for slope, y in zip(slopes, states.T, strict=True))
-        return np.abs(value) <= HELD * size
+        zero: np.ndarray = np.abs(value) <= HELD * size
+        return zero
 
     for number, guard in enumerate(system.guards):
         if guard.law is None or guard.law.kind != "hold":
@@ -136,7 +139,7 @@ def _modes(
 
 
 def _evaluated(
-    system: System, entries: tuple, states: np.ndarray, values: Mapping[str, np.ndarray]
+    system: System, entries: tuple[Expr, ...], states: np.ndarray, values: Mapping[str, np.ndarray]
 ) -> np.ndarray:
     named = dict(zip(system.states, states.T, strict=True))
     bits = _modes(system, states, values)

@@ -78,12 +78,14 @@ class Measures:
     @property
     def peak(self) -> np.ndarray:
         """Largest magnitude, float64[m, K]."""
-        return np.maximum(np.abs(self.maximum), np.abs(self.minimum))
+        peak: np.ndarray = np.maximum(np.abs(self.maximum), np.abs(self.minimum))
+        return peak
 
     @property
     def rms(self) -> np.ndarray:
         """Root mean square about zero, float64[m, K]."""
-        return np.hypot(self.mean, self.deviation)
+        rms: np.ndarray = np.hypot(self.mean, self.deviation)
+        return rms
 
     def by_name(self) -> dict[str, np.ndarray]:
         """What is read off each motion, float64[m, K] by the names that results use."""

@@ -143,7 +143,8 @@ class OrbitBatch:
         the scale; inf where there is none.
         """
         apart = np.abs((self.points[rows] - state[:, None]) / scale[:, None]).max(axis=2)
-        return np.where(np.isnan(apart), np.inf, apart).min(axis=1)
+        nearest: np.ndarray = np.where(np.isnan(apart), np.inf, apart).min(axis=1)
+        return nearest
 
 
 def find_orbits(

@@ -86,9 +86,10 @@ class Divergence:
 
     def _constant(self, map_: Stroboscope) -> np.ndarray:
         """A trace of parameters only."""
-        return (
+        integral: np.ndarray = (
             np.broadcast_to(evaluate([self._trace], values=map_.values)[0], len(map_)) * map_.period
         )
+        return integral
 
     def _dwelling(self, map_: Stroboscope, outcome: Outcome) -> np.ndarray:
         """A trace that is constant in each mode: its values times the times in the modes."""
@@ -101,9 +102,10 @@ class Divergence:
         )
         last = np.zeros(len(map_))
         last[row] = times  # sorted by time: the last one stays
-        return total + (map_.period - last) * self._in_mode(
+        integral: np.ndarray = total + (map_.period - last) * self._in_mode(
             map_, np.arange(len(map_)), outcome.mode
         )
+        return integral
 
     def _in_mode(self, map_: Stroboscope, row: np.ndarray, mode: np.ndarray) -> np.ndarray:
         values = {name: column[row] for name, column in map_.values.items()}

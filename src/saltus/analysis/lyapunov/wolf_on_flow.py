@@ -102,7 +102,8 @@ class NeighbourExponents(Algorithm):
         }
 
     def _each(self, name: str, factor: np.ndarray) -> np.ndarray:
-        return np.array([getattr(one, name) for one in self._found]) * factor
+        values: np.ndarray = np.array([getattr(one, name) for one in self._found]) * factor
+        return values
 
     def settings(self) -> dict[str, Any]:
         """What was asked for, as attributes."""

@@ -80,7 +80,8 @@ def response_noise(system: System, method: Method, exact: xr.Dataset) -> np.ndar
     """
     peaks = exact["response_peak"].values[:, None]
     noise = Stroboscope(system, method).noise_of(peaks)
-    return np.append(noise, 0.0)[exact["response_of"].values.clip(-1)]
+    of_starts: np.ndarray = np.append(noise, 0.0)[exact["response_of"].values.clip(-1)]
+    return of_starts
 
 
 def cell_agreement(

@@ -230,4 +230,5 @@ def _imbalance(parts: Mapping[str, np.ndarray]) -> np.ndarray:
     """
     largest = {name: np.abs(part).max(axis=1, initial=0.0) for name, part in parts.items()}
     scale = np.max([size for name, size in largest.items() if name != "residual"], axis=0)
-    return largest["residual"] / np.where(scale > 0, scale, 1.0)
+    imbalance: np.ndarray = largest["residual"] / np.where(scale > 0, scale, 1.0)
+    return imbalance

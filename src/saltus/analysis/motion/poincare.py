@@ -259,7 +259,8 @@ def _phases(seen: Stretch, elapsed: np.ndarray, rows: np.ndarray) -> np.ndarray:
     if seen.system.forced_at is None:
         return np.full(len(rows), np.nan)
     period = seen.length.period[rows]
-    return (elapsed / period + (seen.length.t_start / period) % 1.0) % 1.0
+    phases: np.ndarray = (elapsed / period + (seen.length.t_start / period) % 1.0) % 1.0
+    return phases
 
 
 def _transient(seen: Stretch) -> float:

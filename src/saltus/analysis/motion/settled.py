@@ -165,7 +165,8 @@ def _scales(
         largest = own[:, alike].max(axis=1, keepdims=True) * (1.0 if between else LEAST_SHARE)
         rounding = np.fmax.reduce(size[:, alike], axis=1)[:, None] * (ROUNDING / tolerance)
         own[:, alike] = np.maximum(np.maximum(own[:, alike], largest), rounding)
-    return np.maximum(own, AT_REST)
+    scales: np.ndarray = np.maximum(own, AT_REST)
+    return scales
 
 
 def _smallest_repeats(

@@ -21,7 +21,7 @@ from saltus.results.dataset.reader import reader
 
 #: Windows by name: weights of n samples. Both are periodic (the sample after the last would be the
 #: first).
-WINDOWS = {
+WINDOWS: dict[str, Callable[[int], np.ndarray]] = {
     "none": lambda n: np.ones(n),
     "hann": lambda n: 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(n) / n),
 }
@@ -275,4 +275,5 @@ def _lines(run: xr.Dataset, name: str, stretch: _Stretch, weights: np.ndarray) -
     if stretch.count % 2 == 0:
         lines[:, -1] /= 2.0
     lines[:, 0] = mean[:, 0]
-    return lines * np.exp(-2j * np.pi * stretch.frequency * stretch.begin[:, None])
+    referred: np.ndarray = lines * np.exp(-2j * np.pi * stretch.frequency * stretch.begin[:, None])
+    return referred

@@ -39,7 +39,8 @@ _EVENT = [st.REC_GUARD, st.REC_DIRECTION]
 
 def local(outcome: Outcome) -> np.ndarray:
     """What one step's own error means for the time of its contact [s]."""
-    return outcome.contacts.time_error
+    errors: np.ndarray = outcome.contacts.time_error
+    return errors
 
 
 def measured(

@@ -51,12 +51,13 @@ class Stretch:
     @property
     def duration(self) -> np.ndarray:
         """Time that is looked at, float64[n] [s]."""
-        return (
+        duration: np.ndarray = (
             self.length.t_start
             + self.length.count * self.length.period
             + self.length.phase
             - self.begin
         )
+        return duration
 
     @property
     def forcing_period(self) -> float | np.ndarray | None:

@@ -50,7 +50,8 @@ def columns_of(series: Any, embed: bool | None) -> np.ndarray:
             f"column {int((wide > 0).argmin())} of the series is constant. There "
             f"is no motion to measure: leave it out."
         )
-    return array / wide
+    scaled: np.ndarray = array / wide
+    return scaled
 
 
 def interval_of(given: Any, count: int) -> float:

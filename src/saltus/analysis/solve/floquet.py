@@ -41,7 +41,8 @@ def nontrivial(segments: np.ndarray, flows: np.ndarray) -> np.ndarray:
         return np.zeros(1, complex)
     ahead = np.roll(flows, -1, axis=0)
     parts = [across(*one) for one in zip(segments, flows, ahead, strict=True)]
-    return multipliers(np.array(parts)[None])[0]
+    found: np.ndarray = multipliers(np.array(parts)[None])[0]
+    return found
 
 
 def multipliers(segments: np.ndarray) -> np.ndarray:

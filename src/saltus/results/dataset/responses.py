@@ -169,4 +169,6 @@ def response_values(
 
 def _per_period(table: AttractorTable) -> np.ndarray:
     """Contacts in a forcing period; in a cycle, where nothing forces it."""
-    return np.asarray(table.contacts, dtype=float) / np.maximum(np.asarray(table.period), 1)
+    contacts = np.asarray(table.contacts, dtype=float)
+    rates: np.ndarray = contacts / np.maximum(np.asarray(table.period), 1)
+    return rates

@@ -117,7 +117,8 @@ def columns(data: bytes, path: Path) -> np.ndarray:
     found = [
         [_number(path, line, row, i, str(i + 1), "", "") for i in (0, 1)] for line, row in rows
     ]
-    return np.array(found, float).reshape(-1, 2).T * np.array(factors)[:, None]
+    values: np.ndarray = np.array(found, float).reshape(-1, 2).T * np.array(factors)[:, None]
+    return values
 
 
 def _is_number(text: str) -> bool:

@@ -105,9 +105,8 @@ class Chunks:
     def size(self, index: int) -> int:
         """Bytes of the file of a chunk."""
         extent = self.extent(index)
-        return (extent.stop - extent.start) * sum(
-            dtype.itemsize for dtype in self.arrays.values()
-        ) + TRAILER
+        cells: int = extent.stop - extent.start
+        return cells * sum(dtype.itemsize for dtype in self.arrays.values()) + TRAILER
 
     def encode(self, index: int, values: Mapping[str, np.ndarray], store: str) -> bytes:
         """The file of a chunk.

@@ -107,7 +107,9 @@ def _above_rounding(amplitude: xr.DataArray) -> xr.DataArray:
     """
     along = str(amplitude.dims[-1])
     stages = np.log2(2 * amplitude.sizes[along])
-    return amplitude > 2 * np.finfo(float).eps * stages * np.sqrt((amplitude**2).sum(along))
+    rounding = 2 * np.finfo(float).eps * stages * np.sqrt((amplitude**2).sum(along))
+    above: xr.DataArray = amplitude > rounding
+    return above
 
 
 def impact_table(title: str, ds: xr.Dataset) -> TextTable:
