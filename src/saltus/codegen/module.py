@@ -79,10 +79,7 @@ def taylor_module(system: System, order: int, lanes: int) -> Flow:
     title = f"{system.name}, Taylor order {order}, {lanes} lanes"
     with working(lambda: f"compiling {_sized(system)}"):
         head = _printed(system, lambda: taylor_head(system, order, lanes))
-        flow: Flow = _flow(
-            TAYLOR, f"taylor_{lanes}", head, title, f"{_described(system)} for Taylor"
-        )
-        return flow
+        return _flow(TAYLOR, f"taylor_{lanes}", head, title, f"{_described(system)} for Taylor")
 
 
 #: Name of each other method: templates, their bitcode, and the numbers that they are given.
@@ -102,8 +99,7 @@ def steps_module(system: System, method: str) -> Flow:
     jacobian, title = "jacobian" in interface.functions, f"{system.name}, {method}"
     with working(lambda: f"compiling {_sized(system)}"):
         head = _printed(system, lambda: rates_head(system, numbers, jacobian))
-        flow: Flow = _flow(interface, template, head, title, f"{_described(system)} for {method}")
-        return flow
+        return _flow(interface, template, head, title, f"{_described(system)} for {method}")
 
 
 def _printed(system: System, head: Callable[[], Head]) -> Head:
@@ -143,7 +139,7 @@ def _sized(system: System) -> str:
     return f"{_described(system)} ({len(system.guards)} boundaries, {operations} operations)"
 
 
-def _flow(interface: Interface, template: str, head: Head, title: str, what: str) -> Any:
+def _flow(interface: Interface, template: str, head: Head, title: str, what: str) -> Flow:
     return (
         _interpreted(interface, head)
         if jit_disabled()
