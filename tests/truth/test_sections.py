@@ -235,10 +235,10 @@ def test_ode45_locates_a_surface_and_refuses_to_step_over_it():
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"surface": "levle"}, "no guard 'levle'"),
+        ({"surface": "levle"}, "no boundary 'levle'"),
         ({"surface": ("x", 0.3, 1)}, "a pair of a state and a value"),
         ({"surface": ("y", 0.3)}, "no state 'y'"),
-        ({"surface": 3.0}, "no guard 3.0"),
+        ({"surface": 3.0}, "no boundary 3.0"),
         ({"direction": 2}, "direction must be 0, 1 or -1"),
         ({"transient": -1}, "transient must be a whole number of at least 0"),
         ({"transient": 3, "periods": None, "t_end": 250.0}, "outlast the run"),

@@ -143,7 +143,7 @@ def check_gaps(guards: Sequence[Guard]) -> None:
                 and boundaries.lifted(node) is not node
             ):
                 raise TraceError(
-                    f"the guard {guard.name!r} asks for the sign of a law that has no Taylor "
+                    f"the boundary {guard.name!r} asks for the sign of a law that has no Taylor "
                     f"series where its own piece begins. Write it "
                     f"as one piece with all of its conditions: for a contact without tension, d = "
                     f"x - gap and "

@@ -30,11 +30,11 @@ MODE_SAMPLES = 32
 #: End of the message for a system without forcing.
 NO_PERIOD = (
     "has no forcing period: give every=, the time between two samples of the motion, such as "
-    'every="0.1 s", about a turn of it. '
+    'every="0.1 s", about one rotation. '
     "Answers don't depend on it."
 )
 #: End of the message where a time is given for a forced one.
-FORCED = "is forced: it is looked at once a forcing period. Leave every= out."
+FORCED = "is forced: it is sampled once a forcing period. Leave every= out."
 #: The noise of a method is relative to a box of starts; a motion is some ten times smaller.
 #: Measured for ode45 at (1e-4, 1e-7) on the rig's responses: its returns scatter by 0.05 to 2 % of
 #: their range with location, by 0.3 to 4 % without.

@@ -40,7 +40,9 @@ def with_guard_names(system: System, names: Mapping[str, Quantity]) -> System:
     new: dict[int, str] = {}
     for name, function in names.items():
         if (why := why_no_title(name)) is not None:
-            raise TraceError(f"{system.name}: {shown(name)} can't be the name of a guard: {why}.")
+            raise TraceError(
+                f"{system.name}: {shown(name)} can't be the name of a boundary: {why}."
+            )
         number = _meant(system, name, function)
         if number in new:
             raise TraceError(
@@ -53,7 +55,7 @@ def with_guard_names(system: System, names: Mapping[str, Quantity]) -> System:
     for number, guard in enumerate(guards):
         if guard.name in taken:
             what = (
-                "another guard"
+                "another boundary"
                 if guard.name in [other.name for other in guards[:number]]
                 else ("a state or of its turning points")
             )
@@ -66,7 +68,7 @@ def with_guard_names(system: System, names: Mapping[str, Quantity]) -> System:
 
 def _meant(system: System, name: str, function: Quantity) -> int:
     """Number of the guard that a comparison means."""
-    what = f"the guard {shown(name)}"
+    what = f"the boundary {shown(name)}"
     condition = called(system, function, what)
     if not isinstance(condition, Relation):
         given = "several joined" if isinstance(condition, Condition) else shown(condition)

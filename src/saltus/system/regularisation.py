@@ -181,7 +181,7 @@ def _names(system: System, width: Any) -> dict[int, Any]:
     for name in width:
         if not among(name, known):
             raise ParameterError(
-                f"{system.name} has no guard {shown(name)}. {nearest(name, known)}"
+                f"{system.name} has no boundary {shown(name)}. {nearest(name, known)}"
             )
     if not width:
         raise ParameterError("width={} names no boundary: there is nothing to regularise.")

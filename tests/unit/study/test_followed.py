@@ -314,7 +314,7 @@ def test_the_values_of_the_system_are_part_of_every_answer(question, tmp_path):
         (SPECTRUM + "last = 25\n", r"\[spectrum\] last = 25 are more forcing periods than are "
                                    r"looked at, periods = 24"),
         (IMPACTS + "contact_side = { uper_gap = 1 }\n", r"\[impacts\.contact_side\] 'uper_gap' is "
-                                                        r"no guard.*Did you mean 'upper_gap'"),
+                                                        r"no boundary.*Did you mean 'upper_gap'"),
         (IMPACTS + "contact_side = { upper_gap = 2 }\n", r"contact_side\.upper_gap|upper_gap = 2 "
                                                          r"must be"),
         (IMPACTS + "bins = 0\n", r"bins = 0 must be greater than or equal to 1"),
@@ -359,7 +359,7 @@ def test_systems_of_ones_own(tmp_path):
         r"formula, 0 if there is none\.$",
     ):
         asked('[energy]\nt_end = "2 s"\n')
-    with pytest.raises(StudyError, match=r"\[impacts\] free has no guard"):
+    with pytest.raises(StudyError, match=r"\[impacts\] free has no boundary"):
         asked('[impacts]\nt_end = "2 s"\n')
     with pytest.raises(StudyError, match=r'\[spectrum\] free is not forced\. Write t_end = "20 s"'):
         asked("[spectrum]\nperiods = 20\n")

@@ -284,7 +284,7 @@ t_end = "1 s"
             'supplied = "..."'),
         (RIG + ENERGY.replace("pull*v", "pull*"), "[energy] the formula 'pull*' can't be read"),
         (RIG + ENERGY.replace("pull*v", "pull*w"), "asks for 'w'"),
-        (RIG + IMPACTS.replace("gap =", "gab ="), "[impacts.force] 'gab' is no guard of written "
+        (RIG + IMPACTS.replace("gap =", "gab ="), "[impacts.force] 'gab' is no boundary of written "
                                                   "out. Did you mean 'gap'?"),
         (RIG + SECTION.replace("v - 0.01", "__import__('os').system('ls')"), "has no meaning in a "
             "formula"),

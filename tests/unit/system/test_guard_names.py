@@ -64,7 +64,7 @@ def test_a_guard_inside_a_gap_is_named_too():
         ({"stop": "x2 > wall"}, "must be a function"),
         ({"x2": lambda x2, wall: x2 > wall}, "name of a state"),
         ({"x1 turns": lambda x2, wall: x2 > wall}, "turning points"),
-        ({"x2 - x1 = gap": lambda x2, wall: x2 > wall}, "another guard"),
+        ({"x2 - x1 = gap": lambda x2, wall: x2 > wall}, "another boundary"),
         ({"a": lambda x2, wall: x2 > wall, "b": lambda x2, wall: wall > x2}, "both 'a' and 'b'"),
         ({"\x1b[2J": lambda x2, wall: x2 > wall}, "without control characters"),
     ],

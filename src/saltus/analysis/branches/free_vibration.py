@@ -151,7 +151,7 @@ def place_of_rest(system: System) -> np.ndarray:
     )
     if not found[0]:
         raise ParameterError(
-            f"no place of rest of {system.name} was found from zero: a backbone begins with small "
+            f"no equilibrium of {system.name} was found from zero: a backbone begins with small "
             "vibrations about one."
         )
     return np.asarray(state[0])

@@ -100,7 +100,7 @@ def impact_statistics(
     Raises
     ------
     ParameterError, UnitError
-        If an argument can't be used, the system has no guard, or the method doesn't locate
+        If an argument can't be used, the system has no boundary, or the method doesn't locate
         contacts.
     TraceError
         If a force can't be traced.
@@ -129,7 +129,7 @@ def impact_statistics(
             f'or sl.ODE45(..., events="locate").'
         )
     if not system.guards:
-        raise ParameterError(f"{system.name} has no guard, so there is no contact to count.")
+        raise ParameterError(f"{system.name} has no boundary, so there is no contact to count.")
     forces = _by_guard(system, force or {}, "force")
     sides = contact_sides(system, _by_guard(system, contact_side or {}, "contact_side"))
     stops = [
@@ -168,7 +168,7 @@ def _by_guard(system: System, given: Mapping[str, Any], argument: str) -> dict[i
     for name in given:
         if name not in names:
             raise ParameterError(
-                f"{argument}= names {shown(name)}, which is no guard of "
+                f"{argument}= names {shown(name)}, which is no boundary of "
                 f"{system.name}. {nearest(name, names)}"
             )
     return {names.index(name): value for name, value in given.items()}

@@ -183,7 +183,7 @@ def crossed(system: System, surface: Any, values: Mapping[str, Any]) -> Crossed:
             surface,
         )
     raise ParameterError(
-        f"{system.name} has no guard {shown(surface)}. {nearest(surface, (*names, *turns))} Or "
+        f"{system.name} has no boundary {shown(surface)}. {nearest(surface, (*names, *turns))} Or "
         f"give a function, or a level such as "
         f'("{system.states[0]}", 0.0).'
     )

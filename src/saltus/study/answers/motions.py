@@ -173,13 +173,14 @@ class Statistics(OfMotions):
         names = [guard.name for guard in self.system.guards]
         if not names:
             raise StudyError(
-                f"[{self.place}] {self.system.name} has no guard, so there is no contact to count."
+                f"[{self.place}] {self.system.name} has no boundary, so there is no contact to "
+                "count."
             )
         for key in ("contact_side", "force"):
             for name in getattr(table, key):
                 if name not in names:
                     raise StudyError(
-                        f"[{self.place}.{key}] {name!r} is no guard of "
+                        f"[{self.place}.{key}] {name!r} is no boundary of "
                         f"{self.system.name}. {nearest(name, names)}"
                     )
         force = {

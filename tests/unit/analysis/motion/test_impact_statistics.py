@@ -77,7 +77,7 @@ def test_a_system_without_guards_is_refused():
     def free(t, x, v):
         return v, -x
 
-    with pytest.raises(ParameterError, match="has no guard"):
+    with pytest.raises(ParameterError, match="has no boundary"):
         sl.impact_statistics(free, (0.0, 0.0), t_end=1.0)
 
 
