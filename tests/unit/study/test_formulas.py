@@ -262,8 +262,8 @@ t_end = "1 s"
         (RIG.replace("[system.tables.stop]", "[system.tables.sin]") + SIMULATE, "'sin' can't be "
             "the name of a term or a table"),
         (RIG + '[system.guards]\nstop = "x > 2*gap"\n' + SIMULATE, "[system] written out: the "
-            "guard 'stop' means no boundary"),
-        (RIG + '[system.guards]\nstop = "x - gap"\n' + SIMULATE, "the guard 'stop' must be one "
+            "boundary 'stop' means no boundary"),
+        (RIG + '[system.guards]\nstop = "x - gap"\n' + SIMULATE, "the boundary 'stop' must be one "
             "comparison, such as x > gap"),
         ('[study]\nname="b"\n[system]\nmodel="delangre"\nguards.a="x '
          '> 0"\n' + SIMULATE, "guards: this "
