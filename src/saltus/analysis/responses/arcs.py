@@ -171,9 +171,11 @@ def _follow_orbits(
             grid.system, orbits.points[some], orbits.period[some], orbits.time[some],
             values[found.place[some]],
         )  # fmt: skip
-        some_progress = None if plan.stable else progress
-        trace(plan, scaled(grid.system, name, list(seeds), method), arcs.branches, some_progress)
-        _number(found, orbits, grid, plan, np.append(some, left), arcs, known)
+        beginnings = scaled(grid.system, name, list(seeds), method)
+        try:
+            trace(plan, beginnings, arcs.branches, None if plan.stable else progress)
+        finally:  # also of what is known when it is interrupted
+            _number(found, orbits, grid, plan, np.append(some, left), arcs, known)
         left, known = left[arcs.of[left] < 0], len(arcs.branches)
         if progress is not None:
             progress(1.0 - len(left) / number)

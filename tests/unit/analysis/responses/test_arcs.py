@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import saltus as sl
+from saltus.analysis.branches.tracing import trace
+from saltus.analysis.responses import arcs
 from saltus.errors import ParameterError
 
 RIG = sl.models.delangre("b", force="4 N")
@@ -39,7 +41,8 @@ def test_every_response_that_repeats_lies_on_a_branch_that_passes_its_value(diag
             assert diagram.branch_periods.values[branch] == period
 
 
-def test_a_branch_ends_with_the_orbit_at_which_stability_is_lost(diagram):
+def ends_checked(diagram):
+    """How many branches end with the event at which stability is lost, each asserted."""
     points, found = diagram.point_frequency.values, 0
     for branch in range(diagram.sizes["branch"]):
         mine = np.flatnonzero(diagram.point_branch.values == branch)
@@ -50,7 +53,11 @@ def test_a_branch_ends_with_the_orbit_at_which_stability_is_lost(diagram):
                 found += 1
         own = diagram.point_multiplier_real.values + 1j * diagram.point_multiplier_imag.values
         assert np.nanmax(np.abs(own[mine])) < 1.0 + 1e-9
-    assert found > 4
+    return found
+
+
+def test_a_branch_ends_with_the_orbit_at_which_stability_is_lost(diagram):
+    assert ends_checked(diagram) > 4
 
 
 def test_multipliers_at_events_are_those_that_define_them(diagram):
@@ -111,6 +118,20 @@ def test_ctrl_c_hands_out_the_branches_that_are_done():
     assert (part.type.values != "not_computed").all()
     assert part.sizes["branch"] > 0
     assert part.sizes["event"] > 0
+
+
+def test_ctrl_c_while_branches_are_followed_leaves_those_that_are_done_whole(monkeypatch):
+    def stopped(plan, seeds, branches, progress=None):
+        trace(plan, seeds[:3], branches)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(arcs, "trace", stopped)
+    with pytest.raises(sl.Interrupted) as stop:
+        sl.frequency_response(RIG, (*BAND, 9), "random 10", box=BOX, progress=False)
+    part = stop.value.partial
+    assert part.sizes["branch"] > 0
+    ends_checked(part)
+    assert (part.response_branch.values < part.sizes["branch"]).any()
 
 
 def test_responses_of_an_inexact_method_are_on_the_branches_of_the_exact_orbits(diagram):
