@@ -1,0 +1,97 @@
+"""The public names, and where each is at home. `__init__.py` reads them from here."""
+
+from saltus import models as models
+from saltus import plot as plot
+from saltus.analysis.attractors.attractors import attractors as attractors
+from saltus.analysis.attractors.edge_orbit import edge_orbit as edge_orbit
+from saltus.analysis.basins.basin_fractions import basin_fractions as basin_fractions
+from saltus.analysis.basins.basins import basins as basins
+from saltus.analysis.basins.compare import compare as compare
+from saltus.analysis.branches.backbone import backbone as backbone
+from saltus.analysis.branches.bifurcation_curve import bifurcation_curve as bifurcation_curve
+from saltus.analysis.branches.branches import branches as branches
+from saltus.analysis.closed.equilibria import equilibria as equilibria
+from saltus.analysis.closed.periodic_orbits import periodic_orbits as periodic_orbits
+from saltus.analysis.lyapunov.lyapunov import lyapunov as lyapunov
+from saltus.analysis.methods.compare_methods import compare_methods as compare_methods
+from saltus.analysis.methods.regularisation_widths import (
+    regularisation_widths as regularisation_widths,
+)
+from saltus.analysis.motion.energy_balance import energy_balance as energy_balance
+from saltus.analysis.motion.impact_statistics import impact_statistics as impact_statistics
+from saltus.analysis.motion.poincare import poincare as poincare
+from saltus.analysis.motion.settled import settled as settled
+from saltus.analysis.motion.simulate import simulate as simulate
+from saltus.analysis.motion.spectrum import spectrum as spectrum
+from saltus.analysis.motion.stroboscope import stroboscope as stroboscope
+from saltus.analysis.motion.structure_modes import structure_modes as structure_modes
+from saltus.analysis.motion.transmissibility import transmissibility as transmissibility
+from saltus.analysis.recorded.wolf import wolf as wolf
+from saltus.analysis.responses.bifurcation_diagram import bifurcation_diagram as bifurcation_diagram
+from saltus.analysis.responses.frequency_response import frequency_response as frequency_response
+from saltus.contact import clearance as clearance
+from saltus.contact import flores as flores
+from saltus.contact import freeplay as freeplay
+from saltus.contact import friction as friction
+from saltus.contact import hertz as hertz
+from saltus.contact import hunt_crossley as hunt_crossley
+from saltus.contact import impact as impact
+from saltus.contact import iwan as iwan
+from saltus.contact import jump as jump
+from saltus.contact import lankarani_nikravesh as lankarani_nikravesh
+from saltus.contact import play as play
+from saltus.contact import slider as slider
+from saltus.errors import SaltusError as SaltusError
+from saltus.flow import ODE23 as ODE23
+from saltus.flow import ODE45 as ODE45
+from saltus.flow import ODE113 as ODE113
+from saltus.flow import RK4 as RK4
+from saltus.flow import Interrupted as Interrupted
+from saltus.flow import ODE15s as ODE15s
+from saltus.flow import Taylor as Taylor
+from saltus.interrupt import Stop as Stop
+from saltus.language import abs as abs
+from saltus.language import acos as acos
+from saltus.language import asin as asin
+from saltus.language import atan as atan
+from saltus.language import atan2 as atan2
+from saltus.language import clip as clip
+from saltus.language import cos as cos
+from saltus.language import cosh as cosh
+from saltus.language import exp as exp
+from saltus.language import heaviside as heaviside
+from saltus.language import hypot as hypot
+from saltus.language import log as log
+from saltus.language import max as max
+from saltus.language import min as min
+from saltus.language import mod as mod
+from saltus.language import pi as pi
+from saltus.language import piecewise as piecewise
+from saltus.language import pulse as pulse
+from saltus.language import recorded as recorded
+from saltus.language import sawtooth as sawtooth
+from saltus.language import sign as sign
+from saltus.language import sin as sin
+from saltus.language import sinh as sinh
+from saltus.language import sqrt as sqrt
+from saltus.language import square as square
+from saltus.language import table as table
+from saltus.language import tan as tan
+from saltus.language import tanh as tanh
+from saltus.language import where as where
+from saltus.results import contacts as contacts
+from saltus.results import load as load
+from saltus.results import samples as samples
+from saltus.results import save as save
+from saltus.results import to_csv as to_csv
+from saltus.results import to_mat as to_mat
+from saltus.results.describe import describe as describe
+from saltus.system import Contact as Contact
+from saltus.system import Force as Force
+from saltus.system import System as System
+from saltus.system import regularise as regularise
+from saltus.system import structure as structure
+from saltus.system import system as system
+
+__version__: str
+_HOMES: dict[str, str]
