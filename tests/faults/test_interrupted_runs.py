@@ -315,7 +315,7 @@ def test_an_import_does_not_swallow_ctrl_c(tmp_path, monkeypatch, in_a_module):
     monkeypatch.setitem(sl._HOMES, "function", "swallowing")
     monkeypatch.delitem(sys.modules, "swallowing", raising=False)
     if in_a_module:
-        monkeypatch.setattr(sl, "_MODULES", ("swallowing",))
+        monkeypatch.setitem(sl._HOMES, "swallowing", "saltus")
         monkeypatch.setattr(sl.importlib, "import_module", lambda _: __import__("swallowing"))
     with pytest.raises(KeyboardInterrupt):
         _ = sl.swallowing if in_a_module else sl.function
