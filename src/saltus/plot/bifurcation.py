@@ -12,7 +12,7 @@ from saltus.errors import ParameterError, nearest, shown
 from saltus.plot import axes as draw
 from saltus.plot import motion_colors, regions
 from saltus.plot import response_points as points
-from saltus.plot.branches import draw_branches, draw_marks
+from saltus.plot.branches import draw_branches, draw_marks, within_view
 from saltus.plot.picture import caller, picture
 from saltus.plot.style import QUIET, Scale
 from saltus.results.dataset.schema import point_name, response_name, sample_name, states_of
@@ -155,7 +155,8 @@ def _continued(
     else:
         curves = list(ds[point_name(state)].values.T)
     named: dict[str, Any] = {}
-    for values in curves:
+    drawn = ds[_variable(one, state)].values
+    for values in (within_view(ds, one, drawn) for one in curves):
         named |= draw_branches(ax, ds, values, across, up)
         if events and ds.attrs.get("unstable"):
             draw_marks(ax, ds, values, across, up)

@@ -114,6 +114,17 @@ def _values(ds: xr.Dataset, quantity: str, output: str | None) -> tuple[np.ndarr
     return chosen[f"point_output_{quantity}"].values, unit, name
 
 
+def within_view(ds: xr.Dataset, values: np.ndarray, drawn: np.ndarray) -> np.ndarray:
+    """Heights float64[point] of branches, NaN far above and below all responses, drawn at
+    float64[..], where a branch was stopped after so many points: it may grow without bound.
+    """
+    ends = np.stack([ds["branch_begin"].values, ds["branch_end"].values])
+    stopped = np.isin(ds["point_branch"].values, np.flatnonzero((ends == "points").any(axis=0)))
+    seen = np.concatenate([np.ravel(drawn), values[~stopped]])
+    largest = float(np.nanmax(np.abs(seen), initial=0.0))
+    return np.where(stopped & (np.abs(values) > 1.2 * largest), np.nan, values)
+
+
 def draw_branches(
     ax: Axes, ds: xr.Dataset, values: np.ndarray, across: Scale, up: Scale
 ) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from saltus.errors import ParameterError, UnitError, among, nearest, shown
 from saltus.plot import axes as draw
 from saltus.plot import motion_colors
 from saltus.plot import response_points as points
-from saltus.plot.branches import draw_branches, draw_marks
+from saltus.plot.branches import draw_branches, draw_marks, within_view
 from saltus.plot.picture import picture
 from saltus.plot.style import OKABE_ITO, Scale
 from saltus.results.dataset.schema import states_of
@@ -227,6 +227,7 @@ def _continued(
     name = states_of(one.ds)[0] if output is None else output
     values = one.ds[f"point_output_{quantity}"].sel(output=name).values
     values = np.rad2deg(values) if quantity == "phase" else values
+    values = within_view(one.ds, values, one.ds["drawn"].values)
     named = draw_branches(ax, one.ds, values, across, up)
     if events and one.ds.attrs.get("unstable"):
         draw_marks(ax, one.ds, values, across, up)

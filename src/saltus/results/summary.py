@@ -197,13 +197,18 @@ def _responses(ds: xr.Dataset) -> list[str]:
     if ds.sizes.get("event"):
         lines.append(f"events   {_tally(ds['event_kind'].values.tolist())}")
     if text := ds.attrs.get("branches_refused"):
-        lines.append(f"branches by where responses lie, for {text}")
+        lines.append(f"unsure   branches are matched by where responses lie: {text}")
     if "branch_end" in ds:
         ends = np.concatenate([ds["branch_begin"].values, ds["branch_end"].values])
-        if lost := int(np.isin(ends, ("lost", "points")).sum()):
+        if lost := int((ends == "lost").sum()):
             lines.append(
                 f"unsure   {counted(lost, 'end')} of branches where no more orbits were found: "
                 "a narrower range gives shorter steps"
+            )
+        if stopped := int((ends == "points").sum()):
+            lines.append(
+                f"stopped  {counted(stopped, 'end')} of branches that go on, after 1000 points: "
+                "their orbits may grow without bound"
             )
     left = int((ds["response_type"].values == Kind.NOT_REPEATING.word).sum())
     if left:

@@ -11,7 +11,7 @@ import xarray as xr
 
 from saltus.analysis.branches.switching import Seed
 from saltus.analysis.closed.all_equilibria import all_equilibria
-from saltus.analysis.closed.cycles import units
+from saltus.analysis.closed.cycles import ZERO, units
 from saltus.analysis.closed.measures import measure
 from saltus.errors import ParameterError, shown
 from saltus.flow.maps import Stroboscope
@@ -120,7 +120,7 @@ def rests_at(
     if starts is not None:
         usual = np.abs(starts).max(axis=0, initial=0.0)
         unit = np.where(unit > NOTHING * usual, unit, usual)
-    unit = np.where(unit > 0, unit, 1.0)
+    unit = np.where(unit > ZERO, unit, 1.0)
     return [Seed(one[None], np.array([v]), unit) for one, v in zip(places, values, strict=True)]
 
 

@@ -25,6 +25,8 @@ from saltus.flow.maps import Stroboscope
 from saltus.flow.polynomials import between
 from saltus.flow.request import Schedule
 
+#: A state that stays smaller than this is zero [SI].
+ZERO = 1e-15
 #: Samples of the motion in which a return is searched; ratio of the lengths of two windows.
 SAMPLES, ZOOM = 4096, 8
 #: Most windows that are tried, from that of the samples on.
@@ -71,9 +73,11 @@ class Returns:
 
 
 def units(high: np.ndarray, low: np.ndarray) -> np.ndarray:
-    """Units of states between bounds: their range, their size where they rest."""
+    """Units of states between bounds: their range, their size where they rest, 1 where they have
+    decayed to nothing.
+    """
     ranges, sizes = high - low, np.maximum(np.abs(high), np.abs(low))
-    return np.where(ranges > RESTS * sizes, ranges, np.where(sizes > 0, sizes, 1.0))
+    return np.where(sizes > ZERO, np.where(ranges > RESTS * sizes, ranges, sizes), 1.0)
 
 
 # -- the first guess -------------------------------------------------------------------------------

@@ -136,7 +136,8 @@ def _follow_rests(
     if not len(rests):
         return
     ((name, values),) = grid.axes.items()
-    seeds = rests_at(orbits.points[rests, 0], values[found.place[rests]], grid.starts)
+    usual = np.concatenate([grid.starts, found.motions.scale[found.row[rests]]])
+    seeds = rests_at(orbits.points[rests, 0], values[found.place[rests]], usual)
     born = trace_rests(plan, grid.system, name, seeds, arcs.branches)
     _number(found, orbits, grid, plan, rests, arcs, 0)
     if "hopf" in plan.switch:

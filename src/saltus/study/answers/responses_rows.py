@@ -14,6 +14,7 @@ import numpy as np
 from saltus.results.dataset.kinds import OPEN, Kind, sentences
 from saltus.results.dataset.schema import (
     parameters_of,
+    point_name,
     response_name,
     states_of,
 )
@@ -57,6 +58,11 @@ def _branches(title: str, ds: xr.Dataset) -> TextTable:
     def ends(name: str, pick: Callable[[np.ndarray], Any]) -> list[float]:
         return [float(pick(one[name].values)) for one in each]
 
+    extents = [
+        _extent(ds, int(number), one[values].values)
+        for number, one in zip(numbers, each, strict=True)
+    ]
+
     def at_top(name: str) -> list[float]:
         return [float(one[name].values[top]) for one, top in zip(each, tops, strict=True)]
 
@@ -64,8 +70,8 @@ def _branches(title: str, ds: xr.Dataset) -> TextTable:
         words("branch", numbers),
         words("type", [_types(one) for one in each]),
         words("values", sizes),
-        quantity(f"{along} from", ends(values, np.min), unit, 5),
-        quantity("to", ends(values, np.max), unit, 5, name=f"{along} to"),
+        quantity(f"{along} from", [low for low, _ in extents], unit, 5),
+        quantity("to", [high for _, high in extents], unit, 5, name=f"{along} to"),
         interval(
             "contacts in T",
             ends("response_contacts", _least),
@@ -79,6 +85,16 @@ def _branches(title: str, ds: xr.Dataset) -> TextTable:
         number("largest exponent", ends("response_exponent", _most), ".4g", "1/s"),
     ]
     return table(title, columns, _notes(ds, len(numbers) - len(shown)), shown)
+
+
+def _extent(ds: xr.Dataset, branch: int, values: np.ndarray) -> tuple[float, float]:
+    """Least and largest value of the parameter on a branch: of its responses, and as far as it was
+    followed.
+    """
+    if "point_branch" in ds:
+        followed = ds[point_name(parameters_of(ds)[0])].values[ds["point_branch"].values == branch]
+        values = np.concatenate([values, followed])
+    return float(values.min()), float(values.max())
 
 
 def _least(values: np.ndarray) -> float:

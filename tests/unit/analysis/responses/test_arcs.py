@@ -163,6 +163,6 @@ def test_where_no_branch_can_be_followed_responses_are_matched_and_the_reason_is
     found = sl.bifurcation_diagram(play, vary, periods=300, progress=False)
     assert found.response_branch.values.tolist() == 4 * [0]
     assert "switches at times that depend on a parameter" in found.attrs["branches_refused"]
-    assert "branches by where responses lie, for play switches" in sl.describe(found)
+    assert "branches are matched by where responses lie: play switches" in sl.describe(found)
     with pytest.raises(ParameterError, match="switches at times that depend"):
         sl.bifurcation_diagram(play, vary, periods=300, unstable=True, progress=False)
