@@ -26,6 +26,8 @@ from saltus.system import System
 #: Longest step of Newton's method, in units of the scale: the field of a motion that has escaped
 #: points anywhere.
 FARTHEST_STEP = 1e6
+#: Least range of a state that goes on decaying: the square of less is no number.
+DECAYED = 1e-150
 #: Share of the norm of the Jacobian that a real part must lie below zero: more than rounding.
 MARGINAL = 1e-10
 #: A constraint that is zero to so small a share of its terms is held.
@@ -159,6 +161,7 @@ def find_equilibria(
     ``captures``: whether to ask where they capture.
     """
     system, values = map_.system, map_.values
+    scale = np.maximum(scale, DECAYED)
 
     def equations(x: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         mine, unit = {name: column[rows] for name, column in values.items()}, scale[rows]
