@@ -452,6 +452,22 @@ def test_lines_of_stable_orbits_end_where_stability_does():
     assert heights[np.isfinite(heights)] == pytest.approx(17.0)
 
 
+def test_a_branch_without_bound_does_not_flatten_the_picture():
+    """The cycles of the wing grow to thousands of radians towards 13.5002 m/s."""
+    wing = sl.models.aeroelastic()
+    start = {"plunge": 0, "pitch": "2 deg", "plunge_rate": 0, "pitch_rate": 0}
+    found = sl.bifurcation_diagram(wing, {"airspeed": ("9 m/s", "13 m/s", 3)}, start)
+    assert "points" in found.branch_end.values
+    assert found.point_output_peak.sel(output="pitch").max() > 100
+    largest = found.output_peak.sel(output="pitch").values.max()
+    for axes in (
+        frequency_response(found, quantity="maximum", output="pitch"),
+        bifurcation_diagram(found, state="pitch"),
+    ):
+        assert largest < axes.get_ylim()[1] < 2 * largest
+    assert "1 end of branches that go on, after 1000 points" in sl.describe(found)
+
+
 def test_an_empty_picture_says_why():
     @sl.system(states="x v", forced_at="f", units={"f": "Hz"})
     def away(t, x, v, *, f=1.0, k=3.0):

@@ -110,8 +110,7 @@ class _Way:
         """The parameter at which the events behind the pieces accumulate; NaN if they don't."""
         ends = [piece.end for piece in self.pieces if piece.end is not None]
         contacts = [len(piece.legs.contacts) for piece in self.pieces]
-        values = [float(end.event.legs.values(end.event.z)[-1]) for end in ends]
-        return accumulation(contacts, values)
+        return accumulation(contacts, [float(end.event.z[-1]) for end in ends])
 
     def _piece(self, legs: Legs, z: np.ndarray, along: np.ndarray) -> End | None:
         """One contact sequence, and where it ends if that is at an event."""

@@ -36,8 +36,7 @@ class Legs:
 
     Unknowns z: the time of each contact in periods since the orbit's first point and the state
     before it, one contact after the other; the period [s] of a system without forcing; the
-    parameters, as those of ``orbits``. An orbit without contacts has its first point in their
-    place, at time 0.
+    parameters [SI]. An orbit without contacts has its first point in their place, at time 0.
 
     Parameters
     ----------
@@ -112,8 +111,7 @@ class Legs:
 
     def values(self, z: np.ndarray) -> np.ndarray:
         """The parameters of orbits float64[..., z], float64[..., names]."""
-        values = z[..., self.count * (self.size + 1) + self.free :]
-        return np.exp(values) if self.orbits.log else values
+        return z[..., self.count * (self.size + 1) + self.free :]
 
     def spans(self, phase: np.ndarray) -> np.ndarray:
         """How long the leg behind each contact lasts, in periods."""

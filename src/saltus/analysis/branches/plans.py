@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 
 from saltus.analysis.branches.leg_branches import leg_branches
@@ -18,8 +17,6 @@ from saltus.system.symmetry import is_symmetric
 LONGEST_DOUBLED, POINTS = 2, 1000
 #: Events at which the branches that leave are followed.
 SWITCHES = ("period_doubling", "branch_point", "hopf")
-#: Over a range of which the ends have a larger ratio a parameter is followed by its logarithm.
-DECADES = 100.0
 
 
 def plan_of(
@@ -43,11 +40,9 @@ def plan_of(
     """
     jumps = any(guard.law is not None and guard.law.reset for guard in system.guards)
     symmetric = not twins and is_symmetric(system, {name: limits})
-    log = limits[0] > 0 and limits[1] > DECADES * limits[0]
-    ends = (math.log(limits[0]), math.log(limits[1])) if log else limits
     return Plan(
-        lambda n, scale: PeriodicOrbits(system, (name,), n, scale, method, threads, symmetric, log),
-        ends, points, longest, frozenset(switch),
+        lambda n, scale: PeriodicOrbits(system, (name,), n, scale, method, threads, symmetric),
+        limits, points, longest, frozenset(switch),
         leg_branches if jumps and has_legs(system) else both_ways,
-        stable=stable, log=log,
+        stable=stable,
     )  # fmt: skip

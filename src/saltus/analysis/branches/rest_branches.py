@@ -134,7 +134,7 @@ def trace_rests(
     follow = functools.partial(both_ways, ends=_left, kind=RestBranch)
 
     def make(_: int, scale: np.ndarray) -> Any:
-        return Rests(system, name, scale, plan.log)
+        return Rests(system, name, scale)
 
     mine = replace(plan, make=make, follow=follow, leave=_leave, crossed=True)
     trace(mine, seeds, branches)
@@ -181,7 +181,7 @@ def _finished(branch: RestBranch, event: SpecialPoint) -> SpecialPoint:
         return event
     if event.kind == "hopf" and abs(found.coefficient) > NEUTRAL * found.frequency:
         outcome = "supercritical" if found.coefficient < 0 else "subcritical"
-    return replace(event, z=orbits.unknowns(found.state, found.value), outcome=outcome)
+    return replace(event, z=np.append(found.state, found.value), outcome=outcome)
 
 
 def _solved(
@@ -189,11 +189,11 @@ def _solved(
 ) -> SpecialEquilibrium | None:
     """The special equilibrium at the unknowns float64[z]; None where another one is found."""
     orbits, size = branch.orbits, branch.orbits.size
-    system = orbits.system.with_values(**{orbits.names[0]: float(orbits.values(z)[0])})
+    system = orbits.system.with_values(**{orbits.names[0]: float(z[-1])})
     found = solve(system, orbits.names[0], z[:size], branch.scale[:size])
     if found is None:
         return None
-    apart = np.abs((orbits.unknowns(found.state, found.value) - z) / branch.scale).max()
+    apart = np.abs((np.append(found.state, found.value) - z) / branch.scale).max()
     return found if apart < SAME else None
 
 
@@ -206,7 +206,7 @@ def _born(branch: RestBranch, event: SpecialPoint, parent: tuple[int, int]) -> S
     vector = vectors[:, here]
     turned = vector * np.exp(-0.5j * np.angle((vector * vector).sum()))
     way = np.concatenate([turned.real / np.linalg.norm(turned.real), [0.0, 0.0]])
-    own = np.array([2.0 * np.pi / values[here].imag, orbits.values(event.z)[0]])
+    own = np.array([2.0 * np.pi / values[here].imag, event.z[-1]])
     return Seed(event.z[None, :size], own, unit[:size], way, parent)
 
 
@@ -219,12 +219,12 @@ def _meet_boundary(branch: RestBranch, side: int, place: int) -> None:
     with np.errstate(all="ignore"):
         far = -gaps / (slopes @ out)
     guard = int(np.argmin(np.where(far > 0, far, np.inf)))
-    system = orbits.system.with_values(**{orbits.names[0]: float(orbits.values(z)[0])})
+    system = orbits.system.with_values(**{orbits.names[0]: float(z[-1])})
     size, unit = orbits.size, branch.scale
     found = boundary_equilibrium(system, orbits.names[0], guard, z[:size], unit[:size])
     if found is None:
         return
-    end, one = orbits.unknowns(found.state, found.value), np.array([row])
+    end, one = np.append(found.state, found.value), np.array([row])
     apart = float(np.linalg.norm((end - z) / unit))
     if apart > ENDING:
         return

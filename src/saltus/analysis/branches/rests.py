@@ -31,8 +31,8 @@ class Rests:
     """Curves of equilibria over one parameter; an arclength ``Equations``, and what a branch asks
     of the equations of its orbits.
 
-    Unknowns z: the state, and the parameter [SI] or its logarithm. The mode of a curve is that of
-    the first point which is accepted.
+    Unknowns z: the state, and the parameter [SI]. The mode of a curve is that of the first point
+    which is accepted.
 
     Parameters
     ----------
@@ -42,12 +42,10 @@ class Rests:
         The parameter that is followed.
     scale : float64[k, D + 1]
         Units of the unknowns.
-    log : bool
-        Whether the unknown is the logarithm of the parameter.
     """
 
-    def __init__(self, system: System, name: str, scale: np.ndarray, log: bool = False) -> None:
-        self.system, self.names, self.scale, self.log = system, (name,), scale, log
+    def __init__(self, system: System, name: str, scale: np.ndarray) -> None:
+        self.system, self.names, self.scale = system, (name,), scale
         self.n, self.size, self.free, self.symmetric = 1, len(system.states), False, False
         self._whole = parametric(system, self.names).system
         size = self.size
@@ -70,11 +68,7 @@ class Rests:
 
     def values(self, z: np.ndarray) -> np.ndarray:
         """The parameter of equilibria float64[..., z], float64[..., 1]."""
-        return np.exp(z[..., self.size :]) if self.log else z[..., self.size :]
-
-    def unknowns(self, state: np.ndarray, value: float) -> np.ndarray:
-        """The unknowns of an equilibrium float64[D] at a value of the parameter."""
-        return np.append(state, np.log(value) if self.log else value)
+        return z[..., self.size :]
 
     def period(self, z: np.ndarray) -> np.ndarray:
         """A time in which nothing moves away from equilibria float64[..., z] [s], float64[...]."""
@@ -88,8 +82,7 @@ class Rests:
         float64[r, len(entries)].
         """
         states = {name: np.ones(len(z)) for name in self._whole.states}
-        columns = [*self.points(z)[:, 0].T, *self.values(z).T]
-        for column, values in zip(self._columns, columns, strict=True):
+        for column, values in zip(self._columns, z.T, strict=True):
             states[self._whole.states[column]] = values
         found = evaluate(
             entries, states=states, values=self._whole.values, bits=list(modes.T)
@@ -98,18 +91,7 @@ class Rests:
 
     def jacobian(self, z: np.ndarray, modes: np.ndarray) -> np.ndarray:
         """Derivatives of the rates with respect to the unknowns, float64[r, D, D + 1]."""
-        return self._by_unknowns(self._at(self._slopes, z, modes), z).reshape(
-            len(z), self.size, self.width
-        )
-
-    def _by_unknowns(self, slopes: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Derivatives with respect to the states and the parameter at float64[r, z], one row of
-        them after the other, as those with respect to the unknowns.
-        """
-        if self.log:
-            slopes = slopes.reshape(len(z), -1, self.width)
-            slopes[:, :, -1] *= self.values(z)
-        return slopes
+        return self._at(self._slopes, z, modes).reshape(len(z), self.size, self.width)
 
     def sides(self, z: np.ndarray) -> np.ndarray:
         """The modes in which float64[r, z] lie, bool[r, guards]."""
@@ -128,8 +110,8 @@ class Rests:
             return np.zeros(0), np.zeros((0, self.width))
         values = self._at([guard.gap for guard in guards], z[None], modes)[0]
         slopes = [one[i] for one in self._whole.guard_gradients for i in self._columns]
-        entries = self._by_unknowns(self._at(slopes, z[None], modes), z[None])
-        return values, entries.reshape(len(guards), -1) * self.scale[row]
+        entries = self._at(slopes, z[None], modes)[0].reshape(len(guards), -1)
+        return values, entries * self.scale[row]
 
     def margin(self, z: np.ndarray) -> float:
         """Distance of float64[z] to the nearest boundary; inf without one."""

@@ -38,7 +38,7 @@ class PeriodicOrbits:
     """Curves of periodic orbits of n periods over one parameter; an arclength ``Equations``.
 
     Unknowns z: the n points, one after the other; the time from one to the next [s] in a system
-    without forcing; the parameters [SI], or the logarithm of the one that there is.
+    without forcing; the parameters [SI].
 
     Parameters
     ----------
@@ -52,8 +52,6 @@ class PeriodicOrbits:
         Units of the unknowns.
     symmetric : bool
         Whether mirror images of orbits are orbits: see system/symmetry.py.
-    log : bool
-        Whether the unknown is the logarithm of the parameter.
     """
 
     def __init__(
@@ -65,9 +63,8 @@ class PeriodicOrbits:
         method: Method,
         threads: int | None = None,
         symmetric: bool = False,
-        log: bool = False,
     ) -> None:
-        self.symmetric, self.log = symmetric, log
+        self.symmetric = symmetric
         self.system, self.names, self.n, self.scale = system, tuple(names), n, scale
         self.size, self.free = len(system.states), system.forced_at is None
         self.parametric = parametric(system, self.names)
@@ -102,8 +99,7 @@ class PeriodicOrbits:
 
     def values(self, z: np.ndarray) -> np.ndarray:
         """The parameters of orbits float64[..., z], float64[..., names]."""
-        values = z[..., self.n * self.size + self.free :]
-        return np.exp(values) if self.log else values
+        return z[..., self.n * self.size + self.free :]
 
     def period(self, z: np.ndarray) -> np.ndarray:
         """The period of orbits float64[..., z] [s], all n parts of it, float64[...]."""
@@ -119,15 +115,12 @@ class PeriodicOrbits:
         beside the points float64[r, e], the derivative of each with respect to its unknown, both
         float64[r, e], and which unknown that is, int64[e].
         """
-        values, slopes = rest, np.ones(rest.shape)
-        if self.log:
-            values = rest.copy()
-            values[:, -1] = slopes[:, -1] = np.exp(rest[:, -1])
-        if self.system.forced_at in self.names:
-            values, slopes = values[:, self._order], slopes[:, self._order]
-            period = self._turns / values[:, 0]
-            slopes[:, 0] *= -period / values[:, 0]
-            values[:, 0] = period
+        slopes = np.ones(rest.shape)
+        if self.system.forced_at not in self.names:
+            return rest, slopes, self._order
+        values, frequency = rest[:, self._order], rest[:, self._order[0]]
+        values[:, 0] = self._turns / frequency
+        slopes[:, 0] = -values[:, 0] / frequency
         return values, slopes, self._order
 
     def starts(self, z: np.ndarray) -> np.ndarray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -42,10 +42,6 @@ class Seed:
     def z(self) -> np.ndarray:
         """All unknowns."""
         return np.concatenate([self.points.ravel(), self.own])
-
-    def at(self, unknown: float) -> Seed:
-        """The same with another last unknown."""
-        return replace(self, own=np.append(self.own[:-1], unknown))
 
 
 def children(branch: Branch, number: int, switch: frozenset[str], longest: int) -> Iterator[Seed]:

@@ -5,7 +5,6 @@ branches, each once.
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -39,7 +38,7 @@ class Plan:
     make : callable
         The equations of orbits of n periods with a scale float64[k, z].
     limits : (float, float)
-        Range of the parameter, or of its logarithm.
+        Range of the parameter.
     points : int
         Most points of a branch in each direction.
     longest : int
@@ -56,8 +55,6 @@ class Plan:
         from where they cross: what was followed is compared with the others once more.
     stable : bool
         Branches are followed up to where their orbits lose stability.
-    log : bool
-        The last unknown of all orbits is the logarithm of the parameter.
     """
 
     make: Callable[[int, np.ndarray], PeriodicOrbits]
@@ -69,11 +66,6 @@ class Plan:
     leave: Callable[[Any, int, frozenset[str], int], Iterator[Seed]] = children
     crossed: bool = False
     stable: bool = False
-    log: bool = False
-
-    def unknown(self, value: float) -> float:
-        """The last unknown of orbits at a value of the parameter [SI]."""
-        return math.log(value) if self.log else value
 
 
 def trace(
@@ -84,10 +76,9 @@ def trace(
 ) -> None:
     """Add all branches that seeds lie on, and those that leave them at their events, to a list.
 
-    Seeds are at values of the parameter [SI]. Those that lie on a branch already followed, or on
-    its mirror image, are not followed again.
+    Seeds that lie on a branch already followed, or on its mirror image, are not followed again.
     """
-    waiting, begun = [seed.at(plan.unknown(seed.own[-1])) for seed in seeds], 0
+    waiting, begun = list(seeds), 0
     while waiting:
         beside = _abreast(waiting)
         begun += len(beside)

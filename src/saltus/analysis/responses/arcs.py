@@ -207,7 +207,7 @@ def _number(
         for number in range(known, len(arcs.branches)):
             arcs.branches[number], *others = arcs.branches[number].stable_parts()
             arcs.branches += others
-    for z, n, which in _unknowns(found, orbits, values, plan, some):
+    for z, n, which in _unknowns(found, orbits, values, some):
         for number, branch in enumerate(arcs.branches[known:], known):
             mine = which[arcs.of[which] < 0]
             if len(mine):
@@ -216,7 +216,7 @@ def _number(
 
 
 def _unknowns(
-    found: GridResponses, orbits: OrbitBatch, values: np.ndarray, plan: Plan, some: np.ndarray
+    found: GridResponses, orbits: OrbitBatch, values: np.ndarray, some: np.ndarray
 ) -> Iterator[tuple[np.ndarray, int, np.ndarray]]:
     """Responses by their number of points: their unknowns float64[r, z], that number, and which
     they are, int64[r].
@@ -230,8 +230,8 @@ def _unknowns(
                 continue
             parts = [orbits.points[which, :n].reshape(len(which), -1)]
             parts += [orbits.time[which, None]] if cycles else []
-            last = [plan.unknown(float(value)) for value in values[found.place[which]]]
-            yield np.concatenate([*parts, np.array(last)[:, None]], axis=1), int(n), which
+            parts += [values[found.place[which], None]]
+            yield np.concatenate(parts, axis=1), int(n), which
 
 
 def _in_order(arcs: Arcs) -> None:

@@ -75,7 +75,7 @@ def soft(t, x, v, *, stiffness=10.0, gap=0.01, spring=0.0, w=1.0):
     return v, force
 
 
-def test_over_decades_a_branch_is_followed_by_the_logarithm_of_the_parameter():
+def test_a_branch_over_four_decades_has_its_closed_form():
     """The amplitude is 1/sqrt((k - 1)^2 + 0.04); the gap is touched where it is 0.01."""
     found = sl.bifurcation_diagram(soft, {"stiffness": (3.0, 3e4, 9, "log")}, progress=False)
     assert (found.response_branch.values == 0).all()
@@ -89,7 +89,7 @@ def test_over_decades_a_branch_is_followed_by_the_logarithm_of_the_parameter():
     assert alone.event_stiffness.item() == pytest.approx(found.event_stiffness.item(), rel=1e-11)
 
 
-def test_equilibria_over_decades_have_their_hopf_point_where_the_closed_form_says():
+def test_equilibria_over_three_decades_have_their_hopf_point_where_the_closed_form_says():
     @sl.system(states="x y")
     def planar(t, x, y, *, gain=1.0):
         r = x * x + y * y
