@@ -22,11 +22,11 @@ from saltus.flow.counts import whole as whole_number
 from saltus.flow.growth import mark_growth
 from saltus.flow.methods import Method
 from saltus.flow.pace import marks, resume
-from saltus.flow.request import Outcome, Request
+from saltus.flow.request import Outcome, Request, Schedule
 from saltus.flow.room import Contacts
 from saltus.flow.stops import on_allowed_sides
 from saltus.flow.threads import may_wait, on_threads, usable_processors
-from saltus.interrupt import Interrupted, Stop
+from saltus.interrupt import Interrupted, Stop, check_stop
 from saltus.kernels import status as st
 from saltus.kernels.batch import Batch
 from saltus.system import System
@@ -197,23 +197,39 @@ def _cut(
     request: Request, whole: dict[str, np.ndarray], first: int, data: np.ndarray, due: float | None
 ) -> _Chunk:
     """The arrays of one chunk: views of the whole, and tables of its own."""
-    last = min(first + CHUNK, len(request.start))
-    arrays = {name: array[first:last] for name, array in whole.items()}
-    shared = len(request.parameters) == 1
-    arrays["param"] = np.ascontiguousarray(
-        request.parameters if shared else request.parameters[first:last], float
+    rows = slice(first, min(first + CHUNK, len(request.start)))
+    parameters = request.parameters if len(request.parameters) == 1 else request.parameters[rows]
+    arrays = {name: array[rows] for name, array in whole.items()} | shared_arrays(
+        rows.stop - first, parameters, request.schedule, data
     )
-    arrays["stride"] = np.int64(0 if shared else 1)  # type: ignore[assignment]
-    arrays["sample_count"], arrays["sample_fraction"] = (
-        request.schedule.count,
-        request.schedule.fraction,
-    )
-    arrays["rec_first"] = np.full(
-        last - first, 0 if request.record_from is None else request.record_from, np.int64
-    )
-    arrays["rec_used"] = np.zeros(1, np.int64)
-    arrays["data"] = data
+    arrays["rec_first"] += request.record_from or 0
     return _Chunk(first, arrays, request.record_from is not None, due)
+
+
+def shared_arrays(
+    count: int, parameters: np.ndarray, schedule: Schedule, data: np.ndarray
+) -> dict[str, np.ndarray]:
+    """The arguments of a kernel that aren't written to: of ``count`` trajectories, contacts
+    recorded from the first period on.
+    """
+    return {
+        "param": np.ascontiguousarray(parameters, float),
+        "stride": np.int64(0 if len(parameters) == 1 else 1),  # type: ignore[dict-item]
+        "sample_count": schedule.count,
+        "sample_fraction": schedule.fraction,
+        "rec_first": np.zeros(count, np.int64),
+        "rec_used": np.zeros(1, np.int64),
+        "data": data,
+    }
+
+
+def move_to_end(move: Callable[[], int], arrays: dict[str, np.ndarray], due: float | None) -> None:
+    """Call a kernel until its trajectories have ended. Ctrl-C is noticed between two calls."""
+    outcome, went_on = st.PAUSED, False
+    while outcome == st.PAUSED or went_on:
+        outcome = move()
+        went_on = due is not None and resume(arrays, due)
+        check_stop()
 
 
 def _open_tables(chunk: _Chunk, module: Flow) -> None:

@@ -7,10 +7,19 @@ from __future__ import annotations
 import numpy as np
 
 from saltus.flow.contact_table import ContactTable
-from saltus.flow.engine import ARGUMENTS, allocate, check_steps, options_of, slice_of, tables_of
+from saltus.flow.engine import (
+    ARGUMENTS,
+    allocate,
+    check_steps,
+    move_to_end,
+    options_of,
+    shared_arrays,
+    slice_of,
+    tables_of,
+)
 from saltus.flow.methods import Method
-from saltus.flow.pace import marks, resume
-from saltus.flow.request import Request
+from saltus.flow.pace import marks
+from saltus.flow.request import Request, Schedule
 from saltus.interrupt import check_stop
 from saltus.kernels import status as st
 from saltus.system import System
@@ -66,10 +75,11 @@ class Flight:
         count = len(start)
         check_steps(system, method, period)
         self._module = method.kernels(system.origin)
-        request = Request.periods(start, parameters, period, 0)
-        _, self._arrays = allocate(request, system, self._module)
-        self._arrays["param"] = np.ascontiguousarray(parameters, float)
+        _, self._arrays = allocate(
+            Request.periods(start, parameters, period, 0), system, self._module
+        )
         self._arrays["options"] = options_of(method, longest, count)
+        self._parameters = parameters
         self._data, self._due = tables_of(system.origin), method.due(longest)
         self.age = 0
 
@@ -110,27 +120,24 @@ class Flight:
         arrays["status"][self.going] = st.RUNNING
         arrays["end_count"] = np.full(k, self.age + periods, np.int64)
         samples = np.full((k, periods, states), np.nan)
-        call = dict(
-            arrays, stride=np.int64(0 if len(arrays["param"]) == 1 else 1),
-            cursor=np.zeros(k, np.int64), samples=samples,
-            sample_count=np.arange(self.age + 1, self.age + periods + 1, dtype=np.int64),
-            sample_fraction=np.zeros(periods),
-            sample_mode=np.zeros((k, periods), np.int64), rec_first=np.zeros(k, np.int64),
-            rec_used=np.zeros(1, np.int64), data=self._data,
-        )  # fmt: skip
+        schedule = Schedule.even(periods, 1, self.age + 1)
+        call = arrays | shared_arrays(k, self._parameters, schedule, self._data)
+        call |= {
+            "cursor": np.zeros(k, np.int64),
+            "samples": samples,
+            "sample_mode": np.zeros((k, periods), np.int64),
+        }
         call["rec_i"], call["rec_f"] = ContactTable.empty(0, states).arrays
-        steps, workspace = slice_of(states), self._module.workspace()
-        outcome, went_on = st.PAUSED, False
-        while outcome == st.PAUSED or went_on:
-            outcome = self._module.propagate(*(call[name] for name in ARGUMENTS), steps, *workspace)
-            went_on = self._due is not None and resume(arrays, self._due)
-            check_stop()
+        move = self._module.bound(
+            *(call[name] for name in ARGUMENTS), slice_of(states), *self._module.workspace()
+        )
+        move_to_end(move, arrays, self._due)
         self.age += periods
         return samples
 
     def keep(self, wanted: np.ndarray) -> None:
         """Let go of the trajectories that aren't wanted, bool[k]."""
-        if len(self._arrays["param"]) > 1:
-            self._arrays["param"] = np.ascontiguousarray(self._arrays["param"][wanted])
+        if len(self._parameters) > 1:
+            self._parameters = self._parameters[wanted]
         for name in _FOLLOW:
             self._arrays[name] = np.ascontiguousarray(self._arrays[name][wanted])

@@ -7,12 +7,20 @@ from __future__ import annotations
 import numpy as np
 
 from saltus.flow.contact_table import ContactTable
-from saltus.flow.engine import ARGUMENTS, allocate, check_steps, options_of, slice_of, tables_of
+from saltus.flow.engine import (
+    ARGUMENTS,
+    allocate,
+    check_steps,
+    move_to_end,
+    options_of,
+    shared_arrays,
+    slice_of,
+    tables_of,
+)
 from saltus.flow.methods import Method
-from saltus.flow.pace import marks, resume
+from saltus.flow.pace import marks
 from saltus.flow.request import Request
 from saltus.flow.stops import on_allowed_sides
-from saltus.interrupt import check_stop
 from saltus.kernels import status as st
 from saltus.system import System
 
@@ -51,16 +59,8 @@ class Shots:
         module = method.kernels(system.origin)
         request = Request.periods(np.zeros((k, states)), parameters, period, periods)
         _, arrays = allocate(request, system, module)
-        arrays |= {
-            "param": np.ascontiguousarray(parameters, float),
-            "stride": np.int64(0 if len(parameters) == 1 else 1),  # type: ignore[dict-item]
-            "sample_count": request.schedule.count,
-            "sample_fraction": request.schedule.fraction,
-            "rec_first": np.zeros(k, np.int64),
-            "rec_used": np.zeros(1, np.int64),
-            "options": options_of(method, periods, k),
-            "data": tables_of(system.origin),
-        }
+        arrays |= shared_arrays(k, parameters, request.schedule, tables_of(system.origin))
+        arrays["options"] = options_of(method, periods, k)
         arrays["rec_i"], arrays["rec_f"] = ContactTable.empty(0, states).arrays
         self._system, self._request, self._arrays = system, request, arrays
         self._begun = [(arrays[name], arrays[name].copy()) for name in _LEFT]
@@ -90,9 +90,5 @@ class Shots:
         if not self._finite:
             good &= np.isfinite(request.parameters).all(axis=1)
         arrays["status"][...] = np.where(good, st.RUNNING, st.INVALID)
-        outcome, went_on = st.PAUSED, False
-        while outcome == st.PAUSED or went_on:
-            outcome = self._move()
-            went_on = self._due is not None and resume(arrays, self._due)
-            check_stop()
+        move_to_end(self._move, arrays, self._due)
         return arrays["state"].copy(), arrays["status"].copy()
