@@ -15,7 +15,7 @@ import importlib
 import re
 from typing import Any
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 #: Public name: module that holds it. They stand in the stub, which type checkers read too.
 with open(f"{__file__}i", encoding="utf-8") as _stub:
