@@ -1,4 +1,4 @@
-"""From the laws that an equation declares, and from two-valued forces, to laws of guards."""
+"""Convert the laws that an equation declares, and its two-valued forces, to laws of guards."""
 
 from __future__ import annotations
 
@@ -31,21 +31,21 @@ from saltus.language.roots import with_root, zero_where_idle
 from saltus.language.sums import dot, ratio
 
 _ZERO, _ONE = ex.constant(0.0), ex.constant(1.0)
-#: States and parameters at which a velocity is compared with the rate of its gap, and the part of
-#: their size by which rounding may make them differ.
+#: Samples of states and parameters at which a velocity is compared with the rate of its gap, and
+#: the relative difference that rounding explains.
 _PLACES, _ROUNDING = 16, 1e-9
 
 Field = tuple[Expr, ...]
 
 
-#: Share of a pivot without friction at which one with friction counts as none: the force that it
-#: takes to hold the contact grows beyond all bounds.
+#: A pivot with friction below this share of the one without counts as zero: the force that holds
+#: the contact grows without bound.
 _NO_PIVOT = ex.constant(2.0**-40)
 
 
 @dataclass(frozen=True, eq=False)
 class _Met:
-    """A declared law, its comparison and parts written with bits."""
+    """A declared law, with its comparison and parts written with bits."""
 
     law: Declared
     number: int
@@ -55,7 +55,7 @@ class _Met:
 
 @dataclass(frozen=True, eq=False)
 class _Rubbing:
-    """The friction of a contact that rests.
+    """The friction of a contact at rest.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class _Rubbing:
 def find_contacts(
     rates: Sequence[Expr], declared: Sequence[Declared], states: Sequence[str]
 ) -> tuple[Field, tuple[Guard, ...]]:
-    """Field and guards of traced rates and the laws that follow them. Hold guards stand behind all
+    """Field and guards of traced rates and the laws that follow them. Hold guards come after all
     others.
 
     Raises
@@ -115,7 +115,7 @@ def find_contacts(
 
 
 def _met(law: Declared, comparison: Expr, parts: Sequence[Expr]) -> _Met:
-    """A declared law by the guard of its comparison, checked."""
+    """The declared law with the guard of its comparison, checked."""
     found = comparison.payload if comparison.op == "select" else None
     bit = found.inner if isinstance(found, Not) else found
     if not isinstance(bit, Bit):
@@ -133,7 +133,7 @@ def _met(law: Declared, comparison: Expr, parts: Sequence[Expr]) -> _Met:
 
 
 def _add_limit(limits: dict[int, Expr], number: int, limit: Expr, guards: Sequence[Guard]) -> None:
-    """Static over kinetic force, by the number of the guard."""
+    """Add the ratio of static to kinetic force, by the number of the guard."""
     if limits.setdefault(number, limit) is not limit:
         raise TraceError(
             f"two friction laws with different limits act where "
@@ -149,8 +149,8 @@ def with_laws(
     limits: Mapping[int, Expr] | None = None,
     levels: Mapping[int, Field] | None = None,
 ) -> tuple[Field, tuple[Guard, ...]]:
-    """The field, reduced where contacts are held, and the guards with their laws; hold guards stand
-    behind them. Where no guard has a law both are as they were.
+    """The field, reduced where contacts are held, and the guards with their laws; hold guards come
+    after the others. Without laws both are returned as they were.
 
     Raises
     ------
@@ -202,7 +202,7 @@ def hold_name(owner: Guard) -> str:
 
 
 def renamed(guards: Sequence[Guard], names: Mapping[int, str]) -> tuple[Guard, ...]:
-    """Guards with other names for some; hold guards follow the names of their owners."""
+    """Rename some guards; hold guards follow the names of their owners."""
     new = [
         replace(guard, name=names.get(number, guard.name)) for number, guard in enumerate(guards)
     ]
@@ -221,9 +221,7 @@ def _held_contacts(
     laws: Mapping[int, Law],
     rubbing: Sequence[_Rubbing],
 ) -> tuple[list[Held], Field]:
-    """The contacts that can be held, and the field with the middle of each surface where it is
-    held.
-    """
+    """The contacts that can be held, and the field with the middle of each held surface."""
     of_contacts = {one.guard: one for one in rubbing}
     surfaces = sorted(number for number, law in laws.items() if law.kind == "surface")
     order = sorted(number for number, law in laws.items() if law.kind != "jump")
@@ -271,15 +269,15 @@ def _held_contacts(
 
 
 def _moved_alone(number: int, field: Field) -> int | None:
-    """The state whose rate a surface decides, if that is just one: of several surfaces that decide
-    only the same rate one can be held at a time, and no term is written for two at once.
+    """The state whose rate a surface decides, if it is just one. Of several surfaces that decide
+    only the same rate, one can be held at a time, so no term for two of them is written.
     """
     moved = [i for i, entry in enumerate(field) if number in bits_in([entry])]
     return moved[0] if len(moved) == 1 else None
 
 
 def _known(entry: Expr, bits: Iterable[int], value: bool) -> Expr:
-    """An expression with some bits known."""
+    """The expression with some bits known."""
     for bit in bits:
         entry = assuming(entry, bit, value)
     return entry
@@ -290,7 +288,7 @@ def _scaled(factor: Operand, direction: Sequence[Expr]) -> Field:
 
 
 class _Forces:
-    """What holds each contact, all others that are held eliminated.
+    """The force that holds each contact, with all other held contacts eliminated.
 
     Parameters
     ----------
@@ -329,8 +327,8 @@ class _Forces:
         return pivot
 
     def own(self, one: Held) -> tuple[Expr, Expr, Field, int]:
-        """Drive, pivot and direction of a contact as :class:`Law` has them, and what supports it:
-        the force of friction is in units of its limit.
+        """Drive, pivot and direction of a contact as :class:`Law` has them, and the force that
+        supports it. The force of friction is in units of its limit.
         """
         drive, pivot, direction = self.elimination.own(one)
         if one.owner not in self._by_guard:
@@ -345,7 +343,7 @@ class _Forces:
 
 
 def _completed(law: Law, held: Held, forces: _Forces, limit: Expr, states: Sequence[str]) -> Law:
-    """The law of a contact with what holding it needs."""
+    """The law of a contact, completed with the expressions that holding it needs."""
     drive, pivot, direction, support = forces.own(held)
     surface = law.kind == "surface"
     rough = law.friction is not None
@@ -365,7 +363,9 @@ def _completed(law: Law, held: Held, forces: _Forces, limit: Expr, states: Seque
 
 
 def _settled(held: Held, states: Sequence[str]) -> Field:
-    """The state on a surface: its pivot from the constraint, or else a step along the normal."""
+    """The state moved onto a surface: its pivot from the constraint, or else a step along the
+    normal.
+    """
     own = [ex.state(name) for name in states]
     if held.pivot is not None:
         i = held.pivot
@@ -382,8 +382,8 @@ def _settled(held: Held, states: Sequence[str]) -> Field:
 def _shares(
     met: _Met, velocity: Expr, moved: Sequence[str], states: Sequence[str], said: tuple[str, str]
 ) -> list[Expr]:
-    """What an impulse of one along a velocity changes each state by: the slope over the mass, zero
-    of states that it doesn't move. Raises TraceError where the velocity isn't linear in them.
+    """Change of each state by a unit impulse along a velocity: the slope over the mass, zero for
+    states that it doesn't move. Raises TraceError where the velocity isn't linear in them.
     """
     normal = gradient(velocity, states)
     for name in moved:
@@ -424,7 +424,7 @@ def _impact(met: _Met, field: Field, guards: Sequence[Guard], states: Sequence[s
 def _struck(
     w: Expr, impulse: Sequence[Expr], restitution: Expr, moved: Sequence[str], states: Sequence[str]
 ) -> Field:
-    """The state after an impact: w becomes -restitution*w by an impulse."""
+    """The state after an impact: an impulse changes w to -restitution*w."""
     after = [ex.state(name) for name in states]
     normal = gradient(w, states)
     if len(moved) == 1:
@@ -443,7 +443,7 @@ def _struck(
 
 
 def _check_velocity(met: _Met, guard: Guard, field: Field, states: Sequence[str]) -> None:
-    """Raise a TraceError unless the closing velocity is minus the rate of the gap, to a positive
+    """Raise a TraceError unless the closing velocity is minus the rate of the gap, times a positive
     number.
     """
     w = met.parts["velocity"]
@@ -466,7 +466,7 @@ def _check_velocity(met: _Met, guard: Guard, field: Field, states: Sequence[str]
 
 
 def _equal(a: Expr, b: Expr) -> bool:
-    """Whether two expressions have equal values at samples."""
+    """True if two expressions have equal values at samples."""
     random = np.random.default_rng(11)
     leaves = {(node.op, node.payload) for node in ex.walk(a, b) if node.op in ("state", "param")}
     states, values = (
@@ -509,7 +509,9 @@ def _rubbing(met: _Met, states: Sequence[str]) -> _Rubbing | None:
 def _check_rubbing(
     rubbing: Sequence[_Rubbing], laws: Mapping[int, Law], field: Field, guards: Sequence[Guard]
 ) -> None:
-    """Raise a TraceError where something else happens at the velocity at which a contact turns."""
+    """Raise a TraceError if another guard acts at the velocity at which a contact's sliding
+    reverses.
+    """
     owned = set(laws) | bits_in(field)
     for one in rubbing:
         if one.guard in owned:
@@ -523,7 +525,7 @@ def _check_rubbing(
 
 # -- jumps -----------------------------------------------------------------------------------------
 def _jump(met: _Met, states: Sequence[str]) -> Law:
-    """A jump of the state, from the side where the comparison doesn't hold."""
+    """A jump of the state, from the side on which the comparison doesn't hold."""
     assert isinstance(met.law, Jump)
     for name in met.parts:
         if name not in states:

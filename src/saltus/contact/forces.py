@@ -1,4 +1,4 @@
-"""Contact laws: short-hands for the piecewise forces that come up most."""
+"""Contact laws: short forms of the most common piecewise forces."""
 
 from __future__ import annotations
 
@@ -314,8 +314,8 @@ def _restitution(name: str, restitution: Operand) -> Any:
 
 
 def _number(operand: Operand) -> Operand:
-    """An expression as it is, any other number as a plain one. Raises TraceError for
-    anything else.
+    """Return an expression as it is, any other number as a float. Raises TraceError for anything
+    else.
     """
     found = as_expr(operand)
     return operand if isinstance(operand, Expr) else float(found.payload)

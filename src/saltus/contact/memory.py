@@ -1,4 +1,4 @@
-"""Contacts with a memory: play, Jenkins and Iwan elements. Each brings a state of its own.
+"""Contacts with a memory: play, Jenkins and Iwan elements. Each adds a state of its own.
 
 All of them rest on one element, the *stop operator*: p follows the input x, and stays at its limit
 while x pushes on::
@@ -42,7 +42,7 @@ _MADE: ContextVar[list[Element] | None] = ContextVar("elements", default=None)
 
 
 def elements() -> AbstractContextManager[list[Element]]:
-    """The elements that are made inside."""
+    """Collect the elements that are made inside."""
     return gathered(_MADE)
 
 
@@ -234,7 +234,7 @@ def _stop(law: str, x: Expr, limit: Expr, name: str | None, what: str) -> Expr:
 def rates_of(
     made: Sequence[Element], states: Sequence[str], rates: Sequence[Expr]
 ) -> dict[str, Expr]:
-    """The rate of each element's state, from the rates of an equation's own states."""
+    """The rate of each element's state, from the rates of the equation's own states."""
     known = dict(zip(states, rates, strict=True))
     own = [*states, *(one.name for one in made)]
     for one in made:
@@ -264,7 +264,7 @@ def _either(a: Condition | bool, b: Condition | bool) -> Condition | bool:
 
 
 def _is_positive(rate: Expr) -> Condition | bool:
-    """Whether a rate is positive; of one with pieces in it, piece by piece."""
+    """The condition that a rate is positive; for a rate with pieces, piece by piece."""
     for node in ex.walk(rate):
         if node.op == "select":
             yes, no = (_is_positive(ex.substituted(rate, {node: one})) for one in node.args)

@@ -24,8 +24,8 @@ from saltus.language.sums import ratio, total
 
 _SIGMA = ex.parameter("\0sigma")
 _ZERO = ex.constant(0.0)
-#: Places on a surface where a jump is tried, Newton steps that lead there, and the part of the
-#: terms' size below which their sum is rounding.
+#: Samples of a surface where a jump is tried, Newton steps that lead there, and the relative size
+#: below which a sum is rounding.
 _PLACES, _STEPS, _ROUNDING = 512, 8, 1e-9
 
 
@@ -55,7 +55,7 @@ class Surface:
 def is_surface(
     number: int, field: Sequence[Expr], guards: Sequence[Guard], states: Sequence[str]
 ) -> bool:
-    """Whether the rate of a guard's gap jumps across it. Gaps with clocks in them count as none."""
+    """True if the rate of a guard's gap jumps across it. Gaps with clocks are excluded."""
     gap = guards[number].gap
     if has_clock(gap):
         return False
@@ -74,7 +74,7 @@ def is_surface(
 
 
 class OnSurface:
-    """What expressions are where a gap is zero."""
+    """Expressions where a gap is zero."""
 
     def __init__(self, gap: Expr, states: Sequence[str]) -> None:
         self._canonical = Canonical()
@@ -86,7 +86,7 @@ class OnSurface:
                 break
 
     def is_zero(self, expression: Expr) -> bool:
-        """Whether an expression is certainly zero on the surface."""
+        """True if an expression is certainly zero on the surface."""
         polynomial = self._canonical.polynomial(expression)
         if not polynomial or is_multiple(polynomial, self._gap):
             return True
@@ -100,7 +100,7 @@ class OnSurface:
 
 
 def level(gap: Expr, name: str, slope: Expr) -> Expr:
-    """The value of a state at which a gap is zero that is linear in it."""
+    """The value of a state at which a gap, linear in it, is zero."""
     rest = ex.substituted(gap, {ex.state(name): _ZERO})
     return ratio(ex.neg(rest), slope)
 
@@ -110,7 +110,7 @@ def _is_zero(node: Expr) -> bool:
 
 
 def has_clock(expression: Expr) -> bool:
-    """Whether a remainder or a table of time, or a comparison of time, stands in an expression."""
+    """True if an expression holds a remainder or a table of time, or a comparison of time."""
     if ex.depends_on(expression, ("mod", "table")):
         return True
     pieces = (node for node in ex.walk(expression) if node.op == "select")
@@ -120,8 +120,9 @@ def has_clock(expression: Expr) -> bool:
 def _jumps(
     jump: Expr, number: int, guards: Sequence[Guard], field: Sequence[Expr], states: Sequence[str]
 ) -> bool:
-    """Whether the jump of a gap's rate is more than rounding somewhere on the surface, by samples:
-    what is zero there needn't look so, as where the pieces of a curve meet.
+    """True if the jump of a gap's rate exceeds rounding somewhere on the surface. Tested by
+    sampling: an expression may be identically zero without simplifying to 0, e.g. where two spline
+    pieces meet.
     """
     random = np.random.default_rng(7)
     gap = guards[number].gap
@@ -137,7 +138,9 @@ def _jumps(
     t = random.uniform(0.0, 1.5, _PLACES)
 
     def sides(roots: Sequence[Expr]) -> dict[int, np.ndarray]:
-        """Sides of the guards whose bits stand in some expressions, and in the gaps of those."""
+        """Samples of the sides of guards whose bits stand in some expressions, and in the gaps of
+        those.
+        """
         needed, bits = bits_in(roots), dict[int, np.ndarray]()
         for other in range(len(guards) - 1, -1, -1):
             needed |= bits_in([guards[other].gap]) if other in needed else set()
@@ -200,7 +203,7 @@ def _at(mean: Expr, half: Expr, sigma: Expr) -> Expr:
 def held_at(
     field: Sequence[Expr], surface: Surface, hold: int, sigma: Expr = _ZERO
 ) -> tuple[Expr, ...]:
-    """The field at a sigma of a surface where its hold guard says so; elsewhere as it was."""
+    """The field at a sigma of a surface where its hold guard says so; elsewhere unchanged."""
     memo: dict[Expr, Expr] = {}
     for node in ex.walk(*field, conditions=False):
         new = ex.rebuild(node, tuple(memo[child] for child in node.args), node.payload)
@@ -216,8 +219,8 @@ def held_at(
 
 
 def with_held_signs(root: Expr, guards: Sequence[Guard], states: Sequence[str]) -> Expr:
-    """An expression that joins a system, with the sign that a held surface takes: the force of
-    friction that sticks is the one that holding it needs.
+    """An expression that joins a system, with the sign that a held surface takes: friction that
+    sticks is the force that holding it needs.
     """
     for number, guard in enumerate(guards):
         law = guard.law
@@ -232,7 +235,7 @@ def with_held_signs(root: Expr, guards: Sequence[Guard], states: Sequence[str]) 
 
 
 def averaged(entry: Expr, number: int, hold: int, place: OnSurface) -> Expr:
-    """An expression with the mean of its two sides where a surface is held."""
+    """The expression with the mean of its two sides where a surface is held."""
     if number not in bits_in([entry]):
         return entry
     return held_at([entry], split(number, [entry], place), hold)[0]

@@ -36,7 +36,7 @@ from saltus.system import System
 CHUNK = 1024
 #: Threads of one call.
 MOST_THREADS = 4096
-#: Steps of the lanes between two checks for Ctrl-C, for two states: some ten milliseconds.
+#: Steps of the lanes between two checks for Ctrl-C, for two states: about ten milliseconds.
 SLICE = 50_000
 #: Contacts that a chunk's table holds before it is emptied, besides room for those of one step.
 RECORDS = 8192
@@ -48,8 +48,8 @@ class RunInterrupted(Interrupted):
 
 @dataclass
 class _Chunk:
-    """A run of trajectories and the arrays of its kernel call (views of the outcome's arrays where
-    possible).
+    """A slice of the trajectories and the arrays of its kernel call (views of the outcome's arrays
+    where possible).
     """
 
     first: int
@@ -130,8 +130,8 @@ def check_steps(system: System, method: Method, period: np.ndarray) -> None:
 
 
 def options_of(method: Method, periods: float, count: int, checks: int = 0) -> np.ndarray:
-    """The numbers of a method as its kernels read them, for ``count`` trajectories, the last
-    ``checks`` of them checks.
+    """The numbers of a method as its kernels read them, for ``count`` trajectories. The last
+    ``checks`` of these measure errors.
     """
     numbers = method.numbers(periods)
     options = np.full((count, len(numbers)), numbers)
@@ -150,9 +150,7 @@ def tables_of(system: System) -> np.ndarray:
 def allocate(
     request: Request, system: System, module: Flow
 ) -> tuple[Outcome, dict[str, np.ndarray]]:
-    """The arrays that all chunks write to, at the start of a run, and the outcome
-    that shows them.
-    """
+    """Allocate the arrays that all chunks write to, and the outcome that shows them."""
     n, m, states = len(request.start), len(request.schedule.count), len(system.states)
     sampled = n - request.checks
     finite = np.isfinite(request.start).all(axis=1) & np.isfinite(request.parameters).all(axis=1)
@@ -196,7 +194,7 @@ ARGUMENTS = Batch._fields
 def _cut(
     request: Request, whole: dict[str, np.ndarray], first: int, data: np.ndarray, due: float | None
 ) -> _Chunk:
-    """The arrays of one chunk: views of the whole, and tables of its own."""
+    """The arrays of one chunk: views of the shared arrays, and tables of its own."""
     last = min(first + CHUNK, len(request.start))
     arrays = {name: array[first:last] for name, array in whole.items()}
     shared = len(request.parameters) == 1
@@ -217,9 +215,7 @@ def _cut(
 
 
 def _open_tables(chunk: _Chunk, module: Flow) -> None:
-    """The chunk's table of contacts, made when its turn comes so that waiting chunks hold no
-    memory.
-    """
+    """Allocate a chunk's table of contacts when its turn comes: waiting chunks hold no memory."""
     size = RECORDS + module.STEP_RECORDS if chunk.keeps_contacts else 0
     chunk.arrays["rec_i"], chunk.arrays["rec_f"] = ContactTable.empty(
         size, chunk.arrays["state"].shape[1]
@@ -240,8 +236,8 @@ def _empty_table(chunk: _Chunk, room: Contacts) -> None:
 def _finish(
     outcome: Outcome, whole: dict[str, np.ndarray], chunks: list[_Chunk], t_end: float
 ) -> Outcome:
-    """Times at the end, and the contacts of all chunks in one sorted table; none is later than the
-    end, not by rounding either.
+    """Fill in the end times, and sort the contacts of all chunks into one table. No contact is
+    later than the end, not even by rounding.
     """
     outcome.time = np.minimum(
         whole["origin"] + whole["count"] * whole["period"] + whole["phase"], t_end
@@ -258,8 +254,8 @@ def _finish(
 
 
 def _returns_where_sliding_begins(contacts: ContactTable, status: np.ndarray) -> np.ndarray:
-    """The last contact of a trajectory that slides, where it is the return from the one before it
-    at the same instant: bool[contacts].
+    """True where the last contact of a sliding trajectory is the return, at the same instant, from
+    the contact before it: bool[contacts].
     """
     who, guard, direction, time = (
         contacts.trajectory,
@@ -280,7 +276,9 @@ def _returns_where_sliding_begins(contacts: ContactTable, status: np.ndarray) ->
 
 # -- work ------------------------------------------------------------------------------------------
 def slice_of(states: int) -> int:
-    """Steps of the lanes between two checks for Ctrl-C: steps of many states take longer."""
+    """Steps of the lanes between two checks for Ctrl-C: fewer for many states, whose steps take
+    longer.
+    """
     return max(SLICE * 4 // max(states, 2) ** 2, 1)
 
 
@@ -292,7 +290,7 @@ def _advance(
     room: Contacts,
     show: Callable[[float], None] | None = None,
 ) -> None:
-    """Move a chunk to its end in slices; empties its table of contacts after each. It ends early if
+    """Move a chunk to its end in slices, and empty its table of contacts after each. Stop early if
     the memory for contacts is full.
     """
     arrays = chunk.arrays
@@ -312,7 +310,7 @@ def _advance(
 
 
 def _share_done(chunks: list[_Chunk]) -> float:
-    """Share of all periods that lie behind the trajectories."""
+    """Share of all periods that the trajectories have passed."""
     done = sum(_behind(chunk.arrays) for chunk in chunks)
     return done / max(sum(len(chunk.arrays["status"]) for chunk in chunks), 1)
 
@@ -331,7 +329,7 @@ def _run_chunks(
     progress: Callable[[float], None] | None,
     workers: int,
 ) -> None:
-    """All chunks; Ctrl-C never comes in the midst of one, which would cut a table of contacts in
+    """Run all chunks. Ctrl-C never interrupts a chunk midway: a table of contacts would be cut in
     two.
 
     A single chunk that is moved by this very thread reports its own progress: a thread only for

@@ -12,7 +12,7 @@ from saltus.flow.method import check_positive, explain_unknown_options
 from saltus.flow.one_by_one import OneByOne
 from saltus.units import to_si
 
-#: Steps that a forcing period takes at least: fewer don't see what drives the motion.
+#: Least steps in a forcing period: fewer miss changes of the forcing.
 STEPS_PER_FORCING = 10
 
 
@@ -72,7 +72,7 @@ class RK4(OneByOne):
 
     @property
     def fixed(self) -> bool:
-        """They have."""
+        """True: the steps have one length."""
         return True
 
     def check_forcing(self, period: float) -> None:
@@ -87,10 +87,10 @@ class RK4(OneByOne):
 
     @property
     def label(self) -> str:
-        """Such as ``RK4 henon (0.001)``."""
+        """A label such as ``RK4 henon (0.001)``."""
         return f"{self.name} {self.events} ({float(self.step):g})"
 
     @property
     def noise(self) -> float:
-        """Nothing measures the errors of fixed steps: what they are taken to be."""
+        """The assumed error: nothing measures the errors of fixed steps."""
         return 1e-3 if self.records_contacts else 0.01

@@ -1,5 +1,5 @@
-"""The Taylor series of motions: from the places where a flow knows them, with those of any function
-of them.
+"""Taylor series of motions, and of functions of them, from the nodes at which a flow knows the
+states.
 
 The series are those that the flow itself steps by: :mod:`saltus.codegen` writes them, NumPy
 evaluates them for thousands of places at once, and nothing is compiled.
@@ -20,12 +20,12 @@ from saltus.flow.set_aside import Boundaries
 from saltus.kernels.isolation import ROUNDING
 from saltus.system import System
 
-#: Order and log2 of the tolerance of the series: their truncation is rounding.
+#: Order, and log2 of the tolerance, of the series: their truncation is rounding.
 ORDER, LOG2_TOLERANCE = 20, -50.0
-#: Pieces between two nodes; more mean a pole.
+#: Most pieces between two nodes; more mean a pole.
 MOST_PIECES = 1000
-#: A boundary nearer than this to the start of a piece is the one at which the piece starts [lengths
-#: of the piece].
+#: A boundary nearer than this to the start of a piece is the boundary it starts at [lengths of the
+#: piece].
 START_TOLERANCE = 1e-9
 
 
@@ -63,8 +63,8 @@ class Pieces:
 
 @dataclass(frozen=True)
 class Nodes:
-    """Where motions are known: row by row in the order of motion and time; each lasts until the
-    next.
+    """Nodes, at which the states of motions are known: sorted by motion and time; each lasts until
+    the next.
     """
 
     motion: np.ndarray
@@ -80,8 +80,8 @@ class Nodes:
 
 
 class MotionSeries:
-    """The Taylor series of a map_'s states, of some quantities (the last guards of ``watched``) and
-    of its gaps.
+    """Taylor series of a map's states, of some quantities (the last guards of ``watched``) and of
+    its gaps.
     """
 
     def __init__(self, map_: Stroboscope, watched: System, guards: int):
@@ -108,8 +108,8 @@ class MotionSeries:
         )
 
     def of(self, nodes: Nodes, cubic: bool) -> list[Pieces]:
-        """The pieces that begin at nodes and fill them; for cubics the first terms of
-        each will do.
+        """The pieces that begin at the nodes and fill the time to the next; for cubics one piece a
+        node with the lowest terms.
         """
         result, state, left = [], nodes.state.T.copy(), nodes.length.copy()
         # -1: no term is left out
@@ -146,8 +146,8 @@ class MotionSeries:
     def _step(
         self, nodes: Nodes, state: np.ndarray, side: np.ndarray, new: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """All terms at some places, and how far they reach. At new nodes the sides of guards of the
-        quantities' own are found first.
+        """All terms at the nodes, and the lengths they hold for. At new nodes the sides of the
+        quantities' own guards are found first.
         """
         module, motion = self._module, nodes.motion
         constants, (clock, room) = self._constants[:, motion], self._clock(nodes)
@@ -170,8 +170,8 @@ class MotionSeries:
         return work, h
 
     def _clock(self, nodes: Nodes) -> tuple[np.ndarray, np.ndarray]:
-        """Phase, time at phase zero, the phases of all harmonics there, what the clocks hold; and
-        the time to the next break of one.
+        """Phase, time at phase zero, the phases of all harmonics there, the state of the clocks;
+        and the time to the next break of a clock.
         """
         module, motion = self._module, nodes.motion
         clock = self._turns[:, motion]
@@ -215,7 +215,7 @@ class MotionSeries:
         work: np.ndarray,
         h: np.ndarray,
     ) -> np.ndarray:
-        """Steps cut down to where the right-hand side agrees with the series: a term may sleep at
+        """Shorten steps to where the right-hand side agrees with the series: a term may vanish at
         the node.
         """
         module, width = self._module, len(h)
@@ -232,7 +232,7 @@ class MotionSeries:
 
     def _until_own_boundary(self, work: np.ndarray, h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Lengths up to the first boundary of the quantities' own, and the guards float64[guards,
-        n] that flip there.
+        n] that change there.
         """
         flips = np.zeros((self._module.NGUARDS + self._module.SINGULAR, len(h)), bool)
         for guard in range(self._own, self._guards):
@@ -254,7 +254,7 @@ class MotionSeries:
         return work[first : first + ORDER + 1]
 
     def _gap(self, work: np.ndarray, guard: int) -> np.ndarray:
-        """Terms of a gap, or of a quantity."""
+        """Terms of the gap of a guard, or of a quantity."""
         module = self._module
         terms: np.ndarray = module.GUARD_SIGN[guard] * self._rows(work, module.GUARD_ROW[guard])
         terms[0] = work[module.GAP_ROW + guard]
@@ -265,7 +265,7 @@ class MotionSeries:
         return noise
 
     def _piece(self, nodes: Nodes, work: np.ndarray, h: np.ndarray) -> Pieces:
-        """What is asked for, over lengths h."""
+        """The pieces of states, quantities and gaps, over lengths h."""
         states = [self._rows(work, i * (ORDER + 1)) for i in range(self._module.NSTATES)]
         terms = np.stack([*states, *(self._gap(work, guard) for guard in self._asked)], axis=1)
         terms *= (h ** np.arange(ORDER + 1)[:, None])[:, None]

@@ -13,7 +13,7 @@ import numpy as np
 
 from saltus.kernels import status as st
 
-#: Steps between two checks of a trajectory; steps over which its average pace is measured.
+#: Steps between two checks, and between two long checks, of a trajectory's pace.
 CHECK_STEPS, LONG_CHECK_STEPS = 20_000, 1_000_000
 #: Share of the rest of a run that CHECK_STEPS steps must bring. Less would need 2e11 steps to the
 #: end: days.
@@ -36,8 +36,7 @@ def marks(count: int) -> dict[str, np.ndarray]:
 
 
 def resume(arrays: dict[str, np.ndarray], due: float) -> bool:
-    """Resume the trajectories that were stopped for a check and are fast enough; returns whether
-    there are any.
+    """Resume the stopped trajectories that are fast enough; True if there are any.
 
     Parameters
     ----------
@@ -70,8 +69,8 @@ def resume(arrays: dict[str, np.ndarray], due: float) -> bool:
 
 
 def _since(arrays: dict[str, np.ndarray], who: np.ndarray, which: str) -> np.ndarray:
-    """Periods since a mark: whole ones and the rest apart, so that no digit is lost
-    in a long run.
+    """Periods since a mark. Whole periods and the rest are subtracted apart, so that a long run
+    loses no digits.
     """
     whole, phase = (
         arrays["count"][who] - arrays[f"{which}_count"][who],

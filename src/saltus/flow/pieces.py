@@ -1,5 +1,4 @@
-"""Motions as polynomials: what a compiled flow has computed, with everything between its samples
-and contacts.
+"""Motions as polynomials between the samples and contacts of a compiled flow.
 
 The flow hands over its states some times a period and at every contact, and the mode in between.
 From each of these nodes the motion is the Taylor series of the equations in that mode:
@@ -25,12 +24,12 @@ from saltus.flow.request import Outcome, Schedule
 from saltus.language.expression import Expr
 from saltus.system import System
 
-#: Samples of a period besides the contacts: for an exact method, for another method, and for
+#: Nodes of a period besides the contacts: for an exact method, for another method, and samples for
 #: cubics.
 NODES, NODES_INEXACT, SAMPLES = 8, 64, 1000
-#: Nodes whose series are worked out at a time: some thousand rows of them fill a few ten megabytes.
+#: Nodes whose series are computed at a time: some tens of megabytes.
 WIDTH = 2048
-#: A sample that lies less than this behind a contact is the contact [forcing periods].
+#: A sample within this time after a contact is the contact [forcing periods].
 SAME = 1e-9
 
 
@@ -81,13 +80,13 @@ def pieces(
 
 @lru_cache(maxsize=256)
 def _watched(system: System, guards: tuple[Guard, ...], quantities: tuple[Expr, ...]) -> System:
-    """A system whose last guards are quantities: made once, since its series are."""
+    """The system with the quantities as its last guards; cached, since its series are costly."""
     asked = tuple(Guard(f"quantity {i}", quantity) for i, quantity in enumerate(quantities))
     return replace(system, guards=(*guards, *asked))
 
 
 def nodes_of(map_: Stroboscope, cubic: bool = False) -> int:
-    """Samples of a period."""
+    """Nodes of a period."""
     if cubic or not map_.method.records_contacts:
         return SAMPLES
     return NODES if map_.exact else NODES_INEXACT
@@ -96,7 +95,7 @@ def nodes_of(map_: Stroboscope, cubic: bool = False) -> int:
 def _pieces(
     map_: Stroboscope, start: np.ndarray, periods: int, watched: System, guards: int, cubic: bool
 ) -> tuple[Pieces, Outcome]:
-    """The pieces by Taylor series, or by cubics, and what the flow computed."""
+    """The pieces by Taylor series or by cubics, and the outcome of the flow."""
     count = nodes_of(map_, cubic)
     schedule = Schedule.even(periods, count, beyond=int(cubic))
     outcome = map_.run(start, periods, schedule, record=0)
@@ -116,7 +115,7 @@ def _pieces(
 def _nodes(
     map_: Stroboscope, outcome: Outcome, periods: int, schedule: Schedule, cubic: bool
 ) -> Nodes:
-    """Samples and contacts in one list, without what lies at one instant with the next."""
+    """Samples and contacts in one list; of two at the same instant the later one counts."""
     k, m, size = outcome.samples.shape
     contacts = outcome.contacts
     whole = np.isfinite(outcome.samples).all(axis=(1, 2)) & (m > 0)
@@ -153,8 +152,8 @@ def _nodes(
 
 
 def _joined(parts: list[list[Pieces]]) -> Pieces:
-    """All pieces in the order of motion and time; cubics have as many terms as the others, the last
-    ones zero.
+    """All pieces in the order of motion and time. Cubics are padded with zero terms to the length
+    of the others.
     """
     flat = [piece for part in parts for piece in part]
     longest = max(len(piece.terms) for piece in flat)
@@ -172,8 +171,8 @@ def _joined(parts: list[list[Pieces]]) -> Pieces:
 
 
 def _between(whole: Pieces) -> Pieces:
-    """Cubics from each node to the next, through values and rates at both: the node at the end of a
-    motion closes its last piece.
+    """Cubics from each node to the next, through values and rates at both. The node at the end of a
+    motion only closes its last piece.
     """
     first = np.flatnonzero(np.diff(whole.motion) == 0)
     length = whole.length[first]

@@ -1,5 +1,5 @@
-"""Drives with breaks: square waves, saw-teeth, pulses, recorded series. The instants at which they
-break follow from their parameters by a formula: steps end there, and nothing is searched for.
+"""Drives with breaks: square waves, saw-teeth, pulses, recorded series. The instants of their
+breaks follow from their parameters by a formula, so steps end there and nothing is searched for.
 """
 
 from __future__ import annotations
@@ -241,7 +241,7 @@ def recorded(
 
 
 def _times(numbers: Any, factor: float) -> Any:
-    """Numbers times a factor; anything else as it is, for :func:`curve` to refuse."""
+    """Numbers times a factor; anything else unchanged, for :func:`curve` to refuse."""
     try:
         return np.asarray(numbers, dtype=np.float64) * factor
     except (TypeError, ValueError, OverflowError):

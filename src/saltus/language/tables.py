@@ -193,8 +193,8 @@ def table(
 
 
 def look_up(x: Operand, data: Table) -> Any:
-    """The value of a table at ``x``, as :func:`table` gives it. Raises TraceError if it can't be
-    looked up there.
+    """The value of a table at ``x``, as :func:`table` gives it. Raises TraceError if ``x`` can't be
+    an argument.
     """
     if not isinstance(x, Expr):
         return float(data(x))
@@ -254,7 +254,7 @@ def curve(points: Any, values: Any, kind: str, outside: str, name: str, unit: st
 
 
 def _ascending(x: np.ndarray, y: np.ndarray, i: int) -> str:
-    """What to do about point number i, which doesn't lie after the one before it."""
+    """Advice about point number i, which isn't greater than the one before it."""
     if (np.diff(x) < 0).any():
         return "Sort them."
     if y[i] == y[i - 1]:

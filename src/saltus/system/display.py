@@ -17,7 +17,7 @@ from saltus.language.text import Writer
 from saltus.system.equations_of_motion import EquationsOfMotion
 from saltus.units import from_si
 
-#: How the description of a structure begins.
+#: First words of the description of a structure.
 STRUCTURE = "Structure of"
 
 
@@ -38,7 +38,7 @@ def equation_lines(system: EquationsOfMotion) -> list[str]:
 
 
 def _jumps(system: EquationsOfMotion, writer: Writer) -> Iterator[tuple[str, str, Expr]]:
-    """Where the state jumps: the place, a state and its new value."""
+    """Jumps of the state: the side where each happens, a state and its new value."""
     for number, guard in enumerate(system.guards):
         if guard.law is None:
             continue
@@ -72,13 +72,13 @@ def system_text(system: EquationsOfMotion) -> str:
 
 
 def _about(system: EquationsOfMotion) -> list[str]:
-    """What is said of a structure, whose equations alone don't tell its frequencies."""
+    """The lines about a structure, whose equations alone don't show its frequencies."""
     words = system.description if system.description.startswith(STRUCTURE) else ""
     return textwrap.wrap(f"{'about':<12}{words}", 100, subsequent_indent=" " * 12) if words else []
 
 
 def _boundaries(system: EquationsOfMotion) -> int:
-    """How many boundaries there are: hold guards aren't any."""
+    """Number of boundaries, hold guards not counted."""
     return sum(not is_hold(guard) for guard in system.guards)
 
 
@@ -92,7 +92,7 @@ def _forcing(system: EquationsOfMotion) -> str:
 
 
 def _guard_rows(system: EquationsOfMotion) -> list[tuple[str, str]]:
-    """Name and place of each guard."""
+    """Name and equation of each guard."""
     writer = _writer(Writer, system, free_field(system.field, system.guards))
     rows = []
     for number, guard in enumerate(system.guards):
@@ -111,7 +111,7 @@ def _guard_rows(system: EquationsOfMotion) -> list[tuple[str, str]]:
 
 
 def _by_law(law: Law | None, place: str, system: EquationsOfMotion, writer: Writer) -> str:
-    """What happens at a boundary, and where it is."""
+    """The effect of a boundary in words, and its equation."""
     if law is None:
         return place
     if law.kind == "surface":
@@ -131,7 +131,7 @@ def _by_law(law: Law | None, place: str, system: EquationsOfMotion, writer: Writ
 
 
 def _number(part: Expr, system: EquationsOfMotion, writer: Writer) -> str:
-    """A plain number of a law: its value, or how it depends on the state."""
+    """A plain number of a law: its value, or its dependence on the state."""
     if varies(part):
         return writer.text(part)
     (value,) = evaluate([part], values=system.values)
@@ -153,7 +153,7 @@ def _parameter_rows(system: EquationsOfMotion) -> list[tuple[str, str]]:
 
 
 def _value(system: EquationsOfMotion, parameter: str) -> str:
-    """The value of a parameter as people write it."""
+    """The value of a parameter in a readable unit."""
     return from_si(system.values[parameter], system.units[parameter])
 
 

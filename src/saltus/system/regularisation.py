@@ -1,5 +1,5 @@
-"""Smooth stand-ins for contacts: a system whose boundaries are blended over a width in place of
-being located.
+"""Regularised contacts: a system whose boundaries are blended over a width in place of being
+located.
 
 Each side of a guard has a weight, the step H(gap/width) or one minus it, and a piece counts with
 the weight of its condition. Every analysis then works on the system as on any other, by any method.
@@ -25,7 +25,8 @@ from saltus.system.guard_units import gap_units
 from saltus.system.system import System
 from saltus.units import coherent_unit
 
-#: Where a law of a user is tried, and how near to 0 and 1 it must be there: arctan is off by 0.003.
+#: Argument at which a user's law is tried, and largest distance from 0 and 1 there: arctan is off
+#: by 0.003.
 _FAR, _NEAR = 100.0, 0.02
 
 
@@ -35,7 +36,7 @@ def regularise(
     *,
     width: float | str | Mapping[str, float | str],
 ) -> System:
-    """A smooth stand-in of a system: at each boundary the pieces are blended over a width.
+    """Regularise a system: at each boundary the pieces are blended over a width.
 
     A piece that holds where ``gap > 0`` is multiplied by a smoothed step ``H(gap/width)``, the
     other one by ``1 - H``; a weight of joined conditions is the product of theirs. A spring behind
@@ -137,7 +138,7 @@ def regularise(
 
 
 def _without_laws(system: System) -> System:
-    """The system of which friction only slips: nothing is held. Raises a ParameterError if the
+    """The system with friction that only slips: nothing is held. Raises a ParameterError if the
     state jumps at a contact.
     """
     for guard in system.guards:
@@ -233,7 +234,7 @@ def _free_name(system: System, others: Mapping[str, float], guard: str | None) -
 
 
 def _check_both_sides(system: System, smoothed: Mapping[int, str]) -> None:
-    """Raise a TraceError if a piece ends to exist on a boundary that is to be blended."""
+    """Raise a TraceError if a piece isn't defined beyond a boundary that is to be blended."""
     for number in set_aside(system.field, system.guards).guards:
         if number in smoothed:
             name = system.guards[number].name

@@ -14,14 +14,15 @@ from saltus.language.expression import depends_on
 from saltus.system.modes import sides
 from saltus.system.system import System
 
-#: States at which both sides are compared, and powers of ten between which their sizes lie.
+#: States at which both sides are compared, and the powers of ten between which their magnitudes
+#: lie.
 SAMPLES, SIZES = 256, (-6.0, 2.0)
 #: Share of a value by which it may differ from its mirror image: rounding.
 ROUNDING = 1e-7
 
 
 def is_symmetric(system: System, varied: Mapping[str, tuple[float, float]]) -> bool:
-    """Whether the mirror image of each motion is one, whatever value some parameters have.
+    """True if the mirror image of each motion is a motion too, at all values of some parameters.
 
     Both sides are compared at random states and times. Contacts that stick or slide, and jumps
     other than impacts, count as not symmetric.
@@ -72,7 +73,7 @@ class _Place:
 
 
 def _period(system: System, values: Mapping[str, np.ndarray]) -> np.ndarray | None:
-    """Forcing periods, any where the time doesn't matter; None where it does without forcing."""
+    """Forcing periods; ones without forcing if the time doesn't matter, None if it does."""
     if system.forced_at is not None:
         frequency = values.get(system.forced_at, np.full(SAMPLES, system.values[system.forced_at]))
         return np.asarray(system.period({system.forced_at: 1.0}) / frequency)
@@ -85,7 +86,7 @@ def _opposite(one: np.ndarray, other: np.ndarray) -> bool:
 
 
 def _mirror(system: System, i: int, j: int, here: _Place, there: _Place) -> bool:
-    """Whether an impact is the mirror image of another one."""
+    """True if an impact is the mirror image of another one."""
     one, other = system.guards[i], system.guards[j]
     assert one.law is not None
     assert other.law is not None

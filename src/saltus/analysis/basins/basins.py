@@ -1,4 +1,4 @@
-"""`basins`: which attractor each start leads to."""
+"""`basins`: the attractor that each start of a grid leads to."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from saltus.flow.threads import on_threads
 from saltus.interrupt import Interrupted
 from saltus.system import System
 
-#: Share of the progress that the search for attractors takes.
+#: Share of the progress bar for the search for attractors.
 SCOUTING = 0.05
 
 

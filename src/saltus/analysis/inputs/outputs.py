@@ -1,5 +1,5 @@
-"""Outputs: what engineers read off a motion besides its states - a force, an acceleration, the
-motion of a base.
+"""Outputs: functions of a motion besides its states, such as a force, an acceleration or the motion
+of a base.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Outputs:
 
 
 def outputs_of(system: System, given: Mapping[str, Any] | None = None) -> Outputs:
-    """The outputs of a system: its states, then what the user asks for.
+    """The outputs of a system: its states, then the user's functions.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def outputs_of(system: System, given: Mapping[str, Any] | None = None) -> Output
 
 
 def _unit(system: System, formula: Expr, name: str, declared: str) -> str:
-    """The unit of an output: that which was declared, or what its formula comes to."""
+    """The unit of an output: the declared one, or that of its formula."""
     (found,) = units_of(system.states, system.units, system.field, [formula])
     if declared and found and dimension(found) != dimension(declared):
         raise UnitError(

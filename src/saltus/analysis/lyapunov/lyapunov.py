@@ -1,4 +1,4 @@
-"""`lyapunov`: how fast small deviations grow or die along a motion."""
+"""`lyapunov`: growth rates of small deviations along a motion."""
 
 from __future__ import annotations
 
@@ -28,16 +28,14 @@ from saltus.results.dataset import schema
 from saltus.system import System
 
 METHODS = ("variational", "wolf")
-#: Units in which exponents are given: what one block is worth, and whether the logarithm is
-#: natural.
+#: Units of exponents: the time that one block stands for, and True for a natural logarithm.
 UNITS = {
     "1/s": (False, 1.0),
     "1/period": (True, 1.0),
     "bit/s": (False, math.log(2)),
     "bit/period": (True, math.log(2)),
 }
-#: Blocks from which something can be said at least: the error of the mean needs 8 independent
-#: batches, of some blocks each.
+#: Least number of blocks: the error of the mean needs 8 independent batches, of some blocks each.
 LEAST_PERIODS = 64
 
 
@@ -188,7 +186,7 @@ def _check_words(method: Any, unit: Any, system: System) -> None:
 def _dataset(
     system: System, flow: Method, group: Ensemble, work: Algorithm, unit: str
 ) -> xr.Dataset:
-    """Everything under its name and in its unit."""
+    """The Dataset of the exponents, in the chosen unit."""
     per_period, logarithm = UNITS[unit]
     factor = (1.0 if per_period else 1.0 / work.map.period) / logarithm
     attrs = (

@@ -1,5 +1,5 @@
-"""`regularisation_widths`: how wide may the smooth stand-in of a contact be? As wide as makes no
-more error than the method that integrates it, and what a step then costs.
+"""`regularisation_widths`: the widths at which a regularised contact is as exact as the method that
+integrates it, and the steps it then takes.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from saltus.results.dataset.schema import WIDTHS
 from saltus.system import System, gap_units, regularise
 from saltus.units import to_si
 
-#: Widths that are tried where none are given, as shares of the largest gap of the motion.
+#: Default widths, as shares of the largest gap of the motion.
 SHARES = np.geomspace(1e-1, 1e-6, 16)
 
 
@@ -41,8 +41,8 @@ def regularisation_widths(
     points: int = 32,
     threads: int | None = None,
 ) -> xr.Dataset:
-    """The width at which a smooth stand-in of a system is as wrong as the method that integrates
-    it, and the steps that it takes there.
+    """The width at which the error of regularisation equals that of the integrating method, and the
+    steps taken there.
 
     A forcing period is computed from points of the settled motion: exactly; by the method, with its
     contacts; and of :func:`saltus.regularise`'s stand-in at each width, exactly and by the method.
@@ -168,8 +168,8 @@ def _widths(system: System, orbit: np.ndarray, given: Any, unit: str) -> np.ndar
 
 
 def _where_equal(widths: np.ndarray, errors: np.ndarray, wanted: float) -> float:
-    """The largest width below which the error by the width stays under another, NaN if there is
-    none among them.
+    """The largest width below which the error stays under another one, NaN if there is none among
+    them.
     """
     below = errors <= wanted
     count = len(below) if below.all() else int(np.argmin(below[::-1]))

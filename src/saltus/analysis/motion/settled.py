@@ -1,4 +1,4 @@
-"""What a motion has settled to, so far as the kept periods can tell.
+"""The response that a motion has settled to, as far as the kept periods show.
 
 The stroboscope (states at whole forcing periods) is searched for the smallest n after which it
 repeats. That is an observation, not a proof: a slow transient may pass for settled, and a response
@@ -29,24 +29,24 @@ from saltus.results.dataset.schema import (
     states_of,
 )
 
-#: Largest mismatch that counts as a repeat: far above rounding, far below what tells 24T from its
-#: neighbour 12T on the rig (1e-2).
+#: Largest mismatch that counts as a repeat: far above rounding, far below the difference of 24T
+#: from its neighbour 12T on the rig (1e-2).
 TOLERANCE = 1e-6
 #: A transient of an nT response may repeat to the tolerance after 3n periods a little before it
-#: does after n. Where a part of the period repeats to this multiple of the tolerance, nothing is
-#: decided yet.
+#: does after n. If a part of the period repeats to this multiple of the tolerance, the response is
+#: undecided.
 UNDECIDED = 10
-#: Periods looked at, by default: enough for two repeats of a 48T response.
+#: Default number of last periods: enough for two repeats of a 48T response.
 LAST = 96
-#: Where nothing but magnitudes is known, a state counts as at least this share of the largest of
-#: its unit: one that has died away beside others has no size of its own.
+#: Least size of a state, as a share of the largest of its unit, if only magnitudes are known: a
+#: state that has decayed besides others has no size of its own.
 LEAST_SHARE = 1e-6
-#: The size that every state has at least [SI]: of one that died away and is alone of its unit. An
-#: atom measures 1e-10 m.
+#: Least size of any state [SI], for one that has decayed and is alone in its unit. An atom measures
+#: 1e-10 m.
 AT_REST = 1e-14
 #: Rounding of a state, relative to the largest value of its unit.
 ROUNDING = 64 * np.finfo(float).eps
-#: Numbers of one state that are looked at together.
+#: Numbers of one state that are processed together.
 TOGETHER = 2**19
 
 
@@ -141,7 +141,7 @@ def _phases(run: xr.Dataset) -> np.ndarray:
 
 
 def _parts(samples: np.ndarray) -> Iterator[slice]:
-    """Trajectories that are looked at together."""
+    """Groups of trajectories that are processed together."""
     size = max(TOGETHER // max(samples.shape[1], 1), 1)
     return (slice(first, first + size) for first in range(0, len(samples), size))
 
@@ -149,7 +149,10 @@ def _parts(samples: np.ndarray) -> Iterator[slice]:
 def _scales(
     samples: Sequence[np.ndarray], units: Sequence[str], whole: np.ndarray, tolerance: float
 ) -> np.ndarray:
-    """What differences of each state are measured against, float64[trajectory, state].
+    """Scales of the differences of each state, float64[trajectory, state].
+
+    The range of a state at rest, or near it, is no scale: the range of other states of its unit,
+    the rounding of values of that unit, or :data:`AT_REST` stands for it.
 
     The range of a state that rests, or is on its way there, says nothing: it is measured by the
     range of others of its unit, by the rounding of values of that unit, or by :data:`AT_REST`.
@@ -172,8 +175,8 @@ def _scales(
 def _smallest_repeats(
     strobe: np.ndarray, scale: np.ndarray, tolerance: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Smallest n with states n periods apart equal, and how equal, for each trajectory; 0 and the
-    smallest mismatch where none is decided.
+    """Smallest n with states n periods apart equal, and their mismatch, for each trajectory; 0 and
+    the smallest mismatch if undecided.
 
     ``strobe`` has shape (trajectory, state, period), ``scale`` (trajectory, state); n runs up to
     half of the periods.
@@ -201,8 +204,8 @@ def _smallest_repeats(
 def _measures(
     run: xr.Dataset, samples: Mapping[str, np.ndarray], whole: np.ndarray, n: np.ndarray
 ) -> dict[str, Any]:
-    """Contacts in a response, peak and rms of each state, over whole responses; where nothing
-    repeats, over all that was looked at.
+    """Contacts in a response, peak and rms of each state, over whole responses; over all kept
+    periods if nothing repeats.
     """
     last, each = len(whole) - 1, np.arange(len(n))
     repeats = np.where(n > 0, last // np.maximum(n, 1), 0)
@@ -240,7 +243,7 @@ def _contacts(run: xr.Dataset, first: np.ndarray, final: int, count: int) -> np.
     time = np.broadcast_to(np.atleast_2d(run["time"].values), (count, run["time"].shape[-1]))
     contact = run["contact_time"].values
     place, known = np.zeros(contact.size, np.int64), np.ones(contact.size, bool)
-    if "trajectory" in run.coords:  # of those that were chosen, in their order
+    if "trajectory" in run.coords:  # of the chosen trajectories, in their order
         numbers, who = np.atleast_1d(run["trajectory"].values), run["contact_trajectory"].values
         order = np.argsort(numbers)
         place = order[np.searchsorted(numbers, who, sorter=order) % count]

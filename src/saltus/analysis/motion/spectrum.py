@@ -1,4 +1,4 @@
-"""`spectrum`: the response by frequency."""
+"""`spectrum`: amplitudes of the response by frequency."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from saltus.results import Subject, build, inherited
 from saltus.results.dataset import schema
 from saltus.results.dataset.reader import reader
 
-#: Windows by name: weights of n samples. Both are periodic (the sample after the last would be the
-#: first).
+#: Windows by name: weights of n samples. They are periodic: the sample after the last would be the
+#: first.
 WINDOWS: dict[str, Callable[[int], np.ndarray]] = {
     "none": lambda n: np.ones(n),
     "hann": lambda n: 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(n) / n),
@@ -153,8 +153,8 @@ def spectrum(
 # -- which samples ---------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class _Stretch:
-    """Samples ``first`` to ``first + count``: frequencies [Hz], orders, the time of the first [s];
-    the periods of the responses [T].
+    """Samples ``first`` to ``first + count``: frequencies [Hz], orders, the time of the first
+    sample [s]; the periods of the responses [T].
     """
 
     first: int
@@ -214,7 +214,7 @@ def _forced_stretch(run: xr.Dataset, last: int | None) -> _Stretch:
             f"one by one: run.isel(trajectory=0)."
         )
     if last is None and response.all():
-        periods = common  # more of the same would only put empty lines between
+        periods = common  # more periods would only add empty lines between
     periods -= periods % common
     first, count = int(whole[-periods - 1]), int(whole[-1] - whole[-periods - 1])
     order = np.arange(count // 2 + 1) / periods
@@ -227,7 +227,8 @@ def _forced_stretch(run: xr.Dataset, last: int | None) -> _Stretch:
 
 
 def _free_stretch(run: xr.Dataset, last: int | None) -> _Stretch:
-    """All samples of a system without forcing; the last one would be the first of a repeat."""
+    """All samples of a system without forcing; the last one is left out where it repeats the first.
+    """
     if last is not None:
         raise ParameterError(
             "spectrum: last= counts forcing periods, and this system isn't "

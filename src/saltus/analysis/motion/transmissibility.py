@@ -1,4 +1,4 @@
-"""`transmissibility`: how much of one output of a response arrives in another."""
+"""`transmissibility`: the ratio of two outputs of a response."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from saltus.results.dataset.build import finish
 from saltus.results.dataset.reader import reader
 from saltus.results.dataset.schema import RESPONSES, check
 
-#: What two outputs are compared by.
+#: Quantities by which two outputs are compared.
 By = Literal["amplitude", "rms", "rms_about_mean"]
 
 

@@ -15,13 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-#: Neighbours that a point has within the default of the largest distance: enough that one of them
-#: lies in the old direction.
+#: Neighbours of a point within the default largest distance: enough that one of them lies in the
+#: old direction.
 CROWD = 20
-#: Points that are asked for it, evenly spread.
+#: Points for which this distance is measured, evenly spread.
 ASKED = 200
-#: Angle that a replacement may turn by at first [rad], and how often the largest distance grows
-#: before the angle is doubled: Wolf's.
+#: Largest angle of a first replacement [rad], and widenings of the largest distance before the
+#: angle is doubled (Wolf's values).
 ANGLE, WIDENINGS = 0.3, 5
 
 
@@ -46,7 +46,7 @@ class Evolutions:
 
 @dataclass(frozen=True)
 class Search:
-    """Where neighbours are looked for.
+    """Limits of the search for neighbours.
 
     Attributes
     ----------
@@ -72,8 +72,8 @@ def crowd_distance(points: np.ndarray, smallest: float, exclude: int) -> float:
 
 
 def _crowd(points: np.ndarray, tree: cKDTree, here: int, smallest: float, exclude: int) -> float:
-    """Distance of a point to its 20th allowed neighbour: among a few that the tree finds, among
-    more, at last among all.
+    """Distance of a point to its 20th allowed neighbour; the tree returns more neighbours until
+    there are enough, at last all.
     """
     for count in (4 * CROWD, 16 * CROWD, len(points)):
         if count < len(points) // 8:
@@ -88,14 +88,14 @@ def _crowd(points: np.ndarray, tree: cKDTree, here: int, smallest: float, exclud
 
 
 def follow(points: np.ndarray, search: Search) -> Evolutions:
-    """The evolutions of the trajectory float64[n, m], from its first point on that has a neighbour;
-    empty if none has.
+    """The evolutions of the trajectory float64[n, m], from its first point with a neighbour on;
+    empty if none has one.
     """
     return _Chase(points, search).run()
 
 
 class _Chase:
-    """A fiducial point and its neighbour on their way."""
+    """A fiducial point and its neighbour, moving along the trajectory."""
 
     def __init__(self, points: np.ndarray, search: Search):
         self._points, self._search = points, search
@@ -114,7 +114,7 @@ class _Chase:
             there = here + search.evolve, neighbour + search.evolve
             before, after = points[neighbour] - points[here], points[there[1]] - points[there[0]]
             distance, later = float(np.linalg.norm(before)), float(np.linalg.norm(after))
-            # on one another: no growth to be seen, and no direction
+            # on one another: neither growth nor direction is defined
             if later == 0.0 or distance == 0.0:
                 neighbour = None
                 continue
@@ -135,8 +135,8 @@ class _Chase:
     def _replacement(
         self, there: tuple[int, int], direction: np.ndarray
     ) -> tuple[int | None, float]:
-        """The neighbour that takes over: the one that turns least, close by if it can be; the old
-        one if there is no other.
+        """The neighbour that replaces the old one: the one that turns least, close by if possible;
+        the old one if there is no other.
         """
         here, old = there
         if here >= len(self._points) - self._search.evolve:

@@ -1,5 +1,5 @@
-"""Motions at neighbouring values of a parameter that are one, where no branch can be followed: of
-those that never repeat, the ones that lie in the same place.
+"""Match motions that never repeat at neighbouring values of a parameter: they are one if they lie
+in the same place. No branch of them can be followed.
 """
 
 from __future__ import annotations
@@ -9,11 +9,11 @@ from scipy.optimize import linear_sum_assignment
 
 from saltus.analysis.attractors.grid_responses import GridResponses
 
-#: Values over which a motion that never repeats may be missing.
+#: Most consecutive values at which a motion that never repeats may be missing.
 MISSED = 3
-#: Farthest that such a motion moves from one value to the next, in units of its own range.
+#: Largest displacement of such a motion from one value to the next, in units of its own range.
 MOVED = 0.35
-#: What is farther apart than any two responses.
+#: A distance beyond that of any two responses.
 _NEVER = 1e6
 
 
@@ -30,7 +30,7 @@ def matched(found: GridResponses, of: np.ndarray, places: int, known: int) -> np
         Values of the parameter; branches that were followed, from which number on the others are
         counted in the order in which they begin.
     """
-    branch, heads = of.copy(), list[int]()  # response that a branch ends with so far
+    branch, heads = of.copy(), list[int]()  # the last response of each branch so far
     for place in range(places):
         here = np.flatnonzero((found.place == place) & (of < 0))
         near = [i for i, last in enumerate(heads) if place - found.place[last] <= MISSED]
@@ -57,8 +57,8 @@ def _matches(found: GridResponses, before: list[int], here: np.ndarray) -> list[
 
 
 def _distance(found: GridResponses, a: int, b: int) -> float:
-    """How far two motions at different values lie apart, in units of their range; inf if they
-    differ in kind.
+    """Distance of two motions at different values, in units of their range; inf if they differ in
+    kind.
     """
     if found.kind[a] != found.kind[b] or found.period[a] != found.period[b]:
         return np.inf

@@ -12,17 +12,17 @@ import numpy as np
 
 from saltus.errors import ParameterError, among, nearest, shown
 
-#: Where a contact begins: above its gap, below minus its gap, or at both.
+#: Sides on which contact begins: above the gap, below minus the gap, or both.
 SIDES = ("upper", "lower", "both")
 P = TypeVar("P", "Contact", "Force")
 
 
-#: How to write what is no part of a structure.
+#: Advice on parts that can't be given as data.
 BY_HAND = (
     "Write the equations of the modes with @sl.system: sl.structure_modes(mass, stiffness, "
     "modes) gives their frequencies and shapes."
 )
-#: What people ask of a contact or a force that has no such argument, and what to do.
+#: Advice on arguments that a contact or a force lacks.
 _ELSEWHERE = {
     "restitution": "A contact is a spring, and loses energy by damping=. " + BY_HAND.replace(
         "Write", "For a rigid stop, sl.impact, write"),
@@ -42,7 +42,7 @@ _ELSEWHERE = {
 
 
 def _answered(kind: type[P]) -> type[P]:
-    """A part whose wrong arguments are answered in words."""
+    """Answer wrong arguments of a part in words."""
     made = kind.__init__
 
     @functools.wraps(made)
@@ -55,7 +55,7 @@ def _answered(kind: type[P]) -> type[P]:
 
 
 def _check_names(kind: type[Any], given: Mapping[Any, Any], places: int = 0) -> None:
-    """Raise a ParameterError for arguments that a part hasn't, or that it needs."""
+    """Raise a ParameterError for unknown or missing arguments of a part."""
     allowed = [field.name for field in fields(kind)]
     for name in given:
         if not among(name, allowed):
@@ -188,7 +188,7 @@ def _made(kind: type[P], given: Any) -> P:
 
 
 def _check(name: str, one: Contact | Force, known: list[str]) -> None:
-    """Raise a ParameterError for a part that names no degree of freedom, or something else."""
+    """Raise a ParameterError for a part without a valid degree of freedom."""
     places = [one.at] + ([one.to] if isinstance(one, Contact) and one.to is not None else [])
     for place in places:
         if not among(place, known):
@@ -213,7 +213,7 @@ def _check(name: str, one: Contact | Force, known: list[str]) -> None:
 
 
 def _named(place: Any, known: list[str]) -> str:
-    """What to write for a degree of freedom, given by its number or misspelt."""
+    """Advice on a degree of freedom that is given by its number or misspelt."""
     number = isinstance(place, int | np.integer) and not isinstance(place, bool)
     if number and 1 <= place <= len(known):
         return f"They are given by name: number {place} is {known[place - 1]!r}, counted from 1."
