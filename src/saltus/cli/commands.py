@@ -52,7 +52,7 @@ class Kind(StrEnum):
 
 
 class Progress(StrEnum):
-    """How progress is shown."""
+    """Displays of the progress."""
 
     bar = "bar"
     json = "json"
@@ -218,7 +218,7 @@ def _run(
 
 
 def _again(folder: Path, system: str) -> str:
-    """The command that goes on, with the system of one's own that the study was run with."""
+    """The command that resumes the study, with the user's own system if there is one."""
     return shlex.join(["saltus", "resume", str(folder), *(["--system", system] if system else [])])
 
 
@@ -403,7 +403,7 @@ def models(
 
 
 def _models_table(width: int) -> TextTable:
-    """A line for each model; sources are cut where the screen ends."""
+    """A line for each model; sources are cut to the width of the screen."""
     from saltus import models as published
     from saltus.study.table import TextTable
 

@@ -60,7 +60,8 @@ def drives(force: float) -> str:
 
 
 def sticks_less(limit: float) -> str:
-    """The message about a friction force that is smaller at rest than in motion, or has no ratio.
+    """The message about a friction force that is smaller at rest than in motion, or has no
+    ratio.
     """
     if not math.isfinite(limit):
         return (

@@ -117,7 +117,8 @@ class Map(Protocol):
         """
 
     def launch(self, start: np.ndarray, longest: float) -> Travel:
-        """Launch trajectories from float64[k, D], to be advanced by ``longest`` iterates at most.
+        """Launch trajectories from float64[k, D], to be advanced by ``longest`` iterates at
+        most.
         """
 
     def tangent(

@@ -163,7 +163,8 @@ def proportion(a: Polynomial, b: Polynomial) -> int:
 
 
 def is_multiple(a: Polynomial, b: Polynomial) -> bool:
-    """True if ``a = m b`` with a monomial m: a gap times, or over, quantities that it doesn't hold.
+    """True if ``a = m b`` with a monomial m: a gap times, or over, quantities that it doesn't
+    hold.
     """
     if len(a) != len(b) or not a:
         return False

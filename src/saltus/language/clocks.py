@@ -176,7 +176,8 @@ def _unsolvable(gap: Expr) -> str:
 
 
 def of_time_only(gap: Expr) -> bool:
-    """True if a gap depends on time, and on no state. Pieces in it that time decides are time too.
+    """True if a gap depends on time, and on no state. Pieces in it that time decides are time
+    too.
     """
     return ex.depends_on(gap, ("time",)) and not ex.depends_on(gap, ("state",))
 

@@ -251,9 +251,6 @@ def answers(method: str) -> Callable[[Answer], Answer]:
     ``__array_ufunc__``.
 
     Such a function is built of expressions, so it stands in a file above this one.
-
-    Such a function is built of expressions, so it stands in a file above this one, and is handed
-    in.
     """
 
     def handed_in(function: Answer) -> Answer:
@@ -304,7 +301,8 @@ class _LeavesOpen(Protocol):
 
 # -- conditions ------------------------------------------------------------------------------------
 class _MadeOnce(type):
-    """Makes equal conditions one object, as equal nodes are, so that comparing long ones is quick.
+    """Makes equal conditions one object, as equal nodes are, so that comparing long ones is
+    quick.
     """
 
     def __call__(cls, *parts: Condition | int) -> Any:
@@ -675,7 +673,8 @@ def walk(
 
 
 def rebuild(node: Expr, args: tuple[Expr, ...], payload: Any) -> Expr:
-    """The same operation on other operands, constants folded; the node itself if nothing differs.
+    """The same operation on other operands, constants folded; the node itself if nothing
+    differs.
     """
     if payload is node.payload and all(
         new is old for new, old in zip(args, node.args, strict=True)

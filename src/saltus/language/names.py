@@ -49,7 +49,8 @@ def why_not_together(states: Sequence[str]) -> str | None:
 
 
 def why_no_title(title: Any) -> str | None:
-    """The reason why this can't be the name of a system, as the end of a sentence; None if it can.
+    """The reason why this can't be the name of a system, as the end of a sentence; None if it
+    can.
     """
     if not isinstance(title, str) or not title.strip():
         return "it must be text"

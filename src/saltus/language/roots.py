@@ -51,7 +51,8 @@ def without_root(gap: Expr) -> Expr:
 
 
 def with_root(gap: Expr) -> Expr:
-    """The original ``sqrt(u) - d`` of a gap made by :func:`without_root`; any other gap unchanged.
+    """The original ``sqrt(u) - d`` of a gap made by :func:`without_root`; any other gap
+    unchanged.
     """
     if (inner := _within_factor(gap, with_root)) is not None:
         return inner
@@ -81,7 +82,8 @@ def root_name(root: Expr) -> str:
 
 
 def _within_factor(gap: Expr, change: Callable[[Expr], Expr]) -> Expr | None:
-    """A constant sign or factor, and the changed operand that it multiplies; None if there is none.
+    """A constant sign or factor, and the changed operand that it multiplies; None if there is
+    none.
     """
     match gap.op, gap.args:
         case "neg", (inner,):
@@ -110,7 +112,8 @@ def _is_square(node: Expr) -> bool:
 
 
 def _split(gap: Expr, sign: float = 1.0) -> tuple[list[tuple[Expr, Expr]], Expr]:
-    """The terms ``c*sqrt(u)`` of a sum, or of its negative, as pairs (c, u), and minus all others.
+    """The terms ``c*sqrt(u)`` of a sum, or of its negative, as pairs (c, u), and minus all
+    others.
     """
     roots: list[tuple[Expr, Expr]] = []
     level: Expr = ex.constant(0.0)

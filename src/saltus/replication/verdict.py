@@ -1,5 +1,5 @@
-"""Verdicts: the rules that hold a number of a claim against its limit, and what follows when checks
-pass or fail.
+"""Verdicts: rules that compare a number of a claim with its limit, and the verdict of several
+checks.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from typing import Any
 HOLDS, IN_PART, FAILS, UNDECIDED = "holds", "holds in part", "does not hold", "not decidable"
 #: All verdicts, best first.
 VERDICTS = (HOLDS, IN_PART, FAILS, UNDECIDED)
-#: How the checks of any claim make its verdict; the report prints it.
+#: The rule from checks to a verdict, which the report prints.
 RULE_OF_ALL = (
     "A claim holds if all of its checks pass, doesn't hold if none does, and holds in part if some "
     "do, or if some pass and others can't be "
     "decided. It is not decidable if no check can be decided."
 )
 
-#: Rules of a check: from a quantity and the limit to whether it is so.
+#: Rules of a check: functions of a quantity and the limit.
 RULES: dict[str, Callable[[Any, Any], bool]] = {
     "below": lambda value, limit: value < limit,
     "at_most": lambda value, limit: value <= limit,
@@ -54,7 +54,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Finding:
-    """What was found on a claim.
+    """The finding on a claim.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class Finding:
 
     @property
     def verdict(self) -> str:
-        """The verdict that the checks make."""
+        """The verdict of the checks."""
         return verdict_of(self.checks)
 
 
@@ -115,7 +115,7 @@ def _unknown(value: Any) -> bool:
 
 
 def verdict_of(checks: Sequence[Check]) -> str:
-    """The verdict that some checks make; see :data:`RULE_OF_ALL`."""
+    """The verdict of some checks; see :data:`RULE_OF_ALL`."""
     passed = [check.passed for check in checks]
     decided = [one for one in passed if one is not None]
     if not decided:

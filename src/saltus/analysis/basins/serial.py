@@ -1,4 +1,5 @@
-"""Attractors and labels as plain data, which a store keeps to the last bit. Reading runs no code.
+"""Attractors and labels as plain data, which a store keeps to the last bit. Reading runs no
+code.
 """
 
 from __future__ import annotations

@@ -2,8 +2,6 @@
 
 scipy.stats has it too, but its import (0.7 s) takes longer than the search for attractors of many a
 map.
-
-scipy.stats has it too, but takes longer to import (0.7 s) than many a map to scout.
 """
 
 from __future__ import annotations

@@ -228,9 +228,6 @@ def _check_period_of_each(
 
     Only parameters in the explicit time dependence matter; each different combination is checked
     once.
-
-    Only parameters that the explicit time dependence can see are asked; each different combination
-    once.
     """
     if system.forced_at is None:
         return

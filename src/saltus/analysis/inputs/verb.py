@@ -1,4 +1,5 @@
-"""The wrapper of every public verb: it answers wrong arguments in words, and ends well on Ctrl-C.
+"""The wrapper of every public verb: it answers wrong arguments in words, and ends well on
+Ctrl-C.
 """
 
 from __future__ import annotations
@@ -100,10 +101,6 @@ def verb(function: Callable[P, R]) -> Callable[P, R]:
     It answers unknown arguments by the known ones, and arguments of a wrong kind by the right kind.
     ``progress=False`` also silences messages about compiling. Ctrl-C before anything is finished is
     an :class:`Interrupted` too.
-
-    Arguments that it doesn't have are answered by those that it has, and those of another kind by
-    what they must be; ``progress=False`` silences what is said about compiling; Ctrl-C that comes
-    before anything is finished is an :class:`Interrupted` too.
     """
     signature, kinds = inspect.signature(function), Kinds(function)
 

@@ -167,8 +167,6 @@ def _rest(found: Spectrum, flow: TangentFlow, start: np.ndarray, every: float) -
 
     Means of growth converge slowly: those of a pair of complex eigenvalues oscillate about its real
     part.
-
-    Means of growth lag behind: those of a pair of complex eigenvalues swing about its real part.
     """
     iterates = found.growth.segment.points
     state, whole = (

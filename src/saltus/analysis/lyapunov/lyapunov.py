@@ -56,10 +56,22 @@ def lyapunov(
 ) -> xr.Dataset:
     """Lyapunov exponents of the motions that given starts lead to, with their errors.
 
-    A motion that settles to a periodic orbit has exactly the exponents of the orbit, the logarithms
-    of the magnitudes of its Floquet multipliers over its period. Any other has the mean growth of
-    small deviations, by the variational equations, their jumps at contacts (saltation) and the QR
-    method, over ``periods`` blocks after ``transient``. A block is a forcing period.
+    1. Each trajectory runs through ``transient`` blocks; a block is a forcing period. At their end
+       a frame of small deviations is carried along, so that its axes have found their directions.
+    2. Over ``periods`` blocks the derivative of each block is computed by the variational
+       equations, with their jumps at contacts (saltation).
+    3. The frame is carried through these derivatives and made orthogonal after each (QR method), as
+       otherwise all axes would turn to the fastest one. The mean logarithm of their growth gives
+       the exponents.
+    4. A motion that settles to a periodic orbit has exactly the exponents of the orbit, which
+       replace the means: the logarithms of the magnitudes of its Floquet multipliers over its
+       period. At an equilibrium they are the real parts of the eigenvalues.
+    5. The errors of the means come from batches that grow until they are independent, since growth
+       in successive blocks is correlated.
+    6. The sum of the exponents is held against the mean divergence, which is found without the
+       tangent.
+
+    These are the steps of ``method="variational"``.
 
     Two conventions are in use. A forced system of D states has D exponents as a stroboscopic map:
     ``lyapunov_exponent``. As a flow, the phase of the forcing is one more state, whose exponent is

@@ -80,9 +80,6 @@ def spectrum(
 
     Without forcing a motion that repeats has an exponent of zero along itself, which changes its
     kind.
-
-    Without forcing a motion that repeats has an exponent of zero along itself; that makes a
-    difference to what it is called.
     """
     growth = grow(flow, start, count, transient, progress)
     rates = _told(

@@ -107,9 +107,6 @@ def one_period_errors(
     It doesn't depend on stability or basins, so it is a smooth function of the parameters: the
     method's own error.
 
-    Independent of stability and of basins, and so a smooth function of the parameters: what the
-    method itself does wrong.
-
     Returns
     -------
     dict of float64[places...]

@@ -153,9 +153,6 @@ def _scales(
 
     The range of a state at rest, or near it, is no scale: the range of other states of its unit,
     the rounding of values of that unit, or :data:`AT_REST` stands for it.
-
-    The range of a state that rests, or is on its way there, says nothing: it is measured by the
-    range of others of its unit, by the rounding of values of that unit, or by :data:`AT_REST`.
     """
     between = whole[-1] - whole[0] > len(whole) - 1
     looked_at = [of[:, whole[0] : whole[-1] + 1] for of in samples]

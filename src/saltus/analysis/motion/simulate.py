@@ -215,7 +215,8 @@ def _check_room(system: System, trajectories: int, samples: int, states: int | N
 
 
 def _per_span(trajectories: int) -> int:
-    """Samples of a motion without forcing: enough for a smooth curve, fewer for many trajectories.
+    """Samples of a motion without forcing: enough for a smooth curve, fewer for many
+    trajectories.
     """
     return max(MOST_PER_SPAN // max(trajectories // 20, 1), LEAST_PER_SPAN)
 

@@ -227,7 +227,8 @@ def _forced_stretch(run: xr.Dataset, last: int | None) -> _Stretch:
 
 
 def _free_stretch(run: xr.Dataset, last: int | None) -> _Stretch:
-    """All samples of a system without forcing; the last one is left out where it repeats the first.
+    """All samples of a system without forcing; the last one is left out where it repeats the
+    first.
     """
     if last is not None:
         raise ParameterError(

@@ -214,9 +214,6 @@ def _distances(outcome: Outcome, check: Outcome, offset: int) -> np.ndarray:
 
     The k-th contact is compared with the k-th; from the first different guards on the distance is
     infinite.
-
-    The k-th contact is compared with the k-th; from the first at which the two runs meet different
-    guards on, it is infinite.
     """
     distance = np.full(len(outcome.contacts), np.inf)
     count = len(outcome.status)

@@ -96,9 +96,6 @@ def _nearest_allowed(
 
     The few nearest are tried first, then four times as many while all are too near in time: for
     most points a few are enough.
-
-    The few nearest are looked at first, four times as many where all of them are too near in time:
-    for most points a few are enough.
     """
     tree, most = cKDTree(points), min(2 * exclude + 2, len(points))
     distance, place = np.full(len(asked), np.inf), np.full(len(asked), -1)

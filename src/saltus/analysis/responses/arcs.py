@@ -182,7 +182,8 @@ def _follow_orbits(
 
 
 def _coarse_first(place: np.ndarray, places: int) -> np.ndarray:
-    """The rank of indices int64[k] among all: every other one first, then those between, and so on.
+    """The rank of indices int64[k] among all: every other one first, then those between, and so
+    on.
     """
     result, left = np.zeros(len(place), np.int64), place.copy()
     for _ in range(int(places).bit_length()):

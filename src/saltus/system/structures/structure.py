@@ -225,7 +225,8 @@ def _modal(kept: Modes, damping: Any) -> Coordinates:
 
 
 def _angular(moving: Coordinates, stiffness: Any) -> np.ndarray:
-    """Angular natural frequencies [rad/s], ascending; empty for a stiffness that isn't symmetric.
+    """Angular natural frequencies [rad/s], ascending; empty for a stiffness that isn't
+    symmetric.
     """
     full = matrices.dense(stiffness)
     if moving.inverse is None or np.abs(full - full.T).max() > ASYMMETRY * np.abs(full).max():
