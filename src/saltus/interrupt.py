@@ -153,7 +153,7 @@ class Stop:
 
     @property
     def inside(self) -> bool:
-        """True if the work is part of other work, which Ctrl-C asks to stop without interrupting it."""
+        """True if the work is part of other work, which Ctrl-C asks to stop, not interrupts."""
         return self._outer is not None and (self._outer._works or self._outer.inside)
 
     def hold(self) -> None:

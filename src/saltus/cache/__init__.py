@@ -115,32 +115,32 @@ def keep(key: str, title: str, data: bytes, kind: str = KERNEL) -> None:
 
 def _usable() -> bool:
     """True if the folder can be used, made if it doesn't exist; a warning says why not."""
-    place = folder()
+    directory = folder()
     try:
-        place.mkdir(parents=True, exist_ok=True, mode=0o700)
-        entry.check_folder(place)
+        directory.mkdir(parents=True, exist_ok=True, mode=0o700)
+        entry.check_folder(directory)
     except entry.NotOurs as why:
         _warn(
-            f"saltus: the folder of compiled kernels {place} {why}, so whoever writes there could "
-            f"run code as you. It isn't used: kernels "
+            f"saltus: the folder of compiled kernels {directory} {why}, so whoever writes there "
+            f"could run code as you. It isn't used: kernels "
             "are compiled for this process only. Close it (chmod go-w), or set SALTUS_CACHE to a "
             "folder of yours."
         )
         return False
     except OSError as error:
-        _cannot_write(place, error)
+        _cannot_write(directory, error)
         return False
     return True
 
 
-def _sweep(place: Path) -> None:
+def _sweep(directory: Path) -> None:
     """Delete unfinished entries of processes that were killed long ago, and hashes of old code."""
     for pattern, age in ((f"{entry.DRAFT}*", ABANDONED), (f"*{HASH}", _OLD)):
-        _sweep_older(place, pattern, age)
+        _sweep_older(directory, pattern, age)
 
 
-def _sweep_older(place: Path, pattern: str, age: float) -> None:
-    for path in place.glob(pattern):
+def _sweep_older(directory: Path, pattern: str, age: float) -> None:
+    for path in directory.glob(pattern):
         try:
             if is_older(path, age):
                 _delete(path)
@@ -148,10 +148,10 @@ def _sweep_older(place: Path, pattern: str, age: float) -> None:
             continue
 
 
-def _cannot_write(place: Path, error: OSError) -> None:
+def _cannot_write(directory: Path, error: OSError) -> None:
     _warn(
-        f"saltus: {place} can't be written ({error.strerror or error}); kernels are compiled for "
-        f"this process only. "
+        f"saltus: {directory} can't be written ({error.strerror or error}); kernels are compiled "
+        f"for this process only. "
         "Set SALTUS_CACHE to a folder of yours with free space."
     )
 

@@ -105,14 +105,14 @@ def read(path: Path) -> bytes:
     header, data = _split(_content(path))
     try:
         fields = json.loads(header)
-        whole = (
+        intact = (
             fields["format"] == FORMAT
             and fields["key"] == path.stem
             and fields["sha256"] == sha256(data)
         )
     except (ValueError, KeyError, TypeError, RecursionError):
-        whole = False
-    if not whole:
+        intact = False
+    if not intact:
         raise Damaged("is damaged")
     return data
 

@@ -168,12 +168,12 @@ def with_laws(
             if isinstance(declared.law, Impact)
             else _jump(declared, states)
         )
-    rubbing = [one for one in (_rubbing(each, states) for each in met) if one]
+    rubbing = [contact for contact in (_rubbing(each, states) for each in met) if contact]
     _check_rubbing(rubbing, laws, field, guards)
     laws |= {
         number: Law("surface", constraint=guards[number].gap, levels=levels.get(number, ()))
         for number in range(len(guards))
-        if number in {one.guard for one in rubbing}
+        if number in {contact.guard for contact in rubbing}
         or (number not in laws and is_surface(number, field, guards, states))
     }
     if not laws:
@@ -183,15 +183,19 @@ def with_laws(
     owners, holds = list(guards), []
     for number, law in laws.items():
         owners[number] = replace(guards[number], law=law)
-    for one in held:
-        law = _completed(laws[one.owner], one, forces, limits.get(one.owner, _ONE), states)
-        owners[one.owner] = replace(owners[one.owner], law=law)
+    for contact in held:
+        law = _completed(
+            laws[contact.owner], contact, forces, limits.get(contact.owner, _ONE), states
+        )
+        owners[contact.owner] = replace(owners[contact.owner], law=law)
         assert law.drive is not None
         assert law.pivot is not None
         gap = hold_gap(law.kind, law.drive, law.pivot, law.limit)
         if law.remaining is not None:
             gap = ex.mul(gap, ex.sub(law.remaining, _NO_PIVOT))
-        holds.append(Guard(hold_name(owners[one.owner]), gap, law=Law("hold", partner=one.owner)))
+        holds.append(
+            Guard(hold_name(owners[contact.owner]), gap, law=Law("hold", partner=contact.owner))
+        )
     return forces.elimination.reduced(), (*owners, *holds)
 
 
@@ -225,7 +229,7 @@ def _held_contacts(
     of_contacts = {one.guard: one for one in rubbing}
     surfaces = sorted(number for number, law in laws.items() if law.kind == "surface")
     order = sorted(number for number, law in laws.items() if law.kind != "jump")
-    holds = {number: len(guards) + place for place, number in enumerate(order)}
+    holds = {number: len(guards) + index for index, number in enumerate(order)}
     directions = {number: law.direction for number, law in laws.items() if law.kind == "impact"}
     for one in rubbing:
         directions[one.guard] = _scaled(-one.along, one.direction)
@@ -238,18 +242,18 @@ def _held_contacts(
     for number in surfaces:
         if number in of_contacts:
             continue
-        place = OnSurface(guards[number].gap, states)
+        on_surface = OnSurface(guards[number].gap, states)
         apart = {
             holds[other]
             for other, i in alone.items()
             if other < number and i is not None and i == alone[number]
         }
         free = tuple(_known(entry, apart, False) for entry in field)
-        surface = split(number, free, place)
+        surface = split(number, free, on_surface)
         directions = {
             other: direction
             if holds[other] in apart
-            else tuple(averaged(entry, number, holds[number], place) for entry in direction)
+            else tuple(averaged(entry, number, holds[number], on_surface) for entry in direction)
             for other, direction in directions.items()
         }
         directions[number] = surface.halves
@@ -314,29 +318,29 @@ class _Forces:
         self._smooth = Elimination(field, smooth) if rubbing else self.elimination
         self._smoothly = dict(zip(self._held, smooth, strict=True))
 
-    def _without_friction(self, one: Held) -> Held:
-        rubbing = self._by_contact.get(one.owner)
+    def _without_friction(self, held: Held) -> Held:
+        rubbing = self._by_contact.get(held.owner)
         if rubbing is None:
-            return one
+            return held
         sticks = self._held[rubbing.guard].hold
-        return replace(one, direction=tuple(assuming(x, sticks, True) for x in one.direction))
+        return replace(held, direction=tuple(assuming(x, sticks, True) for x in held.direction))
 
-    def without_friction(self, one: Held) -> Expr:
+    def without_friction(self, held: Held) -> Expr:
         """The pivot of a contact without its friction."""
-        _, pivot, _ = self._smooth.own(self._smoothly[one.owner])
+        _, pivot, _ = self._smooth.own(self._smoothly[held.owner])
         return pivot
 
-    def own(self, one: Held) -> tuple[Expr, Expr, Field, int]:
+    def own(self, held: Held) -> tuple[Expr, Expr, Field, int]:
         """Drive, pivot and direction of a contact as :class:`Law` has them, and the force that
         supports it. The force of friction is in units of its limit.
         """
-        drive, pivot, direction = self.elimination.own(one)
-        if one.owner not in self._by_guard:
+        drive, pivot, direction = self.elimination.own(held)
+        if held.owner not in self._by_guard:
             return drive, pivot, direction, -1
-        rubbing = self._by_guard[one.owner]
+        rubbing = self._by_guard[held.owner]
         contact = self._held[rubbing.contact]
         pressed, by, _ = self.elimination.own(contact)
-        force = ex.neg(ex.div(assuming(pressed, one.hold, True), assuming(by, one.hold, True)))
+        force = ex.neg(ex.div(assuming(pressed, held.hold, True), assuming(by, held.hold, True)))
         limit = ex.mul(rubbing.coefficient, assuming(force, contact.hold, True))
         most = ex.select(Bit(contact.hold), ex.mul(limit, pivot), _ZERO)
         return drive, most, direction, contact.hold
@@ -366,15 +370,15 @@ def _settled(held: Held, states: Sequence[str]) -> Field:
     """The state moved onto a surface: its pivot from the constraint, or else a step along the
     normal.
     """
-    own = [ex.state(name) for name in states]
+    settled = [ex.state(name) for name in states]
     if held.pivot is not None:
         i = held.pivot
-        own[i] = level(held.constraint, states[i], held.normal[i])
-        return tuple(own)
+        settled[i] = level(held.constraint, states[i], held.normal[i])
+        return tuple(settled)
     share = ex.div(held.constraint, dot(held.normal, held.normal))
     return tuple(
         ex.sub(state, ex.mul(slope, share)) if slope is not _ZERO else state
-        for state, slope in zip(own, held.normal, strict=True)
+        for state, slope in zip(settled, held.normal, strict=True)
     )
 
 
@@ -513,14 +517,14 @@ def _check_rubbing(
     reverses.
     """
     owned = set(laws) | bits_in(field)
-    for one in rubbing:
-        if one.guard in owned:
+    for contact in rubbing:
+        if contact.guard in owned:
             raise TraceError(
                 f"the friction of a contact changes its direction where "
-                f"{equation_of(one.guard, guards)}, and another force or law does too. Leave "
+                f"{equation_of(contact.guard, guards)}, and another force or law does too. Leave "
                 f"friction= and slip_velocity= out, or the other."
             )
-        owned.add(one.guard)
+        owned.add(contact.guard)
 
 
 # -- jumps -----------------------------------------------------------------------------------------

@@ -236,21 +236,21 @@ def rates_of(
 ) -> dict[str, Expr]:
     """The rate of each element's state, from the rates of the equation's own states."""
     known = dict(zip(states, rates, strict=True))
-    own = [*states, *(one.name for one in made)]
-    for one in made:
-        total = time_derivative(one.x)
-        for name, slope in zip(own, gradient(one.x, own), strict=True):
+    all_states = [*states, *(element.name for element in made)]
+    for element in made:
+        total = time_derivative(element.x)
+        for name, slope in zip(all_states, gradient(element.x, all_states), strict=True):
             if slope.op == "const" and slope.payload == 0:
                 continue
             if name not in known:
-                raise TraceError(f"the element {one.name!r} moves what moves it.")
+                raise TraceError(f"the element {element.name!r} moves what moves it.")
             total = ex.add(total, ex.mul(slope, known[name]))
-        p, limit = ex.state(one.name), one.limit
+        p, limit = ex.state(element.name), element.limit
         pushes = _either(
             _both(p >= limit, _is_positive(total)), _both(p <= -limit, _is_positive(ex.neg(total)))
         )
-        known[one.name] = piecewise((0.0, pushes), otherwise=total)
-    return {one.name: known[one.name] for one in made}
+        known[element.name] = piecewise((0.0, pushes), otherwise=total)
+    return {element.name: known[element.name] for element in made}
 
 
 def _both(a: Condition, b: Condition | bool) -> Condition | bool:

@@ -92,12 +92,14 @@ def with_pivots(contacts: Sequence[Held]) -> list[Held]:
     return [replace(one, pivot=chosen.get(number)) for number, one in enumerate(contacts)]
 
 
-def _linear_states(one: Held) -> list[int]:
+def _linear_states(contact: Held) -> list[int]:
     """The states in which a constraint is linear, those that its force changes first."""
     linear = [
-        i for i, slope in enumerate(one.normal) if slope is not _ZERO and not ex.varies(slope)
+        i for i, slope in enumerate(contact.normal) if slope is not _ZERO and not ex.varies(slope)
     ]
-    return sorted(linear, key=lambda i: (one.direction[i] is _ZERO, one.normal[i].op != "const"))
+    return sorted(
+        linear, key=lambda i: (contact.direction[i] is _ZERO, contact.normal[i].op != "const")
+    )
 
 
 class Elimination:
@@ -140,62 +142,68 @@ class Elimination:
     ) -> tuple[tuple[Expr, ...], dict[int, tuple[Expr, ...]]]:
         """Field and directions after the elimination of all contacts but one."""
         field = self._field
-        directions = {one.hold: one.direction for one in self._contacts}
-        for number, one in enumerate(self._contacts):
-            if one is left_out:
+        directions = {contact.hold: contact.direction for contact in self._contacts}
+        for number, contact in enumerate(self._contacts):
+            if contact is left_out:
                 continue
-            across = dot(one.normal, directions[one.hold])
+            across = dot(contact.normal, directions[contact.hold])
             if _is_nothing(across):
                 continue  # its force changes nothing once those before are held: it can't be
             later = [other for other in self._contacts[number + 1 :] if other is not left_out]
             later += [left_out] if left_out else []
-            own = directions[one.hold]
-            rate = ex.add(dot(one.normal, field), one.drift)
-            field = self._take(one, field, own, ratio(rate, across), one.drift)
+            direction = directions[contact.hold]
+            rate = ex.add(dot(contact.normal, field), contact.drift)
+            field = self._take(contact, field, direction, ratio(rate, across), contact.drift)
             for other in later:
-                along = dot(one.normal, directions[other.hold])
+                along = dot(contact.normal, directions[other.hold])
                 if self._canonical.polynomial(along):
                     directions[other.hold] = self._take(
-                        one, directions[other.hold], own, ratio(along, across), _ZERO
+                        contact, directions[other.hold], direction, ratio(along, across), _ZERO
                     )
         return field, directions
 
     def _take(
-        self, one: Held, entries: tuple[Expr, ...], own: Sequence[Expr], share: Expr, drift: Expr
+        self,
+        contact: Held,
+        entries: tuple[Expr, ...],
+        direction: Sequence[Expr],
+        share: Expr,
+        drift: Expr,
     ) -> tuple[Expr, ...]:
         """Entries minus a share of a contact's direction, where the contact is held."""
         new = tuple(
-            self._held(one, ex.sub(entry, ex.mul(by, share)), entry)
-            if by is not _ZERO and i != one.pivot
+            self._held(contact, ex.sub(entry, ex.mul(by, share)), entry)
+            if by is not _ZERO and i != contact.pivot
             else entry
-            for i, (entry, by) in enumerate(zip(entries, own, strict=True))
+            for i, (entry, by) in enumerate(zip(entries, direction, strict=True))
         )
-        return self._put(one, new, drift, entries) if one.pivot is not None else new
+        return self._put(contact, new, drift, entries) if contact.pivot is not None else new
 
     def _put(
-        self, one: Held, entries: tuple[Expr, ...], drift: Expr, free: tuple[Expr, ...]
+        self, contact: Held, entries: tuple[Expr, ...], drift: Expr, free: tuple[Expr, ...]
     ) -> tuple[Expr, ...]:
         """Entries with the pivot's one taken from the constraint, exactly, where the contact is
         held.
         """
-        if one.pivot is None:
+        if contact.pivot is None:
             return entries
-        i = one.pivot
+        i = contact.pivot
         others = [
             ex.mul(slope, entry)
-            for k, (slope, entry) in enumerate(zip(one.normal, entries, strict=True))
+            for k, (slope, entry) in enumerate(zip(contact.normal, entries, strict=True))
             if k != i and slope is not _ZERO and entry is not _ZERO
         ]
-        exact = ratio(ex.neg(total([drift, *others])), one.normal[i])
-        return (*entries[:i], self._held(one, exact, free[i]), *entries[i + 1 :])
+        exact = ratio(ex.neg(total([drift, *others])), contact.normal[i])
+        return (*entries[:i], self._held(contact, exact, free[i]), *entries[i + 1 :])
 
-    def _held(self, one: Held, value: Expr, otherwise: Expr) -> Expr:
+    def _held(self, contact: Held, value: Expr, otherwise: Expr) -> Expr:
         """``value`` where the contact is held, else ``otherwise``."""
         if self._known:
             value, otherwise = (
-                assuming(root, one.hold, side) for root, side in ((value, True), (otherwise, False))
+                assuming(root, contact.hold, side)
+                for root, side in ((value, True), (otherwise, False))
             )
-        return ex.select(Bit(one.hold), value, otherwise)
+        return ex.select(Bit(contact.hold), value, otherwise)
 
     def _in_order(self) -> list[Held]:
         """The contacts with pivots, each after those whose pivots its own rate follows from;

@@ -132,14 +132,14 @@ def check_gaps(guards: Sequence[Guard]) -> None:
     boundaries = _Boundaries(guards)
     for guard in guards:
         for node in ex.walk(guard.gap):
-            whole = (
+            whole_power = (
                 node.op == "pow"
                 and node.args[1].op == "const"
                 and float(node.args[1].payload).is_integer()
             )
             if (
                 node.op in ("pow", "sqrt", "log")
-                and not whole
+                and not whole_power
                 and boundaries.lifted(node) is not node
             ):
                 raise TraceError(
@@ -364,7 +364,7 @@ def _one_by_one(node: Expr) -> Expr:
         if (acting := _acting(below)) is not None:
             acts[acting] = None
 
-    def where(one: Condition | None) -> Expr:
+    def where(condition: Condition | None) -> Expr:
         """The function where one of the pieces acts, or none."""
         new: dict[Expr, Expr] = {}
         for below in ex.walk(operand):
@@ -372,16 +372,16 @@ def _one_by_one(node: Expr) -> Expr:
             if acting is None:
                 new[below] = ex.rebuild(below, args, below.payload)
             else:
-                new[below] = args[args[0] is _ZERO] if acting is one else _ZERO
+                new[below] = args[args[0] is _ZERO] if acting is condition else _ZERO
         return ex.rebuild(node, (new[operand], *node.args[1:]), node.payload)
 
     none = where(None)
     if none.op != "const":
         return node
     lifted = ex.select(reduce(Or, acts), node, none)
-    for one in acts:
-        rest = [Not(other) for other in acts if other is not one]
-        lifted = ex.select(reduce(And, rest, one), where(one), lifted)
+    for condition in acts:
+        rest = [Not(other) for other in acts if other is not condition]
+        lifted = ex.select(reduce(And, rest, condition), where(condition), lifted)
     return lifted
 
 

@@ -163,7 +163,7 @@ def _jumps(
         return bool(np.any(np.abs(found) > _ROUNDING * size))
 
 
-def split(number: int, field: Sequence[Expr], place: OnSurface) -> Surface:
+def split(number: int, field: Sequence[Expr], surface: OnSurface) -> Surface:
     """Middle and halves of a field in terms of the sigma of a guard."""
     pieces: dict[Expr, tuple[Expr, Expr]] = {}
     spread: dict[Expr, Expr] = {}
@@ -171,29 +171,29 @@ def split(number: int, field: Sequence[Expr], place: OnSurface) -> Surface:
         spread[node] = ex.rebuild(node, tuple(spread[child] for child in node.args), node.payload)
         if node.op == "select" and node.payload.bits >> number & 1:
             up, down = (assuming(node, number, side) for side in (True, False))
-            half = _ZERO if place.is_zero(ex.sub(up, down)) else _half(up, down, place)
-            pieces[node] = (_mean(up, down, place), half)
+            half = _ZERO if surface.is_zero(ex.sub(up, down)) else _half(up, down, surface)
+            pieces[node] = (_mean(up, down, surface), half)
             spread[node] = _at(*pieces[node], _SIGMA)
     halves: list[Expr] = []
-    whole: dict[int, Expr] = {}
+    means: dict[int, Expr] = {}
     for i, entry in enumerate(field):
         half = differentiate(spread[entry], _SIGMA)
         if _SIGMA in set(ex.walk(half)) or number in bits_in([spread[entry]]):
             up, down = (assuming(entry, number, side) for side in (True, False))
-            half, whole[i] = _half(up, down, place), _mean(up, down, place)
+            half, means[i] = _half(up, down, surface), _mean(up, down, surface)
         halves.append(half)
-    return Surface(number, pieces, tuple(halves), whole)
+    return Surface(number, pieces, tuple(halves), means)
 
 
-def _mean(up: Expr, down: Expr, place: OnSurface) -> Expr:
+def _mean(up: Expr, down: Expr, surface: OnSurface) -> Expr:
     """The value halfway between two sides."""
     both = ex.add(up, down)
-    return _ZERO if place.is_zero(both) else ex.mul(0.5, both)
+    return _ZERO if surface.is_zero(both) else ex.mul(0.5, both)
 
 
-def _half(up: Expr, down: Expr, place: OnSurface) -> Expr:
+def _half(up: Expr, down: Expr, surface: OnSurface) -> Expr:
     """Half of the difference of two sides."""
-    return up if place.is_zero(ex.add(up, down)) else ex.mul(0.5, ex.sub(up, down))
+    return up if surface.is_zero(ex.add(up, down)) else ex.mul(0.5, ex.sub(up, down))
 
 
 def _at(mean: Expr, half: Expr, sigma: Expr) -> Expr:
@@ -234,8 +234,8 @@ def with_held_signs(root: Expr, guards: Sequence[Guard], states: Sequence[str]) 
     return root
 
 
-def averaged(entry: Expr, number: int, hold: int, place: OnSurface) -> Expr:
+def averaged(entry: Expr, number: int, hold: int, surface: OnSurface) -> Expr:
     """The expression with the mean of its two sides where a surface is held."""
     if number not in bits_in([entry]):
         return entry
-    return held_at([entry], split(number, [entry], place), hold)[0]
+    return held_at([entry], split(number, [entry], surface), hold)[0]

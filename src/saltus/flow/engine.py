@@ -89,13 +89,13 @@ def run(
     """
     threads = threads if threads is None else whole_number(threads, "threads", 1, MOST_THREADS)
     module = method.kernels(system.origin)
-    outcome, whole = allocate(request, system, module)
+    outcome, arrays = allocate(request, system, module)
     periods = float(np.max(request.end_count + request.end_phase / request.period, initial=0.0))
     data, due = tables_of(system.origin), method.due(periods)
-    whole["options"] = options_of(method, periods, len(request.start), request.checks)
+    arrays["options"] = options_of(method, periods, len(request.start), request.checks)
     check_steps(system, method, request.period)
     chunks = [
-        _cut(request, whole, first, data, due) for first in range(0, len(request.start), CHUNK)
+        _cut(request, arrays, first, data, due) for first in range(0, len(request.start), CHUNK)
     ]
     workers = threads or usable_processors()
     stop, room = Stop(), Contacts(len(system.states))
@@ -103,7 +103,7 @@ def run(
         _run_chunks(chunks, module, stop, room, progress, workers)
     except KeyboardInterrupt:
         outcome.complete = False
-        raise RunInterrupted(lambda: _finish(outcome, whole, chunks, request.t_end)) from None
+        raise RunInterrupted(lambda: _finish(outcome, arrays, chunks, request.t_end)) from None
     if room.stopped:
         warnings.warn(
             f"the contacts of this call, {room.count} by now, filled half of the free memory: "
@@ -113,7 +113,7 @@ def run(
             SaltusWarning,
             stacklevel=4,
         )
-    _finish(outcome, whole, chunks, request.t_end)
+    _finish(outcome, arrays, chunks, request.t_end)
     if method.fixed:
         companion = method.companion()
         try:
@@ -160,7 +160,7 @@ def allocate(
     finite &= ~beyond
     zeros, counts = np.zeros((2, n)), np.zeros((4, n), np.int64)
     counts[2, sampled:] = counts[3] = -1
-    whole = {
+    arrays = {
         "period": request.period,
         "origin": zeros[0] + request.origin,
         "state": start,
@@ -180,11 +180,11 @@ def allocate(
         **marks(n),
     }
     outcome = Outcome(
-        whole["state"], whole["phase"], whole["status"], whole["mode"], whole["counters"],
-        whole["minima"], whole["samples"],
-        whole["sample_mode"], ContactTable.empty(0, states),
+        arrays["state"], arrays["phase"], arrays["status"], arrays["mode"], arrays["counters"],
+        arrays["minima"], arrays["samples"],
+        arrays["sample_mode"], ContactTable.empty(0, states),
     )  # fmt: skip
-    return outcome, whole
+    return outcome, arrays
 
 
 #: Order of the arguments of every `propagate`.
@@ -192,11 +192,15 @@ ARGUMENTS = Batch._fields
 
 
 def _cut(
-    request: Request, whole: dict[str, np.ndarray], first: int, data: np.ndarray, due: float | None
+    request: Request,
+    all_arrays: dict[str, np.ndarray],
+    first: int,
+    data: np.ndarray,
+    due: float | None,
 ) -> _Chunk:
     """The arrays of one chunk: views of the shared arrays, and tables of its own."""
     last = min(first + CHUNK, len(request.start))
-    arrays = {name: array[first:last] for name, array in whole.items()}
+    arrays = {name: array[first:last] for name, array in all_arrays.items()}
     shared = len(request.parameters) == 1
     arrays["param"] = np.ascontiguousarray(
         request.parameters if shared else request.parameters[first:last], float
@@ -234,16 +238,16 @@ def _empty_table(chunk: _Chunk, room: Contacts) -> None:
 
 
 def _finish(
-    outcome: Outcome, whole: dict[str, np.ndarray], chunks: list[_Chunk], t_end: float
+    outcome: Outcome, arrays: dict[str, np.ndarray], chunks: list[_Chunk], t_end: float
 ) -> Outcome:
     """Fill in the end times, and sort the contacts of all chunks into one table. No contact is
     later than the end, not even by rounding.
     """
     outcome.time = np.minimum(
-        whole["origin"] + whole["count"] * whole["period"] + whole["phase"], t_end
+        arrays["origin"] + arrays["count"] * arrays["period"] + arrays["phase"], t_end
     )
-    running, begun = whole["status"] == st.RUNNING, whole["counters"][:, st.STEPS] > 0
-    whole["status"][running] = np.where(begun[running], st.INTERRUPTED, st.NOT_COMPUTED)
+    running, begun = arrays["status"] == st.RUNNING, arrays["counters"][:, st.STEPS] > 0
+    arrays["status"][running] = np.where(begun[running], st.INTERRUPTED, st.NOT_COMPUTED)
     if parts := [part for chunk in chunks for part in chunk.contacts]:
         contacts = ContactTable.joined(parts)
         if (outcome.status == st.SLIDING).any():
@@ -335,11 +339,13 @@ def _run_chunks(
     A single chunk that is moved by this very thread reports its own progress: a thread only for
     that would take as long as a short run.
     """
-    here = len(chunks) == 1 and may_wait(stop)
+    in_this_thread = len(chunks) == 1 and may_wait(stop)
 
     def work(chunk: _Chunk) -> None:
         _open_tables(chunk, module)
-        _advance(chunk, module, module.workspace(), stop, room, progress if here else None)
+        _advance(
+            chunk, module, module.workspace(), stop, room, progress if in_this_thread else None
+        )
 
-    show = None if progress is None or here else lambda _: progress(_share_done(chunks))
+    show = None if progress is None or in_this_thread else lambda _: progress(_share_done(chunks))
     on_threads(work, chunks, lambda *_: None, workers, show, stop)

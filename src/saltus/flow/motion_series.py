@@ -236,13 +236,13 @@ class MotionSeries:
         """
         flips = np.zeros((self._module.NGUARDS + self._module.SINGULAR, len(h)), bool)
         for guard in range(self._own, self._guards):
-            which, place = polynomials.sign_changes(
+            which, root = polynomials.sign_changes(
                 self._gap(work, guard) * h ** np.arange(ORDER + 1)[:, None]
             )
-            which, place = which[place > START_TOLERANCE], place[place > START_TOLERANCE]
+            which, root = which[root > START_TOLERANCE], root[root > START_TOLERANCE]
             which, first = np.unique(which, return_index=True)
             sooner = np.ones(len(h))
-            sooner[which] = place[first]
+            sooner[which] = root[first]
             nearer = sooner < 1.0
             flips[:, nearer] = False
             flips[guard, nearer] = True

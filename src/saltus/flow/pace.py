@@ -45,19 +45,19 @@ def resume(arrays: dict[str, np.ndarray], due: float) -> bool:
     due : float
         Periods that LONG_CHECK_STEPS steps must bring.
     """
-    here = np.flatnonzero(arrays["status"] == st.BUDGET_STEPS)
-    if not len(here):
+    stopped = np.flatnonzero(arrays["status"] == st.BUDGET_STEPS)
+    if not len(stopped):
         return False
-    steps = arrays["counters"][here, st.STEPS]
-    rest = -_since(arrays, here, "end")
-    still = (steps - arrays["check_steps"][here] < 2 * CHECK_STEPS) & (
-        _since(arrays, here, "check") < MIN_PROGRESS * rest
+    steps = arrays["counters"][stopped, st.STEPS]
+    rest = -_since(arrays, stopped, "end")
+    still = (steps - arrays["check_steps"][stopped] < 2 * CHECK_STEPS) & (
+        _since(arrays, stopped, "check") < MIN_PROGRESS * rest
     )
-    long = steps - arrays["long_steps"][here]
+    long = steps - arrays["long_steps"][stopped]
     slow = (long >= LONG_CHECK_STEPS) & ~(
-        _since(arrays, here, "long") >= due * long / LONG_CHECK_STEPS
+        _since(arrays, stopped, "long") >= due * long / LONG_CHECK_STEPS
     )
-    on = here[~(still | slow)]
+    on = stopped[~(still | slow)]
     for which, who in (("check", on), ("long", on[(long >= LONG_CHECK_STEPS)[~(still | slow)]])):
         arrays[f"{which}_steps"][who] = arrays["counters"][who, st.STEPS]
         arrays[f"{which}_count"][who], arrays[f"{which}_phase"][who] = (

@@ -62,20 +62,20 @@ def pieces(
         that didn't reach the end has no pieces.
     """
     watched = _watched(map_.system.origin, tuple(guards), tuple(quantities))
-    whole, outcome = _pieces(
+    found, outcome = _pieces(
         map_, start, periods, watched, len(guards), not map_.method.records_contacts
     )
     if map_.method.records_contacts:
         without = np.setdiff1d(
-            np.arange(len(start)), whole.motion[np.isfinite(whole.terms).all(axis=(0, 1))]
+            np.arange(len(start)), found.motion[np.isfinite(found.terms).all(axis=(0, 1))]
         )
-        bad = np.union1d(without, whole.motion[~np.isfinite(whole.terms).all(axis=(0, 1))])
+        bad = np.union1d(without, found.motion[~np.isfinite(found.terms).all(axis=(0, 1))])
         bad = bad[np.isfinite(outcome.state[bad]).all(axis=1)]
         if len(bad):  # a pole, or a law whose series isn't known where it begins
             cubics = _pieces(map_.rows(bad), start[bad], periods, watched, len(guards), True)[0]
-            good = whole.rows(~np.isin(whole.motion, bad))
-            whole = _joined([[good, replace(cubics, motion=bad[cubics.motion])]])
-    return whole, outcome
+            good = found.rows(~np.isin(found.motion, bad))
+            found = _joined([[good, replace(cubics, motion=bad[cubics.motion])]])
+    return found, outcome
 
 
 @lru_cache(maxsize=256)
@@ -118,7 +118,7 @@ def _nodes(
     """Samples and contacts in one list; of two at the same instant the later one counts."""
     k, m, size = outcome.samples.shape
     contacts = outcome.contacts
-    whole = np.isfinite(outcome.samples).all(axis=(1, 2)) & (m > 0)
+    complete = np.isfinite(outcome.samples).all(axis=(1, 2)) & (m > 0)
     nodes = Nodes(
         np.concatenate([np.repeat(np.arange(k), m), contacts.trajectory]),
         np.concatenate([np.tile(schedule.count, k), contacts.period]),
@@ -136,7 +136,7 @@ def _nodes(
         np.diff(nodes.period * period + nodes.phase) < SAME * period[1:]
     )
     behind[1:] = follows & (nodes.length[1:] == 0.0) & (nodes.length[:-1] == 1.0)
-    keep = whole[nodes.motion] & ~behind
+    keep = complete[nodes.motion] & ~behind
     nodes, period = nodes.rows(keep), period[keep]
     last = np.append(np.diff(nodes.motion) != 0, True)[: len(period)]
     until_period = np.where(last, periods, np.roll(nodes.period, -1))
@@ -161,29 +161,29 @@ def _joined(parts: list[list[Pieces]]) -> Pieces:
         replace(piece, terms=np.pad(piece.terms, ((0, longest - len(piece.terms)), (0, 0), (0, 0))))
         for piece in flat
     ]
-    whole = Pieces(
+    joined = Pieces(
         *(
             np.concatenate([getattr(piece, name) for piece in flat], axis=-1)
             for name in Pieces.__dataclass_fields__
         )
     )
-    return whole.rows(np.lexsort((whole.phase, whole.period, whole.motion)))
+    return joined.rows(np.lexsort((joined.phase, joined.period, joined.motion)))
 
 
-def _between(whole: Pieces) -> Pieces:
+def _between(nodes: Pieces) -> Pieces:
     """Cubics from each node to the next, through values and rates at both. The node at the end of a
     motion only closes its last piece.
     """
-    first = np.flatnonzero(np.diff(whole.motion) == 0)
-    length = whole.length[first]
-    rate = whole.terms[1] / whole.length
-    (a, b), (da, db) = ((of[:, first], of[:, first + 1]) for of in (whole.terms[0], rate))
+    first = np.flatnonzero(np.diff(nodes.motion) == 0)
+    length = nodes.length[first]
+    rate = nodes.terms[1] / nodes.length
+    (a, b), (da, db) = ((of[:, first], of[:, first + 1]) for of in (nodes.terms[0], rate))
     terms = polynomials.hermite(a, b, da * length, db * length)
     return Pieces(
-        whole.motion[first],
-        whole.period[first],
-        whole.phase[first],
+        nodes.motion[first],
+        nodes.period[first],
+        nodes.phase[first],
         length,
         terms,
-        whole.noise[:, first],
+        nodes.noise[:, first],
     )

@@ -113,14 +113,14 @@ def _refined(terms: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray
     rises, which = value(terms, high) > value(terms, low), np.arange(len(root))
     for _ in range(MOST_STEPS):
         x = root[which]
-        here = value(terms, x)
-        below = (here < 0.0) == rises
+        residual = value(terms, x)
+        below = (residual < 0.0) == rises
         low, high = np.where(below, x, low), np.where(below, high, x)
         with np.errstate(all="ignore"):
-            new = x - here / value(rates, x)
+            new = x - residual / value(rates, x)
         new = np.where((new >= low) & (new <= high), new, 0.5 * (low + high))
-        root[which] = np.where(here == 0.0, x, new)
-        on = (np.abs(new - x) > CONVERGED) & (here != 0.0)
+        root[which] = np.where(residual == 0.0, x, new)
+        on = (np.abs(new - x) > CONVERGED) & (residual != 0.0)
         if not on.any():
             break
         if not on.all():

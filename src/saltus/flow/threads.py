@@ -45,14 +45,14 @@ def on_threads(
     """
     stop = stop or Stop()
 
-    def one(item: Item) -> tuple[Item, Result] | None:
+    def run_item(item: Item) -> tuple[Item, Result] | None:
         stop.hold()
         return None if stop.is_set() else (item, work(item))
 
     handler = _ctrl_c_of(stop)
     if len(items) == 1 and progress is None and _is_ours(handler):
         with _ctrl_c_asks(stop) if handler is signal.default_int_handler else nullcontext():
-            result = copy_context().run(one, items[0])
+            result = copy_context().run(run_item, items[0])
         if result is not None:
             done(*result)
         check_stop()
@@ -64,7 +64,7 @@ def on_threads(
     ):
         waiting: set[Future[Any]] = set()
         try:
-            waiting |= {pool.submit(copy_context().run, one, item) for item in items}
+            waiting |= {pool.submit(copy_context().run, run_item, item) for item in items}
             while waiting:
                 ready, waiting = wait(waiting, timeout=0.1, return_when=FIRST_COMPLETED)
                 for result in (future.result() for future in ready):

@@ -168,13 +168,13 @@ def is_multiple(a: Polynomial, b: Polynomial) -> bool:
     """
     if len(a) != len(b) or not a:
         return False
-    own = {atom for monomial in b for atom, _ in monomial}
+    atoms = {atom for monomial in b for atom, _ in monomial}
     first = next(iter(b))
     inverse = frozenset((atom, -exponent) for atom, exponent in first)
     for candidate in a:
         factor = _merged(candidate, inverse)
         multiple = {_merged(monomial, factor): coefficient for monomial, coefficient in b.items()}
-        if all(exponent > 0 or atom not in own for atom, exponent in factor) and proportion(
+        if all(exponent > 0 or atom not in atoms for atom, exponent in factor) and proportion(
             a, multiple
         ):
             return True

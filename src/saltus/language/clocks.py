@@ -134,7 +134,7 @@ def switch(gap: Expr) -> Condition | bool:
     return _cases(gap, gap, [_MOST_CASES])
 
 
-def _cases(gap: Expr, whole: Expr, left: list[int]) -> Condition | bool:
+def _cases(gap: Expr, original: Expr, left: list[int]) -> Condition | bool:
     """Join (this piece and its comparison) by or; ``left`` counts the comparisons that may still
     come.
     """
@@ -145,10 +145,10 @@ def _cases(gap: Expr, whole: Expr, left: list[int]) -> Condition | bool:
             return holds
         left[0] -= 1
         if left[0] < 0 or switch_of(gap) is None:
-            raise TraceError(_unsolvable(whole))
+            raise TraceError(_unsolvable(original))
         return _RELATIONS.setdefault(gap, Relation(gap))
     if_so, if_not = (
-        _cases(ex.substituted(gap, {piece: value}), whole, left) for value in piece.args
+        _cases(ex.substituted(gap, {piece: value}), original, left) for value in piece.args
     )
     return _either(_both(piece.payload, if_so), _both(Not(piece.payload), if_not))
 

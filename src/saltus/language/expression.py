@@ -631,16 +631,16 @@ def relations_in(condition: Condition) -> Iterator[Relation]:
     seen: set[Condition] = set()
     stack = [condition]
     while stack:
-        one = stack.pop()
-        if not one.ops or one in seen:  # bits only
+        top = stack.pop()
+        if not top.ops or top in seen:  # bits only
             continue
-        seen.add(one)
-        if isinstance(one, Relation):
-            yield one
-        elif isinstance(one, And | Or):
-            stack += (one.right, one.left)
-        elif isinstance(one, Not):
-            stack.append(one.inner)
+        seen.add(top)
+        if isinstance(top, Relation):
+            yield top
+        elif isinstance(top, And | Or):
+            stack += (top.right, top.left)
+        elif isinstance(top, Not):
+            stack.append(top.inner)
 
 
 def operands(node: Expr) -> tuple[Expr, ...]:

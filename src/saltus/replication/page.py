@@ -240,15 +240,15 @@ def _claim(result: Replication, claim: Claim, finding: Finding) -> str:
 def _made(result: Replication) -> str:
     """The computations, the machine and the time."""
     packages = ", ".join(f"{name} {value}" for name, value in versions().items())
-    new, kept = len(result.computed), len(result.data) - len(result.computed)
+    new, earlier = len(result.computed), len(result.data) - len(result.computed)
     size = (
         "Grids and sweeps are coarser than in the full run, and shorter."
         if result.quick
         else "Grids and sweeps are those of the study files."
     )
     return (
-        f"<p>{counted(new, 'computation')} in this run, {kept} from an earlier one with the same "
-        f"settings and code. "
+        f"<p>{counted(new, 'computation')} in this run, {earlier} from an earlier one with the "
+        f"same settings and code. "
         f"This run took {result.seconds:.0f} s, with {counted(result.threads, 'thread')} on "
         f"{counted(usable_processors(), 'usable core')} ({_text(platform.machine())}, "
         f"{_text(platform.system())}). All computations, "

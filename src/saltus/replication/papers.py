@@ -233,21 +233,21 @@ def folder_of(name: str) -> Path:
     """
     if name not in _PAPERS:
         raise ParameterError(f"no paper {name!r} can be reproduced. {nearest(name, _PAPERS)}")
-    beside = PACKAGE.parents[1] if PACKAGE.parent.name == "src" else PACKAGE
-    place = next(
+    root = PACKAGE.parents[1] if PACKAGE.parent.name == "src" else PACKAGE
+    folder = next(
         (
             one
-            for one in (PACKAGE / "replications" / name, beside / "replications" / name)
+            for one in (PACKAGE / "replications" / name, root / "replications" / name)
             if one.is_dir()
         ),
         None,
     )
-    if place is None:
+    if folder is None:
         raise ParameterError(
             f"the study files of {name} are missing: no folder "
             f"{PACKAGE / 'replications' / name}. Install saltus again."
         )
-    return place
+    return folder
 
 
 def code(name: str, module: str) -> ModuleType:

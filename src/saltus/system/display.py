@@ -98,22 +98,22 @@ def _guard_rows(system: EquationsOfMotion) -> list[tuple[str, str]]:
     for number, guard in enumerate(system.guards):
         if is_hold(guard):
             continue
-        place = at_equality(writer.side(number))
+        where = at_equality(writer.side(number))
         if guard.boundary is not None and guard.state is not None:
             (value,) = evaluate([guard.boundary], values=system.values)
-            place += (
+            where += (
                 f"  ({from_si(float(value) + 0.0, system.units[guard.state])})"
                 if guard.boundary.op != "const"
                 else ""
             )
-        rows.append((guard.name, _by_law(guard.law, place, system, writer)))
+        rows.append((guard.name, _by_law(guard.law, where, system, writer)))
     return rows
 
 
-def _by_law(law: Law | None, place: str, system: EquationsOfMotion, writer: Writer) -> str:
+def _by_law(law: Law | None, where: str, system: EquationsOfMotion, writer: Writer) -> str:
     """The effect of a boundary in words, and its equation."""
     if law is None:
-        return place
+        return where
     if law.kind == "surface":
         limit = writer.text(law.limit) if law.limit is not None else "1"
         stronger = "" if limit == "1" else f", held by up to {limit} times the force of sliding"
@@ -121,13 +121,13 @@ def _by_law(law: Law | None, place: str, system: EquationsOfMotion, writer: Writ
             contact = system.guards[law.support].law
             assert contact is not None
             return (
-                f"sticks or slides at {place} while {system.guards[contact.partner].name!r} rests"
+                f"sticks or slides at {where} while {system.guards[contact.partner].name!r} rests"
             )
-        return f"sticks or slides at {place}{stronger}"
+        return f"sticks or slides at {where}{stronger}"
     if law.restitution is None:
-        return f"jump at {place}"
+        return f"jump at {where}"
     rough = "" if law.friction is None else f" and friction {_number(law.friction, system, writer)}"
-    return f"impact with restitution {_number(law.restitution, system, writer)}{rough} at {place}"
+    return f"impact with restitution {_number(law.restitution, system, writer)}{rough} at {where}"
 
 
 def _number(part: Expr, system: EquationsOfMotion, writer: Writer) -> str:

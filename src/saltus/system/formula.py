@@ -116,14 +116,14 @@ class Formula:
 
     def __call__(self, **values: Any) -> Any:
         """The value for symbols or numbers. Raises TraceError if there is none."""
-        own = {
+        terms = {
             term: self.book.terms[term](
                 **{name: values[name] for name in self.book.terms[term].names}
             )
             for term in self._terms
         }
         try:
-            return self._value(self._tree, {**_CONSTANTS, **values, **own})
+            return self._value(self._tree, {**_CONSTANTS, **values, **terms})
         except SaltusError:
             raise
         except (ArithmeticError, TypeError, ValueError) as error:

@@ -173,13 +173,13 @@ def _check_samples(system: EquationsOfMotion, period: float, unsure: list[int]) 
         evaluate(expressions, t=when, states=states, values=system.values, bits=bits)
         for when in (t, t + period)
     )
-    for place, (a, b) in enumerate(zip(now, later, strict=True)):
+    for index, (a, b) in enumerate(zip(now, later, strict=True)):
         a, b = np.broadcast_to(a, (6, 8)), np.broadcast_to(b, (6, 8))
         with np.errstate(invalid="ignore"):
             scale = np.maximum(np.abs(a), np.abs(b)).max(axis=1, keepdims=True)
             differs = np.abs(a - b) > DIFFERENCE * scale
         if differs.any():
-            raise TraceError(_not_periodic(system, unsure[place % len(unsure)], period))
+            raise TraceError(_not_periodic(system, unsure[index % len(unsure)], period))
 
 
 def _not_periodic(system: EquationsOfMotion, entry: int, period: float) -> str:

@@ -194,9 +194,9 @@ def _parameters(
 ) -> tuple[dict[int, str], dict[str, float], dict[str, str]]:
     """Name of the width of each guard; values and units of these parameters."""
     in_units = gap_units(system)
-    one = len(set(map(id, widths.values()))) == 1 and len(widths) == len(system.guards)
+    shared = len(set(map(id, widths.values()))) == 1 and len(widths) == len(system.guards)
     known = sorted({in_units[number] for number in widths} - {""})
-    if one and len(known) > 1:
+    if shared and len(known) > 1:
         guards = [guard.name for guard in system.guards]
         raise ParameterError(
             f"the boundaries of {system.name} are in {' and '.join(known)}: one width can't be "
@@ -206,11 +206,11 @@ def _parameters(
     values: dict[str, float] = {}
     units: dict[str, str] = {}
     for number, value in widths.items():
-        if one and names:
+        if shared and names:
             names[number] = next(iter(values))
             continue
-        name = _free_name(system, values, None if one else system.guards[number].name)
-        unit = (known or [""])[0] if one else in_units[number]
+        name = _free_name(system, values, None if shared else system.guards[number].name)
+        unit = (known or [""])[0] if shared else in_units[number]
         if not unit and isinstance(value, str):
             unit = coherent_unit(value, name)
         names[number], units[name] = name, unit

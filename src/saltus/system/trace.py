@@ -396,14 +396,14 @@ def _check_same(
     first: tuple[list[Expr], list[Declared]], second: tuple[list[Expr], list[Declared]]
 ) -> None:
     """Raise a TraceError unless two calls gave the same equation."""
-    one, two = (
+    first_nodes, second_nodes = (
         [
             (node.op, None if node.op == "select" else node.payload)
             for node in walk(*rates, *(root for law in laws for root in law.roots()))
         ]
         for rates, laws in (first, second)
     )
-    for a, b in zip_longest(one, two):
+    for a, b in zip_longest(first_nodes, second_nodes):
         if a == b:
             continue
         plain = a is not None and b is not None and a[0] == b[0] == "const"

@@ -111,18 +111,18 @@ def _orbit_from(data: Mapping[str, Any], size: int) -> Orbit:
     return Orbit(_array(data["points"], size), values, float(data["mismatch"]))
 
 
-def _sampled_data(one: SampledAttractor) -> dict[str, Any]:
+def _sampled_data(attractor: SampledAttractor) -> dict[str, Any]:
     data = {
-        "kind": one.kind, "exponent": one.exponent, "error": one.exponent_error,
-        "points": one.points.tolist(), "scale": one.scale.tolist(),
+        "kind": attractor.kind, "exponent": attractor.exponent, "error": attractor.exponent_error,
+        "points": attractor.points.tolist(), "scale": attractor.scale.tolist(),
     }  # fmt: skip
-    if not isinstance(one, Noisy):
+    if not isinstance(attractor, Noisy):
         return data
     return data | {
-        "orbit": _orbit_data(one.orbit),
-        "size": one.size.tolist(),
-        "scatter": one.scatter.tolist(),
-        "stray": one.stray,
+        "orbit": _orbit_data(attractor.orbit),
+        "size": attractor.size.tolist(),
+        "scatter": attractor.scatter.tolist(),
+        "stray": attractor.stray,
     }
 
 

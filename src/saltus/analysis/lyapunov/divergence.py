@@ -122,15 +122,15 @@ class Divergence:
         """
         system, contacts = self._system, outcome.contacts
         carried, behind = _carried(contacts)
-        here = self._here(map_, contacts)
+        arguments = self._here(map_, contacts)
         before, after = self._bits(contacts.mode_before), self._bits(contacts.mode_after)
-        fields = [evaluate(system.field, bits=bits, **here) for bits in (before, after)]
+        fields = [evaluate(system.field, bits=bits, **arguments) for bits in (before, after)]
         logarithm = np.where(contacts.kind == st.HOLD, -np.inf, 0.0)
         for g, guard in enumerate(system.guards):
             *normal, drift = evaluate(
                 [*gradient(guard.gap, system.states), time_derivative(guard.gap)],
                 bits=before,
-                **here,
+                **arguments,
             )
             rates = [
                 sum((n * f for n, f in zip(normal, field, strict=True)), start=drift)

@@ -122,16 +122,16 @@ class Exponents(Algorithm):
 
     def columns(self, factor: np.ndarray) -> dict[str, Any]:
         """The columns of the result; exponents times a factor for each trajectory, float64[k]."""
-        one, two = factor[:, None], factor[:, None, None]
-        mean, half = self._mean * one, self._half * one
-        running, running_half = self._running * two, self._running_half * two
+        scale, running_scale = factor[:, None], factor[:, None, None]
+        mean, half = self._mean * scale, self._half * scale
+        running, running_half = self._running * running_scale, self._running_half * running_scale
         lost = ~np.isin(self._status, GOOD)
         mean[lost], half[lost] = np.nan, np.nan
         return {
             "kind": self._kind.astype(str),
             "response_period": self._period,
             "lyapunov_exponent": mean,
-            "lyapunov_error": np.where(np.isnan(mean), np.nan, self._error * one),
+            "lyapunov_error": np.where(np.isnan(mean), np.nan, self._error * scale),
             "lyapunov_low": mean - half,
             "lyapunov_high": mean + half,
             "flow_lyapunov_exponent": _with_phase(mean) if self._every is None else mean,
@@ -169,14 +169,14 @@ def _rest(found: Spectrum, flow: TangentFlow, start: np.ndarray, every: float) -
     part.
     """
     iterates = found.growth.segment.points
-    state, whole = (
+    state, extent = (
         iterates[:, -1],
         np.ptp(np.concatenate([start[:, None], iterates], axis=1), axis=1),
     )
     # replaces the range of a state that was at rest all the time
-    widest = whole.max(axis=1, keepdims=True)
+    widest = extent.max(axis=1, keepdims=True)
     scale = np.where(
-        whole > AT_REST * widest, whole, np.where((widest > 0) & np.isfinite(widest), widest, 1.0)
+        extent > AT_REST * widest, extent, np.where((widest > 0) & np.isfinite(widest), widest, 1.0)
     )
     still = find_equilibria(flow.map, state, scale, captures=False)
     with np.errstate(invalid="ignore"):
@@ -185,9 +185,9 @@ def _rest(found: Spectrum, flow: TangentFlow, start: np.ndarray, every: float) -
     arrived = np.flatnonzero(attracts & near & np.isin(found.growth.segment.status, GOOD))
     rounding = 64 * np.finfo(float).eps
     for i in arrived:
-        own = still.eigenvalues[i]
-        found.exponents[i] = own.real * every
-        found.errors[i] = found.half_width[i] = rounding * np.abs(own).max() * every
+        eigenvalues = still.eigenvalues[i]
+        found.exponents[i] = eigenvalues.real * every
+        found.errors[i] = found.half_width[i] = rounding * np.abs(eigenvalues).max() * every
         found.batches[i], found.kinds[i] = 0, Kind.EQUILIBRIUM.word
         found.volume[i] = flow.rows(np.array([i])).divergences(still.place[[i]][:, None])[0][0, 0]
 

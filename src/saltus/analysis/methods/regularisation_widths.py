@@ -107,12 +107,12 @@ def regularisation_widths(
     smooth = regularise(system, law, width=float(tried[-1]))
     (name,) = smooth.values.keys() - system.values.keys()
 
-    def period(of: System, by: Method, width: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def period(moving: System, by: Method, width: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Error and steps of a period for each width."""
-        rows = np.tile(np.array(list(of.values.values())), (len(width) * len(begin), 1))
-        if of is smooth:
-            rows[:, list(of.values).index(name)] = np.repeat(width, len(begin))
-        map_ = Stroboscope(of, by, rows, threads=threads)
+        rows = np.tile(np.array(list(moving.values.values())), (len(width) * len(begin), 1))
+        if moving is smooth:
+            rows[:, list(moving.values).index(name)] = np.repeat(width, len(begin))
+        map_ = Stroboscope(moving, by, rows, threads=threads)
         outcome = map_.run(np.tile(begin, (len(width), 1)), 1)
         apart = (outcome.state - np.tile(end, (len(width), 1))) / scale
         steps = outcome.counters[:, st.STEPS] + outcome.counters[:, st.REJECTED]
@@ -121,16 +121,16 @@ def regularisation_widths(
             steps.reshape(len(width), -1).mean(axis=1),
         )
 
-    (own,), (own_steps,) = period(system, method, np.ones(1))
+    (method_error,), (method_steps,) = period(system, method, np.ones(1))
     by_width, _ = period(smooth, Taylor(), tried)
     both, steps = period(smooth, method, tried)
-    equal = _where_equal(tried, by_width, own)
+    equal = _where_equal(tried, by_width, method_error)
     equal_steps = np.exp(np.interp(np.log(equal), np.log(tried[::-1]), np.log(steps[::-1])))
     if np.isnan(equal):
         equal_steps = np.nan
     values = {
         "width": tried, "regularisation_error": by_width, "error": both, "steps_per_period": steps,
-        "method_error": own, "method_steps_per_period": own_steps, "equal_width": equal,
+        "method_error": method_error, "method_steps_per_period": method_steps, "equal_width": equal,
         "equal_steps_per_period": equal_steps,
     }  # fmt: skip
     about = subject(system, provenance(system, method, system.values) | {"law": law})

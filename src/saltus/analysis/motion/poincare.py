@@ -210,20 +210,20 @@ def _dataset(
     late = time > seen.begin[who]
     ours = late & (guard == crossed.guard)
     wanted = ours & flips & ((direction == 0) | (table.direction == direction))
-    kept, rows = table.rows(wanted), who[wanted]
+    crossings, rows = table.rows(wanted), who[wanted]
 
     def count(of: np.ndarray) -> np.ndarray:
         return np.bincount(who[of], minlength=seen.group.size)
 
     columns = {
-        "<state>": kept.state[:, : len(system.states)],
-        "crossing_time": kept.time,
-        "crossing_time_error": kept.time_error,
-        "crossing_period": kept.period,
-        "crossing_phase": _phases(seen, kept.phase, rows),
-        "crossing_direction": kept.direction,
-        "crossing_rate": kept.velocity,
-        "crossing_kind": kept.kind_name,
+        "<state>": crossings.state[:, : len(system.states)],
+        "crossing_time": crossings.time,
+        "crossing_time_error": crossings.time_error,
+        "crossing_period": crossings.period,
+        "crossing_phase": _phases(seen, crossings.phase, rows),
+        "crossing_direction": crossings.direction,
+        "crossing_rate": crossings.velocity,
+        "crossing_kind": crossings.kind_name,
         "crossing_trajectory": rows,
     }
     contacts = late & flips & np.isin(guard, acting_guards(system))

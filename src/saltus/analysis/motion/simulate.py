@@ -176,13 +176,13 @@ def _plan(
         samples, "samples", _per_span(group.size) if system.forced_at is None else PER_PERIOD
     )
     last = int(np.max(length.count + length.phase / length.period))
-    kept = _whole(keep, "keep", max(last, 1))
+    periods_kept = _whole(keep, "keep", max(last, 1))
     if keep is not None and system.forced_at is None:
         raise ParameterError(
             f"{system.name} has no forcing period, so keep= has no meaning. Start "
             f"later, or take fewer samples=."
         )
-    first = max(int(np.min(length.count)) - kept, 0) if keep is not None else 0
+    first = max(int(np.min(length.count)) - periods_kept, 0) if keep is not None else 0
     longest = np.max((length.count + length.phase / length.period) * per)
     count = int(longest + 1e-9) + 1 - first * per
     _check_room(system, group.size, count, states)

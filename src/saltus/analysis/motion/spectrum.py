@@ -117,12 +117,12 @@ def spectrum(
         for name in named
         if name in run.coords and name not in ("frequency", "order")
     }
-    own = stretch.frequency.ndim == 2
+    separate = stretch.frequency.ndim == 2
     subject = Subject(
         states=names,
         units={name: run[name].attrs.get("units", "") for name in (*names, *varied)},
         forcing_period=np.atleast_1d(run["forcing_period"].values)
-        if own
+        if separate
         else run.attrs.get("forcing_period_s"),
         varied=varied,
         attrs=inherited(run),
@@ -146,7 +146,7 @@ def spectrum(
         schema.SPECTRUM,
         subject,
         [*places.items(), *spectra, *each.items()],
-        along={"frequency": "order"} if own else {},
+        along={"frequency": "order"} if separate else {},
     )
 
 
@@ -187,21 +187,21 @@ def _forced_stretch(run: xr.Dataset, last: int | None) -> _Stretch:
     trajectories that repeat.
     """
     phases = np.asarray(run["period"].values, dtype=float)
-    whole = np.flatnonzero(phases == np.round(phases))
-    kept = max(whole.size - 1, 0)
+    whole_periods = np.flatnonzero(phases == np.round(phases))
+    available = max(whole_periods.size - 1, 0)
     last = last if last is None else whole_number(last, "last")
-    if last is not None and last > kept:
+    if last is not None and last > available:
         raise ParameterError(
-            f"spectrum: last={shown(last)}, but {kept} whole forcing periods were "
+            f"spectrum: last={shown(last)}, but {available} whole forcing periods were "
             f"kept. Simulate with more keep=."
         )
-    if not kept:
+    if not available:
         raise ParameterError(
             "spectrum needs a whole forcing period of samples, its two ends included. Simulate "
             "longer, or give more keep=."
         )
-    periods = kept if last is None else last
-    _check_even(phases[whole[-periods - 1] :], "forcing periods")
+    periods = available if last is None else last
+    _check_even(phases[whole_periods[-periods - 1] :], "forcing periods")
     response = np.zeros(run.sizes.get("trajectory", 1), dtype=np.int64)
     if periods >= 2:
         response = np.atleast_1d(settled(run, last=periods)["response_period"].values)
@@ -216,7 +216,10 @@ def _forced_stretch(run: xr.Dataset, last: int | None) -> _Stretch:
     if last is None and response.all():
         periods = common  # more periods would only add empty lines between
     periods -= periods % common
-    first, count = int(whole[-periods - 1]), int(whole[-1] - whole[-periods - 1])
+    first, count = (
+        int(whole_periods[-periods - 1]),
+        int(whole_periods[-1] - whole_periods[-periods - 1]),
+    )
     order = np.arange(count // 2 + 1) / periods
     own = "forcing_period" in run.variables and run["forcing_period"].ndim == 1
     period = (

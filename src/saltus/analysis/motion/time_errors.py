@@ -90,13 +90,13 @@ def _in_one_call(
     """
     n, total = len(request.start), (1 + COPIES) * len(request.start)
     try:
-        whole = engine.run(
+        together = engine.run(
             system, method.suited_to(total), _with_copies(system, request), threads, show
         )
     except RunInterrupted as stop:
         so_far = stop
         raise RunInterrupted(lambda: so_far.partial.of(0, n)) from None
-    outcome, check = whole.of(0, n), whole.of(n, total)
+    outcome, check = together.of(0, n), together.of(n, total)
     return outcome, np.max([_distances(outcome, check, i * n) for i in range(COPIES)], axis=0)
 
 

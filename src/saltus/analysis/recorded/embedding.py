@@ -98,7 +98,7 @@ def _nearest_allowed(
     most points a few are enough.
     """
     tree, most = cKDTree(points), min(2 * exclude + 2, len(points))
-    distance, place = np.full(len(asked), np.inf), np.full(len(asked), -1)
+    distance, index = np.full(len(asked), np.inf), np.full(len(asked), -1)
     left, count = np.arange(len(asked)), min(8, most)
     while True:
         near, who = (
@@ -106,10 +106,10 @@ def _nearest_allowed(
         )
         allowed = np.abs(who - asked[left, None]) > exclude
         rows, first = np.flatnonzero(allowed.any(axis=1)), allowed.argmax(axis=1)
-        distance[left[rows]], place[left[rows]] = near[rows, first[rows]], who[rows, first[rows]]
+        distance[left[rows]], index[left[rows]] = near[rows, first[rows]], who[rows, first[rows]]
         left = np.delete(left, rows)
         if not len(left) or count == most:
-            return distance, place
+            return distance, index
         count = min(4 * count, most)
 
 

@@ -181,11 +181,11 @@ def _follow_orbits(
             progress(1.0 - len(left) / number)
 
 
-def _coarse_first(place: np.ndarray, places: int) -> np.ndarray:
+def _coarse_first(index: np.ndarray, places: int) -> np.ndarray:
     """The rank of indices int64[k] among all: every other one first, then those between, and so
     on.
     """
-    result, left = np.zeros(len(place), np.int64), place.copy()
+    result, left = np.zeros(len(index), np.int64), index.copy()
     for _ in range(int(places).bit_length()):
         result, left = 2 * result + left % 2, left // 2
     return result

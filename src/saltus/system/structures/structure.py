@@ -216,11 +216,11 @@ def _physical(mass: Any, stiffness: Any, damping: Any, degrees: list[str]) -> Co
     )
 
 
-def _modal(kept: Modes, damping: Any) -> Coordinates:
-    names = [f"q{i}" for i in range(1, len(kept.angular) + 1)]
+def _modal(modes: Modes, damping: Any) -> Coordinates:
+    names = [f"q{i}" for i in range(1, len(modes.angular) + 1)]
     return Coordinates(
-        names, [f"{one}_rate" for one in names], None, np.diag(kept.angular**2), damping,
-        kept.shapes,
+        names, [f"{one}_rate" for one in names], None, np.diag(modes.angular**2), damping,
+        modes.shapes,
     )  # fmt: skip
 
 
