@@ -96,9 +96,9 @@ def keep(key: str, title: str, data: bytes, kind: str = KERNEL) -> None:
     key : str
         Its name.
     title : str
-        What `saltus cache` shows for it.
+        Its title in `saltus cache`.
     data : bytes
-        What it holds.
+        Its content.
     kind : str
         :data:`KERNEL` or :data:`HASH`.
     """

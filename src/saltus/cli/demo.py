@@ -34,9 +34,10 @@ STARTS = ((1.0e-3, 0.0), (0.2e-3, 0.0), (0.4e-3, 0.0), (2.0e-3, 0.0), (1.9e-3, 0
 NEIGHBOUR = 1e-9
 #: Periods to run: enough for the slowest response, 24T from x = 0.4 mm, to repeat to ten digits.
 PERIODS = 2000
-#: Forcing periods drawn in a time history, and in the phase portrait of a response that doesn't
-#: repeat.
-SHOWN, SHOWN_IF_APERIODIC = 12, 24
+#: Forcing periods drawn in a time history.
+SHOWN = 12
+#: Forcing periods drawn in the phase portrait of a response that doesn't repeat.
+SHOWN_IF_APERIODIC = 24
 #: Margins of the panels, in shares of the figure: fixed, since searching them takes longer than
 #: drawing.
 MARGINS = {
@@ -53,11 +54,11 @@ class Demo:
     run : Dataset
         The motions, a trajectory for each start.
     settled : Dataset
-        What they settled to.
+        The responses that they settled to.
     neighbours : array of int, shape (2, trajectory)
         Periods of the responses from one nanometre to either side, 0 if none was found.
     table : TextTable
-        What to print.
+        The table to print.
     """
 
     run: xr.Dataset

@@ -58,7 +58,7 @@ class Order:
     called : tuple of str
         Its symbols that others use.
     title : str
-        What `saltus cache` shows for it.
+        Its title in `saltus cache`.
     said : str
         What is said to be compiled, if it takes long; "" to say nothing.
     open_sizes : bool

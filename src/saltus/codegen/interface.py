@@ -33,9 +33,9 @@ class Interface:
     sizes, flags : tuple of str
         Whole numbers and truth values that the head supplies.
     tables : mapping
-        What the entries of each table are, by its name.
+        Content of each table, by name.
     functions : mapping
-        What the arguments of each function are, by its name.
+        Arguments of each function, by name.
     truths : tuple of str
         Functions that return a truth value; the others return nothing.
     """

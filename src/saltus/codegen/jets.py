@@ -66,7 +66,7 @@ class JetCode:
     fields : tuple of Linear
         Their right-hand sides in linear form.
     builder : SeriesBuilder
-        What made them.
+        The builder that made them.
     constants : Constants
         Receives the parameter-only coefficients.
     shared : int, optional

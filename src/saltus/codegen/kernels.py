@@ -131,13 +131,13 @@ class Kernels:
     Parameters
     ----------
     interface : Interface
-        What the templates leave open.
+        The names that the templates leave open.
     template : str
         Name of their bitcode.
     head : Head
-        What the equation supplies.
+        The numbers and functions of the equation.
     title : str
-        What `saltus cache` shows for it.
+        Its title in `saltus cache`.
     what : str
         What is said to be compiled, if that takes long.
 

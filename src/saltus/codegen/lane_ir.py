@@ -110,11 +110,11 @@ def equation_ir(
     constants : mapping
         Its sizes and tables.
     interface : Interface
-        What the templates call.
+        The functions and names that the templates use.
     lanes : int
         Trajectories in a row.
     register : int, optional
-        How many of them a register holds. Default: all.
+        Number of them in a register. Default: all.
     """
     part = min(register or lanes, lanes)
     shared, declared = _trigonometry(part)

@@ -105,7 +105,7 @@ def object_code(
     texts : sequence of str
         LLVM IR: constants that the template leaves open, functions that it calls.
     called : collection of str
-        What others refer to; the rest is this object's own.
+        Symbols that others refer to; the rest is this object's own.
     chosen : Target, optional
         Default: this machine.
     open_sizes : bool

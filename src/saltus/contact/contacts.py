@@ -31,9 +31,10 @@ from saltus.language.roots import with_root, zero_where_idle
 from saltus.language.sums import dot, ratio
 
 _ZERO, _ONE = ex.constant(0.0), ex.constant(1.0)
-#: Samples of states and parameters at which a velocity is compared with the rate of its gap, and
-#: the relative difference that rounding explains.
-_PLACES, _ROUNDING = 16, 1e-9
+#: Samples at which a velocity is compared with the rate of its gap.
+_PLACES = 16
+#: Relative difference of the two that rounding explains.
+_ROUNDING = 1e-9
 
 Field = tuple[Expr, ...]
 
@@ -66,7 +67,7 @@ class _Rubbing:
     sign : Expr
         Of the velocity of sliding: 1 or -1, by its guard.
     direction : tuple of Expr
-        What a unit of force against a positive velocity adds to the field.
+        Change of the field by a unit of force against a positive velocity.
     along : int
         Sign of the gap where that velocity is positive.
     """

@@ -114,7 +114,7 @@ def check_law(law: Declared, dimensions: DimensionCheck) -> None:
 
 @contextmanager
 def gathered(made: ContextVar[list[Made] | None]) -> Iterator[list[Made]]:
-    """Collect what is added to the list of a context variable inside."""
+    """Collect the items that are added to the list of a context variable inside."""
     found: list[Made] = []
     token = made.set(found)
     try:

@@ -113,7 +113,7 @@ def hertz(depth: Operand, *, stiffness: Operand, exponent: Operand = 1.5) -> Any
     Parameters
     ----------
     depth : Expr or float
-        How far they are pressed together [m], such as ``x - gap``; negative where they don't touch.
+        Compression [m], such as ``x - gap``; negative where they don't touch.
     stiffness : Expr or float
         [N/m**exponent].
     exponent : Expr or float
@@ -162,7 +162,7 @@ def hunt_crossley(
     Parameters
     ----------
     depth : Expr or float
-        How far the bodies are pressed together [m], such as ``x - gap``; negative where they don't
+        Compression [m], such as ``x - gap``; negative where they don't
         touch.
     velocity : Expr or float
         Time derivative of the depth [m/s].

@@ -47,7 +47,8 @@ def elements() -> AbstractContextManager[list[Element]]:
 
 
 def play(x: Operand, *, gap: Operand, name: str | None = None) -> Any:
-    """A play, or backlash: what a part carries along that has a clearance on both sides of it.
+    """A play, or backlash: the position of a part that x carries along through a clearance on both
+    sides.
 
     The value rests while x moves inside the clearance, and goes with x where that pushes on.
 
@@ -153,7 +154,7 @@ def iwan(
     stiffnesses, limits : sequence of Expr or float
         Of each element, as :func:`slider` takes them.
     name : str, optional
-        What the names of the states begin with: ``iwan``; each has its number behind it.
+        Prefix of the names of the states: ``iwan``; each has its number behind it.
 
     Returns
     -------

@@ -44,7 +44,7 @@ class Held:
     drift : Expr
         Partial derivative of w with respect to t.
     direction : tuple of Expr
-        What a unit of its force adds to the field.
+        Change of the field by a unit of its force.
     pivot : int or None
         The state whose rate follows from the constraint, exactly.
     """

@@ -33,7 +33,7 @@ class _Signs:
         self._canonical, self._guards = Canonical(), guards
 
     def of(self, node: Expr, facts: Facts) -> Known | None:
-        """The same as :func:`never_negative_if`, where the signs of some gaps are known."""
+        """The result of :func:`never_negative_if` if the signs of some gaps are known."""
         if node.op == "const":
             return () if node.payload >= 0 else None
         if not varies(node):

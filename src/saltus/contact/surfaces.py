@@ -24,9 +24,12 @@ from saltus.language.sums import ratio, total
 
 _SIGMA = ex.parameter("\0sigma")
 _ZERO = ex.constant(0.0)
-#: Samples of a surface where a jump is tried, Newton steps that lead there, and the relative size
-#: below which a sum is rounding.
-_PLACES, _STEPS, _ROUNDING = 512, 8, 1e-9
+#: Samples of a surface where a jump is tried.
+_PLACES = 512
+#: Newton steps that lead onto the surface.
+_STEPS = 8
+#: A sum below this share of its terms is rounding.
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)

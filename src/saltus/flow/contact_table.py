@@ -130,7 +130,7 @@ class ContactTable:
         return ContactTable(integers, self.floats)
 
     def rows(self, which: np.ndarray | slice) -> ContactTable:
-        """Some of the contacts: views for a slice."""
+        """The contacts of these indices; views for a slice."""
         return ContactTable(self.integers[which], self.floats[which])
 
     def begins(self, count: int, first: int = 0) -> np.ndarray:

@@ -73,9 +73,9 @@ def run(
     system : System
         The equations; its own parameter values aren't used.
     method : Method
-        How to integrate.
+        The method of integration.
     request : Request
-        What to compute.
+        The trajectories to compute.
     threads : int, optional
         Threads to use; default all processors this process may run on. The result doesn't depend on
         it.

@@ -38,7 +38,7 @@ class RK4(OneByOne):
         about within the step that crossed, the first two end with status ``turned``; at an impact,
         also where its rate more than doubles in the step.
     tolerance : float
-        How closely ``"bisect"`` brackets a contact, as a share of a step [-].
+        Bracket of a contact after ``"bisect"``, as a share of a step [-].
     max_steps, max_events : int, optional
         Budgets of one trajectory. Default: 10 000 steps per period and a million more; 10 million
         contacts.

@@ -41,7 +41,7 @@ class Flight:
     system : System
         The equations.
     method : Method
-        How to integrate.
+        The method of integration.
     start : float64[k, D]
         States at a whole period.
     parameters : float64[1 or k, P]

@@ -28,9 +28,9 @@ def mark_growth(outcome: Outcome, request: Request, exactly: Callable[[Request],
     Parameters
     ----------
     outcome : Outcome
-        What came out of steps of a fixed length.
+        The outcome of steps of a fixed length.
     request : Request
-        What was asked for.
+        Its request.
     exactly : callable
         The outcome of a request by an exact method.
     """

@@ -142,7 +142,7 @@ class Stroboscope:
     system : System
         Equations and values.
     method : Method
-        How to integrate.
+        The method of integration.
     parameters : float64[k, P], optional
         Values in the order of ``system.values``: one row for all points, or a row for each.
         Default: those of the system.

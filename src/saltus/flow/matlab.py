@@ -56,7 +56,9 @@ class Matlab(OneByOne):
 
     @property
     def label(self) -> str:
-        """Such as ``ode45 located (0.0001, 1e-07)``, ``ode45 not located (0.0001, 1e-07)``."""
+        """A label such as ``ode45 located (0.0001, 1e-07)``, ``ode45 not located
+        (0.0001, 1e-07)``.
+        """
         return (
             f"{self.name.lower()} {'' if self.events == 'locate' else 'not '}located "
             f"({self.rtol:g}, {self.atol:g})"

@@ -20,8 +20,10 @@ from saltus.flow.set_aside import Boundaries
 from saltus.kernels.isolation import ROUNDING
 from saltus.system import System
 
-#: Order, and log2 of the tolerance, of the series: their truncation is rounding.
-ORDER, LOG2_TOLERANCE = 20, -50.0
+#: Order of the series.
+ORDER = 20
+#: log2 of their tolerance: truncation is rounding.
+LOG2_TOLERANCE = -50.0
 #: Most pieces between two nodes; more mean a pole.
 MOST_PIECES = 1000
 #: A boundary nearer than this to the start of a piece is the boundary it starts at [lengths of the
@@ -42,7 +44,7 @@ class Pieces:
     phase : float64[p]
         the time after them at which it begins [s].
     length : float64[p]
-        How long it lasts [s].
+        Its duration [s].
     terms : float64[n + 1, q, p]
         Polynomials on [0, 1] of the q quantities [their units].
     noise : float64[q, p]
@@ -57,7 +59,7 @@ class Pieces:
     noise: np.ndarray
 
     def rows(self, which: np.ndarray) -> Pieces:
-        """Some of them."""
+        """The pieces of these indices."""
         return Pieces(*(getattr(self, name)[..., which] for name in self.__dataclass_fields__))
 
 
@@ -75,7 +77,7 @@ class Nodes:
     mode: np.ndarray
 
     def rows(self, which: np.ndarray | slice) -> Nodes:
-        """Some of them."""
+        """The nodes of these indices."""
         return Nodes(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
 
 
@@ -100,7 +102,7 @@ class MotionSeries:
             self._drifts[i] = module.turns(row, 0.0, map_.period[i], 0, i, self._turns)
 
     def none(self) -> Pieces:
-        """No pieces at all."""
+        """An empty set of pieces."""
         numbers, reals = np.zeros(0, np.int64), np.zeros(0)
         size = self._module.NSTATES + len(self._asked)
         return Pieces(

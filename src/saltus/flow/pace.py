@@ -13,8 +13,10 @@ import numpy as np
 
 from saltus.kernels import status as st
 
-#: Steps between two checks, and between two long checks, of a trajectory's pace.
-CHECK_STEPS, LONG_CHECK_STEPS = 20_000, 1_000_000
+#: Steps between two checks of a trajectory's pace.
+CHECK_STEPS = 20_000
+#: Steps between two long checks, over which its average pace is measured.
+LONG_CHECK_STEPS = 1_000_000
 #: Share of the rest of a run that CHECK_STEPS steps must bring. Less would need 2e11 steps to the
 #: end: days.
 MIN_PROGRESS = 1e-7

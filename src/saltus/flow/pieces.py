@@ -24,9 +24,12 @@ from saltus.flow.request import Outcome, Schedule
 from saltus.language.expression import Expr
 from saltus.system import System
 
-#: Nodes of a period besides the contacts: for an exact method, for another method, and samples for
-#: cubics.
-NODES, NODES_INEXACT, SAMPLES = 8, 64, 1000
+#: Nodes of a period besides the contacts.
+NODES = 8
+#: Nodes of a period for a method whose errors are more than rounding.
+NODES_INEXACT = 64
+#: Samples of a period for cubics.
+SAMPLES = 1000
 #: Nodes whose series are computed at a time: some tens of megabytes.
 WIDTH = 2048
 #: A sample within this time after a contact is the contact [forcing periods].

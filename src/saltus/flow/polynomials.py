@@ -15,9 +15,10 @@ import numpy as np
 
 #: Most halvings; the roots left in such an interval count as one.
 DEEPEST = 40
-#: Most Newton steps and bisections of an isolated root, and the change below which it has
-#: converged.
-MOST_STEPS, CONVERGED = 80, 4e-16
+#: Most Newton steps and bisections of an isolated root.
+MOST_STEPS = 80
+#: A step that changes a root by less is the last.
+CONVERGED = 4e-16
 
 
 def value(terms: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -58,7 +59,7 @@ def sign_changes(terms: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     which : int64[r]
         The polynomial, ascending.
     place : float64[r]
-        Where, ascending for each polynomial.
+        Places of the zeros, ascending for each polynomial.
     """
     coefficients = bernstein(len(terms) - 1) @ terms
     which = np.arange(terms.shape[1])

@@ -25,7 +25,7 @@ class Schedule:
 
     @classmethod
     def none(cls) -> Schedule:
-        """No samples."""
+        """A schedule without samples."""
         return cls(np.zeros(0, np.int64), np.zeros(0))
 
     @classmethod

@@ -14,10 +14,11 @@ SHARE = 0.5
 ALWAYS_ALLOWED = 2**24
 #: Free memory if the system doesn't report it [bytes].
 DEFAULT_FREE = 4 * 2**30
-#: Memory of a contact, and that of each state in it [bytes]: from the kernel's table to the Dataset
-#: with both runs of measured time errors. Measured: 401 for two states in one run; the second run
-#: keeps as many.
-CONTACT, CONTACT_OF_A_STATE = 640, 80
+#: Memory of a contact [bytes], from the kernel's table to the Dataset with both runs of measured
+#: time errors. Measured: 401 for two states in one run; the second run keeps as many.
+CONTACT = 640
+#: Memory of each state in a contact [bytes].
+CONTACT_OF_A_STATE = 80
 
 
 def free() -> int:

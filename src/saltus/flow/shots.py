@@ -29,7 +29,7 @@ class Shots:
     system : System
         The equations.
     method : Method
-        How to integrate: one whose steps adapt.
+        The method of integration: one whose steps adapt.
     parameters : float64[1 or k, P]
         Values in the order of ``system.values``.
     period : float64[k]

@@ -40,7 +40,7 @@ def on_allowed_sides(
     period : float64[n]
         Forcing period, or the span of a run without forcing [s].
     roundings : float
-        How many roundings beyond a stop a start may lie.
+        Most roundings beyond a stop of a start that lies on it.
 
     Returns
     -------

@@ -119,7 +119,7 @@ class DimensionCheck:
         )
 
     def declared(self, node: Expr) -> str:
-        """As :meth:`unit`, and ``"1"`` of what is known to be a plain number."""
+        """The unit as from :meth:`unit`, but ``"1"`` for a node known to be a plain number."""
         return "1" if self._dimension(node) == _PLAIN else self.unit(node)
 
     # -- one node ----------------------------------------------------------------------------------

@@ -33,7 +33,7 @@ def evaluate(
     Parameters
     ----------
     expressions : iterable of Expr
-        What to evaluate; parts that they share are computed once.
+        The expressions; parts that they share are computed once.
     t : float or array
         Time [s].
     states, values : mapping of str to float or array

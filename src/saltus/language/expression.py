@@ -40,9 +40,11 @@ _INTERNED: weakref.WeakValueDictionary[tuple[Any, ...], Expr] = weakref.WeakValu
 _JOINED: weakref.WeakValueDictionary[tuple[Any, ...], Condition] = weakref.WeakValueDictionary()
 _LOCK = threading.RLock()  # two nodes for one state would make a derivative silently zero
 _OBSERVER: ContextVar[Callable[[Expr], None] | None] = ContextVar("observer", default=None)
-#: Most comparisons in one condition as it would be written out (a chain in which each condition
-#: uses the one before twice doubles at each), and most nested brackets (Python reads 200).
-MOST_JOINED, DEEPEST = 1000, 150
+#: Most comparisons in one condition as it would be written out: a chain in which each condition
+#: uses the one before twice doubles at each.
+MOST_JOINED = 1000
+#: Most nested brackets of a condition; Python reads 200.
+DEEPEST = 150
 #: Bit of each operation, in the order in which they were met.
 _OPS: dict[str, int] = {}
 Number = int | float

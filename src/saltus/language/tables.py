@@ -35,7 +35,7 @@ class Table:
     Attributes
     ----------
     name : str
-        How equations show it.
+        Name in printed equations.
     points : float64[n]
         Knots, ascending.
     pieces : float64[m, 5]
@@ -159,7 +159,7 @@ def table(
         any number of points. Or anything that depends on states: a law of 32 points at most, with a
         boundary at each knot.
     points : sequence of float
-        Where the curve is known, ascending [unit of x].
+        Arguments of the given values, ascending [unit of x].
     values : sequence of float
         Its values there [SI]. An amplitude stays a parameter: ``amplitude*sl.table(...)``.
     kind : str
@@ -171,7 +171,7 @@ def table(
         polynomials at the ends go on. ``"periodic"``: the curve repeats after ``points[-1] -
         points[0]``; first and last value must be equal. In time only.
     name : str
-        What printed equations call it.
+        Its name in printed equations.
 
     Returns
     -------

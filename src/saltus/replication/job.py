@@ -40,7 +40,7 @@ class Job:
     system : System
         With the values of this job.
     method : Method
-        How to integrate.
+        The method of integration.
     arguments : mapping
         Plain values.
     needs : tuple of str

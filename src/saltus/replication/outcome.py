@@ -28,7 +28,7 @@ class Replication:
     figures : tuple of str
         The figures that were asked for.
     folder : Path
-        Where everything is.
+        Folder of all files.
     threads : int
         Threads of each computation.
     data : dict of str to Dataset

@@ -44,7 +44,7 @@ class Picture:
     name : str
         Its own name, also that of its file.
     title, caption : str
-        What it shows; how to read it.
+        Title, and how to read the picture.
     needs : tuple of str
         Names of the jobs that it is drawn from.
     draw : callable
@@ -94,7 +94,7 @@ class Claim:
     says : str
         The claim.
     where : str
-        Where the paper says so.
+        Place of the claim in the paper.
     rule : str
         The rule in words.
     needs : tuple of str

@@ -31,8 +31,12 @@ _Made = TypeVar("_Made")
 
 #: Dots per inch of the pictures: sharp on a phone, in a report small enough to mail.
 DPI = 130
-#: Folders beside the report: Datasets, pictures, and the lock against a second run.
-DATA, PICTURES, LOCKS = "data", "pictures", "locks"
+#: Folder of the Datasets, beside the report.
+DATA = "data"
+#: Folder of the pictures.
+PICTURES = "pictures"
+#: Folder of the lock against a second run.
+LOCKS = "locks"
 
 
 def reproduce(

@@ -43,7 +43,7 @@ class Check:
     Attributes
     ----------
     text : str
-        What must be so, in words, with the numbers that decide it.
+        The statement in words, with the numbers that decide it.
     passed : bool or None
         Whether it is so; None if the data can't tell.
     """
@@ -59,13 +59,13 @@ class Finding:
     Attributes
     ----------
     own : str
-        What the paper's own settings give here.
+        Answer of the paper's own settings here.
     exact : str
-        What exact arithmetic gives.
+        Answer of exact arithmetic.
     checks : tuple of Check
         They make the verdict.
     sure : str
-        How sure that is: starts, intervals, error estimates.
+        Certainty of that: starts, intervals, error estimates.
     why : str
         Where we differ from the paper: which setting might explain it. Where nothing is decided:
         why not.
@@ -93,7 +93,7 @@ def passed(row: Mapping[str, Any], quantities: Mapping[str, Any]) -> bool | None
         that is the limit. Without a rule the quantity itself says whether it is so. ``given``: name
         of a quantity that must be true for the data to decide.
     quantities : mapping
-        What was read from the data, by name.
+        Readings of the data, by name.
 
     Returns
     -------

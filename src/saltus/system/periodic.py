@@ -29,9 +29,10 @@ from saltus.language.expression import (
 from saltus.system.equations_of_motion import EquationsOfMotion
 from saltus.system.modes import sides
 
-#: Rounding allowed in the number of cycles in a period: relative for a clock, absolute for a phase
-#: [cycles].
-CLOCK_MISS, PHASE_MISS = 1e-9, 1e-9
+#: Rounding allowed in the number of a clock's cycles in a period [relative].
+CLOCK_MISS = 1e-9
+#: Rounding allowed in the number of a phase's cycles in a period [cycles].
+PHASE_MISS = 1e-9
 #: Smallest difference after a period that exceeds rounding, relative to the values at one state.
 DIFFERENCE = 1e-7
 

@@ -60,7 +60,7 @@ def quantity(
         in any order; ``**rest`` takes all other parameters. So the signature of the equation itself
         will do. Default values aren't used. It returns one number.
     what : str
-        What the function is, for messages: ``"the surface"``.
+        Words for the function in messages: ``"the surface"``.
 
     Returns
     -------
@@ -161,7 +161,7 @@ def with_surface(system: System, surface: Quantity | str, name: str = "surface")
     Parameters
     ----------
     system : System
-        What moves.
+        The equations and values.
     surface : callable or str
         The motion is on the surface where this function of (t, states, parameters) is zero (see
         :func:`quantity`); or the name of a state, for the surface on which that state is zero.
@@ -196,7 +196,7 @@ def with_level(system: System, name: str, level: float | str) -> System:
     Parameters
     ----------
     system : System
-        What moves.
+        The equations and values.
     name : str
         A state.
     level : float or str
@@ -228,7 +228,7 @@ def turning_surface(system: System, name: str) -> System:
     Parameters
     ----------
     system : System
-        What moves.
+        The equations and values.
     name : str
         A state.
 
@@ -277,7 +277,7 @@ def with_integrals(
     Parameters
     ----------
     system : System
-        What moves.
+        The equations and values.
     integrands : mapping of str to callable
         Integrands by the name of the new state: functions of (t, states, parameters), see
         :func:`quantity`. They can't use the other integrals.
@@ -320,7 +320,7 @@ def with_states(
     Parameters
     ----------
     system : System
-        What moves.
+        The equations and values.
     rates : mapping of str to Expr
         Rate of each new state by its name, which isn't taken.
     units : mapping of str to str, optional
@@ -392,7 +392,7 @@ def with_losses(system: System, stored: Expr, name: str, unit: str) -> System:
     Parameters
     ----------
     system : System
-        What moves.
+        The equations and values.
     stored : Expr
         The quantity, as :func:`quantity` returns it; its pieces are those from which the state
         jumps.
@@ -422,14 +422,14 @@ def with_losses(system: System, stored: Expr, name: str, unit: str) -> System:
 
 
 def with_impulses(system: System, names: Mapping[int, str]) -> System:
-    """The system with more states, the last: each the impulse of a stop so far, of its impacts and
-    of the force at rest. Where impacts accumulate, the force that would hold the contact stands for
-    those that aren't followed: their impulse is the same.
+    """The system with more states, the last: the impulse of each stop so far, from its impacts and
+    from the force at rest. Where impacts accumulate, the force that would hold the contact replaces
+    the impacts that aren't followed: their impulse is the same.
 
     Parameters
     ----------
     system : System
-        What moves.
+        The equations and values.
     names : mapping of int to str
         Names of the new states by the number of the guard, all of which have the law of an impact.
 

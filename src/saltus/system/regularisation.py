@@ -25,9 +25,10 @@ from saltus.system.guard_units import gap_units
 from saltus.system.system import System
 from saltus.units import coherent_unit
 
-#: Argument at which a user's law is tried, and largest distance from 0 and 1 there: arctan is off
-#: by 0.003.
-_FAR, _NEAR = 100.0, 0.02
+#: Argument, and its negative, at which a user's law is tried.
+_FAR = 100.0
+#: Largest distance from 0 and 1 there: arctan is off by 0.003.
+_NEAR = 0.02
 
 
 def regularise(

@@ -28,8 +28,10 @@ from saltus.language.tables import Table
 from saltus.system.equations_of_motion import EquationsOfMotion
 from saltus.units import check_declared
 
-#: Versions of the data's meaning: for systems without a law of contact, and with one.
-FORMAT, WITH_LAWS = "saltus-system/1", "saltus-system/2"
+#: Version of the data's meaning, for systems without a law of contact.
+FORMAT = "saltus-system/1"
+#: Version for systems with a law of contact.
+WITH_LAWS = "saltus-system/2"
 #: Bound of the numbers of guards in conditions, well above those that any system has.
 MOST_BITS = 1000
 #: Entries of a law's data by content: tuples of expressions, single expressions or None, others.

@@ -14,9 +14,10 @@ from saltus.language.expression import depends_on
 from saltus.system.modes import sides
 from saltus.system.system import System
 
-#: States at which both sides are compared, and the powers of ten between which their magnitudes
-#: lie.
-SAMPLES, SIZES = 256, (-6.0, 2.0)
+#: States at which both sides are compared.
+SAMPLES = 256
+#: Powers of ten between which their magnitudes lie.
+SIZES = (-6.0, 2.0)
 #: Share of a value by which it may differ from its mirror image: rounding.
 ROUNDING = 1e-7
 

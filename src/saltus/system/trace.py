@@ -112,7 +112,7 @@ def system(
     name : str, optional
         Name of the system; default: that of the function.
     source : str, optional
-        Where the equations were published.
+        Publication of the equations.
     check_units : bool, optional
         Whether to check known units: terms of a sum or comparison have one unit, and each rate has
         that of its state per second. False for equations whose numbers have units of their own.

@@ -58,7 +58,7 @@ def compare(map_a: xr.Dataset, map_b: xr.Dataset, *, tolerance: float = TOLERANC
     Parameters
     ----------
     map_a, map_b : Dataset
-        What ``basins`` returned.
+        The result of ``basins``.
     tolerance : float
         Largest distance of two orbits that count as one, in units of the axis ranges. A state that
         is no axis is measured by the largest magnitude of the points.

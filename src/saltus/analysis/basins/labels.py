@@ -41,11 +41,11 @@ class Settling:
     periods : int64[k]
         Iterates until captured; -1 if it wasn't.
     status : int64[k]
-        How it ended: codes of kernels/status.py.
+        Its end: codes of kernels/status.py.
     unresolved : int64[k]
         Grazes on the way that were shallower than the local error.
     end : float64[k, D]
-        Where it stood last.
+        Its last state.
     """
 
     label: np.ndarray

@@ -58,7 +58,7 @@ class BasinPlan:
     system : System
         Equations and values.
     method : Method
-        How to integrate.
+        The method of integration.
     axes : mapping of str to float64[n]
         The two states that the map is drawn over, and their values [SI].
     fixed : mapping of str to float

@@ -191,7 +191,7 @@ def measure(ds: xr.Dataset) -> dict[str, float | int]:
     Parameters
     ----------
     ds : Dataset
-        What ``basins`` returned.
+        The result of ``basins``.
 
     Returns
     -------

@@ -33,7 +33,7 @@ def along(
     number : callable
         One value [SI] from a number or a text with a unit.
     what : str
-        What the values are, for messages: ``"values"``, ``"starts"``.
+        Words for the values in messages: ``"values"``, ``"starts"``.
     example : str
         A range as one would write it.
     least : int

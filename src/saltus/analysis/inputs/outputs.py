@@ -30,7 +30,7 @@ class Outputs:
     formulas : tuple of Expr
         Of the functions; conditions hold bits.
     guards : tuple of Guard
-        What these bits number: those of the system, then those that only the functions need.
+        The guards of these bits: those of the system, then those that only the functions need.
     """
 
     names: tuple[str, ...]
@@ -48,7 +48,7 @@ def outputs_of(system: System, given: Mapping[str, Any] | None = None) -> Output
     Parameters
     ----------
     system : System
-        What moves.
+        The equations and values.
     given : mapping of str to callable, or to (callable, unit)
         Functions of (t, states, parameters), arguments found by name; see
         :func:`saltus.system.quantity.quantity`.

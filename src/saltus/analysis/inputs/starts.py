@@ -20,8 +20,10 @@ from saltus.units import to_si
 
 #: Most trajectories of a single call: the starts of more would fill the memory.
 MOST_TRAJECTORIES = 100_000_000
-#: Memory of a trajectory that keeps only its end, and of each of its states [bytes].
-TRAJECTORY, TRAJECTORY_OF_A_STATE = 200.0, 24.0
+#: Memory of a trajectory that keeps only its end [bytes].
+TRAJECTORY = 200.0
+#: Memory of each of its states [bytes].
+TRAJECTORY_OF_A_STATE = 24.0
 
 #: Most combinations of values whose periodicity is checked; each takes half a millisecond.
 MOST_PERIOD_CHECKS = 2000

@@ -28,7 +28,7 @@ from saltus.results.dataset import schema
 from saltus.system import System
 
 METHODS = ("variational", "wolf")
-#: Units of exponents: the time that one block stands for, and True for a natural logarithm.
+#: Units of exponents: True for a growth per block, and the logarithm that counts as one.
 UNITS = {
     "1/s": (False, 1.0),
     "1/period": (True, 1.0),
@@ -90,8 +90,8 @@ def lyapunov(
         states and the phase of the forcing, 32 in a block; an evolution is one block. It is the
         largest exponent of the flow, so never below zero: neighbours on an orbit stay neighbours.
     flow : Method
-        How to integrate. Default :class:`saltus.Taylor`. With ``sl.ODE45(events="ignore")`` jumps
-        of the tangent are left out, as contacts aren't known.
+        The method of integration. Default :class:`saltus.Taylor`. With
+        ``sl.ODE45(events="ignore")`` jumps of the tangent are left out, as contacts aren't known.
     periods : int
         Blocks that growth is measured over, at least 64. The error falls with the square root of
         it.

@@ -14,8 +14,10 @@ from saltus.flow.maps import Stroboscope
 from saltus.flow.request import Schedule
 from saltus.kernels import status as st
 
-#: Blocks sampled for the size of the motion, and samples in each.
-SAMPLED_BLOCKS, SAMPLES_PER_BLOCK = 16, 32
+#: Blocks sampled for the size of the motion.
+SAMPLED_BLOCKS = 16
+#: Samples in each of these blocks.
+SAMPLES_PER_BLOCK = 32
 
 
 @dataclass(frozen=True)
@@ -27,7 +29,7 @@ class Segment:
     points : float64[k, n, D]
         States at the ends of the blocks.
     status : int64[k]
-        How each ended: codes of kernels/status.py.
+        Its end: codes of kernels/status.py.
     grazes, unresolved : int64[k]
         Grazes, and those of them that were shallower than the local error.
     margin : float64[k]

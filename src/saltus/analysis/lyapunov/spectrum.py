@@ -24,9 +24,10 @@ from saltus.results.dataset.kinds import Kind
 #: Logarithm of the ratio of growths in one block above which the slower one is lost in the rounding
 #: of the faster: three digits are left.
 LOST = 29.0
-#: Factor on the rounding of a monodromy matrix above which a multiplier is lost, and blocks of the
-#: round trips that find it then.
-AMPLIFIED, TRIPS = 1e6, 256
+#: Factor on the rounding of a monodromy matrix above which a multiplier is lost.
+AMPLIFIED = 1e6
+#: Blocks of the round trips that find a lost multiplier.
+TRIPS = 256
 #: A slow approach to an orbit must shrink its distance to this share over half of the last segment.
 GAINED = 0.5
 
@@ -53,7 +54,7 @@ class Spectrum:
     running : Means
         and these, float64[k, D, m].
     growth : Growth
-        What they come from.
+        The growth that they come from.
     """
 
     exponents: np.ndarray

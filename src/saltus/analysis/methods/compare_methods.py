@@ -71,9 +71,9 @@ def compare_methods(
         :func:`saltus.frequency_response`, :func:`saltus.bifurcation_diagram` or
         :func:`saltus.basins`.
     methods : sequence of Method
-        What is compared; default ode45 at (1e-4, 1e-7) with and without event location.
+        The methods compared; default ode45 at (1e-4, 1e-7) with and without event location.
     reference : Method
-        What it is compared with; default :class:`saltus.Taylor`, exact but for rounding.
+        The exact method; default :class:`saltus.Taylor`, exact but for rounding.
     computed : mapping of str to Dataset, optional
         Results that exist already, by the ``label`` of their method; they aren't computed again,
         and their cost stays unknown.

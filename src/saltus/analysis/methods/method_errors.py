@@ -13,9 +13,10 @@ from saltus.kernels import status as st
 from saltus.results.dataset.schema import parameters_of, response_name, states_of
 from saltus.system import System
 
-#: Orbits of two methods are one below this multiple of the method's noise, or below this part of
-#: the motion's range.
-SAME_NOISE, SAME_AT_LEAST = 4.0, 1e-3
+#: Orbits of two methods are one below this multiple of the method's noise.
+SAME_NOISE = 4.0
+#: They are one below this part of the motion's range, too.
+SAME_AT_LEAST = 1e-3
 #: Points of a response from which one-period errors are measured; more add nothing.
 POINTS = 64
 

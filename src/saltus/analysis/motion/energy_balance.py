@@ -27,8 +27,8 @@ from saltus.system.quantity import Quantity, quantity, with_integrals, with_loss
 
 #: Default number of intervals of an unforced system's span.
 INTERVALS = 100
-#: Names of the states that hold the integrals, by content, and of the sum of the losses at impacts.
-#: No user can write them.
+#: Names of the states that hold the integrals, by content, and of the sum of the losses at impacts;
+#: chosen so that no system has them.
 _NAMES = {
     "supplied": "work_supplied_",
     "dissipated": "energy_dissipated_",

@@ -60,8 +60,8 @@ def settled(
     Parameters
     ----------
     run : Dataset
-        What ``simulate`` returned for a forced system with samples at whole periods, or what
-        ``stroboscope`` returned.
+        The result of ``simulate`` for a forced system with samples at whole periods, or of
+        ``stroboscope``.
     tolerance : float
         Largest difference of states n periods apart that counts as a repeat, relative to the
         largest range that a state of the same unit has in the samples looked at; where there are

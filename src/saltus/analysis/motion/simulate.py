@@ -30,9 +30,10 @@ from saltus.system.quantity import remembering
 
 #: Default samples per forcing period, enough for a picture; contacts are exact without them.
 PER_PERIOD = 200
-#: Samples over the whole span of an unforced system, for one trajectory and at least for each of
-#: many: a smooth curve over a hundred oscillations.
-MOST_PER_SPAN, LEAST_PER_SPAN = 10_000, 2000
+#: Samples over the whole span of an unforced system: a smooth curve over a hundred oscillations.
+MOST_PER_SPAN = 10_000
+#: Least number of these, for each of many trajectories.
+LEAST_PER_SPAN = 2000
 
 
 @verb

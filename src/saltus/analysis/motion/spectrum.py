@@ -60,12 +60,12 @@ def spectrum(
     Parameters
     ----------
     run : Dataset
-        What ``simulate`` returned. Take the transient off with its ``keep=``. Sampling folds what
+        The result of ``simulate``. Take the transient off with its ``keep=``. Sampling folds what
         lies above half of the samples per period back into the spectrum; forces of contact springs
         bend and their lines fall off as the third power of the order, so 200 samples a period leave
         some 1e-6 of the largest line.
     state : str or sequence of str, optional
-        Which states; all of them by default.
+        The states; all of them by default.
     window : {"none", "hann"}, optional
         For all trajectories; by default ``"none"`` where the response repeats, else ``"hann"``.
     last : int, optional
@@ -230,8 +230,8 @@ def _forced_stretch(run: xr.Dataset, last: int | None) -> _Stretch:
 
 
 def _free_stretch(run: xr.Dataset, last: int | None) -> _Stretch:
-    """All samples of a system without forcing; the last one is left out where it repeats the
-    first.
+    """All samples of a system without forcing but the last, which would be the first of a
+    repeat.
     """
     if last is not None:
         raise ParameterError(

@@ -23,9 +23,10 @@ from saltus.system import System
 #: fastest, so the ratio of a trajectory's error to its distance from a copy stays at its random
 #: first value: one copy can be near for ever, three rarely are.
 COPIES = 3
-#: Factor of the estimate on the largest distance so far: where errors are rounding, and where the
-#: companion is exact in comparison.
-SAFETY, SAFETY_OF_EXACT_COMPANION = 8.0, 4.0
+#: Factor of the estimate on the largest distance so far, if errors are rounding.
+SAFETY = 8.0
+#: The same factor, if the companion is exact in comparison.
+SAFETY_OF_EXACT_COMPANION = 4.0
 #: Most trajectories that move in one call with their copies.
 FEW = 16
 #: Share of the progress for the run itself, if its copies come after it.
@@ -60,7 +61,7 @@ def measured(
     Returns
     -------
     Outcome, float64[contact]
-        What came out, and the estimated error of the time of every contact [s]; infinite from where
+        The outcome, and the estimated error of the time of every contact [s]; infinite from where
         on nothing is known.
 
     Raises

@@ -25,7 +25,7 @@ def transmissibility(ds: xr.Dataset, output: str, to: str, by: By = "amplitude")
     Parameters
     ----------
     ds : Dataset
-        What ``frequency_response`` or ``bifurcation_diagram`` returned.
+        The result of ``frequency_response`` or ``bifurcation_diagram``.
     output, to : str
         Outputs of it, states or functions: numerator and denominator.
     by : {"amplitude", "rms", "rms_about_mean"}
@@ -84,5 +84,5 @@ def transmissibility(ds: xr.Dataset, output: str, to: str, by: By = "amplitude")
 
 
 def _factor(unit: str) -> str:
-    """A unit as it stands in a denominator."""
+    """A unit in the form for a denominator."""
     return f"({unit})" if any(sign in unit for sign in "*/ ") else unit

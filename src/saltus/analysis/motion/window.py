@@ -61,7 +61,7 @@ class Stretch:
 
     @property
     def forcing_period(self) -> float | np.ndarray | None:
-        """One for all, or one each [s]; None for an unforced system."""
+        """Forcing period, one for all trajectories or one each [s]; None for an unforced system."""
         if self.system.forced_at is None:
             return None
         return (

@@ -14,11 +14,14 @@ from scipy.spatial import cKDTree
 LONGEST = 0.05
 #: Samples for each cell of the histogram of the mutual information.
 PER_CELL = 40
-#: A neighbour is false from this growth of its distance by one more coordinate, or this distance
-#: relative to the series (Kennel's values).
-STRETCHED, SPREAD = 15.0, 2.0
-#: Share of false neighbours that counts as none, and the largest dimension tried.
-NONE_FALSE, MOST = 0.01, 10
+#: Growth of a distance by one more coordinate from which a neighbour is false (Kennel's value).
+STRETCHED = 15.0
+#: Distance relative to the series from which a neighbour is false (Kennel's value).
+SPREAD = 2.0
+#: Share of false neighbours that counts as none.
+NONE_FALSE = 0.01
+#: Largest dimension tried.
+MOST = 10
 #: Points whose neighbours are tested.
 ASKED = 4000
 
@@ -124,8 +127,8 @@ def least_dimension(series: np.ndarray, delay: int, exclude: int) -> int:
 
 
 def hardly_correlated(series: np.ndarray) -> bool:
-    """True if neighbouring samples tell little of each other, as those of a map: autocorrelation
-    below 1/e in magnitude.
+    """True if neighbouring samples are hardly correlated, as those of a map: autocorrelation below
+    1/e in magnitude.
     """
     centred = series - series.mean()
     return bool(abs(np.dot(centred[:-1], centred[1:])) < np.dot(centred, centred) / np.e)

@@ -20,9 +20,10 @@ from scipy.spatial import cKDTree
 CROWD = 20
 #: Points for which this distance is measured, evenly spread.
 ASKED = 200
-#: Largest angle of a first replacement [rad], and widenings of the largest distance before the
-#: angle is doubled (Wolf's values).
-ANGLE, WIDENINGS = 0.3, 5
+#: Largest angle of a first replacement [rad] (Wolf's value).
+ANGLE = 0.3
+#: Widenings of the largest distance before the angle is doubled (Wolf's value).
+WIDENINGS = 5
 
 
 @dataclass(frozen=True)

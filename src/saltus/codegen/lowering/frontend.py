@@ -121,7 +121,7 @@ def module_of(interface: Interface, lanes: int) -> tuple[llvm.ModuleRef, str, se
     Parameters
     ----------
     interface : Interface
-        What is left open.
+        The names left open.
     lanes : int
         Lanes of a step.
 

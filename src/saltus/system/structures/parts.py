@@ -143,7 +143,7 @@ def parts(kind: type[P], given: Any, word: str, known: Iterable[str]) -> list[tu
     given : sequence
         Of them, or of mappings of their arguments.
     word : str
-        How they are called by default.
+        Their default name.
     known : iterable of str
         Names of the degrees of freedom.
 

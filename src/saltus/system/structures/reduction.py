@@ -92,7 +92,7 @@ def flexibility(
     modes : Modes
         All of them, or those that are kept.
     count : int
-        How many are kept.
+        Number of modes kept.
     at : float64[m, n]
         Directions of the forces.
 

@@ -90,7 +90,7 @@ def structure(
         In place of ``damping``: the ratio of every mode, such as 0.02 or ``"2 %"``, or one each for
         the lowest of them.
     modes : int, optional
-        How many of the lowest modes are kept; the states are then their coordinates. Default: all
+        Number of the lowest modes kept; the states are then their coordinates. Default: all
         degrees of freedom, as they are. ``modes=n`` loses nothing, and makes a full mass matrix
         quicker to compile.
     names : sequence of str, or str
