@@ -217,8 +217,8 @@ class MotionSeries:
         work: np.ndarray,
         h: np.ndarray,
     ) -> np.ndarray:
-        """Shorten steps to where the right-hand side agrees with the series: a term may vanish at
-        the node.
+        """Shorten steps to where the right-hand side agrees with the series: a term may be
+        negligible at the node, and not after it.
         """
         module, width = self._module, len(h)
         period = self._map.period[nodes.motion]

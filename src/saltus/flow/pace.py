@@ -17,7 +17,7 @@ from saltus.kernels import status as st
 CHECK_STEPS = 20_000
 #: Steps between two long checks, over which its average pace is measured.
 LONG_CHECK_STEPS = 1_000_000
-#: Share of the rest of a run that CHECK_STEPS steps must bring. Less would need 2e11 steps to the
+#: Share of the remaining run that CHECK_STEPS steps must bring. Less would need 2e11 steps to the
 #: end: days.
 MIN_PROGRESS = 1e-7
 

@@ -118,7 +118,7 @@ def _pieces(
 def _nodes(
     map_: Stroboscope, outcome: Outcome, periods: int, schedule: Schedule, cubic: bool
 ) -> Nodes:
-    """Samples and contacts in one list; of two at the same instant the later one counts."""
+    """Samples and contacts in one list, one of them for each instant."""
     k, m, size = outcome.samples.shape
     contacts = outcome.contacts
     complete = np.isfinite(outcome.samples).all(axis=(1, 2)) & (m > 0)

@@ -37,8 +37,8 @@ def watch(lanes, lane):
 
 @inner
 def base_of_law(lanes, lane, batch):
-    """Start of the period in the time of laws. If the forcing repeats to the bit it is that of the
-    first period, which is accurate to rounding after any number of periods.
+    """Start of the period as laws read the time. If the forcing repeats to the bit it is that of
+    the first period, which is accurate to rounding after any number of periods.
     """
     if NCLOCKS == 0 and lanes.memo[lane, DRIFTS] == 0:
         return batch.origin[lanes.memo[lane, WHO]]
@@ -47,7 +47,7 @@ def base_of_law(lanes, lane, batch):
 
 @inner
 def time_of_law(lanes, lane, batch):
-    """The time in the time of laws."""
+    """The time as laws read it, see `base_of_law`."""
     return lanes.clock[TAU, lane] + base_of_law(lanes, lane, batch)
 
 
@@ -205,7 +205,8 @@ def face(lanes, lane, batch, g, slow):
 @kernel
 def loosen(lanes, lane, batch, struck, closing, slow):
     """Release the held contacts that feel the impact of another: their surfaces slide then, their
-    stops are struck or left. A stop that nothing kept from leaving closes or opens now.
+    stops are struck or left. A free stop whose gap and rate were known to be zero closes or opens
+    now.
     """
     mode, others = mode_of(lanes, lane), False
     for g in range(NGUARDS):
@@ -235,8 +236,8 @@ def loosen(lanes, lane, batch, struck, closing, slow):
 
 @inner
 def too_short(lanes, lane, g, restitution):
-    """Duration of a chatter [s] below which it is completed: its rest changes the acceleration by
-    less than 1e-8, so the time of its end is accurate to rounding.
+    """Duration of a chatter [s] below which it is completed: the remainder changes the acceleration
+    by less than 1e-8, so the time of its end is accurate to rounding.
 
     The acceleration's own time scale is read from the series of the flight that has just ended.
     """

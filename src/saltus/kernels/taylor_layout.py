@@ -101,7 +101,7 @@ CARRY = CARRIED + (2 if LAWS else 1) * NGUARDS
 STEP_RECORDS = 2 * LANES * ((2 if LAWS else 1) * NGUARDS + MOST_TOUCHES)
 #: First of the rows of `side` that hold the lanes in which each guard is watched (0/1).
 WATCHED = NGUARDS + NSINGULAR
-#: Excess of the needed force over a friction force at the begin of slip, as a part of it, below
+#: Excess of the needed force over a friction force where slip begins, as a part of it, below
 #: which it is rounding.
 SLOW_START = 1.0e-9
 #: Part of the first closing velocity at which successive impacts of one instant have ended for
@@ -115,7 +115,7 @@ LOOKS, HALVINGS = 4, 60
 #: Share of a contact's effect left by friction, at which a contact is given up rather than
 #: released.
 PARADOX = 1.0e-9
-#: Rest of a chatter when it is completed, as a part of the time scale of the acceleration.
+#: Remainder of a chatter when it is completed, as a part of the time scale of the acceleration.
 CHATTER = 1.0e-8
 #: Times within this many ulp are one event (EVENTS.md, rule 6).
 COINCIDENT = 10.0 * 2.220446049250313e-16

@@ -37,8 +37,8 @@ from saltus.kernels.lanes import (
 
 @inner
 def coefficients(lanes):
-    """Taylor coefficients of all lanes, repeated while lanes prove so near a boundary that its
-    terms are set aside.
+    """Taylor coefficients of all lanes, computed again while lanes are found so near a boundary
+    that its terms are set aside.
     """
     if NSINGULAR == 0:
         jets(lanes.y, lanes.side, lanes.c, lanes.clock, lanes.work)
