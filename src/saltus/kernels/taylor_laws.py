@@ -332,7 +332,7 @@ def strays(lanes, lane, batch, slow):
 
 @kernel
 def hold(lanes, lane, batch, g, later, slow):
-    """Begin to hold a contact: state and tangent go onto its constraint, `later` [s] at most than
+    """Begin to hold a contact: state and tangent go onto its constraint, at most `later` [s] after
     now.
     """
     who, before, h = lanes.memo[lane, WHO], mode_of(lanes, lane), PARTNER[g]

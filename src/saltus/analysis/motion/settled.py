@@ -39,7 +39,7 @@ UNDECIDED = 10
 #: Default number of last periods: enough for two repeats of a 48T response.
 LAST = 96
 #: Least size of a state, as a share of the largest of its unit, if only magnitudes are known: a
-#: state that has decayed besides others has no size of its own.
+#: state that has decayed beside others has no size of its own.
 LEAST_SHARE = 1e-6
 #: Least size of any state [SI], for one that has decayed and is alone in its unit. An atom measures
 #: 1e-10 m.
