@@ -1,4 +1,4 @@
-"""How much there is to read in each package, without comments, docstrings, blank lines and imports.
+"""Amount of code to read in each package, without comments, docstrings, blank lines and imports.
 
 Lines of code depend on how wide they are; tokens (names, numbers, strings, operators) don't.
 

@@ -52,7 +52,7 @@ class Kind(StrEnum):
 
 
 class Progress(StrEnum):
-    """How progress is shown."""
+    """Displays of the progress."""
 
     bar = "bar"
     json = "json"
@@ -169,8 +169,8 @@ def run(
     for place in inputs or []:
         if not place.is_dir():
             raise StudyError(f"--inputs {place}: there is no such folder.")
-    own = own_system(system) if system else None
-    if own is None and spec.system.model is None and not spec.system.rates:
+    user_system = own_system(system) if system else None
+    if user_system is None and spec.system.model is None and not spec.system.rates:
         check_beside(study)
     resources = _resources(spec, threads, workers, scheduler, shard)
     folder = out or Path("saltus-runs") / study.stem
@@ -178,7 +178,7 @@ def run(
     again = _again(folder, system)
     with no_folder_left(folder):
         usable_folder(folder)
-        _run(spec, text, folder, found, own, only or [], resources, progress, again)
+        _run(spec, text, folder, found, user_system, only or [], resources, progress, again)
 
 
 def _resources(
@@ -195,9 +195,8 @@ def _resources(
 
 
 def _run(
-    spec: Study, text: str, folder: Path, inputs: Inputs, own: System | None, only: list[str],
-    resources: Resources, progress: Progress,
-    again: str,
+    spec: Study, text: str, folder: Path, inputs: Inputs, user_system: System | None,
+    only: list[str], resources: Resources, progress: Progress, again: str,
 ) -> None:  # fmt: skip
     from saltus.cli import screen
     from saltus.study.run.study import run_study
@@ -205,7 +204,7 @@ def _run(
     try:
         with screen.reporting(progress.value) as (report, say):
             outcome = run_study(
-                spec, text, folder, own, resources, report, say, inputs=inputs, only=only
+                spec, text, folder, user_system, resources, report, say, inputs=inputs, only=only
             )
     except KeyboardInterrupt:
         screen.fail(f"stopped; results so far are stored. Go on with: {again}")
@@ -218,7 +217,7 @@ def _run(
 
 
 def _again(folder: Path, system: str) -> str:
-    """The command that goes on, with the system of one's own that the study was run with."""
+    """The command that resumes the study, with the user's own system if there is one."""
     return shlex.join(["saltus", "resume", str(folder), *(["--system", system] if system else [])])
 
 
@@ -262,14 +261,14 @@ def resume(
     from saltus.study.tables.read import read
 
     spec, text = read(copy_of(store))
-    own = own_system(system) if system else None
+    user_system = own_system(system) if system else None
     resources = _resources(spec, threads, workers, scheduler, shard)
     _run(
         spec,
         text,
         store,
         inputs_of(store, text),
-        own,
+        user_system,
         only or [],
         resources,
         progress,
@@ -403,7 +402,7 @@ def models(
 
 
 def _models_table(width: int) -> TextTable:
-    """A line for each model; sources are cut where the screen ends."""
+    """A line for each model; sources are cut to the width of the screen."""
     from saltus import models as published
     from saltus.study.table import TextTable
 

@@ -1,4 +1,4 @@
-"""Draw a result that stands in a file."""
+"""Draw the result in a file."""
 
 from __future__ import annotations
 

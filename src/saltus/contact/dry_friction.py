@@ -52,7 +52,7 @@ def friction(velocity: Operand, *, slip: Operand, stick: Operand | None = None) 
 
 
 def drives(force: float) -> str:
-    """What to say of a negative friction force."""
+    """The message about a negative friction force."""
     return (
         f"the friction force slip = {force:g} is negative: friction never pushes on. Give its "
         f"size, and subtract sl.friction(...) in the equation of motion."
@@ -60,7 +60,9 @@ def drives(force: float) -> str:
 
 
 def sticks_less(limit: float) -> str:
-    """What to say of a friction force that is smaller at rest than in motion, or has no ratio."""
+    """The message about a friction force that is smaller at rest than in motion, or has no
+    ratio.
+    """
     if not math.isfinite(limit):
         return (
             "slip is 0, and what a contact holds at rest is a multiple of it, stick/slip. Leave "

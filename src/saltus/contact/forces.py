@@ -1,4 +1,4 @@
-"""Contact laws: short-hands for the piecewise forces that come up most."""
+"""Contact laws: short forms of the most common piecewise forces."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def hertz(depth: Operand, *, stiffness: Operand, exponent: Operand = 1.5) -> Any
     Parameters
     ----------
     depth : Expr or float
-        How far they are pressed together [m], such as ``x - gap``; negative where they don't touch.
+        Compression [m], such as ``x - gap``; negative where they don't touch.
     stiffness : Expr or float
         [N/m**exponent].
     exponent : Expr or float
@@ -162,7 +162,7 @@ def hunt_crossley(
     Parameters
     ----------
     depth : Expr or float
-        How far the bodies are pressed together [m], such as ``x - gap``; negative where they don't
+        Compression [m], such as ``x - gap``; negative where they don't
         touch.
     velocity : Expr or float
         Time derivative of the depth [m/s].
@@ -314,8 +314,8 @@ def _restitution(name: str, restitution: Operand) -> Any:
 
 
 def _number(operand: Operand) -> Operand:
-    """An expression as it is, any other number as a plain one. Raises TraceError for
-    anything else.
+    """Return an expression as it is, any other number as a float. Raises TraceError for anything
+    else.
     """
     found = as_expr(operand)
     return operand if isinstance(operand, Expr) else float(found.payload)

@@ -1,4 +1,4 @@
-"""The methods that there are, by name."""
+"""The methods, by name."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ METHODS: Mapping[str, type[Method]] = {
 
 
 def check_method(method: Any) -> Method:
-    """The method itself, the default for None. Raises ParameterError for anything
-    that isn't one.
+    """Return the method, or the default for None. Raises ParameterError for anything that isn't a
+    method.
     """
     if method is None:
         return Taylor()
@@ -44,8 +44,8 @@ def check_method(method: Any) -> Method:
 
 
 def exact_method(method: Any, asked: str) -> Method:
-    """The same for what closes orbits by Newton's method, ``asked``: a ParameterError for methods
-    whose errors are more than rounding.
+    """Return the method for ``asked``, a verb that closes orbits by Newton's method. Raises
+    ParameterError for methods with errors beyond rounding.
     """
     checked = check_method(method)
     if not checked.exact:

@@ -1,4 +1,4 @@
-"""What the methods have in common that move one trajectory after the other: all but Taylor's."""
+"""Common parts of the methods that move one trajectory after the other: all but Taylor's."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from saltus.system import System
 
 
 class OneByOne(Method):
-    """A method whose kernels are those of kernels/trajectory.py."""
+    """A method with the kernels of kernels/trajectory.py."""
 
     #: Ways of crossing a boundary, ``"ignore"`` among them.
     EVENTS: ClassVar[tuple[str, ...]]
@@ -24,7 +24,7 @@ class OneByOne(Method):
     max_events: int
 
     def _check_common(self) -> None:
-        """Raise ParameterError for an unknown way of crossing, or a budget that is none."""
+        """Raise ParameterError for an unknown way of crossing, or a bad step budget."""
         if not isinstance(self.events, str) or self.events not in self.EVENTS:
             ways = ", ".join(f'"{way}"' for way in self.EVENTS)
             raise ParameterError(f"events must be one of {ways}, not {shown(self.events)}.")
@@ -47,7 +47,7 @@ class OneByOne(Method):
 
     @property
     def records_contacts(self) -> bool:
-        """Only if they are located."""
+        """True if contacts are located."""
         return self.events != "ignore"
 
     def companion(self) -> Taylor:

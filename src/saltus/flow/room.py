@@ -10,18 +10,20 @@ from saltus.errors import ParameterError
 
 #: Share of the free memory that one call may take.
 SHARE = 0.5
-#: Always allowed, without a measurement of the free memory [bytes].
+#: Size that is allowed without measuring the free memory [bytes].
 ALWAYS_ALLOWED = 2**24
 #: Free memory if the system doesn't report it [bytes].
 DEFAULT_FREE = 4 * 2**30
-#: Memory of a contact of D states, from the kernel's table to the Dataset with both runs of
-#: measured time errors [bytes]. Measured: 401 for two states in one run; the second keeps its own.
-CONTACT, CONTACT_OF_A_STATE = 640, 80
+#: Memory of a contact [bytes], from the kernel's table to the Dataset with both runs of measured
+#: time errors. Measured: 401 for two states in one run; the second run keeps as many.
+CONTACT = 640
+#: Memory of each state in a contact [bytes].
+CONTACT_OF_A_STATE = 80
 
 
 def free() -> int:
-    """Memory that this process can have without taking it from others [bytes]; the limit of a
-    container counts.
+    """Memory that this process can have without taking it from others [bytes], within the limit of
+    its container.
     """
     amounts = []
     try:
@@ -70,7 +72,7 @@ def check_room(size: float, what: str, instead: str) -> None:
 
 
 class Contacts:
-    """Room for the contacts of one run, shared by its threads.
+    """Memory for the contacts of one run, shared by its threads.
 
     Parameters
     ----------
@@ -94,5 +96,5 @@ class Contacts:
 
     @property
     def full(self) -> bool:
-        """Whether the memory for contacts is full."""
+        """True if the memory for contacts is full."""
         return self.count * self._each > ALWAYS_ALLOWED and self.count >= self.most

@@ -1,5 +1,5 @@
-"""Functions made of others: each is a composition of elementary functions and pieces, chosen so
-that no digit is lost near special points.
+"""Functions composed of elementary functions and pieces, written so that no digits are lost near
+special points.
 
 Derivatives and Taylor series follow from the parts. A function with a kink or a jump has its
 boundaries there, as `sl.piecewise` would.
@@ -89,7 +89,7 @@ def acos(a: Operand) -> Any:
 
 
 def hypot(a: Operand, b: Operand) -> Any:
-    """``sqrt(a**2 + b**2)``. A cone: it has no derivative where both are zero."""
+    """``sqrt(a**2 + b**2)``, a cone: it has no derivative where both are zero."""
     return sqrt(a * a + b * b) if _traced(a, b) else of_numbers("hypot", math.hypot, a, b)
 
 
@@ -109,7 +109,7 @@ def atan2(y: Operand, x: Operand) -> Any:
 
 
 def _at_distance(y: Any, x: Any) -> Any:
-    """atan2 for a number x."""
+    """The angle for a number x."""
     if x > 0:
         return atan(y / x)
     above = piecewise((pi, y > 0), otherwise=-pi)

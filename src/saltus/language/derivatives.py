@@ -66,7 +66,7 @@ def differentiate(expression: Expr, with_respect_to: Expr) -> Expr:
 
 
 def _rule(node: Expr, inner: list[Expr]) -> Expr:
-    """The derivative of one operation from the derivatives of its operands."""
+    """The derivative of one operation, from the derivatives of its operands."""
     match node.op, node.args, inner:
         case "add", _, (da, db):
             return add(da, db)

@@ -1,4 +1,4 @@
-"""Expressions: what a traced equation is made of.
+"""Expressions, the nodes of a traced equation.
 
 An :class:`Expr` is one node of a directed acyclic graph. Nodes are interned: the same operation on
 the same operands is the same object, so common subexpressions are shared from the start, and the
@@ -40,10 +40,12 @@ _INTERNED: weakref.WeakValueDictionary[tuple[Any, ...], Expr] = weakref.WeakValu
 _JOINED: weakref.WeakValueDictionary[tuple[Any, ...], Condition] = weakref.WeakValueDictionary()
 _LOCK = threading.RLock()  # two nodes for one state would make a derivative silently zero
 _OBSERVER: ContextVar[Callable[[Expr], None] | None] = ContextVar("observer", default=None)
-#: Most comparisons in one condition, as they would be written out (a chain in which each condition
-#: uses the one before twice doubles at each), and within one another (Python reads 200 brackets).
-MOST_JOINED, DEEPEST = 1000, 150
-#: A number with one bit for each operation, in the order in which they were met.
+#: Most comparisons in one condition as it would be written out: a chain in which each condition
+#: uses the one before twice doubles at each.
+MOST_JOINED = 1000
+#: Most nested brackets of a condition; Python reads 200.
+DEEPEST = 150
+#: Bit of each operation, in the order in which they were met.
 _OPS: dict[str, int] = {}
 Number = int | float
 Operand = Union["Expr", int, float]
@@ -81,7 +83,7 @@ class Expr:
     bits: int
 
     def __new__(cls, op: str, args: tuple[Expr, ...] = (), payload: Any = None) -> Expr:
-        """The one node of this operation on these operands."""
+        """Return the one node of this operation on these operands."""
         tag = payload.hex() if isinstance(payload, float) else payload
         key = (op, tag, tuple(map(id, args)))
         with _LOCK:
@@ -143,7 +145,7 @@ class Expr:
         return absolute(self)
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **keywords: Any) -> Any:
-        """A NumPy function of traced values is saltus's own."""
+        """Apply saltus's function of the same name to traced values."""
         return _ANSWERS["__array_ufunc__"](ufunc, method, inputs, keywords)
 
     # -- what has no meaning here ------------------------------------------------------------------
@@ -166,7 +168,7 @@ class Expr:
     __rfloordiv__ = __floordiv__
 
     def __call__(self, *_arguments: object) -> Expr:
-        """Refused: the value of a state at another time."""
+        """Refuse: a state can't be taken at another time."""
         raise TraceError(
             f"an equation called {self!r} as a function. There are no delays, x(t - tau): a rate "
             f"depends on the states at the time t only. "
@@ -241,16 +243,16 @@ class Expr:
         return self
 
 
-#: What answers for an expression where Python asks, by the method: see :func:`answers`.
+#: Functions that answer for an expression, by the method that Python asks: see :func:`answers`.
 _ANSWERS: dict[str, Callable[..., Any]] = {}
 Answer = TypeVar("Answer", bound=Callable[..., Any])
 
 
 def answers(method: str) -> Callable[[Answer], Answer]:
-    """Let a function answer for every expression: ``__repr__``, ``__mod__``, ``__array_ufunc__``.
+    """Register a function that answers for every expression: ``__repr__``, ``__mod__``,
+    ``__array_ufunc__``.
 
-    Such a function is built of expressions, so it stands in a file above this one, and is handed
-    in.
+    Such a function is built of expressions, so it stands in a file above this one.
     """
 
     def handed_in(function: Answer) -> Answer:
@@ -260,7 +262,7 @@ def answers(method: str) -> Callable[[Answer], Answer]:
     return handed_in
 
 
-#: Where a comparison stands for 0 or 1, as it does in MATLAB.
+#: Message for a comparison used as 0 or 1, as MATLAB allows.
 _NO_NUMBER = (
     "a comparison was used as a number. Write sl.piecewise((1, x > gap), otherwise=0), or the "
     "whole term in place of the 1: sl.piecewise((k*(x - gap), x > gap), otherwise=0)."
@@ -269,8 +271,8 @@ _NO_NUMBER = (
 
 @contextmanager
 def observed(observer: Callable[[Expr], None] | None) -> Iterator[None]:
-    """Every node that is asked for inside is shown to the observer, which may raise: the error then
-    has the line of the user's function.
+    """Show every node that is asked for inside to the observer, which may raise: the error then has
+    the line of the user's function.
     """
     token = _OBSERVER.set(observer)
     try:
@@ -280,8 +282,8 @@ def observed(observer: Callable[[Expr], None] | None) -> Iterator[None]:
 
 
 def with_own_unit(make: Callable[[], Any]) -> Any:
-    """What ``make`` returns, made unobserved and of a unit that the observer can't know: numbers in
-    it carry units of their own.
+    """Return ``make()``, made unobserved. Its unit is left open: numbers in it carry units of their
+    own.
     """
     observer = _OBSERVER.get()
     with observed(None):
@@ -296,13 +298,13 @@ class _LeavesOpen(Protocol):
     """An observer that can leave the unit of a node open."""
 
     def leave_open(self, node: Expr) -> None:
-        """Take the node as it is."""
+        """Accept the node as it is."""
 
 
 # -- conditions ------------------------------------------------------------------------------------
 class _MadeOnce(type):
-    """Equal conditions are one object, as equal nodes are: a comparison of two takes no longer for
-    long ones.
+    """Makes equal conditions one object, as equal nodes are, so that comparing long ones is
+    quick.
     """
 
     def __call__(cls, *parts: Condition | int) -> Any:
@@ -365,7 +367,7 @@ class Condition:
         )
 
     def __neg__(self, *_others: object) -> Expr:
-        """Refused, as every operation that would need a number."""
+        """Refuse, as every operation that would need a number."""
         raise TraceError(_NO_NUMBER)
 
     __pos__ = __abs__ = __float__ = __int__ = __neg__
@@ -375,8 +377,8 @@ class Condition:
 
 @dataclass(frozen=True, eq=False)
 class Relation(Condition):
-    """``gap > 0``. While tracing, any comparison; in a system's conditions, one of time and
-    parameters only: no guard, but a switch whose times are known. What a state decides is a
+    """``gap > 0``. While tracing, any comparison. In a system's conditions, one of time and
+    parameters only: no guard, but a switch at known instants; a comparison of states is a
     :class:`Bit` there.
     """
 
@@ -389,7 +391,7 @@ class Relation(Condition):
 @dataclass(frozen=True, eq=False)
 class Friction(Relation):
     """A comparison that decides the direction of friction forces. These are ``levels`` in motion;
-    at rest they may be ``limit`` times as large, where that is given.
+    at rest they may be ``limit`` times as large, if that is given.
     """
 
     limit: Expr | None
@@ -398,7 +400,7 @@ class Friction(Relation):
 
 @dataclass(frozen=True, eq=False)
 class Bit(Condition, metaclass=_MadeOnce):
-    """Side of guard number ``guard`` in a system's list: true where that guard is positive."""
+    """Side of guard number ``guard`` in a system's list: true where its gap is positive."""
 
     guard: int
 
@@ -408,7 +410,7 @@ class Bit(Condition, metaclass=_MadeOnce):
 
 @dataclass(frozen=True, eq=False)
 class _Joint(Condition, metaclass=_MadeOnce):
-    """Two conditions, joined."""
+    """Two joined conditions."""
 
     left: Condition
     right: Condition
@@ -627,20 +629,20 @@ def absolute(a: Operand) -> Expr:
 
 # -- walking ---------------------------------------------------------------------------------------
 def relations_in(condition: Condition) -> Iterator[Relation]:
-    """Every relation in a condition, left to right; one that stands in it twice may come once."""
+    """Every relation in a condition, left to right; a repeated one may come once."""
     seen: set[Condition] = set()
     stack = [condition]
     while stack:
-        one = stack.pop()
-        if not one.ops or one in seen:  # of bits alone
+        top = stack.pop()
+        if not top.ops or top in seen:  # bits only
             continue
-        seen.add(one)
-        if isinstance(one, Relation):
-            yield one
-        elif isinstance(one, And | Or):
-            stack += (one.right, one.left)
-        elif isinstance(one, Not):
-            stack.append(one.inner)
+        seen.add(top)
+        if isinstance(top, Relation):
+            yield top
+        elif isinstance(top, And | Or):
+            stack += (top.right, top.left)
+        elif isinstance(top, Not):
+            stack.append(top.inner)
 
 
 def operands(node: Expr) -> tuple[Expr, ...]:
@@ -673,8 +675,8 @@ def walk(
 
 
 def rebuild(node: Expr, args: tuple[Expr, ...], payload: Any) -> Expr:
-    """The same operation on other operands, constants folded; the node itself if
-    nothing differs.
+    """The same operation on other operands, constants folded; the node itself if nothing
+    differs.
     """
     if payload is node.payload and all(
         new is old for new, old in zip(args, node.args, strict=True)
@@ -690,7 +692,7 @@ def rebuild(node: Expr, args: tuple[Expr, ...], payload: Any) -> Expr:
 
 
 def substituted(root: Expr, new: Mapping[Expr, Expr]) -> Expr:
-    """The expression with other nodes in the places of some; conditions stay as they are."""
+    """The expression with some nodes replaced; conditions are kept."""
     memo: dict[Expr, Expr] = {}
     for node in walk(root):
         memo[node] = (
@@ -702,12 +704,12 @@ def substituted(root: Expr, new: Mapping[Expr, Expr]) -> Expr:
 
 
 def depends_on(node: Expr, ops: tuple[str, ...]) -> bool:
-    """Whether a leaf of one of the kinds ``ops`` stands below ``node``."""
+    """True if a leaf of one of the kinds ``ops`` is at or below ``node``."""
     return any(node.ops & _number_of(op) for op in ops)
 
 
 def varies(node: Expr) -> bool:
-    """Whether the value changes along a trajectory (depends on time, state or mode)."""
+    """True if the value changes along a trajectory (depends on time, state or mode)."""
     return depends_on(node, ("time", "state", "select"))
 
 

@@ -1,5 +1,5 @@
-"""Functions of other packages in an equation: what saltus calls them, and what to write for those
-that it hasn't.
+"""Functions of other packages in an equation: their equivalents in saltus, and advice on those
+without one.
 """
 
 from __future__ import annotations
@@ -14,8 +14,7 @@ from saltus.language import functions as own
 from saltus.language.clocks import mod
 from saltus.language.expression import OWN_FUNCTIONS, answers, as_expr
 
-#: NumPy's ufuncs that an equation may call, by their names: the traced function that each stands
-#: for.
+#: NumPy's ufuncs that an equation may call, by name, and the traced function for each.
 UFUNCS: dict[str, Callable[..., Any]] = {
     "add": operator.add, "subtract": operator.sub, "multiply": operator.mul,
     "divide": operator.truediv, "power": operator.pow,
@@ -63,7 +62,7 @@ ADVICE: dict[str, str] = {
 
 @answers("__array_ufunc__")
 def traced_ufunc(ufunc: Any, method: str, inputs: tuple[Any, ...], keywords: dict[str, Any]) -> Any:
-    """What a NumPy ufunc gives for traced values.
+    """The result of a NumPy ufunc for traced values.
 
     Raises
     ------

@@ -1,5 +1,5 @@
-"""The functions that an equation may call. Each takes traced values or plain numbers; plain numbers
-give a plain number.
+"""The functions that an equation may call, of traced values or plain numbers. Plain numbers give a
+plain number.
 """
 
 from __future__ import annotations

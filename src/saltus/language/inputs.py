@@ -1,5 +1,5 @@
-"""Drives with breaks: square waves, saw-teeth, pulses, recorded series. The instants at which they
-break follow from their parameters by a formula: steps end there, and nothing is searched for.
+"""Drives with breaks: square waves, saw-teeth, pulses, recorded series. The instants of their
+breaks follow from their parameters by a formula, so steps end there and nothing is searched for.
 """
 
 from __future__ import annotations
@@ -102,14 +102,14 @@ def pulse(
     t : Expr or float
         The time [s].
     duration : Expr or float
-        How long it lasts [s]: a number or a parameter.
+        Its duration [s]: a number or a parameter.
     start : Expr or float
         When it begins [s].
     every : Expr or float, optional
         Time from one pulse of a train to the next [s], at least ``duration``; pulses begin at
         ``start`` and at all whole multiples of ``every`` before and after. Default: one pulse.
     shape : {"rectangle", "half_sine", "triangle"}
-        How it rises and falls.
+        Shape of the pulse.
 
     Returns
     -------
@@ -169,7 +169,7 @@ class Record:
         return float(self.table.points[-1] - self.table.points[0])
 
     def __call__(self, t: Any) -> Any:
-        """Its value [SI] at a time: ``t``, ``rate*t + offset``, a number, or an array of numbers.
+        """The value [SI] at a time: ``t``, ``rate*t + offset``, a number, or an array of numbers.
 
         Raises
         ------
@@ -203,7 +203,7 @@ def recorded(
     times : sequence of float
         Instants, ascending [``time_unit``].
     values : sequence of float
-        What was recorded [``unit``].
+        Recorded values [``unit``].
     unit : str
         Unit of the values, such as ``"mm"``; they are converted to SI, and the units of the
         equation are checked with it. Default: numbers in SI of a unit that isn't checked.
@@ -241,7 +241,7 @@ def recorded(
 
 
 def _times(numbers: Any, factor: float) -> Any:
-    """Numbers times a factor; anything else as it is, for :func:`curve` to refuse."""
+    """Numbers times a factor; anything else unchanged, for :func:`curve` to refuse."""
     try:
         return np.asarray(numbers, dtype=np.float64) * factor
     except (TypeError, ValueError, OverflowError):

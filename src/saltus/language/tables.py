@@ -35,7 +35,7 @@ class Table:
     Attributes
     ----------
     name : str
-        How equations show it.
+        Name in printed equations.
     points : float64[n]
         Knots, ascending.
     pieces : float64[m, 5]
@@ -159,7 +159,7 @@ def table(
         any number of points. Or anything that depends on states: a law of 32 points at most, with a
         boundary at each knot.
     points : sequence of float
-        Where the curve is known, ascending [unit of x].
+        Arguments of the given values, ascending [unit of x].
     values : sequence of float
         Its values there [SI]. An amplitude stays a parameter: ``amplitude*sl.table(...)``.
     kind : str
@@ -171,7 +171,7 @@ def table(
         polynomials at the ends go on. ``"periodic"``: the curve repeats after ``points[-1] -
         points[0]``; first and last value must be equal. In time only.
     name : str
-        What printed equations call it.
+        Its name in printed equations.
 
     Returns
     -------
@@ -193,8 +193,8 @@ def table(
 
 
 def look_up(x: Operand, data: Table) -> Any:
-    """The value of a table at ``x``, as :func:`table` gives it. Raises TraceError if it can't be
-    looked up there.
+    """The value of a table at ``x``, as :func:`table` gives it. Raises TraceError if ``x`` can't be
+    an argument.
     """
     if not isinstance(x, Expr):
         return float(data(x))
@@ -254,7 +254,7 @@ def curve(points: Any, values: Any, kind: str, outside: str, name: str, unit: st
 
 
 def _ascending(x: np.ndarray, y: np.ndarray, i: int) -> str:
-    """What to do about point number i, which doesn't lie after the one before it."""
+    """Advice about point number i, which isn't greater than the one before it."""
     if (np.diff(x) < 0).any():
         return "Sort them."
     if y[i] == y[i - 1]:

@@ -136,7 +136,7 @@ def energy(name: str) -> dict[str, Callable[..., Any]]:
 
 
 def has_energy(name: str) -> bool:
-    """Whether a model brings its energies along. Raises ParameterError for an unknown model."""
+    """True if a model has its energies. Raises ParameterError for an unknown model."""
     return hasattr(sys.modules[find(name).__module__], "ENERGY")
 
 

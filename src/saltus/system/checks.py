@@ -1,4 +1,4 @@
-"""Checks on a system: what a parameter's value may be, and how many boundaries there may be."""
+"""Checks of a system: allowed values of parameters, and the number of boundaries."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def resolve(name: str, value: Any, unit: str, forced_at: str | None) -> Any:
 
 
 def resolve_one(name: str, value: Any, unit: str, forced_at: str | None) -> float:
-    """As :func:`resolve`, for the single value that a system holds."""
+    """Resolve the single value that a system holds, as :func:`resolve` does."""
     result = resolve(name, value, unit, forced_at)
     if not isinstance(result, float):
         raise ParameterError(
@@ -116,7 +116,7 @@ def resolve_one(name: str, value: Any, unit: str, forced_at: str | None) -> floa
 
 
 def point(system: EquationsOfMotion, t: Any, y: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Times and states [SI] as arrays of numbers that fit together; the states come first.
+    """Times and states [SI] as arrays of numbers with matching shapes; the states come first.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Equations of motion as data: what a System holds, for the files that it is built of."""
+"""Equations of motion as data: the fields of a System, for the files that it is built on."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from saltus.language.expression import Expr
 
 @dataclass(frozen=True, eq=False, repr=False)
 class EquationsOfMotion:
-    """Equations of motion with contacts, and values for their parameters. The attributes are those
+    """Equations of motion with contacts, and values of their parameters. The attributes are those
     of a System, and are described there.
     """
 

@@ -1,6 +1,4 @@
-"""What to say of an error inside a user's function: where it is, what it is, and what to write
-instead.
-"""
+"""Messages about errors inside a user's function: the line, the fault, and a remedy."""
 
 from __future__ import annotations
 
@@ -19,7 +17,7 @@ _HERE = str(Path(__file__).parent.parent)
 _LIBRARIES = tuple(
     {sysconfig.get_path(key) for key in ("stdlib", "platstdlib", "purelib", "platlib")} - {None}
 )
-#: Calls of functions that are often called with positional arguments.
+#: Functions that are often called with positional arguments, and how to call them.
 _CALLS = {
     "freeplay": "sl.freeplay(x, stiffness=..., gap=...), or lower_gap= and upper_gap=, damping= "
     "with velocity=, preload=",
@@ -40,9 +38,7 @@ _HOW_TO = (
 
 
 def explained(error: Exception, function: Callable[..., Any], title: str) -> str:
-    """The message for an error inside the user's function: where, what, and what to
-    write instead.
-    """
+    """The message for an error inside the user's function: the line, the fault, and a remedy."""
     if isinstance(function, Formula | Equations) and isinstance(error, TraceError | UnitError):
         return f"{title}: {error}"
     code = getattr(inspect.unwrap(function), "__code__", None)
@@ -78,7 +74,7 @@ def explained(error: Exception, function: Callable[..., Any], title: str) -> str
 
 
 def place(function: Callable[..., Any]) -> str:
-    """File and line of a function, or the formula that it is."""
+    """File and line of a function, or the text of a formula."""
     if isinstance(function, Formula | Equations):
         return function.place
     code = getattr(inspect.unwrap(function), "__code__", None)

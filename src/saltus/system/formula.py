@@ -90,8 +90,7 @@ _INSTEAD: dict[type[ast.AST], str] = {
 
 
 class Formula:
-    """A function of time, states and parameters that was written as text. It is called with them by
-    name.
+    """A function of time, states and parameters written as text. It is called with them by name.
 
     Attributes
     ----------
@@ -116,15 +115,15 @@ class Formula:
         )
 
     def __call__(self, **values: Any) -> Any:
-        """The value, of symbols or of numbers. Raises TraceError if it has none."""
-        own = {
+        """The value for symbols or numbers. Raises TraceError if there is none."""
+        terms = {
             term: self.book.terms[term](
                 **{name: values[name] for name in self.book.terms[term].names}
             )
             for term in self._terms
         }
         try:
-            return self._value(self._tree, {**_CONSTANTS, **values, **own})
+            return self._value(self._tree, {**_CONSTANTS, **values, **terms})
         except SaltusError:
             raise
         except (ArithmeticError, TypeError, ValueError) as error:
@@ -135,7 +134,7 @@ class Formula:
             raise TraceError(f"{self.place} has no value: {error}.") from error
 
     def data(self) -> list[Any]:
-        """All that it depends on, as JSON-able data: its text, those of its terms, and the
+        """All that the formula depends on, as JSON-able data: its text, those of its terms, and the
         fingerprints of the tables.
         """
         tables = {
@@ -248,7 +247,7 @@ class Formulas:
 
 
 class Equations:
-    """An equation of motion from formulas: what :func:`saltus.system` makes a System of.
+    """An equation of motion from formulas, from which :func:`saltus.system` makes a System.
 
     Parameters
     ----------
@@ -321,7 +320,7 @@ def _parsed(text: str) -> ast.expr:
         )
     try:
         with warnings.catch_warnings():
-            # of numbers that touch words: the tree gives the better message
+            # about numbers that touch words: the tree gives the better message
             warnings.simplefilter("ignore")
             tree = ast.parse(f"({text.strip()}\n)", mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
@@ -350,9 +349,7 @@ def _depth(tree: ast.AST) -> int:
 
 
 def _names(tree: ast.AST) -> Iterator[str]:
-    """Names of values in a formula, in its order; those of functions that it calls aren't among
-    them.
-    """
+    """Names of values in a formula, in its order; names of called functions are left out."""
     called = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
     found = [
         node
@@ -367,7 +364,7 @@ def _written(node: ast.AST) -> str:
 
 
 def _check(tree: ast.AST, text: str) -> None:
-    """Raise a TraceError for the first part of a formula that has no meaning in one."""
+    """Raise a TraceError for the first part of a formula that isn't allowed."""
     for node in ast.walk(tree):
         match node:
             case ast.Constant(value=number):

@@ -1,5 +1,5 @@
-"""Whether a forced system repeats after the period of its forcing: by formula where time enters as
-a phase or a clock, else by samples.
+"""Check that a forced system repeats after the period of its forcing: by formula where time enters
+as a phase or a clock, else by samples.
 """
 
 from __future__ import annotations
@@ -29,16 +29,17 @@ from saltus.language.expression import (
 from saltus.system.equations_of_motion import EquationsOfMotion
 from saltus.system.modes import sides
 
-#: Rounding allowed in the number of cycles in a period: relative, and absolute for a phase
-#: [cycles].
-CLOCK_MISS, PHASE_MISS = 1e-9, 1e-9
-#: Difference after a period that exceeds rounding, relative to the values at one state.
+#: Rounding allowed in the number of a clock's cycles in a period [relative].
+CLOCK_MISS = 1e-9
+#: Rounding allowed in the number of a phase's cycles in a period [cycles].
+PHASE_MISS = 1e-9
+#: Smallest difference after a period that exceeds rounding, relative to the values at one state.
 DIFFERENCE = 1e-7
 
 
 @dataclass(frozen=True)
 class Timing:
-    """How time enters an expression. None of it depends on the values of the parameters.
+    """The ways in which time enters an expression, independent of the values of parameters.
 
     Attributes
     ----------
@@ -59,7 +60,7 @@ class Timing:
 
 @functools.lru_cache(maxsize=1024)
 def timing_of(entry: Expr) -> Timing:
-    """How time enters an expression; worked out once for each."""
+    """Find the ways in which time enters an expression; cached."""
     timed: set[Expr] = set()
     for node in walk(entry):
         if node.op == "time" or not timed.isdisjoint(operands(node)):
@@ -88,8 +89,8 @@ def timing_of(entry: Expr) -> Timing:
 
 
 def _rate(angle: Expr) -> Expr | None:
-    """The rate of ``rate*t + (anything without time)``, of parameters only; None for any other
-    angle.
+    """The rate of ``rate*t + (anything without time)``, if it depends on parameters only; None for
+    any other angle.
     """
     if depends_on(angle, ("select", "mod", "table")):
         return None
@@ -119,7 +120,9 @@ def check_periodic(system: EquationsOfMotion) -> None:
 
 
 def _entries(system: EquationsOfMotion) -> list[Expr]:
-    """The field where no contact is held, then the gaps of the guards and what laws set."""
+    """The field where no contact is held, then the gaps of the guards and the expressions of the
+    laws.
+    """
     return list(_written(system.field, system.guards))
 
 
@@ -131,8 +134,8 @@ def _written(field: tuple[Expr, ...], guards: tuple[Guard, ...]) -> tuple[Expr, 
 
 
 def _clocks_repeat(timing: Timing, system: EquationsOfMotion, period: float) -> bool:
-    """Whether every clock has a whole number of cycles in a period: by formula, since samples miss
-    pulses.
+    """True if every clock has a whole number of cycles in a period. Tested by formula, since
+    samples miss pulses.
     """
     cycles = [
         abs(rate * period)
@@ -146,7 +149,7 @@ def _clocks_repeat(timing: Timing, system: EquationsOfMotion, period: float) -> 
 
 
 def _phases_repeat(timing: Timing, system: EquationsOfMotion, period: float) -> bool:
-    """Whether every phase has a whole number of cycles in a period."""
+    """True if every phase has a whole number of cycles in a period."""
     cycles = [rate * period for rate in evaluate(timing.phases, values=system.values)]
     return all(abs(number - np.round(number)) <= PHASE_MISS for number in cycles)
 
@@ -171,13 +174,13 @@ def _check_samples(system: EquationsOfMotion, period: float, unsure: list[int]) 
         evaluate(expressions, t=when, states=states, values=system.values, bits=bits)
         for when in (t, t + period)
     )
-    for place, (a, b) in enumerate(zip(now, later, strict=True)):
+    for index, (a, b) in enumerate(zip(now, later, strict=True)):
         a, b = np.broadcast_to(a, (6, 8)), np.broadcast_to(b, (6, 8))
         with np.errstate(invalid="ignore"):
             scale = np.maximum(np.abs(a), np.abs(b)).max(axis=1, keepdims=True)
             differs = np.abs(a - b) > DIFFERENCE * scale
         if differs.any():
-            raise TraceError(_not_periodic(system, unsure[place % len(unsure)], period))
+            raise TraceError(_not_periodic(system, unsure[index % len(unsure)], period))
 
 
 def _not_periodic(system: EquationsOfMotion, entry: int, period: float) -> str:

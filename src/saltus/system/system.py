@@ -102,8 +102,8 @@ class System(EquationsOfMotion):
 
     @property
     def origin(self) -> System:
-        """The system that this one copies with other values, or itself; it holds all that depends
-        on the equations alone.
+        """The system that this one copies with other values, or itself; it holds everything that
+        depends on the equations alone.
         """
         origin: System = vars(self).get("_origin", self)
         return origin
@@ -147,8 +147,8 @@ class System(EquationsOfMotion):
 
     @functools.cached_property
     def is_steep(self) -> bool:
-        """Whether an entry of the Jacobian is infinite where a contact begins, as that of
-        ``depth**0.25`` is: derivatives of the flow are differences then.
+        """True if an entry of the Jacobian is infinite where a contact begins, as that of
+        ``depth**0.25``: derivatives of the flow are differences then.
         """
         if self.origin is not self:
             return self.origin.is_steep
@@ -265,7 +265,7 @@ class System(EquationsOfMotion):
         raise AttributeError(f"a System has no attribute {shown(name)}: {self._instead(name)}")
 
     def _instead(self, name: Any) -> str:
-        """What to write for a parameter or a state by its name."""
+        """Advice about a parameter or a state by its name."""
         if among(name, self.values):
             return (
                 f"{self.name}.values[{name!r}] is the value of a parameter, "
@@ -283,7 +283,7 @@ class System(EquationsOfMotion):
         )
 
 
-#: What people ask of a System, and what does it.
+#: Names that people try on a System, and the functions that do it.
 _DONE_ELSEWHERE = {
     **dict.fromkeys(("simulate", "solve", "run", "integrate", "compute"), "sl.simulate({}, ...)"),
     **dict.fromkeys(("copy", "set", "update", "replace"), "{}.with_values(name=...)"),

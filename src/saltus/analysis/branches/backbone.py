@@ -65,11 +65,18 @@ def backbone(
     """The backbone of the resonances over their amplitude: free vibrations without damping
     (nonlinear normal modes), or forced ones in phase quadrature, damping included.
 
-    The family of periodic orbits is followed by pseudo-arclength from small vibrations about rest.
-    Free vibrations: parameters that are zero are taken out of the equations; what then still forces
-    or damps is refused. In quadrature the forcing frequency and the amplitude of the force are such
-    that the mean of displacement times force over a period is zero: the displacement's first
-    harmonic lags a harmonic force by a quarter of the period.
+    1. Free vibrations: parameters that are zero are taken out of the equations; what then still
+       forces or damps is refused. Orbits come in families then, and one of the equations that close
+       them follows from the others. A fictitious damping is one more unknown, which makes them
+       independent; it vanishes on the family.
+    2. In quadrature the forcing frequency and the amplitude of the force are unknowns, such that
+       the mean of displacement times force over a period is zero: the displacement's first harmonic
+       lags a harmonic force by a quarter of the period.
+    3. The chosen mode of small vibrations about the equilibrium gives the first orbit, below the
+       smallest amplitude, as there the equations are linear unless a contact is near.
+    4. Newton's method closes it, and the family is followed by pseudo-arclength continuation until
+       it exceeds the largest amplitude; frequency and amplitude may both turn back on the way.
+    5. The first and the last point are moved along the family to exactly the amplitudes asked for.
 
     Parameters
     ----------

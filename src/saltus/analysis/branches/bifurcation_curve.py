@@ -46,12 +46,21 @@ def bifurcation_curve(
 ) -> xr.Dataset:
     """A bifurcation of periodic orbits followed over two parameters, in both directions.
 
-    Folds, period doublings, Neimark-Sacker bifurcations and grazes are followed by pseudo-arclength
-    on equations that define them, so each point is one to rounding. Points of codimension two are
-    located on the way: cusps, resonances, degenerate doublings, and the extrema of a curve of
-    folds, at which closed branches (isolas) are born or join another branch; on a curve of grazes
-    where the orbit folds or doubles, where a second boundary is touched, and where the square root
-    that an impact brings vanishes.
+    1. The event gives the orbit, the parameters and the critical multiplier, or the boundary that
+       is grazed, to begin with.
+    2. The equations of the orbit are extended by those of the bifurcation, so that each point is
+       one to rounding: for folds, period doublings and Neimark-Sacker bifurcations one that
+       vanishes where the tangent map has that multiplier; for grazes, that gap and rate are zero at
+       an instant of the orbit.
+    3. Their solutions are followed by pseudo-arclength continuation over both parameters at once,
+       since curves turn back in either of them. They end where they leave the range, close, or run
+       out of ``points``, or where a curve of this kind ends.
+    4. Test functions along the curve change sign at points of codimension two, which are located:
+       cusps, resonances, degenerate doublings, and the extrema of a curve of folds, at which closed
+       branches (isolas) are born or join another branch.
+    5. On a curve of grazes these are the points where the orbit folds or doubles, where a second
+       boundary is touched, and where the square root that an impact brings vanishes. The contact
+       that grazes is left out of the equations, which keeps them smooth.
 
     Parameters
     ----------

@@ -61,17 +61,25 @@ def branches(
     """Branches of periodic orbits over a parameter, stable and unstable, with folds, period
     doublings, branch points, tori and grazes.
 
-    Each branch is followed by pseudo-arclength continuation on the exact flow, in both directions
-    and through its folds, until it leaves the range or closes: an isola. Contacts come and go by
-    themselves; no contact sequence is given. Derivatives, also with respect to the parameter, are
-    those of the tangent flow. Bifurcations are located to rounding; where the number of multipliers
-    outside the unit circle changes otherwise, the step is refined, and what stays unexplained is
-    counted in ``branch_unexplained``. Orbits with impacts are followed from contact to contact,
-    through the grazes at which an impact appears or vanishes.
+    1. Seeds are the orbits of ``start``, or the orbits that starts settle to at ``at`` values of
+       the parameter: continuation needs an orbit to begin with.
+    2. Newton's method closes each seed. Seeds on a branch that was followed already, or on its
+       mirror image, are dropped, so each branch is listed once.
+    3. The branch is followed by pseudo-arclength continuation on the exact flow in both directions,
+       until it leaves the range or closes (an isola). Steps in arclength pass folds like any other
+       point. Contacts come and go by themselves; no contact sequence is given. Derivatives, also
+       with respect to the parameter, are those of the tangent flow.
+    4. Orbits with impacts are followed from contact to contact, through the grazes at which an
+       impact appears or vanishes, because the map over a period isn't smooth there.
+    5. Events are located to rounding where a test function changes its sign. Where the number of
+       multipliers outside the unit circle changes otherwise, the step is refined; what stays
+       unexplained is counted in ``branch_unexplained``.
+    6. The branches that leave at the events in ``switch`` are seeds of their own, begun beside the
+       event.
 
-    Of a system without forcing branches of equilibria are followed too, with their eigenvalues,
-    one branch in each mode, from mode to mode through boundary equilibria, and the limit cycles
-    that are born at their Hopf points. Equilibria that a contact holds aren't followed.
+    Of a system without forcing branches of equilibria are followed too, with their eigenvalues, one
+    branch in each mode, from mode to mode through boundary equilibria, and the limit cycles that
+    are born at their Hopf points. Equilibria that a contact holds aren't followed.
 
     Parameters
     ----------

@@ -40,10 +40,21 @@ def equilibria(
     """All equilibria of a system without forcing: in each region, on boundaries, and held by
     contacts; stable ones and unstable ones.
 
-    In every mode - a side of each boundary, and which contacts are held - Newton's method looks for
-    zeros of the field from many starts, those that are known deflated; in a mode whose equations
-    are linear one start finds what there is. A zero counts if the mode holds there. Nothing is
-    integrated.
+    1. Every mode is taken in turn: a side of each boundary, and the contacts that are held. In a
+       mode the equations are smooth.
+    2. In each mode Newton's method looks for zeros of the field from all starts; linear equations
+       need only one. Of a held contact the constraint vanishes too, so steps are least-squares
+       steps.
+    3. It is started again with the known zeros deflated, also from beside them, until nothing new
+       is found: many starts lead to one zero, and hide the others.
+    4. A zero counts if its mode holds there: the gaps have their sides, and held contacts stay
+       held. Other zeros are virtual.
+    5. The eigenvalues of the linear part along the boundaries that hold it give kind and stability.
+       On a boundary itself linear parts decide nothing: ``undecided``.
+    6. Where contacts leave a state free (a block that is stuck), the equilibria form a continuum;
+       the ends of an interval are where a contact is released.
+
+    Nothing is integrated.
 
     Parameters
     ----------

@@ -56,17 +56,22 @@ def periodic_orbits(
     """The periodic orbits of a system, stable and unstable: of a forced one those with periods up
     to a number of forcing periods, of one without forcing its limit cycles.
 
-    Newton's method is started from many states, for each period at once in all of them, with the
-    points of an orbit at whole forcing periods as unknowns (multiple shooting), steps that are
-    shortened until they help, and derivatives of the exact tangent flow. Then it is started again
-    with the orbits that are known deflated: their zeros are divided out, so that only others can be
-    found; also from beside known orbits, where a fold leaves the second of a pair. No search of
-    this kind finds every orbit for sure. What is said of those that it missed: ``search_unseen``.
-
-    Without forcing, the period is one more unknown. Close returns of the motions from the starts,
-    at once and after some turns, are first guesses of a state and a period: a motion on a chaotic
-    set passes near its unstable cycles. A cycle is one whatever its phase, for deflation too.
-    Cycles that lie side by side in families, as where energy is conserved, aren't found.
+    1. Starts are followed for none or some periods before Newton's method begins, in rotation: none
+       finds repelling orbits, some periods reach a chaotic set and the orbits in it.
+    2. For each period Newton's method is started from their next iterates, with the points of an
+       orbit at whole forcing periods as unknowns (multiple shooting: errors grow over one forcing
+       period only). Steps are shortened until they help; derivatives are those of the exact tangent
+       flow.
+    3. Orbits are reduced to their least period, and each is listed once.
+    4. Newton's method is started again with the known orbits deflated: their zeros are divided out,
+       so that only others can be found. Starts beside known orbits find the second of a pair that a
+       fold has made.
+    5. No search of this kind finds every orbit for sure. From the orbits that only one start led
+       to, ``search_unseen`` estimates the share of those that were missed.
+    6. Without forcing, the period is one more unknown. Close returns of the motions give first
+       guesses of a state and a period, as a motion on a chaotic set passes near its unstable
+       cycles. A cycle is the same whatever its phase, for deflation too. Cycles that lie side by
+       side in families, as where energy is conserved, aren't found.
 
     Parameters
     ----------

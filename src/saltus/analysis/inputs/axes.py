@@ -1,5 +1,5 @@
-"""Values along an axis, from what users write: a tuple is a range, a list or array holds the
-values. One rule for all verbs.
+"""Values along an axis from a user's argument: a tuple is a range, a list or array holds the
+values. All verbs share this rule.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ import numpy as np
 from saltus.errors import ParameterError, among, nearest, shown
 from saltus.flow.counts import MOST, whole
 
-#: Values along a range, by what users write for the scale.
+#: Spacings of a range, by name.
 SCALES = ("linear", "log")
-#: Values along one axis beyond which a range is refused before it fills memory.
+#: Most values along one axis; a longer range is refused before it fills memory.
 MOST_VALUES = 100_000_000
 
 
@@ -33,7 +33,7 @@ def along(
     number : callable
         One value [SI] from a number or a text with a unit.
     what : str
-        What the values are, for messages: ``"values"``, ``"starts"``.
+        Words for the values in messages: ``"values"``, ``"starts"``.
     example : str
         A range as one would write it.
     least : int
@@ -71,8 +71,8 @@ def along(
 
 
 def count_along(given: Any) -> int:
-    """How many values :func:`along` makes of what users write, before it makes them: what they take
-    is counted first. 1 of a single value, and of what it refuses.
+    """Number of values that :func:`along` makes of an argument, counted before they are made. 1 for
+    a single value, and for arguments that it refuses.
     """
     if isinstance(given, tuple):
         count = given[2] if len(given) in (3, 4) else 1
@@ -82,8 +82,8 @@ def count_along(given: Any) -> int:
 
 
 def axes_of(given: Any) -> int:
-    """Number of axes of lists or an array; -1 for lists of unequal length, and for what can't be
-    made an array.
+    """Number of axes of lists or an array; -1 for lists of unequal length, and for anything that
+    can't become an array.
     """
     try:
         return np.ndim(given)
@@ -113,7 +113,7 @@ def _listed(
                 f"{name} is {values[where[0]]} at index {where[0]}. Give finite {what}."
             )
         for value in (values.min(), values.max()) if len(values) else ():
-            number(float(value))  # what the name allows is checked there
+            number(float(value))  # checks the limits that the name implies
         return values
     items = list(given)
     if (

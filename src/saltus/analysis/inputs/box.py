@@ -37,7 +37,7 @@ def box_ranges(system: System, box: Mapping[str, Any]) -> dict[str, tuple[float,
 
 
 def draw(ranges: Mapping[str, tuple[float, float]], unit: np.ndarray) -> dict[str, np.ndarray]:
-    """Starts of the states that have a range, from numbers in [0, 1), one column for each."""
+    """Starts of the states that have a range, from numbers in [0, 1), one column for each state."""
     return {
         name: low + (high - low) * column
         for (name, (low, high)), column in zip(ranges.items(), unit.T, strict=True)

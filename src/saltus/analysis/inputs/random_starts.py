@@ -63,7 +63,7 @@ def random_starts(
 
 
 def random_count(start: str) -> int:
-    """How many starts ``"random 20"`` asks for; 0 of any other word."""
+    """Number of starts that ``"random 20"`` asks for; 0 for any other word."""
     word, _, number = start.partition(" ")
     return int(number) if word == "random" and _COUNT.fullmatch(number.strip()) else 0
 

@@ -1,4 +1,4 @@
-"""What users write for starts, values and spans, turned into the arrays of a request."""
+"""Convert a user's starts, values and spans to the arrays of a request."""
 
 from __future__ import annotations
 
@@ -18,12 +18,14 @@ from saltus.language import expression as ex
 from saltus.system import System, check_values
 from saltus.units import to_si
 
-#: Trajectories that a single call may hold before their starts alone fill memory.
+#: Most trajectories of a single call: the starts of more would fill the memory.
 MOST_TRAJECTORIES = 100_000_000
-#: Memory of a trajectory of D states that keeps nothing but its end [bytes]: rows of the engine.
-TRAJECTORY, TRAJECTORY_OF_A_STATE = 200.0, 24.0
+#: Memory of a trajectory that keeps only its end [bytes].
+TRAJECTORY = 200.0
+#: Memory of each of its states [bytes].
+TRAJECTORY_OF_A_STATE = 24.0
 
-#: Different combinations of values whose periodicity is checked; each takes half a millisecond.
+#: Most combinations of values whose periodicity is checked; each takes half a millisecond.
 MOST_PERIOD_CHECKS = 2000
 
 
@@ -115,7 +117,7 @@ def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> En
 
 
 def trajectories(start: Any, values: Any) -> int:
-    """How many trajectories starts and values ask for, before any array of them is made."""
+    """Number of trajectories in given starts and values, counted before any array is made."""
     given = [*(start.values() if isinstance(start, Mapping) else ())]
     given += values.values() if isinstance(values, Mapping) else ()
     rows = 1 if isinstance(start, Mapping) or axes_of(start) != 2 else max(len(start), 1)
@@ -137,8 +139,8 @@ def _check_count(system: System, count: int) -> None:
 
 
 def _check_labels(given: Mapping[str, Any]) -> None:
-    """Columns of pandas or xarray are taken row by row, so their labels must be the same, in the
-    same order. Raises ParameterError.
+    """Raise a ParameterError for columns of pandas or xarray with different labels, or labels in
+    different order: columns are used row by row.
     """
     labelled = {
         name: labels for name, value in given.items() if (labels := _labels(value)) is not None
@@ -153,14 +155,14 @@ def _check_labels(given: Mapping[str, Any]) -> None:
 
 
 def _labels(value: Any) -> Any:
-    """The index of a Series, or of a DataArray with one dim; None where there is none."""
+    """The index of a Series, or of a DataArray with one dim; None for anything else."""
     if hasattr(value, "iloc"):
         return value.index
     return next(iter(value.indexes.values()), None) if hasattr(value, "indexes") else None
 
 
 def check_system(system: Any) -> None:
-    """Raises ParameterError for what isn't a System."""
+    """Raise a ParameterError for anything that isn't a System."""
     if isinstance(system, System):
         return
     name = getattr(system, "__name__", "")
@@ -181,8 +183,8 @@ def check_system(system: Any) -> None:
 def fill(
     system: System, columns: Mapping[str, np.ndarray], fixed: Mapping[str, float]
 ) -> np.ndarray:
-    """States float64[k, D] from float64[k] for some of them; the others are fixed, at zero if
-    nothing is said.
+    """States float64[k, D] from float64[k] for some of them; the others are fixed, by default at
+    zero.
     """
     count = len(next(iter(columns.values())))
     return np.stack(
@@ -192,7 +194,7 @@ def fill(
 
 
 def fixed_states(system: System, at: Any, moving: Iterable[str]) -> dict[str, float]:
-    """Starts [SI] of the states that don't move over a map or a box; default zero.
+    """Starts [SI] of the states that aren't varied in a map or a box; default zero.
 
     Raises
     ------
@@ -223,10 +225,10 @@ def fixed_states(system: System, at: Any, moving: Iterable[str]) -> dict[str, fl
 def _check_period_of_each(
     system: System, shared: Mapping[str, float], varied: Mapping[str, np.ndarray], count: int
 ) -> None:
-    """The time dependence must repeat with the forcing period for every trajectory, not only for
-    the system's own values.
+    """Check that the time dependence repeats with the forcing period for every trajectory, not only
+    for the system's own values.
 
-    Only parameters that the explicit time dependence can see are asked; each different combination
+    Only parameters in the explicit time dependence matter; each different combination is checked
     once.
     """
     if system.forced_at is None:
@@ -257,8 +259,8 @@ def _values(system: System, name: str, value: Any) -> Any:
 
 
 def at_values(system: System, values: Mapping[str, Any] | None) -> System:
-    """A system at other values of its parameters, one each. Raises ParameterError or UnitError
-    where one isn't a value.
+    """The system with other values of its parameters, one each. Raises ParameterError or UnitError
+    for an invalid value.
     """
     if values is None:
         return system
@@ -275,8 +277,8 @@ def at_values(system: System, values: Mapping[str, Any] | None) -> System:
 
 
 def single(system: System, name: str, value: Any) -> float:
-    """The value of a parameter [SI] at an end of a range, or in a list of them. Raises
-    ParameterError for many in place of one.
+    """The value of a parameter [SI] at an end of a range, or in a list. Raises ParameterError for
+    many in place of one.
     """
     number = system.resolve(name, value)
     if np.ndim(number):
@@ -343,12 +345,12 @@ def _columns(system: System, start: Any) -> dict[str, np.ndarray]:
 
 
 def _made(system: System) -> tuple[str, ...]:
-    """The states that elements with a memory have brought."""
+    """The states that elements with a memory have added."""
     return system.states[len(system.states) - system.made :]
 
 
 def _as_array(start: Any) -> np.ndarray:
-    """Rows as an array; mixed text and numbers stay as they are."""
+    """Rows as an array; mixed text and numbers are kept."""
     try:
         rows = np.asarray(start)
         return rows if rows.dtype.kind in "fiu" else np.asarray(start, dtype=object)
@@ -383,7 +385,7 @@ def _numbers(system: System, name: str, value: Any) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Span:
-    """How long to run: a period for each trajectory, whole periods and the time after them, all
+    """The length of a run: a period for each trajectory, whole periods and the time after them, all
     since t_start.
 
     For an unforced system the whole span is one period. ``t_end`` is the time that was asked for
@@ -399,8 +401,8 @@ class Span:
     def request(
         self, start: np.ndarray, parameters: np.ndarray, schedule: Schedule, record_from: int | None
     ) -> Request:
-        """A run of this length, with samples at a schedule; contacts from period ``record_from`` on
-        are kept, or none.
+        """A request of this length, with samples at a schedule; contacts are kept from period
+        ``record_from`` on, or none.
         """
         return Request(
             start=start, parameters=parameters, period=self.period, end_count=self.count,

@@ -28,11 +28,12 @@ from saltus.results.dataset import schema
 from saltus.system import System
 from saltus.system.quantity import remembering
 
-#: Samples per forcing period: contacts are exact anyway, this is what a picture needs.
+#: Default samples per forcing period, enough for a picture; contacts are exact without them.
 PER_PERIOD = 200
-#: Samples over the whole span of an unforced system: a curve without corners over a hundred
-#: oscillations; fewer of many trajectories.
-MOST_PER_SPAN, LEAST_PER_SPAN = 10_000, 2000
+#: Samples over the whole span of an unforced system: a smooth curve over a hundred oscillations.
+MOST_PER_SPAN = 10_000
+#: Least number of these, for each of many trajectories.
+LEAST_PER_SPAN = 2000
 
 
 @verb
@@ -151,7 +152,7 @@ def simulate(
 
 @dataclass(frozen=True)
 class _Plan:
-    """Which samples and contacts are kept."""
+    """The samples and contacts that are kept."""
 
     schedule: Schedule
     first: int
@@ -176,13 +177,13 @@ def _plan(
         samples, "samples", _per_span(group.size) if system.forced_at is None else PER_PERIOD
     )
     last = int(np.max(length.count + length.phase / length.period))
-    kept = _whole(keep, "keep", max(last, 1))
+    periods_kept = _whole(keep, "keep", max(last, 1))
     if keep is not None and system.forced_at is None:
         raise ParameterError(
             f"{system.name} has no forcing period, so keep= has no meaning. Start "
             f"later, or take fewer samples=."
         )
-    first = max(int(np.min(length.count)) - kept, 0) if keep is not None else 0
+    first = max(int(np.min(length.count)) - periods_kept, 0) if keep is not None else 0
     longest = np.max((length.count + length.phase / length.period) * per)
     count = int(longest + 1e-9) + 1 - first * per
     _check_room(system, group.size, count, states)
@@ -196,7 +197,7 @@ def _plan(
 
 
 def _least_samples(system: System, trajectories: int, periods: Any, samples: Any, keep: Any) -> int:
-    """Samples that each trajectory has at least, known before any array is made."""
+    """Least number of samples of each trajectory, known before any array is made."""
     if system.forced_at is None:
         return _whole(samples, "samples", _per_span(trajectories)) + 1
     if periods is None:
@@ -206,7 +207,7 @@ def _least_samples(system: System, trajectories: int, periods: Any, samples: Any
 
 
 def _check_room(system: System, trajectories: int, samples: int, states: int | None = None) -> None:
-    """Raise ParameterError if samples of so many trajectories don't fit into memory."""
+    """Raise a ParameterError if samples of so many trajectories don't fit into memory."""
     check_room(
         samples * trajectories * (16.0 * (states or len(system.states)) + 16.0),
         f"{trajectories} trajectories with {samples} samples each",
@@ -215,7 +216,7 @@ def _check_room(system: System, trajectories: int, samples: int, states: int | N
 
 
 def _per_span(trajectories: int) -> int:
-    """Samples of a motion without forcing: enough for a smooth curve, fewer where there are many
+    """Samples of a motion without forcing: enough for a smooth curve, fewer for many
     trajectories.
     """
     return max(MOST_PER_SPAN // max(trajectories // 20, 1), LEAST_PER_SPAN)
@@ -234,7 +235,7 @@ def _dataset(
     outcome: Outcome,
     errors: np.ndarray,
 ) -> xr.Dataset:
-    """Everything under its name."""
+    """The Dataset of a run."""
     reached = slice(outcome.reached())
     count, fraction = plan.schedule.count[reached], plan.schedule.fraction[reached]
     forced = system.forced_at is not None

@@ -1,4 +1,4 @@
-"""`transmissibility`: how much of one output of a response arrives in another."""
+"""`transmissibility`: the ratio of two outputs of a response."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from saltus.results.dataset.build import finish
 from saltus.results.dataset.reader import reader
 from saltus.results.dataset.schema import RESPONSES, check
 
-#: What two outputs are compared by.
+#: Quantities by which two outputs are compared.
 By = Literal["amplitude", "rms", "rms_about_mean"]
 
 
@@ -25,7 +25,7 @@ def transmissibility(ds: xr.Dataset, output: str, to: str, by: By = "amplitude")
     Parameters
     ----------
     ds : Dataset
-        What ``frequency_response`` or ``bifurcation_diagram`` returned.
+        The result of ``frequency_response`` or ``bifurcation_diagram``.
     output, to : str
         Outputs of it, states or functions: numerator and denominator.
     by : {"amplitude", "rms", "rms_about_mean"}
@@ -84,5 +84,5 @@ def transmissibility(ds: xr.Dataset, output: str, to: str, by: By = "amplitude")
 
 
 def _factor(unit: str) -> str:
-    """A unit as it stands in a denominator."""
+    """A unit in the form for a denominator."""
     return f"({unit})" if any(sign in unit for sign in "*/ ") else unit

@@ -37,9 +37,8 @@ def bifurcation_diagram(
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
 ) -> xr.Dataset:
-    """How the steady responses change with a parameter: their turning points, periods, kinds, and
-    what happens to them on the way, to rounding. For the steps see
-    :func:`saltus.frequency_response`.
+    """Steady responses against a parameter: their turning points, periods, kinds and bifurcations,
+    located to rounding. For the steps see :func:`saltus.frequency_response`.
 
     Parameters
     ----------

@@ -35,8 +35,7 @@ def frequency_response(
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
 ) -> xr.Dataset:
-    """Steady responses against the forcing frequency: which there are, and which start leads to
-    which.
+    """Steady responses against the forcing frequency, and the starts that lead to each.
 
     1. Every start is followed at every frequency until it has settled on an orbit that is closed by
        Newton's method and attracts by its Floquet multipliers. What never repeats is typed by its

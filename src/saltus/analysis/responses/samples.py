@@ -1,5 +1,5 @@
-"""What a bifurcation diagram shows of each response: where it turns, where it is at whole periods,
-or where it meets a boundary.
+"""Samples of each response in a bifurcation diagram: its turning points, its states at whole
+periods, or its contacts.
 """
 
 from __future__ import annotations
@@ -21,14 +21,16 @@ from saltus.flow.request import Outcome
 from saltus.kernels import status as st
 from saltus.system import System
 
-#: What may be shown.
+#: Known kinds of samples.
 SAMPLES = ("turning_points", "stroboscope", "contacts")
 #: Responses sampled at a time.
 PIECE = 256
 
 
 def check_sample(sample: str, method: Method) -> str:
-    """The sample, if it is known and the method can tell it. Raises ParameterError."""
+    """Return the kind of sample, checked. Raises ParameterError if it is unknown, or the method
+    can't give it.
+    """
     if not among(sample, SAMPLES):
         raise ParameterError(f"sample={shown(sample)} isn't known. {nearest(sample, SAMPLES)}")
     if sample == "contacts" and not method.records_contacts:
@@ -39,7 +41,7 @@ def check_sample(sample: str, method: Method) -> str:
 
 
 def check_unforced_sample(sample: str, system: System) -> None:
-    """Raises ParameterError if a system without forcing can't show it."""
+    """Raise a ParameterError if a system without forcing can't show this sample."""
     if sample == "stroboscope" and system.forced_at is None:
         raise ParameterError(
             f"{system.name} has no forcing period: it has no stroboscope. Take "
@@ -55,8 +57,8 @@ def sampled(
     found: GridResponses,
     threads: int | None = None,
 ) -> list[np.ndarray]:
-    """The sampled states of each response, float64[n, D], over one period of a response, or many of
-    one that never repeats.
+    """The sampled states of each response, float64[n, D]: over one period, or over many for a
+    motion that never repeats.
     """
     spans = np.where(found.period > 0, spans_of(found), APERIODIC_PERIODS)
     if sample == "stroboscope":

@@ -1,4 +1,4 @@
-"""Matrices of a structure, dense or sparse: their checks and what is factorised."""
+"""Matrices of a structure, dense or sparse: their checks and factorisations."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ ASYMMETRY = 1e-10
 
 
 def is_sparse(matrix: Any) -> bool:
-    """Whether this is a SciPy sparse matrix or array."""
+    """True if this is a SciPy sparse matrix or array."""
     return hasattr(matrix, "tocsr") and hasattr(matrix, "nnz")
 
 
