@@ -8,7 +8,7 @@ import numpy as np
 
 from saltus.analysis.attractors.aperiodic import SURVEY_ITERATES, SampledAttractor
 from saltus.analysis.closed.cycles import attracting_cycles
-from saltus.analysis.closed.orbits import OrbitBatch
+from saltus.analysis.closed.motions import ClosedMotions
 from saltus.analysis.solve.tolerances import NEAR, ROUND
 from saltus.flow.maps import Stroboscope
 from saltus.flow.request import Schedule
@@ -45,7 +45,7 @@ def limit_cycles(
     return [SampledAttractor(Kind.LIMIT_CYCLE.word, 0.0, 0.0, one, scale) for one in points]
 
 
-def cycle_of(map_: Stroboscope, one: SampledAttractor) -> OrbitBatch:
+def cycle_of(map_: Stroboscope, one: SampledAttractor) -> ClosedMotions:
     """A limit cycle that is known by its places.
 
     Newton's method begins at several of them: at a jump of the state there is no derivative.

@@ -14,7 +14,7 @@ from saltus.analysis.attractors.attractor_set import AttractorSet
 from saltus.analysis.attractors.noisy import Noisy
 from saltus.analysis.basins.labels import Settling
 from saltus.analysis.closed.capture import Neighbourhoods
-from saltus.analysis.closed.orbits import Orbit
+from saltus.analysis.closed.motions import ClosedMotion
 from saltus.errors import SaltusError
 
 #: What is kept of each cell, beside where it ended.
@@ -98,7 +98,7 @@ def _found(data: Mapping[str, Any], size: int) -> AttractorSet:
     )
 
 
-def _orbit_data(orbit: Orbit) -> dict[str, Any]:
+def _orbit_data(orbit: ClosedMotion) -> dict[str, Any]:
     values = orbit.multipliers
     return {
         "points": orbit.points.tolist(), "mismatch": orbit.mismatch,
@@ -106,9 +106,9 @@ def _orbit_data(orbit: Orbit) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _orbit_from(data: Mapping[str, Any], size: int) -> Orbit:
+def _orbit_from(data: Mapping[str, Any], size: int) -> ClosedMotion:
     values = np.array([complex(real, imaginary) for real, imaginary in data["multipliers"]])
-    return Orbit(_array(data["points"], size), values, float(data["mismatch"]))
+    return ClosedMotion(_array(data["points"], size), values, float(data["mismatch"]))
 
 
 def _sampled_data(one: SampledAttractor) -> dict[str, Any]:

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.linalg import solve_continuous_lyapunov
 
 from saltus.analysis.closed.capture import RADII, SAFETY, sphere
-from saltus.analysis.closed.orbits import OrbitBatch
+from saltus.analysis.closed.motions import ClosedMotions
 from saltus.analysis.solve.newton import newton
 from saltus.flow.maps import Stroboscope
 from saltus.language.evaluate import evaluate
@@ -71,10 +71,10 @@ class Equilibria:
         return stable
 
     @property
-    def orbits(self) -> OrbitBatch:
+    def orbits(self) -> ClosedMotions:
         """They as orbits of one point and of time 0."""
         found = np.isfinite(self.place).all(axis=1)
-        result = OrbitBatch.none(*self.place.shape)
+        result = ClosedMotions.none(*self.place.shape)
         result.period[found], result.time[found] = 1, 0.0
         result.points[:, 0], result.multipliers[:] = self.place, self.eigenvalues
         return result

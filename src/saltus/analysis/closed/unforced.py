@@ -11,7 +11,7 @@ import numpy as np
 from saltus.analysis.closed.cycles import attracting_cycles, find_cycles, returns
 from saltus.analysis.closed.field_zeros import find_equilibria
 from saltus.analysis.closed.measures import Measures
-from saltus.analysis.closed.orbits import OrbitBatch
+from saltus.analysis.closed.motions import ClosedMotions
 from saltus.contact.guards import is_hold
 from saltus.flow.maps import Stroboscope
 from saltus.language.evaluate import evaluate
@@ -29,13 +29,13 @@ class Attracted:
 
     Attributes
     ----------
-    orbits : OrbitBatch
+    orbits : ClosedMotions
         Their equilibria (time 0) and limit cycles (time > 0); period 0 where there is none yet.
     scale : float64[k, D]
         Range of each state on the limit cycle; of an equilibrium that which was given.
     """
 
-    orbits: OrbitBatch
+    orbits: ClosedMotions
     scale: np.ndarray
 
 
@@ -58,7 +58,7 @@ def attracted(
     near : float
         Distance of a return, in units of the scale, that is worth a try by Newton's method.
     """
-    result = Attracted(OrbitBatch.none(len(state), state.shape[1]), scale.copy())
+    result = Attracted(ClosedMotions.none(len(state), state.shape[1]), scale.copy())
     rest = find_equilibria(map_, state, scale)
     here = np.flatnonzero(rest.stable & rest.holds(state))
     result.orbits.put(here, rest.orbits.rows(here))
@@ -124,9 +124,9 @@ def multipliers_and_eigenvalues(
 
 def close_again(
     map_: Stroboscope, start: np.ndarray, time: np.ndarray, scale: np.ndarray
-) -> OrbitBatch:
+) -> ClosedMotions:
     """Equilibria (time 0) and limit cycles (their period) from those at other parameter values."""
-    result = OrbitBatch.none(len(start), start.shape[1])
+    result = ClosedMotions.none(len(start), start.shape[1])
     rests, turns = np.flatnonzero(time == 0), np.flatnonzero(time > 0)
     if len(rests):
         result.put(rests, find_equilibria(map_.rows(rests), start[rests], scale[rests]).orbits)

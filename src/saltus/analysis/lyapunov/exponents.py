@@ -11,7 +11,7 @@ import numpy as np
 
 from saltus.analysis.closed.field_zeros import autonomous, find_equilibria
 from saltus.analysis.closed.measures import measure
-from saltus.analysis.closed.orbits import Orbit
+from saltus.analysis.closed.motions import ClosedMotion
 from saltus.analysis.lyapunov.algorithm import Algorithm
 from saltus.analysis.lyapunov.qr import AT_REST, GOOD, SEGMENT
 from saltus.analysis.lyapunov.segments import TangentFlow
@@ -113,7 +113,7 @@ class Exponents(Algorithm):
                 self._of_orbit(rows[i], flow.rows(np.array([i])), orbit)
         self._near[rows] |= (self._grazes[rows] > 0) | (self._unresolved[rows] > 0)
 
-    def _of_orbit(self, row: int, flow: TangentFlow, orbit: Orbit) -> None:
+    def _of_orbit(self, row: int, flow: TangentFlow, orbit: ClosedMotion) -> None:
         """Grazes and margin of the orbit alone, in place of those on the way to it."""
         segment = flow.advance(orbit.points[:1], orbit.period)
         self._grazes[row], self._unresolved[row] = segment.grazes[0], segment.unresolved[0]

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from function_maps import FunctionMap, attracts, orbit_near
-from saltus.analysis.closed.orbits import Orbit, find_orbits, orbit_distance, phase_distances, same
+from saltus.analysis.closed.motions import ClosedMotion, orbit_distance, phase_distances, same
+from saltus.analysis.closed.orbits import find_orbits
 
 UNIT = np.array([1.0, 1.0])
 
@@ -116,11 +117,12 @@ def test_no_orbit_is_none():
 def test_same_orbits_whatever_their_first_point_and_twins_that_are_not():
     points = np.array([[-1.0, 0.2], [0.5, 0.1], [1.0, 0.0]])
     a, shifted, twin = (
-        Orbit(p, np.zeros(2) + 0j, 0.0) for p in (points, np.roll(points, 1, axis=0), -points)
+        ClosedMotion(p, np.zeros(2) + 0j, 0.0)
+        for p in (points, np.roll(points, 1, axis=0), -points)
     )
     assert same(a, shifted, UNIT, 1e-9)
     assert not same(a, twin, UNIT, 1e-9)  # of equal amplitude
-    assert not same(a, Orbit(points[:1], np.zeros(2) + 0j, 0.0), UNIT, 1e-9)
+    assert not same(a, ClosedMotion(points[:1], np.zeros(2) + 0j, 0.0), UNIT, 1e-9)
 
 
 def test_an_orbit_of_an_inexact_map_does_not_depend_on_the_others_of_its_batch():
