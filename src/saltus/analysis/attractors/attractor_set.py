@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from saltus.analysis.attractors.aperiodic import SampledAttractor, merge
+from saltus.analysis.attractors.aperiodic import SampledMotion, merge
 from saltus.analysis.attractors.noisy import Noisy, Stray
 from saltus.analysis.closed.capture import Neighbourhoods, neighbourhoods
 from saltus.analysis.closed.motions import ClosedMotion
@@ -27,7 +27,7 @@ class AttractorSet:
         Where the periodic ones capture.
     orbits : list of ClosedMotion
         The periodic ones, stable.
-    sampled : list of SampledAttractor
+    sampled : list of SampledMotion
         Those that never repeat: their ids follow.
     unstable : list of ClosedMotion
         Periodic orbits met on the way that don't attract.
@@ -37,9 +37,14 @@ class AttractorSet:
 
     near: Neighbourhoods
     orbits: list[ClosedMotion] = field(default_factory=list)
-    sampled: list[SampledAttractor] = field(default_factory=list)
+    sampled: list[SampledMotion] = field(default_factory=list)
     unstable: list[ClosedMotion] = field(default_factory=list)
     astray: list[Stray] = field(default_factory=list)
+
+    @property
+    def every(self) -> list[ClosedMotion | SampledMotion]:
+        """All of them, in the order of their ids."""
+        return [*self.orbits, *self.sampled]
 
     def __len__(self) -> int:
         return len(self.orbits) + len(self.sampled)
@@ -49,7 +54,7 @@ class AttractorSet:
         self.near = self.near.joined(neighbourhoods(map_, orbit, len(self.orbits), scale))
         self.orbits.append(orbit)
 
-    def add_sampled(self, one: SampledAttractor) -> None:
+    def add_sampled(self, one: SampledMotion) -> None:
         """One more that is known by where it goes, unless it is there. Orbits that turn out to be
         scatter about it are no longer others.
         """
@@ -58,10 +63,9 @@ class AttractorSet:
         self.near = self.near.of(np.array(kept, np.int64))
         self.orbits = [self.orbits[i] for i in kept]
 
-    def index(self, one: ClosedMotion | SampledAttractor) -> int:
+    def index(self, one: ClosedMotion | SampledMotion) -> int:
         """The id of an attractor that was found."""
-        every: list[ClosedMotion | SampledAttractor] = [*self.orbits, *self.sampled]
-        for i, other in enumerate(every):
+        for i, other in enumerate(self.every):
             if other is one or (isinstance(one, ClosedMotion) and is_about(other, one)):
                 return i
         raise AssertionError("an attractor that wasn't found")
@@ -81,7 +85,7 @@ class AttractorSet:
         )
 
 
-def is_about(one: ClosedMotion | SampledAttractor, orbit: ClosedMotion) -> bool:
+def is_about(one: ClosedMotion | SampledMotion, orbit: ClosedMotion) -> bool:
     """Whether an orbit is scatter about a noisy one."""
     return isinstance(one, Noisy) and bool(one.share(orbit.points[None])[0] >= INSIDE)
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from saltus.analysis.attractors.aperiodic import SampledAttractor
+from saltus.analysis.attractors.aperiodic import SampledMotion
 from saltus.analysis.attractors.attractor_set import AttractorSet
 from saltus.analysis.attractors.find_attractors import find_attractors
 from saltus.analysis.attractors.recurrence import recurrence
@@ -67,18 +67,18 @@ class _Sides:
     def __init__(self, map_: Map, ends: np.ndarray, scale: np.ndarray, most: int) -> None:
         self._map, self._scale, self._most = map_, scale, most
         self.found: AttractorSet | None = None
-        self.first: ClosedMotion | SampledAttractor | None = None
+        self.first: ClosedMotion | SampledMotion | None = None
         self.first, self.second = self.of(ends)
 
-    def of(self, states: np.ndarray) -> list[ClosedMotion | SampledAttractor | None]:
+    def of(self, states: np.ndarray) -> list[ClosedMotion | SampledMotion | None]:
         """The attractors of states float64[k, D]; None where none was established."""
         self.found, label, _ = find_attractors(
             self._map, states, self._scale, self._most, self.found
         )
-        every = [*self.found.orbits, *self.found.sampled]
+        every = self.found.every
         return [every[i] if i >= 0 else None for i in label.tolist()]
 
-    def number(self, one: ClosedMotion | SampledAttractor | None) -> int:
+    def number(self, one: ClosedMotion | SampledMotion | None) -> int:
         """The id of an attractor as they are now."""
         return -1 if one is None or self.found is None else self.found.index(one)
 
@@ -174,7 +174,7 @@ def _closed(map_: Map, points: np.ndarray, scale: np.ndarray) -> ClosedMotion | 
 
 def _beside(
     map_: Map, orbit: ClosedMotion, scale: np.ndarray, sides: _Sides
-) -> list[ClosedMotion | SampledAttractor | None]:
+) -> list[ClosedMotion | SampledMotion | None]:
     """The attractors on the two sides of an orbit, along its most unstable direction."""
     n = orbit.period
     _, matrix = map_.tangent(orbit.points[:1], n)

@@ -11,7 +11,7 @@ import numpy as np
 from saltus.analysis.attractors.aperiodic import (
     REPEATS,
     SURVEY_ITERATES,
-    SampledAttractor,
+    SampledMotion,
     merge,
     mismatch,
     survey,
@@ -29,7 +29,7 @@ from saltus.flow.maps import Map, Stroboscope, Travel
 from saltus.results.dataset.kinds import Kind
 
 #: The attractor of each trajectory, None as long as it isn't known.
-Owners = list[ClosedMotion | SampledAttractor | None]
+Owners = list[ClosedMotion | SampledMotion | None]
 #: Candidates for orbits in one round; what isn't tried has its turn in the next.
 MAX_CANDIDATES = 12
 #: Trajectories that never recur whose motion is surveyed.

@@ -227,17 +227,17 @@ def _settled_unforced(
     """
     state, window = points[:, -1], ROUND * float(map_.period[0])
     result.scale[who] = np.maximum(result.scale[who], np.ptp(points, axis=1))
-    found = unforced.attracted(map_, state, result.scale[who], window, near)
-    done = found.orbits.period > 0
+    found, scale = unforced.attracted(map_, state, result.scale[who], window, near)
+    done = found.period > 0
     chosen = who[done]
-    result.orbits.put(chosen, found.orbits.rows(done))
-    result.scale[chosen] = found.scale[done]
-    rests = found.orbits.time[done] == 0
+    result.orbits.put(chosen, found.rows(done))
+    result.scale[chosen] = scale[done]
+    rests = found.time[done] == 0
     result.kind[chosen], result.exponent_error[chosen] = (
         np.where(rests, Kind.EQUILIBRIUM, Kind.LIMIT_CYCLE),
         0.0,
     )
-    leading = found.orbits.multipliers[done, 0].real * map_.period[done]
+    leading = found.multipliers[done, 0].real * map_.period[done]
     # along a limit cycle nothing grows or dies
     result.exponent[chosen] = np.where(rests, leading, 0.0)
     return done

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from saltus.analysis.attractors.aperiodic import SampledAttractor, alike
+from saltus.analysis.attractors.aperiodic import SampledMotion, alike
 from saltus.analysis.attractors.find_responses import SettledMotions, find_responses
 from saltus.analysis.attractors.grid import Grid
 from saltus.analysis.closed.cycles import ASIDE
@@ -197,7 +197,7 @@ def _same(result: SettledMotions, a: int, b: int, tolerance: float) -> bool:
             < tolerance
         )
     first, second = (
-        SampledAttractor("", 0.0, 0.0, result.iterates[row], result.scale[a]) for row in (a, b)
+        SampledMotion("", 0.0, 0.0, result.iterates[row], result.scale[a]) for row in (a, b)
     )
     return alike(first, second)
 
@@ -241,13 +241,8 @@ def table_of(found: GridResponses, numbers: Measures, grid: Grid, method: Method
     low, high = wilson(hits, len(grid.starts))
     shares = (hits / len(grid.starts), low, high) if grid.drawn else None
     return AttractorTable(
+        **{**numbers.columns(period), "itinerary": [""] * len(found)},
         kind=[Kind(code).word for code in kind],
-        period=period,
-        contacts=numbers.contacts * np.maximum(period, 1),
-        itinerary=[""] * len(found),
-        peak=numbers.peak[:, 0],
-        rms=numbers.rms[:, 0],
-        margin=numbers.margin,
         multipliers=multipliers,
         exponent=s.exponent[found.row] / map_.period,
         exponent_error=s.exponent_error[found.row] / map_.period,

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from saltus.analysis.attractors.aperiodic import SURVEY_ITERATES, SampledAttractor
+from saltus.analysis.attractors.aperiodic import SURVEY_ITERATES, SampledMotion
 from saltus.analysis.closed.motions import ClosedMotion
 from saltus.flow.maps import Map, Stroboscope
 from saltus.flow.request import Schedule
@@ -36,7 +36,7 @@ BETWEEN = 32
 
 
 @dataclass(frozen=True)
-class Noisy(SampledAttractor):
+class Noisy(SampledMotion):
     """An orbit about which errors of a map keep its motion scattered; ``points`` and ``exponent``
     are the orbit's.
 
@@ -184,7 +184,7 @@ def stray_attrs(strays: Sequence[Stray]) -> dict[str, str | float]:
     return {"unconverged_exactly": words, "unconverged_stray": max(far, default=np.nan)}
 
 
-def keep_to(attractors: Sequence[SampledAttractor], runs: np.ndarray, inside: float) -> np.ndarray:
+def keep_to(attractors: Sequence[SampledMotion], runs: np.ndarray, inside: float) -> np.ndarray:
     """Which of some attractors, known by where they go, trajectories float64[k, m, D] keep to with
     such a share, int64[k]; -1 for none.
     """

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.analysis.attractors.aperiodic import SampledAttractor
+from saltus.analysis.attractors.aperiodic import SampledMotion
 from saltus.analysis.attractors.attractor_set import AttractorSet
 from saltus.analysis.attractors.noisy import Noisy
 from saltus.analysis.basins.labels import Settling
@@ -111,7 +111,7 @@ def _orbit_from(data: Mapping[str, Any], size: int) -> ClosedMotion:
     return ClosedMotion(_array(data["points"], size), values, float(data["mismatch"]))
 
 
-def _sampled_data(one: SampledAttractor) -> dict[str, Any]:
+def _sampled_data(one: SampledMotion) -> dict[str, Any]:
     data = {
         "kind": one.kind, "exponent": one.exponent, "error": one.exponent_error,
         "points": one.points.tolist(), "scale": one.scale.tolist(),
@@ -126,7 +126,7 @@ def _sampled_data(one: SampledAttractor) -> dict[str, Any]:
     }
 
 
-def _sampled_from(data: Mapping[str, Any], size: int) -> SampledAttractor:
+def _sampled_from(data: Mapping[str, Any], size: int) -> SampledMotion:
     plain = (
         str(data["kind"]),
         float(data["exponent"]),
@@ -135,7 +135,7 @@ def _sampled_from(data: Mapping[str, Any], size: int) -> SampledAttractor:
         np.array(data["scale"], float),
     )
     if "orbit" not in data:
-        return SampledAttractor(*plain)
+        return SampledMotion(*plain)
     widths = np.array(data["size"], float), np.array(data["scatter"], float)
     return Noisy(*plain, _orbit_from(data["orbit"], size), *widths, float(data["stray"]))
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from saltus.analysis.solve.tolerances import LONGEST, MARGINAL, SAME
+from saltus.results.dataset.kinds import Kind
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,11 @@ class ClosedMotion:
         return len(self.points)
 
     @property
+    def kind(self) -> str:
+        """Kind of motion, in the word of results."""
+        return (Kind.LIMIT_CYCLE if self.time > 0 else Kind.PERIODIC).word
+
+    @property
     def transverse(self) -> np.ndarray:
         """The multipliers but for the trivial one, complex128[D] or [D - 1]. A limit cycle of one
         state, which jumps, has nothing across it: a single 0.
@@ -58,6 +64,11 @@ class ClosedMotion:
         largest = abs(self.transverse[0])
         growth = math.log(largest) if largest > 0 else -math.inf
         return max(growth / self.time, 0.0) if self.time > 0 else growth / self.period
+
+    @property
+    def exponent_error(self) -> float:
+        """Its standard error: none."""
+        return 0.0
 
 
 @dataclass

@@ -12,7 +12,6 @@ from saltus.analysis.closed.motions import ClosedMotion
 from saltus.analysis.solve.tolerances import MARGINAL
 from saltus.flow.maps import Stroboscope
 from saltus.results import AttractorTable
-from saltus.results.dataset.kinds import Kind
 from saltus.results.dataset.orbits import OrbitTable
 
 
@@ -31,13 +30,8 @@ def table_of(
     numbers = measure(rows if forced else rows.with_period(time), start, period)
     per_second = 1.0 / float(map_.period[0]) if forced else 1.0
     whole = AttractorTable(
-        kind=[Kind.PERIODIC.word if forced else Kind.LIMIT_CYCLE.word] * count,
-        period=period if forced else np.zeros(count, np.int64),
-        contacts=numbers.contacts * period,
-        itinerary=numbers.itinerary,
-        peak=numbers.peak[:, 0],
-        rms=numbers.rms[:, 0],
-        margin=numbers.margin,
+        **numbers.columns(period if forced else 0 * period),
+        kind=[one.kind for one in motions],
         multipliers=np.array(multipliers, complex).reshape(count, size - (not forced and size > 1)),
         exponent=per_second * np.array([one.exponent for one in motions]),
         exponent_error=np.zeros(count),

@@ -178,18 +178,18 @@ def _rest(found: Spectrum, flow: TangentFlow, start: np.ndarray, every: float) -
     scale = np.where(
         whole > AT_REST * widest, whole, np.where((widest > 0) & np.isfinite(widest), widest, 1.0)
     )
-    still = find_equilibria(flow.map, state, scale, captures=False)
+    still = find_equilibria(flow.map, state, scale)
     with np.errstate(invalid="ignore"):
-        attracts = (still.eigenvalues.real < 0).all(axis=1)
-        near = (np.abs(state - still.place) <= SAME * scale).all(axis=1)
+        attracts = (still.multipliers.real < 0).all(axis=1)
+        near = (np.abs(state - still.points[:, 0]) <= SAME * scale).all(axis=1)
     arrived = np.flatnonzero(attracts & near & np.isin(found.growth.segment.status, GOOD))
     rounding = 64 * np.finfo(float).eps
     for i in arrived:
-        own = still.eigenvalues[i]
+        own = still.multipliers[i]
         found.exponents[i] = own.real * every
         found.errors[i] = found.half_width[i] = rounding * np.abs(own).max() * every
         found.batches[i], found.kinds[i] = 0, Kind.EQUILIBRIUM.word
-        found.volume[i] = flow.rows(np.array([i])).divergences(still.place[[i]][:, None])[0][0, 0]
+        found.volume[i] = flow.rows(np.array([i])).divergences(still.points[[i], :1])[0][0, 0]
 
 
 def _with_phase(exponents: np.ndarray) -> np.ndarray:

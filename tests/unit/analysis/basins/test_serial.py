@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from function_maps import FunctionMap
-from saltus.analysis.attractors.aperiodic import SampledAttractor
+from saltus.analysis.attractors.aperiodic import SampledMotion
 from saltus.analysis.attractors.attractor_set import AttractorSet
 from saltus.analysis.attractors.find_attractors import find_attractors
 from saltus.analysis.basins.labels import Settling, settle
@@ -132,7 +132,7 @@ def test_numbers_that_text_may_lose():
     found = AttractorSet(
         Neighbourhoods(odd[:2].copy(), matrices[:2], np.array([0, 1])),
         [orbit],
-        [SampledAttractor("quasi_periodic", -0.0, np.nan, odd, SCALE)],
+        [SampledMotion("quasi_periodic", -0.0, np.nan, odd, SCALE)],
         [orbit],
     )
     data = json.loads(json.dumps(found_data(found)))
