@@ -232,7 +232,7 @@ def numbers_of(
 def table_of(found: GridResponses, numbers: Measures, grid: Grid, method: Method) -> AttractorTable:
     """What is known of each response."""
     map_ = grid.map(method).rows(found.place)
-    kind, s = found.kind, found.motions
+    kind, s, free = found.kind, found.motions, grid.every is not None
     period = np.where(kind == Kind.PERIODIC, found.period, 0)
     multipliers, eigenvalues = multipliers_and_eigenvalues(
         s.orbits.multipliers[found.row], kind == Kind.EQUILIBRIUM
@@ -251,14 +251,8 @@ def table_of(found: GridResponses, numbers: Measures, grid: Grid, method: Method
             for i, known in enumerate(np.where(found.period > 0, found.period, APERIODIC_PERIODS))
         ],
         fractions=shares,
-        **(
-            {}
-            if grid.every is None
-            else {
-                "cycle": np.where(kind == Kind.LIMIT_CYCLE, found.time, np.nan),
-                "eigenvalues": eigenvalues,
-            }
-        ),
+        cycle=np.where(kind == Kind.LIMIT_CYCLE, found.time, np.nan) if free else None,
+        eigenvalues=eigenvalues if free else None,
     )
 
 

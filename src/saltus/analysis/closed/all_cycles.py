@@ -22,13 +22,13 @@ from saltus.analysis.closed.cycles import (
     first_point,
     least_part,
     units,
+    with_trivial,
 )
 from saltus.analysis.closed.field_zeros import field_of
 from saltus.analysis.closed.motions import ClosedMotion
 from saltus.analysis.closed.search import AGES, BESIDE, Family, Search, used_up
 from saltus.analysis.closed.shooting import Shooting, close
 from saltus.analysis.solve.damped import Known
-from saltus.analysis.solve.floquet import nontrivial
 from saltus.analysis.solve.tolerances import AMPLIFIED, CONVERGED, LONGEST, SAME
 from saltus.flow.maps import Stroboscope
 from saltus.flow.polynomials import between
@@ -306,10 +306,10 @@ def _cycle(cycles: Cycles, found: Shooting) -> Cycle | None:
     mismatch = float(np.abs((ends - np.roll(found.points[0], -1, axis=0)) / scale).max())
     if not (mismatch < AMPLIFIED and np.isfinite(matrices).all() and np.isfinite(samples).all()):
         return None
-    transverse = nontrivial(matrices, found.rates(found.points)[0])
-    if not _repeats(whole, found.points[0], scale, float(np.abs(transverse).max())):
+    multipliers = with_trivial(matrices, found.rates(found.points)[0])
+    growth = float(np.abs(multipliers[1:]).max(initial=0.0))
+    if not _repeats(whole, found.points[0], scale, growth):
         return None
-    multipliers = np.append(1.0, transverse)[: len(scale)]
     points = samples[:: SAMPLES // LONGEST][:LONGEST]
     return Cycle(
         points, multipliers, mismatch, float(found.time[0]), scale=scale, samples=samples,

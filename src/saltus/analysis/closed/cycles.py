@@ -19,8 +19,8 @@ import numpy as np
 from saltus.analysis.closed.field_zeros import field_of, jacobian_of
 from saltus.analysis.closed.motions import ClosedMotions
 from saltus.analysis.closed.shooting import Shooting
-from saltus.analysis.solve.floquet import across
-from saltus.analysis.solve.newton import leading_first, newton
+from saltus.analysis.solve.floquet import nontrivial
+from saltus.analysis.solve.newton import newton
 from saltus.analysis.solve.tolerances import AMPLIFIED, BESIDE, CONVERGED, LONGEST, RESTS, ROUNDING
 from saltus.flow.maps import Stroboscope
 from saltus.flow.polynomials import between
@@ -367,7 +367,13 @@ def _multipliers(map_: Stroboscope, x: np.ndarray) -> np.ndarray:
     size = x.shape[1]
     result = np.full((len(x), size), np.nan + 0j)
     for i, (matrix, rate) in enumerate(zip(matrices, rates, strict=True)):
-        if not (np.isfinite(matrix).all() and np.isfinite(rate).all() and rate.any()):
-            continue
-        result[i] = np.append(1.0, leading_first(across(matrix, rate)[None])[0])
+        if np.isfinite(matrix).all() and np.isfinite(rate).all() and rate.any():
+            result[i] = with_trivial(matrix[None], rate[None])
     return result
+
+
+def with_trivial(segments: np.ndarray, flows: np.ndarray) -> np.ndarray:
+    """1, and the multipliers of a limit cycle across the flow, the largest first, complex128[D];
+    see :func:`saltus.analysis.solve.floquet.nontrivial`.
+    """
+    return np.append(1.0, nontrivial(segments, flows))[: segments.shape[1]]
