@@ -127,7 +127,37 @@ class Cycles(Family[Cycle]):
 
     def motion(self, closed: Shooting) -> Cycle | None:
         """See :class:`Family`; None too if it rests."""
-        return _cycle(self, closed)
+        assert closed.time is not None
+        row, n = self.map.rows(closed.row), closed.points.shape[1]
+        travelled = np.abs(closed.rates(closed.points)[0]) * closed.time
+        if not (travelled > NO_CYCLE * closed.scale).any():
+            return None
+        time = least_part(row, closed.points[:, 0], closed.time, closed.scale)
+        if time[0] < 0.75 * closed.time[0]:
+            points = _parts(self.map, closed.points[:, 0], time, n)
+            _, closed = close(replace(closed, points=points, time=time, longest=2.0 * time[0]))
+            if not len(closed):
+                return None
+        assert closed.time is not None
+        ends, matrices = closed.parts().tangent(closed.points[0], 1)
+        whole = row.with_period(closed.time)
+        first = first_point(row, closed.points[:, 0], closed.time)
+        samples = whole.run(first, 1, Schedule.even(1, SAMPLES, beyond=1)).samples[0]
+        scale = units(samples.max(axis=0), samples.min(axis=0))
+        mismatch = float(np.abs((ends - np.roll(closed.points[0], -1, axis=0)) / scale).max())
+        if not (
+            mismatch < AMPLIFIED and np.isfinite(matrices).all() and np.isfinite(samples).all()
+        ):
+            return None
+        multipliers = with_trivial(matrices, closed.rates(closed.points)[0])
+        growth = float(np.abs(multipliers[1:]).max(initial=0.0))
+        if not _repeats(whole, closed.points[0], scale, growth):
+            return None
+        points = samples[:: SAMPLES // LONGEST][:LONGEST]
+        return Cycle(
+            points, multipliers, mismatch, float(closed.time[0]), scale=scale, samples=samples,
+            rates=closed.rates(samples[None])[0],
+        )  # fmt: skip
 
     def same(self, motion: Cycle, closed: Shooting) -> np.ndarray:
         """See :class:`Family`: once or several times round."""
@@ -274,47 +304,11 @@ def _apart(map_: Stroboscope, cycle: Cycle, states: np.ndarray) -> np.ndarray:
     for _ in range(LOCATED):
         sample = np.floor(place - 0.5).astype(int)
         there = rows.with_period((place - sample) * step).run(cycle.samples[sample % SAMPLES], 1)
-        offset, rate = (
-            (states - there.state) / cycle.scale,
-            field_of(map_.system, there.state, rows.values) / cycle.scale,
-        )
+        offset = (states - there.state) / cycle.scale
+        rate = field_of(map_.system, there.state, rows.values) / cycle.scale
         along = np.einsum("mj,mj->m", offset, rate) / np.einsum("mj,mj->m", rate, rate)
         place = place + np.clip(np.nan_to_num(along / step), -1.0, 1.0)
     return np.asarray(np.abs(offset).max(axis=1))
-
-
-def _cycle(cycles: Cycles, found: Shooting) -> Cycle | None:
-    """The cycle that Newton's method found; None if it doesn't close, or rests."""
-    assert found.time is not None
-    row, n = cycles.map.rows(found.row), found.points.shape[1]
-    travelled = np.abs(found.rates(found.points)[0]) * found.time
-    if not (travelled > NO_CYCLE * found.scale).any():
-        return None
-    time = least_part(row, found.points[:, 0], found.time, found.scale)
-    if time[0] < 0.75 * found.time[0]:
-        points = _parts(cycles.map, found.points[:, 0], time, n)
-        guess = replace(found, points=points, time=time, longest=2.0 * time[0])
-        _, found = close(guess)
-        if not len(found):
-            return None
-    assert found.time is not None
-    ends, matrices = found.parts().tangent(found.points[0], 1)
-    whole = row.with_period(found.time)
-    first = first_point(row, found.points[:, 0], found.time)
-    samples = whole.run(first, 1, Schedule.even(1, SAMPLES, beyond=1)).samples[0]
-    scale = units(samples.max(axis=0), samples.min(axis=0))
-    mismatch = float(np.abs((ends - np.roll(found.points[0], -1, axis=0)) / scale).max())
-    if not (mismatch < AMPLIFIED and np.isfinite(matrices).all() and np.isfinite(samples).all()):
-        return None
-    multipliers = with_trivial(matrices, found.rates(found.points)[0])
-    growth = float(np.abs(multipliers[1:]).max(initial=0.0))
-    if not _repeats(whole, found.points[0], scale, growth):
-        return None
-    points = samples[:: SAMPLES // LONGEST][:LONGEST]
-    return Cycle(
-        points, multipliers, mismatch, float(found.time[0]), scale=scale, samples=samples,
-        rates=found.rates(samples[None])[0],
-    )  # fmt: skip
 
 
 def _repeats(whole: Stroboscope, points: np.ndarray, scale: np.ndarray, growth: float) -> bool:
