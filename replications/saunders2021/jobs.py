@@ -17,7 +17,8 @@ from saltus.analysis.basins.basins import map_of
 from saltus.analysis.basins.pipeline import basin_plan
 from saltus.analysis.branches.branches import branches
 from saltus.analysis.closed.capture import Neighbourhoods
-from saltus.analysis.closed.orbits import Orbit, find_orbits, same
+from saltus.analysis.closed.motions import ClosedMotion, same
+from saltus.analysis.closed.orbits import find_orbits
 from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.lyapunov.lyapunov import lyapunov
 from saltus.analysis.methods.compare_methods import compare_methods, methods_dataset
@@ -442,7 +443,7 @@ def halved(
     closed = find_orbits(
         map_, start, period, np.broadcast_to(scale, start.shape), np.full(len(near), map_.noise)
     )
-    orbits: list[Orbit] = []
+    orbits: list[ClosedMotion] = []
     for orbit in closed.rows(closed.period > 0):
         if not any(same(orbit, one, scale, SAME) and orbit.period == one.period for one in orbits):
             orbits.append(orbit)

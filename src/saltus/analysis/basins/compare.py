@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from scipy.optimize import linear_sum_assignment
 
-from saltus.analysis.closed.orbits import orbit_distance
+from saltus.analysis.closed.motions import orbit_distance
 from saltus.analysis.inputs.verb import verb
 from saltus.errors import ParameterError
 from saltus.intervals import wilson

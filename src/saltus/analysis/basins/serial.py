@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from saltus.analysis.attractors.aperiodic import SampledAttractor
+from saltus.analysis.attractors.aperiodic import SampledMotion
 from saltus.analysis.attractors.attractor_set import AttractorSet
 from saltus.analysis.attractors.noisy import Noisy
 from saltus.analysis.basins.labels import Settling
 from saltus.analysis.closed.capture import Neighbourhoods
-from saltus.analysis.closed.orbits import Orbit
+from saltus.analysis.closed.motions import ClosedMotion
 from saltus.errors import SaltusError
 
 #: Data of each cell, besides its final state.
@@ -98,7 +98,7 @@ def _found(data: Mapping[str, Any], size: int) -> AttractorSet:
     )
 
 
-def _orbit_data(orbit: Orbit) -> dict[str, Any]:
+def _orbit_data(orbit: ClosedMotion) -> dict[str, Any]:
     values = orbit.multipliers
     return {
         "points": orbit.points.tolist(), "mismatch": orbit.mismatch,
@@ -106,12 +106,12 @@ def _orbit_data(orbit: Orbit) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _orbit_from(data: Mapping[str, Any], size: int) -> Orbit:
+def _orbit_from(data: Mapping[str, Any], size: int) -> ClosedMotion:
     values = np.array([complex(real, imaginary) for real, imaginary in data["multipliers"]])
-    return Orbit(_array(data["points"], size), values, float(data["mismatch"]))
+    return ClosedMotion(_array(data["points"], size), values, float(data["mismatch"]))
 
 
-def _sampled_data(attractor: SampledAttractor) -> dict[str, Any]:
+def _sampled_data(attractor: SampledMotion) -> dict[str, Any]:
     data = {
         "kind": attractor.kind, "exponent": attractor.exponent, "error": attractor.exponent_error,
         "points": attractor.points.tolist(), "scale": attractor.scale.tolist(),
@@ -126,7 +126,7 @@ def _sampled_data(attractor: SampledAttractor) -> dict[str, Any]:
     }
 
 
-def _sampled_from(data: Mapping[str, Any], size: int) -> SampledAttractor:
+def _sampled_from(data: Mapping[str, Any], size: int) -> SampledMotion:
     plain = (
         str(data["kind"]),
         float(data["exponent"]),
@@ -135,7 +135,7 @@ def _sampled_from(data: Mapping[str, Any], size: int) -> SampledAttractor:
         np.array(data["scale"], float),
     )
     if "orbit" not in data:
-        return SampledAttractor(*plain)
+        return SampledMotion(*plain)
     widths = np.array(data["size"], float), np.array(data["scatter"], float)
     return Noisy(*plain, _orbit_from(data["orbit"], size), *widths, float(data["stray"]))
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.closed.all_equilibria import Rest, all_equilibria
+from saltus.analysis.closed.all_equilibria import Equilibrium, all_equilibria
 from saltus.analysis.closed.field_zeros import autonomous
 from saltus.analysis.dataset_parts import gap_unit
 from saltus.analysis.inputs.box import box_ranges, draw
@@ -146,7 +146,7 @@ def _starts(
     return begin, np.where(wide > 0, wide, 1.0)
 
 
-def _columns(system: System, found: list[Rest]) -> dict[str, Any]:
+def _columns(system: System, found: list[Equilibrium]) -> dict[str, Any]:
     """The variables of the result."""
     size, names = len(system.states), [guard.name for guard in system.guards]
     own = np.array([one.eigenvalues for one in found], complex).reshape(-1, size)

@@ -11,9 +11,10 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.closed.all_cycles import all_cycles
-from saltus.analysis.closed.all_orbits import AGES, Search, all_orbits
+from saltus.analysis.closed.all_orbits import all_orbits
 from saltus.analysis.closed.field_zeros import autonomous
-from saltus.analysis.closed.orbit_table import table_of, table_of_cycles
+from saltus.analysis.closed.orbit_table import table_of
+from saltus.analysis.closed.search import AGES, Search
 from saltus.analysis.closed.spread import spread
 from saltus.analysis.closed.turns import looks_every
 from saltus.analysis.dataset_parts import provenance, subject
@@ -161,9 +162,9 @@ def periodic_orbits(
         looks = Stroboscope(system, method, every=turn, threads=threads)
         with reporting(progress) as show:
             cycles = all_cycles(looks, states, limits, guess or turn, show)
-            table = table_of_cycles(looks, cycles.cycles, cycles.found)
+            table = table_of(looks, cycles.motions, cycles.found)
         attrs |= {"shortest_period": limits[0], "longest_period": limits[1]}
-        return orbits_dataset(system, attrs, table, searches([cycles.search]))
+        return orbits_dataset(system, attrs, table, searches(cycles.searches))
     if period is not None:
         raise ParameterError(
             f"{system.name} is forced: its orbits last whole forcing periods. Give periods=, the "
@@ -174,7 +175,7 @@ def periodic_orbits(
     scale = spread(before, states)
     with reporting(progress) as show:
         found = all_orbits(map_, states, periods, scale, show, before)
-        table = table_of(map_, found.orbits, found.found)
+        table = table_of(map_, found.motions, found.found)
     return orbits_dataset(system, attrs | {"periods": periods}, table, searches(found.searches))
 
 

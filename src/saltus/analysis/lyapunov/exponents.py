@@ -11,7 +11,7 @@ import numpy as np
 
 from saltus.analysis.closed.field_zeros import autonomous, find_equilibria
 from saltus.analysis.closed.measures import measure
-from saltus.analysis.closed.orbits import Orbit
+from saltus.analysis.closed.motions import ClosedMotion
 from saltus.analysis.lyapunov.algorithm import Algorithm
 from saltus.analysis.lyapunov.qr import AT_REST, GOOD, SEGMENT
 from saltus.analysis.lyapunov.segments import TangentFlow
@@ -112,7 +112,7 @@ class Exponents(Algorithm):
                 self._of_orbit(rows[i], flow.rows(np.array([i])), orbit)
         self._near[rows] |= (self._grazes[rows] > 0) | (self._unresolved[rows] > 0)
 
-    def _of_orbit(self, row: int, flow: TangentFlow, orbit: Orbit) -> None:
+    def _of_orbit(self, row: int, flow: TangentFlow, orbit: ClosedMotion) -> None:
         """Replace grazes and margin by those of the orbit alone, without the way to it."""
         segment = flow.advance(orbit.points[:1], orbit.period)
         self._grazes[row], self._unresolved[row] = segment.grazes[0], segment.unresolved[0]
@@ -178,18 +178,18 @@ def _rest(found: Spectrum, flow: TangentFlow, start: np.ndarray, every: float) -
     scale = np.where(
         extent > AT_REST * widest, extent, np.where((widest > 0) & np.isfinite(widest), widest, 1.0)
     )
-    still = find_equilibria(flow.map, state, scale, captures=False)
+    still = find_equilibria(flow.map, state, scale)
     with np.errstate(invalid="ignore"):
-        attracts = (still.eigenvalues.real < 0).all(axis=1)
-        near = (np.abs(state - still.place) <= SAME * scale).all(axis=1)
+        attracts = (still.multipliers.real < 0).all(axis=1)
+        near = (np.abs(state - still.points[:, 0]) <= SAME * scale).all(axis=1)
     arrived = np.flatnonzero(attracts & near & np.isin(found.growth.segment.status, GOOD))
     rounding = 64 * np.finfo(float).eps
     for i in arrived:
-        eigenvalues = still.eigenvalues[i]
+        eigenvalues = still.multipliers[i]
         found.exponents[i] = eigenvalues.real * every
         found.errors[i] = found.half_width[i] = rounding * np.abs(eigenvalues).max() * every
         found.batches[i], found.kinds[i] = 0, Kind.EQUILIBRIUM.word
-        found.volume[i] = flow.rows(np.array([i])).divergences(still.place[[i]][:, None])[0][0, 0]
+        found.volume[i] = flow.rows(np.array([i])).divergences(still.points[[i], :1])[0][0, 0]
 
 
 def _with_phase(exponents: np.ndarray) -> np.ndarray:

@@ -14,7 +14,7 @@ import numpy as np
 
 from saltus.analysis.attractors.aperiodic import SURE
 from saltus.analysis.attractors.recurrence import recurring_orbits
-from saltus.analysis.closed.orbits import Orbit
+from saltus.analysis.closed.motions import ClosedMotion
 from saltus.analysis.lyapunov.qr import GOOD, Growth, carry, grow
 from saltus.analysis.lyapunov.segments import TangentFlow
 from saltus.analysis.solve.tolerances import NEAR, ROUND, SAME
@@ -44,7 +44,7 @@ class Spectrum:
         Mean growth of volumes, found without the tangent: the sum of the exponents.
     batches : int64[k]
         Independent batches that the error of the largest comes from; 0 for an orbit.
-    orbits : list of Orbit or None
+    orbits : list of ClosedMotion or None
         The periodic orbit to which each settles.
     kinds : list of str
         ``periodic``, ``quasi_periodic``, ``chaotic``, ``equilibrium``, ``limit_cycle`` or
@@ -62,7 +62,7 @@ class Spectrum:
     half_width: np.ndarray
     volume: np.ndarray
     batches: np.ndarray
-    orbits: list[Orbit | None]
+    orbits: list[ClosedMotion | None]
     kinds: list[str]
     ends: np.ndarray
     running: Means
@@ -136,19 +136,19 @@ def _vanish(zeros: int, exponents: np.ndarray, *errors: np.ndarray) -> None:
 
 
 # -- orbits ----------------------------------------------------------------------------------------
-def _orbits(flow: TangentFlow, growth: Growth) -> list[Orbit | None]:
+def _orbits(flow: TangentFlow, growth: Growth) -> list[ClosedMotion | None]:
     """The stable periodic orbit to which each trajectory has come, None for the others."""
     points, scale = growth.segment.points, growth.scale
     orbits, _, noise = recurring_orbits(flow.map, points[:, -ROUND - 1 :], scale, NEAR)
     good = orbits.stable & np.isin(growth.segment.status, GOOD)
-    found: list[Orbit | None] = [None] * len(points)
+    found: list[ClosedMotion | None] = [None] * len(points)
     for row in np.flatnonzero(good).tolist():
         if _arrives(points[row], orbits[row], scale[row], float(noise[row])):
             found[row] = orbits[row]
     return found
 
 
-def _arrives(points: np.ndarray, orbit: Orbit, scale: np.ndarray, noise: float) -> bool:
+def _arrives(points: np.ndarray, orbit: ClosedMotion, scale: np.ndarray, noise: float) -> bool:
     """True if a trajectory float64[m, D] lies on an orbit at its end, or approaches it all the
     time.
     """
@@ -161,7 +161,7 @@ def _arrives(points: np.ndarray, orbit: Orbit, scale: np.ndarray, noise: float) 
 
 
 def _of_orbit(
-    flow: TangentFlow, i: int, orbit: Orbit, scale: np.ndarray, volume: float, vanish: bool
+    flow: TangentFlow, i: int, orbit: ClosedMotion, scale: np.ndarray, volume: float, vanish: bool
 ) -> tuple[np.ndarray, np.ndarray]:
     """Exponents of an orbit per block, and their error from the map's own errors (Bauer & Fike:
     times the condition of the eigenvectors).
@@ -196,7 +196,7 @@ def _of_orbit(
 
 
 def _round_trips(
-    flow: TangentFlow, i: int, orbit: Orbit, scale: np.ndarray
+    flow: TangentFlow, i: int, orbit: ClosedMotion, scale: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Mean growth per block over the later half of many round trips of an orbit, and the difference
     of that half's two halves.
@@ -210,7 +210,7 @@ def _round_trips(
         return 0.5 * (early + late), np.abs(late - early) + flow.map.noise
 
 
-def _volume(flow: TangentFlow, i: int, orbit: Orbit) -> tuple[float, int]:
+def _volume(flow: TangentFlow, i: int, orbit: ClosedMotion) -> tuple[float, int]:
     """Mean growth of volumes over an orbit, and directions that vanish on it."""
     growth, lost = flow.rows(np.full(orbit.period, i)).divergences(orbit.points[:, None])
     return float(growth.mean()), int(lost.max())

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.attractors.find_responses import motion_range
-from saltus.analysis.closed.orbits import orbit_distance
+from saltus.analysis.closed.motions import orbit_distance
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.kernels import status as st

@@ -29,7 +29,8 @@ from saltus.analysis.branches.rest_branches import trace_rests
 from saltus.analysis.branches.same_branch import on_branch
 from saltus.analysis.branches.seeds import rests_at, scaled, seeds_at
 from saltus.analysis.branches.tracing import Plan, trace
-from saltus.analysis.closed.orbits import OrbitBatch, find_orbits, phase_distances
+from saltus.analysis.closed.motions import ClosedMotions, phase_distances
+from saltus.analysis.closed.orbits import find_orbits
 from saltus.analysis.closed.unforced import close_again
 from saltus.analysis.inputs.outputs import Outputs
 from saltus.errors import ParameterError
@@ -126,7 +127,7 @@ def follow_arcs(
 
 
 def _follow_rests(
-    found: GridResponses, orbits: OrbitBatch, grid: Grid, plan: Plan, arcs: Arcs
+    found: GridResponses, orbits: ClosedMotions, grid: Grid, plan: Plan, arcs: Arcs
 ) -> None:
     """Follow the branches of equilibria, and those of limit cycles born at Hopf points if unstable
     orbits are followed.
@@ -145,7 +146,7 @@ def _follow_rests(
 
 def _follow_orbits(
     found: GridResponses,
-    orbits: OrbitBatch,
+    orbits: ClosedMotions,
     grid: Grid,
     plan: Plan,
     method: Method,
@@ -193,7 +194,7 @@ def _coarse_first(index: np.ndarray, places: int) -> np.ndarray:
 
 def _number(
     found: GridResponses,
-    orbits: OrbitBatch,
+    orbits: ClosedMotions,
     grid: Grid,
     plan: Plan,
     some: np.ndarray,
@@ -217,7 +218,7 @@ def _number(
 
 
 def _unknowns(
-    found: GridResponses, orbits: OrbitBatch, values: np.ndarray, some: np.ndarray
+    found: GridResponses, orbits: ClosedMotions, values: np.ndarray, some: np.ndarray
 ) -> Iterator[tuple[np.ndarray, int, np.ndarray]]:
     """Responses by their number of points: their unknowns float64[r, z], that number, and their
     indices, int64[r].
@@ -252,7 +253,7 @@ def _in_order(arcs: Arcs) -> None:
 # -- inexact methods -------------------------------------------------------------------------------
 def _exact_orbits(
     found: GridResponses, grid: Grid, method: Method, threads: int | None
-) -> OrbitBatch:
+) -> ClosedMotions:
     """The orbit of each response; for an inexact method the exact one near it, with period 0 where
     there is none.
     """
