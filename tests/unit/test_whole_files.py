@@ -55,7 +55,7 @@ def test_what_the_disk_refuses_is_said_once_in_words():
 
     with pytest.raises(RefusedError, match=r"a can't be written: No space left\. Make room\."):
         refused(OSError(28, "No space left"))
-    with pytest.raises(CacheError, match="^own words$"):
+    with pytest.raises(CacheError, match=r"^own words$"):
         refused(CacheError("own words"))
 
 
