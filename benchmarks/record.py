@@ -82,7 +82,7 @@ class Record:
                 ["python", f"benchmarks/{Path(sys.argv[0]).name}", *sys.argv[1:]]
             ),
             "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
-            "machine": f"{processor()}, {lane_width()} lanes",
+            "machine": machine(),
             "python": ".".join(map(str, sys.version_info[:3])),
             "versions": {name: _version(name) for name in PACKAGES if _version(name)},
         }
@@ -93,6 +93,11 @@ class Record:
             encoding="utf-8",
         )
         return file
+
+
+def machine() -> str:
+    """The processor, and how many lanes an equation has on it."""
+    return f"{processor()}, {lane_width()} lanes"
 
 
 def _version(package: str) -> str:

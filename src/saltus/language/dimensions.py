@@ -13,7 +13,8 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 from saltus.errors import UnitError
-from saltus.language.expression import ELEMENTARY, Expr, walk
+from saltus.language.expression import Expr, walk
+from saltus.language.operations import ELEMENTARY
 from saltus.language.text import PI_MULTIPLES
 from saltus.units import dimension, unit_text
 

@@ -11,13 +11,12 @@ from typing import Any
 import numpy as np
 
 from saltus.language.expression import And, Bit, Condition, Expr, Not, Or, Relation, walk
+from saltus.language.operations import ARITHMETIC, FUNCTIONS
 
 _OPERATIONS: dict[str, Any] = {
-    "add": np.add, "sub": np.subtract, "mul": np.multiply, "div": np.divide, "neg": np.negative,
-    "pow": np.power, "mod": np.mod,
-    "sqrt": np.sqrt, "exp": np.exp, "log": np.log, "sin": np.sin, "cos": np.cos, "tan": np.tan,
-    "atan": np.arctan, "tanh": np.tanh,
-}  # fmt: skip
+    name: getattr(np, one.numpy) for name, one in (ARITHMETIC | FUNCTIONS).items() if one.operands
+}
+_OPERATIONS["mod"] = np.mod
 
 
 def evaluate(

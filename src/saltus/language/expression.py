@@ -22,15 +22,11 @@ from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar, Union, runtime_checkable
 
 from saltus.errors import TraceError, shown
-
-#: Elementary functions that a traced equation may call, in addition to arithmetic.
-ELEMENTARY = ("sqrt", "exp", "log", "sin", "cos", "tan", "atan", "tanh")
+from saltus.language.operations import ELEMENTARY, FUNCTIONS
 
 #: The functions that an equation may call, as a sentence.
 OWN_FUNCTIONS = (
-    "Use saltus's own: sl.sqrt, sl.exp, sl.log, sl.sin, sl.cos, sl.tan, sl.asin, sl.acos, sl.atan, "
-    "sl.atan2, sl.sinh, sl.cosh, sl.tanh, "
-    "sl.hypot, sl.abs, sl.sign, sl.heaviside, sl.min, sl.max, sl.clip, sl.where, sl.piecewise; "
+    f"Use saltus's own: {', '.join(f'sl.{name}' for name in FUNCTIONS)}; "
     "sl.mod(t, T) for a time that repeats, sl.square, sl.sawtooth, sl.pulse; sl.table(x, points, "
     "values) for measured points, in place of np.interp or a spline."
 )
@@ -62,7 +58,8 @@ class Expr:
     ----------
     op : str
         ``const``, ``param``, ``state``, ``time``, ``add``, ``sub``, ``mul``, ``div``, ``neg``,
-        ``pow``, ``select``, ``mod``, ``table`` or one of :data:`ELEMENTARY`.
+        ``pow``, ``select``, ``mod``, ``table`` or one of
+        :data:`~saltus.language.operations.ELEMENTARY`.
     args : tuple of Expr
         Operands in the order written. ``pow`` holds base and exponent, ``select`` the value where
         its condition holds and the other.
@@ -601,7 +598,7 @@ def power(base: Operand, exponent: Operand) -> Expr:
 
 
 def elementary(name: str, a: Operand) -> Expr:
-    """One of the functions in :data:`ELEMENTARY` of ``a``."""
+    """One of the functions in :data:`~saltus.language.operations.ELEMENTARY` of ``a``."""
     a = as_expr(a)
     if a.op == "const":
         try:

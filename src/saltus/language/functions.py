@@ -21,6 +21,7 @@ from saltus.language.expression import (
     select,
 )
 from saltus.language.expression import sub as _difference
+from saltus.language.operations import FUNCTIONS
 
 pi = math.pi
 
@@ -44,25 +45,25 @@ def of_numbers(name: str, function: Callable[..., Any], *numbers: Any) -> Any:
         ) from None
 
 
-def _elementary(name: str, what: str) -> Callable[[Operand], Any]:
+def _elementary(name: str) -> Callable[[Operand], Any]:
     on_numbers = getattr(math, name)
 
     def function(a: Operand) -> Any:
         return elementary(name, a) if isinstance(a, Expr) else of_numbers(name, on_numbers, a)
 
     function.__name__ = function.__qualname__ = name
-    function.__doc__ = f"{what} of a traced value or a number."
+    function.__doc__ = f"{FUNCTIONS[name].what} of a traced value or a number."
     return function
 
 
-sqrt = _elementary("sqrt", "Square root")
-exp = _elementary("exp", "Exponential")
-log = _elementary("log", "Natural logarithm")
-sin = _elementary("sin", "Sine [of rad]")
-cos = _elementary("cos", "Cosine [of rad]")
-tan = _elementary("tan", "Tangent [of rad]")
-atan = _elementary("atan", "Inverse tangent [rad]")
-tanh = _elementary("tanh", "Hyperbolic tangent")
+sqrt = _elementary("sqrt")
+exp = _elementary("exp")
+log = _elementary("log")
+sin = _elementary("sin")
+cos = _elementary("cos")
+tan = _elementary("tan")
+atan = _elementary("atan")
+tanh = _elementary("tanh")
 
 
 def abs(a: Operand) -> Any:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 
-from saltus.language.expression import ELEMENTARY, Condition, Expr
-from saltus.language.text import ATOM, PI_MULTIPLES, PRODUCT, Writer
+from saltus.language.expression import Condition, Expr
+from saltus.language.operations import ATOM, ELEMENTARY, FUNCTIONS, PRODUCT
+from saltus.language.text import PI_MULTIPLES, Writer
 
 _GREEK = frozenset([
     "alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "iota", "kappa", "lambda",
@@ -70,7 +71,7 @@ class LatexWriter(Writer):
             return rf"\sqrt{{{inner}}}"
         if function not in ELEMENTARY:
             return latex_name(function) + self.parentheses(inner)
-        return rf"\{'arctan' if function == 'atan' else function}{self.parentheses(inner)}"
+        return rf"\{FUNCTIONS[function].latex or function}{self.parentheses(inner)}"
 
     def piece(self, value: Expr, condition: Condition) -> str:
         """One line of cases."""

@@ -25,16 +25,9 @@ from saltus.language.expression import (
     operands,
     walk,
 )
+from saltus.language.operations import ARITHMETIC, ATOM, NEGATIVE, POWER, PRODUCT
 from saltus.language.roots import with_root
 
-#: Binding strengths: a text that binds more weakly than asked for is bracketed.
-ATOM, POWER, NEGATIVE, PRODUCT, SUM = 5, 4, 3, 2, 1
-_INFIX = {
-    "add": (" + ", SUM),
-    "sub": (" - ", SUM),
-    "mul": ("*", PRODUCT),
-    "div": ("/", PRODUCT),
-}
 #: Constants that people write with pi.
 PI_MULTIPLES = {math.pi: "pi", 2 * math.pi: "2*pi", 4 * math.pi: "4*pi", math.pi / 2: "pi/2"}
 
@@ -165,7 +158,7 @@ class Writer:
 
     def infix(self, op: str, left: Expr, right: Expr) -> tuple[str, int]:
         """A sum, difference, product or quotient and its binding strength."""
-        sign, strength = _INFIX[op]
+        sign, strength = ARITHMETIC[op].sign, ARITHMETIC[op].strength
         return self.part(left, strength) + sign + self.part(
             right, strength + 1, after_sign=True
         ), strength
@@ -218,7 +211,7 @@ class Writer:
                 return self.power(*node.args), POWER
             case "select":
                 return self._select(node), ATOM
-            case op if op in _INFIX:
+            case op if op in ARITHMETIC:
                 return self.infix(op, *node.args)
         return self.call(node.payload.name if node.op == "table" else node.op, *node.args), ATOM
 

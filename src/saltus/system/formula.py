@@ -16,10 +16,11 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import partial, reduce
 from typing import Any
 
+from saltus import language
 from saltus.contact.forces import flores, freeplay, hertz, hunt_crossley, lankarani_nikravesh
 from saltus.contact.memory import play, slider
 from saltus.errors import SaltusError, TraceError, nearest, shown
-from saltus.language import compositions, functions
+from saltus.language import functions, operations
 from saltus.language.clocks import mod
 from saltus.language.expression import Condition
 from saltus.language.inputs import pulse, sawtooth, square
@@ -30,36 +31,9 @@ from saltus.language.tables import Table, look_up
 LONGEST = 1000
 #: Deepest nesting of a formula: each level takes a few of Python's thousand nested calls.
 DEPTH = 200
-_SIMPLE = (
-    "abs",
-    "atan",
-    "cos",
-    "exp",
-    "log",
-    "max",
-    "min",
-    "piecewise",
-    "sin",
-    "sqrt",
-    "tan",
-    "tanh",
-)
-_COMPOSED = (
-    "acos",
-    "asin",
-    "atan2",
-    "clip",
-    "cosh",
-    "heaviside",
-    "hypot",
-    "sign",
-    "sinh",
-    "where",
-)
 #: Functions of formulas.
 FUNCTIONS: dict[str, Callable[..., Any]] = {
-    **{name: getattr(functions, name) for name in _SIMPLE},
-    **{name: getattr(compositions, name) for name in _COMPOSED},
+    **{name: getattr(language, name) for name in operations.FUNCTIONS},
     "freeplay": freeplay, "hertz": hertz, "hunt_crossley": hunt_crossley,
     "lankarani_nikravesh": lankarani_nikravesh, "flores": flores, "mod": mod, "play": play,
     "slider": slider,

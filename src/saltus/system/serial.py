@@ -11,7 +11,6 @@ from saltus.contact.guards import Guard, Law, bits_in, expressions_of, is_hold
 from saltus.errors import SaltusError, among, shown
 from saltus.language.clocks import affine, switch
 from saltus.language.expression import (
-    ELEMENTARY,
     And,
     Bit,
     Condition,
@@ -24,6 +23,7 @@ from saltus.language.expression import (
     walk,
 )
 from saltus.language.names import why_no_name, why_no_text, why_no_title, why_not_together
+from saltus.language.operations import ARITHMETIC, FUNCTIONS
 from saltus.language.tables import Table
 from saltus.system.equations_of_motion import EquationsOfMotion
 from saltus.units import check_declared
@@ -39,21 +39,8 @@ _TUPLES = ("reset", "settled", "normal", "direction")
 _SINGLE = ("constraint", "drive", "pivot", "limit", "restitution", "friction", "remaining", "mass")
 _PLAIN = ("kind", "side", "partner", "zeros")
 
-_OPERANDS = {
-    "const": 0,
-    "param": 0,
-    "state": 0,
-    "time": 0,
-    "add": 2,
-    "sub": 2,
-    "mul": 2,
-    "div": 2,
-    "neg": 1,
-    "pow": 2,
-    "select": 2,
-}
-_OPERANDS |= {"mod": 2, "table": 1}
-_OPERANDS |= dict.fromkeys(ELEMENTARY, 1)
+_OPERANDS = {"const": 0, "param": 0, "state": 0, "time": 0, "select": 2, "mod": 2, "table": 1}
+_OPERANDS |= {name: one.operands for name, one in (ARITHMETIC | FUNCTIONS).items() if one.operands}
 
 
 def to_dict(system: EquationsOfMotion) -> dict[str, Any]:
