@@ -189,7 +189,7 @@ def test_a_result_is_a_dataset_of_its_kind_in_which_all_has_units(verb):
     assert isinstance(found, Result)
     kind = schema.kind_of(found)
     if verb != "transmissibility":  # which adds two variables to a response
-        assert f"sl.{verb}" in schema.MAKERS[kind].split(" or ")
+        assert f"sl.{verb}" in schema.KINDS[kind].makers.split(" or ")
     schema.check(found, caller=f"sl.{verb}", kinds=(kind,))
     for name, variable in found.variables.items():
         assert isinstance(variable.attrs["units"], str), name

@@ -24,7 +24,7 @@ from saltus.study.code import PACKAGE
 if TYPE_CHECKING:
     from saltus.replication.job import Job
     from saltus.replication.verdict import Finding
-    from saltus.study.table import TextTable
+    from saltus.results.table import TextTable
 
 #: Name of each paper: what it is. Its folder is replications/NAME.
 _PAPERS = {

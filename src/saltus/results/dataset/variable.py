@@ -81,3 +81,18 @@ SHARED = {
     **VARIED,
     **TRAJECTORY_NUMBER,
 }
+#: What stands in every table of motions from given starts: how they ended, and at what cost.
+ENDINGS = {
+    "status": STATUS,
+    **{
+        name: COUNTERS[name]
+        for name in ("steps", "rejected_steps", "mode_violations", "grazes_unresolved")
+    },
+    **END_TIME,
+    **END_STATES,
+}
+#: What a graze does to the motions behind it.
+SQRT_COEFFICIENT = (
+    "change of the grazed gap when the orbit returns, over the square root of the depth by which a "
+    "motion would pass the boundary"
+)

@@ -1,37 +1,36 @@
-"""The table of what ``branches`` returns."""
+"""What ``branches`` returns: orbits over a parameter, stable or not, and their bifurcations."""
 
 from __future__ import annotations
 
-from saltus.results.dataset.bifurcation_curves import SQRT_COEFFICIENT
-from saltus.results.dataset.variable import GUARDS, Variable
+import math
+
+import numpy as np
+import xarray as xr
+
+from saltus.errors import counted
+from saltus.results.dataset.schema import (
+    ResultKind,
+    event_name,
+    period_text,
+    point_name,
+    states_of,
+)
+from saltus.results.dataset.variable import GUARDS, SQRT_COEFFICIENT, Variable
+from saltus.results.table import ROWS, TextTable, quantity, table, words
+from saltus.results.wording import plain, unit_of
 
 _POINT = ("point",)
 _MULTIPLIER = ("point", "multiplier")
 _OUTPUT = ("point", "output")
 _BRANCH = ("branch",)
 _EVENT = ("event",)
-
-#: What a branch's end says.
-BRANCH_ENDS = {
-    "range": "the end of the range",
-    "closed": "closed: an isola",
-    "branch": "where it leaves another branch",
-    "hopf": "where a limit cycle shrinks to an equilibrium",
-    "boundary_equilibrium": "where an equilibrium meets a boundary",
-    "period_doubling": "where it becomes an orbit of half the period",
-    "points": "as many points as were asked for",
-    "lost": "no step leads on, however short",
-    "graze": "a graze behind which it isn't known how it goes on",
-    "corner": "two contacts at once, behind which it isn't known how it goes on",
-    "held": "where the impacts that chatter before a contact is held become others",
-    "accumulates": "before the value at which its grazes accumulate: an orbit that chatters",
-    "interrupted": "interrupted",
-}
+#: Digits of the parameter at a bifurcation.
+DIGITS = 10
 
 #: Variables of what ``branches`` returns. ``<first>``: the unit of the first state; ``<gap>``: that
 #: of the gaps; ``<varied>``: that of the parameter; ``<output>``: that in ``output_units``, which
 #: an output has of its own.
-BRANCHES_VARIABLES = {
+VARIABLES = {
     "point": Variable(_POINT, "1", "point of a branch", "i8", coord=True),
     "point_branch": Variable(_POINT, "1", "branch that the point lies on", "i8"),
     "point_<parameter>": Variable(_POINT, "<parameter>", "<parameter>"),
@@ -148,3 +147,118 @@ BRANCHES_VARIABLES = {
     "event_<state>": Variable(("event", "orbit_point"), "<state>", "<state> <when>"),
     **GUARDS,
 }
+
+
+#: Why a branch stops within the range though it goes on, in the words of an account.
+_STOPPED = {
+    "points": "stopped by points=",
+    "lost": "lost",
+    "held": "ends where the chatter before a held contact changes",
+}
+
+
+# -- account ---------------------------------------------------------------------------------------
+def account(ds: xr.Dataset) -> list[str]:
+    """A line on each branch with its events, and one on each whose stability isn't explained."""
+    name, stable = ds.attrs["parameter"], ds["point_stable"].values
+    lines = [
+        f"found    {counted(ds.sizes['branch'], 'branch')}, {int(ds['branch_closed'].sum())} of "
+        f"them closed, {ds.sizes['point']} points"
+        + (f", {stable.mean():.0%} of them stable" if len(stable) else ""),
+    ]
+    lines += [f"  {i}: {_one(ds, i)}" for i in range(ds.sizes["branch"])]
+    for i, count in enumerate(ds["branch_unexplained"].values.tolist()):
+        if count:
+            changes = counted(count, "change")
+            lines.append(
+                f"unsure   {changes} of stability unexplained on branch {i}: a narrower range of "
+                f"{name} gives shorter steps"
+            )
+    return lines
+
+
+def _one(ds: xr.Dataset, i: int) -> str:
+    """Kind, extent, ends and events of a branch."""
+    name, branch = ds.attrs["parameter"], ds.isel(branch=i)
+    points, events = ds[point_name(name)], ds[event_name(name)]
+    mine = points.values[ds["point_branch"].values == i]
+    here = ds["event_branch"].values == i
+    text = ", ".join(
+        f"{plain(word)} {value:.10g}"
+        for word, value in zip(ds["event_kind"].values[here], events.values[here], strict=True)
+    )
+    extent = f"{mine.min():.6g} to {mine.max():.6g} {unit_of(points)}".rstrip()
+    ends = ", closed" if branch["branch_closed"] else _stopped(branch, mine[[0, -1]])
+    kind = str(branch["branch_kind"].item())
+    what = period_text(int(branch["branch_periods"])) if kind == "periodic" else plain(kind)
+    return f"{what} from {extent}{ends}{text and '; ' + text}"
+
+
+def _stopped(branch: xr.Dataset, ends: np.ndarray) -> str:
+    """Where a branch ends within the range though it goes on."""
+    text = ""
+    for side, last in zip(("begin", "end"), ends, strict=True):
+        why = branch[f"branch_{side}"].item()
+        if why == "accumulates":
+            limit = float(branch[f"branch_{side}_limit"])
+            places = max(0, -math.floor(math.log10(abs(last - limit))))  # see ladders.STEADY
+            text += f", its grazes accumulate at {limit:.{places}f}"
+        elif why in _STOPPED:
+            text += f", {_STOPPED[why]} at {last:.6g}"
+    return text
+
+
+# -- rows ------------------------------------------------------------------------------------------
+def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
+    """Branches, and the bifurcations on them."""
+    return [_branches(title, ds), *events(title, ds)]
+
+
+def _branches(title: str, ds: xr.Dataset) -> TextTable:
+    """A row for each branch; on the screen the longest ones if there are many."""
+    name, of = ds.attrs["parameter"], ds["point_branch"].values
+    values, unit = ds[point_name(name)].values, unit_of(ds[point_name(name)])
+    stable, peak = ds["point_stable"].values, ds["point_peak"].values
+    numbers = ds["branch"].values
+    mine = [np.flatnonzero(of == number) for number in numbers]
+    along, first = plain(name), states_of(ds)[0]
+    columns = [
+        words("branch", numbers),
+        words("period", [period_text(int(n)) for n in ds["branch_periods"].values]),
+        quantity(f"{along} from", [values[i].min() for i in mine], unit, 6),
+        quantity("to", [values[i].max() for i in mine], unit, 6, name=f"{along} to"),
+        words("closed", ["yes" if one else "no" for one in ds["branch_closed"].values]),
+        words("stable orbits", [f"{100 * stable[i].mean():.0f} %" for i in mine]),
+        quantity(f"largest |{first}|", [peak[i].max() for i in mine], unit_of(ds["point_peak"])),
+        words("bifurcations", [int((ds["event_branch"].values == i).sum()) for i in numbers]),
+    ]
+    notes = [f"{len(of)} orbits on {len(numbers)} branches."]
+    if missed := int(ds["branch_unexplained"].sum()):
+        notes.append(f"{missed} changes of stability are not explained by the bifurcations found.")
+    shown = np.sort(np.argsort([-len(i) for i in mine], kind="stable")[:ROWS]).tolist()
+    return table(title, columns, tuple(notes), shown)
+
+
+def events(title: str, ds: xr.Dataset) -> list[TextTable]:
+    """A row for each bifurcation, in the order of the parameter; no table where there is none."""
+    if not ds.sizes.get("event"):
+        return []
+    at = ds[event_name(ds.attrs["parameter"])]
+    order = np.argsort(at.values, kind="stable")
+    peak = ds["event_peak"]
+    columns = [
+        quantity(plain(ds.attrs["parameter"]), at.values[order], unit_of(at), DIGITS),
+        words("branch", ds["event_branch"].values[order]),
+        words("what happens", [plain(kind) for kind in ds["event_kind"].values[order]]),
+        quantity(f"peak |{states_of(ds)[0]}|", peak.values[order], unit_of(peak)),
+    ]
+    return [table(f"{title}: bifurcations", columns)]
+
+
+KIND = ResultKind(
+    makers="sl.branches",
+    variables=VARIABLES,
+    needed=("point_branch", "point_stable", "branch_periods"),
+    account=account,
+    rows=rows,
+)
