@@ -8,6 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from saltus.units import from_si, titled
 
 if TYPE_CHECKING:
@@ -189,16 +191,22 @@ def _floats(values: Any) -> list[float]:
 
 
 # -- columns of a Dataset --------------------------------------------------------------------------
-def of_trajectory(ds: xr.Dataset, trajectories: Any, heading: str = "trajectory") -> list[Column]:
-    """Columns of the trajectory that each row is of, and of the parameters that set it apart; none
-    of a result that holds one.
+def of_trajectory(
+    ds: xr.Dataset,
+    variable: str = "trajectory",
+    like: xr.DataArray | None = None,
+    heading: str = "trajectory",
+) -> list[Column]:
+    """Columns of the trajectory that each row is of, by a variable that holds its number, and of
+    the parameters that set it apart; none of a result that holds one. ``like``: see :func:`flat`.
     """
     if "trajectory" not in ds.dims:
         return []
-    return [words(heading, trajectories, "trajectory"), *varied(ds, trajectories)]
+    rows = ds[variable].values if like is None else flat(ds[variable], like)
+    return [words(heading, rows, "trajectory"), *_varied(ds, rows)]
 
 
-def varied(ds: xr.Dataset, trajectories: Any) -> list[Column]:
+def _varied(ds: xr.Dataset, trajectories: Any) -> list[Column]:
     """A column for each parameter that differs from trajectory to trajectory, at the rows of these
     trajectories.
     """
@@ -214,11 +222,7 @@ def varied(ds: xr.Dataset, trajectories: Any) -> list[Column]:
     ]
 
 
-def row_dims(values: xr.DataArray) -> list[Any]:
-    """Dims in the order of the rows: trajectory by trajectory."""
-    return sorted(values.dims, key=lambda dim: dim != "trajectory")
-
-
-def flat(values: xr.DataArray, like: xr.DataArray) -> Any:
-    """Values as a column: one for each element of ``like``, in the order of :func:`row_dims`."""
-    return values.broadcast_like(like).transpose(*row_dims(like)).values.ravel()
+def flat(values: xr.DataArray, like: xr.DataArray) -> np.ndarray:
+    """Values as a column: one for each element of ``like``, trajectory by trajectory."""
+    dims = sorted(like.dims, key=lambda dim: dim != "trajectory")
+    return np.ravel(values.broadcast_like(like).transpose(*dims).values)

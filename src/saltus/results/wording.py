@@ -21,6 +21,11 @@ def unit_of(values: xr.DataArray) -> str:
     return str(values.attrs.get("units", ""))
 
 
+def sized(value: xr.DataArray, form: str = ".4g") -> str:
+    """A number and its unit: ``0.4 m``."""
+    return f"{float(value):{form}} {unit_of(value)}".rstrip()
+
+
 def header(ds: xr.Dataset, name: str) -> str:
     """What stands above a variable as a column: ``x [m]``."""
     return titled(name, unit_of(ds[name]))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -63,6 +63,21 @@ ATTRACTOR_VARIABLES = {
     ),
     "attractor_<state>": Variable(("attractor", "phase"), "<state>", "<state> <when>"),
 }
+
+
+def rows_as(what: str, without: Sequence[str] = ()) -> dict[str, Variable]:
+    """The rows of attractors as those of something of which the same is known: an orbit, a
+    response. ``without``: beginnings of names that are left out.
+    """
+    return {
+        name.replace("attractor", what): replace(
+            row,
+            dims=tuple(what if dim == "attractor" else dim for dim in row.dims),
+            long_name=row.long_name.replace("attractor", what),
+        )
+        for name, row in ATTRACTOR_VARIABLES.items()
+        if not name.removeprefix("attractor_").startswith(tuple(without))
+    }
 
 
 @dataclass(frozen=True)

@@ -86,10 +86,4 @@ def _share(heading: str, shares: list[float], numbers: list[int]) -> Column:
     )
 
 
-KIND = ResultKind(
-    makers="sl.compare",
-    variables=VARIABLES,
-    needed=("agreement", "match_a"),
-    account=account,
-    rows=rows,
-)
+KIND = ResultKind("sl.compare", VARIABLES, ("agreement", "match_a"), account, rows)

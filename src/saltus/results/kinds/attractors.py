@@ -21,7 +21,7 @@ from saltus.results.table import (
     with_error,
     words,
 )
-from saltus.results.wording import LINES, kind_texts, meanings, more, unit_of
+from saltus.results.wording import LINES, kind_texts, meanings, more, sized, unit_of
 
 #: Variables of what ``attractors`` and ``basin_fractions`` return.
 VARIABLES = {
@@ -126,15 +126,14 @@ def _attractors(ds: xr.Dataset) -> Iterator[str]:
 
 def _one(one: xr.Dataset) -> str:
     """Kind and size of an attractor."""
-    unit = unit_of(one["attractor_peak"])
     kind, period = str(one["attractor_type"].item()), int(one["attractor_period"])
     name = f"{kind} {period}T" if kind == "periodic" else kind_text(kind, period)
     if kind == "limit_cycle" and "attractor_cycle" in one:
         cycle = float(one["attractor_cycle"])
         name += f", period {cycle:.4g} s, {1 / cycle:.4g} Hz"
-    size = f"peak {float(one['attractor_peak']):.4g} {unit}".rstrip()
+    size = f"peak {sized(one['attractor_peak'])}"
     if kind == Kind.NOISY_PERIODIC.word:
-        size += f", scatter {float(one['attractor_scatter']):.2g} {unit}".rstrip()
+        size += f", scatter {sized(one['attractor_scatter'], '.2g')}"
     return f"{name}, {size}"
 
 
@@ -142,13 +141,11 @@ def _through(one: xr.Dataset) -> str:
     """The first point that an attractor is known by: it tells mirror images apart, whose sizes are
     the same.
     """
-    points = {
-        name: one[attractor_name(name)] for name in states_of(one) if attractor_name(name) in one
-    }
+    first = one.isel(phase=0, missing_dims="ignore")
     place = ", ".join(
-        f"{name} = {value:.4g} {unit_of(point)}".rstrip()
-        for name, point in points.items()
-        if np.isfinite(value := float(np.ravel(point.values)[0]))
+        f"{name} = {sized(first[attractor_name(name)])}"
+        for name in states_of(one)
+        if attractor_name(name) in first and np.isfinite(first[attractor_name(name)])
     )
     return f", through {place}" if place else ""
 
@@ -250,9 +247,5 @@ def trust(ds: xr.Dataset) -> Iterator[str]:
 
 
 KIND = ResultKind(
-    makers="sl.attractors or sl.basin_fractions",
-    variables=VARIABLES,
-    needed=("attractor_type",),
-    account=account,
-    rows=rows,
+    "sl.attractors or sl.basin_fractions", VARIABLES, ("attractor_type",), account, rows
 )

@@ -6,11 +6,10 @@ import xarray as xr
 
 from saltus.results.dataset.schema import ResultKind
 from saltus.results.dataset.variable import Variable
-from saltus.results.kinds.branches import DIGITS
+from saltus.results.kinds import branches
 from saltus.results.table import TextTable, number, quantity, spread, table, words
 
 _POINT = ("point",)
-_OUTPUT = ("point", "output")
 #: Why a backbone may end before the amplitude asked for.
 _ENDS = ("points", "lost")
 
@@ -21,24 +20,19 @@ VARIABLES = {
     "backbone_frequency": Variable(_POINT, "Hz", "frequency of the vibration"),
     "point_period": Variable(_POINT, "s", "period of the orbit"),
     "point_stable": Variable(_POINT, "1", "whether the vibration is stable", "i1"),
-    "point_itinerary": Variable(
-        _POINT, "", "guards met, with + where the gap becomes positive, in the order of time", "str"
-    ),
-    "point_multiplier_real": Variable(
-        ("point", "multiplier"), "1", "Floquet multiplier, real part"
-    ),
-    "point_multiplier_imag": Variable(
-        ("point", "multiplier"), "1", "Floquet multiplier, imaginary part"
-    ),
+    **{
+        f"point_{name}": branches.VARIABLES[f"point_{name}"]
+        for name in ("itinerary", "multiplier_real", "multiplier_imag")
+    },
     "fictitious_damping": Variable(_POINT, "1/s", "damping that closes the orbit: rounding"),
     "point_<parameter>": Variable(_POINT, "<parameter>", "<parameter> in quadrature"),
     "point_<state>": Variable(_POINT, "<state>", "<state> <when>"),
     "output": Variable(("output",), "", "output: a state", "str", coord=True),
-    "output_units": Variable(("output",), "", "unit of the output", "str", coord=True),
-    "point_output_maximum": Variable(_OUTPUT, "<output>", "largest value"),
-    "point_output_minimum": Variable(_OUTPUT, "<output>", "smallest value"),
-    "point_output_peak": Variable(_OUTPUT, "<output>", "largest magnitude"),
-    "point_output_rms": Variable(_OUTPUT, "<output>", "root mean square about zero"),
+    "output_units": branches.VARIABLES["output_units"],
+    **{
+        f"point_output_{name}": branches.VARIABLES[f"point_output_{name}"]
+        for name in ("maximum", "minimum", "peak", "rms")
+    },
 }
 
 
@@ -62,7 +56,7 @@ def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
     one = ds.sel(output=state)
     columns = [
         quantity(f"peak |{state}|", one["point_output_peak"].values, one["output_units"].item(), 6),
-        quantity("frequency", ds["backbone_frequency"].values, "Hz", DIGITS),
+        quantity("frequency", ds["backbone_frequency"].values, "Hz", branches.DIGITS),
         words("stable", ["yes" if stable else "no" for stable in ds["point_stable"].values]),
         words("contacts", ds["point_itinerary"].values),
     ]
@@ -74,9 +68,5 @@ def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
 
 
 KIND = ResultKind(
-    makers="sl.backbone",
-    variables=VARIABLES,
-    needed=("backbone_frequency", "point_output_peak"),
-    account=account,
-    rows=rows,
+    "sl.backbone", VARIABLES, ("backbone_frequency", "point_output_peak"), account, rows
 )

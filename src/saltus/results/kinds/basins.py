@@ -41,10 +41,4 @@ def account(ds: xr.Dataset) -> list[str]:
     return lines + ([f"trust    {', '.join(trust)}"] if trust else [])
 
 
-KIND = ResultKind(
-    makers="sl.basins",
-    variables=VARIABLES,
-    needed=("basin", "status", "attractor_type"),
-    account=account,
-    rows=rows,
-)
+KIND = ResultKind("sl.basins", VARIABLES, ("basin", "status", "attractor_type"), account, rows)

@@ -6,7 +6,7 @@ import xarray as xr
 
 from saltus.results.dataset.schema import ResultKind, period_text, point_name
 from saltus.results.dataset.variable import SQRT_COEFFICIENT, Variable
-from saltus.results.kinds.branches import DIGITS
+from saltus.results.kinds import branches
 from saltus.results.table import Column, TextTable, quantity, spread, table, words
 from saltus.results.wording import plain, unit_of
 
@@ -22,21 +22,11 @@ VARIABLES = {
         _POINT, "1", "length of the curve from its first point, in ranges of its unknowns"
     ),
     "point_period": Variable(_POINT, "s", "period of the orbit"),
-    "point_peak": Variable(_POINT, "<first>", "largest magnitude of the first state"),
-    "point_rms": Variable(_POINT, "<first>", "root mean square of the first state"),
-    "point_itinerary": Variable(
-        _POINT, "", "guards met, with + where the gap becomes positive, in the order of time", "str"
-    ),
-    "point_margin": Variable(
-        _POINT, "<gap>", "smallest distance by which the orbit misses or overshoots a boundary"
-    ),
+    **{
+        f"point_{name}": branches.VARIABLES[f"point_{name}"]
+        for name in ("peak", "rms", "itinerary", "margin", "multiplier_real", "multiplier_imag")
+    },
     "point_sqrt_coefficient": Variable(_POINT, "<root gap>", SQRT_COEFFICIENT),
-    "point_multiplier_real": Variable(
-        ("point", "multiplier"), "1", "Floquet multiplier, real part"
-    ),
-    "point_multiplier_imag": Variable(
-        ("point", "multiplier"), "1", "Floquet multiplier, imaginary part"
-    ),
     "point_<state>": Variable(("point", "phase"), "<state>", "<state> <when>"),
     "codim2": Variable(_CODIM2, "1", "point of codimension two", "i8", coord=True),
     "codim2_kind": Variable(_CODIM2, "", "kind of point", "str"),
@@ -91,13 +81,9 @@ def _names(ds: xr.Dataset) -> tuple[str, str]:
 
 def _along(ds: xr.Dataset, parameter: str, variable: str) -> Column:
     """A column of a parameter."""
-    return quantity(plain(parameter), ds[variable].values, unit_of(ds[variable]), DIGITS)
+    return quantity(plain(parameter), ds[variable].values, unit_of(ds[variable]), branches.DIGITS)
 
 
 KIND = ResultKind(
-    makers="sl.bifurcation_curve",
-    variables=VARIABLES,
-    needed=("point_arclength", "codim2_kind"),
-    account=account,
-    rows=rows,
+    "sl.bifurcation_curve", VARIABLES, ("point_arclength", "codim2_kind"), account, rows
 )

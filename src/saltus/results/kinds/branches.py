@@ -15,13 +15,12 @@ from saltus.results.dataset.schema import (
     point_name,
     states_of,
 )
-from saltus.results.dataset.variable import GUARDS, SQRT_COEFFICIENT, Variable
+from saltus.results.dataset.variable import GUARDS, OUTPUT, SQRT_COEFFICIENT, Variable, of_outputs
 from saltus.results.table import ROWS, TextTable, quantity, table, words
 from saltus.results.wording import plain, unit_of
 
 _POINT = ("point",)
 _MULTIPLIER = ("point", "multiplier")
-_OUTPUT = ("point", "output")
 _BRANCH = ("branch",)
 _EVENT = ("event",)
 #: Digits of the parameter at a bifurcation.
@@ -63,27 +62,8 @@ VARIABLES = {
         _MULTIPLIER, "1/s", "eigenvalue of an equilibrium, imaginary part"
     ),
     "point_<state>": Variable(("point", "orbit_point"), "<state>", "<state> <when>"),
-    "output": Variable(
-        ("output",), "", "output: a state, or a function of the motion", "str", coord=True
-    ),
-    "output_units": Variable(("output",), "", "unit of the output", "str", coord=True),
-    "point_output_maximum": Variable(_OUTPUT, "<output>", "largest value"),
-    "point_output_minimum": Variable(_OUTPUT, "<output>", "smallest value"),
-    "point_output_peak": Variable(_OUTPUT, "<output>", "largest magnitude"),
-    "point_output_peak_to_peak": Variable(_OUTPUT, "<output>", "largest less smallest value"),
-    "point_output_mean": Variable(_OUTPUT, "<output>", "mean"),
-    "point_output_rms": Variable(_OUTPUT, "<output>", "root mean square about zero"),
-    "point_output_rms_about_mean": Variable(_OUTPUT, "<output>", "root mean square about the mean"),
-    "point_output_amplitude": Variable(
-        _OUTPUT,
-        "<output>",
-        "amplitude A of the first harmonic A cos(2 pi f t + phase), f the forcing frequency",
-    ),
-    "point_output_phase": Variable(
-        _OUTPUT,
-        "rad",
-        "phase of the first harmonic A cos(2 pi f t + phase), t the time of the equations",
-    ),
+    **OUTPUT,
+    **of_outputs("point", "point_"),
     "branch": Variable(_BRANCH, "1", "branch", "i8", coord=True),
     "branch_kind": Variable(
         _BRANCH, "", "what lies on it: periodic, limit_cycle, equilibrium", "str"
@@ -256,9 +236,5 @@ def events(title: str, ds: xr.Dataset) -> list[TextTable]:
 
 
 KIND = ResultKind(
-    makers="sl.branches",
-    variables=VARIABLES,
-    needed=("point_branch", "point_stable", "branch_periods"),
-    account=account,
-    rows=rows,
+    "sl.branches", VARIABLES, ("point_branch", "point_stable", "branch_periods"), account, rows
 )

@@ -73,7 +73,7 @@ def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
     """A row for each interval, of each trajectory."""
     like = ds["residual"]
     along = str(like.dims[-1])
-    columns = of_trajectory(ds, flat(ds["trajectory"], like)) if "trajectory" in like.dims else []
+    columns = of_trajectory(ds, like=like)
     columns.append(number(along, flat(ds[along], like), ".8g", "s" if along == "time" else ""))
     columns += [
         quantity("stored at the end" if name == "energy" else name, flat(ds[name], like), "J", 6)
@@ -93,10 +93,4 @@ def _worst(ds: xr.Dataset) -> str:
     return f"{float(np.nanmax(np.atleast_1d(ds['imbalance'].values), initial=0.0)):.1e}"
 
 
-KIND = ResultKind(
-    makers="sl.energy_balance",
-    variables=VARIABLES,
-    needed=("energy", "residual", "status"),
-    account=account,
-    rows=rows,
-)
+KIND = ResultKind("sl.energy_balance", VARIABLES, ("energy", "residual", "status"), account, rows)

@@ -9,7 +9,7 @@ from saltus.errors import counted
 from saltus.results.dataset.schema import ResultKind, equilibrium_name, states_of
 from saltus.results.dataset.variable import Variable
 from saltus.results.table import TextTable, number, quantity, table, words
-from saltus.results.wording import plain, unit_of
+from saltus.results.wording import plain, sized, unit_of
 
 _EACH = ("equilibrium",)
 _EIGENVALUE = ("equilibrium", "eigenvalue")
@@ -57,11 +57,7 @@ def account(ds: xr.Dataset) -> list[str]:
 
 def _one(one: xr.Dataset) -> str:
     """Type, state and contacts of an equilibrium."""
-    states = [one[equilibrium_name(name)] for name in states_of(one)]
-    at = ", ".join(
-        f"{name} = {float(value):.4g} {unit_of(value)}".rstrip()
-        for name, value in zip(states_of(one), states, strict=True)
-    )
+    at = ", ".join(f"{name} = {sized(one[equilibrium_name(name)])}" for name in states_of(one))
     kind = one["equilibrium_type"].item().replace("_", "-")
     stable = "stable" if one["equilibrium_stable"] else "unstable"
     word = kind if kind in ("center", "degenerate", "undecided") else f"{stable} {kind}"
@@ -87,9 +83,5 @@ def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
 
 
 KIND = ResultKind(
-    makers="sl.equilibria",
-    variables=VARIABLES,
-    needed=("equilibrium_type", "equilibrium_place"),
-    account=account,
-    rows=rows,
+    "sl.equilibria", VARIABLES, ("equilibrium_type", "equilibrium_place"), account, rows
 )

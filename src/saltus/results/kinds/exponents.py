@@ -120,7 +120,7 @@ def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
     exponents, unit = ds["lyapunov_exponent"].values, unit_of(ds["lyapunov_exponent"])
     low, high = (ds[name].values[:, 0] for name in ("lyapunov_low", "lyapunov_high"))
     columns = [
-        *of_trajectory(ds, ds["trajectory"].values, ""),
+        *of_trajectory(ds, heading=""),
         words("motion", _kinds(ds)),
         *(
             number(f"exponent {k + 1}", exponents[:, k], ".6g", unit)
@@ -170,9 +170,5 @@ def _notes(ds: xr.Dataset) -> tuple[str, ...]:
 
 
 KIND = ResultKind(
-    makers="sl.lyapunov or sl.wolf",
-    variables=VARIABLES,
-    needed=("lyapunov_exponent", "running_exponent"),
-    account=account,
-    rows=rows,
+    "sl.lyapunov or sl.wolf", VARIABLES, ("lyapunov_exponent", "running_exponent"), account, rows
 )

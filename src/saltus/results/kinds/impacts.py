@@ -18,7 +18,7 @@ from saltus.results.table import (
     with_error,
     words,
 )
-from saltus.results.wording import failed, unit_of
+from saltus.results.wording import failed, sized, unit_of
 
 _CONTACT = ("contact",)
 _GUARD = ("trajectory", "guard")
@@ -85,14 +85,13 @@ def account(ds: xr.Dataset) -> list[str]:
     lines = [f"found    {ds.sizes['contact']} contacts"]
     for i, name in enumerate(ds["guard"].values.tolist()):
         one = ds.isel(guard=i)
-        rate, speed, share = (
-            float(one[key].mean())
-            for key in ("contacts_per_second", "speed_mean", "share_in_contact")
+        rate, share = (
+            float(one[key].mean()) for key in ("contacts_per_second", "share_in_contact")
         )
-        unit = unit_of(one["speed_mean"])
+        speed = sized(one["speed_mean"].mean(keep_attrs=True))
         lines.append(
-            f"  {name}: {rate:.4g} a second, at {speed:.4g} {unit}".rstrip() + f" on average, "
-            f"in contact {share:.2%} of the time"
+            f"  {name}: {rate:.4g} a second, at {speed} on average, in contact {share:.2%} of the "
+            f"time"
         )
     return lines
 
@@ -107,7 +106,7 @@ def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
     def measured(heading: str, name: str, unit: str = "") -> Column:
         return with_error(heading, column(name), column(f"{name}_error"), unit=unit)
 
-    columns = of_trajectory(ds, column("trajectory")) if "trajectory" in like.dims else []
+    columns = of_trajectory(ds, like=like)
     columns += [words("guard", column("guard").astype(str)), words("contacts", column("contacts"))]
     columns.append(measured("contacts per second", "contacts_per_second", "1/s"))
     if "contacts_per_period" in ds:
@@ -126,9 +125,9 @@ def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
 
 
 KIND = ResultKind(
-    makers="sl.impact_statistics",
-    variables=VARIABLES,
-    needed=("contact_speed", "contacts_per_second", "status"),
-    account=account,
-    rows=rows,
+    "sl.impact_statistics",
+    VARIABLES,
+    ("contact_speed", "contacts_per_second", "status"),
+    account,
+    rows,
 )

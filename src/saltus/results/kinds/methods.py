@@ -83,10 +83,4 @@ def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
     return [table(title, columns, (note,))]
 
 
-KIND = ResultKind(
-    makers="sl.compare_methods",
-    variables=VARIABLES,
-    needed=("method", "agrees"),
-    account=account,
-    rows=rows,
-)
+KIND = ResultKind("sl.compare_methods", VARIABLES, ("method", "agrees"), account, rows)

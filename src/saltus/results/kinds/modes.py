@@ -52,10 +52,4 @@ def _shares(ds: xr.Dataset) -> list[str]:
     ]
 
 
-KIND = ResultKind(
-    makers="sl.structure_modes",
-    variables=VARIABLES,
-    needed=("shape", "flexibility"),
-    account=account,
-    rows=rows,
-)
+KIND = ResultKind("sl.structure_modes", VARIABLES, ("shape", "flexibility"), account, rows)

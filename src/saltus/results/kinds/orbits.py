@@ -8,30 +8,18 @@ import numpy as np
 import xarray as xr
 
 from saltus.errors import counted
-from saltus.results.dataset.attractors import ATTRACTOR_VARIABLES
+from saltus.results.dataset.attractors import rows_as
 from saltus.results.dataset.orbits import OF_ATTRACTORS
 from saltus.results.dataset.schema import ResultKind, kind_text, period_text, states_of
 from saltus.results.dataset.variable import Variable
 from saltus.results.table import Column, TextTable, number, quantity, table, words
-from saltus.results.wording import LINES, more, unit_of
+from saltus.results.wording import LINES, more, sized, unit_of
 
 _EACH, _SEARCH = ("orbit",), ("search_period",)
 
-
-def _renamed(row: Variable) -> Variable:
-    """The row of an attractor as one of an orbit."""
-    dims = tuple("orbit" if dim == "attractor" else dim for dim in row.dims)
-    long_name = row.long_name.replace("attractor", "orbit")
-    return Variable(dims, row.units, long_name, row.dtype, row.coord)
-
-
 #: Variables of what ``periodic_orbits`` returns.
 VARIABLES = {
-    **{
-        name.replace("attractor", "orbit"): _renamed(row)
-        for name, row in ATTRACTOR_VARIABLES.items()
-        if not name.removeprefix("attractor_").startswith(OF_ATTRACTORS)
-    },
+    **rows_as("orbit", without=OF_ATTRACTORS),
     "orbit_stable": Variable(
         _EACH,
         "1",
@@ -91,15 +79,14 @@ def account(ds: xr.Dataset) -> list[str]:
 
 def _one(one: xr.Dataset) -> str:
     """Kind, stability, size and largest multiplier of an orbit."""
-    peak = one["orbit_peak"]
-    size = f"peak {float(peak):.4g} {unit_of(peak)}".rstrip()
     real, imag = (
         float(np.ravel(one[f"orbit_multiplier_{part}"].values)[0]) for part in ("real", "imag")
     )
     cycle = f" of {float(one['orbit_cycle']):.8g} s" if "orbit_cycle" in one else ""
+    kind = kind_text(str(one["orbit_type"].item()), int(one["orbit_period"]))
     return (
-        f"{kind_text(str(one['orbit_type'].item()), int(one['orbit_period']))}{cycle}, "
-        f"{one['orbit_stability'].item()}, {size}, largest multiplier {np.hypot(real, imag):.4g}"
+        f"{kind}{cycle}, {one['orbit_stability'].item()}, peak {sized(one['orbit_peak'])}, "
+        f"largest multiplier {np.hypot(real, imag):.4g}"
     )
 
 
@@ -160,9 +147,5 @@ def _unseen(ds: xr.Dataset) -> list[str]:
 
 
 KIND = ResultKind(
-    makers="sl.periodic_orbits or sl.edge_orbit",
-    variables=VARIABLES,
-    needed=("orbit_type", "orbit_stable"),
-    account=account,
-    rows=rows,
+    "sl.periodic_orbits or sl.edge_orbit", VARIABLES, ("orbit_type", "orbit_stable"), account, rows
 )

@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.errors import counted
+from saltus.results.dataset.attractors import rows_as
 from saltus.results.dataset.kinds import OPEN, WITHOUT_WORDS, Kind, sentences
 from saltus.results.dataset.schema import (
     ResultKind,
@@ -20,7 +21,7 @@ from saltus.results.dataset.schema import (
     response_name,
     states_of,
 )
-from saltus.results.dataset.variable import GUARDS, Variable
+from saltus.results.dataset.variable import GUARDS, OUTPUT, Variable, of_outputs
 from saltus.results.kinds import branches
 from saltus.results.kinds.attractors import missed, settled, untyped
 from saltus.results.table import ROWS, Column, TextTable, interval, number, quantity, table, words
@@ -30,8 +31,6 @@ from saltus.units import from_si, titled
 #: What belongs to a start at one place of the grid.
 _GRID = ("...", "start")
 _RESPONSE = ("response",)
-_MULTIPLIER = ("response", "multiplier")
-_OUTPUT = ("response", "output")
 
 #: Variables of what ``frequency_response`` and ``bifurcation_diagram`` return. ``<first>``: the
 #: unit of the first state; ``<gap>``: that of the gaps; ``<output>``: that in ``output_units``,
@@ -58,63 +57,15 @@ VARIABLES = {
     "response_branch": Variable(
         _RESPONSE, "1", "branch: orbits that go over into each other", "i8"
     ),
-    "response_type": Variable(_RESPONSE, "", "kind of motion", "str"),
-    "response_period": Variable(
-        _RESPONSE, "1", "period in forcing periods, 0 if it doesn't repeat", "i8"
-    ),
-    "response_contacts": Variable(_RESPONSE, "1", "contacts in a forcing period"),
-    "response_peak": Variable(_RESPONSE, "<first>", "largest magnitude of the first state"),
-    "response_rms": Variable(_RESPONSE, "<first>", "root mean square of the first state"),
-    "response_margin": Variable(
-        _RESPONSE, "<gap>", "smallest distance by which the orbit misses or overshoots a boundary"
-    ),
-    "response_multiplier_real": Variable(_MULTIPLIER, "1", "Floquet multiplier, real part"),
-    "response_multiplier_imag": Variable(_MULTIPLIER, "1", "Floquet multiplier, imaginary part"),
-    "response_cycle": Variable(_RESPONSE, "s", "period of a limit cycle"),
-    "response_eigenvalue_real": Variable(
-        _MULTIPLIER, "1/s", "eigenvalue of the Jacobian of an equilibrium, real part"
-    ),
-    "response_eigenvalue_imag": Variable(
-        _MULTIPLIER, "1/s", "eigenvalue of the Jacobian of an equilibrium, imaginary part"
-    ),
-    "response_exponent": Variable(_RESPONSE, "1/s", "largest Lyapunov exponent"),
-    "response_exponent_error": Variable(_RESPONSE, "1/s", "error of the largest Lyapunov exponent"),
-    "response_share": Variable(_RESPONSE, "1", "share of the starts"),
-    "response_share_low": Variable(
-        _RESPONSE, "1", "share of the starts, lower end of the 95 % interval"
-    ),
-    "response_share_high": Variable(
-        _RESPONSE, "1", "share of the starts, upper end of the 95 % interval"
-    ),
-    "response_<state>": Variable(("response", "phase"), "<state>", "<state> <when>"),
-    "output": Variable(
-        ("output",), "", "output: a state, or a function of the motion", "str", coord=True
-    ),
-    "output_units": Variable(("output",), "", "unit of the output", "str", coord=True),
-    "output_maximum": Variable(_OUTPUT, "<output>", "largest value"),
-    "output_minimum": Variable(_OUTPUT, "<output>", "smallest value"),
-    "output_peak": Variable(_OUTPUT, "<output>", "largest magnitude"),
-    "output_peak_to_peak": Variable(_OUTPUT, "<output>", "largest less smallest value"),
-    "output_mean": Variable(_OUTPUT, "<output>", "mean"),
-    "output_rms": Variable(_OUTPUT, "<output>", "root mean square about zero"),
-    "output_rms_about_mean": Variable(_OUTPUT, "<output>", "root mean square about the mean"),
-    "output_amplitude": Variable(
-        _OUTPUT,
-        "<output>",
-        "amplitude A of the first harmonic A cos(2 pi f t + phase), f the forcing frequency",
-    ),
-    "output_phase": Variable(
-        _OUTPUT,
-        "rad",
-        "phase of the first harmonic A cos(2 pi f t + phase), t the time of the equations",
-    ),
-    "sample_<state>": Variable(("response", "sample"), "<state>", "<state> <sampled>"),
     **{
-        name: row
-        for name, row in branches.VARIABLES.items()
-        if name not in ("output", "output_units")
+        name.replace("fraction", "share"): row
+        for name, row in rows_as("response", without=("itinerary", "scatter")).items()
     },
-    **GUARDS,
+    "response_contacts": Variable(_RESPONSE, "1", "contacts in a forcing period"),
+    **OUTPUT,
+    **of_outputs("response"),
+    "sample_<state>": Variable(("response", "sample"), "<state>", "<state> <sampled>"),
+    **branches.VARIABLES,
     "guard_boundary": replace(GUARDS["guard_boundary"], dims=("guard", "...?")),
 }
 
@@ -209,14 +160,14 @@ def _branches(title: str, ds: xr.Dataset) -> TextTable:
         _extent(ds, int(number), one[values].values)
         for number, one in zip(numbers, each, strict=True)
     ]
-    contacts = [ends("response_contacts", pick) for pick in (_least, _most)]
+    fewest, most = (ends("response_contacts", pick) for pick in (_least, _most))
     columns = [
         words("branch", numbers),
         words("type", [_types(one) for one in each]),
         words("values", sizes),
         quantity(f"{along} from", [low for low, _ in extents], unit, 5),
         quantity("to", [high for _, high in extents], unit, 5, name=f"{along} to"),
-        interval("contacts in T", *contacts, "{:.3g}".format),
+        interval("contacts in T", fewest, most, "{:.3g}".format),
         quantity(f"largest rms of {first}", at_top("response_rms"), size),
         quantity("at", at_top(values), unit, 5, name=f"{along} at the largest rms"),
         quantity(f"peak |{first}|", ends("response_peak", _most), size),
@@ -325,10 +276,10 @@ def _outputs(ds: xr.Dataset) -> dict[str, np.ndarray]:
 
 
 KIND = ResultKind(
-    makers="sl.frequency_response or sl.bifurcation_diagram",
-    variables=VARIABLES,
-    needed=("response_of", "response_type", "response_branch"),
-    account=account,
-    rows=rows,
+    "sl.frequency_response or sl.bifurcation_diagram",
+    VARIABLES,
+    ("response_of", "response_type", "response_branch"),
+    account,
+    rows,
     sheets=sheets,
 )

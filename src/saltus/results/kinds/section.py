@@ -60,7 +60,7 @@ def account(ds: xr.Dataset) -> list[str]:
 def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
     """A row for each crossing, sorted by trajectory and time."""
     up = ds["crossing_direction"].values.tolist()
-    columns = of_trajectory(ds, ds["crossing_trajectory"].values) if "trajectory" in ds.dims else []
+    columns = of_trajectory(ds, "crossing_trajectory")
     columns.append(number("time", ds["crossing_time"].values, ".10g", "s"))
     if "crossing_phase" in ds and np.isfinite(ds["crossing_phase"].values).any():
         columns.append(number("phase of the forcing", ds["crossing_phase"].values, ".8f"))
@@ -81,10 +81,4 @@ def _totals(ds: xr.Dataset) -> str:
     )
 
 
-KIND = ResultKind(
-    makers="sl.poincare",
-    variables=VARIABLES,
-    needed=("<state>", "crossing_time", "status"),
-    account=account,
-    rows=rows,
-)
+KIND = ResultKind("sl.poincare", VARIABLES, ("<state>", "crossing_time", "status"), account, rows)

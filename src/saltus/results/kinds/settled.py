@@ -47,7 +47,7 @@ def _words(ds: xr.Dataset, periods: np.ndarray) -> list[str]:
 def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
     """A row for each trajectory: its response, how well it repeats, its contacts and size."""
     batch = ds if "trajectory" in ds.dims else ds.expand_dims("trajectory")
-    columns = of_trajectory(ds, ds["trajectory"].values) if batch is ds else []
+    columns = of_trajectory(ds)
     columns += [
         words("response", responses(ds)),
         number("mismatch", batch["mismatch"].values, ".1e"),
@@ -64,10 +64,4 @@ def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
     return [table(title, columns, left_out(batch.sizes["trajectory"], "trajectories"))]
 
 
-KIND = ResultKind(
-    makers="sl.settled",
-    variables=VARIABLES,
-    needed=("response_period", "mismatch"),
-    account=account,
-    rows=rows,
-)
+KIND = ResultKind("sl.settled", VARIABLES, ("response_period", "mismatch"), account, rows)

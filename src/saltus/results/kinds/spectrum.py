@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
 
@@ -16,7 +18,7 @@ from saltus.results.table import (
     quantity,
     table,
 )
-from saltus.results.wording import failed, unit_of
+from saltus.results.wording import failed, sized, unit_of
 
 #: Largest lines of a spectrum that an account lists.
 _LARGEST = 5
@@ -52,15 +54,10 @@ def account(ds: xr.Dataset) -> list[str]:
         f"extent   {len(frequency)} lines up to {frequency[-1]:g} Hz, window {one['window'].item()}"
     ]
     for name in states_of(ds):
-        amplitude, unit = one[f"{name}_amplitude"].values, unit_of(one[f"{name}_amplitude"])
-        largest = np.argsort(amplitude)[::-1][:_LARGEST]
-        lines.append(
-            f"  {name}: "
-            + ", ".join(
-                f"{amplitude[i]:.4g} {unit}".rstrip() + f" at {frequency[i]:.6g} Hz"
-                for i in largest
-            )
-        )
+        amplitude = one[f"{name}_amplitude"]
+        largest = np.argsort(amplitude.values)[::-1][:_LARGEST]
+        told = [f"{sized(amplitude[i])} at {frequency[i]:.6g} Hz" for i in largest]
+        lines.append(f"  {name}: {', '.join(told)}")
     return lines
 
 
@@ -70,7 +67,7 @@ def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
     """
     amplitudes = [ds[f"{name}_amplitude"] for name in states_of(ds)]
     like = amplitudes[0]
-    columns = of_trajectory(ds, flat(ds["trajectory"], like)) if "trajectory" in like.dims else []
+    columns = of_trajectory(ds, like=like)
     columns.append(number("frequency", flat(ds["frequency"], like), ".8g", "Hz"))
     if "order" in ds.variables:
         columns.append(number("order", flat(ds["order"], like), ".6g"))
@@ -101,7 +98,7 @@ def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
 _NONE = "not periodic within the samples"
 
 
-def _different(values: xr.DataArray) -> list:
+def _different(values: xr.DataArray) -> list[Any]:
     return sorted(set(np.atleast_1d(values.values).tolist()))
 
 
@@ -117,10 +114,4 @@ def _above_rounding(amplitude: xr.DataArray) -> xr.DataArray:
     return above
 
 
-KIND = ResultKind(
-    makers="sl.spectrum",
-    variables=VARIABLES,
-    needed=("frequency", "window"),
-    account=account,
-    rows=rows,
-)
+KIND = ResultKind("sl.spectrum", VARIABLES, ("frequency", "window"), account, rows)

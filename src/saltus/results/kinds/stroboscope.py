@@ -19,11 +19,11 @@ VARIABLES = {
 
 
 KIND = ResultKind(
-    makers="sl.stroboscope",
-    variables=VARIABLES,
-    needed=("<state>", "status"),
-    account=account,
-    rows=rows,
+    "sl.stroboscope",
+    VARIABLES,
+    ("<state>", "status"),
+    account,
+    rows,
     headline=headline,
     sheets=sheets,
 )

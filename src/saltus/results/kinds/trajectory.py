@@ -132,8 +132,7 @@ def rows(
         for name in ("events", "grazes", "grazes_unresolved", "steps")
         if name in batch and (name in ("events", "steps") or batch[name].any())
     ]
-    columns = of_trajectory(run, run["trajectory"].values, "") if batch is run else []
-    columns = columns or [words("", range(total), "trajectory")]
+    columns = of_trajectory(run, heading="") or [words("", [0], "trajectory")]
     columns.append(words("status", batch["status"].values.astype(str)))
     columns += [
         words("contacts" if name == "events" else plain(name), batch[name].values)
@@ -205,11 +204,5 @@ def _spread(variable: xr.Variable, shape: xr.Variable) -> np.ndarray:
 
 
 KIND = ResultKind(
-    makers="sl.simulate",
-    variables=VARIABLES,
-    needed=("<state>", "status"),
-    account=account,
-    rows=rows,
-    headline=headline,
-    sheets=sheets,
+    "sl.simulate", VARIABLES, ("<state>", "status"), account, rows, headline=headline, sheets=sheets
 )

@@ -62,9 +62,9 @@ def _equal(ds: xr.Dataset) -> str:
 
 
 KIND = ResultKind(
-    makers="sl.regularisation_widths",
-    variables=VARIABLES,
-    needed=("regularisation_error", "error", "steps_per_period"),
-    account=account,
-    rows=rows,
+    "sl.regularisation_widths",
+    VARIABLES,
+    ("regularisation_error", "error", "steps_per_period"),
+    account,
+    rows,
 )
