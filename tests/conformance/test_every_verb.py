@@ -221,6 +221,25 @@ def test_asked_again_in_other_units_it_is_the_same_to_the_bit(verb):
 
 
 @every
+def test_a_result_says_in_lines_and_in_rows_what_it_holds(verb):
+    found = given(verb)
+    kind = schema.KINDS[schema.kind_of(found)]
+    lines = kind.account(found)
+    assert lines
+    assert set(lines) <= set(sl.describe(found).splitlines())
+    tables = kind.rows("what it holds", found)
+    assert tables[0].title == "what it holds"
+    for table in tables:
+        assert table.columns
+        assert {len(row) for row in table.rows} <= {len(table.columns)}
+        assert len(table.data) - 1 >= len(table.rows)
+
+
+def test_every_kind_of_result_is_given_by_a_verb():
+    assert {schema.kind_of(given(verb)) for verb in VERBS} == set(schema.NAMES)
+
+
+@every
 def test_a_result_comes_back_from_its_file_as_it_was(verb, tmp_path):
     file = sl.save(given(verb), tmp_path / "result.nc")
     back = sl.load(file)

@@ -54,7 +54,7 @@ class ResultKind:
     headline : callable, optional
         Its content in a line, where that isn't the first lines of the account.
     sheets : callable, optional
-        All of it as columns with headers, by the end of the name of a CSV file, ``""`` first. None
+        All of it as columns with headers, by the end of the name of a CSV file, ``""`` last. None
         where no tables hold all of it.
     """
 

@@ -249,8 +249,8 @@ def sheets(ds: xr.Dataset) -> dict[str, Mapping[str, np.ndarray]]:
     mine = sorted(_along(ds, "response"), key=lambda name: order.get(name, len(first)))
     happens = _along(ds, "event") if ds.sizes.get("event") else []
     return {
-        "": _titled(ds, mine, "response_") | _outputs(ds),
         "events": _titled(ds, happens, "event_"),
+        "": _titled(ds, mine, "response_") | _outputs(ds),
     }
 
 

@@ -179,11 +179,11 @@ def contact_columns(ds: xr.Dataset) -> Columns:
 
 
 def sheets(ds: xr.Dataset) -> dict[str, Mapping[str, np.ndarray]]:
-    """Samples, contacts and, of a batch, trajectories: parameters, status, counters and end."""
+    """Contacts; of a batch trajectories with parameters, status, counters and end; samples."""
     return {
-        "": _titled(ds, sample_columns(ds)),
         "contacts": _titled(ds, contact_columns(ds), "contact_"),
         "trajectories": _trajectories(ds) if "trajectory" in ds.dims else {},
+        "": _titled(ds, sample_columns(ds)),
     }
 
 
