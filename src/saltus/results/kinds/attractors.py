@@ -54,7 +54,7 @@ def found(ds: xr.Dataset) -> list[str]:
     words = own_errors(ds) if (ds["basin"].values == Kind.UNCONVERGED).any() else ""
     lines += [f"noise    {words}"] if words else []
     lines += untyped(ds["basin"], Kind.UNCONVERGED)
-    return lines + missed(int((ds["basin"].values != Kind.NOT_COMPUTED).sum()))
+    return lines + [f"missed   {one}" for one in missed(_computed(ds["basin"]))]
 
 
 def settled(labels: xr.DataArray) -> str:
@@ -69,14 +69,19 @@ def settled(labels: xr.DataArray) -> str:
     return f"settled  {', '.join([there, *others])}"
 
 
+def _computed(labels: xr.DataArray) -> int:
+    """How many starts were followed."""
+    return int((labels.values != Kind.NOT_COMPUTED).sum())
+
+
 def missed(starts: int, where: str = "") -> list[str]:
-    """A line on what so many starts may have missed: by the rule of three a basin above 3/N of
-    their box is met with 95 %. Hanley & Lippman-Hand, J. Am. Med. Assoc. 249 (1983) 1743.
+    """What so many starts may have missed: by the rule of three a basin above 3/N of their box is
+    met with 95 %. Hanley & Lippman-Hand, J. Am. Med. Assoc. 249 (1983) 1743.
     """
     if not starts:
         return []
     size = f" with a basin below {300 / starts:.2g} % of where they lie" if starts > 3 else ""
-    return [f"missed   {counted(starts, 'start')}{where}: other attractors{size} may be missed"]
+    return [f"{counted(starts, 'start')}{where}: other attractors{size} may be missed"]
 
 
 def untyped(labels: xr.DataArray, *codes: Kind) -> list[str]:
@@ -206,14 +211,10 @@ def _share(ds: xr.Dataset) -> list[Column]:
 
 def _notes(ds: xr.Dataset) -> Iterator[str]:
     """What the numbers are worth."""
-    labels = ds["basin"].values if "basin" in ds else np.empty(0)
-    if "smallest_basin_seen" in ds.attrs:
-        yield (
-            f"{labels.size} starts; a basin of less than "
-            f"{100 * ds.attrs['smallest_basin_seen']:.2g} % may have been missed."
-        )
-    yield from trust(ds)
-    for note in sentences(labels):
+    if "basin" in ds:
+        yield from (f"{one}." for one in missed(_computed(ds["basin"])))
+    yield from _trust(ds)
+    for note in sentences(ds["basin"].values) if "basin" in ds else ():
         yield f"{note} {own_errors(ds)}".rstrip() if WITHOUT[Kind.UNCONVERGED] in note else note
     if "attractor_scatter" in ds:
         yield (
@@ -223,7 +224,7 @@ def _notes(ds: xr.Dataset) -> Iterator[str]:
         )
 
 
-def trust(ds: xr.Dataset) -> Iterator[str]:
+def _trust(ds: xr.Dataset) -> Iterator[str]:
     """What the checks of a map say of its numbers, so far as they were made."""
     attrs = ds.attrs
     if attrs.get("flip_checked"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
@@ -140,21 +141,24 @@ _STOPPED = {
 # -- account ---------------------------------------------------------------------------------------
 def account(ds: xr.Dataset) -> list[str]:
     """A line on each branch with its events, and one on each whose stability isn't explained."""
-    name, stable = ds.attrs["parameter"], ds["point_stable"].values
+    stable = ds["point_stable"].values
     lines = [
         f"found    {counted(ds.sizes['branch'], 'branch')}, {int(ds['branch_closed'].sum())} of "
         f"them closed, {ds.sizes['point']} points"
         + (f", {stable.mean():.0%} of them stable" if len(stable) else ""),
     ]
     lines += [f"  {i}: {_one(ds, i)}" for i in range(ds.sizes["branch"])]
+    return lines + [f"unsure   {one}" for one in _unexplained(ds)]
+
+
+def _unexplained(ds: xr.Dataset) -> Iterator[str]:
+    """Changes of stability that the events of a branch don't explain."""
     for i, count in enumerate(ds["branch_unexplained"].values.tolist()):
         if count:
-            changes = counted(count, "change")
-            lines.append(
-                f"unsure   {changes} of stability unexplained on branch {i}: a narrower range of "
-                f"{name} gives shorter steps"
+            yield (
+                f"{counted(count, 'change')} of stability unexplained on branch {i}: a narrower "
+                f"range of {ds.attrs['parameter']} gives shorter steps"
             )
-    return lines
 
 
 def _one(ds: xr.Dataset, i: int) -> str:
@@ -213,8 +217,7 @@ def _branches(title: str, ds: xr.Dataset) -> TextTable:
         words("bifurcations", [int((ds["event_branch"].values == i).sum()) for i in numbers]),
     ]
     notes = [f"{len(of)} orbits on {len(numbers)} branches."]
-    if missed := int(ds["branch_unexplained"].sum()):
-        notes.append(f"{missed} changes of stability are not explained by the bifurcations found.")
+    notes += [f"{one}." for one in _unexplained(ds)]
     shown = np.sort(np.argsort([-len(i) for i in mine], kind="stable")[:ROWS]).tolist()
     return table(title, columns, tuple(notes), shown)
 

@@ -9,7 +9,7 @@ from saltus.errors import counted
 from saltus.results.dataset.schema import ResultKind, equilibrium_name, states_of
 from saltus.results.dataset.variable import Variable
 from saltus.results.table import TextTable, number, quantity, table, words
-from saltus.results.wording import plain, sized, unit_of
+from saltus.results.wording import sized, unit_of
 
 _EACH = ("equilibrium",)
 _EIGENVALUE = ("equilibrium", "eigenvalue")
@@ -58,12 +58,17 @@ def account(ds: xr.Dataset) -> list[str]:
 def _one(one: xr.Dataset) -> str:
     """Type, state and contacts of an equilibrium."""
     at = ", ".join(f"{name} = {sized(one[equilibrium_name(name)])}" for name in states_of(one))
-    kind = one["equilibrium_type"].item().replace("_", "-")
+    kind = _kind(one["equilibrium_type"].item())
     stable = "stable" if one["equilibrium_stable"] else "unstable"
     word = kind if kind in ("center", "degenerate", "undecided") else f"{stable} {kind}"
     contacts = one["equilibrium_contacts"].item()
     on = "held at" if one["equilibrium_place"].item() == "pseudo" else "on the boundary"
     return f"{word} at {at}{contacts and f', {on} {contacts}'}"
+
+
+def _kind(kind: str) -> str:
+    """A type in the field's word: ``saddle-focus``."""
+    return kind.replace("_", "-")
 
 
 def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
@@ -72,7 +77,7 @@ def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
     growth = ds["equilibrium_eigenvalue_real"].values
     largest = np.fmax.reduce(growth, axis=1, initial=-np.inf)
     columns = [
-        words("type", [plain(kind) for kind in ds["equilibrium_type"].values]),
+        words("type", [_kind(kind) for kind in ds["equilibrium_type"].values]),
         words("stable", ["yes" if one else "no" for one in ds["equilibrium_stable"].values]),
         words("place", ds["equilibrium_place"].values),
         words("contacts", ds["equilibrium_contacts"].values),

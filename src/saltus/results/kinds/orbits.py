@@ -4,6 +4,8 @@ same of any orbit, and what only a search for all of them knows.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import xarray as xr
 
@@ -65,8 +67,7 @@ def account(ds: xr.Dataset) -> list[str]:
     lines = [f"found    {counted(count, 'orbit')}, {stable} of them stable"]
     lines += [f"  {i}: {_one(ds.isel(orbit=i))}" for i in range(min(count, LINES))]
     lines += more(count)
-    for i in range(ds.sizes.get("search_period", 0)):
-        lines.append(f"search   {_searched(ds.isel(search_period=i))}")
+    lines += [f"search   {one}" for one in _searches(ds)]
     if "search_given_up" in ds and (dropped := int(ds["search_given_up"].max())):
         lines.append(
             f"given up {counted(dropped, 'start')}: the motion took more steps or contacts than "
@@ -90,20 +91,17 @@ def _one(one: xr.Dataset) -> str:
     )
 
 
-def _searched(one: xr.Dataset) -> str:
-    """What the search for orbits of one period found."""
-    share = float(one["search_unseen"])
-    unseen = f", about {share:.1%} of them to one that isn't known" if share == share else ""
-    return (
-        f"{_sought(int(one['search_period']))}: {int(one['search_converged'])} of "
-        f"{one.attrs.get('starts', '?')} starts led to an orbit{unseen}; deflation found "
-        f"{int(one['search_deflated'])} more"
-    )
-
-
-def _sought(n: int) -> str:
-    """What was searched for, in a word."""
-    return period_text(n, "limit cycles")
+def _searches(ds: xr.Dataset) -> Iterator[str]:
+    """What the search for orbits of each period found, and what it may have missed."""
+    for i in range(ds.sizes.get("search_period", 0)):
+        one = ds.isel(search_period=i)
+        share = float(one["search_unseen"])
+        unseen = f", about {share:.1%} of them to one that isn't known" if share == share else ""
+        yield (
+            f"{period_text(int(one['search_period']), 'limit cycles')}: "
+            f"{int(one['search_converged'])} of {ds.attrs.get('starts', '?')} starts led to an "
+            f"orbit{unseen}; deflation found {int(one['search_deflated'])} more"
+        )
 
 
 # -- rows ------------------------------------------------------------------------------------------
@@ -118,7 +116,7 @@ def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
         words("contacts", ds["orbit_itinerary"].values),
         words("starts", ds["orbit_found"].values),
     ]
-    return [table(title, columns, _unseen(ds))]
+    return [table(title, columns, [f"{one}." for one in _searches(ds)])]
 
 
 def _periods(ds: xr.Dataset) -> Column:
@@ -131,19 +129,6 @@ def _periods(ds: xr.Dataset) -> Column:
 def _largest(sizes: np.ndarray) -> np.ndarray:
     """The largest of each row; NaN in one without numbers."""
     return np.where(np.isnan(sizes).all(axis=1), np.nan, np.fmax.reduce(sizes, axis=1, initial=0))
-
-
-def _unseen(ds: xr.Dataset) -> list[str]:
-    """A note on what each search missed."""
-    if "search_unseen" not in ds:
-        return []
-    unseen = [
-        f"{_sought(int(n))} {100 * share:.2g} %"
-        if np.isfinite(share)
-        else f"{_sought(int(n))} not known"
-        for n, share in zip(ds["search_period"].values, ds["search_unseen"].values, strict=True)
-    ]
-    return [f"Estimated share of the starts whose orbit was not found: {', '.join(unseen)}."]
 
 
 KIND = ResultKind(

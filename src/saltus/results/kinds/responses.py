@@ -84,7 +84,7 @@ def account(ds: xr.Dataset) -> list[str]:
     if left := _open(ds):
         lines.append(f"open     {counted(left, 'response')} {OPEN}")
     lines += [settled(labels), *untyped(labels, Kind.UNCONVERGED, Kind.FAILED)]
-    return lines + missed(starts, " at each")
+    return lines + [f"missed   {one}" for one in missed(starts, " at each")]
 
 
 def _found(ds: xr.Dataset) -> str:
