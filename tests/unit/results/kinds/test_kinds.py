@@ -7,9 +7,10 @@ import dataclasses
 from pathlib import Path
 
 import pytest
+import xarray as xr
 
 from saltus.results import kinds
-from saltus.results.dataset.schema import KINDS, NAMES, ResultKind
+from saltus.results.dataset.schema import KINDS, METHODS, NAMES, SETTLED, ResultKind
 
 FOLDER = Path(kinds.__file__).parent
 HOUSE = FOLDER.parents[1]
@@ -63,3 +64,41 @@ def _makes_a_table(path: Path) -> bool:
     }
     text = path.read_text(encoding="utf-8")
     return "saltus.results.table" in text and bool(called & {"TextTable", "table", "Column"})
+
+
+def test_methods_side_by_side_are_told_beside_the_reference():
+    found = xr.Dataset(
+        {
+            "method_agreement": ("method", [1.0, 0.875], {"units": "1"}),
+            "method_agreement_low": ("method", [0.7, 0.5], {"units": "1"}),
+            "method_agreement_high": ("method", [1.0, 0.98], {"units": "1"}),
+            "method_cpu_seconds": ("method", [0.5, 2.0], {"units": "s"}),
+        },
+        {"method": ["Taylor", "RK4"]},
+        {"analysis": "basins"},
+    )
+    assert KINDS[METHODS].account(found) == [
+        "found    basins by 2 methods",
+        "  Taylor: the reference, 0.5 s of processor time",
+        "  RK4: 87.50% of the settled starts as by the reference, 2 s of processor time",
+    ]
+    (rows,) = KINDS[METHODS].rows("two", found)
+    assert rows.rows[1] == ("RK4", "87.50%", "50.00% to 98.00%", "2 s")
+
+
+def test_a_run_that_does_not_repeat_says_how_long_was_looked():
+    found = xr.Dataset(
+        {
+            "response_period": ("trajectory", [0, 3]),
+            "mismatch": ("trajectory", [0.1, 1e-12]),
+            "contacts_per_response": ("trajectory", [float("nan"), 8.0]),
+        },
+        {"trajectory": [0, 1]},
+        {"longest_period": 48, "states": "x v"},
+    )
+    assert KINDS[SETTLED].account(found) == ["found    1 not periodic within 48T, 1 3T"]
+    (rows,) = KINDS[SETTLED].rows("two", found)
+    assert [row[1:] for row in rows.rows] == [
+        ("not periodic within 48T", "1.0e-01", "-"),
+        ("3T", "1.0e-12", "8"),
+    ]
