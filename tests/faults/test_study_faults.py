@@ -33,8 +33,8 @@ from saltus.analysis.basins.serial import found_data
 from saltus.cli.commands import app
 from saltus.kernels import status as st
 from saltus.results import load
+from saltus.results.kinds.basins import rows
 from saltus.results.store.store import Store
-from saltus.study.answers.basins_rows import attractor_table
 from saltus.study.run import maps
 from saltus.study.run.maps import compute, finish, open_store
 from saltus.study.run.running import Resources
@@ -653,4 +653,4 @@ def test_a_poison_cell_hurts_only_itself(healthy, poisoned, start, method, label
     told = (
         f"{int((poisoned_.basin == label).sum())} starts {'escaped' if label == -1 else 'failed'}:"
     )
-    assert told in " ".join(attractor_table("a", poisoned_).notes)
+    assert told in " ".join(rows("a", poisoned_)[0].notes)

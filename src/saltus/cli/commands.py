@@ -14,9 +14,9 @@ from saltus.cli.app import app as app
 from saltus.errors import StudyError
 
 if TYPE_CHECKING:
+    from saltus.results.table import TextTable
     from saltus.study.run.running import Resources
     from saltus.study.setting.inputs import Inputs
-    from saltus.study.table import TextTable
     from saltus.study.tables.spec import Study
     from saltus.system import System
 
@@ -106,6 +106,7 @@ def demo(
     from saltus.cli import demo as study
     from saltus.cli import screen
     from saltus.results import save, usable_folder
+    from saltus.results.files.sheets import write_table
 
     usable_folder(out)
     files = study.prepare_files(plot)
@@ -114,7 +115,7 @@ def demo(
         result = study.demo(frequency, case.value, force, periods, progress)
     files.join()
     screen.show(result.table)
-    written = [save(result.run, out / "demo.nc"), result.table.write_csv(out / "demo.csv")]
+    written = [save(result.run, out / "demo.nc"), write_table(result.table, out / "demo.csv")]
     if plot:
         written.append(study.draw(result, out / "demo.png"))
     screen.files(written)
@@ -349,7 +350,7 @@ def reproduce(
 
     from saltus import replication
     from saltus.cli import screen
-    from saltus.study.table import TextTable
+    from saltus.results.table import TextTable
 
     if not paper:
         screen.show(
@@ -404,7 +405,7 @@ def models(
 def _models_table(width: int) -> TextTable:
     """A line for each model; sources are cut to the width of the screen."""
     from saltus import models as published
-    from saltus.study.table import TextTable
+    from saltus.results.table import TextTable
 
     systems = {name: model() for name, model in published.MODELS.items()}
     left = max(width - max(map(len, systems)) - len("  states  contacts  "), 20)
@@ -480,7 +481,7 @@ def cache_show() -> None:
     """
     from saltus import cache as entries
     from saltus.cli import screen
-    from saltus.study.table import TextTable
+    from saltus.results.table import TextTable
 
     rows = tuple(
         (entry.name[:12], entry.system, f"{entry.size_bytes / 1e6:.2f}")

@@ -16,8 +16,8 @@ import numpy as np
 
 from saltus.analysis.motion.settled import LAST, settled
 from saltus.results.dataset.schema import period_text
-from saltus.study.answers.simulate_rows import response_texts
-from saltus.study.table import Column, TextTable, quantity, table, words
+from saltus.results.table import Column, TextTable, quantity, table, words
+from saltus.study.answers.simulate import response_texts
 from saltus.units import from_si
 
 if TYPE_CHECKING:

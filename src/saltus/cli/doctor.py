@@ -8,7 +8,7 @@ import platform
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from saltus.study.table import TextTable
+from saltus.results.table import TextTable
 
 if TYPE_CHECKING:
     from saltus.flow.methods import Method

@@ -18,8 +18,8 @@ from rich.table import Table
 from saltus.fence import printable
 
 if TYPE_CHECKING:
+    from saltus.results.table import TextTable
     from saltus.study.run.running import Report
-    from saltus.study.table import TextTable
 
 #: Columns assumed if the output isn't a terminal: a table in a log file isn't cut.
 LOG_WIDTH = 220

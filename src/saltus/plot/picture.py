@@ -47,7 +47,7 @@ def picture(*kinds: str, needs: Sequence[str] = ()) -> Callable[[Callable[P, R]]
     Parameters
     ----------
     *kinds : str
-        Kinds of Dataset (:data:`saltus.results.schema.MAKERS`) that the first argument may be.
+        Kinds of Dataset (:data:`saltus.results.schema.NAMES`) that the first argument may be.
         Without any, the function checks itself.
     needs : sequence of str
         Variables that it must hold, besides those of its kind.

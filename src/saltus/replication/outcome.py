@@ -13,7 +13,7 @@ from saltus.replication.verdict import Finding
 if TYPE_CHECKING:
     import xarray as xr
 
-    from saltus.study.table import TextTable
+    from saltus.results.table import TextTable
 
 
 @dataclass

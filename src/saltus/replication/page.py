@@ -28,7 +28,7 @@ from saltus.results.provenance import versions
 if TYPE_CHECKING:
     from saltus.replication.outcome import Replication
     from saltus.replication.papers import Claim, Picture
-    from saltus.study.table import TextTable
+    from saltus.results.table import TextTable
 
 #: Style class and sign of each verdict: colour never stands alone.
 _LOOKS = {

@@ -24,7 +24,7 @@ from saltus.study.code import PACKAGE
 if TYPE_CHECKING:
     from saltus.replication.job import Job
     from saltus.replication.verdict import Finding
-    from saltus.study.table import TextTable
+    from saltus.results.table import TextTable
 
 #: Title of each paper, by name. Its folder is replications/NAME.
 _PAPERS = {

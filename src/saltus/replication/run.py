@@ -21,6 +21,7 @@ from saltus.replication.papers import Claim, Numbers, Paper, Picture, folder_of
 from saltus.replication.tables import claims_table
 from saltus.replication.verdict import undecided
 from saltus.results.files.atomic import ResultFileError, replacing, usable_folder
+from saltus.results.files.sheets import write_table
 from saltus.results.store.lock import WHOLE, locked
 from saltus.study.run.running import Report, Resources, Running
 
@@ -132,7 +133,7 @@ def _make(
                 )
         say(_finish(result, figure))
     result.seconds = time.perf_counter() - begin
-    claims_table(result).write_csv(result.claims_file)
+    write_table(claims_table(result), result.claims_file)
     write_page(result)
 
 
@@ -205,7 +206,7 @@ def _finish(result: Replication, figure: str) -> str:
     for numbers in (one for one in paper.tables if one.figure == figure):
         table = _attempt(result, f"table {numbers.name}", numbers, numbers.make)
         if table is not None:
-            table.write_csv(folder / f"{numbers.name}.csv")
+            write_table(table, folder / f"{numbers.name}.csv")
             result.tables.append((numbers, table))
     claims = [one for one in paper.claims if one.figure == figure]
     for claim in claims:

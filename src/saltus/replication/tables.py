@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from saltus.replication.verdict import VERDICTS
-from saltus.study.table import TextTable
+from saltus.results.table import TextTable
 
 if TYPE_CHECKING:
     from saltus.replication.outcome import Replication

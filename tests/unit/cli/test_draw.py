@@ -6,14 +6,14 @@ from saltus import plot
 from saltus.cli import draw
 from saltus.cli.commands import Kind
 from saltus.plot.choice import PICTURES
-from saltus.results.dataset.schema import TABLES
+from saltus.results.dataset.schema import NAMES
 
 
 def test_every_kind_of_result_is_known():
     """Attractors alone have no picture, nor have tables of a few numbers; a new kind needs a line
     in the table, and a word for messages.
     """
-    assert set(TABLES) == set(PICTURES) | {"attractors", "equilibria", "settled", "widths", "modes"}
+    assert set(NAMES) == set(PICTURES) | {"attractors", "equilibria", "settled", "widths", "modes"}
     assert set(draw._WORDS) == set(PICTURES)
 
 

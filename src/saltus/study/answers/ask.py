@@ -27,7 +27,7 @@ from saltus.study.tables.wording import fault
 if TYPE_CHECKING:
     import xarray as xr
 
-    from saltus.study.table import TextTable
+    from saltus.results.table import TextTable
     from saltus.system import System
 
 #: Tables that one question answers.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from saltus.analysis.basins.basins import map_of
 from saltus.analysis.basins.pipeline import BasinPlan, basin_plan
-from saltus.study.answers.basins_rows import agreement_table, attractor_table
+from saltus.results.kinds.agreement import rows
 from saltus.study.answers.question import Answers, Question, Show
 from saltus.study.identity import identity
 from saltus.study.setting import quantities
@@ -20,7 +20,7 @@ from saltus.study.tables.questions import Map
 if TYPE_CHECKING:
     import xarray as xr
 
-    from saltus.study.table import TextTable
+    from saltus.results.table import TextTable
 
 #: Trajectories of attractors drawn in a gallery, and the periods of one that never repeats.
 GALLERY, PERIODS = 8, 24
@@ -93,10 +93,6 @@ class BasinMap(Question):
         """The map, all at once; nothing is stored before it is complete."""
         return map_of(self.plan, threads, progress)
 
-    def rows(self, ds: xr.Dataset, found: Answers) -> list[TextTable]:  # noqa: ARG002
-        """A row for each attractor."""
-        return [attractor_table(self.title, ds)]
-
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
         """The map, and the motions on its attractors."""
         from saltus import plot
@@ -142,8 +138,9 @@ class Agreement(Question):
         )
 
     def rows(self, ds: xr.Dataset, found: Answers) -> list[TextTable]:  # noqa: ARG002
-        """A row for each pair of attractors."""
-        return [agreement_table(ds)]
+        """A row for each pair of attractors, under the names of the maps."""
+        a, b = self.names
+        return rows(f"a: {a} / b: {b}", ds)
 
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
         """The cells on which they differ."""

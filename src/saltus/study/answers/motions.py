@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from saltus.errors import StudyError, nearest
 from saltus.fence import shown
-from saltus.study.answers.motion_rows import TABLES
-from saltus.study.answers.question import Answers, OneVerb, first_figure
+from saltus.study.answers.question import OneVerb, first_figure
 from saltus.study.code import code_hash
 from saltus.study.setting import quantities
 from saltus.study.tables.signature import verb
@@ -17,7 +16,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from saltus.study.setting.setting import Setting
-    from saltus.study.table import TextTable
 
 #: The key of a surface that is a formula.
 FORMULA = "formula"
@@ -62,10 +60,6 @@ class OfMotions(OneVerb):
 
     def check_more(self, table: Any, setting: Setting) -> None:
         """What this question asks besides."""
-
-    def rows(self, ds: xr.Dataset, found: Answers) -> list[TextTable]:  # noqa: ARG002
-        """The one table."""
-        return [TABLES[self.place](self.title, ds)]
 
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
         """The picture of the same name."""

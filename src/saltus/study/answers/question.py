@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from saltus.errors import SaltusError, StudyError
+from saltus.results.dataset.schema import KINDS, kind_of
 from saltus.study.identity import identity
 from saltus.study.setting.arguments import arguments, system_of_question
 from saltus.study.tables.signature import verb
@@ -17,9 +18,9 @@ from saltus.study.tables.wording import fault
 if TYPE_CHECKING:
     import xarray as xr
 
+    from saltus.results.table import TextTable
     from saltus.study.setting.inputs import Input
     from saltus.study.setting.setting import Setting
-    from saltus.study.table import TextTable
 
 #: Datasets that answer a study, by the stems of their files.
 Answers = Mapping[str, "xr.Dataset"]
@@ -79,9 +80,9 @@ class Question(ABC):
     def compute(self, found: Answers, threads: int | None, progress: Show) -> xr.Dataset:
         """The answer."""
 
-    @abstractmethod
-    def rows(self, ds: xr.Dataset, found: Answers) -> list[TextTable]:
+    def rows(self, ds: xr.Dataset, found: Answers) -> list[TextTable]:  # noqa: ARG002
         """The answer in rows: tables to print, the first of which is the CSV file."""
+        return KINDS[kind_of(ds)].rows(self.title, ds)
 
     @abstractmethod
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:

@@ -10,15 +10,13 @@ import numpy as np
 
 from saltus.errors import SaltusError, StudyError
 from saltus.results.files.measured import measured_points
-from saltus.study.answers.question import Answers, OneVerb, first_figure
-from saltus.study.answers.responses_rows import tables
+from saltus.study.answers.question import OneVerb, first_figure
 from saltus.study.tables.wording import fault
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from saltus.study.setting.setting import Setting
-    from saltus.study.table import TextTable
 
 
 class Responses(OneVerb):
@@ -46,10 +44,6 @@ class Responses(OneVerb):
     def call(self, how: dict[str, Any]) -> xr.Dataset:
         """The responses."""
         return super().call(how | {self.axes: self.varied()})
-
-    def rows(self, ds: xr.Dataset, found: Answers) -> list[TextTable]:  # noqa: ARG002
-        """Branches, and what happens to them; kinds of motion over two parameters."""
-        return tables(self.title, ds)
 
     def drawn_with(self) -> dict[str, Any]:
         """What is drawn besides."""

@@ -6,18 +6,21 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from saltus.errors import StudyError
+from saltus.analysis.motion.settled import settled
+from saltus.errors import ParameterError, StudyError
+from saltus.kernels.status import STATUS
+from saltus.results.kinds.settled import responses
+from saltus.results.kinds.trajectory import rows
 from saltus.study.answers.compare import contact_table, exact_times, printed_rows
 from saltus.study.answers.question import Answers, OneVerb, Question, first_figure
-from saltus.study.answers.simulate_rows import run_table
 from saltus.study.setting import quantities
 from saltus.study.tables.questions import REFERENCE, RUN
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from saltus.results.table import TextTable
     from saltus.study.setting.setting import Setting
-    from saltus.study.table import TextTable
 
 
 def questions(table: Any, setting: Setting) -> list[Question]:
@@ -77,7 +80,7 @@ class Motion(OneVerb):
     def rows(self, ds: xr.Dataset, found: Answers) -> list[TextTable]:
         """A row for each trajectory, or for each contact that was printed."""
         if self.compare is None:
-            return [run_table(self.title, ds)]
+            return rows(self.title, ds, response_texts(ds), dict(STATUS.values()))
         return [contact_table(self.title, ds, self.printed, self.exact, found.get(REFERENCE))]
 
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
@@ -117,3 +120,13 @@ class Reference(Motion):
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:  # noqa: ARG002
         """None of its own."""
         return {}
+
+
+def response_texts(run: xr.Dataset) -> list[str]:
+    """``T``, ``3T`` or ``not periodic within 48T`` for each trajectory; empty for an unforced
+    system or too few samples.
+    """
+    try:
+        return responses(settled(run))
+    except ParameterError:
+        return []

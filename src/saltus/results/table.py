@@ -1,16 +1,15 @@
-"""Plain tables: the results of a study, before formatting."""
+"""Tables of text: a result in rows, on the screen and in a CSV file."""
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from saltus.fence import csv_cell
+import numpy as np
+
 from saltus.units import from_si, titled
 
 if TYPE_CHECKING:
@@ -43,17 +42,6 @@ class TextTable:
     rows: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...] = ()
     data: tuple[tuple[str, ...], ...] = ()
-
-    def write_csv(self, path: Path) -> Path:
-        """Write the table as CSV, the notes as comment lines above it."""
-        from saltus.results.files.atomic import replacing
-
-        with replacing(path) as (part,), part.open("w", newline="", encoding="utf-8") as file:
-            file.writelines(f"# {' '.join(note.split())}\n" for note in (self.title, *self.notes))
-            csv.writer(file).writerows(
-                [map(csv_cell, row) for row in self.data or (self.columns, *self.rows)]
-            )
-        return path
 
 
 # -- tables of numbers -----------------------------------------------------------------------------
@@ -132,22 +120,6 @@ def words(heading: str, values: Any, name: str | None = None) -> Column:
     return Column(heading, lambda i: str(found[i]), {name or heading: found})
 
 
-def varied(ds: xr.Dataset, trajectories: Any) -> list[Column]:
-    """A column for each parameter that differs from trajectory to trajectory, at the rows of these
-    trajectories.
-    """
-    names = [
-        name
-        for name in json.loads(ds.attrs.get("varied_parameters", "[]"))
-        if name in ds.coords and ds[name].dims == ("trajectory",)
-    ]
-    own = [ds[name].sel(trajectory=trajectories) for name in names]
-    return [
-        quantity(name.replace("_", " "), one.values, one.attrs.get("units", ""))
-        for name, one in zip(names, own, strict=True)
-    ]
-
-
 def with_error(heading: str, values: Any, errors: Any, form: str = ".4g", unit: str = "") -> Column:
     """Numbers with their standard errors, shown as ``0.5 ± 0.01``."""
     found, off = _floats(values), _floats(errors)
@@ -192,6 +164,13 @@ def left_out(count: int, what: str, shown: int = ROWS) -> list[str]:
     return [f"{count - shown} more {what} are in the file."] if count > shown else []
 
 
+def spread(count: int) -> list[int]:
+    """Numbers of :data:`ROWS` rows in even steps over so many, the first and the last among
+    them.
+    """
+    return [*dict.fromkeys(i * (count - 1) // (ROWS - 1) for i in range(ROWS if count else 0))]
+
+
 def _cell(value: Any) -> str:
     """A value as a program reads it, with every digit."""
     return (
@@ -209,3 +188,41 @@ def _items(values: Any) -> list[Any]:
 
 def _floats(values: Any) -> list[float]:
     return [float(value) for value in _items(values)]
+
+
+# -- columns of a Dataset --------------------------------------------------------------------------
+def of_trajectory(
+    ds: xr.Dataset,
+    variable: str = "trajectory",
+    like: xr.DataArray | None = None,
+    heading: str = "trajectory",
+) -> list[Column]:
+    """Columns of the trajectory that each row is of, by a variable that holds its number, and of
+    the parameters that set it apart; none of a result that holds one. ``like``: see :func:`flat`.
+    """
+    if "trajectory" not in ds.dims:
+        return []
+    rows = ds[variable].values if like is None else flat(ds[variable], like)
+    return [words(heading, rows, "trajectory"), *_varied(ds, rows)]
+
+
+def _varied(ds: xr.Dataset, trajectories: Any) -> list[Column]:
+    """A column for each parameter that differs from trajectory to trajectory, at the rows of these
+    trajectories.
+    """
+    names = [
+        name
+        for name in json.loads(ds.attrs.get("varied_parameters", "[]"))
+        if name in ds.coords and ds[name].dims == ("trajectory",)
+    ]
+    own = [ds[name].sel(trajectory=trajectories) for name in names]
+    return [
+        quantity(name.replace("_", " "), one.values, one.attrs.get("units", ""))
+        for name, one in zip(names, own, strict=True)
+    ]
+
+
+def flat(values: xr.DataArray, like: xr.DataArray) -> np.ndarray:
+    """Values as a column: one for each element of ``like``, trajectory by trajectory."""
+    dims = sorted(like.dims, key=lambda dim: dim != "trajectory")
+    return np.ravel(values.broadcast_like(like).transpose(*dims).values)

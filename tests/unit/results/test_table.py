@@ -6,7 +6,8 @@ import math
 
 import pandas as pd
 
-from saltus.study.table import Column, interval, number, quantity, table, with_error, words
+from saltus.results.files.sheets import write_table
+from saltus.results.table import Column, interval, number, quantity, table, with_error, words
 
 THIRD = 1 / 3e3
 
@@ -34,7 +35,7 @@ def test_the_screen_shows_what_people_write():
 
 
 def test_the_file_holds_every_digit_in_si(tmp_path):
-    file = made().write_csv(tmp_path / "table.csv")
+    file = write_table(made(), tmp_path / "table.csv")
     assert file.read_text().splitlines()[:2] == ["# made up", "# one note"]
     frame = pd.read_csv(file, comment="#")
     assert list(frame.columns) == [
@@ -52,4 +53,4 @@ def test_the_file_holds_the_rows_that_the_screen_leaves_out(tmp_path):
         [words("branch", range(100)), Column("share", "{} %".format, {"share": [0.01] * 100})],
     )
     assert len(many.rows) == 24
-    assert len(pd.read_csv(many.write_csv(tmp_path / "many.csv"), comment="#")) == 100
+    assert len(pd.read_csv(write_table(many, tmp_path / "many.csv"), comment="#")) == 100

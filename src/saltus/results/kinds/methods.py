@@ -1,18 +1,22 @@
-"""The tables of what ``compare_methods`` and ``regularisation_widths`` return."""
+"""What ``compare_methods`` returns: an analysis by several methods, side by side."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from saltus.results.dataset.attractors import AGREEING
-from saltus.results.dataset.responses import RESPONSES_VARIABLES
+import xarray as xr
+
+from saltus.results.dataset.schema import ResultKind
 from saltus.results.dataset.variable import Variable
+from saltus.results.kinds import responses
+from saltus.results.kinds.agreement import AGREEING
+from saltus.results.table import Column, TextTable, interval, number, quantity, table, words
 
 #: What belongs to a method and a place of the grid, and may belong to a start there.
 _FIELD = ("method", "...", "start?")
 
 #: Variables of what ``compare_methods`` returns, beside the coordinates of the analysis.
-METHODS_VARIABLES = {
+VARIABLES = {
     "method": Variable(("method",), "", "method, the reference first", "str", coord=True),
     "method_cpu_seconds": Variable(
         ("method",), "s", "processor time, all threads, without compiling"
@@ -22,9 +26,9 @@ METHODS_VARIABLES = {
     ),
     "method_agreement_low": Variable(("method",), "1", "the same, lower end of the 95 % interval"),
     "method_agreement_high": Variable(("method",), "1", "the same, upper end of the 95 % interval"),
-    **{name: RESPONSES_VARIABLES[name] for name in ("start", "start_direction")},
+    **{name: responses.VARIABLES[name] for name in ("start", "start_direction")},
     **{
-        name: replace(RESPONSES_VARIABLES[name], dims=_FIELD)
+        name: replace(responses.VARIABLES[name], dims=_FIELD)
         for name in ("rms", "peak", "type", "period")
     },
     "basin": Variable(_FIELD, "1", "attractor, in the numbers of the reference", "i2"),
@@ -53,20 +57,30 @@ METHODS_VARIABLES = {
     "steps_per_period": Variable(_FIELD, "1", "steps tried in one forcing period"),
 }
 
-#: Variables of what ``regularisation_widths`` returns.
-WIDTHS_VARIABLES = {
-    "width": Variable(("width",), "<gap>", "width of the blend", coord=True),
-    "regularisation_error": Variable(("width",), "1", "error of a forcing period by the width"),
-    "error": Variable(("width",), "1", "error of a forcing period by width and method"),
-    "steps_per_period": Variable(
-        ("width",), "1", "steps tried in one forcing period of the stand-in"
-    ),
-    "method_error": Variable((), "1", "error of a forcing period by the method"),
-    "method_steps_per_period": Variable(
-        (), "1", "steps tried in one forcing period of the system with contacts"
-    ),
-    "equal_width": Variable((), "<gap>", "width of equal errors"),
-    "equal_steps_per_period": Variable(
-        (), "1", "steps tried in one forcing period at the width of equal errors"
-    ),
-}
+
+def account(ds: xr.Dataset) -> list[str]:
+    """A line on each method: how far it agrees with the reference, and what it costs."""
+    names = ds["method"].values.tolist()
+    lines = [f"found    {ds.attrs.get('analysis', 'an analysis')} by {len(names)} methods"]
+    for i, name in enumerate(names):
+        one = ds.isel(method=i)
+        share, cost = float(one["method_agreement"]), float(one["method_cpu_seconds"])
+        agrees = f"{share:.2%} of the settled starts as by the reference" if i else "the reference"
+        lines.append(f"  {name}: {agrees}, {cost:.3g} s of processor time")
+    return lines
+
+
+def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
+    """A row for each method, the reference first."""
+    low, high = (ds[f"method_agreement_{end}"].values for end in ("low", "high"))
+    columns: list[Column] = [
+        words("method", ds["method"].values),
+        number("agreement", ds["method_agreement"].values, ".2%"),
+        interval("95 % interval", low, high, "{:.2%}".format),
+        quantity("processor time", ds["method_cpu_seconds"].values, "s"),
+    ]
+    note = "Agreement: share of the settled starts with the answer of the first method."
+    return [table(title, columns, (note,))]
+
+
+KIND = ResultKind("sl.compare_methods", VARIABLES, ("method", "agrees"), account, rows)
