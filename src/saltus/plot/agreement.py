@@ -18,7 +18,7 @@ from saltus.plot.basins import paint
 from saltus.plot.palette import hues
 from saltus.plot.picture import picture
 from saltus.plot.style import OKABE_ITO, style
-from saltus.results.dataset.schema import AGREEMENT, kind_text
+from saltus.results.dataset.schema import kind_text
 
 #: Colour and name of each value of the agreement; differences are the news.
 _LOOKS = {
@@ -35,7 +35,7 @@ _NAMED = 8
 _NEEDS = ("agreement", "basin_a", "basin_b", "match_a", "match_b", "match_type", "match_period")
 
 
-@picture(AGREEMENT, needs=_NEEDS)
+@picture(needs=_NEEDS)
 def agreement(ds: xr.Dataset, ax: Any = None) -> Any:
     """Two maps of basins side by side, and where they differ; with one Axes only where they differ.
 

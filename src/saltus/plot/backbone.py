@@ -12,10 +12,9 @@ from saltus.errors import ParameterError, among, nearest, shown
 from saltus.plot import axes as draw
 from saltus.plot.picture import picture
 from saltus.plot.style import OKABE_ITO, display_scale
-from saltus.results.dataset import schema
 
 
-@picture(schema.BACKBONE)
+@picture()
 def backbone(ds: xr.Dataset, *, output: str | None = None, ax: Any = None) -> Axes:
     """Largest magnitude of a state in free vibration, or in phase quadrature, over the frequency;
     where it is unstable, dashed.

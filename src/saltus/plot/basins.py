@@ -22,7 +22,6 @@ from saltus.plot import maps
 from saltus.plot.palette import shades
 from saltus.plot.picture import check, picture
 from saltus.plot.style import QUIET, Scale
-from saltus.results.dataset.schema import BASINS
 from saltus.units import from_si
 
 #: Shades of a hue; the middle one is the hue itself.
@@ -36,7 +35,7 @@ _DIGIT = 0.64
 _LONG_LEGEND = 14
 
 
-@picture()
+@picture(checks=False)
 def basins(
     ds: xr.Dataset,
     ax: Any = None,
@@ -78,7 +77,7 @@ def basins(
     ParameterError
         If ``ds`` is not from ``sl.basins``, or an argument doesn't fit it.
     """
-    check(ds, [BASINS], ["basin", "attractor", *(["periods_to_settle"] if shade else [])])
+    check(ds, ["basin", "attractor", *(["periods_to_settle"] if shade else [])])
     pair = maps.plane(ds, "basin")
     colors = maps.colors_of(ds, order)
     settling = _settling(ds) if shade else None

@@ -13,7 +13,7 @@ from saltus.plot import axes as draw
 from saltus.plot import motion_colors, regions
 from saltus.plot import response_points as points
 from saltus.plot.branches import draw_branches, draw_marks, within_view
-from saltus.plot.picture import caller, picture
+from saltus.plot.picture import PictureError, caller, picture
 from saltus.plot.style import QUIET, Scale
 from saltus.results.dataset.schema import point_name, response_name, sample_name, states_of
 
@@ -31,7 +31,7 @@ _SMALLEST = 0.6
 _BESIDE_GAPS = 1.16
 
 
-@picture()
+@picture(checks=False)
 def bifurcation_diagram(
     ds: points.Source,
     *,
@@ -69,7 +69,7 @@ def bifurcation_diagram(
     ParameterError
         If ``ds`` holds no responses over one parameter, or has no such state.
     """
-    datasets = points.shown(ds, [])
+    datasets = points.shown(ds)
     names = states_of(datasets[0].ds)
     state = names[0] if state is None else state
     if any(state not in states_of(one.ds) for one in datasets):
@@ -104,7 +104,7 @@ def _variable(one: points.Shown, state: str) -> str:
     """The sampled values; where there are none, the points at whole periods."""
     name = sample_name(state) if sample_name(state) in one.ds else response_name(state)
     if name not in one.ds:
-        raise ParameterError(
+        raise PictureError(
             f"{caller()} misses {name} in this Dataset. Give it the whole "
             f"Dataset, not some variables of it."
         )

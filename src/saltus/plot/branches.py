@@ -17,7 +17,6 @@ from saltus.plot import motion_colors
 from saltus.plot import response_points as points
 from saltus.plot.picture import picture
 from saltus.plot.style import QUIET, Scale, display_scale
-from saltus.results.dataset import schema
 from saltus.results.dataset.schema import event_name, point_name, states_of
 
 Quantity = Literal[
@@ -36,7 +35,7 @@ _SIZES = ("peak", "rms", "peak_to_peak", "rms_about_mean", "amplitude", "period"
 _DASHES = (0, (3.0, 1.6))
 
 
-@picture(schema.BRANCHES)
+@picture()
 def branches(
     ds: xr.Dataset,
     *,

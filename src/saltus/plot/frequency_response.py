@@ -38,7 +38,7 @@ _SIZES = ("rms", "peak", "peak_to_peak", "rms_about_mean", "amplitude", "transmi
 Measured = str | os.PathLike[str] | xr.Dataset | None
 
 
-@picture()
+@picture(checks=False)
 def frequency_response(
     ds: points.Source,
     *,
@@ -98,7 +98,7 @@ def frequency_response(
             f"log=True with quantity={quantity!r}, which has a sign. Choose one of "
             f"{', '.join(_SIZES)}."
         )
-    datasets = [_chosen(one, quantity, output) for one in points.shown(ds, [])]
+    datasets = [_chosen(one, quantity, output) for one in points.shown(ds)]
     variable = "drawn"
     marks = None if measured is None else _measured(measured, datasets[0], variable)
     with draw.panels(ax, 1, (6.3, 3.4)) as (panel,):

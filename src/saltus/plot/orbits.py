@@ -13,15 +13,15 @@ from saltus.errors import ParameterError, nearest, shown
 from saltus.plot import axes as draw
 from saltus.plot import maps
 from saltus.plot.basins import basins
-from saltus.plot.picture import picture
+from saltus.plot.picture import check, picture
 from saltus.plot.style import CYCLE, display_scale
-from saltus.results.dataset.schema import BASINS, ORBITS, check, kind_text, orbit_name, states_of
+from saltus.results.dataset.schema import BASINS, kind_text, orbit_name, states_of
 
 #: Orbits that are named in the legend.
 _NAMED = 14
 
 
-@picture(ORBITS)
+@picture()
 def periodic_orbits(
     ds: xr.Dataset,
     x: str | None = None,
@@ -92,7 +92,7 @@ def _pair(ds: xr.Dataset, x: str | None, y: str | None, over: xr.Dataset | None)
                 f"these orbits have no state {shown(name)}. {nearest(name, known)}"
             )
     if over is not None:
-        check(over, caller="plot.periodic_orbits(over=)", kinds=(BASINS,))
+        check(over, kinds=[BASINS], argument="over")
         pair = maps.plane(over, "basin")
         if any(name not in known for name in pair) or (x or pair[0], y or pair[1]) != pair:
             raise ParameterError(

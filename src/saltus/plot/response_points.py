@@ -15,10 +15,10 @@ from matplotlib.lines import Line2D
 
 from saltus.errors import ParameterError
 from saltus.plot import motion_colors
-from saltus.plot.picture import caller, check
+from saltus.plot.picture import PictureError, caller, check
 from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
 from saltus.results.dataset.kinds import WITHOUT_WORDS
-from saltus.results.dataset.schema import RESPONSES, event_name, parameters_of, response_name
+from saltus.results.dataset.schema import event_name, parameters_of, response_name
 
 #: What a picture of responses takes: a Dataset, or several by their names.
 Source = xr.Dataset | Mapping[str, xr.Dataset]
@@ -79,7 +79,7 @@ class Shown:
 
 
 # -- which responses -------------------------------------------------------------------------------
-def shown(source: Any, needs: Sequence[str]) -> list[Shown]:
+def shown(source: Any) -> list[Shown]:
     """The Datasets to draw, each with the responses that are left in it.
 
     Raises
@@ -96,11 +96,11 @@ def shown(source: Any, needs: Sequence[str]) -> list[Shown]:
             "{'exact': a, 'ode45': b}."
         )
     if len(named) > len(MARKERS):
-        raise ParameterError(
+        raise PictureError(
             f"{caller()} tells {len(MARKERS)} Datasets apart, not {len(named)}. "
             f"Draw them in several pictures."
         )
-    found = [_of(ds, str(name), i, needs) for i, (name, ds) in enumerate(named.items())]
+    found = [_of(ds, str(name), i) for i, (name, ds) in enumerate(named.items())]
     if len({one.axis for one in found}) > 1:
         raise ParameterError(
             f"these are over {', '.join(sorted({one.axis for one in found}))}. "
@@ -109,8 +109,8 @@ def shown(source: Any, needs: Sequence[str]) -> list[Shown]:
     return found
 
 
-def _of(ds: Any, name: str, rank: int, needs: Sequence[str]) -> Shown:
-    check(ds, [RESPONSES], [*NEEDS, *needs])
+def _of(ds: Any, name: str, rank: int) -> Shown:
+    check(ds, NEEDS)
     axes = parameters_of(ds)
     if len(axes) != 1:
         over = (
@@ -121,7 +121,7 @@ def _of(ds: Any, name: str, rank: int, needs: Sequence[str]) -> Shown:
             if axes
             else "no parameter"
         )
-        raise ParameterError(
+        raise PictureError(
             f"{caller()} draws responses over one parameter; this Dataset has {over}."
         )
     left = select(ds)

@@ -14,10 +14,10 @@ from saltus.errors import ParameterError, shown
 from saltus.plot import axes as draw
 from saltus.plot import maps, motion_colors
 from saltus.plot import response_points as points
-from saltus.plot.picture import caller, picture
+from saltus.plot.picture import PictureError, caller, picture
 from saltus.plot.style import Scale
 from saltus.results.dataset.kinds import Kind
-from saltus.results.dataset.schema import RESPONSES, parameters_of, start_name, states_of
+from saltus.results.dataset.schema import parameters_of, start_name, states_of
 from saltus.units import from_si
 
 #: Where a start settles to nothing: white and pale greys, as chaos is dark.
@@ -32,7 +32,7 @@ _UNSETTLED: dict[int, tuple[str, str]] = {
 }
 
 
-@picture(RESPONSES, needs=("type", "period", "response_of"))
+@picture(needs=("type", "period", "response_of"))
 def type_map(ds: xr.Dataset, *, start: int = 0, legend: bool = True, ax: Any = None) -> Axes:
     """Kind of motion over two parameters: a hue for each period, grey for motion that never
     repeats, chaos dark.
@@ -62,7 +62,7 @@ def type_map(ds: xr.Dataset, *, start: int = 0, legend: bool = True, ax: Any = N
     """
     pair = parameters_of(ds)
     if len(pair) != 2:
-        raise ParameterError(
+        raise PictureError(
             f"{caller()} draws two parameters, this Dataset has {', '.join(pair) or 'none'}. See "
             f"plot.bifurcation_diagram."
         )
