@@ -10,7 +10,7 @@ import numpy as np
 
 from saltus.results.dataset.schema import event_name, period_text, point_name, states_of
 from saltus.results.wording import unit_of
-from saltus.study.answers.question import Answers, OneVerb, first_figure
+from saltus.study.answers.question import Answers, OneVerb
 from saltus.study.setting import quantities
 from saltus.study.table import ROWS, number, quantity, table, words
 
@@ -35,14 +35,6 @@ class Branches(OneVerb):
         """Branches, and the bifurcations on them."""
         tables = [_branches(self.title, ds)]
         return [*tables, events(f"{self.title}: bifurcations", ds)] if ds.sizes["event"] else tables
-
-    def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
-        """Stable solid, unstable dashed."""
-        from saltus import plot
-
-        axes = plot.branches(ds)
-        axes.set_title(self.title, loc="left")
-        return {"": first_figure(axes)}
 
 
 class Backbone(OneVerb):
@@ -78,14 +70,6 @@ class Backbone(OneVerb):
         end = ds.attrs["end"]
         lost = (f"It ends before the amplitude asked for: {end}.",) if end in ENDS else ()
         return [table(self.title, columns, (f"{count} points.", *lost), shown)]
-
-    def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
-        """Amplitude over frequency."""
-        from saltus import plot
-
-        axes = plot.backbone(ds)
-        axes.set_title(self.title, loc="left")
-        return {"": first_figure(axes)}
 
 
 def _branches(title: str, ds: xr.Dataset) -> TextTable:

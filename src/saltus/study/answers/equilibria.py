@@ -53,7 +53,3 @@ class Equilibria(OneVerb):
         ]
         shown = list(range(min(ds.sizes["equilibrium"], ROWS)))
         return [table(self.title, columns, (), shown)]
-
-    def pictures(self, ds: xr.Dataset) -> dict[str, Any]:  # noqa: ARG002
-        """None: the table says all."""
-        return {}

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from saltus.results.dataset.schema import period_text, states_of
 from saltus.results.wording import unit_of
-from saltus.study.answers.question import Answers, OneVerb, first_figure
+from saltus.study.answers.question import Answers, OneVerb
 from saltus.study.table import ROWS, number, quantity, table, words
 
 if TYPE_CHECKING:
@@ -37,14 +37,6 @@ class Orbits(OneVerb):
         ]
         shown = list(range(min(ds.sizes["orbit"], ROWS)))
         return [table(self.title, columns, (_search(ds),), shown)]
-
-    def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
-        """Their points at whole periods."""
-        from saltus import plot
-
-        axes = plot.periodic_orbits(ds)
-        axes.set_title(self.title, loc="left")
-        return {"": first_figure(axes)}
 
 
 def _periods(ds: xr.Dataset) -> Column:
