@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 
 from saltus.errors import shown
 from saltus.plot import axes as draw
+from saltus.plot import cells
 from saltus.plot import response_points as points
 from saltus.plot.picture import PictureError, caller, check, picture
 from saltus.plot.response_points import MARKS
@@ -120,8 +121,7 @@ def _scale(name: str, named: list[tuple[str, xr.Dataset]], over: xr.Dataset | No
     """Unit in which a parameter is shown."""
     unit = named[0][1][point_name(name)].attrs.get("units", "")
     if over is not None:
-        values = over[name].values
-        return points.parameter_scale(values, unit, points.is_log(values))
+        return cells.parameter(over, name).scale
     return display_scale(unit, max(abs(end) for end in _limits(name, named, Scale(1.0, unit))))
 
 

@@ -36,6 +36,8 @@ LABELS = {
 SIZES = (
     "rms", "peak", "peak_to_peak", "rms_about_mean", "amplitude", "transmissibility", "period",
 )  # fmt: skip
+#: Phases over more than this [deg] have ticks at parts of a right angle.
+_WIDE_PHASE = 20.0
 #: Dashes of what is unstable.
 DASHES = (0, (3.0, 1.6))
 #: Diameter of the smallest dots [pt]: more than a pixel of a screen.
@@ -160,7 +162,7 @@ def height_axis(ax: Axes, quantity: str, of: str, up: Scale, log: bool = False) 
         ax.set_yscale("log")
     elif quantity in SIZES:
         ax.set_ylim(bottom=0)
-    if quantity == "phase":
+    if quantity == "phase" and np.ptp(ax.get_ylim()) > _WIDE_PHASE:
         ax.yaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 1.5, 3, 4.5, 9, 10]))
     ax.set_ylabel(up.label(LABELS[quantity].format(of)))
 

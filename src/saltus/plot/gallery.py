@@ -16,7 +16,7 @@ from matplotlib.transforms import ScaledTranslation
 
 from saltus.errors import ParameterError
 from saltus.plot import axes as draw
-from saltus.plot import maps, selection
+from saltus.plot import cells, selection
 from saltus.plot.history import history
 from saltus.plot.phase import phase
 from saltus.plot.picture import PictureError, caller, check, picture
@@ -69,7 +69,7 @@ def gallery(
         show.
     """
     check(runs, kinds=[schema.TRAJECTORY], argument="runs")
-    colors = maps.colors_of(ds, order)
+    colors = cells.colors_of(ds, order)
     ids = _chosen(runs, list(colors), attractors)
     pair = _pair(runs)
     columns = (
@@ -239,11 +239,11 @@ def title_of(ds: xr.Dataset, key: int) -> str:
     the starts``.
     """
     one = ds.sel(attractor=key)
-    parts = [maps.describe(one), _stability(one)]
+    parts = [cells.describe(one), _stability(one)]
     if "attractor_peak" in one:
-        parts.append(maps.peak_text(one))
+        parts.append(cells.peak_text(one))
     if "attractor_fraction" in one and math.isfinite(float(one["attractor_fraction"])):
-        parts.append(f"{maps.share_text(float(one['attractor_fraction']))} of the starts")
+        parts.append(f"{cells.share_text(float(one['attractor_fraction']))} of the starts")
     return ", ".join(part for part in parts if part)
 
 

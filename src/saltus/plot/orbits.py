@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 
 from saltus.errors import ParameterError, nearest, shown
 from saltus.plot import axes as draw
-from saltus.plot import maps
+from saltus.plot import cells
 from saltus.plot.basins import basins
 from saltus.plot.picture import check, picture
 from saltus.plot.style import CYCLE, display_scale
@@ -75,7 +75,7 @@ def periodic_orbits(
             panel.set_ylabel(scales[1].label(pair[1]))
         else:
             basins(over, ax=panel, legend=False, points=False)
-            scales = tuple(maps.scale_of(over, name) for name in pair)
+            scales = tuple(side.scale for side in cells.plane(over, "basin"))
         for i in range(ds.sizes["orbit"]):
             _orbit(panel, ds.isel(orbit=i), pair, scales, i, over is not None)
         if legend and ds.sizes["orbit"]:
@@ -93,7 +93,8 @@ def _pair(ds: xr.Dataset, x: str | None, y: str | None, over: xr.Dataset | None)
             )
     if over is not None:
         check(over, kinds=[BASINS], argument="over")
-        pair = maps.plane(over, "basin")
+        first, second = (side.name for side in cells.plane(over, "basin"))
+        pair = first, second
         if any(name not in known for name in pair) or (x or pair[0], y or pair[1]) != pair:
             raise ParameterError(
                 f"over is a map of {pair[0]} and {pair[1]}. Leave x and y out, and give orbits of "
