@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -29,6 +30,8 @@ _WHERE = {(True, True): "in both", (True, False): "left only", (False, True): "r
 #: More attractors than this are not named in a legend of their own: the maps of plot.basins do
 #: that.
 _NAMED = 8
+#: Characters of a title that fit above a map.
+_TITLE = 34
 
 
 _NEEDS = ("agreement", "basin_a", "basin_b", "match_a", "match_b", "match_type", "match_period")
@@ -82,9 +85,8 @@ def _three(panels: np.ndarray, ds: xr.Dataset, sides: cells.Sides) -> np.ndarray
     other = "exact" if any(methods.values()) else ""
     for panel, which in zip(panels, "ab", strict=False):
         cells.draw_cells(panel, sides, cells.paint(ds[f"basin_{which}"].values, colors))
-        panel.set_title(
-            str(ds.attrs.get(f"name_{which}", methods[which] or other or f"map {which}"))
-        )
+        name = str(ds.attrs.get(f"name_{which}", methods[which] or other or f"map {which}"))
+        panel.set_title(textwrap.fill(name, _TITLE))
     _difference(panels[2], ds, sides)
     for panel in panels[1:]:
         panel.set_ylabel("")
