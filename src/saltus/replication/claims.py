@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
-from saltus.plot.maps import share_text
+from saltus.plot.cells import share_text
 from saltus.replication.verdict import Check, Finding, passed
 from saltus.results.dataset.schema import period_text
 

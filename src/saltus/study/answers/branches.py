@@ -6,12 +6,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from saltus.study.answers.question import OneVerb, first_figure
+from saltus.study.answers.question import OneVerb
 from saltus.study.setting import quantities
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from saltus.study.setting.setting import Setting
 
 
@@ -19,14 +17,6 @@ class Branches(OneVerb):
     """Branches of periodic orbits over a parameter."""
 
     place, function = "branches", "branches"
-
-    def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
-        """Stable solid, unstable dashed."""
-        from saltus import plot
-
-        axes = plot.branches(ds)
-        axes.set_title(self.title, loc="left")
-        return {"": first_figure(axes)}
 
 
 class Backbone(OneVerb):
@@ -41,11 +31,3 @@ class Backbone(OneVerb):
         self.arguments["amplitude"] = tuple(
             quantities.states(self.system, {state: one}, place)[state] for one in table.amplitude
         )
-
-    def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
-        """Amplitude over frequency."""
-        from saltus import plot
-
-        axes = plot.backbone(ds)
-        axes.set_title(self.title, loc="left")
-        return {"": first_figure(axes)}

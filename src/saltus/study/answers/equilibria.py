@@ -28,7 +28,3 @@ class Equilibria(OneVerb):
     def call(self, how: dict[str, Any]) -> xr.Dataset:  # noqa: ARG002
         """Nothing is integrated: there are no threads, and no method."""
         return super().call({})
-
-    def pictures(self, ds: xr.Dataset) -> dict[str, Any]:  # noqa: ARG002
-        """None: the table says all."""
-        return {}

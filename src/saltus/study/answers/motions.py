@@ -26,9 +26,7 @@ _PARTS, _OPTIONAL = ("energy", "supplied", "dissipated"), ("friction",)
 class OfMotions(OneVerb):
     """A question on motions from given starts, of some length after a transient."""
 
-    #: The function of :mod:`saltus.plot` that draws the answer; whether it draws some trajectories
-    #: of a batch.
-    picture: ClassVar[str]
+    #: Whether its picture draws some trajectories of a batch.
     several: ClassVar[bool] = False
 
     def check_first(self, table: Any) -> None:
@@ -62,8 +60,9 @@ class OfMotions(OneVerb):
         """What this question asks besides."""
 
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
-        """The picture of the same name."""
+        """The usual picture of such a result; of a large batch the first trajectories."""
         from saltus import plot
+        from saltus.plot.choice import default_kind
         from saltus.plot.selection import MOST
 
         some = (
@@ -71,7 +70,7 @@ class OfMotions(OneVerb):
             if self.several and "trajectory" in ds.dims
             else {}
         )
-        return {"": first_figure(getattr(plot, self.picture)(ds, **some))}
+        return {"": first_figure(getattr(plot, default_kind(ds))(ds, **some))}
 
     def needs_contacts(self) -> None:
         """Refuse a method that steps over contacts."""
@@ -85,7 +84,7 @@ class OfMotions(OneVerb):
 class Section(OfMotions):
     """[poincare]: where motions cross a surface."""
 
-    place, function, picture, several = "poincare", "poincare", "section", True
+    place, function, several = "poincare", "poincare", True
 
     def check_more(self, table: Any, setting: Setting) -> None:
         """The surface in SI."""
@@ -118,7 +117,7 @@ class Section(OfMotions):
 class Lines(OfMotions):
     """[spectrum]: motions by frequency."""
 
-    place, function, picture, several = "spectrum", "spectrum", "spectrum", True
+    place, function, several = "spectrum", "spectrum", True
 
     def check_more(self, table: Any, setting: Setting) -> None:  # noqa: ARG002
         """Which states and periods."""
@@ -159,7 +158,7 @@ class Lines(OfMotions):
 class Statistics(OfMotions):
     """[impacts]: how often, how hard and how long the contacts are."""
 
-    place, function, picture = "impacts", "impact_statistics", "impacts"
+    place, function = "impacts", "impact_statistics"
 
     def check_more(self, table: Any, setting: Setting) -> None:
         """Sides and forces."""
@@ -188,7 +187,7 @@ class Statistics(OfMotions):
 class Balance(OfMotions):
     """[energy]: energy stored, supplied and dissipated."""
 
-    place, function, picture = "energy", "energy_balance", "energy"
+    place, function = "energy", "energy_balance"
 
     def check_more(self, table: Any, setting: Setting) -> None:
         """The three functions: as written, or those of the model, which stand in its code."""

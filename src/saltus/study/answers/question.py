@@ -151,6 +151,18 @@ class OneVerb(Question):
         ds: xr.Dataset = verb(self.function)(self.system, **(self.arguments | how))
         return ds
 
+    def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
+        """The usual picture of such a result, if there is one, under the title of the question."""
+        from saltus import plot
+        from saltus.plot.choice import default_kind
+
+        kind = default_kind(ds)
+        if not kind:
+            return {}
+        axes = getattr(plot, kind)(ds)
+        axes.set_title(self.title, loc="left")
+        return {"": first_figure(axes)}
+
 
 def first_figure(axes: Any) -> Any:
     """The figure of the Axes, or the array of them, that a picture returns."""

@@ -1,4 +1,4 @@
-"""What all pictures of basins share: the right Dataset, the starts as cells, codes and colours,
+"""Maps: a plane of coloured cells, for basins, kinds of motion and agreement; codes and colours;
 attractors in words.
 """
 
@@ -6,15 +6,17 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
 
 from saltus.errors import ParameterError, shown
-from saltus.plot.palette import hues
+from saltus.plot.palette import hues, shades
+from saltus.plot.response_points import is_log, parameter_scale
 from saltus.plot.style import Scale, display_scale
 from saltus.results.dataset.kinds import Kind
 from saltus.results.dataset.schema import kind_text
@@ -37,6 +39,8 @@ UNSETTLED: dict[int, Unsettled] = {
     Kind.FAILED: Unsettled("failed", "#3C3C3C"),
     Kind.NOT_COMPUTED: Unsettled("not computed", "#E9E9E9"),
 }
+#: Shades of a hue; the middle one is the hue itself.
+LEVELS = 65
 
 
 # -- the Dataset -----------------------------------------------------------------------------------
@@ -141,9 +145,44 @@ def peak_text(one: xr.Dataset) -> str:
     return f"peak {display_scale(unit, abs(peak)).text(float(f'{peak:.3g}'))}"
 
 
-# -- the starts ------------------------------------------------------------------------------------
-def plane(ds: xr.Dataset, variable: str) -> tuple[str, str]:
-    """Names of the two states on the axes of a map."""
+# -- the plane -------------------------------------------------------------------------------------
+@dataclass(frozen=True)
+class Side:
+    """One axis of a map.
+
+    Attributes
+    ----------
+    name : str
+        The state or parameter.
+    label : str
+        Text of the axis.
+    scale : Scale
+        Its display unit.
+    values : array of float
+        Where the cells are centred [SI].
+    log : bool
+        Whether the axis is logarithmic.
+    """
+
+    name: str
+    label: str
+    scale: Scale
+    values: np.ndarray
+    log: bool = False
+
+    @property
+    def edges(self) -> np.ndarray:
+        """Edges of the cells [display unit], half-way between neighbours: shape (cell + 1,)."""
+        values = self.values * self.scale.factor
+        return np.exp(_edges(np.log(values))) if self.log else _edges(values)
+
+
+#: Both axes of a map.
+Sides = tuple[Side, Side]
+
+
+def plane(ds: xr.Dataset, variable: str) -> Sides:
+    """The two states on the axes of a map."""
     dims = ds[variable].dims
     if len(dims) != 2 or any(dim not in ds.coords for dim in dims):
         raise ParameterError(
@@ -154,59 +193,91 @@ def plane(ds: xr.Dataset, variable: str) -> tuple[str, str]:
         )
     if 0 in ds[variable].shape:
         raise ParameterError(f"this map holds no starts (its shape is {ds[variable].shape}).")
-    return str(dims[0]), str(dims[1])
+    return _state(ds, str(dims[0])), _state(ds, str(dims[1]))
 
 
-def scale_of(ds: xr.Dataset, state: str) -> Scale:
-    """Display unit of one axis of the map."""
-    starts = np.asarray(ds[state].values, dtype=float)
-    return display_scale(ds[state].attrs.get("units", ""), float(np.abs(starts).max()))
+def _state(ds: xr.Dataset, name: str) -> Side:
+    starts = np.asarray(ds[name].values, dtype=float)
+    scale = display_scale(ds[name].attrs.get("units", ""), float(np.abs(starts).max()))
+    return Side(name, scale.label(name), scale, starts)
 
 
-def edges(starts: np.ndarray) -> np.ndarray:
-    """Edges of the cells around the starts, shape (start + 1,): half-way between neighbours, the
-    outer cells symmetric.
+def parameter(ds: xr.Dataset, name: str) -> Side:
+    """A parameter on an axis; logarithmic where its values are even in their logarithms."""
+    values = np.asarray(ds[name].values, dtype=float)
+    log = is_log(values)
+    scale = parameter_scale(values, ds[name].attrs.get("units", ""), log)
+    return Side(name, scale.label(name.replace("_", " ")), scale, values, log)
+
+
+def _edges(centres: np.ndarray) -> np.ndarray:
+    """Half-way between neighbours; the outer cells are symmetric."""
+    if centres.size == 1:
+        half = 0.5 * abs(centres[0]) or 0.5
+        return np.array([centres[0] - half, centres[0] + half])
+    between = 0.5 * (centres[1:] + centres[:-1])
+    return np.concatenate([[2 * centres[0] - between[0]], between, [2 * centres[-1] - between[-1]]])
+
+
+# -- colours of cells ------------------------------------------------------------------------------
+def paint(
+    codes: np.ndarray, colors: Mapping[int, np.ndarray], level: np.ndarray | None = None
+) -> np.ndarray:
+    """The colour of each cell, uint8, shape (A, B, 3).
+
+    Parameters
+    ----------
+    codes : array, shape (A, B)
+        Attractor ids or kinds, and negative codes. NaN, or a code that has no colour, is drawn as
+        not computed.
+    colors : mapping of int to array of shape (3,)
+        The colour of each code, sRGB in 0 to 1; negative ones have those of :data:`UNSETTLED` by
+        default.
+    level : array of int, shape (A, B), optional
+        Shade of each cell that settles, 0 to 64.
     """
-    starts = np.asarray(starts, dtype=float)
-    if starts.size == 1:
-        half = 0.5 * abs(starts[0]) or 0.5
-        return np.array([starts[0] - half, starts[0] + half])
-    between = 0.5 * (starts[1:] + starts[:-1])
-    return np.concatenate([[2 * starts[0] - between[0]], between, [2 * starts[-1] - between[-1]]])
+    looks = {code: np.array(to_rgb(one.color)) for code, one in UNSETTLED.items()} | dict(colors)
+    row = {code: i for i, code in enumerate(looks)}
+    found, where = np.unique(
+        np.nan_to_num(np.asarray(codes), nan=Kind.NOT_COMPUTED), return_inverse=True
+    )
+    rows = np.array([row.get(int(code), row[Kind.NOT_COMPUTED]) for code in found])
+    table = np.stack(list(looks.values()))[:, None]
+    if level is not None:
+        table = table.repeat(LEVELS, axis=1)
+        settled = [i for code, i in row.items() if code >= 0]
+        table[settled] = shades(table[settled, 0], LEVELS)
+    painted: np.ndarray = np.round(255 * table).astype(np.uint8)[
+        rows[where.reshape(np.shape(codes))], 0 if level is None else level
+    ]
+    return painted
 
 
-def draw_cells(
-    ax: Axes, ds: xr.Dataset, pair: tuple[str, str], scales: tuple[Scale, Scale], colors: np.ndarray
-) -> None:
+def draw_cells(ax: Axes, sides: Sides, colors: np.ndarray) -> None:
     """Colour every cell, uint8, shape (A, B, 3), and name the axes.
 
     No colours are mixed, however small the cells: a mixture of two hues would be taken for a third
     attractor.
     """
-    x, y = (edges(ds[name].values * scale.factor) for name, scale in zip(pair, scales, strict=True))
+    x, y = (side.edges for side in sides)
     image = np.ascontiguousarray(colors.swapaxes(0, 1))
-    if all(
-        np.allclose(np.diff(axis), (axis[-1] - axis[0]) / (axis.size - 1), rtol=1e-6, atol=0.0)
-        for axis in (x, y)
-    ):
-        extent = (x[0], x[-1], y[0], y[-1])
+    if all(_is_even(side) for side in sides):
         ax.imshow(
-            image,
-            origin="lower",
-            extent=extent,
-            interpolation="nearest",
-            aspect="auto",
-            zorder=0,
-            rasterized=True,
-        )
+            image, origin="lower", extent=(x[0], x[-1], y[0], y[-1]), interpolation="nearest",
+            aspect="auto", zorder=0, rasterized=True,
+        )  # fmt: skip
     else:
         ax.pcolormesh(x, y, image, zorder=0, rasterized=True)
+        for set_scale, side in zip((ax.set_xscale, ax.set_yscale), sides, strict=True):
+            set_scale("log" if side.log else "linear")
     ax.set_xlim(x.min(), x.max())
     ax.set_ylim(y.min(), y.max())
-    ax.set_xlabel(scales[0].label(pair[0]))
-    ax.set_ylabel(scales[1].label(pair[1]))
+    ax.set_xlabel(sides[0].label)
+    ax.set_ylabel(sides[1].label)
 
 
-def as_bytes(rgb: np.ndarray) -> np.ndarray:
-    """sRGB in 0 to 1 as whole numbers, as images are stored."""
-    return np.round(255 * np.asarray(rgb)).astype(np.uint8)
+def _is_even(side: Side) -> bool:
+    """Whether all cells have one width, as those of an image."""
+    edges = side.edges
+    width = (edges[-1] - edges[0]) / (edges.size - 1)
+    return not side.log and np.allclose(np.diff(edges), width, rtol=1e-6, atol=0.0)
