@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar, Union, runtime_checkable
 
 from saltus.errors import TraceError, shown
+from saltus.sentences import Dialect
 
 #: Elementary functions that a traced equation may call, in addition to arithmetic.
 ELEMENTARY = ("sqrt", "exp", "log", "sin", "cos", "tan", "atan", "tanh")
@@ -207,6 +208,11 @@ class Expr:
 
     __or__ = __rand__ = __ror__ = __and__
 
+    def __xor__(self, _other: object) -> Expr:
+        raise TraceError("a power is written x**2; ^ is something else in Python.")
+
+    __rxor__ = __xor__
+
     def __bool__(self) -> bool:
         raise TraceError(
             "an equation asked whether a traced value is true. It is a symbol here, not a number: "
@@ -260,11 +266,12 @@ def answers(method: str) -> Callable[[Answer], Answer]:
     return handed_in
 
 
-#: Where a comparison stands for 0 or 1, as it does in MATLAB.
-_NO_NUMBER = (
-    "a comparison was used as a number. Write sl.piecewise((1, x > gap), otherwise=0), or the "
-    "whole term in place of the 1: sl.piecewise((k*(x - gap), x > gap), otherwise=0)."
-)
+def _no_number(say: Dialect) -> str:
+    return say.either(
+        "a comparison was used as a number. Write sl.piecewise((1, x > gap), otherwise=0), or the "
+        "whole term in place of the 1: sl.piecewise((k*(x - gap), x > gap), otherwise=0).",
+        "a comparison is no number. Write 1 if x > gap else 0.",
+    )
 
 
 @contextmanager
@@ -366,11 +373,12 @@ class Condition:
 
     def __neg__(self, *_others: object) -> Expr:
         """Refused, as every operation that would need a number."""
-        raise TraceError(_NO_NUMBER)
+        raise TraceError(_no_number)
 
     __pos__ = __abs__ = __float__ = __int__ = __neg__
     __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __neg__
-    __truediv__ = __rtruediv__ = __pow__ = __rpow__ = __neg__
+    __truediv__ = __rtruediv__ = __pow__ = __rpow__ = __mod__ = __rmod__ = __neg__
+    __lt__ = __le__ = __gt__ = __ge__ = __neg__
 
 
 @dataclass(frozen=True, eq=False)
@@ -482,7 +490,7 @@ def as_expr(value: Operand) -> Expr:
     if isinstance(value, Expr):
         return value
     if isinstance(value, Condition):
-        raise TraceError(_NO_NUMBER)
+        raise TraceError(_no_number)
     if isinstance(value, str | bytes):
         raise TraceError(
             f"an equation holds the text {shown(value)}. Text with units is for parameter values; "

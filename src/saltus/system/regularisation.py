@@ -119,7 +119,7 @@ def regularise(
     try:
         field, guards = blended(system.field, system.guards, system.states, step, parameters)
     except TraceError as error:
-        raise TraceError(f"{system.name}, regularised: {error}") from error
+        raise TraceError(f"{system.name}, regularised: ", error) from error
     slips = " Friction slips only: its static limit is left out." if static else ""
     description = (
         f"Regularised: {called} over {', '.join(values)} in place of the boundaries "

@@ -441,7 +441,7 @@ def test_every_key_tells_what_it_is():
 
 def test_examples_of_the_schema_are_read():
     from saltus.study.tables.questions import BifurcationDiagram, FrequencyResponse
-    from saltus.study.tables.wording import toml
+    from saltus.study.tables.toml import toml
 
     for key, table in (
         ("frequency_response", FrequencyResponse),

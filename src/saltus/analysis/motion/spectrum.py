@@ -18,6 +18,7 @@ from saltus.flow.counts import whole as whole_number
 from saltus.results import Subject, build, inherited
 from saltus.results.dataset import schema
 from saltus.results.dataset.reader import reader
+from saltus.sentences import Given
 
 #: Windows by name: weights of n samples. Both are periodic (the sample after the last would be the
 #: first).
@@ -192,13 +193,17 @@ def _forced_stretch(run: xr.Dataset, last: int | None) -> _Stretch:
     last = last if last is None else whole_number(last, "last")
     if last is not None and last > kept:
         raise ParameterError(
-            f"spectrum: last={shown(last)}, but {kept} whole forcing periods were "
-            f"kept. Simulate with more keep=."
+            lambda say: (
+                f"spectrum: {say.key(last=Given(last))}, but {kept} whole forcing periods "
+                f"were kept. Simulate with more {say.key('keep')}."
+            )
         )
     if not kept:
         raise ParameterError(
-            "spectrum needs a whole forcing period of samples, its two ends included. Simulate "
-            "longer, or give more keep=."
+            lambda say: (
+                "spectrum needs a whole forcing period of samples, its two ends included. "
+                f"Simulate longer, or give more {say.key('keep')}."
+            )
         )
     periods = kept if last is None else last
     _check_even(phases[whole[-periods - 1] :], "forcing periods")
@@ -208,10 +213,12 @@ def _forced_stretch(run: xr.Dataset, last: int | None) -> _Stretch:
     common = math.lcm(*(int(n) for n in response if n))
     if common > periods:
         raise ParameterError(
-            f"spectrum: the trajectories repeat after {sorted({int(n) for n in response if n})} "
-            f"forcing periods, so only {common} periods "
-            f"hold whole responses of all, and {periods} were kept. Give more keep=, or take them "
-            f"one by one: run.isel(trajectory=0)."
+            lambda say: (
+                "spectrum: the trajectories repeat after "
+                f"{sorted({int(n) for n in response if n})} forcing periods, so only {common} "
+                f"periods hold whole responses of all, and {periods} were kept. Give more "
+                f"{say.key('keep')}, or take them one by one: run.isel(trajectory=0)."
+            )
         )
     if last is None and response.all():
         periods = common  # more of the same would only put empty lines between

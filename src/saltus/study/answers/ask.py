@@ -22,7 +22,7 @@ from saltus.study.setting.inputs import Inputs
 from saltus.study.setting.setting import Setting, setting_of
 from saltus.study.tables.read import parse, study_of
 from saltus.study.tables.spec import Study
-from saltus.study.tables.wording import fault
+from saltus.study.tables.toml import fault
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from saltus.errors import StudyError, nearest
-from saltus.fence import shown
+from saltus.errors import StudyError, nearest, shown
 from saltus.study.answers.motion_rows import TABLES
 from saltus.study.answers.question import Answers, OneVerb, first_figure
 from saltus.study.code import code_hash
@@ -114,7 +113,7 @@ class Section(OfMotions):
         elif surface not in known:
             level = f'surface = {{ {self.system.states[0]} = "0.3 mm" }}'
             raise StudyError(
-                f"[{self.place}] surface = {shown(surface)!r} is unknown. "
+                f"[{self.place}] surface = {shown(surface)} is unknown. "
                 f"{nearest(surface, known)} Or give a level: {level}."
             )
         crossed(self.system, surface, self.arguments["values"] or {})

@@ -12,7 +12,7 @@ from saltus.errors import SaltusError, StudyError
 from saltus.study.identity import identity
 from saltus.study.setting.arguments import arguments, system_of_question
 from saltus.study.tables.signature import verb
-from saltus.study.tables.wording import fault
+from saltus.study.tables.toml import fault
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -12,7 +12,7 @@ from saltus.errors import SaltusError, StudyError
 from saltus.results.files.measured import measured_points
 from saltus.study.answers.question import Answers, OneVerb, first_figure
 from saltus.study.answers.responses_rows import tables
-from saltus.study.tables.wording import fault
+from saltus.study.tables.toml import fault
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -11,7 +11,7 @@ from saltus import flow
 from saltus.errors import ParameterError, SaltusError, StudyError, nearest
 from saltus.study.setting import quantities
 from saltus.study.setting.curves import curve_of
-from saltus.study.tables.wording import fault
+from saltus.study.tables.toml import fault
 from saltus.system.formula import Equations, Formula, Formulas
 
 if TYPE_CHECKING:

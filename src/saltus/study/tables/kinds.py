@@ -74,7 +74,7 @@ KINDS = {
     "every": _time("1 s"),
     "transient": Kind(Quantity, (500, "5 s"), convert="transient"),
     "box": Kind(dict[str, Interval], ({"x": ["-5 mm", "5 mm"], "v": ["-1 m/s", "1 m/s"]},),
-        convert="box"),
+        'Range (low, high) of each state for random starts: start = "random 20".', convert="box"),
     "outputs": Kind(Outputs,
         ({"spring force": "k*x", "power": {"formula": "c*v**2", "unit": "W"}},),
                     "What to read off each response besides its states, by name: "

@@ -17,7 +17,7 @@ from pydantic import Field, create_model
 import saltus
 from saltus.fence import MOST_COUNT
 from saltus.study.tables.parts import Named, Quantity, Table
-from saltus.study.tables.wording import in_toml, toml
+from saltus.study.tables.toml import TABLES, toml
 
 #: What a question leaves to the study: the system, and how it is run.
 _OF_THE_STUDY = ("system", "run", "threads", "progress")
@@ -101,6 +101,7 @@ def table(
         Keys that no parameter stands for.
     """
     found: dict[str, tuple[Any, Kind]] = {}
+    TABLES[verbs[0]] = place
     for function in map(verb, verbs):
         for parameter in inspect.signature(function).parameters.values():
             name = parameter.name
@@ -209,8 +210,6 @@ def documented(function: Callable[..., Any]) -> dict[str, tuple[str, str]]:
 def _plain(text: str) -> str:
     """The first sentence, as it is said of a study file."""
     sentence = _SENTENCE.match(text)
-    return in_toml(
-        _ROLE.sub(
-            lambda role: role[1] or role[2], (sentence[1] if sentence else text).replace("\n", " ")
-        )
+    return _ROLE.sub(
+        lambda role: role[1] or role[2], (sentence[1] if sentence else text).replace("\n", " ")
     )
