@@ -15,7 +15,7 @@ from saltus.errors import LONGEST, ParameterError, closest, must_be, nearest, on
 SOURCES = Path(saltus.__file__).parent
 #: Functions that read an error by its text, and why.
 READERS = {
-    ("study/tables/messages.py", "syntax_fault"): "tomllib says the line and the fault in a text",
+    ("study/messages.py", "syntax_fault"): "tomllib says the line and the fault in a text",
     ("system/formula.py", "_parsed"): "the first sentence of a SyntaxError is shown",
     (
         "results/files/export.py",

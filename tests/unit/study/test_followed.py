@@ -9,13 +9,13 @@ import pytest
 import saltus as sl
 from saltus.errors import SaltusError, StudyError
 from saltus.results import load
-from saltus.study.answers.ask import questions_of
 from saltus.study.answers.motion_rows import spectrum_table
+from saltus.study.ask import questions_of
+from saltus.study.read import parse
 from saltus.study.run.running import Resources
 from saltus.study.run.status import status_tables
 from saltus.study.run.study import run_study
 from saltus.study.setting.inputs import Inputs
-from saltus.study.tables.read import parse
 from saltus.units import from_si
 
 HEAD = """

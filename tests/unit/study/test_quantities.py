@@ -10,8 +10,8 @@ import pytest
 
 from saltus import models
 from saltus.errors import StudyError, UnitError
+from saltus.study.read import parse
 from saltus.study.setting import quantities
-from saltus.study.tables.read import parse
 
 RIG = models.delangre("b")
 

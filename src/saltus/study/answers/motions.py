@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from pydantic import Field
+
 from saltus.errors import StudyError, nearest, shown
 from saltus.study.answers.motion_rows import TABLES
-from saltus.study.answers.question import Answers, OneVerb, first_figure
+from saltus.study.answers.question import Answers, OneVerb, asked, first_figure
 from saltus.study.code import code_hash
 from saltus.study.setting import quantities
-from saltus.study.tables.signature import verb
+from saltus.study.tables.kinds import KINDS, whole
+from saltus.study.tables.signature import Asked, OfLength, table, verb
 from saltus.system.quantity import quantity
 
 if TYPE_CHECKING:
@@ -22,6 +25,11 @@ if TYPE_CHECKING:
 FORMULA = "formula"
 #: Parts of a balance, and those that needn't be there.
 _PARTS, _OPTIONAL = ("energy", "supplied", "dissipated"), ("friction",)
+
+
+_BASE: Any = (OfLength, Asked)
+_STATES = Field(None, min_length=1, description="Which states; all by default.", examples=[["x"]])
+_LEFT_OUT = ("state", "keep", "time_errors", "surface", "direction")
 
 
 class OfMotions(OneVerb):
@@ -87,10 +95,11 @@ class OfMotions(OneVerb):
             )
 
 
+@asked(20, table("poincare", ["poincare"], KINDS, base=_BASE, called="Poincare section"))
 class Section(OfMotions):
     """[poincare]: where motions cross a surface."""
 
-    place, function, picture, several = "poincare", "poincare", "section", True
+    picture, several = "section", True
 
     def check_more(self, table: Any, setting: Setting) -> None:
         """The surface in SI."""
@@ -120,10 +129,22 @@ class Section(OfMotions):
         self.arguments["surface"] = surface
 
 
+@asked(
+    30,
+    table(
+        "spectrum",
+        ["spectrum", "simulate", "poincare"],
+        KINDS | {"samples": whole(200, least=4)},
+        base=_BASE,
+        called="Spectrum",
+        without=_LEFT_OUT,
+        states=(list[str] | None, _STATES),
+    ),
+)
 class Lines(OfMotions):
     """[spectrum]: motions by frequency."""
 
-    place, function, picture, several = "spectrum", "spectrum", "spectrum", True
+    picture, several = "spectrum", True
 
     def check_more(self, table: Any, setting: Setting) -> None:  # noqa: ARG002
         """Which states and periods."""
@@ -161,10 +182,11 @@ class Lines(OfMotions):
         return ds
 
 
+@asked(40, table("impacts", ["impact_statistics"], KINDS, base=_BASE, called="Impact statistics"))
 class Statistics(OfMotions):
     """[impacts]: how often, how hard and how long the contacts are."""
 
-    place, function, picture = "impacts", "impact_statistics", "impacts"
+    picture = "impacts"
 
     def check_more(self, table: Any, setting: Setting) -> None:
         """Sides and forces."""
@@ -190,10 +212,11 @@ class Statistics(OfMotions):
         self.arguments["force"] = force or None
 
 
+@asked(50, table("energy", ["energy_balance"], KINDS, base=_BASE, called="Energy balance"))
 class Balance(OfMotions):
     """[energy]: energy stored, supplied and dissipated."""
 
-    place, function, picture = "energy", "energy_balance", "energy"
+    picture = "energy"
 
     def check_more(self, table: Any, setting: Setting) -> None:
         """The three functions: as written, or those of the model, which stand in its code."""

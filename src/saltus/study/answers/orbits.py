@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+from pydantic import Discriminator, Tag
 
+from saltus.fence import MOST_PERIODS
 from saltus.results.dataset.schema import period_text, states_of
 from saltus.results.wording import unit_of
-from saltus.study.answers.question import Answers, OneVerb, first_figure
+from saltus.study.answers.question import Answers, OneVerb, asked, first_figure
 from saltus.study.table import ROWS, number, quantity, table, words
+from saltus.study.tables.kinds import KINDS, OF_RESPONSES, whole
+from saltus.study.tables.parts import Interval, Quantity, Starts
+from saltus.study.tables.signature import Kind
+from saltus.study.tables.signature import table as asking
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -17,10 +23,24 @@ if TYPE_CHECKING:
     from saltus.study.table import Column, TextTable
 
 
+#: A time, or a range of them.
+Period = Annotated[
+    Annotated[Interval, Tag("list")] | Annotated[Quantity, Tag("quantity")],
+    Discriminator(lambda given: "list" if isinstance(given, list) else "quantity"),
+]
+#: They are found from many starts.
+KEYS = OF_RESPONSES | {
+    "start": Kind(Starts, (*KINDS["start"].examples, "random 1000"),
+        'Where to begin: every state, lists making a batch; or "random 1000" with box.',
+        convert="start"),
+    "periods": whole(3, most=MOST_PERIODS),
+    "period": Kind(Period, (["1 s", "5 s"], "0.1 s"), convert="period"),
+}  # fmt: skip
+
+
+@asked(100, asking("periodic_orbits", ["periodic_orbits"], KEYS, called="Periodic orbits"))
 class Orbits(OneVerb):
     """Periodic orbits, stable and unstable."""
-
-    place, function = "periodic_orbits", "periodic_orbits"
 
     def rows(self, ds: xr.Dataset, found: Answers) -> list[TextTable]:  # noqa: ARG002
         """A row for each orbit; what the search says of those that it missed."""

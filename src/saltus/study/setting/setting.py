@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from saltus.study.setting.inputs import Inputs
     from saltus.study.tables.parts import Header, Output, Quantity, SystemTable
     from saltus.study.tables.parts import Table as SpecTable
-    from saltus.study.tables.spec import Study
+    from saltus.study.tables.study import Study
     from saltus.system import System
 
 

@@ -5,24 +5,19 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from tomllib import TOMLDecodeError
-from typing import Any
+from types import UnionType
+from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import ValidationError
 
 from saltus.errors import closest, nearest, shown
+from saltus.study.spec import QUESTIONS, Study
 from saltus.study.tables.methods import METHODS
-from saltus.study.tables.parts import Curve, Header, Output, Range, SystemTable, Table
-from saltus.study.tables.questions import Axis, Compare, Map
-from saltus.study.tables.spec import QUESTIONS, Study
+from saltus.study.tables.parts import Table
 from saltus.study.tables.toml import cut, toml
 
 #: Keys and indices on the way from the study to a value.
 Place = tuple[int | str, ...]
-TABLES: dict[str, type[Table]] = QUESTIONS | {
-    "study": Header, "system": SystemTable, "compare": Compare, "map": Map, "axes": Axis,
-    "frequency": Range, "vary": Range,
-    "outputs": Output, "tables": Curve,
-}  # fmt: skip
 #: Parts of a place that name the branch of a union, not a key.
 _BRANCHES = re.compile(r"float|str|(list|dict)\[.*\]|function-.*")
 _BARE_QUANTITY = re.compile(
@@ -192,15 +187,38 @@ def _fault(place: Place, details: list[dict[str, Any]], data: Any) -> str:
 
 def _table(place: Place) -> type[Table] | None:
     """The class of the table at a place in a study."""
-    table: type[Table] | None = Study
+    inside: Any = Study
     for part in place:
-        nested = (
-            part in ("method", "flow", "reference")
-            or isinstance(part, int)
-            or table in (Axis, Range, Output, Curve)
-        )
-        table = METHODS.get(str(part)) or TABLES.get(str(part)) or (table if nested else None)
-    return table
+        inside = METHODS.get(str(part)) or _inside(inside, part)
+    return next((one for one in _parts(inside) if _is_table(one)), None)
+
+
+def _inside(kind: Any, part: int | str) -> Any:
+    """The type of what stands in a table, list or mapping by a key or an index; None if nothing
+    does.
+    """
+    for one in _parts(kind):
+        if _is_table(one):
+            field = one.model_fields.get(str(part))
+            return field.annotation if field is not None else None
+        if get_origin(one) in (list, dict):
+            return get_args(one)[-1]
+    return None
+
+
+def _parts(kind: Any) -> Iterator[Any]:
+    """The types that a type is one of."""
+    if get_origin(kind) is Annotated:
+        yield from _parts(get_args(kind)[0])
+    elif get_origin(kind) in (Union, UnionType):
+        for one in get_args(kind):
+            yield from _parts(one)
+    else:
+        yield kind
+
+
+def _is_table(kind: Any) -> bool:
+    return isinstance(kind, type) and issubclass(kind, Table)
 
 
 def _known(place: Place) -> Iterator[str]:
