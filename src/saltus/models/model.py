@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from saltus.errors import ParameterError, among, nearest, shown
+from saltus.errors import ParameterError, among, shown, unknown
 from saltus.system import System, system
 
 #: What the docstring of every model says about its arguments; ``{example}`` is one of its own
@@ -90,9 +90,7 @@ def model(
                 )
             chosen = positional[0] if positional else case
             if cases and not among(chosen, cases):
-                raise ParameterError(
-                    f"{name} has no case {shown(chosen)}. {nearest(chosen, cases)}"
-                )
+                raise unknown(f"{name} has no case", chosen, cases)
             return traced().with_values(**{**(cases[chosen] if cases else {}), **values})
 
         named = (

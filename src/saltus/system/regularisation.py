@@ -17,7 +17,7 @@ from saltus.contact.blend import STEPS, Step, blended
 from saltus.contact.guards import is_hold
 from saltus.contact.reduction import free_field
 from saltus.contact.singular import set_aside
-from saltus.errors import ParameterError, TraceError, among, nearest, shown
+from saltus.errors import ParameterError, TraceError, among, nearest, shown, unknown
 from saltus.language import expression as ex
 from saltus.language.names import why_no_name
 from saltus.system import checks
@@ -180,9 +180,7 @@ def _names(system: System, width: Any) -> dict[int, Any]:
     known = [guard.name for guard in system.guards]
     for name in width:
         if not among(name, known):
-            raise ParameterError(
-                f"{system.name} has no boundary {shown(name)}. {nearest(name, known)}"
-            )
+            raise unknown(f"{system.name} has no boundary", name, known)
     if not width:
         raise ParameterError("width={} names no boundary: there is nothing to regularise.")
     return {known.index(name): value for name, value in width.items()}

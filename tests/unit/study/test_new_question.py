@@ -41,7 +41,7 @@ model = "delangre"
 """
 (answer,) = ask(HEAD + "[stroboscope]\nperiods = 5\n")
 print(list(QUESTIONS)[:3], "stroboscope" in Study.model_json_schema()["properties"])
-print(answer.question.stem, answer.rows[0].data['points'], FILE.verb("stroboscope"))
+print(answer.question.stem, answer.rows[0].data[1], FILE.verb("stroboscope"))
 try:
     ask(HEAD + "[stroboscope]\nperiod = 5\n")
 except StudyError as error:
@@ -59,6 +59,6 @@ def test_a_new_question_is_one_file(tmp_path):
     assert said.returncode == 0, said.stderr
     assert said.stdout.splitlines() == [
         "['simulate', 'stroboscope', 'poincare'] True",
-        "stroboscope [6] [stroboscope]",
+        "stroboscope ('6',) [stroboscope]",
         "study: [stroboscope] has no key 'period'. Did you mean 'periods'?",
     ]

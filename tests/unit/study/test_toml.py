@@ -6,7 +6,7 @@ import pytest
 
 from saltus.errors import ParameterError, StudyError
 from saltus.sentences import PYTHON, Given, Word, said
-from saltus.study.tables import spec
+from saltus.study.spec import QUESTIONS
 from saltus.study.tables.toml import FILE, fault, toml
 
 
@@ -41,7 +41,7 @@ from saltus.study.tables.toml import FILE, fault, toml
     ],
 )  # fmt: skip
 def test_a_sentence_is_said_of_python_and_of_a_file(text, python, file):
-    assert spec.QUESTIONS
+    assert QUESTIONS
     assert (said(text, PYTHON), said(text, FILE)) == (python, file)
 
 

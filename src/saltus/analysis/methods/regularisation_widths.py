@@ -14,7 +14,7 @@ from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.inputs.starts import ensemble
 from saltus.analysis.inputs.verb import verb
 from saltus.contact import STEPS
-from saltus.errors import ParameterError, among, nearest, shown
+from saltus.errors import ParameterError, among, must_be, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import ODE45, Method, Taylor, check_method
@@ -163,7 +163,7 @@ def _widths(system: System, orbit: np.ndarray, given: Any, unit: str) -> np.ndar
     given = given if isinstance(given, list | tuple | np.ndarray) else [given]
     widths = np.array([to_si(one, unit, "widths") for one in given])
     if not len(widths) or not (widths > 0).all():
-        raise ParameterError(f"widths must be positive, at least one, not {shown(given)}.")
+        raise must_be("widths", "positive, at least one", given)
     return np.sort(widths)[::-1]
 
 

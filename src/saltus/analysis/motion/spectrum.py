@@ -13,7 +13,7 @@ import xarray as xr
 
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion.settled import settled
-from saltus.errors import ParameterError, among, nearest, shown
+from saltus.errors import ParameterError, among, nearest, shown, unknown
 from saltus.flow.counts import whole as whole_number
 from saltus.results import Subject, build, inherited
 from saltus.results.dataset import schema
@@ -177,9 +177,7 @@ def _states(run: xr.Dataset, state: str | Sequence[str] | None) -> list[str]:
     )
     for name in names:
         if not among(name, known):
-            raise ParameterError(
-                f"spectrum: this run has no state {shown(name)}. {nearest(name, known)}"
-            )
+            raise unknown("spectrum: this run has no state", name, known)
     return names
 
 

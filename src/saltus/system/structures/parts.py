@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from saltus.errors import ParameterError, among, nearest, shown
+from saltus.errors import ParameterError, among, must_be, nearest, shown
 
 #: Where a contact begins: above its gap, below minus its gap, or at both.
 SIDES = ("upper", "lower", "both")
@@ -153,7 +153,7 @@ def parts(kind: type[P], given: Any, word: str, known: Iterable[str]) -> list[tu
         If one of them can't be used.
     """
     if isinstance(given, Contact | Force | Mapping) or not isinstance(given, Iterable):
-        raise ParameterError(f"{word}s must be a list of them, not {shown(given)}.")
+        raise must_be(f"{word}s", "a list of them", given)
     degrees = list(known)
     found = [one if isinstance(one, kind) else _made(kind, one) for one in given]
     unnamed = [one for one in found if one.name is None]
