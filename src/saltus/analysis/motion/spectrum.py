@@ -13,7 +13,7 @@ import xarray as xr
 
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion.settled import settled
-from saltus.errors import ParameterError, among, nearest, shown, unknown
+from saltus.errors import ParameterError, among, one_of, unknown
 from saltus.flow.counts import whole as whole_number
 from saltus.results import Subject, build, inherited
 from saltus.results.dataset import schema
@@ -103,8 +103,8 @@ def spectrum(
     0.333
     """
     schema.check(run, caller="spectrum", kinds=[schema.TRAJECTORY])
-    if window is not None and not among(window, WINDOWS):
-        raise ParameterError(f"spectrum: window={shown(window)}. {nearest(window, WINDOWS)}")
+    if window is not None:
+        one_of(WINDOWS, "spectrum: ", window=window)
     names = _states(run, state)
     stretch = _forced_stretch(run, last) if "period" in run.variables else _free_stretch(run, last)
     chosen = [window or ("none" if n else "hann") for n in stretch.response]

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from saltus.errors import ParameterError, among, must_be, nearest, shown
+from saltus.errors import ParameterError, among, must_be, nearest, one_of, shown
 
 #: Where a contact begins: above its gap, below minus its gap, or at both.
 SIDES = ("upper", "lower", "both")
@@ -202,8 +202,8 @@ def _check(name: str, one: Contact | Force, known: list[str]) -> None:
             f"{name}: a structure takes harmonic forces, amplitude*cos(2*pi*frequency*t), and no "
             f"record or function of the time. {BY_HAND}"
         )
-    if isinstance(one, Contact) and not among(one.side, SIDES):
-        raise ParameterError(f"{name}: side={shown(one.side)}. {nearest(one.side, SIDES)}")
+    if isinstance(one, Contact):
+        one_of(SIDES, f"{name}: ", side=one.side)
     if isinstance(one, Force) and (
         isinstance(one.harmonic, bool)
         or not isinstance(one.harmonic, int | np.integer)
