@@ -30,9 +30,9 @@ from saltus.flow import ODE45, Taylor
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.replication import Job
+from saltus.study.read import read
 from saltus.study.setting.setting import method_of, system_of
-from saltus.study.tables.read import read
-from saltus.study.tables.spec import Study
+from saltus.study.spec import Study
 from saltus.system import System
 from saltus.units import to_si
 

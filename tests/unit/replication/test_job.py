@@ -109,7 +109,7 @@ def test_the_code_of_saltus_is_no_paper_s_own():
 #: and pictures of what was computed.
 NO_NUMBERS = ("errors", "sentences", "announce", "arguments", "interrupt", "plot")
 #: What only says which system, method and arguments: these are in the identity themselves.
-SAYS_WHAT = ("replication.Job", "study.tables", "study.setting")
+SAYS_WHAT = ("replication.Job", "study.read", "study.spec", "study.tables", "study.setting")
 
 
 def sources(place):
