@@ -31,9 +31,9 @@ from saltus.flow import ODE45, Taylor
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.replication import Job
+from saltus.study.read import read
 from saltus.study.setting.setting import method_of, system_of
-from saltus.study.tables.read import read
-from saltus.study.tables.spec import Study
+from saltus.study.spec import Study
 from saltus.system import System
 from saltus.units import to_si
 
@@ -262,7 +262,7 @@ class _Plan:
     def maps(self, name: str) -> list[Job]:
         """A job for each basin map of a study file."""
         study, system, text = self._study(name)
-        assert study.basins is not None
+        basins: Any = dict(study.questions())["basins"]
         count = QUICK_CELLS[name] if self.quick else None
         arguments: dict[str, Any] = {
             "axes": {
@@ -279,7 +279,7 @@ class _Plan:
                 method_of(one.method or study.method),
                 arguments,
             )
-            for one in study.basins.map
+            for one in basins.map
         ]
 
     def fig6(self) -> list[Job]:

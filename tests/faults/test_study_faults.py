@@ -35,10 +35,10 @@ from saltus.kernels import status as st
 from saltus.results import load
 from saltus.results.kinds.basins import rows
 from saltus.results.store.store import Store
+from saltus.study.read import parse
 from saltus.study.run import maps
 from saltus.study.run.maps import compute, finish, open_store
 from saltus.study.run.running import Resources
-from saltus.study.tables.read import parse
 from small_maps import small_maps
 from small_study import maps_of, small_study
 
@@ -60,7 +60,7 @@ saltus.analysis.basins.pipeline.CHUNK = 24
 saltus.analysis.basins.pipeline.SCOUTS, saltus.analysis.basins.pipeline.CHECKED = 64, 64
 
 if __name__ == "__main__":  # a process of --workers computes chunks only
-    import saltus.plot, saltus.study.run.maps, saltus.study.tables.read, saltus.study.run.study
+    import saltus.plot, saltus.study.run.maps, saltus.study.read, saltus.study.run.study
     from saltus.cli import main
     from saltus.results.store.store import Store
 

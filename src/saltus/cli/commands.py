@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from saltus.results.table import TextTable
     from saltus.study.run.running import Resources
     from saltus.study.setting.inputs import Inputs
-    from saltus.study.tables.spec import Study
+    from saltus.study.tables.study import Study
     from saltus.system import System
 
 
@@ -163,8 +163,8 @@ def run(
     from saltus.cli.own_system import check_beside, own_system
     from saltus.results import usable_folder
     from saltus.results.files.atomic import no_folder_left
+    from saltus.study.read import read
     from saltus.study.setting.inputs import Inputs
-    from saltus.study.tables.read import read
 
     spec, text = read(study)
     for place in inputs or []:
@@ -187,7 +187,7 @@ def _resources(
 ) -> Resources:
     from saltus.study.run.running import Resources, shard_of
 
-    if spec.basins is None and (workers or scheduler or shard):
+    if "basins" not in dict(spec.questions()) and (workers or scheduler or shard):
         raise StudyError(
             "--workers, --scheduler and --shard are for studies of basins; this one "
             "has no [basins]. Leave them out."
@@ -258,8 +258,8 @@ def resume(
     Example: `saltus resume saltus-runs/fig6b`
     """
     from saltus.cli.own_system import own_system
+    from saltus.study.read import read
     from saltus.study.run.copies import copy_of, inputs_of
-    from saltus.study.tables.read import read
 
     spec, text = read(copy_of(store))
     user_system = own_system(system) if system else None
@@ -452,7 +452,7 @@ def schema() -> None:
     """
     import json
 
-    from saltus.study.tables.spec import Study
+    from saltus.study.spec import Study
 
     typer.echo(json.dumps(Study.model_json_schema(), indent=2, ensure_ascii=False))
 

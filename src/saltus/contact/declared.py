@@ -10,6 +10,7 @@ from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from typing import Any, ClassVar, TypeVar
 
+from saltus.arguments import written
 from saltus.errors import TraceError, shown
 from saltus.language.dimensions import DimensionCheck
 from saltus.language.expression import (
@@ -128,6 +129,7 @@ def declarations() -> AbstractContextManager[list[Declared]]:
     return gathered(_MADE)
 
 
+@written("impact(x < gap, v, restitution=0.8), after the rates")
 def impact(
     allowed: Condition,
     velocity: Operand,

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from saltus.arguments import written
 from saltus.errors import TraceError
 from saltus.language.compositions import sign
 from saltus.language.expression import Expr, Friction, Operand, as_expr, select
 
 
+@written("friction(v, slip=..., stick=...)")
 def friction(velocity: Operand, *, slip: Operand, stick: Operand | None = None) -> Any:
     """The force of dry friction, ``slip*sign(velocity)``: it sticks where the force that this needs
     is smaller than ``stick``.

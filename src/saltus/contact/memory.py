@@ -186,7 +186,7 @@ def iwan(
     if not len(stiffnesses) or len(stiffnesses) != len(limits):
         raise TraceError(
             f"sl.iwan has {len(stiffnesses)} stiffnesses and {len(limits)} limits. Give one of "
-            f"each for every element."
+            "each for every element."
         )
     force: Expr = ex.constant(0.0)
     for number, (k, limit) in enumerate(zip(stiffnesses, limits, strict=True), 1):
@@ -202,7 +202,7 @@ def _taken(name: str) -> bool:
 def _check_positive(law: str, what: str, value: Expr) -> None:
     """Raise a TraceError for a number that isn't positive."""
     if value.op == "const" and not value.payload > 0:
-        raise TraceError(f"sl.{law}: {what} = {value.payload:g} must be positive.")
+        raise TraceError(lambda say: f"{say.sl}{law}: {what} = {value.payload:g} must be positive.")
 
 
 def _stop(law: str, x: Expr, limit: Expr, name: str | None, what: str) -> Expr:
@@ -210,23 +210,29 @@ def _stop(law: str, x: Expr, limit: Expr, name: str | None, what: str) -> Expr:
     made = _MADE.get()
     if made is None:
         raise TraceError(
-            f"sl.{law} brings a state of its own, which only an equation of motion can have: write "
-            f"it inside the function under @sl.system."
+            lambda say: (
+                f"{say.sl}{law} brings a state of its own, which only an equation of motion can "
+                f"have: write it inside the function under {say.system()}."
+            )
         )
     _check_positive(law, what, limit)
     if ex.depends_on(x, ("table",)):
         raise TraceError(
-            f"sl.{law}: a record or table drives it, and where that turns isn't known beforehand. "
-            f"Let it drive a mass, and give the element the place of the mass."
+            lambda say: (
+                f"{say.sl}{law}: a record or table drives it, and where that turns isn't known "
+                "beforehand. Let it drive a mass, and give the element the place of the mass."
+            )
         )
     if name is None:
         numbered = (law if i == 1 else f"{law}_{i}" for i in itertools.count(1))
         name = next(one for one in numbered if not _taken(one))
     elif why_no_name(name) is not None:
-        raise TraceError(f"sl.{law}: {shown(name)} can't be the name of a state.")
+        raise TraceError(lambda say: f"{say.sl}{law}: {shown(name)} can't be the name of a state.")
     elif _taken(name):
         raise TraceError(
-            f"sl.{law}: two elements are called {shown(name)}. Give each its own name=."
+            lambda say: (
+                f"{say.sl}{law}: two elements are called {shown(name)}. Give each its own name=."
+            )
         )
     made.append(Element(name, x, limit))
     return ex.state(name)

@@ -19,6 +19,7 @@ from saltus.contact.guards import Guard, equation_of, is_hold
 from saltus.language.canonical import Canonical
 from saltus.language.evaluate import evaluate
 from saltus.language.expression import Bit, Condition, Expr, Not, add, neg, walk
+from saltus.sentences import Text
 
 
 def overlapping(
@@ -26,7 +27,7 @@ def overlapping(
     guards: tuple[Guard, ...],
     states: Sequence[str],
     values: Mapping[str, Any],
-) -> str | None:
+) -> Text | None:
     """The message about two overlapping pieces, one below a boundary and one above another; None if
     none overlap.
 
@@ -50,12 +51,12 @@ def overlapping(
         )
         entry = f" (trajectory {worst} of {np.size(overlap)})" if np.ndim(overlap) else ""
         places = " and ".join(equation_of(number, guards) for number in (first, second))
-        return (
+        return lambda say: (
             f"with {given}{entry} the contacts at {places} overlap, and the first "
             f"piece would hide the second. A "
             f"clearance can't be negative. Springs that touch on both sides at once are the sum of "
             f"two one-sided contacts: "
-            f"sl.freeplay(x, stiffness=k, lower_gap=gap) + sl.freeplay(x, stiffness=k, "
+            f"{say.sl}freeplay(x, stiffness=k, lower_gap=gap) + {say.sl}freeplay(x, stiffness=k, "
             f"upper_gap=gap)."
         )
     return None

@@ -144,10 +144,10 @@ def check_gaps(guards: Sequence[Guard]) -> None:
             ):
                 raise TraceError(
                     f"the boundary {guard.name!r} asks for the sign of a law that has no Taylor "
-                    f"series where its own piece begins. Write it "
-                    f"as one piece with all of its conditions: for a contact without tension, d = "
-                    f"x - gap and "
-                    f"sl.piecewise((K*d**1.5*(1 + c*v), (d > 0) & (1 + c*v > 0)), otherwise=0)."
+                    "series where its own piece begins. Write it as one piece with all of its "
+                    "conditions: for a contact without tension, d = x - gap and ",
+                    lambda say: f"{say.sl}piecewise((K*d**1.5*(1 + c*v), ",
+                    "(d > 0) & (1 + c*v > 0)), otherwise=0).",
                 )
 
 

@@ -80,9 +80,11 @@ class RK4(OneByOne):
         longest = period / STEPS_PER_FORCING
         if float(self.step) > longest * (1 + 1e-9):
             raise ParameterError(
-                f"RK4's step of {float(self.step):g} s is longer than a tenth of the forcing's "
-                f"period of {period:g} s: too long to follow it. Take at most "
-                f"RK4({longest:.3g}), or sl.Taylor(), which finds its steps itself."
+                lambda say: (
+                    f"RK4's step of {float(self.step):g} s is longer than a tenth of the "
+                    f"forcing's period of {period:g} s: too long to follow it. Take at most "
+                    f"RK4({longest:.3g}), or {say.method('Taylor')}, which finds its steps itself."
+                )
             )
 
     @property

@@ -12,13 +12,14 @@ from typing import Protocol
 
 import numpy as np
 
-from saltus.errors import ParameterError, shown
+from saltus.errors import ParameterError, must_be
 from saltus.flow import engine
 from saltus.flow.flight import Flight
 from saltus.flow.methods import Method
 from saltus.flow.request import Outcome, Request, Schedule
 from saltus.flow.shots import Shots
 from saltus.kernels import status as st
+from saltus.sentences import Dialect
 from saltus.system import System, check_values
 from saltus.system.tangent import tangent_system
 
@@ -27,14 +28,6 @@ from saltus.system.tangent import tangent_system
 STEP = 2e-5
 #: Samples of the mode in each period, where contacts aren't located.
 MODE_SAMPLES = 32
-#: End of the message for a system without forcing.
-NO_PERIOD = (
-    "has no forcing period: give every=, the time between two samples of the motion, such as "
-    'every="0.1 s", about one rotation. '
-    "Answers don't depend on it."
-)
-#: End of the message where a time is given for a forced one.
-FORCED = "is forced: it is sampled once a forcing period. Leave every= out."
 #: Noise of a method relative to a motion, over that relative to a box of starts. Measured for ode45
 #: at (1e-4, 1e-7) on the rig's responses: returns scatter by 0.05 to 2 % of their range with
 #: location, by 0.3 to 4 % without.
@@ -75,6 +68,19 @@ class Travel(Protocol):
 
     def keep(self, wanted: np.ndarray) -> None:
         """Keep only the wanted trajectories, bool[k]."""
+
+
+def no_period(say: Dialect) -> str:
+    """End of the message for a system without forcing."""
+    return (
+        f"has no forcing period: give {say.key('every')}, the time between two samples of the "
+        f"motion, such as {say.key(every='0.1 s')}, about one rotation. Answers don't depend on it."
+    )
+
+
+def forced(say: Dialect) -> str:
+    """End of the message where a time is given for a forced one."""
+    return f"is forced: it is sampled once a forcing period. Leave {say.key('every')} out."
 
 
 class Map(Protocol):
@@ -161,9 +167,9 @@ class Stroboscope:
         threads: int | None = None,
     ):
         if (every is None) == (system.forced_at is None):
-            raise ParameterError(f"{system.name} {NO_PERIOD if every is None else FORCED}")
+            raise ParameterError(f"{system.name} ", no_period if every is None else forced)
         if every is not None and not (np.isfinite(every) & (np.asarray(every) > 0)).all():
-            raise ParameterError(f"every must be a positive time, not {shown(every)}.")
+            raise must_be("every", "a positive time", every)
         self.system, self.method, self.states, self.threads = system, method, system.states, threads
         self.parameters = np.atleast_2d(
             np.array(list(system.values.values()) if parameters is None else parameters, float)

@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from saltus.codegen.module import Flow
-from saltus.errors import ParameterError, nearest, shown
+from saltus.errors import ParameterError, must_be, nearest, shown
 from saltus.system import System
 
 #: Default step budget per period; a healthy trajectory takes ten to a hundred steps.
@@ -40,7 +40,7 @@ def check_positive(name: str, value: Any) -> None:
         or not isinstance(value, int | float | np.integer | np.floating)
         or not 0 < value <= sys.float_info.max
     ):
-        raise ParameterError(f"{name} must be a positive number, not {shown(value)}.")
+        raise must_be(name, "a positive number", value)
 
 
 _M = TypeVar("_M", bound="Method")

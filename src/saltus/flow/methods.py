@@ -50,7 +50,9 @@ def exact_method(method: Any, asked: str) -> Method:
     checked = check_method(method)
     if not checked.exact:
         raise ParameterError(
-            f"{asked} needs a method whose errors are rounding, not {checked.name}: Newton's "
-            "method doesn't close its orbits. Leave method= out."
+            lambda say: say.either(f"{asked} needs", "needs"),
+            f" a method whose errors are rounding, not {checked.name}: Newton's method doesn't "
+            "close its orbits. ",
+            lambda say: f"Leave {say.key('method')} out.",
         )
     return checked

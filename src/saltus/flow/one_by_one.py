@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from saltus.codegen.module import Flow, steps_module
-from saltus.errors import ParameterError, shown
+from saltus.errors import must_be
 from saltus.flow.counts import whole
 from saltus.flow.method import Method, step_budget
 from saltus.flow.taylor import Taylor
@@ -27,7 +27,7 @@ class OneByOne(Method):
         """Raise ParameterError for an unknown way of crossing, or a bad step budget."""
         if not isinstance(self.events, str) or self.events not in self.EVENTS:
             ways = ", ".join(f'"{way}"' for way in self.EVENTS)
-            raise ParameterError(f"events must be one of {ways}, not {shown(self.events)}.")
+            raise must_be("events", f"one of {ways}", self.events)
         if self.max_steps is not None:
             whole(self.max_steps, "max_steps")
         whole(self.max_events, "max_events")

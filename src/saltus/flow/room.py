@@ -7,6 +7,7 @@ import threading
 from pathlib import Path
 
 from saltus.errors import ParameterError
+from saltus.sentences import Text
 
 #: Share of the free memory that one call may take.
 SHARE = 0.5
@@ -48,7 +49,7 @@ def free() -> int:
     return min(amounts)
 
 
-def check_room(size: float, what: str, instead: str) -> None:
+def check_room(size: float, what: str, instead: Text) -> None:
     """Raise ParameterError if ``size`` is more than one call may take.
 
     Parameters
@@ -57,7 +58,7 @@ def check_room(size: float, what: str, instead: str) -> None:
         Estimate [bytes].
     what : str
         The contents, in the plural: ``"4 trajectories with 100 samples each"``.
-    instead : str
+    instead : str or callable
         Advice, as a sentence.
     """
     if size <= ALWAYS_ALLOWED:
@@ -67,7 +68,8 @@ def check_room(size: float, what: str, instead: str) -> None:
         raise ParameterError(
             f"{what} are more than fits here: they need about {size / 1e9:.3g} GB of memory, and "
             f"half of the free memory is "
-            f"{room / 1e9:.3g} GB. {instead}"
+            f"{room / 1e9:.3g} GB. ",
+            instead,
         )
 
 

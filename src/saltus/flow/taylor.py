@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from saltus.codegen.module import Flow, lane_width, taylor_module
-from saltus.errors import ParameterError, shown
+from saltus.errors import must_be
 from saltus.flow.counts import whole
 from saltus.flow.method import STEPS_PER_PERIOD, Method, check_positive, explain_unknown_options
 from saltus.flow.pace import CHECK_STEPS, LONG_CHECK_STEPS
@@ -63,7 +63,7 @@ class Taylor(Method):
         if self.lanes is not None and (
             not isinstance(self.lanes, int) or self.lanes not in (2, 4, 8, 16)
         ):
-            raise ParameterError(f"lanes must be 2, 4, 8 or 16, not {shown(self.lanes)}.")
+            raise must_be("lanes", "2, 4, 8 or 16", self.lanes)
         if self.max_steps is not None:
             whole(self.max_steps, "max_steps")
         whole(self.max_events, "max_events")

@@ -14,6 +14,7 @@ import weakref
 from dataclasses import dataclass
 from typing import Any
 
+from saltus.arguments import written
 from saltus.errors import TraceError, shown
 from saltus.language import expression as ex
 from saltus.language.derivatives import differentiate
@@ -183,6 +184,7 @@ def of_time_only(gap: Expr) -> bool:
 
 
 @ex.answers("__mod__")
+@written("mod(t, T)")
 def mod(a: Operand, cycle: Operand) -> Any:
     """The remainder of ``a`` by ``cycle``, in [0, cycle): time within the present cycle, for drives
     that repeat.
@@ -216,16 +218,20 @@ def mod(a: Operand, cycle: Operand) -> Any:
     value, length = ex.as_expr(a), ex.as_expr(cycle)
     if ex.varies(length):
         raise TraceError(
-            f"the cycle of sl.mod must be a number or a parameter, not {shown(length)}."
+            lambda say: (
+                f"the cycle of {say.sl}mod must be a number or a parameter, not {shown(length)}."
+            )
         )
     if length.op == "const" and length.payload == 0:
-        raise TraceError("the cycle of sl.mod is zero.")
+        raise TraceError(lambda say: f"the cycle of {say.sl}mod is zero.")
     with ex.observed(None):
         line = affine(value)
     if line is None or not ex.depends_on(value, ("time",)):
         raise TraceError(
-            f"sl.mod of {value!r}: a remainder is for rate*t + offset with numbers and parameters. "
-            f"Of a state it has no end of boundaries; "
-            f"write a law that repeats in x with sl.sin and sl.cos."
+            lambda say: (
+                f"{say.sl}mod of {value!r}: a remainder is for rate*t + offset with numbers and "
+                "parameters. Of a state it has no end of boundaries; write a law that repeats in "
+                f"x with {say.sl}sin and {say.sl}cos."
+            )
         )
     return Expr("mod", (value, length))

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from saltus.arguments import written
 from saltus.language.expression import Condition, Expr, Operand
 from saltus.language.functions import atan, exp, max, min, of_numbers, pi, piecewise, sqrt, tanh
 
@@ -18,6 +19,7 @@ def _traced(*values: object) -> bool:
     return any(isinstance(value, Expr) for value in values)
 
 
+@written("where(condition, value, otherwise)")
 def where(condition: Condition | bool, value: Operand, otherwise: Operand) -> Any:
     """``value`` where the condition holds, ``otherwise`` elsewhere: short for
     ``sl.piecewise((value, condition), otherwise=otherwise)``.
@@ -51,6 +53,7 @@ def heaviside(a: Operand, at_zero: float = 0.5) -> Any:
     )
 
 
+@written("clip(x, low, high)")
 def clip(a: Operand, low: Operand, high: Operand) -> Any:
     """``a`` held between ``low`` and ``high``: ``sl.min(sl.max(a, low), high)``, with a boundary at
     each end.

@@ -16,13 +16,17 @@ from saltus.errors import UnitError
 from saltus.language.expression import Expr, walk
 from saltus.language.operations import ELEMENTARY
 from saltus.language.text import PI_MULTIPLES
+from saltus.sentences import Dialect
 from saltus.units import dimension, unit_text
 
 #: Exponents of m, kg, s, A and K.
 Dimension = dict[str, Fraction]
 
 _PLAIN: Dimension = {}
-_WAY_OUT = "sl.system(..., check_units=False) leaves units unchecked."
+
+
+def _way_out(say: Dialect) -> str:
+    return f"{say.system(check_units=False)} leaves units unchecked."
 
 
 class _Number(dict[str, Fraction]):
@@ -81,7 +85,8 @@ class DimensionCheck:
                 raise UnitError(
                     f"d{name}/dt is a rate in {unit_text(wanted)}, but {_brief(term)} is "
                     f"{_in(found)}: "
-                    f"{_missing(found, wanted)}. {_WAY_OUT}"
+                    f"{_missing(found, wanted)}. ",
+                    _way_out,
                 )
 
     def check_plain(self, node: Expr, what: str) -> None:
@@ -107,7 +112,8 @@ class DimensionCheck:
         if isinstance(wanted, _Number) or isinstance(found, _Number):
             return
         raise UnitError(
-            f"{what} is to be {_in(wanted)}, but {_brief(node)} is {_in(found)}. {_WAY_OUT}"
+            f"{what} is to be {_in(wanted)}, but {_brief(node)} is {_in(found)}. ",
+            _way_out,
         )
 
     def unit(self, node: Expr) -> str:
@@ -174,7 +180,8 @@ class DimensionCheck:
         missing = _missing(b, a, " in the second") if second else _missing(a, b, " in the first")
         raise UnitError(
             f"{_brief(left)} [{unit_text(a)}] and {_brief(right)} [{unit_text(b)}] {what}, which "
-            f"needs one unit: {missing}. {_WAY_OUT}"
+            f"needs one unit: {missing}. ",
+            _way_out,
         )
 
     def _power(
@@ -201,7 +208,8 @@ class DimensionCheck:
             raise UnitError(
                 f"{_brief(inner)} is in {unit_text(argument)}, but stands {where} {_brief(node)}, "
                 f"which takes a plain number or an "
-                f"angle. {_WAY_OUT}"
+                "angle. ",
+                _way_out,
             )
         return None if argument is None else _PLAIN
 

@@ -23,6 +23,7 @@ from typing import Any, Protocol, TypeVar, Union, runtime_checkable
 
 from saltus.errors import TraceError, shown
 from saltus.language.operations import ELEMENTARY, FUNCTIONS
+from saltus.sentences import Dialect
 
 #: The functions that an equation may call, as a sentence.
 OWN_FUNCTIONS = (
@@ -206,6 +207,11 @@ class Expr:
 
     __or__ = __rand__ = __ror__ = __and__
 
+    def __xor__(self, _other: object) -> Expr:
+        raise TraceError("a power is written x**2; ^ is something else in Python.")
+
+    __rxor__ = __xor__
+
     def __bool__(self) -> bool:
         raise TraceError(
             "an equation asked whether a traced value is true. It is a symbol here, not a number: "
@@ -259,11 +265,12 @@ def answers(method: str) -> Callable[[Answer], Answer]:
     return handed_in
 
 
-#: Message for a comparison used as 0 or 1, as MATLAB allows.
-_NO_NUMBER = (
-    "a comparison was used as a number. Write sl.piecewise((1, x > gap), otherwise=0), or the "
-    "whole term in place of the 1: sl.piecewise((k*(x - gap), x > gap), otherwise=0)."
-)
+def _no_number(say: Dialect) -> str:
+    return say.either(
+        "a comparison was used as a number. Write sl.piecewise((1, x > gap), otherwise=0), or the "
+        "whole term in place of the 1: sl.piecewise((k*(x - gap), x > gap), otherwise=0).",
+        "a comparison is no number. Write 1 if x > gap else 0.",
+    )
 
 
 @contextmanager
@@ -365,11 +372,12 @@ class Condition:
 
     def __neg__(self, *_others: object) -> Expr:
         """Refuse, as every operation that would need a number."""
-        raise TraceError(_NO_NUMBER)
+        raise TraceError(_no_number)
 
     __pos__ = __abs__ = __float__ = __int__ = __neg__
     __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __neg__
-    __truediv__ = __rtruediv__ = __pow__ = __rpow__ = __neg__
+    __truediv__ = __rtruediv__ = __pow__ = __rpow__ = __mod__ = __rmod__ = __neg__
+    __lt__ = __le__ = __gt__ = __ge__ = __neg__
 
 
 @dataclass(frozen=True, eq=False)
@@ -481,7 +489,7 @@ def as_expr(value: Operand) -> Expr:
     if isinstance(value, Expr):
         return value
     if isinstance(value, Condition):
-        raise TraceError(_NO_NUMBER)
+        raise TraceError(_no_number)
     if isinstance(value, str | bytes):
         raise TraceError(
             f"an equation holds the text {shown(value)}. Text with units is for parameter values; "

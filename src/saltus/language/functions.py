@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from saltus.arguments import written
 from saltus.errors import TraceError, shown
 from saltus.language.expression import (
     Condition,
@@ -41,7 +42,10 @@ def of_numbers(name: str, function: Callable[..., Any], *numbers: Any) -> Any:
     except (TypeError, ValueError, ArithmeticError):
         given = ", ".join(map(shown, numbers))
         raise TraceError(
-            f"sl.{name}({given}) has no finite real value. Keep to the numbers where it has one."
+            lambda say: (
+                f"{say.sl}{name}({given}) has no finite real value. Keep to the numbers where it "
+                "has one."
+            )
         ) from None
 
 
@@ -98,6 +102,7 @@ def _extreme(
     return result
 
 
+@written("piecewise((value, condition), ..., otherwise=value)")
 def piecewise(*pieces: tuple[Operand, Condition | bool], otherwise: Operand | None = None) -> Any:
     """A value that differs from region to region: each comparison in a condition is a boundary
     where a contact can begin or end.
@@ -128,8 +133,10 @@ def piecewise(*pieces: tuple[Operand, Condition | bool], otherwise: Operand | No
     """
     if otherwise is None:
         raise TraceError(
-            "sl.piecewise needs otherwise=, the value where no condition holds: sl.piecewise((k*(x "
-            "- gap), x > gap), otherwise=0)."
+            lambda say: (
+                f"{say.sl}piecewise needs otherwise=, the value where no condition holds: "
+                f"{say.sl}piecewise((k*(x - gap), x > gap), otherwise=0)."
+            )
         )
     result: Any = otherwise
     for piece in reversed(pieces):
@@ -145,19 +152,25 @@ def _pair(piece: Any) -> tuple[Operand, Condition | bool]:
     """A piece, checked."""
     if not (isinstance(piece, tuple | list) and len(piece) == 2):
         raise TraceError(
-            f"a piece of sl.piecewise is a pair (value, condition), not {shown(piece)}."
+            lambda say: (
+                f"a piece of {say.sl}piecewise is a pair (value, condition), not {shown(piece)}."
+            )
         )
     value, condition = piece
     if isinstance(value, Condition):
         raise TraceError(
-            "a piece of sl.piecewise begins with its value: write (value, condition), "
-            "such as (k*(x - gap), x > gap)."
+            lambda say: (
+                f"a piece of {say.sl}piecewise begins with its value: write (value, condition), "
+                "such as (k*(x - gap), x > gap)."
+            )
         )
     if isinstance(condition, Condition):
         return value, condition
     if isinstance(condition, bool) or str(getattr(condition, "dtype", "")) == "bool":
         return value, bool(condition)
     raise TraceError(
-        f"the condition of a piece of sl.piecewise must be a comparison such as x > "
-        f"gap, not {shown(condition)}."
+        lambda say: (
+            f"the condition of a piece of {say.sl}piecewise must be a comparison such as x > gap, "
+            f"not {shown(condition)}."
+        )
     )

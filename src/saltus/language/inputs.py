@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from saltus.arguments import written
 from saltus.errors import TraceError, among, nearest, shown
 from saltus.language.clocks import mod
 from saltus.language.compositions import where
@@ -87,6 +88,7 @@ def sawtooth(phase: Operand, width: Operand = 1.0) -> Any:
     return where(mod(phase, _TURN) < _TURN * width, rise, fall)
 
 
+@written("pulse(t, duration, start=..., every=..., shape=...)")
 def pulse(
     t: Operand,
     duration: Operand,
@@ -129,11 +131,13 @@ def pulse(
     (1.0, 0.0)
     """
     if not among(shape, SHAPES):
-        raise TraceError(f"sl.pulse: shape={shown(shape)}. {nearest(shape, SHAPES)}")
+        raise TraceError(
+            lambda say: f"{say.sl}pulse: shape={shown(shape)}. {nearest(shape, SHAPES)}"
+        )
     for given in (t, duration, start):
         as_expr(given)  # refuses anything but a number or a traced value
     if not isinstance(duration, Expr) and duration <= 0:
-        raise TraceError(f"sl.pulse: duration = {duration:g} must be positive.")
+        raise TraceError(lambda say: f"{say.sl}pulse: duration = {duration:g} must be positive.")
     within = t - start if every is None else mod(t - start, every)
     if shape == "rectangle":
         height: Any = 1.0
@@ -251,5 +255,8 @@ def _times(numbers: Any, factor: float) -> Any:
 def _check_share(number: Any, function: str, argument: str) -> None:
     if not isinstance(number, Expr) and not (isinstance(number, int | float) and 0 <= number <= 1):
         raise TraceError(
-            f"sl.{function}: {argument} is a part of a turn, from 0 to 1, not {shown(number)}."
+            lambda say: (
+                f"{say.sl}{function}: {argument} is a part of a turn, from 0 to 1, not "
+                f"{shown(number)}."
+            )
         )

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from saltus.errors import ParameterError, among, nearest, shown
+from saltus.errors import ParameterError, among, shown, unknown
 from saltus.system import System, system
 
 #: Docstring section on the arguments of every model; ``{example}`` is one of its own parameters.
@@ -89,9 +89,7 @@ def model(
                 )
             chosen = positional[0] if positional else case
             if cases and not among(chosen, cases):
-                raise ParameterError(
-                    f"{name} has no case {shown(chosen)}. {nearest(chosen, cases)}"
-                )
+                raise unknown(f"{name} has no case", chosen, cases)
             return traced().with_values(**{**(cases[chosen] if cases else {}), **values})
 
         named = (

@@ -45,7 +45,7 @@ def check_values(system: EquationsOfMotion, values: Mapping[str, Any]) -> None:
     """
     why = overlapping(system.field, system.guards, system.states, values)
     if why is not None:
-        raise ParameterError(f"{system.name}: {why}")
+        raise ParameterError(f"{system.name}: ", why)
     for guard in system.guards:
         law = guard.law or Law("jump")
         for part, low, high, told in (
@@ -109,8 +109,10 @@ def resolve_one(name: str, value: Any, unit: str, forced_at: str | None) -> floa
     result = resolve(name, value, unit, forced_at)
     if not isinstance(result, float):
         raise ParameterError(
-            f"{name} got {result.size} values, but a system holds one. Give many "
-            f"by values= of the analysis."
+            lambda say: (
+                f"{name} got {result.size} values, but a system holds one. Give many by "
+                f"{say.key('values')} of the analysis."
+            )
         )
     return result
 

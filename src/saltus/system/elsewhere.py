@@ -134,6 +134,10 @@ _ADVICE: dict[str, str] = {
 }  # fmt: skip
 
 
+#: Likeness from which on a name among many is a slip of the pen: 0.5 is "montecarlo", "poincare".
+_NEAR = 0.7
+
+
 def _plain(name: str) -> str:
     return name.lower().replace("_", "")
 
@@ -141,14 +145,4 @@ def _plain(name: str) -> str:
 def instead(name: str, known: list[str]) -> str:
     """A sentence of advice for a name that saltus lacks; ``known`` are the names it has."""
     advice = _ADVICE.get(_plain(name)) or ADVICE.get(name)
-    return advice or near(name, known, "dir(saltus) and docs/api.md list all.")
-
-
-def near(name: str, known: list[str], otherwise: str) -> str:
-    """The nearest of many names, or ``otherwise`` if none is near."""
-    found = nearest(name, known, _NEAR)
-    return found if found.startswith("Did you mean") else otherwise
-
-
-#: Likeness above which a name counts as misspelt: at 0.5 are "montecarlo", "poincare".
-_NEAR = 0.7
+    return advice or nearest(name, known, _NEAR, "dir(saltus) and docs/api.md list all.")

@@ -10,7 +10,6 @@ from __future__ import annotations
 import ast
 import inspect
 import operator
-import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial, reduce
@@ -98,13 +97,9 @@ class Formula:
         }
         try:
             return self._value(self._tree, {**_CONSTANTS, **values, **terms})
-        except SaltusError:
-            raise
+        except SaltusError as error:
+            raise type(error)(f"{self.place}: ", error) from error
         except (ArithmeticError, TypeError, ValueError) as error:
-            if isinstance(error, TypeError) and re.search(r"'(Relation|And|Or|Not)'", str(error)):
-                raise TraceError(
-                    f"{self.place}: a comparison is no number. Write 1 if x > gap else 0."
-                ) from None
             raise TraceError(f"{self.place} has no value: {error}.") from error
 
     def data(self) -> list[Any]:
@@ -164,8 +159,7 @@ class Formula:
         found = self._value(node, scope)
         if not isinstance(found, Condition | bool):
             raise TraceError(
-                f"{self.place}: {_written(node)} is no condition. Write a comparison, "
-                f"such as x > gap."
+                f"{_written(node)} is no condition. Write a comparison, such as x > gap."
             )
         return found
 
@@ -175,9 +169,7 @@ class Formula:
             **{table: partial(look_up, data=data) for table, data in self.book.tables.items()},
         }
         if name not in known:
-            raise TraceError(
-                f"{self.place}: there is no function {shown(name)}. {nearest(name, known)}"
-            )
+            raise TraceError(f"there is no function {shown(name)}. {nearest(name, known)}")
         return known[name]
 
 

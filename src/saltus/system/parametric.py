@@ -185,7 +185,8 @@ class _Rewriting:
         if ex.depends_on(node, ("state",)):
             raise ParameterError(
                 f"{self._system.name} switches at times that depend on a parameter that is "
-                "followed. Write them in phases of the forcing, such as sl.mod(frequency*t, 1)."
+                "followed. Write them in phases of the forcing, such as ",
+                lambda say: f"{say.sl}mod(frequency*t, 1).",
             )
 
 

@@ -26,6 +26,7 @@ from saltus.language.expression import (
     relations_in,
     walk,
 )
+from saltus.sentences import Text
 from saltus.system.equations_of_motion import EquationsOfMotion
 from saltus.system.modes import sides
 
@@ -183,7 +184,7 @@ def _check_samples(system: EquationsOfMotion, period: float, unsure: list[int]) 
             raise TraceError(_not_periodic(system, unsure[index % len(unsure)], period))
 
 
-def _not_periodic(system: EquationsOfMotion, entry: int, period: float) -> str:
+def _not_periodic(system: EquationsOfMotion, entry: int, period: float) -> Text:
     """The message about the entry of the field or the guard that doesn't repeat."""
     count = len(system.states)
     what = (
@@ -197,10 +198,10 @@ def _not_periodic(system: EquationsOfMotion, entry: int, period: float) -> str:
     unit = system.units[name]
     hertz, radians = f"cos(2*pi*{name}*t)", f"cos({name}*t)"
     drive, another, other = (radians, hertz, "Hz") if unit == "rad/s" else (hertz, radians, "rad/s")
-    return (
+    return lambda say: (
         f"{system.name}: {what} doesn't repeat after the forcing period T = {period:.6g} s set by "
-        f"forced_at={name!r} [{unit}]. "
-        f"Write the drive as {drive}, or as {another} with units={{{name!r}: {other!r}}}; let "
-        f"every other forcing "
-        f"frequency be a multiple of it; or leave forced_at= out for a system without a period."
+        f"{say.key(forced_at=name)} [{unit}]. "
+        f"Write the drive as {drive}, or as {another} with {say.key(units={name: other})}; let "
+        "every other forcing frequency be a multiple of it; or leave "
+        f"{say.key('forced_at')} out for a system without a period."
     )

@@ -78,13 +78,13 @@ def quantity(
     try:
         expression = as_expr(returned)
     except Exception as error:
-        raise TraceError(explained(error, function, title)) from error
+        raise TraceError(*explained(error, function, title)) from error
     try:
         (root,), guards = join_guards([expression], system.guards)
         (root,) = lifted([root], guards)
         root = with_held_signs(root, guards, system.states)
     except TraceError as error:
-        raise TraceError(f"{title} ({place(function)}): {error}") from error
+        raise TraceError(f"{title} ({place(function)}): ", error) from error
     return root, guards
 
 
@@ -105,7 +105,7 @@ def called(system: System, function: Quantity, what: str) -> Any:
         if returned is None:
             raise TraceError("it returns nothing. End it with: return ...")
     except Exception as error:
-        raise TraceError(explained(error, function, title)) from error
+        raise TraceError(*explained(error, function, title)) from error
     return returned
 
 

@@ -17,7 +17,7 @@ from saltus.contact.blend import STEPS, Step, blended
 from saltus.contact.guards import is_hold
 from saltus.contact.reduction import free_field
 from saltus.contact.singular import set_aside
-from saltus.errors import ParameterError, TraceError, among, nearest, shown
+from saltus.errors import ParameterError, TraceError, among, nearest, shown, unknown
 from saltus.language import expression as ex
 from saltus.language.names import why_no_name
 from saltus.system import checks
@@ -121,7 +121,7 @@ def regularise(
     try:
         field, guards = blended(system.field, system.guards, system.states, step, parameters)
     except TraceError as error:
-        raise TraceError(f"{system.name}, regularised: {error}") from error
+        raise TraceError(f"{system.name}, regularised: ", error) from error
     slips = " Friction slips only: its static limit is left out." if static else ""
     description = (
         f"Regularised: {called} over {', '.join(values)} in place of the boundaries "
@@ -182,9 +182,7 @@ def _names(system: System, width: Any) -> dict[int, Any]:
     known = [guard.name for guard in system.guards]
     for name in width:
         if not among(name, known):
-            raise ParameterError(
-                f"{system.name} has no boundary {shown(name)}. {nearest(name, known)}"
-            )
+            raise unknown(f"{system.name} has no boundary", name, known)
     if not width:
         raise ParameterError("width={} names no boundary: there is nothing to regularise.")
     return {known.index(name): value for name, value in width.items()}

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from saltus.contact.singular import is_steep
-from saltus.errors import ParameterError, among, nearest, shown
+from saltus.errors import ParameterError, among, nearest, shown, unknown
 from saltus.language.derivatives import gradient
 from saltus.language.expression import Expr
 from saltus.system import checks, serial
@@ -132,9 +132,7 @@ class System(EquationsOfMotion):
     def _known(self, name: str) -> str:
         """The name of a parameter, checked."""
         if not among(name, self.values):
-            raise ParameterError(
-                f"{self.name} has no parameter {shown(name)}. {nearest(name, self.values)}"
-            )
+            raise unknown(f"{self.name} has no parameter", name, self.values)
         return name
 
     # -- equations ---------------------------------------------------------------------------------
@@ -210,9 +208,7 @@ class System(EquationsOfMotion):
     def state_unit(self, name: str) -> str:
         """Unit of a state; ``""`` if not declared. Raises ParameterError for an unknown state."""
         if not among(name, self.states):
-            raise ParameterError(
-                f"{self.name} has no state {shown(name)}. {nearest(name, self.states)}"
-            )
+            raise unknown(f"{self.name} has no state", name, self.states)
         return self.units[name]
 
     def parameter_text(self, name: str) -> str:

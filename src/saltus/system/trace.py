@@ -32,6 +32,7 @@ from saltus.errors import (
 from saltus.language.dimensions import DimensionCheck
 from saltus.language.expression import TIME, Expr, as_expr, observed, parameter, state, walk
 from saltus.language.names import why_no_name, why_no_text, why_no_title, why_not_together
+from saltus.sentences import Given
 from saltus.system import checks
 from saltus.system.explained import explained, place
 from saltus.system.formula import Equations, Formula
@@ -303,12 +304,17 @@ def _units(
     for name in declared:
         if name not in states and name not in defaults:
             raise ParameterError(
-                f"{title}: units= names {shown(name)}, which is neither a state nor a parameter. "
-                f"{nearest(name, (*states, *defaults))}"
+                f"{title}: ",
+                lambda say: say.key("units"),
+                f" names {shown(name)}, which is neither a state nor a parameter. "
+                f"{nearest(name, (*states, *defaults))}",
             )
     if forced_at is not None and forced_at not in defaults:
         raise ParameterError(
-            f"{title}: forced_at={shown(forced_at)} is no parameter. {nearest(forced_at, defaults)}"
+            lambda say: (
+                f"{title}: {say.key(forced_at=Given(forced_at))} is no parameter. "
+                f"{nearest(forced_at, defaults)}"
+            )
         )
     units = {}
     for name in (*states, *defaults):
@@ -354,12 +360,12 @@ def _traced(
         derivatives += rates_of(remembered, states, derivatives).values()
     except Exception as error:
         kind = UnitError if isinstance(error, UnitError) else TraceError
-        raise kind(explained(error, function, title)) from error
+        raise kind(*explained(error, function, title)) from error
     own = {one.name: _unit_of(one.x, states, units, dimensions) for one in remembered}
     try:
         return *find_contacts(derivatives, laws, (*states, *own)), own
     except TraceError as error:
-        raise TraceError(f"{title} ({place(function)}): {error}") from error
+        raise TraceError(f"{title} ({place(function)}): ", error) from error
 
 
 def _unit_of(

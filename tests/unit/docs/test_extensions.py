@@ -27,7 +27,7 @@ def test_every_row_of_the_glossary_becomes_a_term(root):
 def test_every_key_of_a_study_stands_in_the_tables():
     from study_tables import markdown, tables
 
-    from saltus.study.tables.spec import Study, Table
+    from saltus.study.spec import Study, Table
 
     described = {model for _, model in tables()}
     text = markdown()

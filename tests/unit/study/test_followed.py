@@ -10,12 +10,12 @@ import saltus as sl
 from saltus.errors import SaltusError, StudyError
 from saltus.results import load
 from saltus.results.kinds.spectrum import rows
-from saltus.study.answers.ask import questions_of
+from saltus.study.ask import questions_of
+from saltus.study.read import parse
 from saltus.study.run.running import Resources
 from saltus.study.run.status import status_tables
 from saltus.study.run.study import run_study
 from saltus.study.setting.inputs import Inputs
-from saltus.study.tables.read import parse
 from saltus.units import from_si
 
 HEAD = """

@@ -268,7 +268,7 @@ def basin_plan(
     check_room(
         memory(first * second, len(system.states)),
         f"{first} x {second} cells",
-        "Take a coarser grid, or sl.basin_fractions.",
+        lambda say: f"Take a coarser grid, or {say.verb('basin_fractions')}.",
     )
     values = {name: _axis(system, name, given) for name, given in axes.items()}
     plan = BasinPlan(system, method, values, fixed, periods)
@@ -278,10 +278,8 @@ def basin_plan(
 
 def _axis(system: System, name: str, given: Any) -> np.ndarray:
     """Starts along one state from (low, high, count) or a list or array of starts."""
-    example = f'{name}=("-5 mm", "5 mm", 400)'
-    values = along(
-        name, given, lambda value: to_si(value, system.units[name], name), "starts", example, 2
-    )
+    example, unit = {name: ("-5 mm", "5 mm", 400)}, system.units[name]
+    values = along(name, given, lambda value: to_si(value, unit, name), "starts", example, 2)
     if len(values) < 2 or not (np.diff(values) > 0).all():
         raise ParameterError(f"the starts along {name} must ascend, at least two of them.")
     return values

@@ -23,7 +23,7 @@ from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.inputs.starts import at_values, check_system
 from saltus.analysis.inputs.verb import verb
-from saltus.errors import ParameterError, UnitError, among, nearest, shown
+from saltus.errors import ParameterError, UnitError, among, must_be, shown, unknown
 from saltus.flow.counts import whole
 from saltus.flow.methods import Method, exact_method
 from saltus.flow.progress import reporting
@@ -139,13 +139,13 @@ def backbone(
     method, system = exact_method(method, "sl.backbone"), at_values(system, values)
     state = system.states[0] if state is None else state
     if not among(state, system.states):
-        raise ParameterError(
-            f"{system.name} has no state {shown(state)}. {nearest(state, system.states)}"
-        )
+        raise unknown(f"{system.name} has no state", state, system.states)
     low, high = _range(system, state, amplitude)
     points, mode = whole(points, "points", 2), whole(mode, "mode", 1)
     if phase not in ("free", "quadrature"):
-        raise ParameterError(f'phase= is "free" or "quadrature", not {shown(phase)}.')
+        raise ParameterError(
+            lambda say: f'{say.key("phase")} is "free" or "quadrature", not {shown(phase)}.'
+        )
     measured = system.states.index(state)
     about = Force.of(system, force, state) if phase == "quadrature" else None
     with reporting(progress) as show:
@@ -182,8 +182,11 @@ def _free_start(
     z = np.array([[*begin, orbits.first_return(begin, LONGEST * period)[0], 0.0]])
     if not np.isfinite(z).all():
         raise ParameterError(
-            f"small vibrations of {system.name} in mode {mode} don't return to where they "
-            "began: choose a smaller amplitude to begin with, or another mode=."
+            lambda say: (
+                f"small vibrations of {system.name} in mode {mode} don't return to where they "
+                "began: choose a smaller amplitude to begin with, or another "
+                f"{say.key('mode')}."
+            )
         )
     return free, orbits, z
 
@@ -214,7 +217,10 @@ def _relative(system: System, shape: np.ndarray, measured: int, mode: int) -> np
     sizes = np.abs(shape)
     if not sizes[measured] > NODE * sizes.max():
         raise ParameterError(
-            f"{system.states[measured]} is at rest in mode {mode}. Choose another state=."
+            lambda say: (
+                f"{system.states[measured]} is at rest in mode {mode}. Choose another "
+                f"{say.key('state')}."
+            )
         )
     sizes = np.where(sizes > NODE * sizes.max(), sizes, sizes.max()) / sizes[measured]
     return np.asarray(sizes)
@@ -228,11 +234,9 @@ def _range(system: System, state: str, given: Any) -> tuple[float, float]:
     except UnitError:
         raise
     except (TypeError, ValueError):
-        raise ParameterError(
-            f'amplitude= must be (low, high), such as ("0.1 mm", "5 mm"), not {shown(given)}.'
-        ) from None
+        raise must_be("amplitude", '(low, high), such as ("0.1 mm", "5 mm")', given) from None
     if not 0 < low < high < np.inf:
-        raise ParameterError(f"amplitude= must ascend from above zero, not {shown(given)}.")
+        raise ParameterError(f"amplitude must ascend from above zero, not {shown(given)}.")
     return low, high
 
 
@@ -283,8 +287,10 @@ def _family(
     sizes = peak(found)
     if not sizes[0] < limits[0] <= sizes.max():
         raise ParameterError(
-            f"the amplitude of free vibrations of {orbits.system.name} goes from {sizes[0]:.4g} to "
-            f"{sizes.max():.4g}: amplitude= must begin between."
+            lambda say: (
+                f"the amplitude of free vibrations of {orbits.system.name} goes from "
+                f"{sizes[0]:.4g} to {sizes.max():.4g}: {say.key('amplitude')} must begin between."
+            )
         )
     first = int(np.argmax(sizes >= limits[0]))
     step = (found[first] - found[first - 1]) / orbits.scale[0] @ tangent[first - 1]
@@ -354,8 +360,11 @@ def _conserved(system: System, damping: np.ndarray, period: np.ndarray) -> np.nd
     """The fictitious damping of orbits, which must be rounding."""
     if np.abs(damping * period).max() > CONSERVED:
         raise ParameterError(
-            f"{system.name} doesn't conserve energy: its vibrations need a damping of "
-            f"{damping[np.argmax(np.abs(damping))]:.3g} /s to close. Set what damps to zero by "
-            'values=, and the restitution of impacts to 1: values={"damping": 0, "restitution": 1}.'
+            lambda say: (
+                f"{system.name} doesn't conserve energy: its vibrations need a damping of "
+                f"{damping[np.argmax(np.abs(damping))]:.3g} /s to close. Set what damps to zero by "
+                f"{say.key('values')}, and the restitution of impacts to 1: "
+                f"{say.key(values={'damping': 0, 'restitution': 1})}."
+            )
         )
     return damping

@@ -29,6 +29,7 @@ from saltus.results import build
 from saltus.results.dataset import schema
 from saltus.results.dataset.attractors import padded
 from saltus.results.dataset.schema import event_name, point_name
+from saltus.sentences import Word
 from saltus.system import System
 from saltus.system.leg import has_legs
 
@@ -129,7 +130,8 @@ def bifurcation_curve(
         if not low <= start.system.values[name] <= high:
             raise ParameterError(
                 f"the event lies at {name} = {start.system.values[name]:.6g}, outside the range "
-                f"({low:g}, {high:g}) in vary=."
+                f"({low:g}, {high:g}) in ",
+                lambda say: f"{say.key('vary')}.",
             )
     with reporting(progress) as show:
         orbits, z = _orbits(start, names, limits, method, threads)
@@ -164,8 +166,11 @@ def _ranges(system: System, vary: Any) -> tuple[tuple[str, str], list[tuple[floa
     if not isinstance(vary, Mapping) or len(vary) != 2:
         one, two = [*system.values, "name", "other"][:2]
         raise ParameterError(
-            f"sl.bifurcation_curve varies two parameters: vary={{{one!r}: (low, high), {two!r}: "
-            f"(low, high)}}, not {shown(vary)}."
+            lambda say: (
+                f"{say.either('sl.bifurcation_curve varies', 'varies')} two parameters: "
+                f"{say.key(vary=dict.fromkeys((one, two), (Word('low'), Word('high'))))}, not "
+                f"{shown(vary)}."
+            )
         )
     one, two = vary
     return (one, two), [range_of(system, name, ends) for name, ends in vary.items()]
@@ -192,9 +197,9 @@ def _start(system: System, event: Any) -> _Start:
         )
     kind = str(event["event_kind"].item())
     if kind not in (*MULTIPLIER, "graze"):
+        advice = nearest(kind, (*MULTIPLIER, "graze"))
         raise ParameterError(
-            f"a {kind.replace('_', ' ')} can't be followed in two parameters. "
-            f"{nearest(kind, (*MULTIPLIER, 'graze'))}"
+            f"a {kind.replace('_', ' ')} can't be followed in two parameters. {advice}"
         )
     guards = [guard.name for guard in system.guards]
     guard = guards.index(str(event["event_guard"].item())) if kind == "graze" else -1

@@ -35,6 +35,7 @@ from saltus.flow.counts import whole
 from saltus.flow.methods import Method, exact_method
 from saltus.flow.progress import reporting, stage
 from saltus.interrupt import Interrupted
+from saltus.sentences import Dialect, Word
 from saltus.system import System
 
 
@@ -196,9 +197,12 @@ def branches(
             rests = _inside(rests, limits)
             if not begins and not rests:
                 raise ParameterError(
-                    f"no periodic orbit of {system.name} is known between {limits[0]:g} and "
-                    f'{limits[1]:g}: give other starts, more of them (start="random 20" with '
-                    "box=), or longer runs (periods=)."
+                    lambda say: (
+                        f"no periodic orbit of {system.name} is known between "
+                        f"{limits[0]:g} and {limits[1]:g}: give other starts, more of them "
+                        f"({say.key(start='random 20')} with {say.key('box')}), or longer runs "
+                        f"({say.key('periods')})."
+                    )
                 )
             plan = plan_of(system, name, limits, method, threads, points, longest, chosen)
             born = trace_rests(plan, system, name, rests, done) if rests else []
@@ -210,18 +214,24 @@ def branches(
         return table_of(system, name, limits, done, wanted, method)
 
 
+def _two_parameters(say: Dialect) -> str:
+    ranges = "system, {one: (low, high, number), two: (low, high, number)}"
+    return (
+        f" Two parameters: {say.verb('bifurcation_curve')} follows a bifurcation over both, and "
+        f"{say.verb('bifurcation_diagram', ranges)} maps the kinds of motion."
+    )
+
+
 def _range(system: System, vary: Any) -> tuple[str, tuple[float, float]]:
     """The parameter and its range [SI]."""
     example = next(iter(system.values), "name")
     if not isinstance(vary, Mapping) or len(vary) != 1:
-        two = (
-            " Two parameters: sl.bifurcation_curve follows a bifurcation over both, and "
-            "sl.bifurcation_diagram(system, {one: (low, high, number), two: (low, high, number)}) "
-            "maps the kinds of motion."
-        )
         raise ParameterError(
-            f"sl.branches follows one parameter: {{{example!r}: (low, high)}}, not {shown(vary)}."
-            f"{two if isinstance(vary, Mapping) and len(vary) > 1 else ''}"
+            lambda say: (
+                f"{say.either('sl.branches follows', 'follows')} one parameter: "
+                f"{say.key(vary={example: (Word('low'), Word('high'))})}, not {shown(vary)}."
+            ),
+            _two_parameters if isinstance(vary, Mapping) and len(vary) > 1 else "",
         )
     ((name, ends),) = vary.items()
     return name, range_of(system, name, ends)

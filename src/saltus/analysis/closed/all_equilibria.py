@@ -123,8 +123,10 @@ def _modes(guards: Sequence[Guard]) -> list[tuple[bool, ...]]:
         options.append((*free, (False, True)) if law is not None and law.partner >= 0 else free)
     if np.prod([float(len(one)) for one in options]) > MOST_MODES:
         raise ParameterError(
-            f"{len(options)} boundaries make more than {MOST_MODES} modes, too many to look for "
-            f"equilibria in each. Ask sl.attractors for those that attract."
+            lambda say: (
+                f"{len(options)} boundaries make more than {MOST_MODES} modes, too many to "
+                f"look for equilibria in each. Ask {say.verb('attractors')} for those that attract."
+            )
         )
     owners = [number for number, guard in enumerate(guards) if not is_hold(guard)]
     modes = []

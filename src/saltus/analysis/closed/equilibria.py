@@ -107,11 +107,16 @@ def equilibria(
     check_system(system)
     if not autonomous(system):
         raise ParameterError(
-            f"{system.name} depends on time, so it has no equilibria. Ask sl.attractors for its "
-            f"periodic responses; or write it without the forcing."
+            lambda say: (
+                f"{system.name} depends on time, so it has no equilibria. Ask "
+                f"{say.verb('attractors')} for its periodic responses; or write it without the "
+                "forcing."
+            )
         )
     if start is not None and (box or at is not None):
-        raise ParameterError("give start= or ranges of a box, and only one of them.")
+        raise ParameterError(
+            lambda say: f"give {say.key('start')} or ranges of a box, and only one of them."
+        )
     begin, scale = _starts(system, start, whole(starts, "starts", 1, MOST_STARTS), at, box)
     found = all_equilibria(system, begin, scale)
     attrs = attributes(

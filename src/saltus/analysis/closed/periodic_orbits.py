@@ -167,8 +167,10 @@ def periodic_orbits(
         return orbits_dataset(system, attrs, table, searches(cycles.searches))
     if period is not None:
         raise ParameterError(
-            f"{system.name} is forced: its orbits last whole forcing periods. Give periods=, the "
-            f"longest of them, in place of period=."
+            lambda say: (
+                f"{system.name} is forced: its orbits last whole forcing periods. Give "
+                f"{say.key('periods')}, the longest of them, in place of {say.key('period')}."
+            )
         )
     map_ = Stroboscope(system, _with_budget(method, 1), threads=threads)
     before = map_.by(_with_budget(method, AGES[-1] + periods))
@@ -183,8 +185,10 @@ def _turn(system: System, states: np.ndarray) -> float:
     """About a turn of the motions of a system without forcing [s]."""
     if not autonomous(system):
         raise ParameterError(
-            f"{system.name} depends on time, without a forcing period: none of its motions need "
-            f"repeat. Name the parameter that forces it: forced_at=."
+            lambda say: (
+                f"{system.name} depends on time, without a forcing period: none of its "
+                f"motions need repeat. Name the parameter that forces it: {say.key('forced_at')}."
+            )
         )
     every = looks_every(system, None, states)
     assert every is not None
@@ -199,8 +203,10 @@ def _range(period: Any, default: tuple[float, float]) -> tuple[tuple[float, floa
     ends = [to_si(one, "s", "period") for one in (period if pair else (period,))]
     if not (np.isfinite(ends).all() and ends[-1] > 0 and (not pair or 0 <= ends[0] < ends[1])):
         raise ParameterError(
-            f"period must be a positive time or an ascending range of them, such as "
-            f'period=("1 s", "5 s"), not {shown(period)}.'
+            lambda say: (
+                "period must be a positive time or an ascending range of them, such as "
+                f"{say.key(period=('1 s', '5 s'))}, not {shown(period)}."
+            )
         )
     if pair:
         return (ends[0], ends[1]), None
@@ -212,8 +218,10 @@ def exact_method(method: Method | None) -> Method:
     method = check_method(method)
     if not method.exact:
         raise ParameterError(
-            f"errors of {method.name} keep unstable orbits from closing. Leave method= out: Taylor "
-            f"integrates to rounding."
+            lambda say: (
+                f"errors of {method.name} keep unstable orbits from closing. Leave "
+                f"{say.key('method')} out: Taylor integrates to rounding."
+            )
         )
     return method
 
@@ -237,7 +245,9 @@ def _with_budget(method: Method, iterates: float) -> Method:
 def _given(system: System, start: Any, box: Any) -> np.ndarray:
     """The starts that were given, float64[k, D]."""
     if box is not None:
-        raise ParameterError('box= is for random starts: start="random 1000".')
+        raise ParameterError(
+            lambda say: f"{say.key('box')} is for random starts: {say.key(start='random 1000')}."
+        )
     return ensemble(system, start, None).start
 
 

@@ -4,12 +4,12 @@ values. All verbs share this rule.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
-from saltus.errors import ParameterError, among, nearest, shown
+from saltus.errors import ParameterError, among, shown, unknown
 from saltus.flow.counts import MOST, whole
 
 #: Spacings of a range, by name.
@@ -19,7 +19,12 @@ MOST_VALUES = 100_000_000
 
 
 def along(
-    name: str, given: Any, number: Callable[[Any], float], what: str, example: str, least: int = 1
+    name: str,
+    given: Any,
+    number: Callable[[Any], float],
+    what: str,
+    example: Mapping[str, Any],
+    least: int = 1,
 ) -> np.ndarray:
     """Values along an axis [SI], in the order in which they are written.
 
@@ -34,8 +39,8 @@ def along(
         One value [SI] from a number or a text with a unit.
     what : str
         Words for the values in messages: ``"values"``, ``"starts"``.
-    example : str
-        A range as one would write it.
+    example : mapping
+        An argument, and a range as one would write it.
     least : int
         Least number of values of a range.
 
@@ -49,14 +54,16 @@ def along(
         return _listed(name, given, number, what, example)
     if len(given) not in (3, 4):
         raise ParameterError(
-            f"{name} = {shown(given)} must be a range (first, last, number of {what}), such as "
-            f"{example}. A tuple is a range; "
-            f"a list holds the {what} themselves: {shown(list(given))}."
+            lambda say: (
+                f"{name} = {shown(given)} must be a range (first, last, number of {what}), "
+                f"such as {say.key(**example)}. A tuple is a range; a list holds the {what} "
+                f"themselves: {shown(list(given))}."
+            )
         )
     first, last, count, *rest = given
     scale = rest[0] if rest else "linear"
     if not among(scale, SCALES):
-        raise ParameterError(f"the scale of {name} is {shown(scale)}. {nearest(scale, SCALES)}")
+        raise unknown(f"the scale of {name} is", scale, SCALES)
     count = whole(count, f"the number of {what} along {name}", least)
     if count > MOST_VALUES:
         raise ParameterError(
@@ -92,7 +99,7 @@ def axes_of(given: Any) -> int:
 
 
 def _listed(
-    name: str, given: Any, number: Callable[[Any], float], what: str, example: str
+    name: str, given: Any, number: Callable[[Any], float], what: str, example: Mapping[str, Any]
 ) -> np.ndarray:
     """The values of a list or array, each a number or a text with a unit."""
     if (
@@ -101,8 +108,10 @@ def _listed(
         or axes_of(given) != 1
     ):
         raise ParameterError(
-            f"{name} = {shown(given)} must be a range (first, last, number of {what}), such as "
-            f"{example}, or a list or array of {what}."
+            lambda say: (
+                f"{name} = {shown(given)} must be a range (first, last, number of {what}), "
+                f"such as {say.key(**example)}, or a list or array of {what}."
+            )
         )
     values = np.asarray(given)
     if values.dtype.kind in "fiu":

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 
 from saltus.analysis.inputs.axes import along, axes_of, count_along
-from saltus.errors import ParameterError, SaltusError, among, nearest, shown
+from saltus.errors import ParameterError, SaltusError, among, must_be, shown, unknown
 from saltus.flow.counts import whole
 from saltus.flow.request import Request, Schedule
 from saltus.flow.room import check_room
 from saltus.language import expression as ex
+from saltus.sentences import Word
 from saltus.system import System, check_values
 from saltus.units import to_si
 
@@ -76,7 +77,11 @@ def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> En
     """
     check_system(system)
     if values is not None and not isinstance(values, Mapping):
-        raise ParameterError('values must be a mapping, such as values={"frequency": [5.0, 10.0]}.')
+        raise ParameterError(
+            lambda say: (
+                f"values must be a mapping, such as {say.key(values={'frequency': [5.0, 10.0]})}."
+            )
+        )
     _check_labels({**(start if isinstance(start, Mapping) else {}), **(values or {})})
     _check_count(system, trajectories(start, values))
     columns = _columns(system, start)
@@ -203,17 +208,18 @@ def fixed_states(system: System, at: Any, moving: Iterable[str]) -> dict[str, fl
         those isn't a state.
     """
     if at is not None and not isinstance(at, Mapping):
-        raise ParameterError(f"at must be a mapping of states to starts, not {shown(at)}.")
+        raise must_be("at", "a mapping of states to starts", at)
     given, moving = at or {}, list(moving)
     for name in (*moving, *given):
         if name not in system.states:
-            raise ParameterError(
-                f"{system.name} has no state {shown(name)}. {nearest(name, system.states)}"
-            )
+            raise unknown(f"{system.name} has no state", name, system.states)
     twice = [name for name in moving if name in given]
     if twice:
         raise ParameterError(
-            f"{twice[0]} has a range and stands in at= too. Leave it out of one of them."
+            lambda say: (
+                f"{twice[0]} has a range and stands in {say.key('at')} too. Leave it out "
+                "of one of them."
+            )
         )
     return {
         name: to_si(given.get(name, 0.0), system.units[name], name)
@@ -247,14 +253,14 @@ def _check_period_of_each(
         try:
             system.with_values(**{**shared, **dict(zip(columns, key, strict=True))})
         except SaltusError as error:
-            raise ParameterError(f"trajectory {i}: {error}") from None
+            raise ParameterError(f"trajectory {i}: ", error) from None
 
 
 def _values(system: System, name: str, value: Any) -> Any:
     """One value of a parameter [SI], or many: a list or array, or a range (first, last, number)."""
     if not isinstance(value, tuple):
         return system.resolve(name, value)
-    example = f'values={{"{name}": ("{system.parameter_text(name)}", ..., 20)}}'
+    example = {"values": {name: (system.parameter_text(name), ..., 20)}}
     return along(name, value, lambda one: single(system, name, one), "values", example)
 
 
@@ -265,7 +271,9 @@ def at_values(system: System, values: Mapping[str, Any] | None) -> System:
     if values is None:
         return system
     if not isinstance(values, Mapping):
-        raise ParameterError('values must be a mapping, such as values={"force": "4 N"}.')
+        raise ParameterError(
+            lambda say: f"values must be a mapping, such as {say.key(values={'force': '4 N'})}."
+        )
     for name, value in values.items():
         if np.ndim(system.resolve(name, value)):
             raise ParameterError(
@@ -294,9 +302,7 @@ def range_of(system: System, name: Any, ends: Any) -> tuple[float, float]:
     doesn't ascend.
     """
     if not among(name, system.values):
-        raise ParameterError(
-            f"{system.name} has no parameter {shown(name)}. {nearest(name, system.values)}"
-        )
+        raise unknown(f"{system.name} has no parameter", name, system.values)
     if not isinstance(ends, list | tuple | np.ndarray) or len(ends) != 2:
         raise ParameterError(
             f"the range of {name} must be (low, high), not {shown(ends)}: the steps between are "
@@ -311,18 +317,17 @@ def range_of(system: System, name: Any, ends: Any) -> tuple[float, float]:
 def _columns(system: System, start: Any) -> dict[str, np.ndarray]:
     """Each state's start [SI], a scalar or an array."""
     if isinstance(start, Mapping):
-        unknown = [name for name in start if name not in system.states]
-        if unknown:
-            raise ParameterError(
-                f"{system.name} has no state {shown(unknown[0])}. "
-                f"{nearest(unknown[0], system.states)}"
-            )
+        strange = [name for name in start if name not in system.states]
+        if strange:
+            raise unknown(f"{system.name} has no state", strange[0], system.states)
         start = {**dict.fromkeys(_made(system), 0.0), **start}
         missing = [name for name in system.states if name not in start]
         if missing:
             raise ParameterError(
-                f"the start gives no {missing[0]!r}. Write "
-                f"start={{{', '.join(f'{s!r}: 0.0' for s in system.states)}}}."
+                lambda say: (
+                    f"the start gives no {missing[0]!r}. Write "
+                    f"{say.key(start=dict.fromkeys(system.states, 0.0))}."
+                )
             )
         return {name: _numbers(system, name, start[name]) for name in system.states}
     rows = start if isinstance(start, np.ndarray) else _as_array(start)
@@ -360,7 +365,7 @@ def _as_array(start: Any) -> np.ndarray:
 
 def _numbers(system: System, name: str, value: Any) -> np.ndarray:
     if isinstance(value, tuple):
-        example = f'start={{"{name}": (0.0, 1.0, 20), ...}}'
+        example = {"start": Word(f'{{"{name}": (0.0, 1.0, 20), ...}}')}
         return along(
             name, value, lambda one: to_si(one, system.units[name], name), "starts", example
         )
@@ -423,16 +428,25 @@ def span(system: System, group: Ensemble, periods: Any, t_end: Any, t_start: Any
     n = group.size
     if periods is None and t_end is None and system.forced_at is None:
         raise ParameterError(
-            f'{system.name} has no forcing period: give t_end=, such as t_end="10 s".'
+            lambda say: (
+                f"{system.name} has no forcing period: give {say.key('t_end')}, such as "
+                f"{say.key(t_end='10 s')}."
+            )
         )
     if (periods is None) == (t_end is None):
         raise ParameterError(
-            "give periods= (whole forcing periods) or t_end= (seconds), and only one of them."
+            lambda say: (
+                f"give {say.key('periods')} (whole forcing periods) or {say.key('t_end')} "
+                "(seconds), and only one of them."
+            )
         )
     if periods is not None:
         if system.forced_at is None:
             raise ParameterError(
-                f"{system.name} has no forcing period. Give t_end= in place of periods=."
+                lambda say: (
+                    f"{system.name} has no forcing period. Give {say.key('t_end')} in "
+                    f"place of {say.key('periods')}."
+                )
             )
         periods = whole(periods, "periods")
         return Span(begin, _periods(system, group), np.full(n, int(periods), np.int64), np.zeros(n))
@@ -450,7 +464,7 @@ def span(system: System, group: Ensemble, periods: Any, t_end: Any, t_start: Any
 def _time(value: Any, name: str) -> float:
     seconds = to_si(value, "s", name)
     if not math.isfinite(seconds):
-        raise ParameterError(f"{name} must be a finite time, not {shown(value)}.")
+        raise must_be(name, "a finite time", value)
     return seconds
 
 

@@ -17,7 +17,7 @@ from saltus.analysis.lyapunov.algorithm import Algorithm
 from saltus.analysis.lyapunov.exponents import Exponents
 from saltus.analysis.lyapunov.wolf_on_flow import NeighbourExponents
 from saltus.analysis.outcome_messages import warn
-from saltus.errors import ParameterError, among, nearest, shown
+from saltus.errors import ParameterError, among, shown, unknown
 from saltus.flow.counts import whole
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method, check_method
@@ -25,6 +25,7 @@ from saltus.flow.progress import reporting
 from saltus.interrupt import Interrupted
 from saltus.results import build
 from saltus.results.dataset import schema
+from saltus.sentences import Word
 from saltus.system import System
 
 METHODS = ("variational", "wolf")
@@ -181,17 +182,21 @@ def lyapunov(
 def _check_words(method: Any, unit: Any, system: System) -> None:
     if isinstance(method, Method):
         raise ParameterError(
-            f'method says how exponents are measured: "variational" or "wolf". How to integrate is '
-            f"flow=sl.{method.name}(...)."
+            lambda say: (
+                'method says how exponents are measured: "variational" or "wolf". How to '
+                f"integrate is {say.key(flow=Word(say.method(method.name)))}."
+            )
         )
     if not among(method, METHODS):
-        raise ParameterError(f"there is no method {shown(method)}. {nearest(method, METHODS)}")
+        raise unknown("there is no method", method, METHODS)
     if not among(unit, UNITS):
-        raise ParameterError(f"exponents aren't given in {shown(unit)}. {nearest(unit, UNITS)}")
+        raise unknown("exponents aren't given in", unit, UNITS)
     if UNITS[unit][0] and system.forced_at is None:
         raise ParameterError(
-            f"{system.name} has no forcing period, so {shown(unit)} has no meaning. Take "
-            f"unit={unit.replace('period', 's')!r}."
+            lambda say: (
+                f"{system.name} has no forcing period, so {shown(unit)} has no meaning. "
+                f"Take {say.key(unit=unit.replace('period', 's'))}."
+            )
         )
 
 

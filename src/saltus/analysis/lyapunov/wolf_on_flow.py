@@ -41,7 +41,7 @@ class NeighbourExponents(Algorithm):
         check_room(
             self._periods * SAMPLES * (16.0 * size + 32.0),
             f"{SAMPLES} samples in each of {self._periods} periods",
-            "Give fewer periods=.",
+            lambda say: f"Give fewer {say.key('periods')}.",
         )
         schedule = Schedule.even(self._periods, SAMPLES, first=self._transient)
         step = max(GROUP // (self._periods * SAMPLES * size), 1)

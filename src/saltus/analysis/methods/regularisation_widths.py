@@ -14,7 +14,7 @@ from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.inputs.starts import ensemble
 from saltus.analysis.inputs.verb import verb
 from saltus.contact import STEPS
-from saltus.errors import ParameterError, among, nearest, shown
+from saltus.errors import ParameterError, must_be, one_of
 from saltus.flow.counts import whole
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import ODE45, Method, Taylor, check_method
@@ -91,8 +91,7 @@ def regularisation_widths(
     >>> 1e-6 < float(table["equal_width"]) < 1e-5  # [m]; the gap is 4e-4 m
     True
     """
-    if not among(law, STEPS):
-        raise ParameterError(f"regularisation_widths: law={shown(law)}. {nearest(law, STEPS)}")
+    one_of(STEPS, "regularisation_widths: ", law=law)
     method = check_method(ODE45(rtol=1e-4, atol=1e-7) if method is None else method)
     zero = dict.fromkeys(system.states, 0.0)
     group = ensemble(system, zero if start is None else start, None)
@@ -163,7 +162,7 @@ def _widths(system: System, orbit: np.ndarray, given: Any, unit: str) -> np.ndar
     given = given if isinstance(given, list | tuple | np.ndarray) else [given]
     widths = np.array([to_si(one, unit, "widths") for one in given])
     if not len(widths) or not (widths > 0).all():
-        raise ParameterError(f"widths must be positive, at least one, not {shown(given)}.")
+        raise must_be("widths", "positive, at least one", given)
     return np.sort(widths)[::-1]
 
 

@@ -161,14 +161,18 @@ def _schedule(seen: Stretch, intervals: int | None) -> Schedule:
         return Schedule(index // count, (index % count) / count)
     if intervals is not None:
         raise ParameterError(
-            f"{seen.system.name} is forced: its balance is drawn each forcing "
-            f"period. Leave intervals= out."
+            lambda say: (
+                f"{seen.system.name} is forced: its balance is drawn each forcing period. "
+                f"Leave {say.key('intervals')} out."
+            )
         )
     last = int(np.min(seen.length.count))
     if np.any(seen.length.phase > 0) or np.any(seen.length.count != last):
         raise ParameterError(
-            "an energy balance of a forced system is drawn over whole forcing "
-            "periods. Give periods= in place of t_end=."
+            lambda say: (
+                "an energy balance of a forced system is drawn over whole forcing "
+                f"periods. Give {say.key('periods')} in place of {say.key('t_end')}."
+            )
         )
     _check_room(seen, last - seen.skipped)
     index = np.arange(seen.skipped, last + 1)

@@ -14,7 +14,7 @@ from saltus.analysis.motion import touchdowns
 from saltus.analysis.motion.touchdowns import Touchdowns
 from saltus.analysis.motion.window import Stretch, computed, dataset, stretch
 from saltus.analysis.outcome_messages import warn
-from saltus.errors import ParameterError, nearest, shown
+from saltus.errors import ParameterError, must_be, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.methods import Method, check_method
 from saltus.flow.request import Outcome, Schedule
@@ -168,8 +168,9 @@ def _by_guard(system: System, given: Mapping[str, Any], argument: str) -> dict[i
     for name in given:
         if name not in names:
             raise ParameterError(
-                f"{argument}= names {shown(name)}, which is no boundary of "
-                f"{system.name}. {nearest(name, names)}"
+                lambda say: say.key(argument),
+                f" names {shown(name)}, which is no boundary of {system.name}. "
+                f"{nearest(name, names)}",
             )
     return {names.index(name): value for name, value in given.items()}
 
@@ -180,10 +181,7 @@ def contact_sides(system: System, given: Mapping[int, Any]) -> np.ndarray:
     """
     for number, side in given.items():
         if side not in (-1, 1):
-            raise ParameterError(
-                f"contact_side of {system.guards[number].name!r} must be 1 or -1, "
-                f"not {shown(side)}."
-            )
+            raise must_be(f"contact_side of {system.guards[number].name!r}", "1 or -1", side)
     values = {name: value or np.finfo(float).tiny for name, value in system.values.items()}
     rest = dict.fromkeys(system.states, 0.0)
     bits: list[bool] = []

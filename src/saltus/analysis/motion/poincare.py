@@ -15,7 +15,7 @@ from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion.window import Stretch, computed, dataset, stretch
 from saltus.analysis.outcome_messages import warn
 from saltus.contact.guards import equation_of
-from saltus.errors import ParameterError, among, nearest, shown
+from saltus.errors import ParameterError, among, must_be, nearest, shown
 from saltus.flow.methods import Method, check_method
 from saltus.flow.request import Outcome, Schedule
 from saltus.kernels import status as st
@@ -121,7 +121,7 @@ def poincare(
         0,
         1,
     ):
-        raise ParameterError(f"direction must be 0, 1 or -1, not {shown(direction)}.")
+        raise must_be("direction", "0, 1 or -1", direction)
     found = crossed(system, surface, values if isinstance(values, Mapping) else {})
     seen = stretch(found.system, start, values, periods, t_end, t_start, transient)
 

@@ -15,7 +15,7 @@ from saltus.analysis.inputs.starts import Ensemble, Span, check_system, ensemble
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion import time_errors as measure
 from saltus.analysis.outcome_messages import warn
-from saltus.errors import ParameterError, among, shown
+from saltus.errors import ParameterError, among, must_be
 from saltus.flow import engine
 from saltus.flow.counts import whole
 from saltus.flow.methods import Method, check_method
@@ -126,9 +126,7 @@ def simulate(
     flown = remembering(system)
     plan = _plan(system, group, length, samples, keep, len(flown.states))
     if not among(time_errors, ("measured", "local")):
-        raise ParameterError(
-            f'time_errors must be "measured" or "local", not {shown(time_errors)}.'
-        )
+        raise must_be("time_errors", '"measured" or "local"', time_errors)
 
     def so_far(outcome: Outcome) -> xr.Dataset:
         return _dataset(system, method, group, length, plan, outcome, measure.local(outcome))
@@ -180,8 +178,10 @@ def _plan(
     periods_kept = _whole(keep, "keep", max(last, 1))
     if keep is not None and system.forced_at is None:
         raise ParameterError(
-            f"{system.name} has no forcing period, so keep= has no meaning. Start "
-            f"later, or take fewer samples=."
+            lambda say: (
+                f"{system.name} has no forcing period, so {say.key('keep')} has no "
+                f"meaning. Start later, or take fewer {say.key('samples')}."
+            )
         )
     first = max(int(np.min(length.count)) - periods_kept, 0) if keep is not None else 0
     longest = np.max((length.count + length.phase / length.period) * per)
@@ -211,7 +211,10 @@ def _check_room(system: System, trajectories: int, samples: int, states: int | N
     check_room(
         samples * trajectories * (16.0 * (states or len(system.states)) + 16.0),
         f"{trajectories} trajectories with {samples} samples each",
-        "Give keep= (last periods) or fewer samples=, or use sl.stroboscope.",
+        lambda say: (
+            f"Give {say.key('keep')} (last periods) or fewer {say.key('samples')}, or use "
+            f"{say.verb('stroboscope')}."
+        ),
     )
 
 

@@ -13,11 +13,12 @@ import xarray as xr
 
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion.settled import settled
-from saltus.errors import ParameterError, among, nearest, shown
+from saltus.errors import ParameterError, among, one_of, unknown
 from saltus.flow.counts import whole as whole_number
 from saltus.results import Subject, build, inherited
 from saltus.results.dataset import schema
 from saltus.results.dataset.reader import reader
+from saltus.sentences import Given
 
 #: Windows by name: weights of n samples. They are periodic: the sample after the last would be the
 #: first.
@@ -102,8 +103,8 @@ def spectrum(
     0.333
     """
     schema.check(run, caller="spectrum", kinds=[schema.TRAJECTORY])
-    if window is not None and not among(window, WINDOWS):
-        raise ParameterError(f"spectrum: window={shown(window)}. {nearest(window, WINDOWS)}")
+    if window is not None:
+        one_of(WINDOWS, "spectrum: ", window=window)
     names = _states(run, state)
     stretch = _forced_stretch(run, last) if "period" in run.variables else _free_stretch(run, last)
     chosen = [window or ("none" if n else "hann") for n in stretch.response]
@@ -176,9 +177,7 @@ def _states(run: xr.Dataset, state: str | Sequence[str] | None) -> list[str]:
     )
     for name in names:
         if not among(name, known):
-            raise ParameterError(
-                f"spectrum: this run has no state {shown(name)}. {nearest(name, known)}"
-            )
+            raise unknown("spectrum: this run has no state", name, known)
     return names
 
 
@@ -192,13 +191,17 @@ def _forced_stretch(run: xr.Dataset, last: int | None) -> _Stretch:
     last = last if last is None else whole_number(last, "last")
     if last is not None and last > available:
         raise ParameterError(
-            f"spectrum: last={shown(last)}, but {available} whole forcing periods were "
-            f"kept. Simulate with more keep=."
+            lambda say: (
+                f"spectrum: {say.key(last=Given(last))}, but {available} whole forcing periods "
+                f"were kept. Simulate with more {say.key('keep')}."
+            )
         )
     if not available:
         raise ParameterError(
-            "spectrum needs a whole forcing period of samples, its two ends included. Simulate "
-            "longer, or give more keep=."
+            lambda say: (
+                "spectrum needs a whole forcing period of samples, its two ends included. "
+                f"Simulate longer, or give more {say.key('keep')}."
+            )
         )
     periods = available if last is None else last
     _check_even(phases[whole_periods[-periods - 1] :], "forcing periods")
@@ -208,10 +211,12 @@ def _forced_stretch(run: xr.Dataset, last: int | None) -> _Stretch:
     common = math.lcm(*(int(n) for n in response if n))
     if common > periods:
         raise ParameterError(
-            f"spectrum: the trajectories repeat after {sorted({int(n) for n in response if n})} "
-            f"forcing periods, so only {common} periods "
-            f"hold whole responses of all, and {periods} were kept. Give more keep=, or take them "
-            f"one by one: run.isel(trajectory=0)."
+            lambda say: (
+                "spectrum: the trajectories repeat after "
+                f"{sorted({int(n) for n in response if n})} forcing periods, so only {common} "
+                f"periods hold whole responses of all, and {periods} were kept. Give more "
+                f"{say.key('keep')}, or take them one by one: run.isel(trajectory=0)."
+            )
         )
     if last is None and response.all():
         periods = common  # more periods would only add empty lines between

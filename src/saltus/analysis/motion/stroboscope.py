@@ -89,7 +89,11 @@ def stroboscope(
     count = whole_periods + 1 - first
     many = trajectories(start, values)
     size = count * many * (16.0 * len(system.states) + 16.0)
-    check_room(size, f"{many} trajectories with {count} periods each", "Give keep= (last periods).")
+    check_room(
+        size,
+        f"{many} trajectories with {count} periods each",
+        lambda say: f"Give {say.key('keep')} (last periods).",
+    )
     group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
     length = span(system, group, periods, None, t_start)
     periods_kept = np.arange(first, whole_periods + 1, dtype=np.int64)

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.inputs.verb import verb
-from saltus.errors import ParameterError, shown
+from saltus.errors import must_be
 from saltus.flow.counts import whole
 from saltus.results import Subject, build, made_by
 from saltus.results.dataset.schema import MODES
@@ -94,7 +94,7 @@ def _directions(at: Any, usual: list[str], degrees: list[str]) -> tuple[list[str
     if isinstance(at, str):
         at = at.replace(",", " ").split()
     elif not isinstance(at, list | tuple | None):
-        raise ParameterError(f"at must be names of degrees of freedom, not {shown(at)}.")
+        raise must_be("at", "names of degrees of freedom", at)
     pairs: list[tuple[Any, Any]] = [
         one if isinstance(one, tuple) and len(one) == 2 else (one, None)
         for one in (usual if at is None else at)

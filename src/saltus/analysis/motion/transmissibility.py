@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.inputs.verb import verb
-from saltus.errors import ParameterError, among, nearest, shown
+from saltus.errors import ParameterError, nearest, one_of, shown
 from saltus.results.dataset.build import finish
 from saltus.results.dataset.reader import reader
 from saltus.results.dataset.schema import RESPONSES, check
@@ -63,8 +63,7 @@ def transmissibility(ds: xr.Dataset, output: str, to: str, by: By = "amplitude")
                 f"transmissibility: {shown(name)} is no output. "
                 f"{nearest(name, known)} Ask for functions by outputs=."
             )
-    if not among(by, get_args(By)):
-        raise ParameterError(f"transmissibility: by={shown(by)}. Known: {', '.join(get_args(By))}.")
+    one_of(get_args(By), "transmissibility: ", by=by)
     upper, lower = ds.sel(output=output), ds.sel(output=to)
     units = [one["output_units"].item() for one in (upper, lower)]
     unit = "" if "" in units else "1" if units[0] == units[1] else f"{units[0]}/{_factor(units[1])}"

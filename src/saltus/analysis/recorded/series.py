@@ -9,7 +9,7 @@ import numpy as np
 
 from saltus.analysis.inputs.axes import axes_of
 from saltus.analysis.statistics import LEAST
-from saltus.errors import ParameterError, shown
+from saltus.errors import ParameterError, must_be, shown
 from saltus.flow.counts import whole
 from saltus.units import to_si
 
@@ -59,7 +59,7 @@ def interval_of(given: Any, count: int) -> float:
     if isinstance(given, str) or axes_of(given) == 0:
         interval = to_si(given, "s", "sampling_interval")
         if not 0 < interval < math.inf:
-            raise ParameterError(f"sampling_interval must be a positive time, not {shown(given)}.")
+            raise must_be("sampling_interval", "a positive time", given)
         return interval
     try:
         times = np.asarray(given, float)

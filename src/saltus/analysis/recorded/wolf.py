@@ -29,7 +29,7 @@ from saltus.analysis.recorded.series import (
     samples_of,
 )
 from saltus.analysis.statistics import BOUNDED, CONFIDENCE, UNCLEAR, batch_means, running_ends
-from saltus.errors import ParameterError, SaltusWarning, among, nearest, shown
+from saltus.errors import ParameterError, SaltusWarning, among, must_be, unknown
 from saltus.flow.counts import whole
 from saltus.results import Subject, build, made_by
 from saltus.results.dataset import schema
@@ -173,7 +173,7 @@ def wolf(
     True
     """
     if not among(unit, UNITS):
-        raise ParameterError(f"the exponent isn't given in {shown(unit)}. {nearest(unit, UNITS)}")
+        raise unknown("the exponent isn't given in", unit, UNITS)
     columns = columns_of(series, embed)
     interval = interval_of(sampling_interval, len(columns))
     single = columns.shape[1] == 1 if embed is None else embed
@@ -298,9 +298,7 @@ def _search(points: np.ndarray, evolve: int, smallest: Any, largest: Any, exclud
     """The distances, checked."""
     for name, value in (("smallest_distance", smallest), ("largest_distance", largest)):
         if value is not None and not (isinstance(value, int | float) and 0 < value < 1):
-            raise ParameterError(
-                f"{name} must be a share of the range, between 0 and 1, not {shown(value)}."
-            )
+            raise must_be(name, "a share of the range, between 0 and 1", value)
     return default_search(points, evolve, exclude, float(smallest), largest)
 
 

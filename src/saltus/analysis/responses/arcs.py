@@ -71,11 +71,15 @@ def check_unstable(unstable: bool, grid: Grid, method: Method) -> None:
     """Raise a ParameterError unless branches of these responses have unstable parts to follow."""
     if unstable and len(grid.axes) != 1:
         raise ParameterError(
-            "unstable=True follows branches over one parameter; this grid has two."
+            lambda say: (
+                f"{say.key(unstable=True)} follows branches over one parameter; this grid has two."
+            )
         )
     if unstable and len(next(iter(grid.axes.values()))) < 2:
         raise ParameterError(
-            "unstable=True follows branches over a range: give two values or more."
+            lambda say: (
+                f"{say.key(unstable=True)} follows branches over a range: give two values or more."
+            )
         )
     if unstable:
         exact_method(method, "unstable=True")

@@ -97,8 +97,10 @@ def bifurcation_diagram(
     """
     if not isinstance(vary, Mapping):
         raise ParameterError(
-            'vary must be a mapping, such as vary={"contact_stiffness": ("1e3 '
-            'N/m", "1e9 N/m", 200, "log")}.'
+            lambda say: (
+                "vary must be a mapping, such as "
+                f"{say.key(vary={'contact_stiffness': ('1e3 N/m', '1e9 N/m', 200, 'log')})}."
+            )
         )
     method = check_method(method)
     check_sample(sample, method)

@@ -14,7 +14,7 @@ from saltus.analysis.attractors.grid_responses import (
     spans_of,
 )
 from saltus.analysis.closed.measures import Measures
-from saltus.errors import ParameterError, among, nearest, shown
+from saltus.errors import ParameterError, one_of
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.flow.request import Outcome
@@ -31,11 +31,13 @@ def check_sample(sample: str, method: Method) -> str:
     """Return the kind of sample, checked. Raises ParameterError if it is unknown, or the method
     can't give it.
     """
-    if not among(sample, SAMPLES):
-        raise ParameterError(f"sample={shown(sample)} isn't known. {nearest(sample, SAMPLES)}")
+    one_of(SAMPLES, sample=sample)
     if sample == "contacts" and not method.records_contacts:
         raise ParameterError(
-            f'{method.name} with events="ignore" locates no contacts. Take sample="turning_points".'
+            lambda say: (
+                f"{method.name} with {say.key(events='ignore')} locates no contacts. Take "
+                f"{say.key(sample='turning_points')}."
+            )
         )
     return sample
 
@@ -44,8 +46,11 @@ def check_unforced_sample(sample: str, system: System) -> None:
     """Raise a ParameterError if a system without forcing can't show this sample."""
     if sample == "stroboscope" and system.forced_at is None:
         raise ParameterError(
-            f"{system.name} has no forcing period: it has no stroboscope. Take "
-            f'sample="turning_points" or "contacts".'
+            lambda say: (
+                f"{system.name} has no forcing period: it has no stroboscope. Take "
+                f"{say.key(sample='turning_points')} or "
+                '"contacts".'
+            )
         )
 
 

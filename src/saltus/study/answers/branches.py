@@ -4,25 +4,55 @@ the vibrations that resonances follow.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
-from saltus.study.answers.question import OneVerb
+from saltus.fence import MOST_COUNT
+from saltus.study.answers.question import OneVerb, asked
 from saltus.study.setting import quantities
+from saltus.study.tables.kinds import OF_RESPONSES, whole
+from saltus.study.tables.parts import Interval, Quantity
+from saltus.study.tables.signature import Kind
+from saltus.study.tables.signature import table as asking
 
 if TYPE_CHECKING:
     from saltus.study.setting.setting import Setting
 
 
+#: Branches go over a range, without steps.
+OF_BRANCHES = OF_RESPONSES | {
+    "vary": Kind(
+        dict[str, Interval], ({"frequency": ["2 Hz", "30 Hz"]},),
+        "One parameter and its range.", convert="ranges",
+    ),
+    "at": whole(12, most=MOST_COUNT),
+    "longest": whole(8),
+    "points": whole(1000),
+    "switch": Kind(
+        list[Literal["period_doubling", "branch_point"]], (["period_doubling"],),
+        default=["period_doubling", "branch_point"],
+    ),
+}  # fmt: skip
+#: Backbones go over a range of amplitudes; parameters that are zero are taken out.
+OF_BACKBONES = OF_RESPONSES | {
+    "amplitude": Kind(Interval, (["0.1 mm", "5 mm"],)),
+    "state": Kind(examples=("x",)),
+    "force": Kind(examples=("force",)),
+    "values": Kind(dict[str, Quantity], ({"force": "0 N", "damping_ratio": 0},),
+        "Values of parameters: of free vibrations the force and all that damps are zero.", {},
+        convert="values"),
+    "mode": whole(1),
+    "points": whole(400),
+}  # fmt: skip
+
+
+@asked(110, asking("branches", ["branches"], OF_BRANCHES, called="Branches of periodic orbits"))
 class Branches(OneVerb):
     """Branches of periodic orbits over a parameter."""
 
-    place, function = "branches", "branches"
 
-
+@asked(130, asking("backbone", ["backbone"], OF_BACKBONES, called="Backbone"))
 class Backbone(OneVerb):
     """The backbone of resonances over their amplitude."""
-
-    place, function = "backbone", "backbone"
 
     def check(self, table: Any, setting: Setting) -> None:  # noqa: ARG002
         """The amplitude is in the unit of its state."""

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from pydantic import Field
 
 from saltus.errors import StudyError, nearest, shown
 from saltus.results.dataset.schema import event_name
 from saltus.results.provenance import to_json
 from saltus.study.answers.branches import Branches
-from saltus.study.answers.question import Answers, OneVerb, Question, Show, first_figure
+from saltus.study.answers.question import Answers, OneVerb, Question, Show, asked, first_figure
 from saltus.study.setting import quantities
+from saltus.study.tables.kinds import OF_RESPONSES, whole
+from saltus.study.tables.parts import Interval, Quantity
+from saltus.study.tables.signature import Kind
+from saltus.study.tables.signature import table as asking
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -20,10 +25,32 @@ if TYPE_CHECKING:
     from saltus.study.setting.setting import Setting
 
 
+#: A curve begins at an event of the study's branches, named by its kind.
+KEYS = OF_RESPONSES | {
+    "event": Kind(Literal["fold", "period_doubling", "neimark_sacker", "graze"], ("fold",),
+        "Kind of the bifurcation of [branches] at which it begins."),
+    "vary": Kind(dict[str, Interval],
+        ({"frequency": ["12 Hz", "22 Hz"], "force": ["1 N", "6 N"]},),
+        "Two parameters and their ranges.", convert="ranges"),
+    "points": whole(400),
+}  # fmt: skip
+_BRANCHES = Field(None, description="Name of the [branches], of several.", examples=["main"])
+_NEAR = Field(None, description="Value of the branches' parameter near it.", examples=["17.8 Hz"])
+
+
+@asked(
+    120,
+    asking(
+        "bifurcation_curve",
+        ["bifurcation_curve"],
+        KEYS,
+        called="Bifurcation curve",
+        branches=(str | None, _BRANCHES),
+        near=(Quantity | None, _NEAR),
+    ),
+)
 class Curve(OneVerb):
     """A curve of bifurcations."""
-
-    place, function = "bifurcation_curve", "bifurcation_curve"
 
     def check(self, table: Any, setting: Setting) -> None:  # noqa: ARG002
         """Which event of which branches."""

@@ -4,9 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from pydantic import Field
+
 from saltus.errors import StudyError
-from saltus.study.answers.question import OneVerb
+from saltus.study.answers.question import OneVerb, asked
 from saltus.study.setting import quantities
+from saltus.study.tables.kinds import KINDS, whole
+from saltus.study.tables.parts import Interval, Start
+from saltus.study.tables.signature import Kind
+from saltus.study.tables.signature import table as asking
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -14,10 +20,32 @@ if TYPE_CHECKING:
     from saltus.study.setting.setting import Setting
 
 
+#: They are looked for in a box, or from starts.
+KEYS = KINDS | {
+    "start": Kind(dict[str, Start], KINDS["start"].examples,
+        "Starts of Newton's method, in place of a box: every state; lists make a batch.", None,
+        convert="start"),
+    "starts": whole(256),
+}  # fmt: skip
+_BOX = Field(
+    None,
+    description="Ranges of the starts of Newton's method.",
+    examples=[{"x": ["-5 mm", "5 mm"]}],
+)
+
+
+@asked(
+    90,
+    asking(
+        "equilibria",
+        ["equilibria"],
+        KEYS,
+        called="Equilibria",
+        box=(dict[str, Interval] | None, _BOX),
+    ),
+)
 class Equilibria(OneVerb):
     """Equilibria in each region, on boundaries, and held by contacts."""
-
-    place, function = "equilibria", "equilibria"
 
     def check(self, table: Any, setting: Setting) -> None:  # noqa: ARG002
         """The ranges of a box are arguments of their own."""

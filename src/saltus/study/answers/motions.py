@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from saltus.errors import StudyError, nearest
-from saltus.fence import shown
-from saltus.study.answers.question import OneVerb, first_figure
+from pydantic import Field
+
+from saltus.errors import StudyError, nearest, shown
+from saltus.study.answers.question import OneVerb, asked, first_figure
 from saltus.study.code import code_hash
 from saltus.study.setting import quantities
-from saltus.study.tables.signature import verb
+from saltus.study.tables.kinds import KINDS, whole
+from saltus.study.tables.signature import Asked, OfLength, table, verb
 from saltus.system.quantity import quantity
 
 if TYPE_CHECKING:
@@ -21,6 +23,11 @@ if TYPE_CHECKING:
 FORMULA = "formula"
 #: Parts of a balance, and those that needn't be there.
 _PARTS, _OPTIONAL = ("energy", "supplied", "dissipated"), ("friction",)
+
+
+_BASE: Any = (OfLength, Asked)
+_STATES = Field(None, min_length=1, description="Which states; all by default.", examples=[["x"]])
+_LEFT_OUT = ("state", "keep", "time_errors", "surface", "direction")
 
 
 class OfMotions(OneVerb):
@@ -81,10 +88,11 @@ class OfMotions(OneVerb):
             )
 
 
+@asked(20, table("poincare", ["poincare"], KINDS, base=_BASE, called="Poincare section"))
 class Section(OfMotions):
     """[poincare]: where motions cross a surface."""
 
-    place, function, several = "poincare", "poincare", True
+    picture, several = "section", True
 
     def check_more(self, table: Any, setting: Setting) -> None:
         """The surface in SI."""
@@ -107,17 +115,29 @@ class Section(OfMotions):
         elif surface not in known:
             level = f'surface = {{ {self.system.states[0]} = "0.3 mm" }}'
             raise StudyError(
-                f"[{self.place}] surface = {shown(surface)!r} is unknown. "
+                f"[{self.place}] surface = {shown(surface)} is unknown. "
                 f"{nearest(surface, known)} Or give a level: {level}."
             )
         crossed(self.system, surface, self.arguments["values"] or {})
         self.arguments["surface"] = surface
 
 
+@asked(
+    30,
+    table(
+        "spectrum",
+        ["spectrum", "simulate", "poincare"],
+        KINDS | {"samples": whole(200, least=4)},
+        base=_BASE,
+        called="Spectrum",
+        without=_LEFT_OUT,
+        states=(list[str] | None, _STATES),
+    ),
+)
 class Lines(OfMotions):
     """[spectrum]: motions by frequency."""
 
-    place, function, several = "spectrum", "spectrum", True
+    picture, several = "spectrum", True
 
     def check_more(self, table: Any, setting: Setting) -> None:  # noqa: ARG002
         """Which states and periods."""
@@ -155,10 +175,11 @@ class Lines(OfMotions):
         return ds
 
 
+@asked(40, table("impacts", ["impact_statistics"], KINDS, base=_BASE, called="Impact statistics"))
 class Statistics(OfMotions):
     """[impacts]: how often, how hard and how long the contacts are."""
 
-    place, function = "impacts", "impact_statistics"
+    picture = "impacts"
 
     def check_more(self, table: Any, setting: Setting) -> None:
         """Sides and forces."""
@@ -184,10 +205,11 @@ class Statistics(OfMotions):
         self.arguments["force"] = force or None
 
 
+@asked(50, table("energy", ["energy_balance"], KINDS, base=_BASE, called="Energy balance"))
 class Balance(OfMotions):
     """[energy]: energy stored, supplied and dissipated."""
 
-    place, function = "energy", "energy_balance"
+    picture = "energy"
 
     def check_more(self, table: Any, setting: Setting) -> None:
         """The three functions: as written, or those of the model, which stand in its code."""

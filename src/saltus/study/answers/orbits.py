@@ -2,10 +2,32 @@
 
 from __future__ import annotations
 
-from saltus.study.answers.question import OneVerb
+from typing import Annotated
+
+from pydantic import Discriminator, Tag
+
+from saltus.fence import MOST_PERIODS
+from saltus.study.answers.question import OneVerb, asked
+from saltus.study.tables.kinds import KINDS, OF_RESPONSES, whole
+from saltus.study.tables.parts import Interval, Quantity, Starts
+from saltus.study.tables.signature import Kind
+from saltus.study.tables.signature import table as asking
+
+#: A time, or a range of them.
+Period = Annotated[
+    Annotated[Interval, Tag("list")] | Annotated[Quantity, Tag("quantity")],
+    Discriminator(lambda given: "list" if isinstance(given, list) else "quantity"),
+]
+#: They are found from many starts.
+KEYS = OF_RESPONSES | {
+    "start": Kind(Starts, (*KINDS["start"].examples, "random 1000"),
+        'Where to begin: every state, lists making a batch; or "random 1000" with box.',
+        convert="start"),
+    "periods": whole(3, most=MOST_PERIODS),
+    "period": Kind(Period, (["1 s", "5 s"], "0.1 s"), convert="period"),
+}  # fmt: skip
 
 
+@asked(100, asking("periodic_orbits", ["periodic_orbits"], KEYS, called="Periodic orbits"))
 class Orbits(OneVerb):
     """Periodic orbits, stable and unstable."""
-
-    place, function = "periodic_orbits", "periodic_orbits"

@@ -12,17 +12,31 @@ from saltus.kernels.status import STATUS
 from saltus.results.kinds.settled import responses
 from saltus.results.kinds.trajectory import rows
 from saltus.study.answers.compare import contact_table, exact_times, printed_rows
-from saltus.study.answers.question import Answers, OneVerb, Question, first_figure
+from saltus.study.answers.question import Answers, OneVerb, Question, asked, first_figure
 from saltus.study.setting import quantities
-from saltus.study.tables.questions import REFERENCE, RUN
+from saltus.study.tables.kinds import KINDS
+from saltus.study.tables.signature import OfLength
+from saltus.study.tables.signature import table as asking
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from saltus.results.table import TextTable
     from saltus.study.setting.setting import Setting
+    from saltus.study.tables.study import Study
 
 
+#: Stems of the files: of the run, and of that of a second method.
+RUN, REFERENCE = "run", "run-reference"
+
+
+def _files(_table: Any, study: Study) -> list[tuple[str, str]]:
+    second = study.compare is not None and study.compare.reference is not None
+    title = study.study.name
+    return [(title, RUN), *([(f"{title}, reference", REFERENCE)] if second else [])]
+
+
+@asked(10, asking("simulate", ["simulate"], KINDS, base=OfLength), _files)
 def questions(table: Any, setting: Setting) -> list[Question]:
     """How given starts move, by the study's method, and by the second one that [compare] names
     before it.

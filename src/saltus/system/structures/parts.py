@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from saltus.errors import ParameterError, among, nearest, shown
+from saltus.errors import ParameterError, among, must_be, nearest, one_of, shown
 
 #: Sides on which contact begins: above the gap, below minus the gap, or both.
 SIDES = ("upper", "lower", "both")
@@ -153,7 +153,7 @@ def parts(kind: type[P], given: Any, word: str, known: Iterable[str]) -> list[tu
         If one of them can't be used.
     """
     if isinstance(given, Contact | Force | Mapping) or not isinstance(given, Iterable):
-        raise ParameterError(f"{word}s must be a list of them, not {shown(given)}.")
+        raise must_be(f"{word}s", "a list of them", given)
     degrees = list(known)
     found = [part if isinstance(part, kind) else _made(kind, part) for part in given]
     unnamed = [part for part in found if part.name is None]
@@ -204,8 +204,8 @@ def _check(name: str, part: Contact | Force, known: list[str]) -> None:
             f"{name}: a structure takes harmonic forces, amplitude*cos(2*pi*frequency*t), and no "
             f"record or function of the time. {BY_HAND}"
         )
-    if isinstance(part, Contact) and not among(part.side, SIDES):
-        raise ParameterError(f"{name}: side={shown(part.side)}. {nearest(part.side, SIDES)}")
+    if isinstance(part, Contact):
+        one_of(SIDES, f"{name}: ", side=part.side)
     if isinstance(part, Force) and (
         isinstance(part.harmonic, bool)
         or not isinstance(part.harmonic, int | np.integer)

@@ -15,7 +15,7 @@ import numpy as np
 
 from saltus.arguments import checked
 from saltus.contact.guards import number_of
-from saltus.errors import ParameterError, SaltusWarning, among, shown
+from saltus.errors import ParameterError, SaltusWarning, among, must_be, shown
 from saltus.system.display import STRUCTURE
 from saltus.system.structures import matrices
 from saltus.system.structures.equations import UNITS, Coordinates, traced
@@ -134,7 +134,7 @@ def structure(
     (('x1', 'x2', 'v1', 'v2'), ['stop_gap', 'stop_stiffness', 'force', 'frequency'], 'stop')
     """
     if not among(unit, UNITS):
-        raise ParameterError(f"unit must be 'm', 'rad' or '', not {shown(unit)}.")
+        raise must_be("unit", "'m', 'rad' or ''", unit)
     reduced = modes is not None or damping_ratio is not None
     mass = matrices.checked(mass, "mass", symmetric=True)
     size = matrices.len_of(mass)
@@ -203,7 +203,7 @@ def _count(modes: Any, size: int) -> int:
             )
         return size
     if isinstance(modes, bool) or not isinstance(modes, int | np.integer) or modes < 1:
-        raise ParameterError(f"modes must be a whole number, 1 or more, not {shown(modes)}.")
+        raise must_be("modes", "a whole number, 1 or more", modes)
     if modes > min(size, MOST_COORDINATES):
         raise ParameterError(f"modes = {modes}, but at most {min(size, MOST_COORDINATES)} can be.")
     return int(modes)
@@ -263,11 +263,9 @@ def _ratio(ratio: Any, modes: Modes, count: int) -> np.ndarray:
         plain = [_share(one) for one in ratio] if several else _share(ratio)
         ratios = np.broadcast_to(np.asarray(plain, float), count)
     except (TypeError, ValueError, OverflowError):
-        raise ParameterError(
-            f"damping_ratio must be one number or {count} of them, not {shown(ratio)}."
-        ) from None
+        raise must_be("damping_ratio", f"one number or {count} of them", ratio) from None
     if not (np.isfinite(ratios).all() and (ratios >= 0).all()):
-        raise ParameterError(f"damping_ratio must be 0 or more, not {shown(ratio)}.")
+        raise must_be("damping_ratio", "0 or more", ratio)
     if (ratios > 1).any():
         warnings.warn(
             f"damping_ratio = {ratios.max():g} is more than critical damping, 1: such modes don't "

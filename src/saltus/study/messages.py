@@ -5,25 +5,19 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from tomllib import TOMLDecodeError
-from typing import Any
+from types import UnionType
+from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import ValidationError
 
-from saltus.errors import nearest
-from saltus.fence import SHOWN, shown
+from saltus.errors import closest, nearest, shown
+from saltus.study.spec import QUESTIONS, Study
 from saltus.study.tables.methods import METHODS
-from saltus.study.tables.parts import Curve, Header, Output, Range, SystemTable, Table
-from saltus.study.tables.questions import Axis, Compare, Map
-from saltus.study.tables.spec import QUESTIONS, Study
-from saltus.study.tables.wording import toml
+from saltus.study.tables.parts import Table
+from saltus.study.tables.toml import cut, toml
 
 #: Keys and indices on the way from the study to a value.
 Place = tuple[int | str, ...]
-TABLES: dict[str, type[Table]] = QUESTIONS | {
-    "study": Header, "system": SystemTable, "compare": Compare, "map": Map, "axes": Axis,
-    "frequency": Range, "vary": Range,
-    "outputs": Output, "tables": Curve,
-}  # fmt: skip
 #: Parts of a place that name the branch of a union, not a key.
 _BRANCHES = re.compile(r"float|str|(list|dict)\[.*\]|function-.*")
 _BARE_QUANTITY = re.compile(
@@ -80,18 +74,16 @@ def _instead(place: Place) -> str:
     key, known = str(place[-1]), list(_known(place[:-1]))
     if len(place) == 1 and key in _ELSEWHERE:
         return _ELSEWHERE[key]
-    near = nearest(key, known, 0.7)
     there = [name for name, table in QUESTIONS.items() if key in table.model_fields]
     question = QUESTIONS.get(str(place[0]))
-    if there and question is not None and _table(place[:-1]) is question and "Did you" not in near:
+    if (
+        there
+        and question is not None
+        and _table(place[:-1]) is question
+        and not closest(key, known, 0.7)
+    ):
         return f"It is a key of {', '.join(f'[{name}]' for name in there)}."
     return nearest(key, known)
-
-
-def _given(value: Any) -> str:
-    """A value as a message repeats it: as TOML would write it, cut if it is long."""
-    whole = toml(value)
-    return whole if len(whole) <= SHOWN else f"{whole[:SHOWN]}…"
 
 
 def syntax_fault(error: TOMLDecodeError, text: str) -> str:
@@ -101,16 +93,16 @@ def syntax_fault(error: TOMLDecodeError, text: str) -> str:
     place = re.search(r"line (\d+)", str(error))
     number = int(place[1]) if place else text.rstrip().count("\n") + 1
     lines = text.split("\n")
-    line = shown(lines[min(number, len(lines)) - 1].strip())
+    line = lines[min(number, len(lines)) - 1].strip()
     if re.match(r"Cannot (overwrite|declare|mutate)|Duplicate", str(error)):
         return (
-            f"line {number}: {line!r} gives again what stands in the file already. Keep one of "
-            f"the two."
+            f"line {number}: {shown(line)} gives again what stands in the file already. Keep one "
+            f"of the two."
         )
     quantity = _BARE_QUANTITY.fullmatch(line)
     if quantity:
-        return f'line {number}: {line!r} needs quotes. Write {quantity[1]} = "{quantity[2]}".'
-    return f"line {number}: {line!r} isn't TOML: {str(error).split(' (at')[0]}."
+        return f'line {number}: {shown(line)} needs quotes. Write {quantity[1]} = "{quantity[2]}".'
+    return f"line {number}: {shown(line)} isn't TOML: {str(error).split(' (at')[0]}."
 
 
 def content_faults(error: ValidationError, data: Any = None) -> list[str]:
@@ -164,7 +156,7 @@ def _fault(place: Place, details: list[dict[str, Any]], data: Any) -> str:
         given = str(first["ctx"]["tag"])
         alike = [name for name in METHODS if name.lower() == given.lower()]
         return (
-            f"[{'.'.join(path)}] name = {_given(given)} is no method. "
+            f"[{'.'.join(path)}] name = {cut(given)} is no method. "
             f"{nearest(alike[0] if alike else given, METHODS)}"
         )
     if kind == "union_tag_not_found":
@@ -183,27 +175,50 @@ def _fault(place: Place, details: list[dict[str, Any]], data: Any) -> str:
         )
     elif kind in ("too_short", "too_long"):
         return (
-            f"{where}{key} = {_given(first['input'])} must have "
+            f"{where}{key} = {cut(first['input'])} must have "
             f"{first['msg'].split('have ')[1].split(' after')[0]}."
         ) + _example(place)
     elif kind == "list_type" and len(place) == 1:
         expected = "a table"
     else:
         expected = _EXPECTED.get(kind, first["msg"].removeprefix("Input should be "))
-    return f"{where}{key} = {_given(first['input'])} must be {expected}." + _example(place)
+    return f"{where}{key} = {cut(first['input'])} must be {expected}." + _example(place)
 
 
 def _table(place: Place) -> type[Table] | None:
     """The class of the table at a place in a study."""
-    table: type[Table] | None = Study
+    inside: Any = Study
     for part in place:
-        nested = (
-            part in ("method", "flow", "reference")
-            or isinstance(part, int)
-            or table in (Axis, Range, Output, Curve)
-        )
-        table = METHODS.get(str(part)) or TABLES.get(str(part)) or (table if nested else None)
-    return table
+        inside = METHODS.get(str(part)) or _inside(inside, part)
+    return next((one for one in _parts(inside) if _is_table(one)), None)
+
+
+def _inside(kind: Any, part: int | str) -> Any:
+    """The type of what stands in a table, list or mapping by a key or an index; None if nothing
+    does.
+    """
+    for one in _parts(kind):
+        if _is_table(one):
+            field = one.model_fields.get(str(part))
+            return field.annotation if field is not None else None
+        if get_origin(one) in (list, dict):
+            return get_args(one)[-1]
+    return None
+
+
+def _parts(kind: Any) -> Iterator[Any]:
+    """The types that a type is one of."""
+    if get_origin(kind) is Annotated:
+        yield from _parts(get_args(kind)[0])
+    elif get_origin(kind) in (Union, UnionType):
+        for one in get_args(kind):
+            yield from _parts(one)
+    else:
+        yield kind
+
+
+def _is_table(kind: Any) -> bool:
+    return isinstance(kind, type) and issubclass(kind, Table)
 
 
 def _known(place: Place) -> Iterator[str]:

@@ -9,38 +9,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from saltus.errors import ParameterError, StudyError, TraceError, UnitError, nearest
-from saltus.study.answers import basins, simulate
-from saltus.study.answers.branches import Backbone, Branches
-from saltus.study.answers.curves import Curve
-from saltus.study.answers.equilibria import Equilibria
-from saltus.study.answers.lyapunov import Exponents
-from saltus.study.answers.motions import Balance, Lines, Section, Statistics
-from saltus.study.answers.orbits import Orbits
-from saltus.study.answers.question import OneVerb, Question
-from saltus.study.answers.responses import Diagram, Response
+from saltus.study.answers import questions
+from saltus.study.answers.question import Question
+from saltus.study.read import parse, study_of
 from saltus.study.setting.inputs import Inputs
-from saltus.study.setting.setting import Setting, setting_of
-from saltus.study.tables.read import parse, study_of
-from saltus.study.tables.spec import Study
-from saltus.study.tables.wording import fault
+from saltus.study.setting.setting import setting_of
+from saltus.study.tables.study import Study
+from saltus.study.tables.toml import fault
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from saltus.results.table import TextTable
     from saltus.system import System
-
-#: Tables that one question answers.
-_KINDS = (
-    Section, Lines, Statistics, Balance, Exponents, Response, Diagram, Equilibria, Orbits, Branches,
-    Curve, Backbone,
-)  # fmt: skip
-_ONE: dict[str, type[OneVerb]] = {one.place: one for one in _KINDS}
-#: Tables that may be several questions.
-_SEVERAL: dict[str, Callable[[Any, Setting], list[Question]]] = {
-    "simulate": simulate.questions,
-    "basins": basins.questions,
-}
 
 
 @dataclass(frozen=True)
@@ -163,9 +144,7 @@ def questions_of(
     asked: list[Question] = []
     for name, table in study.questions():
         with naming_table(name):
-            asked += (
-                [_ONE[name](table, setting)] if name in _ONE else _SEVERAL[name](table, setting)
-            )
+            asked += questions()[name].make(table, setting)
     for question in asked:
         question.join(asked)
     stems = [stem for question in asked for stem in question.stems]

@@ -1,4 +1,4 @@
-"""Read a study file: TOML to a checked :class:`~saltus.study.tables.spec.Study`."""
+"""Read a study file: TOML to a checked :class:`~saltus.study.spec.Study`."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from pydantic import ValidationError
 
 from saltus import fence
 from saltus.errors import StudyError
-from saltus.study.tables.messages import content_faults, syntax_fault
-from saltus.study.tables.spec import Study
+from saltus.study.messages import content_faults, syntax_fault
+from saltus.study.spec import Study
 from saltus.system.formula import LONGEST
 
 
