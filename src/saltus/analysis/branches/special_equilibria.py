@@ -202,8 +202,9 @@ class _Smooth:
             largest = np.where(largest > 0, largest, 1.0)
             return self.at(entries, every, z) / largest, derivative / largest[:, :, None]
 
-        z, arrived = newton(equations, start, size[None], longest_step=LONGEST_STEP)
-        if not arrived[0]:
+        zeros = newton(equations, start, size[None], longest_step=LONGEST_STEP)
+        z = zeros.z
+        if not zeros.found[0]:
             return None
         states = len(self.near)
         return z[0, :states], float(z[0, states]), z[0, states + 1 :]

@@ -221,12 +221,12 @@ def _branch_point(
         return residual[None], whole[None]
 
     null = np.linalg.svd(derivative[0])[0][:, -1]
-    x, found = newton(
+    zeros = newton(
         equations, np.concatenate([start, [0.0], null])[None],
-        np.concatenate([unit, np.ones(size)])[None], CONVERGED, longest_step=np.inf,
+        np.concatenate([unit, np.ones(size)])[None], enough=CONVERGED, longest_step=np.inf,
     )  # fmt: skip
-    z = x[0, :size]
-    if not found[0]:
+    z = zeros.z[0, :size]
+    if not zeros.found[0]:
         return None
     if np.linalg.norm((z - start) / unit) > FARTHEST:
         return None

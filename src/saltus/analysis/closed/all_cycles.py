@@ -25,9 +25,9 @@ from saltus.analysis.closed.cycles import (
     units,
 )
 from saltus.analysis.closed.field_zeros import field_of
-from saltus.analysis.solve.damped import Known, damped_newton
+from saltus.analysis.solve.deflation import Known
 from saltus.analysis.solve.floquet import nontrivial
-from saltus.analysis.solve.newton import Equations
+from saltus.analysis.solve.newton import Equations, newton
 from saltus.analysis.solve.tolerances import AMPLIFIED, CONVERGED, LONGEST, SAME
 from saltus.flow.maps import Stroboscope
 from saltus.flow.polynomials import between
@@ -266,14 +266,16 @@ def close(
     deflated.
     """
     _, n, size = guess.points.shape
-    options = {} if max_steps is None else {"max_steps": max_steps}
     step, parts = max(1, HELD // (n * size + 1) ** 2), [guess.rows(np.zeros(0, np.int64))]
     for first in range(0, len(guess), step):
         part = guess.rows(np.arange(first, min(first + step, len(guess))))
         z = np.concatenate([part.points.reshape(len(part), -1), part.time[:, None]], axis=1)
         unit = np.concatenate([np.tile(part.scale, n), part.time[:, None]], axis=1)
-        z, found = damped_newton(_equations(map_, part, longest), z, unit, known, **options)
-        found &= (z[:, -1] > 0) & (z[:, -1] <= longest * (1.0 + SAME))
+        zeros = newton(
+            _equations(map_, part, longest), z, unit, damped=True, known=known, max_steps=max_steps
+        )
+        z = zeros.z
+        found = zeros.found & (z[:, -1] > 0) & (z[:, -1] <= longest * (1.0 + SAME))
         points = z[found, :-1].reshape(-1, n, size)
         parts.append(Guess(points, z[found, -1], part.scale[found], part.row[found]))
     return Guess.joined(parts)

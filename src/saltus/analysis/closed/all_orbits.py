@@ -15,8 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from saltus.analysis.closed.orbits import Orbit, phase_distances
-from saltus.analysis.solve.damped import damped_newton
-from saltus.analysis.solve.newton import leading_first
+from saltus.analysis.solve.newton import leading_first, newton
 from saltus.analysis.solve.tolerances import AMPLIFIED, SAME
 from saltus.flow.maps import Map, Travel
 from saltus.flow.progress import stage
@@ -259,19 +258,19 @@ def close(
     """
     _, n, size = guesses.shape
     units = np.tile(scale, n)
-    options = {} if max_steps is None else {"max_steps": max_steps}
     rows = max(1, HELD // max((n * size) ** 2, n * size * (0 if known is None else len(known))))
     parts = []
     for first in range(0, len(guesses), rows):
         part = guesses[first : first + rows].reshape(-1, n * size)
-        x, found = damped_newton(
+        zeros = newton(
             lambda z, _: shooting(map_, z.reshape(-1, n, size), scale),
             part,
             np.broadcast_to(units, part.shape),
-            known,
-            **options,
+            damped=True,
+            known=known,
+            max_steps=max_steps,
         )
-        parts.append(x[found].reshape(-1, n, size))
+        parts.append(zeros.z[zeros.found].reshape(-1, n, size))
     return np.concatenate(parts) if parts else np.zeros((0, n, size))
 
 

@@ -335,14 +335,14 @@ def _newton(
         np.concatenate([part, np.ones((len(start), 1))], axis=1) for part in (start, scale)
     )
     guess[~np.isfinite(time)] = np.nan
-    z, found = newton(
+    zeros = newton(
         equations,
         guess,
         units,
-        CONVERGED if map_.exact else map_.noise_of(scale),
+        enough=CONVERGED if map_.exact else map_.noise_of(scale),
         farthest=FARTHEST,
     )
-    return z[:, :size], z[:, size] * time, found
+    return zeros.z[:, :size], zeros.z[:, size] * time, zeros.found
 
 
 def least_period(

@@ -168,7 +168,8 @@ def find_equilibria(
         derivative = jacobian_of(system, x, mine) * unit[:, None, :] / unit[:, :, None]
         return field_of(system, x, mine) / unit, derivative
 
-    x, found = newton(equations, start, scale, longest_step=FARTHEST_STEP)
+    zeros = newton(equations, start, scale, longest_step=FARTHEST_STEP)
+    x, found = zeros.z, zeros.found
     place = np.where(found[:, None], x, np.nan)
     eigenvalues = np.full(x.shape, np.nan + 0j)
     reach = np.full((*x.shape, x.shape[1]), np.nan)

@@ -208,8 +208,8 @@ def _closed(
         unit = scale[rows]
         return (end - x) / unit, matrix * unit[:, None, :] / unit[:, :, None] - np.eye(x.shape[1])
 
-    x, found = newton(equations, start, scale, max_slow=max_slow)
-    rows = np.flatnonzero(found)
+    zeros = newton(equations, start, scale, max_slow=max_slow)
+    x, rows = zeros.z, np.flatnonzero(zeros.found)
     if not len(rows):
         return rows, [], np.zeros(0)
     points = np.concatenate(
