@@ -26,6 +26,8 @@ from saltus.analysis.solve.tolerances import (
     SLOW,
 )
 
+#: A step so short beside the unknowns is rounding.
+ROUNDED = 4 * np.finfo(float).eps
 #: Residuals float64[m, e] and derivatives float64[m, e, d] of the rows int64[m], at float64[m, d];
 #: all in units of the scale.
 Equations = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -115,14 +117,18 @@ def newton(
             across = ((work.trial[rows] - start[rows]) / scale[rows] * planes[rows]).sum(axis=1)
             residual = np.append(residual, across[:, None], axis=1)
             derivative = np.append(derivative, planes[rows, None], axis=1)
-        helps = work.helps(rows, residual) if damped else np.ones(len(rows), bool)
-        retried = rows[~helps & (work.share[rows] >= SHORTEST_SHARE)]
-        rows = work.step(rows[helps], residual[helps], derivative[helps])
+        retried = rows[:0]
+        if damped:
+            helps = work.helps(rows, residual)
+            retried = rows[~helps & (work.share[rows] >= SHORTEST_SHARE)]
+            rows, residual, derivative = rows[helps], residual[helps], derivative[helps]
+        rows = work.step(rows, residual, derivative)
         done = work.done(rows, enough[rows], foresee)
         slow[rows] += work.length[rows] > SLOW * work.before[rows]
         near = np.abs((work.trial[rows] - start[rows]) / scale[rows]).max(axis=1) <= farthest[rows]
         near &= (work.length[rows] < longest_step) | damped
-        rows = np.sort(np.append(rows[~done & near & (slow[rows] <= max_slow)], retried))
+        rows = rows[~done & near & (slow[rows] <= max_slow)]
+        rows = np.sort(np.append(rows, retried)) if damped else rows
         work.ahead(rows, damped)
     return work.zeros(planes is not None)
 
@@ -140,10 +146,10 @@ class _Iteration:
         self.x, self.trial = np.array(start, float), np.array(start, float)
         self.newton_step = np.zeros(start.shape)
         self.derivative = np.full((k, start.shape[1], start.shape[1]), np.nan)
-        self.length, self.before, self.level = np.full((3, k), np.inf)
+        self.length, self.before = np.full((2, k), np.inf)
         self.share, self.cut = np.ones((2, k))
         self.found, self.evaluations = np.zeros(k, bool), np.zeros(k, np.int64)
-        self.first_lengths = np.zeros((2, k))
+        self.contraction = np.zeros(k)
 
     def helps(self, rows: np.ndarray, residual: np.ndarray) -> np.ndarray:
         """True where the step to the trial shortens the next one, or is too short to tell, bool[r];
@@ -154,9 +160,14 @@ class _Iteration:
         if len(some):
             with np.errstate(all="ignore"):
                 simplified = self._solved(self.derivative[some], residual[told])
-                now = np.abs(simplified).max(axis=1)
-                now *= weight(self.trial[some], self.scale[some], self.known)
-                better[told] = now <= (1.0 - 0.25 * self.cut[some]) * self.level[some]
+                now, before = (
+                    length * weight(x, self.scale[some], self.known)
+                    for length, x in (
+                        (np.abs(simplified).max(axis=1), self.trial[some]),
+                        (self.length[some], self.x[some]),
+                    )
+                )
+                better[told] = now <= (1.0 - 0.25 * self.cut[some]) * before
         share = self.share[rows]
         self.share[rows] = np.where(better, np.minimum(1.0, 2.0 * share), 0.5 * share)
         return better
@@ -166,7 +177,8 @@ class _Iteration:
         finite = np.isfinite(derivative).all(axis=(1, 2)) & np.isfinite(residual).all(axis=1)
         good = np.flatnonzero(finite)
         if not self.least_squares:
-            good = good[np.linalg.cond(derivative[good]) < SINGULAR]
+            sizes = np.linalg.svd(derivative[good], compute_uv=False)
+            good = good[sizes[:, 0] < SINGULAR * sizes[:, -1]]
         rows = rows[good]
         if self.derivative.shape[1] != derivative.shape[1]:
             self.derivative = np.full((len(self.x), *derivative.shape[1:]), np.nan)
@@ -174,12 +186,10 @@ class _Iteration:
         step = -self._solved(derivative[good], residual[good])
         self.newton_step[rows], self.before[rows] = step, self.length[rows]
         self.length[rows] = np.abs(step).max(axis=1)
-        self.level[rows] = self.length[rows] * weight(self.x[rows], self.scale[rows], self.known)
         self.trial[rows] = self.x[rows] + step * self.scale[rows]
         self.evaluations[rows] += 1
-        for number, lengths in enumerate(self.first_lengths, 1):
-            mine = rows[self.evaluations[rows] == number]
-            lengths[mine] = self.length[mine]
+        second = rows[self.evaluations[rows] == 2]
+        self.contraction[second] = self.length[second] / np.maximum(self.before[second], AMPLIFIED)
         return rows
 
     def _solved(self, matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -192,7 +202,7 @@ class _Iteration:
         length, before = self.length[rows], self.before[rows]
         step = np.abs(self.newton_step[rows] * self.scale[rows])
         done = (length < enough) | ((length < AMPLIFIED) & (length > 0.5 * before))
-        done |= np.all(step <= 4 * np.finfo(float).eps * np.abs(self.trial[rows]), axis=1)
+        done |= np.all(step <= ROUNDED * np.abs(self.trial[rows]), axis=1)
         if foresee:
             sure = ~done & np.isfinite(before) & (length * (length / before) ** 2 < FORESEEN)
             self.evaluations[rows[sure]] += 1
@@ -216,9 +226,8 @@ class _Iteration:
         """What was found."""
         found, derivative = self.found, self.derivative
         found[found] = is_new(self.x[found], self.scale[found], self.known)
-        contraction = self.first_lengths[1] / np.maximum(self.first_lengths[0], AMPLIFIED)
         derivative = derivative[:, :-1] if bordered else derivative
-        return Zeros(self.x, found, derivative, self.evaluations, contraction)
+        return Zeros(self.x, found, derivative, self.evaluations, self.contraction)
 
 
 def leading_first(matrices: np.ndarray) -> np.ndarray:
