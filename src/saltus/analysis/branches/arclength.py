@@ -105,6 +105,16 @@ class Curve:
     length: list[float] = field(default_factory=list)
     end: str = ""
 
+    def behind(self, back: Curve) -> Curve:
+        """The curve through the start of both that comes along another one and goes on as this."""
+        return Curve(
+            back.z[:0:-1] + self.z,
+            [-tangent for tangent in back.tangent[:0:-1]] + self.tangent,
+            back.derivative[:0:-1] + self.derivative,
+            [-length for length in back.length[:0:-1]] + self.length,
+            self.end,
+        )
+
 
 def correct(
     equations: Equations,

@@ -119,12 +119,7 @@ def _joined(equations: Equations, curves: list[Curve]) -> BifurcationCurve:
     if closed:
         whole, ends = curves[closed[0]], ("closed", "closed")
     else:
-        whole = Curve(
-            back.z[:0:-1] + ahead.z,
-            [-tangent for tangent in back.tangent[:0:-1]] + ahead.tangent,
-            back.derivative[:0:-1] + ahead.derivative,
-            [-length for length in back.length[:0:-1]] + ahead.length,
-        )
+        whole = ahead.behind(back)
         ends = (_end(equations, back), _end(equations, ahead))
     z, tangent, derivative = (np.array(part) for part in (whole.z, whole.tangent, whole.derivative))
     length = np.array(whole.length) - whole.length[0]

@@ -170,7 +170,7 @@ class _Iteration:
                 better[told] = now <= (1.0 - 0.25 * self.cut[some]) * before
         share = self.share[rows]
         self.share[rows] = np.where(better, np.minimum(1.0, 2.0 * share), 0.5 * share)
-        return better
+        return np.asarray(better)
 
     def step(self, rows: np.ndarray, residual: np.ndarray, derivative: np.ndarray) -> np.ndarray:
         """Go to the trials, where the next steps are known; the rows that have one, int64[r]."""
