@@ -18,8 +18,8 @@ import numpy as np
 from saltus.analysis.branches.arclength import Curve, tangents
 from saltus.analysis.branches.branch import Branch, refine
 from saltus.analysis.branches.criticality import criticality
+from saltus.analysis.branches.events import Event
 from saltus.analysis.branches.rests import Rests
-from saltus.analysis.branches.special_points import SpecialPoint
 from saltus.analysis.branches.switching import Seed, crossing
 from saltus.analysis.branches.tracing import Plan, both_ways, trace
 from saltus.analysis.solve.newton import newton
@@ -42,14 +42,14 @@ class RestBranch(Branch):
 
     Attributes
     ----------
-    borders : tuple of SpecialPoint or None
+    borders : tuple of Event or None
         The boundary equilibria at its first and at its last point.
     beyond : tuple of float64[z] or None
         The direction in which the branch in the mode behind each begins, in units of the scale.
     """
 
     orbits: Rests  # type: ignore[assignment]
-    borders: list[SpecialPoint | None] = field(default_factory=lambda: [None, None])
+    borders: list[Event | None] = field(default_factory=lambda: [None, None])
     beyond: list[np.ndarray | None] = field(default_factory=lambda: [None, None])
 
     def find_events(self) -> None:
@@ -61,7 +61,7 @@ class RestBranch(Branch):
             at = {event.after for event in self.events if event.kind in ("fold", "hopf")}
             refine(self, sorted(at))
 
-    def _contacts(self) -> list[SpecialPoint]:
+    def _contacts(self) -> list[Event]:
         """The boundary equilibria at the ends."""
         places = (0, max(len(self.z) - 2, 0))
         return [
@@ -128,7 +128,7 @@ def trace_rests(
     mine = replace(plan, make=make, follow=follow, leave=_leave, crossed=True)
     trace(mine, seeds, branches)
     rests = [(i, one) for i, one in enumerate(branches) if isinstance(one, RestBranch)]
-    known: list[SpecialPoint] = []
+    known: list[Event] = []
     for _, branch in rests:
         branch.events = [event for event in branch.events if not _told(branch, event, known)]
         known += [event for event in branch.events if event.kind == "boundary_equilibrium"]
@@ -146,7 +146,7 @@ def _left(orbits: Rests, curve: Curve) -> str:
     return "boundary_equilibrium" if (ends[0] != ends[1]).any() else ""
 
 
-def _told(branch: RestBranch, event: SpecialPoint, known: Sequence[SpecialPoint]) -> bool:
+def _told(branch: RestBranch, event: Event, known: Sequence[Event]) -> bool:
     """Whether a boundary equilibrium is the end of a branch that came from its other side."""
     return event.kind == "boundary_equilibrium" and any(
         np.abs((event.z - other.z) / branch.scale).max() < ONE for other in known
@@ -154,14 +154,14 @@ def _told(branch: RestBranch, event: SpecialPoint, known: Sequence[SpecialPoint]
 
 
 # -- Hopf points -----------------------------------------------------------------------------------
-def _named(branch: RestBranch, event: SpecialPoint) -> SpecialPoint:
+def _named(branch: RestBranch, event: Event) -> Event:
     """An event by the name that it has of equilibria."""
     if event.kind != "neimark_sacker":
         return event
     return replace(event, kind="hopf", outcome=criticality(branch.orbits, branch.row, event.z))
 
 
-def _born(branch: RestBranch, event: SpecialPoint, parent: tuple[int, int]) -> Seed:
+def _born(branch: RestBranch, event: Event, parent: tuple[int, int]) -> Seed:
     """The limit cycle that is born at a Hopf point."""
     orbits, size, unit = branch.orbits, branch.orbits.size, branch.scale
     matrix = orbits.jacobian(event.z[None], orbits.modes[[branch.row]])[0, :, :size]
@@ -192,8 +192,8 @@ def _meet_boundary(branch: RestBranch, side: int, place: int) -> None:
     outcome, branch.beyond[side] = _behind(branch, end, guard, tangent)
     own = orbits.multipliers(end[None], derivative, one)
     tangent = tangent if side else -tangent
-    branch.borders[side] = SpecialPoint(
-        "boundary_equilibrium", 0, end, tangent, own[0], derivative[0], (guard,), np.nan, outcome
+    branch.borders[side] = Event(
+        "boundary_equilibrium", 0, end, own[0], tangent, derivative[0], (guard,), outcome=outcome
     )
     at = len(branch.z) if side else 0
     length = branch.length[place] + (apart if side else -apart)

@@ -13,10 +13,11 @@ import numpy as np
 
 from saltus.analysis.branches.arclength import ENDING, FIRST, Curve, correct, follow, tangents
 from saltus.analysis.branches.branch import Branch
+from saltus.analysis.branches.events import Event
 from saltus.analysis.branches.legs import Legs
 from saltus.analysis.branches.same_branch import SAME, branch_of
 from saltus.analysis.branches.shooting import PeriodicOrbits
-from saltus.analysis.branches.special_points import SpecialPoint, unstable
+from saltus.analysis.branches.special_points import unstable
 from saltus.analysis.branches.switching import Seed, children, ends_there
 
 #: How far a new branch begins from the point where it leaves another, in units of the scale: the
@@ -179,7 +180,7 @@ def _holds(branch: Branch, other: Branch) -> bool:
     return n == branch.orbits.n and all(branch_of(z, n, [branch]) == 0 for z in ends)
 
 
-def _same_event(event: SpecialPoint, branch: Branch) -> int | None:
+def _same_event(event: Event, branch: Branch) -> int | None:
     """The number of an event among those of another branch."""
     apart = [
         np.abs((other.z - event.z) / branch.scale).max() if other.kind == event.kind else np.inf
