@@ -18,9 +18,8 @@ import numpy as np
 from saltus.analysis.solve.newton import Zeros, newton
 from saltus.flow.polynomials import between
 
-#: The last step of the corrector is shorter than this, in units of the scale: the derivative before
-#: it is that at the point.
-CLOSED = 1e-13
+#: The corrector is done where its step is shorter than this, in units of the scale.
+CLOSED = 1e-14
 #: Iterations of the corrector: more mean that the step was too long.
 MOST_ITERATIONS = 7
 #: Cosine of the angle between tangents at the ends of a step, and between it and each of them: less

@@ -44,7 +44,7 @@ class Zeros:
     found : bool[k]
         Where the iteration converged.
     derivative : float64[k, e, d]
-        Of the equations in units of the scale, at the last evaluation: a last step before the zero.
+        Of the equations in units of the scale, at the last evaluation: before a last step.
     evaluations : int64[k]
         How many there were, one that was foreseen included.
     contraction : float64[k]
@@ -86,7 +86,7 @@ def newton(
         First guesses, and the unit of each unknown.
     planes : float64[k, d], optional
         Of one equation less: zeros in the planes through the starts across these, in units of the
-        scale.
+        scale. A last step that is short enough isn't taken: the derivative is that at the zero.
     enough : float or float64[k]
         A step so short is the last one.
     foresee : bool
@@ -122,8 +122,12 @@ def newton(
             helps = work.helps(rows, residual)
             retried = rows[~helps & (work.share[rows] >= SHORTEST_SHARE)]
             rows, residual, derivative = rows[helps], residual[helps], derivative[helps]
+        if planes is not None:  # a zero is one where the derivative is singular too
+            closed = np.abs(residual).max(axis=1) < enough[rows]
+            work.settle(rows[closed], derivative[closed])
+            rows, residual, derivative = rows[~closed], residual[~closed], derivative[~closed]
         rows = work.step(rows, residual, derivative)
-        done = work.done(rows, enough[rows], foresee)
+        done = work.done(rows, enough[rows], foresee, stay=planes is not None)
         slow[rows] += work.length[rows] > SLOW * work.before[rows]
         near = np.abs((work.trial[rows] - start[rows]) / scale[rows]).max(axis=1) <= farthest[rows]
         near &= (work.length[rows] < longest_step) | damped
@@ -172,6 +176,17 @@ class _Iteration:
         self.share[rows] = np.where(better, np.minimum(1.0, 2.0 * share), 0.5 * share)
         return np.asarray(better)
 
+    def settle(self, rows: np.ndarray, derivative: np.ndarray) -> None:
+        """End at the trials."""
+        self.x[rows], self.found[rows] = self.trial[rows], True
+        self.evaluations[rows] += 1
+        self._keep(rows, derivative)
+
+    def _keep(self, rows: np.ndarray, derivative: np.ndarray) -> None:
+        if self.derivative.shape[1] != derivative.shape[1]:
+            self.derivative = np.full((len(self.x), *derivative.shape[1:]), np.nan)
+        self.derivative[rows] = derivative
+
     def step(self, rows: np.ndarray, residual: np.ndarray, derivative: np.ndarray) -> np.ndarray:
         """Go to the trials, where the next steps are known; the rows that have one, int64[r]."""
         finite = np.isfinite(derivative).all(axis=(1, 2)) & np.isfinite(residual).all(axis=1)
@@ -180,9 +195,8 @@ class _Iteration:
             sizes = np.linalg.svd(derivative[good], compute_uv=False)
             good = good[sizes[:, 0] < SINGULAR * sizes[:, -1]]
         rows = rows[good]
-        if self.derivative.shape[1] != derivative.shape[1]:
-            self.derivative = np.full((len(self.x), *derivative.shape[1:]), np.nan)
-        self.x[rows], self.derivative[rows] = self.trial[rows], derivative[good]
+        self.x[rows] = self.trial[rows]
+        self._keep(rows, derivative[good])
         step = -self._solved(derivative[good], residual[good])
         self.newton_step[rows], self.before[rows] = step, self.length[rows]
         self.length[rows] = np.abs(step).max(axis=1)
@@ -197,17 +211,20 @@ class _Iteration:
             return np.asarray((np.linalg.pinv(matrix, RANK) @ right[:, :, None])[:, :, 0])
         return np.asarray(np.linalg.solve(matrix, right[:, :, None])[:, :, 0])
 
-    def done(self, rows: np.ndarray, enough: np.ndarray, foresee: bool) -> np.ndarray:
-        """True where the step is the last one, which is taken, bool[r]."""
+    def done(self, rows: np.ndarray, enough: np.ndarray, foresee: bool, stay: bool) -> np.ndarray:
+        """True where the step is the last one, bool[r]: it is taken, unless it is short enough and
+        the zeros ``stay`` where the derivatives are known.
+        """
         length, before = self.length[rows], self.before[rows]
         step = np.abs(self.newton_step[rows] * self.scale[rows])
         done = (length < enough) | ((length < AMPLIFIED) & (length > 0.5 * before))
         done |= np.all(step <= ROUNDED * np.abs(self.trial[rows]), axis=1)
+        taken = np.zeros_like(done) if stay else done.copy()
         if foresee:
             sure = ~done & np.isfinite(before) & (length * (length / before) ** 2 < FORESEEN)
             self.evaluations[rows[sure]] += 1
-            done |= sure
-        self.x[rows[done]], self.found[rows[done]] = self.trial[rows[done]], True
+            done, taken = done | sure, taken | sure
+        self.x[rows[taken]], self.found[rows[done]] = self.trial[rows[taken]], True
         return np.asarray(done)
 
     def ahead(self, rows: np.ndarray, damped: bool) -> None:
