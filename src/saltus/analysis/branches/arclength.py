@@ -18,7 +18,7 @@ import numpy as np
 from saltus.analysis.solve.newton import Zeros, newton
 from saltus.flow.polynomials import between
 
-#: The corrector is done where its step is shorter than this, in units of the scale.
+#: The corrector is done where its residual is smaller than this, in units of the scale.
 CLOSED = 1e-14
 #: Iterations of the corrector: more mean that the step was too long.
 MOST_ITERATIONS = 7

@@ -86,7 +86,8 @@ def newton(
         First guesses, and the unit of each unknown.
     planes : float64[k, d], optional
         Of one equation less: zeros in the planes through the starts across these, in units of the
-        scale. A last step that is short enough isn't taken: the derivative is that at the zero.
+        scale. There a residual so small as ``enough`` is the last one: no step is taken from it,
+        and the derivative is that at the zero.
     enough : float or float64[k]
         A step so short is the last one.
     foresee : bool
@@ -212,13 +213,15 @@ class _Iteration:
         return np.asarray(np.linalg.solve(matrix, right[:, :, None])[:, :, 0])
 
     def done(self, rows: np.ndarray, enough: np.ndarray, foresee: bool, stay: bool) -> np.ndarray:
-        """True where the step is the last one, bool[r]: it is taken, unless it is short enough and
-        the zeros ``stay`` where the derivatives are known.
+        """True where the step is the last one, bool[r]: it is taken, unless the zeros ``stay``
+        where the derivatives are known, which is told by the residual.
         """
         length, before = self.length[rows], self.before[rows]
         step = np.abs(self.newton_step[rows] * self.scale[rows])
-        done = (length < enough) | ((length < AMPLIFIED) & (length > 0.5 * before))
-        done |= np.all(step <= ROUNDED * np.abs(self.trial[rows]), axis=1)
+        done = (length < AMPLIFIED) & (length > 0.5 * before)
+        if not stay:
+            rounding = np.all(step <= ROUNDED * np.abs(self.trial[rows]), axis=1)
+            done |= (length < enough) | rounding
         taken = np.zeros_like(done) if stay else done.copy()
         if foresee:
             sure = ~done & np.isfinite(before) & (length * (length / before) ** 2 < FORESEEN)
