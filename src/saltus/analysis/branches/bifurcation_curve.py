@@ -302,7 +302,7 @@ def _table(
         "codim2": np.arange(len(special)),
         "codim2_kind": [point.kind for point in special],
         "codim2_point": np.array([point.after for point in special], np.int64),
-        "codim2_extremum": ["" if p.parameter < 0 else names[p.parameter] for p in special],
+        "codim2_extremum": ["" if p.extremum < 0 else names[p.extremum] for p in special],
         "codim2_<parameter>": {name: values[count:, i] for i, name in enumerate(names)},
         "codim2_multiplier_real": own[count:].real,
         "codim2_multiplier_imag": own[count:].imag,

@@ -28,7 +28,7 @@ from saltus.analysis.closed.field_zeros import field_of
 from saltus.analysis.closed.motions import ClosedMotion
 from saltus.analysis.closed.search import AGES, BESIDE, Family, Search, used_up
 from saltus.analysis.closed.shooting import Shooting, close
-from saltus.analysis.solve.damped import Known
+from saltus.analysis.solve.deflation import Known
 from saltus.analysis.solve.tolerances import AMPLIFIED, CONVERGED, LONGEST, SAME
 from saltus.flow.maps import Stroboscope
 from saltus.flow.polynomials import between

@@ -318,8 +318,8 @@ def _newton(
     """
     guess = Shooting(map_, np.arange(len(start)), start[:, None], scale, time=time)
     enough = CONVERGED if map_.exact else map_.noise_of(scale)
-    z, found = newton(guess, guess.unknowns, guess.units, enough, farthest=FARTHEST)
-    return z[:, :-1], z[:, -1], found
+    zeros = newton(guess, guess.unknowns, guess.units, enough=enough, farthest=FARTHEST)
+    return zeros.z[:, :-1], zeros.z[:, -1], zeros.found
 
 
 def least_part(

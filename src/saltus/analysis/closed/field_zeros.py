@@ -120,8 +120,9 @@ def find_equilibria(map_: Stroboscope, start: np.ndarray, scale: np.ndarray) -> 
         derivative = jacobian_of(system, x, mine) * unit[:, None, :] / unit[:, :, None]
         return field_of(system, x, mine) / unit, derivative
 
-    x, found = newton(equations, start, scale, longest_step=FARTHEST_STEP)
-    result.period[found], result.time[found], result.points[found, 0] = 1, 0.0, x[found]
+    zeros = newton(equations, start, scale, longest_step=FARTHEST_STEP)
+    found = zeros.found
+    result.period[found], result.time[found], result.points[found, 0] = 1, 0.0, zeros.z[found]
     for i, matrix in _jacobians(map_, result):
         own = np.linalg.eigvals(matrix)
         result.multipliers[i] = own[np.lexsort((-own.imag, -own.real))]

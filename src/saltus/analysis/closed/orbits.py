@@ -80,8 +80,8 @@ def _closed(
     and their mismatch, float64[m].
     """
     guess = Shooting(map_, np.arange(len(start)), start[:, None], scale, iterates=n)
-    x, found = newton(guess, guess.unknowns, guess.units, max_slow=max_slow)
-    rows = np.flatnonzero(found)
+    zeros = newton(guess, guess.unknowns, guess.units, max_slow=max_slow)
+    x, rows = zeros.z, np.flatnonzero(zeros.found)
     if not len(rows):
         return rows, [], np.zeros(0)
     points = np.concatenate(

@@ -22,7 +22,7 @@ import numpy as np
 
 from saltus.analysis.closed.motions import ClosedMotion
 from saltus.analysis.closed.shooting import Shooting, close
-from saltus.analysis.solve.damped import Known
+from saltus.analysis.solve.deflation import Known
 from saltus.flow.maps import Travel
 from saltus.kernels import status as st
 

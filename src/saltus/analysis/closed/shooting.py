@@ -17,7 +17,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from saltus.analysis.closed.field_zeros import field_of
-from saltus.analysis.solve.damped import Known, damped_newton
+from saltus.analysis.solve.deflation import Known
+from saltus.analysis.solve.newton import newton
 from saltus.analysis.solve.tolerances import SAME
 from saltus.flow.maps import Map, Stroboscope
 
@@ -183,15 +184,20 @@ def close(
     """The closed motions that Newton's method finds, ``known`` ones deflated, and the guess that
     led to each, int64[m].
     """
-    options = {} if max_steps is None else {"max_steps": max_steps}
     start, units, found = guess.unknowns, guess.units, np.zeros(len(guess), bool)
     z, width = start.copy(), start.shape[1]
     step = max(1, HELD // (width * max(width, len(known) if isinstance(known, np.ndarray) else 0)))
     for first in range(0, len(guess), step):
         part = np.arange(first, min(first + step, len(guess)))
-        z[part], found[part] = damped_newton(
-            guess.rows(part), start[part], units[part], known, **options
+        zeros = newton(
+            guess.rows(part),
+            start[part],
+            units[part],
+            damped=True,
+            known=known,
+            max_steps=max_steps,
         )
+        z[part], found[part] = zeros.z, zeros.found
     if guess.time is not None:
         found &= (z[:, -1] > 0) & (z[:, -1] <= guess.longest * (1.0 + SAME))
     index = np.flatnonzero(found)

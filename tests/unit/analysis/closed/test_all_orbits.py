@@ -9,7 +9,7 @@ from function_maps import FunctionMap
 from saltus.analysis.closed.all_orbits import all_orbits, multipliers_of
 from saltus.analysis.closed.orbit_table import outside, stability_of
 from saltus.analysis.closed.shooting import close
-from saltus.analysis.solve.damped import damped_newton
+from saltus.analysis.solve.newton import newton
 
 LOGISTIC = FunctionMap(lambda x: 4 * x * (1 - x), "x", lambda x: (4 - 8 * x)[:, :, None])
 HENON = FunctionMap(
@@ -104,11 +104,12 @@ def test_deflation_finds_what_the_starts_do_not_lead_to():
         return x**3 - x, (3 * x**2 - 1)[:, :, None]
 
     start, known = np.linspace(0.7, 1.3, 13)[:, None], np.zeros((0, 1))
-    x, found = damped_newton(equations, start, np.ones((13, 1)))
-    assert found.all()
-    assert x == pytest.approx(np.ones((13, 1)), abs=1e-12)
+    zeros = newton(equations, start, np.ones((13, 1)), damped=True)
+    assert zeros.found.all()
+    assert zeros.z == pytest.approx(np.ones((13, 1)), abs=1e-12)
     for _ in range(3):
-        x, found = damped_newton(equations, start, np.ones((13, 1)), known)
+        zeros = newton(equations, start, np.ones((13, 1)), damped=True, known=known)
+        x, found = zeros.z, zeros.found
         assert not np.isin(np.round(x[found], 6), np.round(known, 6)).any()
         known = np.concatenate([known, x[found][:1]])
     assert np.sort(known[:, 0]) == pytest.approx([0, 1], abs=1e-12)
@@ -116,13 +117,14 @@ def test_deflation_finds_what_the_starts_do_not_lead_to():
 
 def test_damping_converges_where_the_plain_step_runs_away():
     """Newton's method on atan diverges from beyond 1.39."""
-    x, found = damped_newton(
+    zeros = newton(
         lambda x, _: (np.arctan(x), (100 / (1 + x**2))[:, :, None]),
         np.array([[10.0], [-50.0]]),
         np.full((2, 1), 100.0),
+        damped=True,
     )
-    assert found.all()
-    assert np.abs(x).max() < 1e-12
+    assert zeros.found.all()
+    assert np.abs(zeros.z).max() < 1e-12
 
 
 def test_small_multipliers_survive_large_ones():
