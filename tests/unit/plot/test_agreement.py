@@ -101,7 +101,7 @@ def test_errors_teach():
 
 def test_long_names_of_maps_stay_above_their_maps():
     ds = agreement_map(np.zeros((3, 3), dtype=int), np.zeros((3, 3), dtype=int)).assign_attrs(
-        name_b="ode45, rtol 0.001, atol 1e-05, contacts not located"
+        name_b="ode45, rtol 0.001, atol 1e-05, step 0.001, contacts not located"
     )
     panels = agreement(ds)
     panels[0].figure.canvas.draw()
