@@ -1,5 +1,5 @@
-"""What kind of thing an argument of a public function may be, read off its annotation: asked once,
-where the function is entered.
+"""Checks of the types of arguments of public functions, from their annotations: made once, where
+the function is entered.
 
 Only the kinds are asked here, of arguments whose annotation consists of plain ones: ``int``,
 ``float``, ``bool``, ``str``, a ``Mapping`` and ``None``. What a number or a text may say is the
@@ -61,8 +61,8 @@ _KINDS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
 
 
 def has_mask(value: Any, depth: int = 3) -> bool:
-    """Whether numbers in an array, or in arrays in lists and mappings, are masked: as plain numbers
-    they would be whatever stands there.
+    """True if numbers in an array, or in arrays in lists and mappings, are masked. Read as plain
+    numbers they would have arbitrary values.
     """
     if isinstance(value, np.ma.MaskedArray):
         return bool(np.ma.is_masked(value))

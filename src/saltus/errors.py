@@ -43,7 +43,7 @@ class SaltusError(Exception):
         return _cut(said(self, dialect))
 
     def _render_traceback_(self) -> list[str]:
-        """What IPython shows in place of a traceback: the user's own line, and the message."""
+        """Lines that IPython shows in place of a traceback: the user's line, and the message."""
         return [*_own_line(self), f"{type(self).__name__}: {self}"]
 
 
@@ -135,8 +135,8 @@ def one_of(words: Iterable[str], before: str = "", **given: object) -> None:
 
 
 def among(value: object, words: Iterable[str]) -> bool:
-    """Whether a value is text, and one of some words. Lists and arrays, for which ``in`` fails or
-    asks each entry, are none of them.
+    """True if a value is text and one of some words. Lists and arrays are never one: ``in`` fails
+    for them, or compares each entry.
     """
     return isinstance(value, str) and value in words
 

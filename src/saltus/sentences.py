@@ -15,7 +15,7 @@ _DIGITS = 60
 
 
 class Dialect(Protocol):
-    """How those write to whom a sentence is shown.
+    """Style in which a sentence addresses its reader: Python or a study file.
 
     Attributes
     ----------
@@ -32,13 +32,13 @@ class Dialect(Protocol):
         """A function of the analyses, with its arguments if they matter."""
 
     def method(self, name: str, **options: Any) -> str:
-        """How to integrate: a method, with those of its options that matter."""
+        """Name a method of integration, with those of its options that matter."""
 
     def system(self, **options: Any) -> str:
-        """What makes a system of equations, with those of its options that matter."""
+        """Name the call or table that makes a system, with those of its options that matter."""
 
     def either(self, python: str, file: str) -> str:
-        """What is another sentence in Python than in a file."""
+        """Choose the sentence for Python, or the one for a file."""
 
 
 #: A sentence, or a part of one: text; what makes it for a dialect; an error, which says its own.

@@ -107,7 +107,7 @@ def flush(path: Path) -> None:
 
 
 def is_older(path: Path, age: float = ABANDONED) -> bool:
-    """Whether a file was last written longer ago [s]; not, if it is gone."""
+    """True if a file was last written longer than ``age`` ago [s]; False if it is gone."""
     try:
         return time.time() - path.lstat().st_mtime > age
     except FileNotFoundError:  # a draft that has just taken its name
@@ -128,8 +128,8 @@ def seal(values: Mapping[str, Any]) -> bytes:
 
 
 def unseal(data: bytes | None, **identity: object) -> dict[str, Any] | None:
-    """What :func:`seal` was given; None if one bit of it is not what it was, there is no data, or
-    the values of ``identity`` don't stand in it: it belongs somewhere else then.
+    """Return what :func:`seal` was given. None if there is no data, a bit of it differs, or it
+    doesn't hold the values of ``identity``, so that it belongs elsewhere.
     """
     try:
         values = json.loads(data or b"")

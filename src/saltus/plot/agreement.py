@@ -102,7 +102,7 @@ def _three(panels: np.ndarray, ds: xr.Dataset, sides: cells.Sides) -> np.ndarray
 
 
 def _difference(ax: Axes, ds: xr.Dataset, sides: cells.Sides) -> None:
-    """Where the maps differ, with the share that agrees as title."""
+    """Draw the cells in which the maps differ. The title gives the share that agrees."""
     values = ds["agreement"].values
     colors = {key: np.array(to_rgb(color)) for key, (color, _) in _LOOKS.items()}
     cells.draw_cells(ax, sides, cells.paint(np.nan_to_num(values, nan=-1), colors))

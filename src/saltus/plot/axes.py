@@ -1,4 +1,4 @@
-"""What every picture of a run draws: coloured pieces of curve, gap lines, contact regions, limits,
+"""Parts of every picture of a run: coloured pieces of curve, gap lines, contact regions, limits,
 notes.
 """
 
@@ -258,15 +258,13 @@ def legend(ax: Axes, regions: Regions, **place: Any) -> None:
 
 
 def _fits(ax: Axes, shown: Legend) -> bool:
-    """Whether a legend is no wider than the figure."""
+    """True if a legend is no wider than the figure."""
     figure = ax.get_figure(root=True)
     return figure is None or shown.get_window_extent().width <= figure.bbox.width
 
 
 def status_text(ds: xr.Dataset) -> str:
-    """How a trajectory ended, where it stopped early or rests on a graze that isn't decided; else
-    empty.
-    """
+    """Status of a trajectory that stopped early or has an undecided graze; else ""."""
     status = str(ds["status"].values)
     if status == "ok":
         return ""

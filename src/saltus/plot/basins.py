@@ -96,7 +96,7 @@ def basins(
 
 
 def _section(ds: xr.Dataset, sides: cells.Sides) -> str:
-    """Where the other states start, in words; empty where there are none."""
+    """Initial values of the states that aren't axes of the map, in words; "" if there are none."""
     try:
         fixed = {
             name: float(value)
@@ -387,7 +387,7 @@ def _texts(
 
 
 def _inside(ds: xr.Dataset, sides: cells.Sides, key: int) -> bool:
-    """Whether a point of the attractor lies in the map, where it can be drawn."""
+    """True if a point of the attractor lies within the axes of the map."""
     cloud = _stroboscopic(ds, sides, key) * [side.scale.factor for side in sides]
     low, high = zip(*((side.edges.min(), side.edges.max()) for side in sides), strict=True)
     return bool(((cloud >= low) & (cloud <= high)).all(axis=1).any())

@@ -97,14 +97,14 @@ def _variable(one: points.Shown, state: str) -> str:
 
 
 def _sample(ds: xr.Dataset, state: str) -> str:
-    """What was sampled of a state."""
+    """Kind of samples that are drawn of a state."""
     sampled = ds.attrs.get("sample") if sample_name(state) in ds else None
     return sampled if sampled in _SHOWN else "stroboscope"
 
 
 def _along(one: points.Shown, dots: np.ndarray, state: str) -> list[np.ndarray]:
-    """What is drawn of the branches that the responses lie on: their extremes where turning points
-    are drawn, else their points at whole periods.
+    """Heights of the branches that the responses lie on: extremes if turning points are drawn, else
+    points at whole periods.
     """
     ds = one.ds
     if one.name or "point_branch" not in ds:

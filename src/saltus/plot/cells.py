@@ -104,8 +104,8 @@ def describe(one: xr.Dataset) -> str:
 
 
 def method_text(ds: xr.Dataset, suffix: str = "") -> str:
-    """How a map was computed, such as ``ode45, rtol 0.0001, atol 1e-07``; empty for the exact
-    method. ``suffix``: ``_a`` of two maps.
+    """Name and options of the method of a map, such as ``ode45, rtol 0.0001, atol 1e-07``; "" for
+    the exact method. ``suffix``: ``_a`` or ``_b`` for one of two maps.
     """
     name = str(ds.attrs.get(f"method{suffix}", "Taylor"))
     if name == "Taylor":
@@ -277,7 +277,7 @@ def draw_cells(ax: Axes, sides: Sides, colors: np.ndarray) -> None:
 
 
 def _is_even(side: Side) -> bool:
-    """Whether all cells have one width, as those of an image."""
+    """True if all cells have one width, like those of an image."""
     edges = side.edges
     width = (edges[-1] - edges[0]) / (edges.size - 1)
     return not side.log and np.allclose(np.diff(edges), width, rtol=1e-6, atol=0.0)

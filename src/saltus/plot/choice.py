@@ -1,4 +1,4 @@
-"""Which pictures there are of each kind of result."""
+"""Pictures of each kind of result."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What over a parameter: responses as dots, branches as lines, in one frame."""
+"""Curves over a parameter: responses as dots, branches as lines, in one frame."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ _BESIDE, _BESIDE_NAMES = 1.02, 1.16
 
 
 class Height(NamedTuple):
-    """What is drawn of responses or of points [SI], its unit, and of what it is."""
+    """Heights of responses or of points [SI], their unit and their quantity."""
 
     values: np.ndarray
     unit: str
@@ -56,7 +56,7 @@ class Height(NamedTuple):
 
 @dataclass(frozen=True)
 class Curves:
-    """What is drawn of one Dataset.
+    """Curves of one Dataset.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class Curves:
 
     @property
     def events_above(self) -> bool:
-        """Whether events stand above the picture, not on the branches."""
+        """True if events stand above the picture, not on the branches."""
         return self.dots is not None and bool(
             self.one.name or not self.one.ds.attrs.get("unstable")
         )
@@ -88,7 +88,7 @@ class Curves:
 
 @dataclass(frozen=True)
 class Dots:
-    """How responses are drawn.
+    """Style of the dots of responses.
 
     Attributes
     ----------
@@ -290,8 +290,8 @@ def draw_branches(
 def _with_events(
     ds: xr.Dataset, values: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Where points lie and how high, their branches, and whether orbits behind them are stable;
-    between them the events at which stability changes.
+    """Positions, heights, branches and stability of the points of branches, with the events at
+    which stability changes inserted.
     """
     place, of = ds[point_name(ds.attrs["parameter"])].values, ds["point_branch"].values
     stable = ds["point_stable"].values > 0
@@ -311,7 +311,7 @@ def _with_events(
 
 
 def _heights(ds: xr.Dataset, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where events lie, and how high: between the points that they lie between."""
+    """Positions and heights of events, interpolated between their neighbouring points."""
     at = ds[event_name(ds.attrs["parameter"])].values
     before = ds["event_point"].values
     after = np.minimum(before + 1, ds.sizes["point"] - 1)

@@ -1,4 +1,4 @@
-"""How Lyapunov exponents converge: running means with their confidence intervals, against time."""
+"""Convergence of Lyapunov exponents: running means and confidence intervals, against time."""
 
 from __future__ import annotations
 

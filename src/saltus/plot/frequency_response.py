@@ -105,7 +105,7 @@ def frequency_response(
 
 
 def _height(ds: xr.Dataset, quantity: str, output: str | None) -> curves.Height:
-    """What is drawn of the responses."""
+    """Heights of the responses."""
     if quantity != "transmissibility":
         return curves.height(ds, quantity, output)
     if quantity not in ds:
@@ -120,8 +120,8 @@ def _height(ds: xr.Dataset, quantity: str, output: str | None) -> curves.Height:
 def _along(
     one: points.Shown, dots: np.ndarray, quantity: str, output: str | None
 ) -> list[np.ndarray]:
-    """What is drawn of the branches that the responses lie on; a transmissibility is known of the
-    responses alone.
+    """Heights of the branches that the responses lie on. Transmissibility has none: it is known of
+    responses only.
     """
     if one.name or "point_branch" not in one.ds or quantity == "transmissibility":
         return []

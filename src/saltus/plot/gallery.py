@@ -216,7 +216,7 @@ def _window(points: np.ndarray, orbit: np.ndarray) -> tuple[float, float]:
 
 # -- words -----------------------------------------------------------------------------------------
 def _title(ax: Axes, ds: xr.Dataset, key: int, color: np.ndarray) -> None:
-    """What the attractor is, after a dot in its hue."""
+    """Write the title of an attractor, after a dot in its hue."""
     title: Text = ax.set_title(title_of(ds, key))
     shift = ScaledTranslation(12 / 72, 0, ax.figure.dpi_scale_trans)
     title.set_transform(title.get_transform() + shift)

@@ -84,8 +84,8 @@ def impacts(
 
 
 def _in_words(ds: xr.Dataset, labels: np.ndarray | None, counts: xr.DataArray, scale: Scale) -> str:
-    """What there is to say of contacts that make no histogram: there are none, or their speeds come
-    again and again.
+    """Describe contacts that make no histogram, because there are none, or because few speeds
+    repeat; else "".
     """
     if not counts.values.sum():
         return "No contact in the observed time."

@@ -27,8 +27,8 @@ FEW, STEPS = 100, 8
 
 @picture()
 def methods(ds: xr.Dataset, *, ax: Any = None) -> list[Axes]:
-    """What a method does to steady responses, against one parameter: three panels, the first method
-    of ``ds`` being the reference.
+    """Draw the effect of the method on steady responses, against one parameter: three panels, the
+    first method of ``ds`` being the reference.
 
     From above: the error of one forcing period started on the reference's own responses (dots, and
     medians over pieces of the axis); the share of starts whose answer differs from the reference's,
@@ -95,9 +95,7 @@ def _middles(bins: np.ndarray) -> np.ndarray:
 
 
 def _over(bins: np.ndarray, values: Any) -> tuple[np.ndarray, np.ndarray]:
-    """What is drawn of a number for each piece: a curve through their middles; of few pieces a step
-    over each.
-    """
+    """Curve of a number for each piece: through the middles of many pieces, or steps over a few."""
     if len(bins) > STEPS:
         return _middles(bins), np.asarray(values)
     return np.repeat(bins, 2)[1:-1], np.repeat(np.asarray(values), 2)

@@ -56,7 +56,7 @@ def codes(kind: Sequence[str] | np.ndarray, period: Sequence[int] | np.ndarray) 
 
 
 def repeats(code: int) -> bool:
-    """Whether motions of a kind repeat, or rest: their branches are lines."""
+    """True if motions of a kind repeat or rest: their branches are lines."""
     return code not in _GREYS
 
 

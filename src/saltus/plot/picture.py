@@ -1,5 +1,5 @@
-"""What every public picture does besides its work: check its arguments, name itself in messages,
-and leave no text that can't be drawn.
+"""Checks that every public picture shares: of its arguments, of its name in messages, and of text
+that can't be drawn.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Which side of which contact a sample lies on, and the colour and name of that side."""
+"""Side of each contact on which a sample lies, and the colour and name of that side."""
 
 from __future__ import annotations
 
@@ -91,9 +91,7 @@ def _mask(bits: Sequence[int]) -> int:
 
 
 def _positive(mode: np.ndarray, bits: Sequence[int]) -> np.ndarray:
-    """How many of the guards are positive: along one state that is the place among
-    its boundaries.
-    """
+    """Count the positive guards. Along one state the count is the index among its boundaries."""
     return sum(
         ((np.asarray(mode) >> bit) & 1 for bit in bits),
         start=np.zeros(np.shape(mode), dtype=np.int64),
@@ -168,8 +166,8 @@ def along(ds: xr.Dataset, state: str) -> Regions:
 
 
 def _free_region(boundaries: Sequence[ContactLine]) -> int:
-    """Which region is free of contact: above the guards called lower and below those called upper,
-    else the one that holds zero.
+    """Index of the region free of contact: above the guards called lower and below those called
+    upper, else the region that holds zero.
 
     Where zero is itself a boundary it is the middle one, and below a single boundary.
     """
@@ -257,8 +255,8 @@ def _modes(ds: xr.Dataset) -> np.ndarray:
 
 
 def _freeplay(codes: Sequence[int]) -> tuple[int, int, int] | None:
-    """Where the modes are those of a freeplay: the places of the free one, and of those below and
-    above it.
+    """Indices of the free mode, and of the modes below and above it; None if the modes aren't those
+    of a freeplay.
 
     Two gaps of a freeplay give the modes none, one, both positive if they point the same way, and
     none, one, the other if they don't.

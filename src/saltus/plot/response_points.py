@@ -1,5 +1,5 @@
-"""What all pictures of responses share: one or several Datasets, which of their responses are
-shown, axes, events, legends.
+"""Parts of all pictures of responses: one or several Datasets, the responses that are shown, axes,
+events, legends.
 """
 
 from __future__ import annotations
@@ -178,7 +178,7 @@ def branch_lines(one: Shown, y: np.ndarray, mask: np.ndarray) -> tuple[np.ndarra
 
 # -- axes ------------------------------------------------------------------------------------------
 def is_log(values: np.ndarray) -> bool:
-    """Whether a grid is even in its logarithms rather than in its values."""
+    """True if a grid has equal steps in its logarithms rather than in its values."""
     values = np.sort(np.asarray(values, dtype=float))
     if values.size < 3 or values[0] <= 0:
         return False
@@ -326,7 +326,7 @@ def _raise_titles(ax: Axes, rows: int) -> None:
 
 
 def say_if_empty(ax: Axes, datasets: Sequence[Shown]) -> None:
-    """Where there is nothing to draw, say so in the picture, and what became of the starts."""
+    """State in the picture that there are no responses, and the fate of the starts."""
     if any(one.ds.sizes["response"] for one in datasets):
         return
     labels = np.concatenate([one.ds["response_of"].values.ravel() for one in datasets])

@@ -138,7 +138,7 @@ def _scale(ds: xr.Dataset, name: str, values: np.ndarray, unit: str | None) -> S
 def _groups(
     ds: xr.Dataset, labels: Sequence[int], rows: np.ndarray
 ) -> list[tuple[np.ndarray, str, str]]:
-    """Which crossings share a colour, the colour and its name."""
+    """Groups of crossings, each with its colour and its name."""
     if len(labels) > 1:
         who = ds["crossing_trajectory"].values
         names = [selection.named(ds, ds.sel(trajectory=label), label) for label in labels]

@@ -1,4 +1,4 @@
-"""What part of a run a picture shows: one trajectory, a window of time, the samples and contacts in
+"""Selection from a run for a picture: one trajectory, a window of time, the samples and contacts in
 it.
 """
 

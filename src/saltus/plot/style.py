@@ -69,8 +69,8 @@ def style() -> Iterator[None]:
 
 
 def styled(figure: Figure | None) -> bool:
-    """Whether a figure was made in the style, so that what is drawn into it later should be drawn
-    in the style too.
+    """True if a figure was made in the style. What is drawn into it later should be drawn in the
+    style too.
     """
     return figure is not None and figure.get_gid() == _MARK
 
@@ -119,7 +119,7 @@ _AT_LEAST = 0.1
 
 @dataclass(frozen=True)
 class Scale:
-    """How a quantity is shown: multiply by ``factor``, write ``unit``."""
+    """Scale of a quantity in a picture: multiply by ``factor``, write ``unit``."""
 
     factor: float
     unit: str

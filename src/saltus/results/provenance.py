@@ -1,5 +1,4 @@
-"""Where a result comes from: attributes that are enough to compute it again, and a hash of its
-numbers.
+"""Origin of a result: attributes that are enough to compute it again, and a hash of its numbers.
 
 Nothing here depends on the clock, the host or the user: the same computation gives the same
 attributes, so files compare bit by bit.
@@ -92,7 +91,7 @@ def inherited(ds: xr.Dataset) -> dict[str, Any]:
 
 
 def made_by() -> dict[str, str]:
-    """What made a result that comes from no system: the versions."""
+    """Attributes of a result without a system: the versions of saltus and its libraries."""
     return {"saltus_version": version("saltus"), "versions": _versions()}
 
 

@@ -27,7 +27,7 @@ def sized(value: xr.DataArray, form: str = ".4g") -> str:
 
 
 def header(ds: xr.Dataset, name: str) -> str:
-    """What stands above a variable as a column: ``x [m]``."""
+    """Heading of a variable as a column: ``x [m]``."""
     return titled(name, unit_of(ds[name]))
 
 
@@ -45,13 +45,13 @@ def kind_texts(ds: xr.Dataset, prefix: str) -> list[str]:
 
 
 def tally(words: np.ndarray | Sequence[str]) -> dict[str, int]:
-    """How often each word stands there, in the order of the alphabet."""
+    """Count each word, in alphabetical order."""
     found, counts = np.unique(np.atleast_1d(words).astype(str), return_counts=True)
     return dict(zip(found.tolist(), counts.tolist(), strict=True))
 
 
 def ended_early(ds: xr.Dataset) -> dict[str, int]:
-    """How many trajectories ended early, by how they did."""
+    """Count the trajectories that ended early, by their status."""
     return {word: count for word, count in tally(ds["status"].values).items() if word != "ok"}
 
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a question of a study comes to.
+    """Answer to a question of a study.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ def ask(
 
 
 class NoInputs(Inputs):
-    """Where no file may be read."""
+    """Inputs of a study that may read no file."""
 
     def __init__(self) -> None:
         super().__init__(Path())
@@ -172,7 +172,7 @@ def questions_of(
 
 
 def _names(question: Question) -> set[str]:
-    """What a question may be called."""
+    """Return the names by which a question may be called."""
     return {
         name for name in (question.place, question.group, question.title, question.stem) if name
     }

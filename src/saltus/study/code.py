@@ -80,7 +80,7 @@ def _written(value: Any) -> str:
 
 
 def _is_text(body: list[ast.stmt]) -> bool:
-    """Whether a body begins with a docstring."""
+    """True if a body begins with a docstring."""
     first = body[0] if body else None
     return (
         isinstance(first, ast.Expr)

@@ -1,4 +1,4 @@
-"""What must be the same for a result to be that of a study."""
+"""Texts that must be the same for a result to be that of a study."""
 
 from __future__ import annotations
 

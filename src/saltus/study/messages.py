@@ -1,4 +1,4 @@
-"""What is wrong with a study file, said so that it can be mended: place, fault, what to write."""
+"""Messages on errors in a study file: the place, the fault, and what to write instead."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ _ELSEWHERE = {
 
 
 def _instead(place: Place) -> str:
-    """What to write for a key or a table that isn't there."""
+    """Suggest what to write for a key or a table that doesn't exist."""
     key, known = str(place[-1]), list(_known(place[:-1]))
     if len(place) == 1 and key in _ELSEWHERE:
         return _ELSEWHERE[key]

@@ -1,4 +1,4 @@
-"""What is known of attractors, in every result that holds some."""
+"""Numbers of attractors, in every result that holds some."""
 
 from __future__ import annotations
 
@@ -141,12 +141,12 @@ class AttractorTable:
 
     @property
     def points_when(self) -> str:
-        """When the points are taken, in words."""
+        """Times of the points, in words."""
         return "at whole forcing periods" if self.cycle is None else "in equal steps of time"
 
     def columns(self, size: int) -> dict[str, Any]:
-        """What is known of each attractor, by the names of the variables without ``attractor_``.
-        ``size``: D, where there are none.
+        """Columns of the attractors, by the names of the variables without ``attractor_``.
+        ``size``: number of states, D, for a table without attractors.
         """
         real, imag = _parts(self.multipliers, len(self), size)
         found = {

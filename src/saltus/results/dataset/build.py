@@ -81,7 +81,7 @@ class Guards:
 
 @dataclass(frozen=True)
 class Subject:
-    """What a result is about: a system, and where there are any its trajectories.
+    """Subject of a result: a system, and its trajectories if there are any.
 
     Attributes
     ----------
@@ -297,7 +297,7 @@ class _Building:
 
 @cache
 def _is_plain(dims: tuple[str, ...]) -> bool:
-    """Whether these dims are the same in every result of the kind."""
+    """True where these dims are the same in every result of the kind."""
     return not any(dim[0] in ".<" or dim[-1] == "?" for dim in dims)
 
 
@@ -365,7 +365,7 @@ def finish(
 
 
 def _index(name: str, values: np.ndarray) -> xr.indexes.PandasIndex:
-    """What a coordinate is looked up by; numbers stay where they are."""
+    """Index of a coordinate. Numbers aren't copied."""
     if values.dtype.kind == "U":
         return _text_index(name, values.dtype, tuple(values.tolist()))
     return xr.indexes.PandasIndex(pd.Index(values, copy=False, name=name), name, values.dtype)

@@ -62,7 +62,7 @@ def _datasets(given: Any) -> Iterator[xr.Dataset]:
 
 
 def _is_changed(ds: xr.Dataset) -> bool:
-    """Whether the variables, or the attributes that are JSON, aren't those that a function of
+    """True where the variables, or the attributes that are JSON, aren't those that a function of
     saltus returned.
     """
     try:

@@ -18,8 +18,8 @@ SAMPLES = {
 
 
 def grid_values(response_of: np.ndarray, table: AttractorTable) -> dict[str, np.ndarray]:
-    """What each start leads to at each value: the number of the response, and its columns looked
-    up.
+    """Variables of the grid: the response that each start leads to at each value, and the columns
+    of that response.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def grid_values(response_of: np.ndarray, table: AttractorTable) -> dict[str, np.
 def response_values(
     table: AttractorTable, branch: np.ndarray, parameters: dict[str, np.ndarray], size: int
 ) -> dict[str, Any]:
-    """What is known of each response.
+    """Variables of the responses.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ class Result(xr.Dataset):
     _headline: ClassVar[Callable[[xr.Dataset], str]] = str
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: the content in a few lines, and below it what xarray shows."""
+        """Text for a notebook: the content in a few lines, then the table of xarray."""
         try:
             text = type(self)._headline(self)
         except Exception:  # of a Dataset that somebody has changed since, xarray shows what is left

@@ -1,4 +1,4 @@
-"""What one variable of a result is, and the variables that several kinds of result share."""
+"""Description of one variable of a result, and the variables that several kinds of result share."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 @dataclass(frozen=True)
 class Variable:
-    """What one variable of a result is: a row of the table of its kind.
+    """Description of one variable of a result: a row of the table of its kind.
 
     The name of a row may hold ``<state>`` or ``<parameter>``: it then stands for one variable a
     state, or a parameter.

@@ -21,7 +21,7 @@ class ResultFileError(SaltusError, OSError):
 
 
 def path_of(given: object) -> Path:
-    """What a caller gave as the path of a file. Raises ParameterError if it is none."""
+    """Return what a caller gave as the path of a file. Raises ParameterError if it is no path."""
     if not isinstance(given, str | os.PathLike) or "\0" in os.fspath(given):
         raise ParameterError(
             f"{shown(given)} isn't the path of a file. Write it as text, such as 'run.nc'."
@@ -65,8 +65,8 @@ def replacing(*paths: Path) -> Iterator[list[Path]]:
 
 
 def _target(path: Path) -> Path:
-    """Where a path leads: through a link, so that the link stays, but not out of its folder, where
-    it might lead to anything.
+    """Return the file that a path leads to. A link is followed and stays; a link out of its folder
+    is refused, since it might lead to anything.
     """
     what = f"{shown(str(path))} can't be written"
     with refused_as(ResultFileError, what, "Choose another name."):

@@ -25,7 +25,7 @@ def content(ds: xr.Dataset) -> bytes:
 
 
 def dataset(path: str | os.PathLike[str]) -> xr.Dataset:
-    """What a file holds, in memory."""
+    """Return the Dataset of a file, loaded into memory."""
     with _store(path, mode="r") as store:
         return xr.load_dataset(store)
 

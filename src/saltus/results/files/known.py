@@ -24,12 +24,12 @@ _HERE: set[str] = set()
 
 
 def folder() -> Path:
-    """Where they are kept: in ``$SALTUS_CACHE``, else in the user's cache folder."""
+    """Return the folder of the checksums: in ``$SALTUS_CACHE``, else in the user's cache folder."""
     return cache_folder() / "known-results"
 
 
 def is_known(digest: str) -> bool:
-    """Whether the file with this checksum was written by this user's saltus, or has been tried."""
+    """True if this user's saltus wrote the file with this checksum, or has tried it."""
     place = folder()
     if digest in _HERE:
         return True
@@ -54,7 +54,7 @@ def note(digest: str) -> None:
 
 
 def count() -> int:
-    """How many there are."""
+    """Count the checksums."""
     try:
         return len(os.listdir(folder()))
     except OSError:

@@ -148,7 +148,7 @@ def _rows(data: bytes, path: Path) -> Iterator[tuple[int, list[str]]]:
 def _column(
     path: Path, header: list[str], name: str, unit: str, units: dict[str, str]
 ) -> tuple[int, str, str, str]:
-    """Where a column is, its name, the unit it is in, and the one it is wanted in."""
+    """Locate a column: its index, its name, the unit in the file, and the unit wanted."""
     found: dict[str, tuple[int, str]] = {}
     for i, text in enumerate(header):
         match = _HEADER.fullmatch(text)

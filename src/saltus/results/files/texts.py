@@ -14,8 +14,8 @@ from saltus.fence import has_control
 
 
 def place_of_control(ds: xr.Dataset) -> str:
-    """Where the first control character stands among names, texts and attributes, such as ``the
-    attribute 'source'``; "" if nowhere.
+    """Locate the first control character among names, texts and attributes, such as ``the attribute
+    'source'``; "" if there is none.
     """
     for place, text in _texts(ds):
         if has_control(text):

@@ -1,4 +1,4 @@
-"""What ``compare`` returns: where two maps agree."""
+"""Result of ``compare``: the agreement of two maps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What ``attractors`` and ``basin_fractions`` return: what starts settle to."""
+"""Result of ``attractors`` and ``basin_fractions``: the attractors that starts settle to."""
 
 from __future__ import annotations
 
@@ -70,13 +70,14 @@ def settled(labels: xr.DataArray) -> str:
 
 
 def _computed(labels: xr.DataArray) -> int:
-    """How many starts were followed."""
+    """Count the starts that were followed."""
     return int((labels.values != Kind.NOT_COMPUTED).sum())
 
 
 def missed(starts: int, where: str = "") -> list[str]:
-    """What so many starts may have missed: by the rule of three a basin above 3/N of their box is
-    met with 95 %. Hanley & Lippman-Hand, J. Am. Med. Assoc. 249 (1983) 1743.
+    """State which basins N starts may have missed. By the rule of three, a basin above 3/N of the
+    box of starts is met with 95 % confidence. Hanley & Lippman-Hand, J. Am. Med. Assoc. 249 (1983)
+    1743.
     """
     if not starts:
         return []
@@ -90,8 +91,8 @@ def untyped(labels: xr.DataArray, *codes: Kind) -> list[str]:
 
 
 def own_errors(ds: xr.Dataset) -> str:
-    """What errors of a method have to do with starts that never settled, in a sentence or two; ""
-    for one whose errors are rounding.
+    """Explain in a sentence or two how errors of the method keep starts from settling; "" for a
+    method whose errors are only rounding.
     """
     attrs = ds.attrs
     method = str(attrs.get("method", ""))
@@ -210,7 +211,7 @@ def _share(ds: xr.Dataset) -> list[Column]:
 
 
 def _notes(ds: xr.Dataset) -> Iterator[str]:
-    """What the numbers are worth."""
+    """Sentences on how far the numbers can be trusted."""
     if "basin" in ds:
         yield from (f"{one}." for one in missed(_computed(ds["basin"])))
     yield from _trust(ds)
@@ -225,7 +226,7 @@ def _notes(ds: xr.Dataset) -> Iterator[str]:
 
 
 def _trust(ds: xr.Dataset) -> Iterator[str]:
-    """What the checks of a map say of its numbers, so far as they were made."""
+    """Sentences on the checks of a map that were made."""
     attrs = ds.attrs
     if attrs.get("flip_checked"):
         yield (

@@ -1,4 +1,4 @@
-"""What ``backbone`` returns: the vibrations that resonances follow."""
+"""Result of ``backbone``: the free vibrations that resonances follow."""
 
 from __future__ import annotations
 

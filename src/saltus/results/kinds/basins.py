@@ -1,4 +1,4 @@
-"""What ``basins`` returns: which attractor each start of a grid leads to."""
+"""Result of ``basins``: the attractor that each start of a grid leads to."""
 
 from __future__ import annotations
 

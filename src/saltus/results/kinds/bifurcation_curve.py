@@ -1,4 +1,4 @@
-"""What ``bifurcation_curve`` returns: a bifurcation over two parameters."""
+"""Result of ``bifurcation_curve``: a bifurcation over two parameters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What ``branches`` returns: orbits over a parameter, stable or not, and their bifurcations."""
+"""Result of ``branches``: orbits over a parameter, stable or not, and their bifurcations."""
 
 from __future__ import annotations
 
@@ -179,7 +179,9 @@ def _one(ds: xr.Dataset, i: int) -> str:
 
 
 def _stopped(branch: xr.Dataset, ends: np.ndarray) -> str:
-    """Where a branch ends within the range though it goes on."""
+    """Describe the ends of a branch at which following stopped within the range, though the branch
+    goes on.
+    """
     text = ""
     for side, last in zip(("begin", "end"), ends, strict=True):
         why = branch[f"branch_{side}"].item()

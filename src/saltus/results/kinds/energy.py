@@ -1,4 +1,4 @@
-"""What ``energy_balance`` returns: energy stored, supplied and taken."""
+"""Result of ``energy_balance``: energy stored, supplied and taken."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What ``equilibria`` returns: where a system without forcing can rest."""
+"""Result of ``equilibria``: the equilibria of a system without forcing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What ``lyapunov`` and ``wolf`` return: Lyapunov exponents of motions."""
+"""Result of ``lyapunov`` and ``wolf``: Lyapunov exponents of motions."""
 
 from __future__ import annotations
 

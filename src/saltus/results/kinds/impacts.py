@@ -1,4 +1,4 @@
-"""What ``impact_statistics`` returns: how often, how hard and how long contacts are."""
+"""Result of ``impact_statistics``: number, speeds and durations of contacts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What ``compare_methods`` returns: an analysis by several methods, side by side."""
+"""Result of ``compare_methods``: an analysis by several methods, side by side."""
 
 from __future__ import annotations
 

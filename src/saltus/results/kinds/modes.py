@@ -1,4 +1,4 @@
-"""What ``structure_modes`` returns: the modes of a structure from its matrices."""
+"""Result of ``structure_modes``: the modes of a structure from its matrices."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ VARIABLES = {
 
 
 def account(ds: xr.Dataset) -> list[str]:
-    """How many there are, and what they leave out."""
+    """Lines on the modes: their number, their frequencies, and the compliance left out."""
     frequency = ds["frequency"].values
     return [
         f"found    {len(frequency)} modes of {ds.sizes['degree']} degrees of freedom",

@@ -1,5 +1,5 @@
-"""What ``periodic_orbits`` and ``edge_orbit`` return: the variables of attractors that mean the
-same of any orbit, and what only a search for all of them knows.
+"""Result of ``periodic_orbits`` and ``edge_orbit``: those variables of attractors that any orbit
+has, and those that only a search for all orbits gives.
 """
 
 from __future__ import annotations
@@ -92,7 +92,9 @@ def _one(one: xr.Dataset) -> str:
 
 
 def _searches(ds: xr.Dataset) -> Iterator[str]:
-    """What the search for orbits of each period found, and what it may have missed."""
+    """Lines on the search for orbits of each period: the orbits found, and the share that may be
+    missed.
+    """
     for i in range(ds.sizes.get("search_period", 0)):
         one = ds.isel(search_period=i)
         share = float(one["search_unseen"])

@@ -1,4 +1,4 @@
-"""What ``frequency_response`` and ``bifurcation_diagram`` return: all steady responses."""
+"""Result of ``frequency_response`` and ``bifurcation_diagram``: all steady responses."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ VARIABLES = {
 
 # -- account ---------------------------------------------------------------------------------------
 def account(ds: xr.Dataset) -> list[str]:
-    """What was found: branches, kinds of motion, events; and what became of the starts."""
+    """Lines on branches, kinds of motion and events, and on the fate of the starts."""
     starts, labels = ds.sizes["start"], ds["response_of"]
     lines = [
         f"{span(ds, parameters_of(ds), 'values')}, {counted(starts, 'start')} at each",
@@ -88,7 +88,7 @@ def account(ds: xr.Dataset) -> list[str]:
 
 
 def _found(ds: xr.Dataset) -> str:
-    """How many responses there are, on how many branches, and of which kinds."""
+    """Line on the number of responses, their branches and their kinds."""
     kinds = kind_texts(ds, "response_")
     found = f"found    {counted(len(kinds), 'response')}"
     if len(parameters_of(ds)) == 1:
@@ -125,7 +125,7 @@ def _tally(kinds: list[str]) -> str:
 
 
 def _open(ds: xr.Dataset) -> int:
-    """How many responses haven't repeated, and may be of either kind."""
+    """Count the responses that haven't repeated, and may be periodic or not."""
     return int((ds["response_type"].values == Kind.NOT_REPEATING.word).sum())
 
 

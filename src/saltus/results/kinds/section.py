@@ -1,4 +1,4 @@
-"""What ``poincare`` returns: crossings of a surface."""
+"""Result of ``poincare``: crossings of a surface."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What ``settled`` returns: the responses that runs end in."""
+"""Result of ``settled``: the responses that runs end in."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ VARIABLES = {
 
 
 def account(ds: xr.Dataset) -> list[str]:
-    """How many trajectories repeat, and after how many periods."""
+    """Line on the trajectories that repeat, counted by their period."""
     found, counts = np.unique(ds["response_period"].values, return_counts=True)
     each = [f"{count} {word}" for count, word in zip(counts, _words(ds, found), strict=True)]
     return [f"found    {', '.join(each)}"]

@@ -1,4 +1,4 @@
-"""What ``spectrum`` returns: motions by frequency."""
+"""Result of ``spectrum``: motions by frequency."""
 
 from __future__ import annotations
 
@@ -103,9 +103,9 @@ def _different(values: xr.DataArray) -> list[Any]:
 
 
 def _above_rounding(amplitude: xr.DataArray) -> xr.DataArray:
-    """Which lines are larger than what rounding alone can make: eps for each of the log2(N) stages
-    of the transform of N samples, of the root of the sum of all squares (N. J. Higham, Accuracy and
-    Stability of Numerical Algorithms, 2nd ed., theorem 24.2).
+    """True for lines larger than rounding errors. The bound is eps for each of the log2(N) stages
+    of the transform of N samples, times the root of the sum of all squares (N. J. Higham, Accuracy
+    and Stability of Numerical Algorithms, 2nd ed., theorem 24.2).
     """
     along = str(amplitude.dims[-1])
     stages = np.log2(2 * amplitude.sizes[along])

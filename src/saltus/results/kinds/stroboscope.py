@@ -1,4 +1,4 @@
-"""What ``stroboscope`` returns: motions at whole forcing periods. It says what runs say."""
+"""Result of ``stroboscope``: motions at whole forcing periods."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What ``simulate`` returns: motions, their contacts and how they ended."""
+"""Result of ``simulate``: motions, their contacts and how they ended."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What ``regularisation_widths`` returns: errors of smooth stand-ins by their width."""
+"""Result of ``regularisation_widths``: errors of smooth approximations by their width."""
 
 from __future__ import annotations
 

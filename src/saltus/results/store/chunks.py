@@ -28,7 +28,7 @@ TRAILER = _PLACE.size + hashlib.sha256().digest_size
 
 @dataclass(frozen=True)
 class Chunks:
-    """How a map is cut.
+    """Division of a map into chunks.
 
     Attributes
     ----------
@@ -164,7 +164,7 @@ class Chunks:
 
     @staticmethod
     def fits(index: int, trailer: bytes, store: str) -> bool:
-        """Whether the last bytes of a file say that it is this chunk of this store."""
+        """True if the last bytes of a file name this chunk of this store."""
         return trailer[: _PLACE.size] == _place(index, store)
 
 
@@ -173,6 +173,6 @@ def _place(index: int, store: str) -> bytes:
 
 
 def is_whole(data: bytes) -> bool:
-    """Whether the bytes of a file are those that its checksum was made of."""
+    """True if the bytes of a file match the checksum at their end."""
     end = max(0, len(data) - hashlib.sha256().digest_size)
     return len(data) >= TRAILER and hashlib.sha256(memoryview(data)[:end]).digest() == data[end:]

@@ -46,8 +46,8 @@ def write_whole(path: Path, data: bytes, drafts: Path, name: str) -> None:
 
 
 def read(path: Path, most: int = fence.STORED_BYTES) -> bytes | None:
-    """What is in a file; None if it isn't there, isn't one of at most ``most`` bytes, or the disk
-    can't read it any more.
+    """Return the bytes of a file; None if it isn't there, isn't a file of at most ``most`` bytes,
+    or the disk can't read it any more.
     """
     try:
         return fence.content(path, most)

@@ -35,7 +35,7 @@ _TYPES = {
 
 
 def head_of(identity: Mapping[str, str], note: Mapping[str, Any], chunks: Chunks) -> dict[str, Any]:
-    """What ``store.json`` says."""
+    """Return the content of ``store.json``."""
     return {
         "format": FORMAT, "identity": dict(identity), "note": dict(note),
         "shape": list(chunks.shape), "chunk": chunks.chunk,
@@ -84,8 +84,8 @@ def read_head(path: Path) -> dict[str, Any]:
 
 
 def _opened(data: bytes | None) -> dict[str, Any] | None:
-    """What a head says; None if it is damaged, or holds what no head does. Another layout may say
-    anything.
+    """Return the content of a head; None if it is damaged, or isn't the content of a head. The
+    content of another layout isn't checked.
     """
     head = unseal(data)
     if head is None or not isinstance(head.get("format"), int):
@@ -147,8 +147,8 @@ def mend_head(path: Path, head: Mapping[str, Any]) -> None:
 
 
 def _made_under(path: Path, head: Mapping[str, Any]) -> bool | None:
-    """Whether an intact chunk or artifact in a folder was made under a head; None if there is no
-    intact one at all.
+    """True if an intact chunk or artifact in a folder was made under this head, False if all of
+    them were made under another; None if none is intact.
     """
     chunks = Chunks.checked(tuple(head["shape"]), head["chunk"], head["arrays"])
     wanted, strangers = fingerprint(head), False

@@ -1,4 +1,4 @@
-"""What a kept result was made from: it stands for another question's only if nothing differs."""
+"""Origin of a kept result: it answers another question only if nothing differs."""
 
 from __future__ import annotations
 

@@ -94,14 +94,14 @@ def exclusive(file: Path, patience: float = _PATIENCE) -> Iterator[int]:
 
 
 def holders(folder: Path) -> list[str]:
-    """Who holds a lock: a text each, in the order of the shards."""
+    """Return a text for each holder of a lock, in the order of the shards."""
     return [
         _holder(file) for _, file in sorted(_locks(folder).items()) if is_held(file, patience=0.0)
     ]
 
 
 def overlap(one: tuple[int, int], other: tuple[int, int]) -> bool:
-    """Whether two shards have a chunk in common."""
+    """True if two shards have a chunk in common."""
     return (one[0] - other[0]) % math.gcd(one[1], other[1]) == 0
 
 
@@ -126,9 +126,7 @@ def _refuse_if_held(folder: Path, shard: tuple[int, int], *, others_only: bool) 
 
 
 def is_held(file: Path, patience: float = 0.0) -> bool:
-    """Whether somebody holds the lock on a file, and goes on holding it for
-    ``patience`` seconds.
-    """
+    """True if the lock on a file is held, and stays held for ``patience`` seconds."""
     handle = _open(file, os.O_RDONLY)  # so that anyone who may read the store may ask
     try:
         return not _wait(handle, shared=True, patience=patience)

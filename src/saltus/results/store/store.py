@@ -57,7 +57,7 @@ _FOLDERS = (CHUNKS, "artifacts", "locks", "parts")
 
 @dataclass(frozen=True)
 class StoreStatus:
-    """How far a store is.
+    """Progress of a store.
 
     Attributes
     ----------
@@ -317,8 +317,8 @@ class Store:
         write_whole(self._file(index), data, self.path / "parts", str(index))
 
     def done(self) -> np.ndarray:
-        """Which chunks are committed: bool (chunks,). One listing of a folder, so it serves as
-        progress, from any machine too.
+        """Return which chunks are committed: bool (chunks,). It lists one folder only, so it shows
+        progress from any machine.
         """
         done = np.zeros(self.chunks.count, dtype=bool)
         with refused_as(StoreError, f"{self.path} can't be read", "Was it moved or deleted?"):
@@ -466,8 +466,8 @@ class Store:
         return self.get(name)
 
     def get(self, name: str) -> Any:
-        """What :meth:`put` kept, lists where tuples were put; :class:`StoreError` if there is none,
-        or it is damaged.
+        """Return what :meth:`put` kept, with lists for tuples. Raises :class:`StoreError` if there
+        is none, or it is damaged.
         """
         data = read(self._artifact(name))
         values = self._opened(name, data)
@@ -479,7 +479,7 @@ class Store:
         return base64.b64decode(values["base64"]) if "base64" in values else values["value"]
 
     def has(self, name: str) -> bool:
-        """Whether :meth:`get` would return something: kept, and not damaged."""
+        """True if :meth:`get` would return something: kept, and not damaged."""
         return self._opened(name, read(self._artifact(name))) is not None
 
     def _opened(self, name: str, data: bytes | None) -> dict[str, Any] | None:
@@ -492,7 +492,7 @@ class Store:
 
     # -- for people --------------------------------------------------------------------------------
     def status(self, *, checksums: bool = False) -> StoreStatus:
-        """How far the store is; no lock needed.
+        """Return the progress of the store; no lock needed.
 
         Parameters
         ----------

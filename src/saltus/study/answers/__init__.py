@@ -1,5 +1,5 @@
-"""What every question of a study comes to: a Dataset, in rows, drawn. A file each; a new one is
-found here.
+"""Answers to the questions of a study: a Dataset, its rows, its pictures. Each question has a file
+here; a new file is found by itself.
 """
 
 import functools

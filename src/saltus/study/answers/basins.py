@@ -164,7 +164,7 @@ class BasinMap(Question):
         return self.stem, f"{self.stem}{ATTRACTORS}"
 
     def identity(self) -> dict[str, str]:
-        """What must be the same to go on with a store."""
+        """Texts that must be the same to go on with a store."""
         plan = self.plan
         axes = {
             name: f"{float(values[0])!r} to {float(values[-1])!r} in {len(values)}"
@@ -201,7 +201,7 @@ class BasinMap(Question):
 
 
 class Agreement(Question):
-    """Where two maps agree."""
+    """Agreement of two maps."""
 
     place, shared = "basins", True
 

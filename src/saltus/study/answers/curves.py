@@ -53,7 +53,7 @@ class CurveQuestion(OneVerb):
     """A curve of bifurcations."""
 
     def check(self, table: Any, setting: Setting) -> None:  # noqa: ARG002
-        """Which event of which branches."""
+        """Read the event, and the branches that it is on."""
         self.kind, self.near, self.of = table.event, table.near, table.branches
 
     def join(self, asked: Sequence[Question]) -> None:

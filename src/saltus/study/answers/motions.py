@@ -64,7 +64,7 @@ class OfMotions(OneVerb):
         self.check_more(table, setting)
 
     def check_more(self, table: Any, setting: Setting) -> None:
-        """What this question asks besides."""
+        """Read and check the keys that only this question has."""
 
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
         """The usual picture of such a result; of a large batch the first trajectories."""
@@ -140,7 +140,7 @@ class LinesQuestion(OfMotions):
     picture, several = "spectrum", True
 
     def check_more(self, table: Any, setting: Setting) -> None:  # noqa: ARG002
-        """Which states and periods."""
+        """Read and check states and periods."""
         self.arguments["states"] = table.states
         for name in table.states or []:
             if name not in self.system.states:

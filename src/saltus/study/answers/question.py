@@ -1,5 +1,5 @@
-"""What every question of a study can do: compute its Dataset, say it in rows, draw it. Nothing here
-writes a file.
+"""Questions of a study: each computes its Dataset, puts it into rows, draws it. Nothing here writes
+a file.
 """
 
 from __future__ import annotations
@@ -122,8 +122,8 @@ class Question(ABC):
         return (self.stem,)
 
     def identity(self) -> dict[str, str] | None:
-        """What must be the same for a file to hold the answer; None if it follows at once from
-        other answers.
+        """Texts that must be the same for a file to hold the answer; None if the answer follows at
+        once from other answers.
         """
         return None
 
@@ -191,7 +191,7 @@ class OneVerb(Question):
         return
 
     def identity(self) -> dict[str, str]:
-        """What must be the same for a file to hold the answer."""
+        """Texts that must be the same for a file to hold the answer."""
         return identity(self.system, self.method, self.arguments)
 
     def compute(self, found: Answers, threads: int | None, progress: Show) -> xr.Dataset:  # noqa: ARG002

@@ -68,7 +68,7 @@ class Responses(OneVerb):
         return super().call(how | {self.axes: self.varied()})
 
     def drawn_with(self) -> dict[str, Any]:
-        """What is drawn besides."""
+        """Arguments of the picture of a frequency response."""
         return {}
 
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:

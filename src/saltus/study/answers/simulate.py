@@ -38,8 +38,8 @@ def _files(_table: Any, study: Study) -> list[tuple[str, str]]:
 
 @asked(10, asking("simulate", ["simulate"], KINDS, base=OfLength), _files)
 def questions(table: Any, setting: Setting) -> list[Question]:
-    """How given starts move, by the study's method, and by the second one that [compare] names
-    before it.
+    """Questions on how given starts move: by the study's method, and before it by the second method
+    that [compare] names.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def questions(table: Any, setting: Setting) -> list[Question]:
 
 
 class Motion(OneVerb):
-    """How given starts move."""
+    """Motions from given starts."""
 
     place, function = "simulate", "simulate"
 

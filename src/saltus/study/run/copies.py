@@ -105,7 +105,7 @@ def inputs_of(folder: Path, text: str) -> Inputs:
 
 
 def _is_seal(sealed: dict[str, Any]) -> bool:
-    """Whether a seal has its form: hashes, and names of copies in one folder."""
+    """True if a seal has its form: hashes, and names of copies in one folder."""
     inputs = sealed.get("inputs")
     return (
         isinstance(sealed.get("study"), str)

@@ -13,7 +13,7 @@ from saltus.results.table import TextTable
 
 @dataclass(frozen=True)
 class Resources:
-    """What to compute with.
+    """Resources to compute with.
 
     Attributes
     ----------
@@ -44,8 +44,8 @@ def shard_of(text: str) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class Report:
-    """How far a question is; of a map read off its store, so that the work of other machines counts
-    too.
+    """Progress of a question. For a map it is read from the store, so the work of other machines
+    counts too.
 
     ``what`` is counted: chunks, or per cent.
     """
@@ -66,8 +66,8 @@ class Report:
 
 @dataclass
 class StudyOutcome:
-    """What a study gave: tables to print, files written, questions that other shards have still to
-    answer.
+    """Outcome of a study: tables to print, files written, and the questions that other shards have
+    yet to answer.
     """
 
     tables: list[TextTable] = field(default_factory=list)
@@ -83,7 +83,7 @@ class StudyOutcome:
 
 @dataclass(frozen=True)
 class Running:
-    """Where and with what the questions of a study are answered.
+    """Settings of a run of a study: its output folder and its resources.
 
     Attributes
     ----------

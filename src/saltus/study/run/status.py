@@ -1,4 +1,4 @@
-"""How far the questions of a study are, read off its output folder."""
+"""Progress of the questions of a study, read from its output folder."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _TIME = "%Y-%m-%d %H:%M:%S UTC"
 
 
 def status_tables(folder: Path) -> list[TextTable]:
-    """How far the maps and the other questions of an output folder are, or a store.
+    """Tables of the progress of a store, or of the maps and other questions of an output folder.
 
     Raises
     ------
@@ -47,7 +47,9 @@ class DamagedStore:
 
 
 def stores(folder: Path) -> list[StoreStatus | DamagedStore]:
-    """How far the stores of an output folder are, or a store itself; empty if there are none."""
+    """Progress of the stores of an output folder, or of the folder if it is a store; empty if there
+    are none.
+    """
     from saltus.results.store.store import Store, StoreError
 
     found: list[StoreStatus | DamagedStore] = []
@@ -113,7 +115,7 @@ def question_table(folder: Path) -> TextTable | None:
 
 
 def _state(file: Path) -> tuple[str, str]:
-    """Whether an answer is there, and since when."""
+    """State of an answer, and the time when it was written."""
     from saltus.results import load
 
     if not file.exists():

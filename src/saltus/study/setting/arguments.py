@@ -67,7 +67,7 @@ def arguments(table: Generated, system: System, setting: Setting, place: str) ->
 # -- readings, by what the kind of a key names -----------------------------------------------------
 @dataclass(frozen=True)
 class _At:
-    """Where a key stands."""
+    """Place of a key."""
 
     system: System
     setting: Setting

@@ -42,8 +42,8 @@ class Input:
 
 
 class Inputs:
-    """Where the files that a study names are found: in its own folder, and in those that the user
-    allows.
+    """Files that a study names. They are searched for in the study's folder, and in those that the
+    user allows.
 
     Parameters
     ----------

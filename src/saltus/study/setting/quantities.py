@@ -163,7 +163,7 @@ def varied(
 
 
 def is_batch(*tables: Mapping[str, Start], place: str = "simulate") -> bool:
-    """Whether there are lists among values. Raises StudyError if two of them differ in length, or
+    """True if there are lists among the values. Raises StudyError if two lists differ in length, or
     one is empty.
     """
     lengths = {

@@ -1,4 +1,4 @@
-"""What all questions of a study share: its system, its method, the files that it names."""
+"""Setting that all questions of a study share: its system, its method, the files that it names."""
 
 from __future__ import annotations
 
@@ -17,14 +17,13 @@ from saltus.system.formula import Equations, Formula, Formulas
 if TYPE_CHECKING:
     from saltus.study.setting.inputs import Inputs
     from saltus.study.tables.parts import Header, Output, Quantity, StudyTable, SystemTable
-
     from saltus.study.tables.study import Study
     from saltus.system import System
 
 
 @dataclass(frozen=True)
 class Setting:
-    """What the questions of one study share.
+    """Setting that the questions of one study share.
 
     Attributes
     ----------

@@ -1,5 +1,5 @@
-"""What the tables of a study file are made of: the strict base, quantities as written, systems,
-methods, ranges.
+"""Parts of the tables of a study file: the strict base, quantities as written, systems, methods,
+ranges.
 
 Quantities stay as written here ("4 N"); :mod:`saltus.study.setting.quantities` turns them into SI
 once the system is known.
@@ -223,7 +223,7 @@ class Range(StudyTable):
 
 
 class Named(StudyTable):
-    """What questions have in common that may be asked several times."""
+    """Base of questions that may be asked several times."""
 
     #: Name of one without a name.
     called: ClassVar[str]
@@ -236,7 +236,7 @@ class Named(StudyTable):
 
     @property
     def title(self) -> str:
-        """What it is called."""
+        """Return the name, or the default name."""
         return self.name or self.called
 
     @property

@@ -29,7 +29,7 @@ _SENTENCE = re.compile(r"(.*?\.)(?:\s|$)")
 
 @dataclass(frozen=True)
 class WrittenAs:
-    """How a parameter of a function is written in a study file.
+    """Form in which a study file writes a parameter of a function.
 
     Attributes
     ----------

@@ -1,5 +1,5 @@
-"""What a study file writes: values as TOML, and what the analyses say of Python arguments said of
-its keys.
+"""Texts for study files: values as TOML, and sentences on Python arguments turned into sentences on
+keys.
 """
 
 from __future__ import annotations
