@@ -20,7 +20,7 @@ from saltus.plot import response_points as points
 from saltus.plot.style import QUIET, Scale, display_scale
 from saltus.results.dataset.schema import event_name, point_name, states_of
 
-#: What is known of the responses and of the points of branches alike.
+#: Quantities that both responses and points of branches have.
 Size = Literal[
     "rms", "peak", "maximum", "minimum", "peak_to_peak", "mean", "rms_about_mean", "amplitude",
     "phase",
@@ -38,12 +38,14 @@ SIZES = (
 )  # fmt: skip
 #: Phases over more than this [deg] have ticks at parts of a right angle.
 _WIDE_PHASE = 20.0
-#: Dashes of what is unstable.
+#: Dashes of unstable orbits.
 DASHES = (0, (3.0, 1.6))
 #: Diameter of the smallest dots [pt]: more than a pixel of a screen.
 _SMALLEST = 0.6
-#: Where the legend begins, in widths of the Axes: beside the Axes, beside the names of gaps.
-_BESIDE, _BESIDE_NAMES = 1.02, 1.16
+#: Left edge of a legend next to the Axes, in widths of the Axes.
+_BESIDE = 1.02
+#: Left edge of a legend next to the names of gaps, in widths of the Axes.
+_BESIDE_NAMES = 1.16
 
 
 class Height(NamedTuple):

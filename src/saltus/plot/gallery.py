@@ -23,10 +23,11 @@ from saltus.plot.picture import PictureError, caller, check, picture
 from saltus.plot.style import display_scale, style
 from saltus.results.dataset import schema
 
-#: Forcing periods in the time history of a response that doesn't repeat, and the fewest of one that
-#: does: it takes two to see a repeat.
-_SHOWN_IF_APERIODIC, _FEWEST = 12, 2
-#: The most rows that fit a figure.
+#: Forcing periods in the time history of a response that doesn't repeat.
+_SHOWN_IF_APERIODIC = 12
+#: Fewest forcing periods in the time history of one that does: a repeat shows only in two.
+_FEWEST = 2
+#: Most rows that fit a figure.
 _MOST = 20
 _ELSEWHERE = "#D2D2D2"
 #: A picture of Poincare points is no narrower than this share of the orbit: a single point would

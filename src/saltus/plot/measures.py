@@ -15,9 +15,12 @@ from saltus.plot import selection
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
 
-#: Speeds of a guard that are equal to this share of the largest are one speed; the most speeds of a
-#: motion that repeats, and how often each must be seen.
-_SAME, _MOST_SPEEDS, _REPEATED = 1e-7, 6, 3
+#: Speeds closer than this share of the guard's largest speed are one speed.
+_SAME = 1e-7
+#: Most speeds that are listed in words; more make a histogram.
+_MOST_SPEEDS = 6
+#: Contacts per speed, at least, for speeds that repeat.
+_REPEATED = 3
 #: Characters of a line in a picture of words.
 _LINE = 60
 

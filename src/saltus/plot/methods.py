@@ -20,9 +20,10 @@ from saltus.plot.style import CYCLE
 #: Pieces of the axis over which medians and shares are taken: the eye can't follow 2000 values, and
 #: a share needs some dozen.
 PIECES = 30
-#: Up to this number of values they are drawn as dots; up to this number of pieces their means as
-#: steps.
-FEW, STEPS = 100, 8
+#: Most values that are drawn as large dots.
+FEW = 100
+#: Most pieces of the axis over which numbers are drawn as steps.
+STEPS = 8
 
 
 @picture()

@@ -24,7 +24,7 @@ _TO_LAB = np.array(
         [0.0259040371, 0.7827717662, -0.8086757660],
     ]
 )
-#: What deuteranopes and protanopes see of linear sRGB: G. Machado, M. Oliveira and L. Fernandes,
+#: Linear sRGB as deuteranopes and protanopes see it: G. Machado, M. Oliveira and L. Fernandes,
 #: IEEE TVCG 15, 1291 (2009), severity 1.
 _DEUTERANOPIA = np.array(
     [
@@ -43,14 +43,14 @@ _PROTANOPIA = np.array(
 
 #: The first two colours, near Okabe and Ito's blue and orange; the rest follow from them.
 _SEEDS = ("#4C94D8", "#F2B046")
-#: Range of the others: no colour so dark that its shades get lost in black, none so light or vivid
-#: that it glares.
+#: Lightness of the other colours: shades of darker ones vanish in black, lighter ones glare.
 _LIGHTNESS = np.linspace(0.56, 0.86, 13)
 _CHROMA = np.array([0.06, 0.09, 0.115, 0.14])
 _HUE = np.deg2rad(np.arange(0.0, 360.0, 6.0))
-#: A hue's shades: the lightest is mixed with so much white, the darkest keeps so much of the
-#: lightness.
-_TINT, _DARKEST = 0.38, 0.64
+#: Share of white in the lightest shade of a hue.
+_TINT = 0.38
+#: Share of its lightness that the darkest shade of a hue keeps.
+_DARKEST = 0.64
 
 
 # -- colour spaces ---------------------------------------------------------------------------------

@@ -20,7 +20,7 @@ from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
 from saltus.results.dataset.kinds import WITHOUT_WORDS
 from saltus.results.dataset.schema import event_name, parameters_of, point_name, response_name
 
-#: What a picture of responses takes: a Dataset, or several by their names.
+#: Input of a picture of responses: a Dataset, or several by their names.
 Source = xr.Dataset | Mapping[str, xr.Dataset]
 #: Variables without which no response can be drawn.
 NEEDS = ("response_of", "response_branch", "response_type", "response_period")
@@ -33,17 +33,21 @@ MARKS = {
     "hopf": ("Hopf", "p"), "graze": ("graze", "^"), "corner": ("two contacts at once", "v"),
     "boundary_equilibrium": ("boundary equilibrium", "P"),
 }  # fmt: skip
-#: Where the marks of events stand, in heights of the Axes.
+#: Height of the lowest marks of events, in heights of the Axes.
 _EVENTS_AT = 1.025
-#: Marks that would overlap stand above each other, so many sizes apart, in up to so many rows.
-_ROW, _MOST_ROWS = 1.3, 3
-#: Mark of the empty axis that keeps the title clear of them.
+#: Distance of marks that would overlap, in sizes of a mark: they stand in rows above each other.
+_ROW = 1.3
+#: Most rows of marks.
+_MOST_ROWS = 3
+#: Mark of the empty axis that keeps the title clear of the marks of events.
 _ROOM = "saltus-room-of-events"
-#: Values this even in their logarithms, and not in themselves, are drawn over a logarithmic axis.
+#: Largest relative difference of steps that count as equal. An axis whose steps are equal only in
+#: the logarithm is logarithmic.
 _EVEN = 1e-6
-#: Up to this number, marks of bifurcations stand on a line through the picture; more are drawn
-#: smaller, without it.
-_MANY_EVENTS, _FEW_EVENTS = 40, 12
+#: Most marks of bifurcations in full size; more are drawn smaller.
+_MANY_EVENTS = 40
+#: Most marks of bifurcations that stand on lines through the picture.
+_FEW_EVENTS = 12
 #: A legend of more entries is set smaller, so that it fits next to its picture.
 _LONG_LEGEND = 14
 

@@ -19,7 +19,7 @@ import xarray as xr
 
 #: Packages whose versions can change the digits of a result or the layout of its file.
 _PACKAGES = ("numpy", "llvmlite", "xarray", "saltus")
-#: Made once: ``json.dumps`` with an option makes one each time.
+#: Encoder for all calls: ``json.dumps`` with an option makes a new one each time.
 _JSON = json.JSONEncoder(ensure_ascii=False)
 
 

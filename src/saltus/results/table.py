@@ -15,7 +15,7 @@ from saltus.units import from_si, titled
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Rows printed at most; the files hold them all.
+#: Most rows printed; the files hold all rows.
 ROWS = 24
 
 

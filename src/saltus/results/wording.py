@@ -12,7 +12,7 @@ import xarray as xr
 from saltus.results.dataset.schema import kind_text
 from saltus.units import titled
 
-#: Things that get a line of their own in an account; the others are counted.
+#: Most things that an account lists, a line each; the others are counted.
 LINES = 12
 
 

@@ -16,7 +16,7 @@ ENDS = ("", "_low", "_high")
 
 _EACH = ("attractor",)
 _MULTIPLIER = ("attractor", "multiplier")
-#: What is known of each attractor; ``phase`` counts the points of its orbit.
+#: Variables of attractors; ``phase`` counts the points of an orbit.
 #: ``<first>``: the unit of the first state.
 ATTRACTOR_VARIABLES = {
     "attractor": Variable(_EACH, "1", "attractor", "i8", coord=True),

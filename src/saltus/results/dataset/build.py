@@ -26,7 +26,7 @@ _TWICE = (
     "{!r} would stand for two things in the result. Rename the state, or the parameter, of "
     "this name."
 )
-#: Where a name of the system would collide with one of the table, another is taken.
+#: Other names for names of a system that the tables use already.
 _NAMES = {
     "contact_<state>": schema.contact_name, "contact_<state>_before": schema.before_name,
     "attractor_<state>": schema.attractor_name,

@@ -20,7 +20,7 @@ class Kind(IntEnum):
     LIMIT_CYCLE = 4
     #: An orbit that errors of the method keep from closing.
     NOISY_PERIODIC = 5
-    #: It hasn't repeated, and what was spent on its exponent didn't tell what it is.
+    #: Motion that hasn't repeated, and whose exponent is undecided after the time spent on it.
     NOT_REPEATING = 6
     ESCAPED = -1
     UNCONVERGED = -2
@@ -35,21 +35,21 @@ class Kind(IntEnum):
 
 #: Longest period at which a motion is known to repeat [forcing periods]; no argument raises it.
 LONGEST = 64
-#: Of motions without a type, in the words of every result.
+#: Sentence on motions without a type, in every result.
 LONGER = (
     f"An orbit is recognised up to {LONGEST} periods, which no argument raises: a longer one has "
     "no type. sl.stroboscope and sl.poincare show its points."
 )
 #: Kinds that Newton's method closes.
 CLOSED = (Kind.PERIODIC, Kind.EQUILIBRIUM, Kind.LIMIT_CYCLE)
-#: What became of starts that lead to no attractor, as the end of a sentence.
+#: Fate of starts that lead to no attractor, as the end of a sentence.
 WITHOUT: Mapping[Kind, str] = {
     Kind.ESCAPED: "escaped: their motion grew beyond all numbers",
     Kind.UNCONVERGED: "lead to no known attractor within the periods allowed",
     Kind.FAILED: "failed: they begin beyond a stop or ended early, and status says why",
     Kind.NOT_COMPUTED: "weren't computed: the run was stopped",
 }
-#: What was left out where motions were not typed, and what pays for it, as the end of a sentence.
+#: Check left out for motions without a type, and the argument that adds it: end of a sentence.
 OPEN = (
     "haven't repeated, and their exponents don't say yet whether they are quasi-periodic or "
     "chaotic: numbers are those of 64 periods. A larger periods= spends more on it; sl.lyapunov "

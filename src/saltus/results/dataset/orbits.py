@@ -10,7 +10,7 @@ import numpy as np
 
 from saltus.results.dataset.attractors import AttractorTable, padded
 
-#: What is known of attractors, and of no orbit alone.
+#: Variables that attractors have and other orbits lack.
 OF_ATTRACTORS = ("exponent_error", "scatter", "eigenvalue", "fraction")
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from saltus.results.dataset.attractors import ENDS, AttractorTable, padded
 from saltus.results.dataset.kinds import WITHOUT_WORDS, Kind
 
-#: What a bifurcation diagram may show of each response.
+#: Samples of each response that a bifurcation diagram may show.
 SAMPLES = {
     "turning_points": "where the velocity is zero",
     "stroboscope": "at whole forcing periods",

@@ -12,7 +12,7 @@ import xarray as xr
 from saltus.errors import ParameterError
 
 _CONTACTS = "Write run.contact_time, or sl.contacts(run) for a table."
-#: What results of other programs are asked, and what it is called here.
+#: Names that other programs use for parts of a result, and the names used here.
 _ELSEWHERE = {
     "t": "Write run.time.",
     **dict.fromkeys(("y", "ys", "u"), "Each state has its name: run.x, or run['x'].values."),

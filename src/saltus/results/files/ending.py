@@ -22,14 +22,17 @@ from saltus.results.files.atomic import ResultFileError
 
 _ENDING = re.compile(rb"\nsaltus-sha256:([0-9a-f]{64})\n")
 _LENGTH = 80
-#: Time that reading a file without an ending may take [s], and how much of it is read in a second
-#: at the least [byte].
-PATIENCE, SLOWEST = 60.0, 1e7
-#: Time after which a line says what is being done [s].
+#: Time limit for reading an empty file without an ending [s].
+PATIENCE = 60.0
+#: Slowest rate of reading [byte/s]; a larger file gets more time.
+SLOWEST = 1e7
+#: Time after which a line tells the user to wait [s].
 SILENT = 2.0
-#: Memory that it may take: multiple of its size, and least value [byte].
-TIMES, LEAST = 8, 4 << 30
-#: What xarray reads by is tried, without xarray, which takes longer to load than most files.
+#: Memory limit for reading, in sizes of the file.
+TIMES = 8
+#: Least memory limit for reading [byte].
+LEAST = 4 << 30
+#: Program that tries the libraries below xarray: xarray takes longer to load than most files.
 _TRIAL = """
 import contextlib, sys
 with contextlib.suppress(ImportError, ValueError, OSError):

@@ -17,8 +17,7 @@ from saltus.cache import entry
 from saltus.cache import folder as cache_folder
 from saltus.cache.entry import NotOurs, check_folder
 
-#: Names that are kept: where there are more when a process writes its first, all of them are
-#: forgotten.
+#: Most checksums kept; above that the folder is emptied by the next process that writes.
 MOST = 20_000
 _HERE: set[str] = set()
 

@@ -15,7 +15,7 @@ from saltus.results.wording import kind_texts, meanings, span
 
 #: Meaning of the values of ``agreement``.
 AGREEING = {-1: "not_settled", 0: "differ", 1: "agree"}
-#: Variables of what ``compare`` returns.
+#: Variables of the result of ``compare``.
 VARIABLES = {
     **AXES,
     "agreement": Variable(("...",), "1", "whether the two maps agree", "i1", flags=AGREEING),

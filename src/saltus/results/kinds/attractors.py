@@ -23,7 +23,7 @@ from saltus.results.table import (
 )
 from saltus.results.wording import LINES, kind_texts, meanings, more, sized, unit_of
 
-#: Variables of what ``attractors`` and ``basin_fractions`` return.
+#: Variables of the results of ``attractors`` and ``basin_fractions``.
 VARIABLES = {
     **TRAJECTORY_NUMBER,
     "basin": Variable(("trajectory",), "1", "attractor", "i2"),

@@ -10,10 +10,10 @@ from saltus.results.kinds import branches
 from saltus.results.table import TextTable, number, quantity, spread, table, words
 
 _POINT = ("point",)
-#: Why a backbone may end before the amplitude asked for.
+#: Reasons for which a backbone may end before the amplitude asked for.
 _ENDS = ("points", "lost")
 
-#: Variables of what ``backbone`` returns. ``<first>``: the unit of the first state; ``<output>``:
+#: Variables of the result of ``backbone``. ``<first>``: the unit of the first state; ``<output>``:
 #: that in ``output_units``.
 VARIABLES = {
     "point": Variable(_POINT, "1", "point of the backbone", "i8", coord=True),

@@ -12,14 +12,14 @@ from saltus.results.wording import span
 
 #: The two states that a map is drawn over.
 AXES = {"<state>": Variable(("<state>",), "<state>", "<state> at the start", coord=True)}
-#: Trust numbers of a map, and what they are called in the text.
+#: Trust numbers of a map, and their names in the text.
 _TRUST = {
     "basin_entropy": "basin entropy",
     "boundary_basin_entropy": "on the boundary",
     "uncertainty_exponent": "uncertainty exponent",
 }
 
-#: Variables of what ``basins`` returns.
+#: Variables of the result of ``basins``.
 VARIABLES = {
     **AXES,
     "basin": Variable(("...",), "1", "attractor", "i2"),

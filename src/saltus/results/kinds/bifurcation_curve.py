@@ -13,7 +13,7 @@ from saltus.results.wording import plain, unit_of
 _POINT = ("point",)
 _CODIM2 = ("codim2",)
 
-#: Variables of what ``bifurcation_curve`` returns. ``<first>``: the unit of the first state;
+#: Variables of the result of ``bifurcation_curve``. ``<first>``: the unit of the first state;
 #: ``<gap>``: that of the gaps; ``<root gap>``: of their square roots.
 VARIABLES = {
     "point": Variable(_POINT, "1", "point of the curve", "i8", coord=True),

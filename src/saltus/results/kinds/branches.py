@@ -27,9 +27,9 @@ _EVENT = ("event",)
 #: Digits of the parameter at a bifurcation.
 DIGITS = 10
 
-#: Variables of what ``branches`` returns. ``<first>``: the unit of the first state; ``<gap>``: that
-#: of the gaps; ``<varied>``: that of the parameter; ``<output>``: that in ``output_units``, which
-#: an output has of its own.
+#: Variables of the result of ``branches``. ``<first>``: the unit of the first state; ``<gap>``:
+#: that of the gaps; ``<varied>``: that of the parameter; ``<output>``: that of the output, in
+#: ``output_units``.
 VARIABLES = {
     "point": Variable(_POINT, "1", "point of a branch", "i8", coord=True),
     "point_branch": Variable(_POINT, "1", "branch that the point lies on", "i8"),
@@ -130,7 +130,7 @@ VARIABLES = {
 }
 
 
-#: Why a branch stops within the range though it goes on, in the words of an account.
+#: Reasons for which following stops within the range though the branch goes on, in words.
 _STOPPED = {
     "points": "stopped by points=",
     "lost": "lost",

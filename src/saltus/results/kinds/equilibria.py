@@ -13,10 +13,10 @@ from saltus.results.wording import sized, unit_of
 
 _EACH = ("equilibrium",)
 _EIGENVALUE = ("equilibrium", "eigenvalue")
-#: Digits of a state at rest.
+#: Digits of a state of an equilibrium.
 DIGITS = 10
 
-#: Variables of what ``equilibria`` returns.
+#: Variables of the result of ``equilibria``.
 VARIABLES = {
     "equilibrium": Variable(_EACH, "1", "equilibrium", "i8", coord=True),
     "equilibrium_type": Variable(_EACH, "", "node, focus, saddle, ... by its eigenvalues", "str"),

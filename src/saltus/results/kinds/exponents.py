@@ -28,7 +28,7 @@ COLUMNS = 4
 #: Sum of the exponents, and the mean divergence that it must equal.
 _SUMS = {"sum": "exponent_sum", "mean divergence": "mean_divergence"}
 
-#: Variables of what ``lyapunov`` and ``wolf`` return: exponents in descending order, and running
+#: Variables of the results of ``lyapunov`` and ``wolf``: exponents in descending order, and running
 #: means. ``<rate>``: the unit that was asked for, such as ``bit/period``.
 VARIABLES = {
     **TRAJECTORY_NUMBER,

@@ -8,7 +8,7 @@ from saltus.results.dataset.schema import ResultKind
 from saltus.results.dataset.variable import Variable
 from saltus.results.table import TextTable, quantity, table, words
 
-#: Variables of what ``structure_modes`` returns.
+#: Variables of the result of ``structure_modes``.
 VARIABLES = {
     "frequency": Variable(("mode",), "Hz", "natural frequency"),
     "shape": Variable(("degree", "mode"), "kg^-0.5", "mode shape of unit modal mass"),

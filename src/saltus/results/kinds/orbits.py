@@ -17,9 +17,10 @@ from saltus.results.dataset.variable import Variable
 from saltus.results.table import Column, TextTable, number, quantity, table, words
 from saltus.results.wording import LINES, more, sized, unit_of
 
-_EACH, _SEARCH = ("orbit",), ("search_period",)
+_EACH = ("orbit",)
+_SEARCH = ("search_period",)
 
-#: Variables of what ``periodic_orbits`` returns.
+#: Variables of the result of ``periodic_orbits``.
 VARIABLES = {
     **rows_as("orbit", without=OF_ATTRACTORS),
     "orbit_stable": Variable(

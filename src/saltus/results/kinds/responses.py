@@ -28,13 +28,13 @@ from saltus.results.table import ROWS, Column, TextTable, interval, number, quan
 from saltus.results.wording import LINES, header, kind_texts, plain, span, tally, unit_of
 from saltus.units import from_si, titled
 
-#: What belongs to a start at one place of the grid.
+#: Dims of numbers of a start at a place of the grid.
 _GRID = ("...", "start")
 _RESPONSE = ("response",)
 
-#: Variables of what ``frequency_response`` and ``bifurcation_diagram`` return. ``<first>``: the
-#: unit of the first state; ``<gap>``: that of the gaps; ``<output>``: that in ``output_units``,
-#: which an output has of its own.
+#: Variables of the results of ``frequency_response`` and ``bifurcation_diagram``. ``<first>``: the
+#: unit of the first state; ``<gap>``: that of the gaps; ``<output>``: that of the output, in
+#: ``output_units``.
 VARIABLES = {
     "<parameter>": Variable(("<parameter>",), "<parameter>", "<parameter>", coord=True),
     "response_of": Variable(

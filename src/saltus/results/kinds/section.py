@@ -21,7 +21,7 @@ from saltus.results.wording import failed, unit_of
 
 _CROSSING = ("crossing",)
 
-#: Variables of what ``poincare`` returns. Crossings are one table for all trajectories.
+#: Variables of the result of ``poincare``. Crossings are one table for all trajectories.
 VARIABLES = {
     "<state>": Variable(_CROSSING, "<state>", "<state> at the crossing"),
     "crossing_time": Variable(_CROSSING, "s", "time of the crossing"),

@@ -11,7 +11,7 @@ from saltus.results.kinds.spectrum import RESPONSE_PERIOD
 from saltus.results.table import TextTable, left_out, number, of_trajectory, quantity, table, words
 from saltus.results.wording import unit_of
 
-#: Variables of what ``settled`` returns. The last three are those of a run with samples between
+#: Variables of the result of ``settled``. The last three are those of a run with samples between
 #: whole periods.
 VARIABLES = {
     "mismatch": Variable(

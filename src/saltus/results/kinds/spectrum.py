@@ -27,8 +27,8 @@ RESPONSE_PERIOD = Variable(
     ("trajectory",), "1", "period of the response in forcing periods, 0 if none was found", "i8"
 )
 
-#: Variables of what ``spectrum`` returns. Of trajectories with forcing periods of their own they
-#: lie along ``order`` in place of ``frequency``.
+#: Variables of the result of ``spectrum``. If forcing periods differ between trajectories their dim
+#: is ``order``, not ``frequency``.
 VARIABLES = {
     "frequency": Variable(("trajectory?", "frequency"), "Hz", "frequency", coord=True),
     "order": Variable(
@@ -94,7 +94,7 @@ def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
     return [table(title, columns, [*notes, *failed(ds)], shown)]
 
 
-#: Of a motion whose period wasn't found.
+#: Word for the period of a motion whose period wasn't found.
 _NONE = "not periodic within the samples"
 
 

@@ -26,9 +26,9 @@ from saltus.results.wording import ended_early, header, plain, tally, unit_of
 
 _CONTACT = ("contact",)
 
-#: Variables of what ``simulate`` returns. Trajectories with forcing periods of their own share
-#: phases, not times: their samples lie along ``period`` in place of ``time``. Contacts are one
-#: table for all trajectories.
+#: Variables of the result of ``simulate``. Trajectories whose forcing periods differ share phases,
+#: not times: the dim of their samples is ``period``, not ``time``. Contacts are one table for all
+#: trajectories.
 VARIABLES = {
     "<state>": Variable(("trajectory", "time"), "<state>", "<state>"),
     "time": Variable(("trajectory?", "time"), "s", "time", coord=True),
@@ -152,7 +152,7 @@ def rows(
 
 
 # -- all of it -------------------------------------------------------------------------------------
-#: Columns by name, each with the variable of the result that it is.
+#: Columns by name, each with the name and the values of its variable.
 Columns = dict[str, tuple[str, np.ndarray]]
 
 

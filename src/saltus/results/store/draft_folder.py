@@ -15,11 +15,11 @@ from saltus.results.store.durable import StoreError
 from saltus.results.store.lock import exclusive, is_held
 from saltus.whole_files import flush, is_older, refused_as, write
 
-#: A folder takes a moment to make: a draft of one that is older than this [s], and not locked, was
-#: left by a process that was killed.
+#: Age of a draft without a lock [s] above which its process was killed: making a folder takes a
+#: moment only.
 _DRAFT_AGE = 60.0
-#: Lock file in a draft, held while it is filled: a clock that jumps ahead makes it seem old, but
-#: not abandoned.
+#: Lock file in a draft, held while the draft is filled. A clock that jumps ahead makes the draft
+#: seem old, but the lock shows that it is in use.
 _LOCK = Path("locks") / "draft"
 
 

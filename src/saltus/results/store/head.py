@@ -16,13 +16,13 @@ from saltus.results.store.durable import StoreError, read, write_whole
 from saltus.results.store.lock import exclusive
 from saltus.whole_files import seal, sha256, unseal
 
-#: Layout of the files. A store of another one is refused, not guessed at.
+#: Number of the layout of the files. A store with another layout is refused, not guessed at.
 FORMAT = 3
 #: Name of the file.
 HEAD = "store.json"
 #: Folder of the chunks.
 CHUNKS = "chunks"
-#: Most cells of a map that a head may speak of: of more, not even the list of chunks is to be made.
+#: Most cells of a map: a damaged head with more would fill memory with the list of chunks.
 MOST_CELLS = 10**9
 _TYPES = {
     "bool",

@@ -27,14 +27,14 @@ from saltus.whole_files import refused_as
 
 #: All chunks, as a shard.
 WHOLE = (0, 1)
-#: How long to wait for a lock [s]: longer than another process's check of it takes, too short to be
-#: taken for queueing.
+#: Time to wait for a lock [s]: longer than another process takes to check it, too short to seem
+#: like a queue.
 _PATIENCE = 0.5
-#: Most bytes of the note of who holds a lock.
+#: Most bytes of the note that names the holder of a lock.
 _NOTE = 10_000
 
-#: Open lock files of this process. A forked child closes its copies, else it would go on holding
-#: the locks of a parent that was killed.
+#: Open lock files of this process. A forked child closes its copies: otherwise it would hold the
+#: locks after its parent was killed.
 _HANDLES: set[int] = set()
 
 

@@ -28,10 +28,14 @@ if TYPE_CHECKING:
 
     from saltus.results.table import TextTable
 
-#: Trajectories of attractors drawn in a gallery, and the periods of one that never repeats.
-GALLERY, PERIODS = 8, 24
-#: Ends of the names of files that belong to a map.
-ATTRACTORS, AGREEMENT = "-attractors", "-agreement"
+#: Most attractors in a gallery.
+GALLERY = 8
+#: Forcing periods drawn of an attractor that never repeats.
+PERIODS = 24
+#: End of the stem of the file of a map's attractors.
+ATTRACTORS = "-attractors"
+#: End of the stem of the file of a map's agreement with another.
+AGREEMENT = "-agreement"
 
 
 class Axis(Range):

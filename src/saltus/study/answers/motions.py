@@ -21,8 +21,10 @@ if TYPE_CHECKING:
 
 #: The key of a surface that is a formula.
 FORMULA = "formula"
-#: Parts of a balance, and those that needn't be there.
-_PARTS, _OPTIONAL = ("energy", "supplied", "dissipated"), ("friction",)
+#: Parts that every energy balance needs.
+_PARTS = ("energy", "supplied", "dissipated")
+#: Parts that an energy balance may have.
+_OPTIONAL = ("friction",)
 
 
 _BASE: Any = (OfLength, Asked)

@@ -26,8 +26,10 @@ if TYPE_CHECKING:
     from saltus.study.tables.study import Study
 
 
-#: Stems of the files: of the run, and of that of a second method.
-RUN, REFERENCE = "run", "run-reference"
+#: Stem of the file of the run.
+RUN = "run"
+#: Stem of the file of the run by a second method.
+REFERENCE = "run-reference"
 
 
 def _files(_table: Any, study: Study) -> list[tuple[str, str]]:

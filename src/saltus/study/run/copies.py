@@ -15,9 +15,12 @@ from saltus.results.files.atomic import ResultFileError, replacing
 from saltus.study.setting.inputs import Input, Inputs, KeptInputs
 from saltus.whole_files import seal, sha256, unseal
 
-#: Names of the copy of the study, of the seal with its hashes, and of the folder of copies of its
-#: files.
-COPY, SEAL, INPUTS = "study.toml", "study.seal", "inputs"
+#: Name of the copy of the study.
+COPY = "study.toml"
+#: Name of the seal, which holds the hashes of the copies.
+SEAL = "study.seal"
+#: Folder of the copies of the files that the study names.
+INPUTS = "inputs"
 _CHANGED = (
     "changed since it was written. Run the study that it was made from again, with --out "
     "{}: finished results are reused."
