@@ -99,12 +99,12 @@ class Kinds:
             kinds = [
                 re.sub(r"\[[^|]*\]$", "", kind) for kind in str(parameter.annotation).split(" | ")
             ]
-            own = set(kinds) <= {"int", "None"} or (
+            checks_itself = set(kinds) <= {"int", "None"} or (
                 kinds == ["str"] and isinstance(parameter.default, str)
             )
             if (
                 parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)
-                and not own
+                and not checks_itself
                 and set(kinds) <= set(_KINDS)
             ):
                 self._of[name] = kinds

@@ -188,15 +188,15 @@ def draw_gaps(
     line = ax.axvline if direction == "x" else ax.axhline
     names: list[tuple[float, str, bool]] = []
     for i, boundary in enumerate(regions.boundaries):
-        place = boundary.value * scale.factor
-        line(place, color=QUIET, lw=0.7, ls=(0, (4, 3)), zorder=1, gid=tag)
-        if label and low <= place <= high:
+        position = boundary.value * scale.factor
+        line(position, color=QUIET, lw=0.7, ls=(0, (4, 3)), zorder=1, gid=tag)
+        if label and low <= position <= high:
             # else it meets the ticks
-            lower = i == 0 and len(regions.boundaries) > 1 and place - low > 0.12 * (high - low)
+            lower = i == 0 and len(regions.boundaries) > 1 and position - low > 0.12 * (high - low)
             # else it meets the title
-            high_up = direction == "y" and high - place < 0.12 * (high - low)
+            high_up = direction == "y" and high - position < 0.12 * (high - low)
             names.append(
-                (place, f"{boundary.label}\n{scale.text(boundary.value)}", lower or high_up)
+                (position, f"{boundary.label}\n{scale.text(boundary.value)}", lower or high_up)
             )
     if names:
         _name_gaps(ax, direction, names, tag)
@@ -210,10 +210,10 @@ def _name_gaps(
     Above the picture they are labels of an axis of its own, which a title keeps clear of.
     """
     if direction == "y":
-        for place, text, below in names:
+        for position, text, below in names:
             ax.text(
                 1.01,
-                place,
+                position,
                 text,
                 transform=ax.get_yaxis_transform(),
                 va="top" if below else "bottom",
@@ -233,7 +233,7 @@ def _name_gaps(
         drawable(f"{text}\n\n" if raised else text)
         for (_, text, _), raised in zip(names, [*close, False], strict=True)
     ]  # one above the other
-    top.set_xticks([place for place, _, _ in names], texts, linespacing=1.1)
+    top.set_xticks([position for position, _, _ in names], texts, linespacing=1.1)
     for tick, (_, _, left) in zip(top.xaxis.get_major_ticks(), names, strict=True):
         tick.label2.set_horizontalalignment("right" if left else "left")
 

@@ -121,14 +121,14 @@ def _limits_and_gaps(
     ax: Axes, drawn: Sequence[curves.Curves], state: str, up: Scale, across: Scale
 ) -> None:
     """Limits around all dots, and the gaps near them."""
-    one = drawn[0].one
+    first = drawn[0].one
     values = np.concatenate([np.ravel(each.dots) for each in drawn if each.dots is not None])
-    varied, fixed = _boundaries(one.ds, state)
+    varied, fixed = _boundaries(first.ds, state)
     marks = [boundary.value * up.factor for boundary in fixed.boundaries] if fixed else []
     draw.set_limits(ax, "y", values * up.factor, marks)
     if fixed:
         draw.draw_gaps(ax, "y", fixed, up)
-    names = one.ds["guard"].values[one.ds["guard_state"].values == state] if len(varied) else []
+    names = first.ds["guard"].values[first.ds["guard_state"].values == state] if len(varied) else []
     for row, name in zip(varied * up.factor, names, strict=True):  # moved by the parameter itself
         low, high = ax.get_ylim()
         if low <= row[-1] <= high:
@@ -137,7 +137,13 @@ def _limits_and_gaps(
                 va="center", color=QUIET, fontsize=7,
             )  # fmt: skip
         ax.plot(
-            one.grid * across.factor, row, color=QUIET, lw=0.7, ls=(0, (4, 3)), zorder=1, gid="gap"
+            first.grid * across.factor,
+            row,
+            color=QUIET,
+            lw=0.7,
+            ls=(0, (4, 3)),
+            zorder=1,
+            gid="gap",
         )
 
 

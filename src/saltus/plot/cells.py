@@ -54,18 +54,18 @@ def ranked(ds: xr.Dataset, order: Sequence[int] | None) -> list[int]:
     """
     known = ds["attractor"].values.tolist()
     try:
-        first = [] if order is None else [int(one) for one in np.atleast_1d(order).tolist()]
+        first = [] if order is None else [int(number) for number in np.atleast_1d(order).tolist()]
     except (TypeError, ValueError, OverflowError):
         raise ParameterError(
             f"order must hold numbers of attractors, not {shown(order)}."
         ) from None
-    strange = [one for one in first if one not in known]
+    strange = [number for number in first if number not in known]
     if strange or len(set(first)) < len(first):
         what = f"there is no attractor {strange[0]}" if strange else "an attractor occurs twice"
         raise ParameterError(
             f"order={first}, but {what}. Known: {', '.join(map(str, known)) or 'none'}."
         )
-    return first + [one for one in known if one not in first]
+    return first + [number for number in known if number not in first]
 
 
 def colors_of(ds: xr.Dataset, order: Sequence[int] | None) -> dict[int, np.ndarray]:

@@ -158,7 +158,7 @@ def height_scale(unit: str, drawn: Sequence[Curves], quantity: str = "") -> Scal
     return display_scale(unit, largest, "deg" if quantity == "phase" else None)
 
 
-def height_axis(ax: Axes, quantity: str, of: str, up: Scale, log: bool = False) -> None:
+def height_axis(ax: Axes, quantity: str, long_name: str, up: Scale, log: bool = False) -> None:
     """Name, limits and ticks of the vertical axis."""
     if log:
         ax.set_yscale("log")
@@ -166,7 +166,7 @@ def height_axis(ax: Axes, quantity: str, of: str, up: Scale, log: bool = False) 
         ax.set_ylim(bottom=0)
     if quantity == "phase" and np.ptp(ax.get_ylim()) > _WIDE_PHASE:
         ax.yaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 1.5, 3, 4.5, 9, 10]))
-    ax.set_ylabel(up.label(LABELS[quantity].format(of)))
+    ax.set_ylabel(up.label(LABELS[quantity].format(long_name)))
 
 
 # -- frame -----------------------------------------------------------------------------------------
@@ -184,20 +184,24 @@ def frame(
     """Draw Datasets over their parameter; give the Axes and the display unit of the parameter to
     who draws more, and names the vertical axis; then mark events and name the colours.
     """
-    datasets = [one.one for one in drawn]
+    datasets = [drawing.one for drawing in drawn]
     with draw.panels(ax, 1, (6.3, tall)) as (panel,):
         across = points.parameter_axis(panel, datasets)
         named: dict[str, Any] = {}
-        for one in drawn:
-            if one.dots is not None and look is not None:
-                named |= (_compare if one.one.name else _kinds)(panel, one, look, across, up)
-            for curve in one.along:
-                named |= draw_branches(panel, one.one.ds, curve, across, up)
-                if events and not one.events_above:
-                    draw_marks(panel, one.one.ds, curve, across, up)
+        for drawing in drawn:
+            if drawing.dots is not None and look is not None:
+                named |= (_compare if drawing.one.name else _kinds)(
+                    panel, drawing, look, across, up
+                )
+            for curve in drawing.along:
+                named |= draw_branches(panel, drawing.one.ds, curve, across, up)
+                if events and not drawing.events_above:
+                    draw_marks(panel, drawing.one.ds, curve, across, up)
         yield panel, across
         if events:
-            points.draw_events(panel, [one.one for one in drawn if one.events_above], across)
+            points.draw_events(
+                panel, [drawing.one for drawing in drawn if drawing.events_above], across
+            )
         if legend:
             points.legend(panel, named, _BESIDE_NAMES if panel.texts else _BESIDE)
         if look is not None:
@@ -219,37 +223,37 @@ def _kinds(ax: Axes, drawn: Curves, look: Dots, across: Scale, up: Scale) -> dic
     """A colour for each kind of motion: dots, and lines along branches that are known by their
     responses only. Chaos lies under the others.
     """
-    one, dots = drawn.one, np.asarray(drawn.dots)
-    of = motion_colors.of(one.ds)
-    for code in np.unique(of).tolist():
-        mine, repeats, color = of == code, motion_colors.repeats(code), motion_colors.color(code)
+    shown, dots = drawn.one, np.asarray(drawn.dots)
+    kinds = motion_colors.of(shown.ds)
+    for code in np.unique(kinds).tolist():
+        mine, repeats, color = kinds == code, motion_colors.repeats(code), motion_colors.color(code)
         if repeats and not drawn.along and dots.ndim == 1:
-            x, y = points.branch_lines(one, dots, mine)
+            x, y = points.branch_lines(shown, dots, mine)
             ax.plot(
                 x * across.factor, y * up.factor, color=color, lw=0.8, zorder=2,
                 gid=f"branches {code}",
             )  # fmt: skip
-        x, y = _flat(one, dots, mine, across, up)
+        x, y = _flat(shown, dots, mine, across, up)
         draw.draw_points(
             ax, x, y, marker=motion_colors.marker(code) if look.marked else "o", mfc=color,
             mec="none", ms=look.size(x.size, 1.0 if repeats else look.aperiodic),
             zorder=3 if repeats else 2, gid=f"kind {code}",
         )  # fmt: skip
-    return points.kind_handles(one, of, markers=look.marked)
+    return points.kind_handles(shown, kinds, markers=look.marked)
 
 
 def _compare(ax: Axes, drawn: Curves, look: Dots, across: Scale, up: Scale) -> dict[str, Any]:
     """One colour for a Dataset among several; the first lies below in larger dots."""
-    one, dots = drawn.one, np.asarray(drawn.dots)
-    x, y = _flat(one, dots, np.ones(len(dots), dtype=bool), across, up)
-    color, marker = points.dataset_color(one), points.MARKERS[one.rank] if look.marked else "o"
-    hollow = look.marked and one.rank == 0
+    shown, dots = drawn.one, np.asarray(drawn.dots)
+    x, y = _flat(shown, dots, np.ones(len(dots), dtype=bool), across, up)
+    color, marker = points.dataset_color(shown), points.MARKERS[shown.rank] if look.marked else "o"
+    hollow = look.marked and shown.rank == 0
     draw.draw_points(
-        ax, x, y, marker=marker, ms=look.size(x.size, look.first if one.rank == 0 else 1.0),
+        ax, x, y, marker=marker, ms=look.size(x.size, look.first if shown.rank == 0 else 1.0),
         mfc="none" if hollow else color, mec=color, mew=0.6 if hollow else 0.0,
-        zorder=3 + 0.1 * one.rank, gid=f"dataset {one.name}",
+        zorder=3 + 0.1 * shown.rank, gid=f"dataset {shown.name}",
     )  # fmt: skip
-    return {one.name: points.dot(color, marker, hollow)}
+    return {shown.name: points.dot(color, marker, hollow)}
 
 
 # -- branches --------------------------------------------------------------------------------------
@@ -271,15 +275,15 @@ def draw_branches(
     kind = ds["branch_kind"].values
     codes = motion_colors.codes(kind, np.where(kind == "periodic", ds["branch_periods"].values, 0))
     periods = points.periods_of(ds)
-    place, height, of, stable = _with_events(ds, values)
-    place, height = place * across.factor, height * up.factor
+    position, height, branch_of, stable = _with_events(ds, values)
+    position, height = position * across.factor, height * up.factor
     named: dict[str, Any] = {}
     for code in np.unique(codes).tolist():
         color = tuple(motion_colors.color(code).tolist())
-        mine = np.flatnonzero(codes[of] == code)
+        mine = np.flatnonzero(codes[branch_of] == code)
         for solid in (False, True):
             ax.plot(
-                *lines(mine, of, stable == solid, place, height), color=color,
+                *lines(mine, branch_of, stable == solid, position, height), color=color,
                 lw=1.3 if solid else 0.9, ls="-" if solid else DASHES, zorder=3 if solid else 2,
                 gid=f"{'stable' if solid else 'unstable'} {code}",
             )  # fmt: skip
@@ -295,19 +299,21 @@ def _with_events(
     """Positions, heights, branches and stability of the points of branches, with the events at
     which stability changes inserted.
     """
-    place, of = ds[point_name(ds.attrs["parameter"])].values, ds["point_branch"].values
+    position, branch_of = ds[point_name(ds.attrs["parameter"])].values, ds["point_branch"].values
     stable = ds["point_stable"].values > 0
     if not ds.sizes.get("event"):
-        return place, values, of, stable
+        return position, values, branch_of, stable
     before = ds["event_point"].values
     after = np.minimum(before + 1, ds.sizes["point"] - 1)
-    turns = np.flatnonzero((stable[before] != stable[after]) & (of[before] == of[after]))
+    turns = np.flatnonzero(
+        (stable[before] != stable[after]) & (branch_of[before] == branch_of[after])
+    )
     at, height = _heights(ds, values)
     where = before[turns] + 1
     return (
-        np.insert(place, where, at[turns]),
+        np.insert(position, where, at[turns]),
         np.insert(values, where, height[turns]),
-        np.insert(of, where, of[before[turns]]),
+        np.insert(branch_of, where, branch_of[before[turns]]),
         np.insert(stable, where, stable[after[turns]]),
     )
 
@@ -317,9 +323,9 @@ def _heights(ds: xr.Dataset, values: np.ndarray) -> tuple[np.ndarray, np.ndarray
     at = ds[event_name(ds.attrs["parameter"])].values
     before = ds["event_point"].values
     after = np.minimum(before + 1, ds.sizes["point"] - 1)
-    place = ds[point_name(ds.attrs["parameter"])].values
+    position = ds[point_name(ds.attrs["parameter"])].values
     with np.errstate(all="ignore"):
-        share = (at - place[before]) / (place[after] - place[before])
+        share = (at - position[before]) / (position[after] - position[before])
     share = np.where((share >= 0) & (share <= 1), share, 0.5)
     return at, values[before] + share * (values[after] - values[before])
 

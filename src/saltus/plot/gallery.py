@@ -101,8 +101,12 @@ def gallery(
 
 def _chosen(runs: xr.Dataset, ids: list[int], attractors: Any) -> list[int]:
     """Ids of the attractors to show, each with a trajectory."""
-    chosen = ids if attractors is None else [int(one) for one in np.atleast_1d(attractors).tolist()]
-    strange = [one for one in chosen if one not in ids]
+    chosen = (
+        ids
+        if attractors is None
+        else [int(number) for number in np.atleast_1d(attractors).tolist()]
+    )
+    strange = [number for number in chosen if number not in ids]
     if strange:
         raise ParameterError(
             f"there is no attractor {strange[0]}. Known: {', '.join(map(str, ids)) or 'none'}."
@@ -111,7 +115,7 @@ def _chosen(runs: xr.Dataset, ids: list[int], attractors: Any) -> list[int]:
         some = " Choose, such as attractors=[0, 1]." if ids else " Nothing settled in this Dataset."
         raise PictureError(f"{caller()} shows 1 to {_MOST} attractors, not {len(chosen)}.{some}")
     held = runs["trajectory"].values.tolist() if "trajectory" in runs.dims else [0]
-    lacking = [one for one in chosen if one not in held]
+    lacking = [number for number in chosen if number not in held]
     if lacking:
         raise ParameterError(
             f"runs holds {len(held)} trajectories, none for attractor {lacking[0]} of {len(ids)}. "
@@ -135,11 +139,11 @@ def _row(row: np.ndarray, ds: xr.Dataset, runs: xr.Dataset, key: int) -> None:
     """The time history and the phase portrait."""
     n = int(ds["attractor_period"].sel(attractor=key))
     label = key if "trajectory" in runs.dims else None
-    one = selection.single(runs, label)
-    axis = selection.sample_axis(one)
+    motion = selection.single(runs, label)
+    axis = selection.sample_axis(motion)
     held = float(axis[-1] - axis[0])
     shown = (max(n, _FEWEST), n) if n else (_SHOWN_IF_APERIODIC, held)
-    in_time, in_phase = (min(periods, held) if "period" in one else None for periods in shown)
+    in_time, in_phase = (min(periods, held) if "period" in motion else None for periods in shown)
     history(runs, label, periods=in_time, ax=row[0], time="T", legend=False)
     # all else would be rounding
     if len(row) > 1 and str(ds["attractor_type"].sel(attractor=key).item()) == "equilibrium":
@@ -157,7 +161,7 @@ def _row(row: np.ndarray, ds: xr.Dataset, runs: xr.Dataset, key: int) -> None:
     elif len(row) > 1:
         phase(runs, label, periods=in_phase, ax=row[1], legend=False)
         for names in [
-            one for one in row[1].child_axes if one.get_gid() == draw.GAP_NAMES.format("x")
+            child for child in row[1].child_axes if child.get_gid() == draw.GAP_NAMES.format("x")
         ]:
             # the time history beside it names the gaps too; here the names would meet the title
             names.remove()
@@ -239,32 +243,33 @@ def title_of(ds: xr.Dataset, key: int) -> str:
     """An attractor in one line: ``3T, 8 contacts, multipliers |µ| = 0.53, peak 0.91 mm, 12.3 % of
     the starts``.
     """
-    one = ds.sel(attractor=key)
-    parts = [cells.describe(one), _stability(one)]
-    if "attractor_peak" in one:
-        parts.append(cells.peak_text(one))
-    if "attractor_fraction" in one and math.isfinite(float(one["attractor_fraction"])):
-        parts.append(f"{cells.share_text(float(one['attractor_fraction']))} of the starts")
+    attractor = ds.sel(attractor=key)
+    parts = [cells.describe(attractor), _stability(attractor)]
+    if "attractor_peak" in attractor:
+        parts.append(cells.peak_text(attractor))
+    if "attractor_fraction" in attractor and math.isfinite(float(attractor["attractor_fraction"])):
+        parts.append(f"{cells.share_text(float(attractor['attractor_fraction']))} of the starts")
     return ", ".join(part for part in parts if part)
 
 
-def _stability(one: xr.Dataset) -> str:
+def _stability(attractor: xr.Dataset) -> str:
     """The largest multiplier of what repeats, else the largest exponent."""
-    if int(one["attractor_period"]) > 0 and "attractor_multiplier_real" in one:
+    if int(attractor["attractor_period"]) > 0 and "attractor_multiplier_real" in attractor:
         size = np.hypot(
-            one["attractor_multiplier_real"].values, one["attractor_multiplier_imag"].values
+            attractor["attractor_multiplier_real"].values,
+            attractor["attractor_multiplier_imag"].values,
         )
         size = np.sort(size[np.isfinite(size)])[::-1]
         texts = list(dict.fromkeys(f"{value:.3g}" for value in size))
         return f"multipliers |µ| = {', '.join(texts[:3])}" if texts else ""
-    if "attractor_exponent" in one and math.isfinite(float(one["attractor_exponent"])):
+    if "attractor_exponent" in attractor and math.isfinite(float(attractor["attractor_exponent"])):
         error = (
-            float(one["attractor_exponent_error"])
-            if "attractor_exponent_error" in one
+            float(attractor["attractor_exponent_error"])
+            if "attractor_exponent_error" in attractor
             else math.nan
         )
         spread = f" ± {error:.1g}" if math.isfinite(error) else ""
-        return f"exponent {float(one['attractor_exponent']):.3g}{spread} 1/s"
+        return f"exponent {float(attractor['attractor_exponent']):.3g}{spread} 1/s"
     return ""
 
 

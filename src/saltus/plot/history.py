@@ -86,18 +86,18 @@ def history(
     wanted = selection.units_of_states(run, units).get(state)
     labels = selection.chosen(run, trajectory)
     singles = [selection.single(run, label) for label in labels] or [selection.single(run, None)]
-    windows = [selection.window(one, periods) for one in singles]
+    windows = [selection.window(motion, periods) for motion in singles]
     with draw.panels(ax, len(singles), (6.3, 2.5)) as panels:
-        for i, (panel, one, part) in enumerate(zip(panels, singles, windows, strict=True)):
-            _panel(panel, one, state, part, time, wanted)
+        for i, (panel, motion, part) in enumerate(zip(panels, singles, windows, strict=True)):
+            _panel(panel, motion, state, part, time, wanted)
             if len(labels) > 1:
-                panel.set_ylabel(f"{selection.named(run, one, labels[i])}\n{panel.get_ylabel()}")
+                panel.set_ylabel(f"{selection.named(run, motion, labels[i])}\n{panel.get_ylabel()}")
             if legend and i == 0:
-                ticks = 0.25 if time == "both" and "period" in one else 0.05  # inches
+                ticks = 0.25 if time == "both" and "period" in motion else 0.05  # inches
                 above = panel.transAxes + ScaledTranslation(0, ticks, panel.figure.dpi_scale_trans)
                 draw.legend(
                     panel,
-                    regions.find(one, [state]),
+                    regions.find(motion, [state]),
                     loc="lower right",
                     bbox_to_anchor=(1, 1),
                     bbox_transform=above,
@@ -126,7 +126,7 @@ def _panel(
         else display_scale("s", float(np.abs(curve.time).max()))
     )
     coloured = regions.find(ds, [state])
-    own = regions.along(ds, state)
+    state_regions = regions.along(ds, state)
 
     width = 1.1 if shown[1] - shown[0] <= 40 or "period" not in ds else 0.7
     draw.draw_pieces(
@@ -134,7 +134,10 @@ def _panel(
     )
     draw.set_limits(ax, "x", curve.time * x.factor, margin=0.0)
     draw.set_limits(
-        ax, "y", values * y.factor, [boundary.value * y.factor for boundary in own.boundaries]
+        ax,
+        "y",
+        values * y.factor,
+        [boundary.value * y.factor for boundary in state_regions.boundaries],
     )
     table = selection.contacts_in(ds, *shown)
     owners = {
@@ -151,7 +154,7 @@ def _panel(
     )
     _mark_contacts(ax, table.isel(contact=~theirs), state, x, y)
     _note_contacts(ax, table.isel(contact=theirs), owners, x)
-    draw.draw_gaps(ax, "y", own, y)
+    draw.draw_gaps(ax, "y", state_regions, y)
     draw.note_status(ax, ds)
     ax.set_xlabel(x.label("time"))
     ax.set_ylabel(y.label(state))

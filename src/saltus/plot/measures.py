@@ -96,16 +96,20 @@ def _in_words(ds: xr.Dataset, labels: np.ndarray | None, counts: xr.DataArray, s
     speeds, guards = ds["contact_speed"].values[mine], ds["contact_guard"].values[mine].astype(str)
     lines = []
     for name in ds["guard"].values.tolist():
-        own = np.sort(speeds[(guards == name) & np.isfinite(speeds)])
+        guard_speeds = np.sort(speeds[(guards == name) & np.isfinite(speeds)])
         # of each group of equal ones
-        first = np.flatnonzero(np.diff(own, prepend=-np.inf) > _SAME * own.max(initial=0.0))
-        if len(own) and (len(first) > _MOST_SPEEDS or len(own) < _REPEATED * len(first)):
+        first = np.flatnonzero(
+            np.diff(guard_speeds, prepend=-np.inf) > _SAME * guard_speeds.max(initial=0.0)
+        )
+        if len(guard_speeds) and (
+            len(first) > _MOST_SPEEDS or len(guard_speeds) < _REPEATED * len(first)
+        ):
             return ""
-        if len(own):
-            values = ", ".join(scale.text(float(f"{own[i]:.6g}")) for i in first)
+        if len(guard_speeds):
+            values = ", ".join(scale.text(float(f"{guard_speeds[i]:.6g}")) for i in first)
             lines.append(
                 textwrap.fill(
-                    f"{name.replace('_', ' ')}: {len(own)} contacts, at {values}",
+                    f"{name.replace('_', ' ')}: {len(guard_speeds)} contacts, at {values}",
                     _LINE,
                     subsequent_indent="    ",
                 )

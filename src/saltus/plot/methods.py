@@ -138,14 +138,14 @@ def _draw_share(ax: Axes, one: xr.Dataset, x: np.ndarray, bins: np.ndarray, colo
     ax.plot(*_over(bins, 100 * share), color=color, lw=1.4, zorder=3)
 
 
-def _draw_cost(ax: Axes, one: xr.Dataset, x: np.ndarray, name: str, color: str) -> None:
-    cost = float(one["method_cpu_seconds"])
+def _draw_cost(ax: Axes, costs: xr.Dataset, x: np.ndarray, name: str, color: str) -> None:
+    cost = float(costs["method_cpu_seconds"])
     label = f"{name}: {cost:.3g} s" if np.isfinite(cost) else name
     size = 3.0 if x.size <= FEW else 1.5
     draw.draw_points(
         ax,
         x,
-        one["steps_per_period"].values,
+        costs["steps_per_period"].values,
         marker="o",
         ms=size,
         mfc=color,

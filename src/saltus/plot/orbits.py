@@ -108,21 +108,21 @@ def _pair(ds: xr.Dataset, x: str | None, y: str | None, over: xr.Dataset | None)
 
 
 def _orbit(
-    ax: Axes, one: xr.Dataset, pair: tuple[str, str], scales: Any, number: int, over: bool
+    ax: Axes, orbit: xr.Dataset, pair: tuple[str, str], scales: Any, number: int, over: bool
 ) -> None:
     """The points of an orbit."""
     at = [
-        one[orbit_name(name)].values * scale.factor
+        orbit[orbit_name(name)].values * scale.factor
         for name, scale in zip(pair, scales, strict=True)
     ]
-    here = np.isfinite(at[0]) & np.isfinite(at[1])
-    stable = int(one["orbit_stable"]) == 1
-    name = kind_text(str(one["orbit_type"].item()), int(one["orbit_period"]))
+    finite = np.isfinite(at[0]) & np.isfinite(at[1])
+    stable = int(orbit["orbit_stable"]) == 1
+    name = kind_text(str(orbit["orbit_type"].item()), int(orbit["orbit_period"]))
     color = "#222222" if over else CYCLE[number % len(CYCLE)]
     marks: dict[str, Any] = (
         {"marker": "o", "ms": 5, "mfc": color, "mec": "white", "mew": 0.8}
         if stable
         else {"marker": "x", "ms": 6, "mec": color, "mew": 1.6}
     )
-    label = f"{name}, {one['orbit_stability'].item()}" if number < _NAMED else None
-    draw.draw_points(ax, at[0][here], at[1][here], label=label, zorder=5, **marks)
+    label = f"{name}, {orbit['orbit_stability'].item()}" if number < _NAMED else None
+    draw.draw_points(ax, at[0][finite], at[1][finite], label=label, zorder=5, **marks)

@@ -74,18 +74,18 @@ def phase(
     labels = selection.chosen(run, trajectory)
     singles = [selection.single(run, label) for label in labels] or [selection.single(run, None)]
     share = SETTLED_SHARE if "period" in run else 1.0
-    windows = [selection.window(one, periods, share) for one in singles]
-    curves = [_values(one, pair, shown) for one, shown in zip(singles, windows, strict=True)]
+    windows = [selection.window(motion, periods, share) for motion in singles]
+    curves = [_values(motion, pair, shown) for motion, shown in zip(singles, windows, strict=True)]
     scales = _scales(run, pair, np.concatenate(curves), selection.units_of_states(run, units))
     with draw.panels(ax, 1, (4.6, 3.1)) as (panel,):
         if kind_of(run) != STROBOSCOPE and all(begin == end for begin, end in windows):
             draw.say(panel, "It stopped where it began: there is no motion to draw.", *singles)
             return panel
-        for i, (one, shown) in enumerate(zip(singles, windows, strict=True)):
-            name = selection.named(run, one, labels[i]) if len(labels) > 1 else None
+        for i, (motion, shown) in enumerate(zip(singles, windows, strict=True)):
+            name = selection.named(run, motion, labels[i]) if len(labels) > 1 else None
             color = CYCLE[i % len(CYCLE)] if name else None
             if kind_of(run) != STROBOSCOPE:
-                _curve(panel, one, pair, shown, scales, color, name)
+                _curve(panel, motion, pair, shown, scales, color, name)
             if poincare or kind_of(run) == STROBOSCOPE:
                 part = (
                     f", {shown[0]:g} T to {shown[1]:g} T"
@@ -94,12 +94,12 @@ def phase(
                 )
                 _dots(
                     panel,
-                    selection.stroboscope_points(one, pair, *shown),
+                    selection.stroboscope_points(motion, pair, *shown),
                     scales,
                     color,
                     name or f"Poincaré points{part}",
                 )
-            draw.note_status(panel, one)
+            draw.note_status(panel, motion)
         _frame(panel, singles[0], pair, np.concatenate(curves), scales)
         if legend:
             # the names of gaps
@@ -202,12 +202,12 @@ def _frame(
 ) -> None:
     """Limits, gap lines and names of the axes."""
     directions: tuple[draw.Direction, draw.Direction] = ("x", "y")
-    own = [regions.along(ds, name) for name in pair]
+    state_regions = [regions.along(ds, name) for name in pair]
     for i, direction in enumerate(directions):
-        marks = [boundary.value * scales[i].factor for boundary in own[i].boundaries]
+        marks = [boundary.value * scales[i].factor for boundary in state_regions[i].boundaries]
         draw.set_limits(ax, direction, values[:, i] * scales[i].factor, marks)
     for i, direction in enumerate(directions):
-        draw.draw_gaps(ax, direction, own[i], scales[i])
+        draw.draw_gaps(ax, direction, state_regions[i], scales[i])
     draw.few_ticks(ax)
     ax.set_xlabel(scales[0].label(pair[0]))
     ax.set_ylabel(scales[1].label(pair[1]))

@@ -102,10 +102,10 @@ def check(
     argument : str, optional
         Argument that it was given as, if it isn't the first one.
     """
-    of = f"{caller()}({argument}=)" if argument else caller()
+    call = f"{caller()}({argument}=)" if argument else caller()
     wanted, kind = tuple(kinds) or TAKES[_NAME.get()], schema.kind_of(ds)
     try:
-        schema.check(ds, caller=of, kinds=wanted)
+        schema.check(ds, caller=call, kinds=wanted)
     except ParameterError as error:
         others = [f"plot.{name}" for name in pictures_of(kind)] if kind not in wanted else []
         better = f" Draw it with {_either(others)}." if others else ""
@@ -113,7 +113,7 @@ def check(
     missing = [one for one in needs if one not in ds.variables]
     if missing:
         raise PictureError(
-            f"{of} misses {', '.join(missing)} in this Dataset. Give it the whole Dataset, not "
+            f"{call} misses {', '.join(missing)} in this Dataset. Give it the whole Dataset, not "
             f"some variables of it."
         )
 

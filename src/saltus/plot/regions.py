@@ -229,13 +229,16 @@ def _by_touching(codes: np.ndarray, names: Sequence[str], touching: Mapping[int,
         [names[bit] for bit, side in touching.items() if int(code) >> bit & 1 == side]
         for code in codes
     ]
-    if len({tuple(one) for one in sets}) > _OWN_SETS:
-        keys = [f"{len(one)} contacts" if len(one) > 1 else "1 contact" for one in sets]
+    if len({tuple(members) for members in sets}) > _OWN_SETS:
+        keys = [f"{len(members)} contacts" if len(members) > 1 else "1 contact" for members in sets]
     else:
-        keys = [" and ".join(one) + (" touch" if len(one) > 1 else " touches") for one in sets]
-    labels = [key if one else "free" for key, one in zip(keys, sets, strict=True)]
+        keys = [
+            " and ".join(members) + (" touch" if len(members) > 1 else " touches")
+            for members in sets
+        ]
+    labels = [key if members else "free" for key, members in zip(keys, sets, strict=True)]
     ranked = sorted(
-        {label: len(one) for label, one in zip(labels, sets, strict=True)}.items(),
+        {label: len(members) for label, members in zip(labels, sets, strict=True)}.items(),
         key=lambda item: item[1],
     )
     others = [color for color in (*_ABOVE, *_BELOW, *CYCLE) if color != _FREE]

@@ -168,16 +168,16 @@ def select(ds: xr.Dataset) -> xr.Dataset:
 
 
 # -- curves ----------------------------------------------------------------------------------------
-def branch_lines(one: Shown, y: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def branch_lines(shown: Shown, y: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Curves through the responses of ``mask``, neighbours on a branch joined, NaN between the
     pieces; shape (n,) each.
     """
     index = np.flatnonzero(mask)
-    branch, place = one.ds["response_branch"].values[index], one.place[index]
+    branch, place = shown.ds["response_branch"].values[index], shown.place[index]
     order = np.lexsort((place, branch))
     index, branch, place = index[order], branch[order], place[order]
     breaks = np.flatnonzero((np.diff(branch) != 0) | (np.diff(place) > 1)) + 1
-    return np.insert(one.values[index], breaks, np.nan), np.insert(y[index], breaks, np.nan)
+    return np.insert(shown.values[index], breaks, np.nan), np.insert(y[index], breaks, np.nan)
 
 
 # -- axes ------------------------------------------------------------------------------------------
@@ -221,7 +221,7 @@ def dataset_color(one: Shown) -> str:
     return CYCLE[one.rank % len(CYCLE)]
 
 
-def kind_handles(one: Shown, of: np.ndarray, markers: bool = False) -> dict[str, Line2D]:
+def kind_handles(one: Shown, kinds: np.ndarray, markers: bool = False) -> dict[str, Line2D]:
     """The kinds that occur, in the order of the legend, with their colours, and their markers if
     asked for.
     """
@@ -230,7 +230,7 @@ def kind_handles(one: Shown, of: np.ndarray, markers: bool = False) -> dict[str,
         motion_colors.label(code, periods): dot(
             motion_colors.color(code), motion_colors.marker(code) if markers else "o"
         )
-        for code in np.unique(of).tolist()
+        for code in np.unique(kinds).tolist()
     }
 
 
@@ -248,11 +248,11 @@ def draw_events(ax: Axes, datasets: Sequence[Shown], scale: Scale) -> None:
     is named once.
     """
     rows = 0
-    for one in datasets:
-        name = event_name(one.axis)
-        if name not in one.ds or not one.ds.sizes.get("event"):
+    for shown in datasets:
+        name = event_name(shown.axis)
+        if name not in shown.ds or not shown.ds.sizes.get("event"):
             continue
-        values, words = one.ds[name].values * scale.factor, one.ds["event_kind"].values
+        values, words = shown.ds[name].values * scale.factor, shown.ds["event_kind"].values
         low, high = ax.get_xlim()
         drawn = np.isin(words, list(MARKS)) & (values >= low) & (values <= high)
         values, words = values[drawn], words[drawn]
@@ -260,13 +260,13 @@ def draw_events(ax: Axes, datasets: Sequence[Shown], scale: Scale) -> None:
         row = _rows(ax, values, size)
         rows = max(rows, int(row.max(initial=-1)) + 1)
         for word, (text, marker) in MARKS.items():
-            here = words == word
-            if not here.any():
+            mine = words == word
+            if not mine.any():
                 continue
-            above = _EVENTS_AT + row[here] * size * _ROW / _points(ax)[1]
+            above = _EVENTS_AT + row[mine] * size * _ROW / _points(ax)[1]
             if values.size <= _FEW_EVENTS:
                 stems = ax.vlines(
-                    values[here],
+                    values[mine],
                     0,
                     above,
                     transform=ax.get_xaxis_transform(),
@@ -277,9 +277,9 @@ def draw_events(ax: Axes, datasets: Sequence[Shown], scale: Scale) -> None:
                 )
                 stems.set(zorder=1, gid=f"line of event {word}")
             ax.plot(
-                values[here], above, transform=ax.get_xaxis_transform(), ls="none", marker=marker,
+                values[mine], above, transform=ax.get_xaxis_transform(), ls="none", marker=marker,
                 ms=size, mfc="white",
-                mec=dataset_color(one) if one.name else QUIET, mew=width, clip_on=False,
+                mec=dataset_color(shown) if shown.name else QUIET, mew=width, clip_on=False,
                 zorder=5, label=text, gid=f"event {word}",
             )  # fmt: skip
     if rows:
@@ -297,14 +297,14 @@ def _rows(ax: Axes, values: np.ndarray, size: float) -> np.ndarray:
     """In which row each mark of a size [1/72 inch] stands, the lowest in which none of up to
     _MOST_ROWS overlaps it: int64[e].
     """
-    place = ax.transAxes.inverted().transform(
+    position = ax.transAxes.inverted().transform(
         ax.transData.transform(np.stack([values, np.zeros(len(values))], axis=1))
     )[:, 0]
     apart, ends = size * _ROW / _points(ax)[0], np.full(_MOST_ROWS, -np.inf)
     row = np.zeros(len(values), np.int64)
-    for i in np.argsort(place, kind="stable"):
-        row[i] = int(np.argmax(free)) if (free := place[i] - ends >= apart).any() else 0
-        ends[row[i]] = place[i]
+    for i in np.argsort(position, kind="stable"):
+        row[i] = int(np.argmax(free)) if (free := position[i] - ends >= apart).any() else 0
+        ends[row[i]] = position[i]
     return row
 
 
@@ -331,15 +331,15 @@ def _raise_titles(ax: Axes, rows: int) -> None:
 
 def say_if_empty(ax: Axes, datasets: Sequence[Shown]) -> None:
     """State in the picture that there are no responses, and the fate of the starts."""
-    if any(one.ds.sizes["response"] for one in datasets):
+    if any(shown.ds.sizes["response"] for shown in datasets):
         return
-    labels = np.concatenate([one.ds["response_of"].values.ravel() for one in datasets])
+    labels = np.concatenate([shown.ds["response_of"].values.ravel() for shown in datasets])
     ends = [
         f"{count} {WITHOUT_WORDS[code].replace('_', ' ')}"
         for code in sorted(WITHOUT_WORDS, reverse=True)
         if (count := int(np.count_nonzero(labels == code)))
     ]
-    values = sum(one.ds.sizes[one.axis] for one in datasets)
+    values = sum(shown.ds.sizes[shown.axis] for shown in datasets)
     text = f"no response at any of {values} values" + (f":\n{', '.join(ends)}" if ends else "")
     ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center")
 

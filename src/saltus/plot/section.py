@@ -186,7 +186,7 @@ def _frame(
     if name == "phase" and name not in states_of(ds):
         (ax.set_xlim if direction == "x" else ax.set_ylim)(0.0, 1.0)
         return
-    own = (
+    state_regions = (
         regions.along(ds, name)
         if name in states_of(ds) and ds["guard_boundary"].ndim == 1
         else None
@@ -195,9 +195,9 @@ def _frame(
         ax,
         direction,
         values * scale.factor,
-        [b.value * scale.factor for b in own.boundaries] if own else [],
+        [b.value * scale.factor for b in state_regions.boundaries] if state_regions else [],
     )
     if direction == "x":
         draw.few_ticks(ax)
-    if own:
-        draw.draw_gaps(ax, direction, own, scale)
+    if state_regions:
+        draw.draw_gaps(ax, direction, state_regions, scale)

@@ -104,7 +104,7 @@ def _valued(known: list[xr.DataArray]) -> str:
     return ", ".join(text.replace("_", " ") for text in texts)
 
 
-def _start_that_differs(run: xr.Dataset, one: xr.Dataset) -> list[xr.DataArray]:
+def _start_that_differs(run: xr.Dataset, trajectory: xr.Dataset) -> list[xr.DataArray]:
     """The states at the start that aren't the same for all trajectories; none if the start wasn't
     kept, or more than a legend holds.
     """
@@ -116,7 +116,11 @@ def _start_that_differs(run: xr.Dataset, one: xr.Dataset) -> list[xr.DataArray]:
         return []
     first = {name: run[name].isel({dim: 0}).values for name in states_of(run)}
     differing = [name for name, values in first.items() if np.ptp(values) > 0.0]
-    return [one[name].isel({dim: 0}) for name in differing] if len(differing) <= MOST_STATES else []
+    return (
+        [trajectory[name].isel({dim: 0}) for name in differing]
+        if len(differing) <= MOST_STATES
+        else []
+    )
 
 
 def rate_of(ds: xr.Dataset, state: str) -> str:

@@ -72,7 +72,7 @@ def spectrum(
         raise ParameterError(f"this spectrum has no state {shown(state)}. {nearest(state, known)}")
     labels = selection.chosen(ds, trajectory)
     singles = [ds.sel(trajectory=label) for label in labels] or [ds]
-    curves = [np.asarray(one[f"{state}_amplitude"].values, dtype=float) for one in singles]
+    curves = [np.asarray(motion[f"{state}_amplitude"].values, dtype=float) for motion in singles]
     largest = max((float(np.nanmax(curve, initial=0.0)) for curve in curves), default=0.0) or 1.0
     scale = display_scale(
         ds[f"{state}_amplitude"].attrs.get("units", ""),
@@ -84,15 +84,17 @@ def spectrum(
             draw.say(panel, "There is no spectrum: the motion stopped before its end.", *singles)
             return panel
         floor = _SHOWN * largest * scale.factor / 3
-        for i, (one, curve) in enumerate(zip(singles, curves, strict=True)):
-            name = selection.named(ds, one, labels[i]) if len(labels) > 1 else None
-            _curve(panel, one, curve * scale.factor, floor, CYCLE[i % len(CYCLE)], name)
+        for i, (motion, curve) in enumerate(zip(singles, curves, strict=True)):
+            name = selection.named(ds, motion, labels[i]) if len(labels) > 1 else None
+            _curve(panel, motion, curve * scale.factor, floor, CYCLE[i % len(CYCLE)], name)
         panel.set_yscale("log")
         panel.set_ylim(floor, 3 * largest * scale.factor)
         top = (
             float(highest)
             if highest is not None
-            else max(_top(one, curve, largest) for one, curve in zip(singles, curves, strict=True))
+            else max(
+                _top(motion, curve, largest) for motion, curve in zip(singles, curves, strict=True)
+            )
         )
         panel.set_xlim(0.0, top)
         panel.set_xlabel("frequency [Hz]")

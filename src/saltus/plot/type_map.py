@@ -64,11 +64,11 @@ def type_map(ds: xr.Dataset, *, start: int = 0, legend: bool = True, ax: Any = N
             f"{caller()} draws two parameters, this Dataset has {', '.join(pair) or 'none'}. See "
             f"plot.bifurcation_diagram."
         )
-    one = _of_start(ds, start).transpose(*pair, ...)
+    chosen = _of_start(ds, start).transpose(*pair, ...)
     code = np.where(
-        one["response_of"].values < 0,
-        one["response_of"].values,
-        motion_colors.codes(one["type"].values, one["period"].values),
+        chosen["response_of"].values < 0,
+        chosen["response_of"].values,
+        motion_colors.codes(chosen["type"].values, chosen["period"].values),
     )
     sides = cells.parameter(ds, pair[0]), cells.parameter(ds, pair[1])
     with draw.panels(ax, 1, (5.8, 3.9)) as (panel,):
@@ -76,7 +76,7 @@ def type_map(ds: xr.Dataset, *, start: int = 0, legend: bool = True, ax: Any = N
         cells.draw_cells(panel, sides, cells.paint(code, colors))
         panel.set_title(_title(ds, start))
         if legend:
-            handles = [_handle(key, code, one["period"].values) for key in _order(code)]
+            handles = [_handle(key, code, chosen["period"].values) for key in _order(code)]
             panel.legend(
                 handles=handles,
                 loc="upper left",
@@ -122,12 +122,12 @@ def _handle(key: int, code: np.ndarray, period: np.ndarray) -> Patch:
 
 def _title(ds: xr.Dataset, start: int) -> str:
     """The start in words; of a sweep its direction."""
-    one = ds.sel(start=start) if "start" in ds.dims else ds
-    if "start_direction" in one.coords:
-        return f"swept {one['start_direction'].item()}"
-    names = [name for name in states_of(ds) if start_name(name) in one.coords]
+    ds = ds.sel(start=start) if "start" in ds.dims else ds
+    if "start_direction" in ds.coords:
+        return f"swept {ds['start_direction'].item()}"
+    names = [name for name in states_of(ds) if start_name(name) in ds.coords]
     return ", ".join(
         f"{name} = "
-        f"{from_si(float(one[start_name(name)]), one[start_name(name)].attrs.get('units', ''), 4)}"
+        f"{from_si(float(ds[start_name(name)]), ds[start_name(name)].attrs.get('units', ''), 4)}"
         for name in names
     )

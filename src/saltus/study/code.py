@@ -64,7 +64,7 @@ def _written(value: Any) -> str:
         return f"[{' '.join(map(_written, value))}]"
     if not isinstance(value, ast.AST):
         return repr(value)
-    fields = {name: one for name, one in ast.iter_fields(value) if name not in _IDLE}
+    fields = {name: part for name, part in ast.iter_fields(value) if name not in _IDLE}
     if isinstance(
         value, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
     ) and _is_text(value.body[:1]):
@@ -72,11 +72,13 @@ def _written(value: Any) -> str:
     if isinstance(value, ast.JoinedStr):
         # 3.12 has such
         fields["values"] = [
-            one for one in value.values if not (isinstance(one, ast.Constant) and one.value == "")
+            part
+            for part in value.values
+            if not (isinstance(part, ast.Constant) and part.value == "")
         ]
     # Python versions differ in empty fields
-    said = sorted((name, one) for name, one in fields.items() if one is not None and one != [])
-    return f"{type(value).__name__}({' '.join(f'{name}={_written(one)}' for name, one in said)})"
+    said = sorted((name, part) for name, part in fields.items() if part is not None and part != [])
+    return f"{type(value).__name__}({' '.join(f'{name}={_written(part)}' for name, part in said)})"
 
 
 def _is_text(body: list[ast.stmt]) -> bool:

@@ -17,17 +17,17 @@ def identity(system: System, method: Any, arguments: Mapping[str, Any]) -> dict[
     """Texts that must be the same to go on with what was computed: equations, values, method,
     arguments, code.
     """
-    own = {
+    fixed = {
         "equations": system.fingerprint(), "values": to_json(dict(system.values)),
         "method": method.name,
         "method options": to_json(method.options()), "saltus": version("saltus"),
         "code": code_hash(),
     }  # fmt: skip
     asked = {
-        f"{name} of the question" if name in own else name: value
+        f"{name} of the question" if name in fixed else name: value
         for name, value in arguments.items()
     }
-    return own | {name: to_json(_plain(value)) for name, value in asked.items()}
+    return fixed | {name: to_json(_plain(value)) for name, value in asked.items()}
 
 
 def _plain(value: Any) -> Any:

@@ -197,12 +197,12 @@ def _inside(kind: Any, part: int | str) -> Any:
     """The type of what stands in a table, list or mapping by a key or an index; None if nothing
     does.
     """
-    for one in _parts(kind):
-        if _is_table(one):
-            field = one.model_fields.get(str(part))
+    for branch in _parts(kind):
+        if _is_table(branch):
+            field = branch.model_fields.get(str(part))
             return field.annotation if field is not None else None
-        if get_origin(one) in (list, dict):
-            return get_args(one)[-1]
+        if get_origin(branch) in (list, dict):
+            return get_args(branch)[-1]
     return None
 
 

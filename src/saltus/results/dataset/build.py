@@ -222,7 +222,7 @@ class _Building:
             if isinstance(values, Mapping)
             else zip(self.subject.states, np.moveaxis(values, -1, 0), strict=True)
         )
-        for name, one in of_each:
+        for name, given in of_each:
             if row == f"<{what}>" and name in self._reserved():
                 rename = (
                     "Rename the state in the system."
@@ -234,7 +234,9 @@ class _Building:
                 )
             own = _NAMES[row](name) if row in _NAMES else row.replace(f"<{what}>", name)
             text = name if what == "state" else name.replace("_", " ")
-            self._put(own, spec, one, {f"<{what}>": (name, self.subject.units.get(name, ""), text)})
+            self._put(
+                own, spec, given, {f"<{what}>": (name, self.subject.units.get(name, ""), text)}
+            )
 
     def _reserved(self) -> set[str]:
         """Names of the table, and of its dims."""

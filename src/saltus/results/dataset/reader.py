@@ -52,13 +52,13 @@ def reader(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def _datasets(given: Any) -> Iterator[xr.Dataset]:
-    for one in given:
-        if isinstance(one, xr.Dataset):
-            yield one
-        elif isinstance(one, list | tuple):
-            yield from _datasets(one)
-        elif isinstance(one, dict):
-            yield from _datasets(one.values())
+    for item in given:
+        if isinstance(item, xr.Dataset):
+            yield item
+        elif isinstance(item, list | tuple):
+            yield from _datasets(item)
+        elif isinstance(item, dict):
+            yield from _datasets(item.values())
 
 
 def _is_changed(ds: xr.Dataset) -> bool:

@@ -29,12 +29,12 @@ def folder() -> Path:
 
 def is_known(digest: str) -> bool:
     """True if this user's saltus wrote the file with this checksum, or has tried it."""
-    place = folder()
+    path = folder()
     if digest in _HERE:
         return True
     try:
-        check_folder(place)
-        return stat.S_ISREG(os.lstat(place / digest).st_mode)
+        check_folder(path)
+        return stat.S_ISREG(os.lstat(path / digest).st_mode)
     except (OSError, NotOurs):
         return False
 
@@ -42,13 +42,13 @@ def is_known(digest: str) -> bool:
 def note(digest: str) -> None:
     """Remember a checksum: in this process, and for others where the folder can be used."""
     _HERE.add(digest)
-    place = folder()
+    path = folder()
     with suppress(OSError, NotOurs):
-        place.mkdir(parents=True, exist_ok=True, mode=0o700)
-        check_folder(place)
-        _sweep(place)
+        path.mkdir(parents=True, exist_ok=True, mode=0o700)
+        check_folder(path)
+        _sweep(path)
         os.close(
-            os.open(place / digest, os.O_CREAT | os.O_WRONLY | getattr(os, "O_NOFOLLOW", 0), 0o600)
+            os.open(path / digest, os.O_CREAT | os.O_WRONLY | getattr(os, "O_NOFOLLOW", 0), 0o600)
         )
 
 
@@ -64,12 +64,12 @@ def forget() -> int:
     """Forget all of them; returns how many there were. Each file is tried once more when it is
     loaded next.
     """
-    before, place = count(), folder()
+    before, path = count(), folder()
     _HERE.clear()
     with suppress(OSError, NotOurs):
-        check_folder(place)
-        for name in os.listdir(place):
-            entry.remove(place / name)
+        check_folder(path)
+        for name in os.listdir(path):
+            entry.remove(path / name)
     return before - count()
 
 

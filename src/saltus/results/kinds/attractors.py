@@ -118,28 +118,28 @@ def own_errors(ds: xr.Dataset) -> str:
 def _attractors(ds: xr.Dataset) -> Iterator[str]:
     """A line on each of the first, and one on the others."""
     each = [ds.isel(attractor=i) for i in range(ds.sizes["attractor"])]
-    texts = [_one(one) for one in each]
-    for i, (one, text) in enumerate(zip(each[:LINES], texts, strict=False)):
-        through = _through(one) if texts.count(text) > 1 else ""
+    texts = [_one(attractor) for attractor in each]
+    for i, (attractor, text) in enumerate(zip(each[:LINES], texts, strict=False)):
+        through = _through(attractor) if texts.count(text) > 1 else ""
         share = (
-            f", {float(one['attractor_fraction']):.2%} of the starts"
-            if "attractor_fraction" in one
+            f", {float(attractor['attractor_fraction']):.2%} of the starts"
+            if "attractor_fraction" in attractor
             else ""
         )
         yield f"  {i}: {text}{through}{share}"
     yield from more(len(each))
 
 
-def _one(one: xr.Dataset) -> str:
+def _one(attractor: xr.Dataset) -> str:
     """Kind and size of an attractor."""
-    kind, period = str(one["attractor_type"].item()), int(one["attractor_period"])
+    kind, period = str(attractor["attractor_type"].item()), int(attractor["attractor_period"])
     name = f"{kind} {period}T" if kind == "periodic" else kind_text(kind, period)
-    if kind == "limit_cycle" and "attractor_cycle" in one:
-        cycle = float(one["attractor_cycle"])
+    if kind == "limit_cycle" and "attractor_cycle" in attractor:
+        cycle = float(attractor["attractor_cycle"])
         name += f", period {cycle:.4g} s, {1 / cycle:.4g} Hz"
-    size = f"peak {sized(one['attractor_peak'])}"
+    size = f"peak {sized(attractor['attractor_peak'])}"
     if kind == Kind.NOISY_PERIODIC.word:
-        size += f", scatter {sized(one['attractor_scatter'], '.2g')}"
+        size += f", scatter {sized(attractor['attractor_scatter'], '.2g')}"
     return f"{name}, {size}"
 
 
@@ -148,12 +148,12 @@ def _through(one: xr.Dataset) -> str:
     the same.
     """
     first = one.isel(phase=0, missing_dims="ignore")
-    place = ", ".join(
+    point = ", ".join(
         f"{name} = {sized(first[attractor_name(name)])}"
         for name in states_of(one)
         if attractor_name(name) in first and np.isfinite(first[attractor_name(name)])
     )
-    return f", through {place}" if place else ""
+    return f", through {point}" if point else ""
 
 
 # -- rows ------------------------------------------------------------------------------------------

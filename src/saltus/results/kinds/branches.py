@@ -202,11 +202,11 @@ def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
 
 def _branches(title: str, ds: xr.Dataset) -> TextTable:
     """A row for each branch; on the screen the longest ones if there are many."""
-    name, of = ds.attrs["parameter"], ds["point_branch"].values
+    name, branch_of = ds.attrs["parameter"], ds["point_branch"].values
     values, unit = ds[point_name(name)].values, unit_of(ds[point_name(name)])
     stable, peak = ds["point_stable"].values, ds["point_peak"].values
     numbers = ds["branch"].values
-    mine = [np.flatnonzero(of == number) for number in numbers]
+    mine = [np.flatnonzero(branch_of == number) for number in numbers]
     along, first = plain(name), states_of(ds)[0]
     columns = [
         words("branch", numbers),
@@ -218,7 +218,7 @@ def _branches(title: str, ds: xr.Dataset) -> TextTable:
         quantity(f"largest |{first}|", [peak[i].max() for i in mine], unit_of(ds["point_peak"])),
         words("bifurcations", [int((ds["event_branch"].values == i).sum()) for i in numbers]),
     ]
-    notes = [f"{len(of)} orbits on {len(numbers)} branches."]
+    notes = [f"{len(branch_of)} orbits on {len(numbers)} branches."]
     notes += [f"{one}." for one in _unexplained(ds)]
     shown = np.sort(np.argsort([-len(i) for i in mine], kind="stable")[:ROWS]).tolist()
     return table(title, columns, tuple(notes), shown)

@@ -55,14 +55,16 @@ def account(ds: xr.Dataset) -> list[str]:
     return lines + [f"  {i}: {_one(ds.isel(equilibrium=i))}" for i in range(count)]
 
 
-def _one(one: xr.Dataset) -> str:
+def _one(equilibrium: xr.Dataset) -> str:
     """Type, state and contacts of an equilibrium."""
-    at = ", ".join(f"{name} = {sized(one[equilibrium_name(name)])}" for name in states_of(one))
-    kind = _kind(one["equilibrium_type"].item())
-    stable = "stable" if one["equilibrium_stable"] else "unstable"
+    at = ", ".join(
+        f"{name} = {sized(equilibrium[equilibrium_name(name)])}" for name in states_of(equilibrium)
+    )
+    kind = _kind(equilibrium["equilibrium_type"].item())
+    stable = "stable" if equilibrium["equilibrium_stable"] else "unstable"
     word = kind if kind in ("center", "degenerate", "undecided") else f"{stable} {kind}"
-    contacts = one["equilibrium_contacts"].item()
-    on = "held at" if one["equilibrium_place"].item() == "pseudo" else "on the boundary"
+    contacts = equilibrium["equilibrium_contacts"].item()
+    on = "held at" if equilibrium["equilibrium_place"].item() == "pseudo" else "on the boundary"
     return f"{word} at {at}{contacts and f', {on} {contacts}'}"
 
 

@@ -79,15 +79,15 @@ def account(ds: xr.Dataset) -> list[str]:
     return lines
 
 
-def _one(one: xr.Dataset) -> str:
+def _one(orbit: xr.Dataset) -> str:
     """Kind, stability, size and largest multiplier of an orbit."""
     real, imag = (
-        float(np.ravel(one[f"orbit_multiplier_{part}"].values)[0]) for part in ("real", "imag")
+        float(np.ravel(orbit[f"orbit_multiplier_{part}"].values)[0]) for part in ("real", "imag")
     )
-    cycle = f" of {float(one['orbit_cycle']):.8g} s" if "orbit_cycle" in one else ""
-    kind = kind_text(str(one["orbit_type"].item()), int(one["orbit_period"]))
+    cycle = f" of {float(orbit['orbit_cycle']):.8g} s" if "orbit_cycle" in orbit else ""
+    kind = kind_text(str(orbit["orbit_type"].item()), int(orbit["orbit_period"]))
     return (
-        f"{kind}{cycle}, {one['orbit_stability'].item()}, peak {sized(one['orbit_peak'])}, "
+        f"{kind}{cycle}, {orbit['orbit_stability'].item()}, peak {sized(orbit['orbit_peak'])}, "
         f"largest multiplier {np.hypot(real, imag):.4g}"
     )
 
@@ -97,13 +97,13 @@ def _searches(ds: xr.Dataset) -> Iterator[str]:
     missed.
     """
     for i in range(ds.sizes.get("search_period", 0)):
-        one = ds.isel(search_period=i)
-        share = float(one["search_unseen"])
+        search = ds.isel(search_period=i)
+        share = float(search["search_unseen"])
         unseen = f", about {share:.1%} of them to one that isn't known" if share == share else ""
         yield (
-            f"{period_text(int(one['search_period']), 'limit cycles')}: "
-            f"{int(one['search_converged'])} of {ds.attrs.get('starts', '?')} starts led to an "
-            f"orbit{unseen}; deflation found {int(one['search_deflated'])} more"
+            f"{period_text(int(search['search_period']), 'limit cycles')}: "
+            f"{int(search['search_converged'])} of {ds.attrs.get('starts', '?')} starts led to an "
+            f"orbit{unseen}; deflation found {int(search['search_deflated'])} more"
         )
 
 

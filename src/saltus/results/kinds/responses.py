@@ -146,24 +146,29 @@ def _branches(title: str, ds: xr.Dataset) -> TextTable:
     numbers, sizes = np.unique(branch, return_counts=True)
     shown = np.sort(np.argsort(-sizes, kind="stable")[:ROWS]).tolist()
     each = [ds.isel(response=np.flatnonzero(branch == number)) for number in numbers]
-    tops = [int(np.nan_to_num(one["response_rms"].values, nan=-math.inf).argmax()) for one in each]
+    tops = [
+        int(np.nan_to_num(responses["response_rms"].values, nan=-math.inf).argmax())
+        for responses in each
+    ]
     first, along, values = states_of(ds)[0], plain(axis), response_name(axis)
     unit, size, gap = (unit_of(ds[name]) for name in (axis, "response_rms", "response_margin"))
 
     def ends(name: str, pick: Callable[[np.ndarray], Any]) -> list[float]:
-        return [float(pick(one[name].values)) for one in each]
+        return [float(pick(responses[name].values)) for responses in each]
 
     def at_top(name: str) -> list[float]:
-        return [float(one[name].values[top]) for one, top in zip(each, tops, strict=True)]
+        return [
+            float(responses[name].values[top]) for responses, top in zip(each, tops, strict=True)
+        ]
 
     extents = [
-        _extent(ds, int(number), one[values].values)
-        for number, one in zip(numbers, each, strict=True)
+        _extent(ds, int(number), responses[values].values)
+        for number, responses in zip(numbers, each, strict=True)
     ]
     fewest, most = (ends("response_contacts", pick) for pick in (_least, _most))
     columns = [
         words("branch", numbers),
-        words("type", [_types(one) for one in each]),
+        words("type", [_types(responses) for responses in each]),
         words("values", sizes),
         quantity(f"{along} from", [low for low, _ in extents], unit, 5),
         quantity("to", [high for _, high in extents], unit, 5, name=f"{along} to"),
@@ -206,23 +211,23 @@ def _types(ds: xr.Dataset) -> str:
 
 
 def _notes(ds: xr.Dataset, more: int = 0) -> tuple[str, ...]:
-    of = ds["response_of"].values
+    labels = ds["response_of"].values
     notes = [
-        f"{ds.sizes['response']} different responses from {of.size} starts at "
-        f"{math.prod(of.shape[:-1])} values."
+        f"{ds.sizes['response']} different responses from {labels.size} starts at "
+        f"{math.prod(labels.shape[:-1])} values."
     ]
     if more:
         notes.append(f"{more} shorter branches are in the file.")
     if left := _open(ds):
         notes.append(f"{left} responses {OPEN}")
-    return (*notes, *sentences(of))
+    return (*notes, *sentences(labels))
 
 
 def _kinds(title: str, ds: xr.Dataset) -> TextTable:
     """A row for each kind of motion: on how much of the map it is, and where."""
-    of = ds["response_of"].values
+    labels = ds["response_of"].values
     names = np.array(kind_texts(ds, "response_"), dtype=np.str_)
-    cells = np.append(names, "")[np.where(of < 0, len(names), of)]
+    cells = np.append(names, "")[np.where(labels < 0, len(names), labels)]
     kinds = sorted(set(names.tolist()), key=lambda kind: (len(kind), kind))
     shares = [float((cells == kind).mean()) for kind in kinds]
     columns = [
@@ -232,7 +237,7 @@ def _kinds(title: str, ds: xr.Dataset) -> TextTable:
     for dim, axis in enumerate(parameters_of(ds)):
         values, unit = ds[axis].values, unit_of(ds[axis])
         where = [values[np.nonzero((cells == kind).any(axis=-1))[dim]] for kind in kinds]
-        low, high = ([of(found) for found in where] for of in (_least, _most))
+        low, high = ([pick(found) for found in where] for pick in (_least, _most))
         columns.append(
             interval(plain(axis), low, high, partial(from_si, unit=unit, digits=4), unit)
         )

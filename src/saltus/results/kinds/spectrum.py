@@ -48,13 +48,13 @@ VARIABLES = {
 
 def account(ds: xr.Dataset) -> list[str]:
     """The largest lines of each state, of the first trajectory."""
-    one = ds.isel(trajectory=0) if "trajectory" in ds.dims else ds
-    frequency = one["frequency"].values
+    run = ds.isel(trajectory=0) if "trajectory" in ds.dims else ds
+    frequency = run["frequency"].values
     lines = [
-        f"extent   {len(frequency)} lines up to {frequency[-1]:g} Hz, window {one['window'].item()}"
+        f"extent   {len(frequency)} lines up to {frequency[-1]:g} Hz, window {run['window'].item()}"
     ]
     for name in states_of(ds):
-        amplitude = one[f"{name}_amplitude"]
+        amplitude = run[f"{name}_amplitude"]
         largest = np.argsort(amplitude.values)[::-1][:_LARGEST]
         told = [f"{sized(amplitude[i])} at {frequency[i]:.6g} Hz" for i in largest]
         lines.append(f"  {name}: {', '.join(told)}")

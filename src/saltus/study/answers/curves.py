@@ -96,17 +96,17 @@ class CurveQuestion(OneVerb):
 
     def _event(self, ds: xr.Dataset) -> xr.Dataset:
         """The event of that kind which is nearest to a value, or the only one."""
-        here = np.flatnonzero(ds["event_kind"].values == self.kind)
-        at = ds[event_name(ds.attrs["parameter"])].values[here]
-        if not len(here) or (self.near is None and len(here) > 1):
+        events = np.flatnonzero(ds["event_kind"].values == self.kind)
+        at = ds[event_name(ds.attrs["parameter"])].values[events]
+        if not len(events) or (self.near is None and len(events) > 1):
             parameter = ds.attrs["parameter"].replace("_", " ")
-            many = f"{len(here)} events" if len(here) else "no event"
+            many = f"{len(events)} events" if len(events) else "no event"
             raise StudyError(
                 f"[{self.place}] the branches have {many} of the kind {self.kind!r}."
-                + (f" Say near which {parameter}: near = ..." if len(here) else "")
+                + (f" Say near which {parameter}: near = ..." if len(events) else "")
             )
         nearest_one = 0 if self.near is None else int(np.argmin(np.abs(at - self.near)))
-        return ds.isel(event=int(here[nearest_one]))
+        return ds.isel(event=int(events[nearest_one]))
 
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
         """The curve in the plane of both parameters."""

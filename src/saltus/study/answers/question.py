@@ -66,11 +66,11 @@ def asked(
     """
 
     def entered(answer: M) -> M:
-        one: Any = answer
-        make = one
+        question_type: Any = answer
+        make = question_type
         if isinstance(answer, type):
-            one.place, one.function = table.place, table.function
-            make = lambda asked, setting: [one(asked, setting)]  # noqa: E731
+            question_type.place, question_type.function = table.place, table.function
+            make = lambda asked, setting: [question_type(asked, setting)]  # noqa: E731
         REGISTER[table.place] = RegisteredTable(rank, table, make, files)
         return answer
 

@@ -77,15 +77,15 @@ def status_table(found: list[StoreStatus | DamagedStore]) -> TextTable:
     )
 
 
-def _row(one: StoreStatus | DamagedStore) -> tuple[str, ...]:
-    if isinstance(one, DamagedStore):
-        return one.name, "damaged", "-", "-", "-", "-", "-"
+def _row(store: StoreStatus | DamagedStore) -> tuple[str, ...]:
+    if isinstance(store, DamagedStore):
+        return store.name, "damaged", "-", "-", "-", "-", "-"
     return (
-        str(one.note.get("name", one.path.name)), f"{one.done} of {one.total}",
-        f"{100 * one.done / max(one.total, 1):.0f} %",
-        str(one.damaged), f"{one.bytes / 1e6:.1f}",
-        one.last_written.strftime(_TIME) if one.last_written else "never",
-        ", ".join(one.writers) or "-",
+        str(store.note.get("name", store.path.name)), f"{store.done} of {store.total}",
+        f"{100 * store.done / max(store.total, 1):.0f} %",
+        str(store.damaged), f"{store.bytes / 1e6:.1f}",
+        store.last_written.strftime(_TIME) if store.last_written else "never",
+        ", ".join(store.writers) or "-",
     )  # fmt: skip
 
 
