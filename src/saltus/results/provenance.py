@@ -82,7 +82,7 @@ def attributes(
 
 
 def inherited(ds: xr.Dataset) -> dict[str, Any]:
-    """Attributes of a result that one made of it takes over."""
+    """Attributes that a result takes over from the result that it is made of."""
     return {
         str(key): value
         for key, value in ds.attrs.items()
@@ -149,8 +149,8 @@ def hash_of(variables: Mapping[str, tuple[tuple[Hashable, ...], np.ndarray]]) ->
 
 
 def file_hash(ds: xr.Dataset) -> str:
-    """SHA-256 of the numbers and of every attribute, in hexadecimal: what must come back from a
-    file.
+    """SHA-256 of the numbers and of every attribute, in hexadecimal: equal before writing and after
+    reading.
     """
     owners = {"": ds.attrs} | {str(name): variable.attrs for name, variable in ds.variables.items()}
     attrs = {

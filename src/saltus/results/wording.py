@@ -1,4 +1,4 @@
-"""Words that every text on a result shares: the lines of `describe`, the tables of studies, the
+"""Words that all texts on a result share: the lines of `describe`, the tables of studies, the
 headers of files.
 """
 
@@ -67,12 +67,12 @@ def meanings(variable: xr.DataArray) -> Mapping[int, str]:
 
 
 def more(count: int) -> list[str]:
-    """A line on those that have none of their own."""
+    """Line on the number of things that have no line themselves."""
     return [f"  and {count - LINES} more"] if count > LINES else []
 
 
 def span(ds: xr.Dataset, names: tuple[str, ...], what: str) -> str:
-    """The line on how many there are along each coordinate, and from where to where they reach."""
+    """Line on the number of values along each coordinate, and their range."""
     parts = []
     for name in names:
         values, unit = ds[name].values, unit_of(ds[name])

@@ -66,7 +66,7 @@ ATTRACTOR_VARIABLES = {
 
 
 def rows_as(what: str, without: Sequence[str] = ()) -> dict[str, Variable]:
-    """The rows of attractors as those of something of which the same is known: an orbit, a
+    """Variables of attractors under the name of something with the same properties: an orbit, a
     response. ``without``: beginnings of names that are left out.
     """
     return {

@@ -1,4 +1,4 @@
-"""Arrays in, a Dataset out: every result is made here, by the table of its kind.
+"""Arrays in, a Dataset out: every result is built here, by the table of its kind.
 
 Everything that goes in is an array of NumPy. Of anything else xarray asks whether an array is one
 of dask, pint, cupy or sparse, and imports for it those that are installed: dask.array alone takes
@@ -180,7 +180,7 @@ def build(
 
 # -- assembly --------------------------------------------------------------------------------------
 class _Building:
-    """The variables of one Dataset, as they are taken."""
+    """Variables of a Dataset under construction."""
 
     def __init__(
         self,
@@ -210,7 +210,9 @@ class _Building:
         self.coords: dict[str, xr.Variable] = {}
 
     def take(self, row: str, values: Any) -> None:
-        """Add the variable of a row; of one that stands for all states or parameters, theirs."""
+        """Add the variable of a row; for a row that stands for all states or parameters, add one
+        variable each.
+        """
         spec = self.table[row]
         if "<" not in row:
             if self.subject.batch or not row.endswith("trajectory"):
@@ -304,7 +306,7 @@ def _is_plain(dims: tuple[str, ...]) -> bool:
 
 
 def _array(name: str, spec: Variable, values: Any) -> np.ndarray:
-    """The values in the type of the table."""
+    """Convert values to the type of the table."""
     if spec.clipped:
         values = np.minimum(values, np.iinfo(spec.dtype).max)
     array = np.asarray(values, dtype=np.str_ if spec.dtype == "str" else spec.dtype)
@@ -321,7 +323,7 @@ def _array(name: str, spec: Variable, values: Any) -> np.ndarray:
 
 
 def _only(array: np.ndarray, dims: tuple[str, ...]) -> tuple[np.ndarray, tuple[str, ...]]:
-    """The array of the one trajectory."""
+    """Drop the dim ``trajectory`` of an array with one trajectory."""
     axis = dims.index("trajectory")
     if array.shape[axis] != 1:
         raise ParameterError(
@@ -332,7 +334,7 @@ def _only(array: np.ndarray, dims: tuple[str, ...]) -> tuple[np.ndarray, tuple[s
 
 
 def _common(units: Iterable[str]) -> str:
-    """The unit that all share, else ``""``."""
+    """Return the unit that all share, else ``""``."""
     found = set(units)
     return found.pop() if len(found) == 1 else ""
 

@@ -1,5 +1,5 @@
-"""Kinds of motion, and why a start may lead to none: one code and one word for each, wherever they
-are named.
+"""Kinds of motion, and reasons why a start leads to none: one code and one word for each, used
+everywhere.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 
 
 class Kind(IntEnum):
-    """A kind of motion; below zero, why a start leads to none."""
+    """Kind of motion; codes below zero are reasons why a start leads to none."""
 
     PERIODIC = 0
     QUASI_PERIODIC = 1
@@ -29,7 +29,7 @@ class Kind(IntEnum):
 
     @property
     def word(self) -> str:
-        """As it stands in Datasets."""
+        """Word for the kind in Datasets."""
         return self.name.lower()
 
 
@@ -60,8 +60,8 @@ WITHOUT_WORDS = {int(kind): kind.word for kind in WITHOUT}
 
 
 def sentences(labels: np.ndarray) -> list[str]:
-    """A sentence for each reason why starts lead to no attractor, with how many they are: labels
-    int[...] of attractors, or codes.
+    """A sentence for each reason why starts lead to no attractor, with the number of these starts.
+    ``labels``, int[...], are attractors or codes.
     """
     counts = {kind: int(np.count_nonzero(labels == kind)) for kind in WITHOUT}
     return [f"{count} starts {WITHOUT[kind]}." for kind, count in counts.items() if count]

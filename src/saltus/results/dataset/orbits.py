@@ -1,4 +1,4 @@
-"""The variables of orbits, from what is known of them as of attractors."""
+"""Variables of orbits, many of which attractors have too."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The variables of responses, from what is known of them as of attractors."""
+"""Variables of responses, many of which attractors have too."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def response_values(
 
 
 def _per_period(table: AttractorTable) -> np.ndarray:
-    """Contacts in a forcing period; in a cycle, where nothing forces it."""
+    """Contacts in a forcing period, or in a cycle of an unforced system."""
     contacts = np.asarray(table.contacts, dtype=float)
     rates: np.ndarray = contacts / np.maximum(np.asarray(table.period), 1)
     return rates

@@ -126,7 +126,7 @@ _OF_OUTPUT = {
 
 
 def of_outputs(what: str, prefix: str = "") -> dict[str, Variable]:
-    """The rows of what is known of each output of something: a response, a point of a branch."""
+    """Variables of each output of something: a response, a point of a branch."""
     return {
         f"{prefix}output_{name}": replace(row, dims=(what, "output"))
         for name, row in _OF_OUTPUT.items()

@@ -1,4 +1,4 @@
-"""The files of single results, written: what goes wrong with one is a ResultFileError."""
+"""Writing of result files. Errors of the disk become ResultFileErrors."""
 
 from __future__ import annotations
 
@@ -84,9 +84,7 @@ def _target(path: Path) -> Path:
 
 
 def remove_old_drafts(folder: Path) -> None:
-    """Remove the drafts that processes left in a folder which were killed while they wrote: those
-    older than a day.
-    """
+    """Remove the drafts of killed processes from a folder: those older than a day."""
     for draft in folder.glob(".*.part"):
         with suppress(OSError):  # it isn't ours to remove, or has just taken its place
             if _DRAFT.fullmatch(draft.name) and draft.is_file() and is_older(draft):
@@ -95,7 +93,7 @@ def remove_old_drafts(folder: Path) -> None:
 
 @contextmanager
 def no_folder_left(path: Path) -> Iterator[None]:
-    """Folders that are made inside are taken away again if an error leaves them empty."""
+    """Remove the folders that are made inside the block if an error leaves them empty."""
     missing = [one for one in (path, *path.parents) if not one.exists()]
     try:
         yield
@@ -107,8 +105,8 @@ def no_folder_left(path: Path) -> Iterator[None]:
 
 
 def usable_folder(path: Path) -> Path:
-    """A folder that can be written to, made if it isn't there: asked before long work, not after
-    it.
+    """Check that a folder can be written to, and make it if it doesn't exist. Call this before long
+    work.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The end of a result file: a checksum of all bytes before it, asked before any parser sees the
+"""Ending of a result file: a checksum of all bytes before it, checked before any parser sees the
 file.
 
 netCDF-4 and netCDF-3 both say where their data end, and readers stop there: what follows is ours. A
@@ -56,19 +56,20 @@ dict(getattr(file, "attrs", {}))
 
 
 def with_ending(content: bytes | memoryview) -> bytes:
-    """The bytes of a file with its ending."""
+    """Append the ending to the bytes of a file."""
     return (
         bytes(content) + b"\nsaltus-sha256:" + hashlib.sha256(content).hexdigest().encode() + b"\n"
     )
 
 
 def checksum_in(ended: bytes) -> str:
-    """The checksum that stands in what :func:`with_ending` returned."""
+    """Checksum in the ending that :func:`with_ending` appended."""
     return ended[-65:-1].decode()
 
 
 def checksum(path: Path) -> str | None:
-    """The checksum at the end of a file, which is that of its bytes; None if there is none.
+    """Checksum at the end of a file, after a check of the bytes before it; None if there is no
+    checksum.
 
     Raises
     ------
@@ -98,8 +99,7 @@ def checksum(path: Path) -> str | None:
 
 
 def try_elsewhere(path: Path, engine: str) -> None:
-    """Read a file of unknown origin in a process that can be stopped, and that has not more memory
-    than a result takes.
+    """Read a file of unknown origin in a subprocess with a time and memory limit.
 
     Raises
     ------

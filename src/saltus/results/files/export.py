@@ -101,7 +101,9 @@ def to_netcdf(ds: xr.Dataset, path: Target) -> Path:
 
 
 def _check(ds: xr.Dataset, caller: str, kinds: Sequence[str]) -> None:
-    """Raise ParameterError unless a Dataset is a result of such a kind, and of plain text."""
+    """Raise ParameterError unless a Dataset is a result of one of these kinds, and its texts are
+    plain.
+    """
     check(ds, caller=caller, kinds=kinds)
     place = place_of_control(ds)
     if place:
@@ -112,7 +114,7 @@ def _check(ds: xr.Dataset, caller: str, kinds: Sequence[str]) -> None:
 
 
 def _content(ds: xr.Dataset) -> bytes | memoryview:
-    """netCDF-4, or netCDF-3 where what writes the former isn't installed."""
+    """Bytes of a netCDF-4 file, or of netCDF-3 if the writer of netCDF-4 isn't installed."""
     if not (_has("h5netcdf") and _has("h5py")):
         return ds.to_netcdf(engine="scipy")
     from saltus.results.files import hdf5
@@ -309,7 +311,7 @@ def _matlab_names(
 
 @xr.register_dataset_accessor("saltus")
 class Accessor:
-    """``ds.saltus``: what a result can do beside what every Dataset can."""
+    """``ds.saltus``: methods that a result has besides those of every Dataset."""
 
     def __init__(self, ds: xr.Dataset) -> None:
         self._ds = ds

@@ -1,4 +1,4 @@
-"""The tables of a run for pandas: one row a sample, one row a contact."""
+"""Tables of a run for pandas: one row a sample, one row a contact."""
 
 from __future__ import annotations
 

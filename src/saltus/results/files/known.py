@@ -1,5 +1,4 @@
-"""Result files that need no trial: those that this user's saltus wrote here, or has tried before;
-by the checksums at their ends.
+"""Checksums of result files that need no trial: this user's saltus wrote them, or has tried them.
 
 Each is an empty file of that name in a folder of the user's alone. The folder is safe to lose: what
 it held is tried again.
@@ -61,8 +60,8 @@ def count() -> int:
 
 
 def forget() -> int:
-    """Forget all of them; returns how many there were. Each file is tried once more when it is
-    loaded next.
+    """Forget all checksums; return their number. Each file is tried again when it is loaded
+    next.
     """
     before, path = count(), folder()
     _HERE.clear()

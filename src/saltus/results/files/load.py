@@ -1,4 +1,4 @@
-"""Files back to results."""
+"""Loading of result files."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ _HEADER = re.compile(r"\s*(?P<name>.*?)\s*\[(?P<unit>[^]]*)\]\s*")
 def read_measured(
     path: str | os.PathLike[str], axis: str, axis_unit: str, amplitude_unit: str
 ) -> xr.Dataset:
-    """Points that somebody measured, in SI.
+    """Read measured points, in SI.
 
     Parameters
     ----------
@@ -59,8 +59,8 @@ def read_measured(
 def measured_points(
     data: bytes, path: Path, axis: str, axis_unit: str, amplitude_unit: str
 ) -> xr.Dataset:
-    """The same from what is in the file; ``path`` is for messages, in which nothing of the file is
-    repeated.
+    """Measured points from the bytes of a file, in SI. ``path`` is for messages, which repeat
+    nothing of the file.
     """
     units = {axis: axis_unit, "amplitude": amplitude_unit}
     rows = _rows(data, path)

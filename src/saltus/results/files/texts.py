@@ -1,5 +1,5 @@
-"""Texts of a result: none holds what a terminal would obey, neither when it is written nor when it
-is read.
+"""Texts of a result: control characters, which a terminal would obey, are refused in writing and in
+reading.
 """
 
 from __future__ import annotations

@@ -36,7 +36,7 @@ VARIABLES = {
 
 # -- account ---------------------------------------------------------------------------------------
 def account(ds: xr.Dataset) -> list[str]:
-    """The attractors, and what became of the starts."""
+    """Lines on the attractors, and on the fate of the starts."""
     starts = (
         f"{ds.sizes['trajectory']} starts"
         if "trajectory" in ds.dims
@@ -58,7 +58,7 @@ def found(ds: xr.Dataset) -> list[str]:
 
 
 def settled(labels: xr.DataArray) -> str:
-    """The line on how many starts lead to an attractor, and what became of the others."""
+    """Line on the number of starts that lead to an attractor, and on the fate of the others."""
     codes, counts = np.unique(labels.values, return_counts=True)
     others = [
         f"{count} {meanings(labels)[int(code)]}"
@@ -86,7 +86,7 @@ def missed(starts: int, where: str = "") -> list[str]:
 
 
 def untyped(labels: xr.DataArray, *codes: Kind) -> list[str]:
-    """A line on starts whose motion has no type: those with one of some codes."""
+    """Lines on starts whose motion has no type: those with one of these codes."""
     return [f"untyped  {LONGER}"] if np.isin(labels.values, codes).any() else []
 
 
@@ -116,7 +116,7 @@ def own_errors(ds: xr.Dataset) -> str:
 
 
 def _attractors(ds: xr.Dataset) -> Iterator[str]:
-    """A line on each of the first, and one on the others."""
+    """A line on each of the first attractors, and one line on the others."""
     each = [ds.isel(attractor=i) for i in range(ds.sizes["attractor"])]
     texts = [_one(attractor) for attractor in each]
     for i, (attractor, text) in enumerate(zip(each[:LINES], texts, strict=False)):
@@ -144,9 +144,7 @@ def _one(attractor: xr.Dataset) -> str:
 
 
 def _through(one: xr.Dataset) -> str:
-    """The first point that an attractor is known by: it tells mirror images apart, whose sizes are
-    the same.
-    """
+    """First point of an attractor. It distinguishes mirror images, whose sizes are equal."""
     first = one.isel(phase=0, missing_dims="ignore")
     point = ", ".join(
         f"{name} = {sized(first[attractor_name(name)])}"
@@ -188,14 +186,14 @@ def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
 
 
 def _largest(ds: xr.Dataset) -> np.ndarray:
-    """Magnitude of the first multiplier of each; NaN where there is none."""
+    """Magnitude of the first multiplier of each attractor; NaN if there is none."""
     real, imag = (ds[f"attractor_multiplier_{part}"].values[:, 0] for part in ("real", "imag"))
     sizes = np.hypot(real, imag)
     return np.where(np.isfinite(sizes), sizes, np.nan)
 
 
 def _share(ds: xr.Dataset) -> list[Column]:
-    """The share of the starts that lead to each, with its interval."""
+    """Share of the starts that lead to each attractor, with its interval."""
     if "attractor_fraction" not in ds:
         return []
     share, low, high = (

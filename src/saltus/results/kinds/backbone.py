@@ -37,7 +37,7 @@ VARIABLES = {
 
 
 def account(ds: xr.Dataset) -> list[str]:
-    """Its ends, and how much of it is stable."""
+    """Lines on the ends of the backbone, and on the share of it that is stable."""
     frequency, name = ds["backbone_frequency"].values, ds.attrs["amplitude_of"]
     one = ds.sel(output=name)
     peak, unit = one["point_output_peak"].values, one["output_units"].item()

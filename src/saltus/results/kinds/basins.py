@@ -35,7 +35,7 @@ VARIABLES = {
 
 
 def account(ds: xr.Dataset) -> list[str]:
-    """The grid, what was found, and what it is worth."""
+    """Lines on the grid, the attractors, and the trust in the numbers."""
     trust = [f"{words} {ds.attrs[name]:.3g}" for name, words in _TRUST.items() if name in ds.attrs]
     lines = [span(ds, axes_of(ds), "starts"), *found(ds)]
     return lines + ([f"trust    {', '.join(trust)}"] if trust else [])

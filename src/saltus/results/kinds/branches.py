@@ -140,7 +140,9 @@ _STOPPED = {
 
 # -- account ---------------------------------------------------------------------------------------
 def account(ds: xr.Dataset) -> list[str]:
-    """A line on each branch with its events, and one on each whose stability isn't explained."""
+    """A line on each branch with its events, and a line on each branch with unexplained changes of
+    stability.
+    """
     stable = ds["point_stable"].values
     lines = [
         f"found    {counted(ds.sizes['branch'], 'branch')}, {int(ds['branch_closed'].sum())} of "

@@ -49,7 +49,7 @@ VARIABLES = {
 
 
 def account(ds: xr.Dataset) -> list[str]:
-    """A line on each."""
+    """A line on each equilibrium."""
     count = ds.sizes["equilibrium"]
     lines = [f"found    {counted(count, 'equilibrium')}"]
     return lines + [f"  {i}: {_one(ds.isel(equilibrium=i))}" for i in range(count)]
@@ -74,7 +74,7 @@ def _kind(kind: str) -> str:
 
 
 def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
-    """A row for each."""
+    """A row for each equilibrium."""
     states = {name: ds[equilibrium_name(name)] for name in states_of(ds)}
     growth = ds["equilibrium_eigenvalue_real"].values
     largest = np.fmax.reduce(growth, axis=1, initial=-np.inf)

@@ -143,7 +143,7 @@ def _kinds(ds: xr.Dataset) -> list[str]:
 
 
 def _grazes(ds: xr.Dataset) -> list[str]:
-    """``near a graze`` for each motion that is, else ``""``."""
+    """``near a graze`` for each motion near one, else ``""``."""
     if "near_graze" not in ds:
         return [""] * ds.sizes["trajectory"]
     return ["near a graze" if one else "" for one in ds["near_graze"].values]

@@ -59,7 +59,7 @@ VARIABLES = {
 
 
 def account(ds: xr.Dataset) -> list[str]:
-    """A line on each method: how far it agrees with the reference, and what it costs."""
+    """A line on each method: its agreement with the reference, and its cost."""
     names = ds["method"].values.tolist()
     lines = [f"found    {ds.attrs.get('analysis', 'an analysis')} by {len(names)} methods"]
     for i, name in enumerate(names):

@@ -62,7 +62,7 @@ VARIABLES = {
 
 # -- account ---------------------------------------------------------------------------------------
 def account(ds: xr.Dataset) -> list[str]:
-    """A line on each orbit, and what the search says of those that it missed."""
+    """A line on each orbit, and lines on the search for the others."""
     stable = int((ds["orbit_stable"].values == 1).sum())
     count = ds.sizes["orbit"]
     lines = [f"found    {counted(count, 'orbit')}, {stable} of them stable"]
@@ -109,7 +109,7 @@ def _searches(ds: xr.Dataset) -> Iterator[str]:
 
 # -- rows ------------------------------------------------------------------------------------------
 def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
-    """A row for each orbit; what the search says of those that it missed."""
+    """A row for each orbit. Notes tell the share that the search may have missed."""
     real, imag = (ds[f"orbit_multiplier_{part}"].values for part in ("real", "imag"))
     columns = [
         _periods(ds),
@@ -123,14 +123,14 @@ def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
 
 
 def _periods(ds: xr.Dataset) -> Column:
-    """The periods: in forcing periods, of limit cycles in seconds."""
+    """Periods: forcing periods, or seconds for limit cycles."""
     if "orbit_cycle" in ds:
         return quantity("period", ds["orbit_cycle"].values, "s")
     return words("period", [period_text(int(n)) for n in ds["orbit_period"].values])
 
 
 def _largest(sizes: np.ndarray) -> np.ndarray:
-    """The largest of each row; NaN in one without numbers."""
+    """Largest number of each row; NaN for a row without numbers."""
     return np.where(np.isnan(sizes).all(axis=1), np.nan, np.fmax.reduce(sizes, axis=1, initial=0))
 
 

@@ -97,7 +97,7 @@ def _found(ds: xr.Dataset) -> str:
 
 
 def _ends(ds: xr.Dataset) -> list[str]:
-    """Lines on branches that aren't known to their end."""
+    """Lines on branches whose ends aren't known."""
     lines = []
     if text := ds.attrs.get("branches_refused"):
         lines.append(f"unsure   branches are matched by where responses lie: {text}")
@@ -183,8 +183,8 @@ def _branches(title: str, ds: xr.Dataset) -> TextTable:
 
 
 def _extent(ds: xr.Dataset, branch: int, values: np.ndarray) -> tuple[float, float]:
-    """Least and largest value of the parameter on a branch: of its responses, and as far as it was
-    followed.
+    """Least and largest value of the parameter on a branch: of its responses, and of its points if
+    it was followed.
     """
     if "point_branch" in ds:
         followed = ds[point_name(parameters_of(ds)[0])].values[ds["point_branch"].values == branch]
@@ -193,7 +193,7 @@ def _extent(ds: xr.Dataset, branch: int, values: np.ndarray) -> tuple[float, flo
 
 
 def _least(values: np.ndarray) -> float:
-    """The least of the numbers that are there; NaN of none."""
+    """Least of the finite numbers; NaN if there are none."""
     return (
         float(values[~np.isnan(values)].min(initial=math.inf))
         if not np.isnan(values).all()
@@ -224,7 +224,7 @@ def _notes(ds: xr.Dataset, more: int = 0) -> tuple[str, ...]:
 
 
 def _kinds(title: str, ds: xr.Dataset) -> TextTable:
-    """A row for each kind of motion: on how much of the map it is, and where."""
+    """A row for each kind of motion: its share of the map, and its ranges of the parameters."""
     labels = ds["response_of"].values
     names = np.array(kind_texts(ds, "response_"), dtype=np.str_)
     cells = np.append(names, "")[np.where(labels < 0, len(names), labels)]
@@ -260,7 +260,7 @@ def sheets(ds: xr.Dataset) -> dict[str, Mapping[str, np.ndarray]]:
 
 
 def _along(ds: xr.Dataset, dim: str) -> list[str]:
-    """The variables that have a number for each response, or event."""
+    """Variables that have a number for each response, or for each event."""
     return [str(name) for name in ds.variables if ds[name].dims == (dim,)]
 
 

@@ -52,7 +52,7 @@ VARIABLES = {
 
 
 def account(ds: xr.Dataset) -> list[str]:
-    """The surface, and what was found on it."""
+    """Lines on the surface, and on its crossings."""
     directions = {0: "both ways", 1: "upwards", -1: "downwards"}[int(ds.attrs["direction"])]
     return [f"surface  {ds.attrs['surface']}, {directions}", f"found    {_totals(ds)}"]
 

@@ -76,7 +76,7 @@ def account(ds: xr.Dataset) -> list[str]:
 
 
 def headline(ds: xr.Dataset) -> str:
-    """Length, contacts, status and grazes in a line, so far as they are there."""
+    """Length, contacts, status and grazes in a line, as far as the Dataset has them."""
     return ", ".join(_content(ds))
 
 
@@ -167,8 +167,8 @@ def sample_columns(ds: xr.Dataset) -> Columns:
 
 
 def contact_columns(ds: xr.Dataset) -> Columns:
-    """One row a contact, of the trajectories that the Dataset (still) has. The prefix ``contact_``
-    is dropped; empty for a result without contacts.
+    """Columns with one row a contact, of the trajectories that the Dataset has. The prefix
+    ``contact_`` is dropped; empty for a result without contacts.
     """
     names = [str(name) for name in ds.data_vars if ds[name].dims == ("contact",)]
     names.sort(key=lambda name: name != "contact_trajectory")

@@ -1,5 +1,5 @@
-"""A folder that appears under its name with everything in it, or not at all, and what is left of it
-when its maker is killed.
+"""Folders that appear under their names complete or not at all, and removal of the drafts that
+killed processes leave.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _LOCK = Path("locks") / "draft"
 
 
 def write_folder(path: Path, files: Mapping[str, bytes], folders: Iterable[str]) -> None:
-    """Make a folder that appears under its name with everything in it, or not at all.
+    """Make a folder that appears under its name complete or not at all.
 
     Parameters
     ----------
@@ -59,14 +59,14 @@ def write_folder(path: Path, files: Mapping[str, bytes], folders: Iterable[str])
 
 
 def _locked(draft: Path) -> AbstractContextManager[object]:
-    """Hold the lock of a draft. Windows renames no folder with an open file in it: there the age
-    alone must do.
+    """Hold the lock of a draft. Windows renames no folder with an open file in it: on Windows only
+    the age of a draft counts.
     """
     return nullcontext() if os.name == "nt" else exclusive(draft / _LOCK)
 
 
 def remove_old_drafts(path: Path) -> None:
-    """Remove what processes left that were killed within :func:`write_folder`."""
+    """Remove drafts of processes that were killed within :func:`write_folder`."""
     for draft in path.parent.iterdir():
         if (
             draft.name.startswith(f".{path.name}.")

@@ -1,5 +1,5 @@
-"""``store.json``: what a store holds and what it was made from. Its hash stands in every record, so
-that chunks know where they belong.
+"""``store.json``: the content of a store and its origin. Its hash is in every record, so that each
+chunk names its store.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ def head_of(identity: Mapping[str, str], note: Mapping[str, Any], chunks: Chunks
 
 
 def fingerprint(head: Mapping[str, Any]) -> str:
-    """SHA-256 of a head without its note, which is for people: equal for stores whose chunks may
-    stand for each other.
+    """SHA-256 of a head without its note, which is for people. Stores with equal fingerprints may
+    exchange chunks.
     """
     return sha256(
         seal({name: head[name] for name in ("format", "identity", "shape", "chunk", "arrays")})
@@ -118,7 +118,7 @@ def _texts(values: Any) -> bool:
 
 
 def mend_head(path: Path, head: Mapping[str, Any]) -> None:
-    """Write ``store.json`` again where it is damaged, gone or another store's, if the chunks beside
+    """Write ``store.json`` again if it is damaged, gone or another store's, and the chunks next to
     it were made under ``head``.
 
     Raises

@@ -1,5 +1,4 @@
-"""One writer at a time: locks of the operating system, which end with the process that holds them,
-however it ends.
+"""Locks for one writer at a time. The operating system ends them with the process, however it ends.
 
 A lock is for one shard k of n: the chunks k, k + n, k + 2n ... The whole store is shard 0 of 1. Two
 shards exclude each other if they have a chunk in common. Each has a file of its own, and the rule
@@ -66,7 +65,7 @@ def locked(folder: Path, shard: tuple[int, int]) -> Iterator[None]:
 
 @contextmanager
 def exclusive(file: Path, patience: float = _PATIENCE) -> Iterator[int]:
-    """Hold the operating system's lock on one file, made if need be; gives the open file.
+    """Hold the operating system's lock on one file, made if it doesn't exist; gives the open file.
 
     The file is emptied but stays: if it were removed, two processes could hold locks on two files
     of the same name.
@@ -161,8 +160,8 @@ def _holder(file: Path) -> str:
 
 # -- the operating system --------------------------------------------------------------------------
 def _open(file: Path, flags: int = os.O_RDWR | os.O_CREAT) -> int:
-    """Open a lock file: without waiting for the other end of a pipe, and not through a link, whose
-    end would be emptied.
+    """Open a lock file. A pipe isn't waited for; a link isn't followed, since its target would be
+    emptied.
     """
     advice = "Choose a folder that can be written to."
     with refused_as(StoreError, f"{file} can't be locked", advice):
@@ -176,8 +175,8 @@ def _open(file: Path, flags: int = os.O_RDWR | os.O_CREAT) -> int:
 
 
 def _wait(handle: int, *, shared: bool, patience: float) -> bool:
-    """Try to lock until it works or ``patience`` is spent: another process's check takes a moment
-    and is no reason to give up.
+    """Try to lock until it succeeds or ``patience`` is spent: another process's check takes a
+    moment only.
     """
     end = time.monotonic() + patience
     while not _try(handle, shared=shared):
@@ -191,8 +190,8 @@ if sys.platform == "win32":
     import msvcrt
 
     def _try(handle: int, *, shared: bool) -> bool:  # noqa: ARG001
-        """Without shared locks: checks exclude each other for a moment. Locked bytes can't be read:
-        take one far behind the text.
+        """Try once to lock a file on a system without shared locks, where checks exclude each other
+        for a moment. Locked bytes can't be read, so the locked byte lies far behind the text.
         """
         os.lseek(handle, 1 << 30, os.SEEK_SET)
         try:

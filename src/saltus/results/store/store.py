@@ -1,5 +1,5 @@
-"""A store: a map computed chunk by chunk, by one process or many, killed and resumed as often as
-need be, with one outcome.
+"""Store: a map computed chunk by chunk, by one process or many, killed and resumed at any time,
+with one outcome.
 
 ::
 
@@ -164,7 +164,7 @@ class Store:
 
     @classmethod
     def open(cls, path: str | os.PathLike[str], identity: Mapping[str, str] | None = None) -> Store:
-        """Open a store that is there.
+        """Open a store.
 
         Parameters
         ----------
@@ -196,7 +196,7 @@ class Store:
         arrays: Mapping[str, Any],
         note: Mapping[str, Any] | None = None,
     ) -> Store:
-        """:meth:`create` if there is nothing yet, else :meth:`open`; ``shape``, ``chunk`` and
+        """:meth:`create` if there is no store yet, else :meth:`open`; ``shape``, ``chunk`` and
         ``arrays`` must agree too.
 
         A ``store.json`` that is damaged is written again if the chunks beside it were made from the
@@ -248,8 +248,8 @@ class Store:
                 self._shard = None
 
     def _make_folders(self) -> None:
-        """Make those that are gone again: tools that copy trees leave empty ones out. A store that
-        was deleted stays so.
+        """Make missing folders again: tools that copy folders leave empty ones out. A deleted store
+        isn't made again.
         """
         if not (self.path / HEAD).exists():
             raise StoreError(
@@ -262,7 +262,7 @@ class Store:
                 (self.path / name).mkdir(parents=True, exist_ok=True)
 
     def _sweep(self, shard: tuple[int, int]) -> None:
-        """Remove drafts of killed writers: those that only the holder of this lock may write."""
+        """Remove the drafts of killed writers that only the holder of this lock may write."""
         remove_old_drafts(self.path)
         for draft in (self.path / "parts").iterdir():
             owner = draft.name.split(".")[0]
@@ -278,7 +278,7 @@ class Store:
 
     # -- chunks ------------------------------------------------------------------------------------
     def commit(self, index: int, values: Mapping[str, np.ndarray]) -> None:
-        """Write one chunk: all of it is there, or none of it.
+        """Write one chunk, complete or not at all.
 
         Committing the same values again does nothing.
 
@@ -395,8 +395,8 @@ class Store:
         return damaged
 
     def damaged(self, *, checksums: bool = True) -> list[int]:
-        """Committed chunks whose files aren't what was committed; without ``checksums`` only their
-        sizes and last bytes are read.
+        """Committed chunks whose files have changed; without ``checksums`` only sizes and last
+        bytes are checked.
         """
         intact = self._is_intact if checksums else self._seems_intact
         return [int(index) for index in np.flatnonzero(self.done()) if not intact(int(index))]
@@ -418,8 +418,7 @@ class Store:
     def put(
         self, name: str, value: Any, *, existing: Literal["same", "keep", "replace"] = "same"
     ) -> Any:
-        """Keep a small value that belongs to all chunks: the table of attractors, what follows from
-        the finished map.
+        """Keep a small value that belongs to all chunks, such as the table of attractors.
 
         Parameters
         ----------
