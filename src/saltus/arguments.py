@@ -26,7 +26,7 @@ R = TypeVar("R")
 
 
 def _is_number(value: Any) -> bool:
-    """A real number of Python, of NumPy or in an array without axes, or a Quantity of pint."""
+    """True for a real number of Python or NumPy, an array without axes, or a Quantity of pint."""
     if hasattr(value, "magnitude") and hasattr(value, "units"):
         return True
     # NumPy's spans of time count as whole numbers
@@ -86,8 +86,7 @@ _EXAMPLES = {
 
 
 class Kinds:
-    """The kinds of a function's arguments, so far as they are plain and the function doesn't say it
-    better itself.
+    """Kinds of a function's arguments, for those that are checked here.
 
     It does of whole numbers, which have a least one, and of a text whose default is a text: that is
     one of a few words.
@@ -110,8 +109,8 @@ class Kinds:
                 self._of[name] = kinds
 
     def check(self, caller: str, given: Mapping[str, Any]) -> None:
-        """Raise ParameterError for the first of the arguments that is of another kind, or has
-        masked numbers.
+        """Raise ParameterError for the first argument that is of another kind, or has masked
+        numbers.
         """
         for name, value in given.items():
             if has_mask(value):
@@ -133,11 +132,13 @@ class Kinds:
 
 
 class CallError(TraceError, TypeError):
-    """A function of equations was called with other arguments than it has."""
+    """A function of equations was called with wrong arguments."""
 
 
 def written(call: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Make a function of equations one that says how it is called where it is called otherwise."""
+    """Wrap a function of equations: a call with wrong arguments raises an error that shows the
+    right call.
+    """
 
     def made(function: Callable[P, R]) -> Callable[P, R]:
         @functools.wraps(function)
@@ -166,9 +167,8 @@ _OF_AXES = dict.fromkeys(
 
 
 def checked(function: Callable[P, R], elsewhere: Mapping[str, str] | None = None) -> Callable[P, R]:
-    """Make a function one that asks what kinds of arguments it is given, and answers those that it
-    doesn't have: by a sentence of ``elsewhere``, or the nearest that it has. Verbs ask that
-    themselves.
+    """Wrap a function: it checks the kinds of its arguments. For an unknown argument the error has
+    the sentence of ``elsewhere``, or the nearest known name. Verbs check that themselves.
     """
     signature, kinds = inspect.signature(function), Kinds(function)
     known = signature.parameters

@@ -1,5 +1,5 @@
-"""Files that are there in full or not at all, and JSON that knows when it was damaged: what the
-cache, stores, results and the copies of studies are written by.
+"""Files that are complete or absent, and JSON that shows damage, for the cache, stores, results and
+the copies of studies.
 
 A file is written under another name, its draft, and renamed into place. What is to outlast the
 machine's power as well reaches the disk before it has its name, and the name before the call
@@ -53,8 +53,8 @@ def put(path: Path, data: bytes, draft: Path, *, lasting: bool = True, mode: int
 def drafted(
     paths: Sequence[Path], drafts: Sequence[Path], *, lasting: bool = True
 ) -> Iterator[None]:
-    """Within, drafts are written, which take the names of ``paths`` together at the end, in this
-    order: the last one tells that the others are complete.
+    """Write drafts within the block. At its end they take the names of ``paths`` in this order, so
+    the last file shows that the others are complete.
 
     Where ``lasting``, each draft must be on the disk by then. If anything fails, what stood under
     the names before stays, and no draft.
@@ -73,7 +73,7 @@ def drafted(
 
 @contextmanager
 def refused_as(error: type[OSError], what: str, advice: str) -> Iterator[None]:
-    """Within, what the disk refuses is raised as ``error``, such as "PATH can't be written: no
+    """Raise errors of the disk within the block as ``error``, such as "PATH can't be written: no
     space left on device. Free some space."
     """
     try:
@@ -86,7 +86,7 @@ def refused_as(error: type[OSError], what: str, advice: str) -> Iterator[None]:
 
 
 def write(path: Path, data: bytes, *, lasting: bool = True, mode: int = 0o666) -> None:
-    """Write a file, and wait until its bytes are on the disk unless it needn't last."""
+    """Write a file, and wait until its bytes are on the disk unless it needn't survive a crash."""
     flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_BINARY", 0)
     with os.fdopen(os.open(path, flags, mode), "wb") as file:
         file.write(data)
@@ -96,7 +96,7 @@ def write(path: Path, data: bytes, *, lasting: bool = True, mode: int = 0o666) -
 
 
 def flush(path: Path) -> None:
-    """Wait until what is in a file, or the names in a folder, are on the disk."""
+    """Wait until the content of a file, or the names in a folder, are on the disk."""
     if path.is_dir() and os.name == "nt":  # Windows can't open a folder
         return
     handle = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
@@ -121,9 +121,7 @@ def sha256(data: bytes) -> str:
 
 
 def seal(values: Mapping[str, Any]) -> bytes:
-    """JSON text with a checksum of itself; the same values give the same bytes, whatever their
-    order.
-    """
+    """JSON text with a checksum of itself. Equal values give equal bytes, in any order."""
     return _text({**values, "checksum": sha256(_text(values))})
 
 

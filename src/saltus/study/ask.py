@@ -132,7 +132,7 @@ def naming_table(table: str) -> Iterator[None]:
 def questions_of(
     study: Study, own: System | None, inputs: Inputs, only: Sequence[str] = ()
 ) -> list[Question]:
-    """The questions of a study, or some of them, checked against its system.
+    """Questions of a study, or some of them, checked against its system.
 
     Raises
     ------

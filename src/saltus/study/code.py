@@ -1,5 +1,5 @@
-"""The hash of code: of its statements, whatever stands in comments and docstrings, and whichever
-Python reads it.
+"""Hash of code: it depends on the statements only, not on comments, docstrings and the version of
+Python.
 """
 
 from __future__ import annotations
@@ -53,9 +53,7 @@ def hash_of(texts: Mapping[str, bytes]) -> str:
 
 @cache
 def statement_hash(source: bytes) -> str:
-    """SHA-256 of what code says without its comments and docstrings; versions of Python agree on
-    it.
-    """
+    """SHA-256 of code without its comments and docstrings; versions of Python agree on it."""
     return hashlib.sha256(_written(ast.parse(source)).encode("utf-8", "surrogatepass")).hexdigest()
 
 
@@ -92,8 +90,8 @@ def _is_text(body: list[ast.stmt]) -> bool:
 
 
 def _sources(place: str) -> Iterator[tuple[str, bytes]]:
-    """Name and text of the modules of a package of saltus, such as ``study.answers``, rooms in it
-    too, or of one module alone.
+    """Names and texts of the modules of a package of saltus, such as ``study.answers``, with its
+    subpackages, or of one module alone.
     """
     alone = PACKAGE / f"{place.replace('.', '/')}.py"
     for file in [alone] if alone.is_file() else sorted(alone.with_suffix("").rglob("*.py")):

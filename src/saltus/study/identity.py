@@ -31,7 +31,7 @@ def identity(system: System, method: Any, arguments: Mapping[str, Any]) -> dict[
 
 
 def _plain(value: Any) -> Any:
-    """A value with data in place of formulas."""
+    """Convert a value to plain data: formulas become data."""
     if isinstance(value, Mapping):
         return {name: _plain(one) for name, one in value.items()}
     if isinstance(value, list | tuple):

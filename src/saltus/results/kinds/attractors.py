@@ -86,7 +86,7 @@ def missed(starts: int, where: str = "") -> list[str]:
 
 
 def untyped(labels: xr.DataArray, *codes: Kind) -> list[str]:
-    """Lines on starts whose motion has no type: those with one of these codes."""
+    """Line on motions without a type, if there are starts with one of these codes."""
     return [f"untyped  {LONGER}"] if np.isin(labels.values, codes).any() else []
 
 

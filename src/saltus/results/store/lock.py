@@ -190,8 +190,8 @@ if sys.platform == "win32":
     import msvcrt
 
     def _try(handle: int, *, shared: bool) -> bool:  # noqa: ARG001
-        """Try once to lock a file on a system without shared locks, where checks exclude each other
-        for a moment. Locked bytes can't be read, so the locked byte lies far behind the text.
+        """Try once to lock a file on Windows. It has no shared locks: checks exclude each other for
+        a moment. Locked bytes can't be read, so the locked byte lies far behind the text.
         """
         os.lseek(handle, 1 << 30, os.SEEK_SET)
         try:

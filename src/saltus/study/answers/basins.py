@@ -1,5 +1,5 @@
-"""[basins]: which attractor each start of a grid leads to; one map, or several and where they
-agree.
+"""[basins]: the attractor that each start of a grid leads to, in one map or several, and their
+agreement.
 """
 
 from __future__ import annotations
@@ -116,8 +116,8 @@ class OfMaps(Generated):
     lambda _table, _study: [],
 )
 def questions(table: Any, setting: Setting) -> list[Question]:
-    """The maps of the table, then where those agree that are compared. Raises StudyError, UnitError
-    or ParameterError.
+    """Questions of the table: its maps, then the agreement of those that are compared. Raises
+    StudyError, UnitError or ParameterError.
     """
     maps = [
         BasinMap(table, one, setting)
@@ -164,7 +164,7 @@ class BasinMap(Question):
 
     @property
     def stems(self) -> tuple[str, ...]:
-        """Of the map, and of the gallery of its attractors."""
+        """Stems of the files of the map, and of the gallery of its attractors."""
         return self.stem, f"{self.stem}{ATTRACTORS}"
 
     def identity(self) -> dict[str, str]:
@@ -193,7 +193,7 @@ class BasinMap(Question):
         return {"": axes.figure, ATTRACTORS: plot.gallery(ds, self._motions(ds), attractors=shown)}
 
     def _motions(self, ds: xr.Dataset) -> xr.Dataset:
-        """A motion on each attractor, long enough for its picture."""
+        """Motions on the attractors, long enough for their pictures."""
         from saltus.analysis.motion.simulate import simulate
 
         system = self.plan.system

@@ -83,11 +83,11 @@ class CurveQuestion(OneVerb):
             self.near = quantities.parameters(self.system, {name: self.near}, place)[name]
 
     def identity(self) -> dict[str, str]:
-        """Also of the branches at which it begins."""
+        """Identity of the question, with that of the branches at which the curve begins."""
         return super().identity() | {"near": to_json(self.near), "branches": self.parent}
 
     def compute(self, found: Answers, threads: int | None, progress: Show) -> xr.Dataset:
-        """Follow the bifurcation that was meant."""
+        """Follow the bifurcation that the table names."""
         self.arguments["event"] = self._event(found[self.needs[0]])
         try:
             return super().compute(found, threads, progress)
@@ -95,7 +95,7 @@ class CurveQuestion(OneVerb):
             self.arguments["event"] = self.kind
 
     def _event(self, ds: xr.Dataset) -> xr.Dataset:
-        """The event of that kind which is nearest to a value, or the only one."""
+        """Select the event of that kind that is nearest to a value, or the only one."""
         events = np.flatnonzero(ds["event_kind"].values == self.kind)
         at = ds[event_name(ds.attrs["parameter"])].values[events]
         if not len(events) or (self.near is None and len(events) > 1):

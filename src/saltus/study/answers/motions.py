@@ -33,13 +33,13 @@ _LEFT_OUT = ("state", "keep", "time_errors", "surface", "direction")
 
 
 class OfMotions(OneVerb):
-    """A question on motions from given starts, of some length after a transient."""
+    """Question on motions from given starts, of given length after a transient."""
 
     #: Whether its picture draws some trajectories of a batch.
     several: ClassVar[bool] = False
 
     def check_first(self, table: Any) -> None:
-        """Lengths are periods if there is forcing, else times."""
+        """Check that lengths are forcing periods if there is forcing, else times."""
         forced = self.system.forced_at is not None
         if forced != (table.periods is not None):
             right = (
@@ -53,7 +53,7 @@ class OfMotions(OneVerb):
             )
 
     def check(self, table: Any, setting: Setting) -> None:
-        """Start, length and values; then what the question asks besides."""
+        """Check start, length and values, then the keys that only this question has."""
         from saltus.analysis.motion.window import stretch
 
         stretch(
@@ -92,7 +92,7 @@ class OfMotions(OneVerb):
 
 @asked(20, table("poincare", ["poincare"], KINDS, base=_BASE, called="Poincare section"))
 class Section(OfMotions):
-    """[poincare]: where motions cross a surface."""
+    """[poincare]: crossings of a surface."""
 
     picture, several = "section", True
 
@@ -179,7 +179,7 @@ class LinesQuestion(OfMotions):
 
 @asked(40, table("impacts", ["impact_statistics"], KINDS, base=_BASE, called="Impact statistics"))
 class Statistics(OfMotions):
-    """[impacts]: how often, how hard and how long the contacts are."""
+    """[impacts]: number, speeds and durations of contacts."""
 
     picture = "impacts"
 

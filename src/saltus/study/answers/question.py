@@ -32,7 +32,7 @@ M = TypeVar("M", bound="Make | type[OneVerb]")
 
 @dataclass(frozen=True)
 class RegisteredTable:
-    """A table of study files that asks something.
+    """Table of study files that asks a question.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ def asked(
     table: Any,
     files: Callable[[Any, Study], list[tuple[str, str]]] = lambda one, _: [(one.title, one.stem)],
 ) -> Callable[[M], M]:
-    """Enter a table, and what answers it: a class of questions of one function, or a callable that
+    """Register a table with its answer: a class of questions of one function, or a callable that
     makes the questions of a table.
     """
 
@@ -84,8 +84,8 @@ Show = Callable[[float], None]
 
 
 class Question(ABC):
-    """A question of a study whose answer is one Dataset: everything that could be checked before
-    computing was.
+    """Question of a study whose answer is one Dataset. All checks that need no computation are done
+    when it is made.
 
     Attributes
     ----------
@@ -128,7 +128,9 @@ class Question(ABC):
         return None
 
     def join(self, asked: Sequence[Question]) -> None:  # noqa: ARG002
-        """Find the questions whose answers it takes. Raises StudyError if there are none."""
+        """Find the questions whose answers this question needs. Raises StudyError if there are
+        none.
+        """
         return
 
     @abstractmethod
@@ -145,8 +147,8 @@ class Question(ABC):
 
 
 class OneVerb(Question):
-    """A question that one function of the analyses answers, whose table was made from its
-    parameters.
+    """Question that one function of the analyses answers. Its table was made from the parameters of
+    the function.
 
     Parameters
     ----------
@@ -183,7 +185,7 @@ class OneVerb(Question):
         return table.title, table.stem
 
     def check_first(self, table: Any) -> None:  # noqa: ARG002
-        """Refuse what doesn't fit the system before quantities are read."""
+        """Refuse a table that doesn't fit the system, before quantities are read."""
         return
 
     def check(self, table: Any, setting: Setting) -> None:  # noqa: ARG002
@@ -202,7 +204,7 @@ class OneVerb(Question):
             raise fault(self.place, error) from error
 
     def call(self, how: dict[str, Any]) -> xr.Dataset:
-        """The answer; ``how`` are the method, the threads and the progress callable."""
+        """Compute the answer; ``how`` holds the method, the threads and the progress callable."""
         ds: xr.Dataset = verb(self.function)(self.system, **(self.arguments | how))
         return ds
 
@@ -220,5 +222,5 @@ class OneVerb(Question):
 
 
 def first_figure(axes: Any) -> Any:
-    """The figure of the Axes, or the array of them, that a picture returns."""
+    """Figure of the Axes, or of the array of Axes, that a picture returns."""
     return (axes.flat[0] if hasattr(axes, "flat") else axes).figure

@@ -162,5 +162,5 @@ class Response(Responses):
 
 
 def _array(values: Any) -> Any:
-    """Values one by one as the array that the analyses take."""
+    """Array of values given one by one, as the analyses take them."""
     return np.array(values) if isinstance(values, list) else values

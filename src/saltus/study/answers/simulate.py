@@ -1,5 +1,5 @@
-"""[simulate]: move one start, or a batch of them, and keep the motion with its contacts; [compare]:
-with printed and exact times.
+"""[simulate]: motions from one start or a batch, with their contacts; [compare]: comparison with
+printed and exact times.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class Motion(OneVerb):
         return self.group, RUN
 
     def check_first(self, table: Any) -> None:
-        """Periods are those of a forcing."""
+        """Refuse forcing periods for an unforced system."""
         if table.periods is not None and self.system.forced_at is None:
             raise StudyError(
                 f"[simulate] periods: {self.system.name} has no forcing period. Write "
@@ -140,7 +140,7 @@ class Reference(Motion):
 
 def response_texts(run: xr.Dataset) -> list[str]:
     """``T``, ``3T`` or ``not periodic within 48T`` for each trajectory; empty for an unforced
-    system or too few samples.
+    system, and for too few samples.
     """
     try:
         return responses(settled(run))

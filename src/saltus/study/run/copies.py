@@ -1,5 +1,5 @@
-"""The copy of a study in its output folder, with the files that it names, under a seal: what
-`resume` reads.
+"""Copy of a study in its output folder, with the files that it names, under a seal. `resume` reads
+this copy.
 """
 
 from __future__ import annotations
@@ -48,16 +48,14 @@ def keep_copy(folder: Path, text: str, files: Iterable[Input]) -> None:
 
 
 def _write(path: Path, data: bytes) -> None:
-    """Write a file unless it is there already: a study that is run again leaves its
-    copy untouched.
-    """
+    """Write a file unless it exists: a study that is run again leaves its copy untouched."""
     if path.is_symlink() or not path.is_file() or path.read_bytes() != data:
         with replacing(path) as (part,):
             part.write_bytes(data)
 
 
 def _names(files: Iterable[Input]) -> dict[str, str]:
-    """A file name for the copy of each file, no two the same on any system."""
+    """File names for the copies, different on every file system."""
     names: dict[str, str] = {}
     for file in files:
         plain = PurePosixPath(

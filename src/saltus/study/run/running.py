@@ -35,7 +35,7 @@ class Resources:
 
 
 def shard_of(text: str) -> tuple[int, int]:
-    """(k, n) from "k/n". Raises StudyError if that isn't what stands there."""
+    """Read (k, n) from "k/n". Raises StudyError for any other text."""
     match = re.fullmatch(r"(\d+)/(\d+)", text.strip())
     if not match or not int(match[1]) < int(match[2]):
         raise StudyError(f"--shard {text}: write K/N with K from 0 to N - 1, such as 0/4.")
@@ -75,7 +75,7 @@ class StudyOutcome:
     waiting: list[str] = field(default_factory=list)
 
     def add(self, other: StudyOutcome) -> None:
-        """Take in what another question gave."""
+        """Add the outcome of another question."""
         self.tables += other.tables
         self.files += other.files
         self.waiting += other.waiting

@@ -40,7 +40,7 @@ def status_tables(folder: Path) -> list[TextTable]:
 
 @dataclass(frozen=True)
 class DamagedStore:
-    """A store that can't be opened, and why."""
+    """Store that can't be opened, with the reason."""
 
     name: str
     why: str
@@ -67,7 +67,7 @@ def stores(folder: Path) -> list[StoreStatus | DamagedStore]:
 
 
 def status_table(found: list[StoreStatus | DamagedStore]) -> TextTable:
-    """A row for each store; errors of those that can't be opened follow below."""
+    """A row for each store; errors of stores that can't be opened follow below."""
     columns = ("map", "chunks", "done", "damaged", "MB", "last written", "at work")
     return TextTable(
         "Maps",

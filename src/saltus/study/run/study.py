@@ -1,4 +1,4 @@
-"""Run a study: from a checked file to the answers of its questions."""
+"""Running of a study: from a checked file to the answers of its questions."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def run_study(
 def _answer(
     question: Question, found: Mapping[str, xr.Dataset], at: Running, stores: Mapping[str, Store]
 ) -> xr.Dataset | None:
-    """The answer, loaded or computed; None if other shards have still to work on it."""
+    """Load or compute an answer; None if other shards have yet to work on it."""
     if (identity := question.identity()) is None:
         ds = question.compute(found, at.resources.threads, lambda _: None)
         save(ds, at.folder / f"{question.stem}.nc")
