@@ -1,4 +1,4 @@
-"""Two maps of the same starts, and where they differ."""
+"""Comparison of two maps of the same starts."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def _difference(ax: Axes, ds: xr.Dataset, sides: cells.Sides) -> None:
 
 
 def _below(ax: Axes, handles: list[Any], columns: int) -> None:
-    """A legend under the name of the axis."""
+    """Draw a legend below the name of the axis."""
     below = ax.transAxes + ScaledTranslation(0, -0.4, ax.figure.dpi_scale_trans)
     ax.legend(
         handles=handles, loc="upper left", bbox_to_anchor=(0, 0), bbox_transform=below,

@@ -1,4 +1,4 @@
-"""Bifurcation diagram: what a state does in each response, against a parameter."""
+"""Bifurcation diagram: a state in each response, against a parameter."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def bifurcation_diagram(
 
 
 def _variable(one: points.Shown, state: str) -> str:
-    """The sampled values; where there are none, the points at whole periods."""
+    """Name of the sampled values; if there are none, of the points at whole periods."""
     name = sample_name(state) if sample_name(state) in one.ds else response_name(state)
     if name not in one.ds:
         raise PictureError(
@@ -120,7 +120,7 @@ def _along(one: points.Shown, dots: np.ndarray, state: str) -> list[np.ndarray]:
 def _limits_and_gaps(
     ax: Axes, drawn: Sequence[curves.Curves], state: str, up: Scale, across: Scale
 ) -> None:
-    """Limits around all dots, and the gaps near them."""
+    """Set limits around all dots, and draw the gaps near them."""
     first = drawn[0].one
     values = np.concatenate([np.ravel(each.dots) for each in drawn if each.dots is not None])
     varied, fixed = _boundaries(first.ds, state)

@@ -1,4 +1,6 @@
-"""Curves of bifurcations over two parameters, alone or on the map of what motions settle to."""
+"""Curves of bifurcations over two parameters, alone or on the map of the motions that starts settle
+to.
+"""
 
 from __future__ import annotations
 
@@ -91,7 +93,7 @@ def bifurcation_curves(
 
 
 def _named(curves: Any) -> list[tuple[str, xr.Dataset]]:
-    """The curves with the names that they are given in the legend."""
+    """Curves by their names in the legend."""
     if isinstance(curves, Mapping) and not isinstance(curves, xr.Dataset):
         named = [(str(name), ds) for name, ds in curves.items()]
     else:
@@ -138,7 +140,7 @@ def _limits(name: str, named: list[tuple[str, xr.Dataset]], scale: Scale) -> tup
 def _draw(
     ax: Axes, name: str, ds: xr.Dataset, pair: tuple[str, str], scales: list[Scale], color: Any
 ) -> None:
-    """A curve and its points."""
+    """Draw a curve and its points."""
     x, y = (ds[point_name(one)].values * s.factor for one, s in zip(pair, scales, strict=True))
     edge = [patheffects.withStroke(linewidth=2.6, foreground="white")]
     ax.plot(

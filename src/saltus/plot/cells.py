@@ -124,7 +124,9 @@ def method_text(ds: xr.Dataset, suffix: str = "") -> str:
 
 
 def share_text(fraction: float) -> str:
-    """A share in per cent; one that rounds to nothing, or to all, says that it isn't."""
+    """Share in per cent. A share that rounds to none or all is written as more than none, or less
+    than all.
+    """
     if 0 < fraction < 0.0005:
         return "< 0.1 %"
     if 0.9995 <= fraction < 1:
@@ -133,8 +135,8 @@ def share_text(fraction: float) -> str:
 
 
 def peak_text(one: xr.Dataset) -> str:
-    """The largest first state of an attractor, such as ``peak 0.91 mm``; of an equilibrium where it
-    lies, such as ``x = -0.91 mm``.
+    """Largest first state of an attractor, such as ``peak 0.91 mm``; for an equilibrium its value,
+    such as ``x = -0.91 mm``.
     """
     state = str(one.attrs.get("states", "")).split(" ")[0]
     unit = one["attractor_peak"].attrs.get("units", "")
@@ -203,7 +205,7 @@ def _state(ds: xr.Dataset, name: str) -> Side:
 
 
 def parameter(ds: xr.Dataset, name: str) -> Side:
-    """A parameter on an axis; logarithmic where its values are even in their logarithms."""
+    """Axis of a parameter; logarithmic if its values have equal steps in their logarithms."""
     values = np.asarray(ds[name].values, dtype=float)
     log = is_log(values)
     scale = parameter_scale(values, ds[name].attrs.get("units", ""), log)
@@ -211,7 +213,7 @@ def parameter(ds: xr.Dataset, name: str) -> Side:
 
 
 def _edges(centres: np.ndarray) -> np.ndarray:
-    """Half-way between neighbours; the outer cells are symmetric."""
+    """Edges half-way between neighbours; the outer cells are symmetric."""
     if centres.size == 1:
         half = 0.5 * abs(centres[0]) or 0.5
         return np.array([centres[0] - half, centres[0] + half])

@@ -76,7 +76,7 @@ class Curves:
 
     @property
     def largest(self) -> float:
-        """Largest magnitude of what the scale is chosen by."""
+        """Largest magnitude, which decides the display unit."""
         seen = self.along if self.dots is None else [self.dots]
         return max((float(np.nanmax(np.abs(one), initial=0.0)) for one in seen), default=0.0)
 
@@ -110,7 +110,7 @@ class Dots:
     marked: bool
 
     def size(self, count: int, times: float = 1.0) -> float:
-        """Diameter of so many dots [pt]."""
+        """Diameter of dots [pt], given their number."""
         return max(times * next(size for most, size in self.sizes if count <= most), _SMALLEST)
 
 
@@ -159,7 +159,7 @@ def height_scale(unit: str, drawn: Sequence[Curves], quantity: str = "") -> Scal
 
 
 def height_axis(ax: Axes, quantity: str, long_name: str, up: Scale, log: bool = False) -> None:
-    """Name, limits and ticks of the vertical axis."""
+    """Set name, limits and ticks of the vertical axis."""
     if log:
         ax.set_yscale("log")
     elif quantity in SIZES:
@@ -181,8 +181,8 @@ def frame(
     events: bool,
     legend: bool,
 ) -> Iterator[tuple[Axes, Scale]]:
-    """Draw Datasets over their parameter; give the Axes and the display unit of the parameter to
-    who draws more, and names the vertical axis; then mark events and name the colours.
+    """Draw Datasets over their parameter. Give the Axes and the display unit of the parameter to
+    the caller, who draws more and names the vertical axis. Then mark events and name the colours.
     """
     datasets = [drawing.one for drawing in drawn]
     with draw.panels(ax, 1, (6.3, tall)) as (panel,):
@@ -212,7 +212,7 @@ def frame(
 def _flat(
     one: points.Shown, heights: np.ndarray, mask: np.ndarray, across: Scale, up: Scale
 ) -> tuple[np.ndarray, np.ndarray]:
-    """All dots of the responses of ``mask``; the padding is left out."""
+    """Dots of the responses of ``mask`` in one row; padding is left out."""
     y = heights[mask].reshape(int(mask.sum()), -1) * up.factor
     x = np.broadcast_to(one.values[mask][:, None] * across.factor, y.shape)
     there = np.isfinite(y)
@@ -220,8 +220,8 @@ def _flat(
 
 
 def _kinds(ax: Axes, drawn: Curves, look: Dots, across: Scale, up: Scale) -> dict[str, Any]:
-    """A colour for each kind of motion: dots, and lines along branches that are known by their
-    responses only. Chaos lies under the others.
+    """Draw each kind of motion in its colour: dots, and lines along branches without points of
+    their own. Chaos lies under the others.
     """
     shown, dots = drawn.one, np.asarray(drawn.dots)
     kinds = motion_colors.of(shown.ds)
@@ -243,7 +243,7 @@ def _kinds(ax: Axes, drawn: Curves, look: Dots, across: Scale, up: Scale) -> dic
 
 
 def _compare(ax: Axes, drawn: Curves, look: Dots, across: Scale, up: Scale) -> dict[str, Any]:
-    """One colour for a Dataset among several; the first lies below in larger dots."""
+    """Draw one of several Datasets in one colour. The first lies below, in larger dots."""
     shown, dots = drawn.one, np.asarray(drawn.dots)
     x, y = _flat(shown, dots, np.ones(len(dots), dtype=bool), across, up)
     color, marker = points.dataset_color(shown), points.MARKERS[shown.rank] if look.marked else "o"
@@ -258,8 +258,9 @@ def _compare(ax: Axes, drawn: Curves, look: Dots, across: Scale, up: Scale) -> d
 
 # -- branches --------------------------------------------------------------------------------------
 def within_view(ds: xr.Dataset, values: np.ndarray, drawn: np.ndarray) -> np.ndarray:
-    """Heights float64[point] of branches, NaN far above and below all responses, drawn at
-    float64[..], where a branch was stopped after so many points: it may grow without bound.
+    """Heights of the points of branches, float64[point], NaN far beyond ``drawn``, the heights of
+    the responses. Only branches that stopped at the largest number of points are cut: they may grow
+    without bound.
     """
     ends = np.stack([ds["branch_begin"].values, ds["branch_end"].values])
     stopped = np.isin(ds["point_branch"].values, np.flatnonzero((ends == "points").any(axis=0)))
@@ -271,7 +272,7 @@ def within_view(ds: xr.Dataset, values: np.ndarray, drawn: np.ndarray) -> np.nda
 def draw_branches(
     ax: Axes, ds: xr.Dataset, values: np.ndarray, across: Scale, up: Scale
 ) -> dict[str, Any]:
-    """Lines along the branches; the entries of the legend."""
+    """Draw lines along the branches; return the entries of the legend."""
     kind = ds["branch_kind"].values
     codes = motion_colors.codes(kind, np.where(kind == "periodic", ds["branch_periods"].values, 0))
     periods = points.periods_of(ds)
@@ -333,7 +334,9 @@ def _heights(ds: xr.Dataset, values: np.ndarray) -> tuple[np.ndarray, np.ndarray
 def lines(
     mine: np.ndarray, of: np.ndarray, wanted: np.ndarray, x: np.ndarray, y: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Curves through neighbours on one branch of which the first is wanted, NaN between them."""
+    """Curves through neighbours on one branch, where the first of two neighbours is wanted; NaN
+    between the curves.
+    """
     first = mine[:-1]
     joined = (np.diff(mine) == 1) & (of[first] == of[first + 1]) & wanted[first]
     keep = np.zeros(len(x) + 1, bool)
@@ -345,7 +348,7 @@ def lines(
 
 
 def draw_marks(ax: Axes, ds: xr.Dataset, values: np.ndarray, across: Scale, up: Scale) -> None:
-    """Bifurcations on the branches, between the points that they lie between."""
+    """Mark bifurcations on the branches, between their neighbouring points."""
     if not ds.sizes.get("event"):
         return
     at, height = _heights(ds, values)

@@ -66,7 +66,7 @@ def exponents(
 
 
 def _panel(ax: Axes, motion: xr.Dataset, legend: bool) -> None:
-    """One trajectory in one Axes."""
+    """Draw one trajectory in one Axes."""
     unit = motion["lyapunov_exponent"].attrs.get("units", "")
     time = motion["running_time"].values
     finite = time[np.isfinite(time)]
@@ -97,8 +97,8 @@ def _panel(ax: Axes, motion: xr.Dataset, legend: bool) -> None:
 
 
 def _value(one: xr.Dataset, i: int, unit: str) -> str:
-    """An exponent with half of its interval, to the digits that it gives, six at most: ``5.98 ±
-    0.26 1/s``.
+    """Exponent with the half-width of its interval, in the digits that the interval justifies, six
+    at most: ``5.98 ± 0.26 1/s``.
     """
     value = float(one["lyapunov_exponent"][i])
     half = float(one["lyapunov_high"][i]) - value

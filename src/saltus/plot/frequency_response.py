@@ -1,4 +1,4 @@
-"""Frequency response: how large the steady responses are, branch by branch."""
+"""Frequency response: size of the steady responses, branch by branch."""
 
 from __future__ import annotations
 
@@ -147,7 +147,7 @@ def _measured(measured: Measured, one: points.Shown, unit: str) -> xr.Dataset:
 
 
 def _draw_measured(ax: Axes, x: np.ndarray, y: np.ndarray) -> None:
-    """Open circles above all that was computed."""
+    """Draw measured points as open circles above all computed curves."""
     marks = {"ms": 4.5, "mfc": "none", "mec": OKABE_ITO["black"], "mew": 0.9}
     draw.draw_points(ax, x, y, marker="o", zorder=4, label="measured", gid="measured", **marks)
 

@@ -127,7 +127,7 @@ def _chosen(runs: xr.Dataset, ids: list[int], attractors: Any) -> list[int]:
 
 
 def _pair(runs: xr.Dataset) -> tuple[str, ...]:
-    """The states of the phase portrait, as plot.phase chooses them; one where there are no two."""
+    """States of the phase portrait, chosen as in plot.phase; one state if there is only one."""
     known = schema.states_of(runs)
     return (
         (known[0], selection.rate_of(runs, known[0]) or known[1]) if len(known) > 1 else known[:1]
@@ -136,7 +136,7 @@ def _pair(runs: xr.Dataset) -> tuple[str, ...]:
 
 # -- one row ---------------------------------------------------------------------------------------
 def _row(row: np.ndarray, ds: xr.Dataset, runs: xr.Dataset, key: int) -> None:
-    """The time history and the phase portrait."""
+    """Draw the time history and the phase portrait."""
     n = int(ds["attractor_period"].sel(attractor=key))
     label = key if "trajectory" in runs.dims else None
     motion = selection.single(runs, label)
@@ -168,7 +168,7 @@ def _row(row: np.ndarray, ds: xr.Dataset, runs: xr.Dataset, key: int) -> None:
 
 
 def _poincare(ax: Axes, ds: xr.Dataset, runs: xr.Dataset, key: int, color: np.ndarray) -> None:
-    """The attractor at whole periods, the others pale behind it."""
+    """Draw the attractor at whole periods, and the others pale behind it."""
     pair = _pair(runs)
     clouds = np.stack(
         [ds[f"attractor_{name}"].transpose("attractor", "phase").values for name in pair], axis=-1
@@ -253,7 +253,7 @@ def title_of(ds: xr.Dataset, key: int) -> str:
 
 
 def _stability(attractor: xr.Dataset) -> str:
-    """The largest multiplier of what repeats, else the largest exponent."""
+    """Largest multiplier if the motion repeats, else the largest exponent."""
     if int(attractor["attractor_period"]) > 0 and "attractor_multiplier_real" in attractor:
         size = np.hypot(
             attractor["attractor_multiplier_real"].values,
@@ -274,7 +274,7 @@ def _stability(attractor: xr.Dataset) -> str:
 
 
 def _name_colours(figure: Figure, grid: np.ndarray) -> None:
-    """One legend for all rows."""
+    """Draw one legend for all rows."""
     named = {
         label: handle
         for one in grid.flat

@@ -109,7 +109,7 @@ def history(
 def _panel(
     ax: Axes, ds: xr.Dataset, state: str, shown: tuple[float, float], time: str, unit: str | None
 ) -> None:
-    """One trajectory in one Axes."""
+    """Draw one trajectory in one Axes."""
     curve = selection.path(ds, (state,), *shown)
     if shown[0] == shown[1]:
         who = f"Trajectory {int(ds['trajectory'])}" if "trajectory" in ds.coords else "It"
@@ -164,8 +164,8 @@ def _panel(
 
 
 def _note_contacts(ax: Axes, table: xr.Dataset, owners: Mapping[str, str], x: Scale) -> None:
-    """A stroke at the foot of the picture for each contact at a boundary of another state: on this
-    curve it would lie on no line.
+    """Draw a stroke at the foot of the picture for each contact of another state: its boundary
+    isn't on this axis.
     """
     if table.sizes["contact"]:
         names = ", ".join(
@@ -186,8 +186,8 @@ def _note_contacts(ax: Axes, table: xr.Dataset, owners: Mapping[str, str], x: Sc
 
 
 def _mark_contacts(ax: Axes, table: xr.Dataset, state: str, x: Scale, y: Scale) -> None:
-    """A marker for each contact, by its kind; smaller where they are many. The legend counts those
-    that would be a band.
+    """Draw a marker for each contact, by its kind; smaller if there are many. The legend counts
+    contacts that are too many to mark.
     """
     kinds = table["contact_kind"].values.astype(str)
     size = 3.4 if kinds.size <= 40 else 2.4

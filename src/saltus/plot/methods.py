@@ -1,5 +1,5 @@
-"""Methods side by side over one parameter: the error that each makes, where it gives another
-answer, and what it costs.
+"""Comparison of methods over one parameter: the error of each, the share of different answers, and
+the cost.
 """
 
 from __future__ import annotations

@@ -1,6 +1,4 @@
-"""Kinds of motion as colours: the same kind has the same colour in every picture, whatever else is
-in it.
-"""
+"""Colours of the kinds of motion. A kind has the same colour in every picture."""
 
 from __future__ import annotations
 
@@ -77,12 +75,12 @@ def color(code: int, dots: bool = True) -> np.ndarray:
 
 
 def marker(code: int) -> str:
-    """The marker of a kind, for readers and printers without colours."""
+    """Marker of a kind, for readers and printers without colours."""
     return _MARKERS.get(_HUE_OF.get(code, code), ".")
 
 
 def label(code: int, periods: np.ndarray) -> str:
-    """A kind in a legend; ``periods`` are those that occur, to name the long ones."""
+    """Name of a kind in a legend; ``periods`` are those that occur, to name the long ones."""
     if code == LONG:
         long = np.unique(periods[periods > OWN_HUES]).tolist()
         return (

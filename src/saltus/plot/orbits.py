@@ -1,4 +1,4 @@
-"""Points of periodic orbits in the plane of two states, also over a map of basins."""
+"""Points of periodic orbits in the plane of two states, alone or on a map of basins."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def _pair(ds: xr.Dataset, x: str | None, y: str | None, over: xr.Dataset | None)
 def _orbit(
     ax: Axes, orbit: xr.Dataset, pair: tuple[str, str], scales: Any, number: int, over: bool
 ) -> None:
-    """The points of an orbit."""
+    """Draw the points of an orbit."""
     at = [
         orbit[orbit_name(name)].values * scale.factor
         for name, scale in zip(pair, scales, strict=True)

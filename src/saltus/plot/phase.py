@@ -133,7 +133,7 @@ def _pair(run: xr.Dataset, states: Any) -> tuple[str, str]:
 
 
 def _values(ds: xr.Dataset, pair: tuple[str, str], shown: tuple[float, float]) -> np.ndarray:
-    """All points of one trajectory that will be drawn, shape (point, 2)."""
+    """Points of one trajectory in the window, shape (point, 2)."""
     if kind_of(ds) == STROBOSCOPE:
         return selection.stroboscope_points(ds, pair, *shown)
     return selection.path(ds, pair, *shown).values
@@ -160,7 +160,7 @@ def _curve(
     color: str | None,
     name: str | None,
 ) -> None:
-    """The orbit: a colour for each region, or one colour of its own among several."""
+    """Draw the orbit: a colour for each region, or one colour if there are several trajectories."""
     curve = selection.path(ds, pair, *shown)
     x, y = (curve.values[:, i] * scales[i].factor for i in (0, 1))
     width = 1.0 if shown[1] - shown[0] <= 40 or "period" not in ds else 0.6
@@ -174,7 +174,7 @@ def _curve(
 def _dots(
     ax: Axes, points: np.ndarray, scales: tuple[Scale, Scale], color: str | None, name: str
 ) -> None:
-    """The Poincare points; smaller where they are many."""
+    """Draw the Poincaré points; smaller if there are many."""
     size = 4.5 if len(points) <= 60 else 2.5 if len(points) <= 500 else 1.2
     label = name if color is None or name not in ax.get_legend_handles_labels()[1] else None
     marks = {
@@ -200,7 +200,7 @@ def _dots(
 def _frame(
     ax: Axes, ds: xr.Dataset, pair: tuple[str, str], values: np.ndarray, scales: tuple[Scale, Scale]
 ) -> None:
-    """Limits, gap lines and names of the axes."""
+    """Set limits, gap lines and names of the axes."""
     directions: tuple[draw.Direction, draw.Direction] = ("x", "y")
     state_regions = [regions.along(ds, name) for name in pair]
     for i, direction in enumerate(directions):

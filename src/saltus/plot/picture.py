@@ -35,7 +35,7 @@ class PictureError(ParameterError):
 def picture(
     *, needs: Sequence[str] = (), checks: bool = True
 ) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Make a function that draws Axes or a Figure a public picture.
+    """Turn a function that draws Axes or a Figure into a public picture.
 
     Names of maps, outputs and boundaries may hold dollar signs. What is a formula between two of
     them is drawn as one; what isn't, and would end saving the figure, is drawn as it is written.
@@ -124,9 +124,7 @@ def _either(names: Sequence[str]) -> str:
 
 
 def keep_drawable(artist: Artist) -> None:
-    """Have every text of a Figure or Axes drawn as it is written if Matplotlib can't read the
-    formulas in it.
-    """
+    """Make every text of a Figure or Axes plain if Matplotlib can't read the formulas in it."""
     for text in artist.findobj(Text):
         if isinstance(text, Text) and drawable(text.get_text()) != text.get_text():
             text.set_text(drawable(text.get_text()))
@@ -134,8 +132,8 @@ def keep_drawable(artist: Artist) -> None:
 
 @functools.lru_cache(maxsize=256)
 def drawable(text: str) -> str:
-    """The text itself if Matplotlib can read the formulas in it, else one that is drawn as it is
-    written.
+    """Return the text if Matplotlib can read the formulas in it, else one that is drawn
+    literally.
     """
     parser: Any = MathTextParser("path")
     try:

@@ -44,8 +44,8 @@ class ContactLine:
 
 @dataclass(frozen=True)
 class Region:
-    """One side: its colour, its name in a legend, whether it is a contact and the interval of the
-    state that it covers.
+    """One side: its colour, its name in a legend, True for a contact, and the interval of the state
+    that it covers.
     """
 
     color: str
@@ -57,7 +57,7 @@ class Region:
 
 @dataclass(frozen=True)
 class Regions:
-    """All sides that a picture tells apart.
+    """Sides that a picture distinguishes.
 
     Attributes
     ----------
@@ -123,8 +123,8 @@ def find(ds: xr.Dataset, shown: Sequence[str]) -> Regions:
 
 
 def _by_holding(ds: xr.Dataset, shown: Sequence[str], held: Sequence[int]) -> Regions:
-    """A colour for every set of contacts that are held together; the boundaries of the first state
-    that has any.
+    """Regions with a colour for every set of contacts that are held together, and the boundaries of
+    the first state that has any.
     """
     owners = ds["guard_state"].values.tolist()
     lines = next((along(ds, state).boundaries for state in shown if state in owners), ())
@@ -143,7 +143,7 @@ def _by_holding(ds: xr.Dataset, shown: Sequence[str], held: Sequence[int]) -> Re
 
 
 def along(ds: xr.Dataset, state: str) -> Regions:
-    """The regions between the boundaries of one state; a single free one if it has none."""
+    """Regions between the boundaries of one state; one free region if there are none."""
     values = ds["guard_boundary"].values
     mine = [
         i
@@ -182,7 +182,9 @@ def _free_region(boundaries: Sequence[ContactLine]) -> int:
 
 
 def _contact_label(boundary: ContactLine) -> str:
-    """``upper_gap`` bounds the ``upper contact``; ``pitch = pitch_gap`` is no such name."""
+    """Name of the contact at a boundary: ``upper contact`` for ``upper_gap``; ``beyond ...`` for a
+    boundary without such a name.
+    """
     stem = boundary.name.removesuffix("_gap")
     return (
         f"{stem.replace('_', ' ')} contact"
@@ -192,8 +194,8 @@ def _contact_label(boundary: ContactLine) -> str:
 
 
 def _by_mode(ds: xr.Dataset) -> Regions:
-    """A colour for every combination of sides that occurs, named after the sides; where all guards
-    are contacts of a structure, after those that touch.
+    """Regions with a colour for every combination of sides that occurs, named after the sides. If
+    all guards are contacts of a structure, they are named after the contacts that touch.
     """
     names = ds["guard"].values.tolist()
     codes = np.unique(_modes(ds))
@@ -213,7 +215,7 @@ def _by_mode(ds: xr.Dataset) -> Regions:
 
 
 def _touching_sides(ds: xr.Dataset) -> dict[int, int]:
-    """Of each guard that is a contact of `sl.structure` the bit with which it touches."""
+    """Value of the guard's bit at touch, for each guard that is a contact of `sl.structure`."""
     equations = " ".join(equations_of(ds))
     sides = {}
     for i, name in enumerate(map(str, ds["guard"].values)):
@@ -224,7 +226,9 @@ def _touching_sides(ds: xr.Dataset) -> dict[int, int]:
 
 
 def _by_touching(codes: np.ndarray, names: Sequence[str], touching: Mapping[int, int]) -> Regions:
-    """A colour for every set of contacts that touch together, or for their number."""
+    """Regions with a colour for every set of contacts that touch together, or for the number of
+    contacts.
+    """
     sets = [
         [names[bit] for bit, side in touching.items() if int(code) >> bit & 1 == side]
         for code in codes
@@ -251,7 +255,7 @@ def _by_touching(codes: np.ndarray, names: Sequence[str], touching: Mapping[int,
 
 
 def _modes(ds: xr.Dataset) -> np.ndarray:
-    """The modes of the samples and behind the contacts."""
+    """Modes of the samples and after the contacts."""
     if "mode" not in ds:
         return np.zeros(1, dtype=np.int64)
     return np.concatenate([np.ravel(ds["mode"].values), ds["contact_mode_after"].values])
@@ -272,9 +276,7 @@ def _freeplay(codes: Sequence[int]) -> tuple[int, int, int] | None:
 
 
 def _mode_colors(codes: Sequence[int]) -> list[str]:
-    """The colours of a freeplay where the modes are those of one, so that green is free there too;
-    else a colour each.
-    """
+    """Colours of the modes. Those of a freeplay keep green for free; others get one colour each."""
     places = _freeplay(codes)
     if places:
         return [
@@ -286,8 +288,8 @@ def _mode_colors(codes: Sequence[int]) -> list[str]:
 
 
 def _mode_labels(codes: Sequence[int], names: Sequence[str]) -> list[str]:
-    """The sides in words: those of a freeplay by what is met, others by the guards in which they
-    differ; a single one has no name.
+    """Modes in words: those of a freeplay by the contact, others by the guards in which they
+    differ. A single mode has no name.
     """
     places = _freeplay(codes)
     changing = _changing(codes, len(names))
@@ -299,12 +301,12 @@ def _mode_labels(codes: Sequence[int], names: Sequence[str]) -> list[str]:
 
 
 def _changing(codes: Sequence[int], count: int) -> list[int]:
-    """The guards that don't have the same side in all modes."""
+    """Guards that change side between modes."""
     return [bit for bit in range(count) if len({code >> bit & 1 for code in codes}) > 1]
 
 
 def _side(name: str, positive: int) -> str:
-    """A side of a guard: ``gap`` is the name of a boundary, ``x - y = gap`` its equation."""
+    """Side of a guard in words: ``gap`` is the name of a boundary, ``x - y = gap`` its equation."""
     left, equal, right = name.replace("_", " ").partition(" = ")
     return (
         f"{left} {'>' if positive else '<'} {right}"

@@ -97,7 +97,7 @@ class Shown:
 
 # -- which responses -------------------------------------------------------------------------------
 def shown(source: Any) -> list[Shown]:
-    """The Datasets to draw, each with the responses that are left in it.
+    """Datasets to draw, each with its remaining responses.
 
     Raises
     ------
@@ -149,8 +149,8 @@ def _of(ds: Any, name: str, rank: int) -> Shown:
 
 
 def select(ds: xr.Dataset) -> xr.Dataset:
-    """The Dataset with the responses at the values and starts that are left in it: what remains
-    after ``ds.sel(frequency=...)``.
+    """Dataset with the responses at its remaining values and starts, for example after
+    ``ds.sel(frequency=...)``.
 
     Responses that no start leads to at any value (found by following a branch) stay.
     """
@@ -191,14 +191,14 @@ def is_log(values: np.ndarray) -> bool:
 
 
 def parameter_scale(values: np.ndarray, unit: str, log: bool) -> Scale:
-    """Display unit of a parameter; over a logarithmic axis, which shows many sizes at once, the SI
-    unit itself.
+    """Display unit of a parameter. A logarithmic axis shows many sizes at once, so it has the SI
+    unit.
     """
     return Scale(1.0, unit) if log else display_scale(unit, float(np.abs(values).max(initial=0.0)))
 
 
 def parameter_axis(ax: Axes, datasets: Sequence[Shown]) -> Scale:
-    """Name, limits and scale of the horizontal axis; returns its display unit."""
+    """Set name, limits and scale of the horizontal axis; return its display unit."""
     name = datasets[0].axis
     grids = [one.grid for one in datasets]
     values, log = np.concatenate(grids), all(is_log(grid) for grid in grids)
@@ -217,12 +217,12 @@ def parameter_axis(ax: Axes, datasets: Sequence[Shown]) -> Scale:
 
 # -- colours and legend ----------------------------------------------------------------------------
 def dataset_color(one: Shown) -> str:
-    """The colour of a Dataset where several are drawn."""
+    """Colour of a Dataset among several."""
     return CYCLE[one.rank % len(CYCLE)]
 
 
 def kind_handles(one: Shown, kinds: np.ndarray, markers: bool = False) -> dict[str, Line2D]:
-    """The kinds that occur, in the order of the legend, with their colours, and their markers if
+    """Legend handles of the kinds that occur, in order, with their colours, and their markers if
     asked for.
     """
     periods = periods_of(one.ds)
@@ -235,7 +235,7 @@ def kind_handles(one: Shown, kinds: np.ndarray, markers: bool = False) -> dict[s
 
 
 def periods_of(ds: xr.Dataset) -> np.ndarray:
-    """Periods of the responses and of the branches, 0 of what doesn't follow a forcing."""
+    """Periods of the responses and of the branches; 0 for those that don't follow a forcing."""
     parts = [ds["response_period"].values] if "response_period" in ds else []
     if "branch_periods" in ds:
         forced = ds["branch_kind"].values == "periodic"
@@ -244,8 +244,8 @@ def periods_of(ds: xr.Dataset) -> np.ndarray:
 
 
 def draw_events(ax: Axes, datasets: Sequence[Shown], scale: Scale) -> None:
-    """Marks above the picture, clear of its ticks, where something happens to a branch; each kind
-    is named once.
+    """Mark the events of branches above the picture, clear of its ticks. Each kind is named
+    once.
     """
     rows = 0
     for shown in datasets:
@@ -287,15 +287,15 @@ def draw_events(ax: Axes, datasets: Sequence[Shown], scale: Scale) -> None:
 
 
 def _points(ax: Axes) -> np.ndarray:
-    """About the width and the height of an Axes [1/72 inch]."""
+    """Approximate width and height of an Axes [1/72 inch]."""
     figure = ax.get_figure(root=True)
     size = (6.3, 3.4) if figure is None else figure.get_size_inches()
     return np.asarray(72.0 * np.multiply(size, ax.get_position().bounds[2:]))
 
 
 def _rows(ax: Axes, values: np.ndarray, size: float) -> np.ndarray:
-    """In which row each mark of a size [1/72 inch] stands, the lowest in which none of up to
-    _MOST_ROWS overlaps it: int64[e].
+    """Row of each mark of a size [1/72 inch], int64[e]: the lowest of _MOST_ROWS rows in which no
+    mark overlaps it, else the first.
     """
     position = ax.transAxes.inverted().transform(
         ax.transData.transform(np.stack([values, np.zeros(len(values))], axis=1))
@@ -309,8 +309,8 @@ def _rows(ax: Axes, values: np.ndarray, size: float) -> np.ndarray:
 
 
 def _raise_titles(ax: Axes, rows: int) -> None:
-    """Make room for the marks below a title, which may be given later: titles keep clear of what an
-    axis at the top says.
+    """Make room for the marks below a title, which may be set later: titles keep clear of an axis
+    at the top.
     """
     if any(one.get_gid() == _ROOM for one in ax.child_axes):
         return
@@ -345,8 +345,8 @@ def say_if_empty(ax: Axes, datasets: Sequence[Shown]) -> None:
 
 
 def legend(ax: Axes, named: Mapping[str, Any], left: float = 1.02) -> None:
-    """Legend of the colours; above it that of the marks; ``left``: how far, in widths
-    of the Axes.
+    """Draw the legend of the colours, and above it that of the marks. ``left`` is its left edge, in
+    widths of the Axes.
     """
     known = dict(named)
     for handle, text in zip(*ax.get_legend_handles_labels(), strict=True):

@@ -159,7 +159,7 @@ def _draw(
     color: str,
     name: str,
 ) -> None:
-    """One group of crossings; smaller where they are many."""
+    """Draw one group of crossings; smaller if there are many."""
     count = int(mask.sum())
     size = 4.5 if count <= 60 else 2.5 if count <= 500 else 1.2
     sure = ds["crossing_kind"].values.astype(str) == "crossing"
@@ -180,7 +180,7 @@ def _draw(
 def _frame(
     ax: Axes, ds: xr.Dataset, direction: draw.Direction, name: str, values: np.ndarray, scale: Scale
 ) -> None:
-    """Limits, gap lines and name of one axis."""
+    """Set limits, gap lines and name of one axis."""
     label = scale.label(_OTHERS[name][1] if name in _OTHERS and name not in states_of(ds) else name)
     (ax.set_xlabel if direction == "x" else ax.set_ylabel)(label)
     if name == "phase" and name not in states_of(ds):

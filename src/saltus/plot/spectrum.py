@@ -1,4 +1,4 @@
-"""Amplitude spectrum: lines of a periodic response, a curve of any other."""
+"""Amplitude spectrum: lines for a periodic response, a curve for any other."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def spectrum(
 def _curve(
     ax: Axes, one: xr.Dataset, values: np.ndarray, floor: float, color: str, name: str | None
 ) -> None:
-    """Stems of a response that repeats, a curve of any other."""
+    """Draw stems for a response that repeats, a curve for any other."""
     frequency = one["frequency"].values
     if int(one["response_period"]) and one["window"].item() == "none":
         seen = values > floor
@@ -131,8 +131,8 @@ def _top(one: xr.Dataset, values: np.ndarray, largest: float) -> float:
 
 
 def _mark_orders(ax: Axes, singles: Sequence[xr.Dataset], top: float) -> None:
-    """Whole orders of the forcing as quiet lines, with an axis at the top; only where all
-    trajectories share a forcing frequency.
+    """Draw whole orders of the forcing as quiet lines, with an axis at the top, if all trajectories
+    share a forcing frequency.
     """
     forcing = {
         float(one["frequency"].values[-1] / one["order"].values[-1])

@@ -76,14 +76,14 @@ def styled(figure: Figure | None) -> bool:
 
 
 def _fonts(wanted: list[str]) -> list[str]:
-    """The fonts of a list that this machine has; Matplotlib brings the last one."""
+    """Fonts of a list that this machine has; Matplotlib brings the last one."""
     known = {font.name for font in fontManager.ttflist}
     return [name for name in wanted if name in known]
 
 
 def _keep_ticks(figure: Figure) -> None:
-    """Ticks are made as they are needed, by the settings of that moment: write the present ones
-    into the axes, but where a picture chose its own.
+    """Write the style of the present ticks into the axes, except where a picture chose its own:
+    Matplotlib makes ticks late, by the settings of that moment.
     """
     now: dict[str, Any] = {str(name): value for name, value in plt.rcParams.items()}
     for ax in figure.axes:
@@ -136,7 +136,7 @@ class Scale:
 
 
 def display_scale(unit: str, largest: float, wanted: str | None = None) -> Scale:
-    """The prefix under which numbers of this size are best read.
+    """Choose the prefix under which numbers of this size read best.
 
     Parameters
     ----------

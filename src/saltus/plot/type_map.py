@@ -1,4 +1,4 @@
-"""Map of two parameters: which kind of motion a start settles to."""
+"""Map of two parameters: the kind of motion that a start settles to."""
 
 from __future__ import annotations
 
@@ -99,8 +99,8 @@ def _of_start(ds: xr.Dataset, start: int) -> xr.Dataset:
 
 
 def _order(code: np.ndarray) -> list[int]:
-    """Kinds in the order of the legend: by period, then what never repeats, then what never
-    settles.
+    """Kinds in the order of the legend: by period, then motion that never repeats, then starts that
+    never settle.
     """
     found = np.unique(code).tolist()
     return [key for key in found if key > 0] + [key for key in found[::-1] if key < 0]
@@ -121,7 +121,7 @@ def _handle(key: int, code: np.ndarray, period: np.ndarray) -> Patch:
 
 
 def _title(ds: xr.Dataset, start: int) -> str:
-    """The start in words; of a sweep its direction."""
+    """Start in words; the direction of a sweep."""
     ds = ds.sel(start=start) if "start" in ds.dims else ds
     if "start_direction" in ds.coords:
         return f"swept {ds['start_direction'].item()}"

@@ -48,7 +48,7 @@ class Equilibria(OneVerb):
     """Equilibria in each region, on boundaries, and held by contacts."""
 
     def check(self, table: Any, setting: Setting) -> None:  # noqa: ARG002
-        """Pass the ranges of a box as arguments of their own."""
+        """Refuse start together with a box. The ranges of the box become arguments."""
         if table.start is not None and (table.box or table.at):
             raise StudyError("[equilibria] takes start, or box and at; leave out one of them.")
         self.arguments |= quantities.box(self.system, table.box, self.place) or {}

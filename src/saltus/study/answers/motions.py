@@ -248,7 +248,7 @@ class Balance(OfMotions):
             quantity(self.system, self.arguments[name], f"{name} =")
 
     def identity(self) -> dict[str, str]:
-        """With the code of the models, if that holds the functions."""
+        """Identity of the question. If a model holds the functions, its code is part of it."""
         return super().identity() | ({"models": code_hash("models")} if self.of_model else {})
 
     def call(self, how: dict[str, Any]) -> xr.Dataset:
