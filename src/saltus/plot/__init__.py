@@ -34,8 +34,8 @@ def __getattr__(name: str) -> Any:
 
 
 class _Pictures(ModuleType):
-    """This module. Where a picture and its file have one name, the name stays the picture's, in any
-    order of imports.
+    """Module in which a picture keeps its name if its file has the same name, in any order of
+    imports.
     """
 
     def __setattr__(self, name: str, value: object) -> None:

@@ -190,9 +190,9 @@ def draw_gaps(
         position = boundary.value * scale.factor
         line(position, color=QUIET, lw=0.7, ls=(0, (4, 3)), zorder=1, gid=tag)
         if label and low <= position <= high:
-            # else it meets the ticks
+            # Near the lower end, a name on the lower side would touch the ticks.
             lower = i == 0 and len(regions.boundaries) > 1 and position - low > 0.12 * (high - low)
-            # else it meets the title
+            # Near the upper end, a name on the upper side would touch the title.
             high_up = direction == "y" and high - position < 0.12 * (high - low)
             names.append(
                 (position, f"{boundary.label}\n{scale.text(boundary.value)}", lower or high_up)
@@ -243,7 +243,7 @@ def legend(ax: Axes, regions: Regions, **place: Any) -> None:
     others, in as many columns as fit the figure.
     """
     handles, labels = ax.get_legend_handles_labels()
-    # a picture of several trajectories names each thing once
+    # Several trajectories share names: each name is listed once.
     first = dict(zip(labels[::-1], handles[::-1], strict=True))
     known = [region.label for region in regions.regions[::-1] if region.label in first]
     if regions.state is None:

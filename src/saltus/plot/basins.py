@@ -267,14 +267,14 @@ class _DrawRuler(HandlerBase):
         artists: list[Any] = [
             Line2D([-xdescent, width - xdescent], [top, top], color=QUIET, lw=0.6, transform=trans)
         ]
-        for value, place in _apart(
+        for value, position in _apart(
             orig_handle.values, orig_handle.places, width / (0.8 * fontsize)
         ):
-            x = place * width - xdescent
+            x = position * width - xdescent
             artists.append(
                 Line2D([x, x], [top, top - 0.25 * fontsize], color=QUIET, lw=0.6, transform=trans)
             )
-            side = "left" if place == 0 else "right" if place == 1 else "center"
+            side = "left" if position == 0 else "right" if position == 1 else "center"
             text = Text(
                 x,
                 top - 0.4 * fontsize,

@@ -145,7 +145,7 @@ def _row(row: np.ndarray, ds: xr.Dataset, runs: xr.Dataset, key: int) -> None:
     shown = (max(n, _FEWEST), n) if n else (_SHOWN_IF_APERIODIC, held)
     in_time, in_phase = (min(periods, held) if "period" in motion else None for periods in shown)
     history(runs, label, periods=in_time, ax=row[0], time="T", legend=False)
-    # all else would be rounding
+    # A picture of an equilibrium would show rounding errors only.
     if len(row) > 1 and str(ds["attractor_type"].sel(attractor=key).item()) == "equilibrium":
         names = [name for name in schema.states_of(runs) if f"attractor_{name}" in ds]
         places = [ds[f"attractor_{name}"].sel(attractor=key).values.ravel()[0] for name in names]
@@ -163,7 +163,7 @@ def _row(row: np.ndarray, ds: xr.Dataset, runs: xr.Dataset, key: int) -> None:
         for names in [
             child for child in row[1].child_axes if child.get_gid() == draw.GAP_NAMES.format("x")
         ]:
-            # the time history beside it names the gaps too; here the names would meet the title
+            # The time history next to it names the gaps too; here the names would touch the title.
             names.remove()
 
 

@@ -97,7 +97,7 @@ def _in_words(ds: xr.Dataset, labels: np.ndarray | None, counts: xr.DataArray, s
     lines = []
     for name in ds["guard"].values.tolist():
         guard_speeds = np.sort(speeds[(guards == name) & np.isfinite(speeds)])
-        # of each group of equal ones
+        # Index of the first speed of each group of equal speeds.
         first = np.flatnonzero(
             np.diff(guard_speeds, prepend=-np.inf) > _SAME * guard_speeds.max(initial=0.0)
         )

@@ -102,7 +102,7 @@ def phase(
             draw.note_status(panel, motion)
         _frame(panel, singles[0], pair, np.concatenate(curves), scales)
         if legend:
-            # the names of gaps
+            # The names of gaps take the room next to the Axes.
             right = 1.25 if any(text.get_position()[0] > 1.0 for text in panel.texts) else 1.02
             draw.legend(
                 panel, regions.find(singles[0], pair), loc="upper left", bbox_to_anchor=(right, 1)

@@ -93,7 +93,7 @@ def section(
             _frame(panel, ds, direction, name, values[rows], scale)  # type: ignore[arg-type]
         panel.set_title(f"section {ds.attrs.get('surface', '')}", loc="left", fontsize=8)
         if legend and len(panel.get_legend_handles_labels()[1]) > 1:
-            # beside gap names
+            # The names of gaps take the room next to the Axes.
             panel.legend(
                 loc="upper left",
                 bbox_to_anchor=(1.25 if names[1] in ds["guard_state"].values else 1.02, 1),

@@ -167,7 +167,7 @@ def window(ds: xr.Dataset, periods: Periods, default_share: float = 1.0) -> tupl
     if not axis.size:
         raise ParameterError("this run holds no samples.")
     there = np.isfinite(np.stack([ds[name].values for name in states_of(ds)])).all(axis=0)
-    # one that stopped early has no more
+    # A trajectory that stopped early ends in NaN.
     first, last = float(axis[0]), float(axis[there][-1] if there.any() else axis[0])
     if there.sum() < 2:
         return first, first
@@ -266,7 +266,7 @@ def path(ds: xr.Dataset, states: tuple[str, ...], begin: float, end: float) -> P
         [joined(name, [of_state(name) for of_state, _ in sides]) for name in states], axis=-1
     )
     mode = joined("mode", [name for _, name in sides])
-    # at equal times the contacts come last: the curve goes on in their mode
+    # At equal times contacts come last: the curve continues in their mode.
     order = np.argsort(time, kind="stable")
     return Path(time[order], values[order], mode[order])
 
@@ -280,7 +280,7 @@ def stroboscope_points(
     if "period" not in ds:
         return np.empty((0, len(states)))
     axis = sample_axis(ds)
-    # a millionth of a period is far less than the distance of two samples
-    whole = np.abs(axis - np.round(axis)) < 1e-6
-    index = np.flatnonzero(whole & (axis >= begin - 1e-6) & (axis <= end + 1e-6))
+    # A millionth of a period is far less than the distance of two samples.
+    at_periods = np.abs(axis - np.round(axis)) < 1e-6
+    index = np.flatnonzero(at_periods & (axis >= begin - 1e-6) & (axis <= end + 1e-6))
     return np.stack([ds[name].values[index] for name in states], axis=-1)

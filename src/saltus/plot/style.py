@@ -51,8 +51,7 @@ def style() -> Iterator[None]:
     The functions of this package use it themselves when they make the figure. A figure keeps its
     fonts and sizes when it is drawn or saved after the context has ended.
     """
-    # loads the backend, which may switch interaction on: inside the context that would be undone at
-    # its end
+    # Load the backend now: it may switch interaction on, which the end of the context would undo.
     plt.draw_if_interactive()
     with plt.style.context(_STYLE_FILE):
         # A generic family is resolved when a figure is saved, by the settings of that moment; a

@@ -68,7 +68,7 @@ def _written(value: Any) -> str:
     ) and _is_text(value.body[:1]):
         fields["body"] = value.body[1:]
     if isinstance(value, ast.JoinedStr):
-        # 3.12 has such
+        # Python 3.12 adds empty constants.
         fields["values"] = [
             part
             for part in value.values

@@ -179,7 +179,7 @@ class AttractorTable:
 def _parts(both: np.ndarray, count: int, size: int) -> tuple[np.ndarray, np.ndarray]:
     """Real and imaginary parts, shape (count, D) each."""
     both = np.asarray(both, dtype=complex).reshape(count, -1 if count else size)
-    # a plain NaN has the imaginary part 0
+    # The imaginary part of a real NaN is 0.
     return both.real, np.where(np.isnan(both), np.nan, both.imag)
 
 

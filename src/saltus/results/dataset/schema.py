@@ -291,7 +291,7 @@ def restore(ds: xr.Dataset) -> xr.Dataset:
         dtype = dtypes.get(str(name), "f8")
         data = np.asarray(variable.values).astype(np.str_ if dtype == "str" else dtype)
         attrs = {key: _plain(value) for key, value in variable.attrs.items()}
-        # a single number comes back as such, and the codes have the type of their variable
+        # An array of one number is read back as a number. Codes have the type of their variable.
         if "flag_values" in attrs:
             attrs["flag_values"] = np.atleast_1d(np.asarray(attrs["flag_values"], dtype=data.dtype))
         variables[name] = xr.Variable(variable.dims, data, attrs)

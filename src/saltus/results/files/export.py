@@ -241,7 +241,7 @@ def to_mat(ds: xr.Dataset, path: Target) -> Path:
             raise ParameterError(
                 f"{path}: {error}. Write '.nc', which has no limit, or keep fewer samples."
             ) from error
-        # the header is 116 bytes of text, in which scipy puts the time of day
+        # Replace the header, 116 bytes of text: scipy writes the time of day into it.
         with part.open("r+b") as file:
             file.write(b"MATLAB 5.0 MAT-file, written by saltus".ljust(116))
     return path

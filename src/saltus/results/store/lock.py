@@ -86,7 +86,7 @@ def exclusive(file: Path, patience: float = _PATIENCE) -> Iterator[int]:
         if os.getpid() == process:
             os.ftruncate(handle, 0)
     finally:
-        # in a forked child the file is closed already, and its number may be another's
+        # In a forked child the file is closed already, and its number may belong to another file.
         if os.getpid() == process:
             _HANDLES.discard(handle)
             os.close(handle)  # which gives the lock back
@@ -151,7 +151,7 @@ def _holder(file: Path) -> str:
     """``process 4711 on node7 since 2026-01-01 12:00:00+00:00, shard 0 of 4``."""
     k, n = file.name.split("-of-") if "-of-" in file.name else ("0", "1")
     part = "" if n == "1" else f", shard {k} of {n}"
-    # it may be about to write who it is
+    # The note may be incomplete: the holder writes it after it takes the lock.
     with suppress(OSError, ValueError, LookupError, TypeError, RecursionError):
         who = json.loads(fence.content(file, _NOTE))
         return f"process {who['process']} on {who['host']} since {who['since']}{part}"

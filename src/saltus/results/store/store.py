@@ -447,7 +447,7 @@ class Store:
             else {"value": value}
         )
         data = seal({"name": name, "store": self._made_under, **content})
-        # shards may put at the same moment
+        # Other shards may put at the same moment.
         with exclusive(self.path / "locks" / "artifacts", patience=10.0):
             earlier = read(file)
             another = self._opened(name, earlier) is not None and earlier != data

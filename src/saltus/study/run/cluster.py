@@ -58,7 +58,7 @@ def cluster_runner(scheduler: str) -> Iterator[Callable[..., None]]:
         raise StudyError(
             'a cluster needs dask. Install "saltus[cluster]", or leave --scheduler out.'
         ) from None
-    # late heartbeats and lost workers are handled here, or raise errors
+    # Silence dask on late heartbeats and lost workers: both are handled here, or raise errors.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
         client = Client(scheduler, timeout=10)

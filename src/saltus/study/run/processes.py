@@ -57,7 +57,7 @@ def run_on_processes(
     StudyError
         If a chunk can't be computed, or its processes die again and again.
     """
-    # compiles once, before every process does
+    # Compile once here, so that no process compiles.
     plan.map(1).launch(plan.starts(plan.cells_of(missing[0])[:1]), 1)
     team = _Team(plan, found)
     try:
