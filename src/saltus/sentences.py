@@ -20,7 +20,7 @@ class Dialect(Protocol):
     Attributes
     ----------
     sl : str
-        What stands before a function of an equation.
+        Prefix of a function of an equation.
     """
 
     sl: str

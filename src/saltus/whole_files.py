@@ -32,9 +32,9 @@ def put(path: Path, data: bytes, draft: Path, *, lasting: bool = True, mode: int
     path : Path
         The file.
     data : bytes
-        What is in it.
+        Its content.
     draft : Path
-        Where it is written first, on the same disk; no other process writes there.
+        Path that is written first, on the same disk; no other process writes there.
     lasting : bool
         Whether it must be on the disk when this returns. What can be made again needn't.
     mode : int

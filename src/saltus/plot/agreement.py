@@ -47,9 +47,9 @@ def agreement(ds: xr.Dataset, ax: Any = None) -> Any:
     Parameters
     ----------
     ds : Dataset
-        What ``sl.compare`` returned.
+        Result of ``sl.compare``.
     ax : Axes or array of 3 Axes, optional
-        Where to draw; a new figure of three panels by default.
+        Axes to draw into; a new figure of three panels by default.
 
     Returns
     -------

@@ -52,9 +52,9 @@ def basins(
     Parameters
     ----------
     ds : Dataset
-        What ``sl.basins`` returned.
+        Result of ``sl.basins``.
     ax : Axes, optional
-        Where to draw; a new figure by default.
+        Axes to draw into; a new figure by default.
     legend : bool
         Whether to draw the legend of the attractors.
     order : sequence of int, optional

@@ -47,17 +47,17 @@ def bifurcation_diagram(
     Parameters
     ----------
     ds : Dataset, or mapping of str to Dataset
-        What ``sl.bifurcation_diagram`` returned, or a part of it; of any other responses the points
+        Result of ``sl.bifurcation_diagram``, or a part of it; of any other responses the points
         at whole periods are drawn. Several by name are drawn over each other, a colour for each:
         ``{"located": a, "ignored": b}``.
     state : str, optional
-        Which state; by default the first.
+        State to show; by default the first.
     events : bool
         Whether to mark grazes, folds, period doublings and so on above the picture.
     legend : bool
         Whether to draw the legend.
     ax : Axes, optional
-        Where to draw; a new figure by default.
+        Axes to draw into; a new figure by default.
 
     Returns
     -------

@@ -45,15 +45,15 @@ def bifurcation_curves(
     Parameters
     ----------
     curves : Dataset, or sequence or mapping of Datasets
-        What :func:`saltus.bifurcation_curve` returned, all over the same two parameters; in a
+        Result of :func:`saltus.bifurcation_curve`, all over the same two parameters; in a
         mapping by the names that the legend shows.
     over : Dataset, optional
-        What ``sl.bifurcation_diagram`` returned over the same two parameters: its map of types is
+        Result of ``sl.bifurcation_diagram`` over the same two parameters: its map of types is
         drawn below the curves.
     legend : bool
         Whether to draw the legend of the curves.
     ax : Axes, optional
-        Where to draw; a new figure by default.
+        Axes to draw into; a new figure by default.
 
     Returns
     -------

@@ -33,7 +33,7 @@ def branches(
     Parameters
     ----------
     ds : Dataset
-        What :func:`saltus.branches` returned.
+        Result of :func:`saltus.branches`.
     quantity : str
         ``"peak"`` (largest magnitude), ``"rms"``, ``"maximum"``, ``"minimum"``,
         ``"peak_to_peak"``, ``"mean"``, ``"rms_about_mean"``; ``"amplitude"`` or ``"phase"`` of the
@@ -45,7 +45,7 @@ def branches(
     legend : bool
         Whether to draw the legend.
     ax : Axes, optional
-        Where to draw; a new figure by default.
+        Axes to draw into; a new figure by default.
 
     Returns
     -------

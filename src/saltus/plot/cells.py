@@ -161,7 +161,7 @@ class Side:
     scale : Scale
         Its display unit.
     values : array of float
-        Where the cells are centred [SI].
+        Centres of the cells [SI].
     log : bool
         Whether the axis is logarithmic.
     """

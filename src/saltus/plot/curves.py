@@ -95,11 +95,11 @@ class Dots:
     Attributes
     ----------
     sizes : tuple of (float, float)
-        Up to so many dots: their diameter [pt]. They must not hide each other.
+        Largest number of dots, and their diameter [pt]. Dots must not hide each other.
     aperiodic : float
-        How many times as large are those of motion that never repeats.
+        Factor on the diameter for motion that never repeats.
     first : float
-        How many times as large are those of the first of several Datasets, so that none is hidden.
+        Factor on the diameter for the first of several Datasets, so that none is hidden.
     marked : bool
         Whether kinds and Datasets have markers of their own, and the first Dataset is hollow.
     """

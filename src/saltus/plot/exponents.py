@@ -37,11 +37,11 @@ def exponents(
     Parameters
     ----------
     ds : Dataset
-        What ``lyapunov`` or ``wolf`` returned.
+        Result of ``lyapunov`` or ``wolf``.
     trajectory : int or list of int, optional
-        Which of a batch; each gets a panel. Without it all are shown, at most 8.
+        Trajectory of a batch; each gets a panel. Without it all are shown, at most 8.
     ax : Axes or array of Axes, optional
-        Where to draw, one for each trajectory; a new figure by default.
+        Axes to draw into, one for each trajectory; a new figure by default.
     legend : bool
         Whether to give the values.
 

@@ -42,7 +42,7 @@ def frequency_response(
     Parameters
     ----------
     ds : Dataset, or mapping of str to Dataset
-        What ``sl.frequency_response`` returned; a part of it, such as ``ds.sel(frequency=slice(14,
+        Result of ``sl.frequency_response``; a part of it, such as ``ds.sel(frequency=slice(14,
         17))``, is drawn alone. Several by name are drawn over each other, a colour and a marker for
         each: ``{"exact": a, "ode45": b}``.
     quantity : str
@@ -64,7 +64,7 @@ def frequency_response(
     legend : bool
         Whether to draw the legend.
     ax : Axes, optional
-        Where to draw; a new figure by default.
+        Axes to draw into; a new figure by default.
 
     Returns
     -------

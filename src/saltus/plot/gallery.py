@@ -51,9 +51,9 @@ def gallery(
     Parameters
     ----------
     ds : Dataset
-        What ``sl.basins`` (or ``sl.attractors``) returned.
+        Result of ``sl.basins`` or ``sl.attractors``.
     runs : Dataset
-        What ``simulate`` returned for a batch whose trajectory i starts on attractor i.
+        Result of ``simulate`` for a batch whose trajectory i starts on attractor i.
     attractors : sequence of int, optional
         Ids of those to show; all by default, at most 20.
     order : sequence of int, optional

@@ -54,15 +54,15 @@ def history(
     Parameters
     ----------
     run : Dataset
-        What ``simulate`` returned.
+        Result of ``simulate``.
     trajectory : int or list of int, optional
-        Which of a batch; each gets a panel. Without it all are shown, at most 8.
+        Trajectory of a batch; each gets a panel. Without it all are shown, at most 8.
     state : str, optional
         Name of the state; the first one by default.
     periods : int, float or pair, optional
         Number of forcing periods at the end, or (first, last) period; the whole run by default.
     ax : Axes or array of Axes, optional
-        Where to draw, one for each trajectory; a new figure by default.
+        Axes to draw into, one for each trajectory; a new figure by default.
     time : {"both", "s", "T"}
         Axis of time: seconds with forcing periods at the top, or one of the two.
     units : mapping of str to str, optional

@@ -35,11 +35,11 @@ def impacts(
     Parameters
     ----------
     ds : Dataset
-        What ``impact_statistics`` returned.
+        Result of ``impact_statistics``.
     trajectory : int, optional
-        Which of a batch; all of them together by default.
+        Trajectory of a batch; all of them together by default.
     ax : Axes, optional
-        Where to draw; a new figure by default.
+        Axes to draw into; a new figure by default.
     legend : bool
         Whether to name the guards.
 
@@ -127,11 +127,11 @@ def energy(
     Parameters
     ----------
     ds : Dataset
-        What ``energy_balance`` returned.
+        Result of ``energy_balance``.
     trajectory : int, optional
-        Which of a batch; the first one by default.
+        Trajectory of a batch; the first one by default.
     ax : Axes, optional
-        Where to draw; a new figure by default.
+        Axes to draw into; a new figure by default.
     legend : bool
         Whether to name the curves.
 

@@ -38,10 +38,10 @@ def methods(ds: xr.Dataset, *, ax: Any = None) -> list[Axes]:
     Parameters
     ----------
     ds : Dataset
-        What ``sl.compare_methods`` returned for a frequency response or a bifurcation diagram over
+        Result of ``sl.compare_methods`` for a frequency response or a bifurcation diagram over
         one parameter.
     ax : sequence of three Axes, optional
-        Where to draw; a new figure by default.
+        Axes to draw into; a new figure by default.
 
     Returns
     -------

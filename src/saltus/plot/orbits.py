@@ -38,11 +38,11 @@ def periodic_orbits(
     Parameters
     ----------
     ds : Dataset
-        What ``periodic_orbits`` or ``edge_orbit`` returned.
+        Result of ``periodic_orbits`` or ``edge_orbit``.
     x, y : str, optional
         States on the axes; by default those of ``over``, else the first two.
     ax : Axes, optional
-        Where to draw; a new figure by default.
+        Axes to draw into; a new figure by default.
     over : Dataset, optional
         A map of basins to draw them over: the saddles lie on its boundaries.
     units : mapping of str to str, optional

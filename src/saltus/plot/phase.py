@@ -43,9 +43,9 @@ def phase(
     Parameters
     ----------
     run : Dataset
-        What ``simulate`` or ``stroboscope`` returned.
+        Result of ``simulate`` or ``stroboscope``.
     trajectory : int or list of int, optional
-        Which of a batch; without it all are laid over one another, at most 8.
+        Trajectory of a batch; without it all are laid over one another, at most 8.
     states : pair of str, optional
         On the horizontal and the vertical axis; by default the first one and the state that is its
         rate, else the second one.
@@ -53,7 +53,7 @@ def phase(
         Number of forcing periods at the end, or (first, last) period. By default the last 30 % of a
         forced run, as the picture says, and all of a run without forcing.
     ax : Axes, optional
-        Where to draw; a new figure by default.
+        Axes to draw into; a new figure by default.
     poincare : bool
         Whether to draw the Poincare points.
     units : mapping of str to str, optional

@@ -94,7 +94,7 @@ def check(
     Parameters
     ----------
     ds : Any
-        What was given.
+        The argument of the picture.
     needs : sequence of str
         Variables.
     kinds : sequence of str, optional

@@ -30,7 +30,7 @@ class ContactLine:
     name : str
         Name of the guard.
     value : float
-        Where it lies [unit of the state].
+        Its position [unit of the state].
     """
 
     name: str
@@ -169,7 +169,7 @@ def _free_region(boundaries: Sequence[ContactLine]) -> int:
     """Index of the region free of contact: above the guards called lower and below those called
     upper, else the region that holds zero.
 
-    Where zero is itself a boundary it is the middle one, and below a single boundary.
+    If zero is a boundary, it is the middle region, and the region below a single boundary.
     """
     lower = ["lower" in boundary.name for boundary in boundaries]
     if boundaries and all(

@@ -65,7 +65,7 @@ class Shown:
     place : array of int, shape (response,)
         Index of the response's value among the values of that parameter.
     name : str
-        What the Dataset is called where several are drawn; else empty.
+        Name of the Dataset among several; empty for one alone.
     rank : int
         Its number among them.
     """

@@ -44,14 +44,14 @@ def section(
     Parameters
     ----------
     ds : Dataset
-        What ``poincare`` returned.
+        Result of ``poincare``.
     x, y : str, optional
         A state, ``"phase"`` (t/T mod 1) or ``"time"``; by default the first two of the states that
         differ between crossings, then phase (if forced), then time.
     trajectory : int or list of int, optional
-        Which of a batch; without it all are laid over one another, at most 8.
+        Trajectory of a batch; without it all are laid over one another, at most 8.
     ax : Axes, optional
-        Where to draw; a new figure by default.
+        Axes to draw into; a new figure by default.
     units : mapping of str to str, optional
         Display units, such as ``{"v": "mm/s"}``; by the size of the numbers by default.
     legend : bool

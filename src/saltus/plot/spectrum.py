@@ -42,13 +42,13 @@ def spectrum(
     Parameters
     ----------
     ds : Dataset
-        What ``spectrum`` returned.
+        Result of ``spectrum``.
     state : str, optional
         Name of the state; the first one by default.
     trajectory : int or list of int, optional
-        Which of a batch; without it all are laid over one another, at most 8.
+        Trajectory of a batch; without it all are laid over one another, at most 8.
     ax : Axes, optional
-        Where to draw; a new figure by default.
+        Axes to draw into; a new figure by default.
     highest : float, optional
         Highest frequency to show [Hz]; by default the last one with 1e-5 of the largest amplitude,
         and at least order 5.

@@ -41,13 +41,13 @@ def type_map(ds: xr.Dataset, *, start: int = 0, legend: bool = True, ax: Any = N
     Parameters
     ----------
     ds : Dataset
-        What ``sl.bifurcation_diagram`` returned with two entries in ``vary``.
+        Result of ``sl.bifurcation_diagram`` with two entries in ``vary``.
     start : int
-        Which start, by its number: each leads to a map of its own.
+        Number of the start. Each start has its own map.
     legend : bool
         Whether to draw the legend of the colours, with their shares.
     ax : Axes, optional
-        Where to draw; a new figure by default.
+        Axes to draw into; a new figure by default.
 
     Returns
     -------

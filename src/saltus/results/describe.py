@@ -21,7 +21,7 @@ def describe(ds: xr.Dataset) -> str:
     Parameters
     ----------
     ds : Dataset
-        What any function of saltus returned, or :func:`~saltus.results.load`.
+        Result of any function of saltus, or of :func:`~saltus.results.load`.
 
     Returns
     -------

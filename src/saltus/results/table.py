@@ -52,7 +52,7 @@ class Column:
     Attributes
     ----------
     heading : str
-        What stands above it on the screen.
+        Title on the screen.
     text : callable
         The text of a row on the screen, by the number of the row.
     data : mapping of str to sequence

@@ -34,7 +34,7 @@ class Answer:
     dataset : Dataset
         All of it.
     rows : list of TextTable
-        What it says, in rows.
+        The answer in rows.
     """
 
     question: Question
@@ -68,7 +68,7 @@ def ask(
     own : System, optional
         The system, if it isn't one of saltus's models.
     inputs : Inputs, optional
-        Where the files are that the study names; by default none may be read.
+        Files that the study names; by default none may be read.
     only : sequence of str
         Names of questions to answer; by default all.
     threads : int, optional

@@ -116,8 +116,8 @@ class AttractorTable:
         Of a system without forcing: eigenvalues of the Jacobian of each equilibrium [1/s], else
         NaN.
     scatter : array, shape (m,), optional
-        Where one is noisy: root mean square distance of its points from the exact orbit, first
-        state [its unit]; NaN of the others.
+        Root mean square distance of the points of a noisy attractor from the exact orbit, first
+        state [its unit]; NaN for the others.
     """
 
     kind: Sequence[str]

@@ -132,7 +132,7 @@ def build(
     kind : str
         One of :data:`saltus.results.dataset.schema.NAMES`.
     subject : Subject
-        What it is about.
+        Its system and trajectories.
     values : mapping of str to array, or its items
         Variables in the order of the result, under their names in the table and with all dims that
         it names: with ``trajectory`` also where that is dropped. A row for all states or parameters
@@ -143,7 +143,7 @@ def build(
     along : mapping of str to str, optional
         Dims in place of those of the table.
     words : mapping of str to str, optional
-        What stands in angle brackets among the units and long names of the table.
+        Values of the names in angle brackets in the units and long names of the table.
     flags : mapping of str to mapping of int to str, optional
         Meanings of the codes in a variable, where they follow the result.
     carried : mapping of str to xarray.Variable, optional

@@ -21,7 +21,7 @@ class OrbitTable:
     Attributes
     ----------
     orbits : AttractorTable
-        What is known of them as of attractors.
+        Properties that attractors have too.
     stability : sequence of str, length m
         Kind of stability.
     unstable : array of int, shape (m,)

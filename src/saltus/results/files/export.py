@@ -42,7 +42,7 @@ def save(ds: xr.Dataset, path: Target) -> Path:
     Parameters
     ----------
     ds : Dataset
-        What ``simulate`` or ``stroboscope`` returned.
+        Result of ``simulate`` or ``stroboscope``.
     path : str or path
         File to write, in a folder that exists.
 
@@ -142,8 +142,7 @@ def to_csv(ds: xr.Dataset, path: Target) -> Path:
     Parameters
     ----------
     ds : Dataset
-        What ``simulate``, ``stroboscope``, ``frequency_response`` or ``bifurcation_diagram``
-        returned.
+        Result of ``simulate``, ``stroboscope``, ``frequency_response`` or ``bifurcation_diagram``.
     path : str or path
         The file of samples, or of responses; the others get their names from it.
 
@@ -205,7 +204,7 @@ def to_mat(ds: xr.Dataset, path: Target) -> Path:
     Parameters
     ----------
     ds : Dataset
-        What ``simulate`` or ``stroboscope`` returned.
+        Result of ``simulate`` or ``stroboscope``.
     path : str or path
         File to write.
 

@@ -34,7 +34,7 @@ def read_measured(
         the header: ``frequency [Hz], amplitude [mm]``. Other columns are passed over, lines that
         begin with # are comments.
     axis : str
-        What the points are measured over, such as ``frequency``.
+        Quantity over which the points are measured, such as ``frequency``.
     axis_unit, amplitude_unit : str
         SI units; those of the file are converted.
 

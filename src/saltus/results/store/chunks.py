@@ -37,7 +37,7 @@ class Chunks:
     chunk : int
         Cells in one chunk, the last one excepted.
     arrays : dict of str to dtype
-        What is kept of each cell, by name.
+        Values kept of each cell, by name.
     """
 
     shape: tuple[int, ...]

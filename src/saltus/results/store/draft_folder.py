@@ -31,7 +31,7 @@ def write_folder(path: Path, files: Mapping[str, bytes], folders: Iterable[str])
     path : Path
         Its name, not taken yet.
     files : mapping of str to bytes
-        What is in it, by path in the folder.
+        Its content, by path in the folder.
     folders : iterable of str
         Folders in it; ``locks`` is one of them.
 

@@ -26,7 +26,7 @@ def write_whole(path: Path, data: bytes, drafts: Path, name: str) -> None:
     path : Path
         The file.
     data : bytes
-        What is in it.
+        Its content.
     drafts : Path
         Folder on the same disk for the draft; what a killed process leaves behind lies there.
     name : str

@@ -44,7 +44,7 @@ def locked(folder: Path, shard: tuple[int, int]) -> Iterator[None]:
     Parameters
     ----------
     folder : Path
-        Where the lock files lie.
+        Folder of the lock files.
     shard : tuple of int
         (k, n); :data:`WHOLE` for everything.
 

@@ -71,9 +71,9 @@ class StoreStatus:
     bytes : int
         Size on the disk.
     last_written : datetime or None
-        When the last chunk was committed (UTC); None before the first.
+        Time at which the last chunk was committed (UTC); None before the first.
     writers : tuple of str
-        Who holds a lock, since when.
+        Holders of locks, each with the time since when.
     """
 
     path: Path
@@ -127,14 +127,14 @@ class Store:
         path : str or path
             A folder that isn't there yet, in one that is.
         identity : mapping of str to str
-            What a process must agree on to add chunks: hashes of study and system, versions,
+            Texts on which a process must agree to add chunks: hashes of study and system, versions,
             options.
         shape : tuple of int
             Size of the grid along each dim.
         chunk : int
             Cells of the flattened grid (C order) that are one task.
         arrays : mapping of str to dtype
-            What is kept of each cell.
+            Values kept of each cell.
         note : mapping, optional
             Anything else worth keeping with it, as plain values; never compared.
 
@@ -433,7 +433,7 @@ class Store:
         Returns
         -------
         bytes or plain values
-            What is kept now. With "keep" it may be what another shard put first.
+            The value that is kept now. With "keep", another shard may have put it first.
 
         Raises
         ------

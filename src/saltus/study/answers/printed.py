@@ -64,7 +64,7 @@ def rows(data: bytes, path: Path, columns: tuple[str, ...]) -> list[CsvRow]:
     Parameters
     ----------
     data : bytes
-        What is in the file.
+        Content of the file.
     path : Path
         Its name, for messages.
     columns : tuple of str

@@ -37,7 +37,7 @@ class RegisteredTable:
     Attributes
     ----------
     rank : int
-        Where it stands among the others, which are answered in this order: the quick ones first.
+        Rank among the questions, which are answered in this order: the quick ones first.
     table : type
         The table.
     make : callable
@@ -90,13 +90,13 @@ class Question(ABC):
     Attributes
     ----------
     title : str
-        What it is called.
+        Its name in tables and pictures.
     stem : str
         Stem of the names of its files.
     place : str
         The table of the study that asks it.
     group : str
-        What it may be called together with others, besides its table.
+        Name that it shares with other questions, besides its table.
     needs : tuple of str
         Stems of the questions whose answers it takes.
     shared : bool
@@ -153,7 +153,7 @@ class OneVerb(Question):
     Parameters
     ----------
     table : Generated
-        What the study asks.
+        Arguments of the function, from the study.
     setting : Setting
         Of the study.
 

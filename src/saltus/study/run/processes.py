@@ -46,7 +46,7 @@ def run_on_processes(
     workers : int, optional
         Processes; by default one for each usable core.
     plan, found : BasinPlan, AttractorSet
-        What is computed, and the attractors.
+        The map, and its attractors.
     missing : sequence of int
         Chunks to compute.
     keep, show : callable

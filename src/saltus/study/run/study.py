@@ -44,7 +44,7 @@ def run_study(
     Parameters
     ----------
     study : Study
-        What to compute.
+        The questions, and their system.
     text : str
         The file as it stands; a copy goes to the folder. :func:`saltus.study.read.read`
         returns both.
@@ -53,7 +53,7 @@ def run_study(
     own : System, optional
         The system, if it isn't one of saltus's models.
     resources : Resources
-        What to compute with.
+        Resources to compute with.
     report, say : callable
         Called with the progress of a question; with a sentence.
     pictures : bool

@@ -21,9 +21,9 @@ class Input:
     name : str
         As the study writes it.
     path : Path
-        Where it was read; for messages.
+        Path from which it was read; for messages.
     data : bytes
-        What it holds.
+        Its content.
     """
 
     name: str

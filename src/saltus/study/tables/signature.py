@@ -34,7 +34,7 @@ class WrittenAs:
     Attributes
     ----------
     holds : type
-        What stands there; by default what the function's annotation says.
+        Type in the file; by default that of the function's annotation.
     examples : tuple
         The first one stands in messages.
     description : str
@@ -45,8 +45,8 @@ class WrittenAs:
     limits : mapping
         ``ge=`` and others.
     convert : str
-        Which reading of :mod:`saltus.study.setting.arguments` makes the function's argument of it;
-        by default it is the argument.
+        Name of the conversion in :mod:`saltus.study.setting.arguments` that makes the function's
+        argument of it; by default there is none.
     """
 
     holds: Any = None
@@ -110,7 +110,7 @@ def table(
         Functions of the analyses whose parameters are keys, the first one giving the table its
         summary.
     kinds : mapping of str to Kind
-        How parameters are written that aren't plain numbers, words and choices.
+        Forms of parameters that aren't plain numbers, words and choices.
     base, without, called
         Classes below it; parameters that it leaves out; what one without a name is called.
     **own : (type, Field)
