@@ -33,10 +33,20 @@ def __getattr__(name: str) -> Any:
     return value
 
 
+def __dir__() -> list[str]:
+    return __all__
+
+
 class _Pictures(ModuleType):
     """Module in which a picture keeps its name if its file has the same name, in any order of
     imports.
     """
+
+    def __call__(self, *_: Any, **__: Any) -> None:
+        raise TypeError(
+            "sl.plot holds the pictures: write sl.plot.history(run), or another of "
+            f"{', '.join(__all__)}."
+        )
 
     def __setattr__(self, name: str, value: object) -> None:
         if not (name in _HOMES and isinstance(value, ModuleType)):

@@ -110,11 +110,10 @@ def _axes(ds: xr.Dataset, x: str | None, y: str | None) -> tuple[str, str]:
             raise ParameterError(
                 f"this section has no {shown(name)} to draw. {nearest(name, known)}"
             )
-    moving = (
-        [name for name in states_of(ds) if np.ptp(ds[name].values) > 0]
-        if ds.sizes["crossing"]
-        else list(states_of(ds))
-    )
+    sides = {side.strip() for side in str(ds.attrs["surface"]).split("=")}
+    moving = [name for name in states_of(ds) if name not in sides]
+    if ds.sizes["crossing"] and len(moving) == len(states_of(ds)):  # the surface fixes no state
+        moving = [name for name in moving if np.ptp(ds[name].values) > 0]
     free = [name for name in (*moving, *known[len(states_of(ds)) :]) if name not in (x, y)]
     first = x if x is not None else free.pop(0)
     return first, y if y is not None else free[0]

@@ -46,7 +46,7 @@ CLOSED = (Kind.PERIODIC, Kind.EQUILIBRIUM, Kind.LIMIT_CYCLE)
 WITHOUT: Mapping[Kind, str] = {
     Kind.ESCAPED: "escaped: their motion grew beyond all numbers",
     Kind.UNCONVERGED: "lead to no known attractor within the periods allowed",
-    Kind.FAILED: "failed: they begin beyond a stop or ended early, and status says why",
+    Kind.FAILED: "failed: they begin beyond a stop, or a law or a budget ended them (sl.simulate)",
     Kind.NOT_COMPUTED: "weren't computed: the run was stopped",
 }
 #: Check left out for motions without a type, and the argument that adds it: end of a sentence.
