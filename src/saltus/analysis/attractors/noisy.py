@@ -106,7 +106,7 @@ def apart(runs: np.ndarray, points: np.ndarray, size: np.ndarray) -> np.ndarray:
 
 
 def blurred(map_: Map, orbit: ClosedMotion, scale: np.ndarray) -> Noisy | None:
-    """Scatter that errors of a map cause about an orbit of the exact one; None if the motion leaves
+    """Noisy orbit that errors of a map make of an orbit of the exact one; None if the motion leaves
     it.
 
     The map is started on each point of the orbit for SURVEY_ITERATES iterates. So the scatter is a
@@ -183,8 +183,8 @@ def stray_attrs(strays: Sequence[Stray]) -> dict[str, str | float]:
 
 
 def keep_to(attractors: Sequence[SampledMotion], runs: np.ndarray, inside: float) -> np.ndarray:
-    """Index of the sampled attractor in whose boxes at least a share ``inside`` of each trajectory
-    float64[k, m, D] lies, int64[k]; -1 for none.
+    """Index of the attractor, known by samples, that each trajectory float64[k, m, D] keeps to with
+    at least a share ``inside`` of its points, int64[k]; -1 for none.
     """
     if not attractors:
         return np.full(len(runs), -1, np.int64)

@@ -243,7 +243,7 @@ class _Iteration:
         self.trial[rows] = x + step * scale
 
     def zeros(self, bordered: bool) -> Zeros:
-        """Return the zeros, without known ones."""
+        """Return the zeros; known ones don't count as found."""
         found, derivative = self.found, self.derivative
         found[found] = is_new(self.x[found], self.scale[found], self.known)
         derivative = derivative[:, :-1] if bordered else derivative
