@@ -1,3 +1,3 @@
-"""What trajectories settle to: closed motions, and those that never repeat - found, told apart and
-described, from one start or from many at many values of a parameter.
+"""Attractors that trajectories settle to: closed motions, and those that never repeat - found, told
+apart and described, from one start or from many at many values of a parameter.
 """

@@ -160,8 +160,8 @@ def survey(
 
 
 def _settles(iterates: np.ndarray, scale: np.ndarray) -> bool:
-    """Whether iterates float64[m, D] recur, or recur better and better: they are on an orbit, or on
-    their way to one.
+    """True where iterates float64[m, D] recur, or recur better with time: they are on an orbit or
+    approach one.
     """
     part = len(iterates) // 16
     early, late = (mismatch(piece, scale) for piece in (iterates[:part], iterates[-part:]))
@@ -204,8 +204,8 @@ def kinds_of(
     groups: Sequence[Sequence[int]],
     budget: float = math.inf,
 ) -> tuple[np.ndarray, list[tuple[str, float, float] | None]]:
-    """What motions that never repeat are: their exponents are measured for longer while they could
-    be zero as well as positive, and the budget lasts.
+    """Classify motions that never repeat by their largest Lyapunov exponent. It is measured for
+    longer while its sign is unclear and the budget lasts.
 
     Parameters
     ----------
@@ -275,7 +275,7 @@ def _undecided(blocks: np.ndarray) -> tuple[str, float, float] | None:
 
 
 def alike(one: SampledMotion, other: SampledMotion) -> bool:
-    """Whether two attractors visit the same boxes."""
+    """True where two attractors visit the same boxes."""
     return (
         min(float(other.share(one.points[None])[0]), float(one.share(other.points[None])[0]))
         > ALIKE

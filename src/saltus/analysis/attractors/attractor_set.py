@@ -86,7 +86,7 @@ class AttractorSet:
 
 
 def is_about(one: ClosedMotion | SampledMotion, orbit: ClosedMotion) -> bool:
-    """Whether an orbit is scatter about a noisy one."""
+    """True where an orbit is scatter about a noisy one."""
     return isinstance(one, Noisy) and bool(one.share(orbit.points[None])[0] >= INSIDE)
 
 

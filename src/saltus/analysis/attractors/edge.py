@@ -38,7 +38,7 @@ ASIDE = 1e-6
 
 @dataclass
 class Edge:
-    """What the boundary between two starts led to.
+    """Orbit on the boundary between two starts, and the attractors met.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Edge:
 
 
 class _Sides:
-    """Which attractor states lead to, and whether it is that of the first start."""
+    """Attractors that states lead to, compared with that of the first start."""
 
     def __init__(self, map_: Map, ends: np.ndarray, scale: np.ndarray, most: int) -> None:
         self._map, self._scale, self._most = map_, scale, most

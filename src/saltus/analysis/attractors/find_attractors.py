@@ -200,7 +200,7 @@ def _behind(map_: Map, orbit: ClosedMotion, scale: np.ndarray, most: int) -> Noi
 
 
 def _blurs(map_: Map) -> bool:
-    """Whether errors of a map are more than rounding, and periods are there to be blurred."""
+    """True where a map has errors beyond rounding, and its motions have periods to blur."""
     return map_.exact_map is not None and not (
         isinstance(map_, Stroboscope) and autonomous(map_.system)
     )
@@ -223,8 +223,8 @@ def _on_cycles(
     map_: Map, found: AttractorSet, points: np.ndarray, who: np.ndarray, travel: Travel,
     rows: np.ndarray, scale: np.ndarray, owner: Owners, settled: np.ndarray,
 ) -> np.ndarray:  # fmt: skip
-    """Which trajectories of a flow without forcing go round a limit cycle, bool[k]; new ones are
-    looked for. Notes their owners.
+    """True where a trajectory of an unforced flow is on a limit cycle, bool[k]. Looks for new
+    cycles; notes the owners.
     """
     cycles = [one for one in found.sampled if one.kind == Kind.LIMIT_CYCLE.word]
     alone = np.flatnonzero(keep_to(cycles, points, INSIDE) < 0)
@@ -246,8 +246,8 @@ def _survey(
     map_: Map, travel: Travel, going: np.ndarray, scale: np.ndarray, found: AttractorSet,
     owner: Owners, settled: np.ndarray, most: int
 ) -> None:  # fmt: skip
-    """Find out what the trajectories do that never settled: watch them much longer, and call an
-    attractor only what none of them leaves.
+    """Follow unsettled trajectories much longer. Accept an aperiodic attractor only if none leaves
+    it.
 
     A chaotic saddle holds trajectories for thousands of periods too; what is seen to leave it
     betrays it.
@@ -332,8 +332,8 @@ def _blurred(
 def _leave(
     map_: Map, state: np.ndarray, found: AttractorSet, noisy: list[Noisy], scale: np.ndarray
 ) -> np.ndarray:
-    """Which of some trajectories, watched for very long, come to an orbit after all, bool[k]; those
-    beside a noisy one don't.
+    """True where a trajectory, followed for very long, reaches an orbit after all, bool[k]. Those
+    near a noisy orbit don't count.
     """
     travel, going = map_.launch(state, WATCHING_ITERATES), np.arange(len(state))
     left = np.zeros(len(state), bool)

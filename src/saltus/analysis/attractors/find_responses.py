@@ -1,5 +1,5 @@
-"""What many trajectories settle to, each with parameter values of its own: the engine of frequency
-responses and bifurcation diagrams.
+"""Attractors that many trajectories settle to, each with parameter values of its own: the engine of
+frequency responses and bifurcation diagrams.
 
 A basin map asks one system of a great many starts, and capture by known attractors answers. Here
 every trajectory may have an attractor of its own: each is followed until it nearly recurs, Newton's
@@ -46,7 +46,7 @@ KEPT_ITERATES = 1024
 
 @dataclass
 class SettledMotions:
-    """What k trajectories settle to.
+    """Motions that k trajectories settle to.
 
     Attributes
     ----------
@@ -105,8 +105,8 @@ def find_responses(
     progress: Callable[[float], None] | None = None,
     result: SettledMotions | None = None,
 ) -> SettledMotions:
-    """What each trajectory settles to: start float64[k, D], row i by row i of the map, followed for
-    ``most`` iterates at the longest.
+    """Find the motion that each trajectory settles to. Start i, of float64[k, D], takes row i of
+    the map and is followed for ``most`` iterates at most.
 
     What is known when Ctrl-C ends it stands in ``result``, if that is given. The result doesn't
     depend on the other trajectories, nor on threads. ``progress`` counts trajectories, and of each
@@ -200,8 +200,8 @@ def _settled(
     result: SettledMotions,
     purse: np.ndarray,
 ) -> np.ndarray:
-    """Which of the trajectories float64[k, ROUND, D] lie on an attracting orbit, bool[k]; writes
-    the orbits. ``purse``: what closing them may cost yet.
+    """True where a trajectory of float64[k, ROUND, D] lies on an attracting orbit, bool[k]; writes
+    the orbits. ``purse``: budget left for closing them.
     """
     if autonomous(map_.system):
         return _settled_unforced(map_.rows(who), points, who, near, result)
@@ -290,8 +290,8 @@ def _leave_open(
     exponents: dict[int, tuple[float, float]],
     result: SettledMotions,
 ) -> None:
-    """What trajectories are that nothing has told: those whose exponents are open and which don't
-    recur don't repeat; of the others more iterates may tell.
+    """Label trajectories still unclassified: not repeating where the exponent is unclear and
+    nothing recurs, else unconverged, since more iterates may tell.
     """
     result.kind[who] = Kind.UNCONVERGED
     rows = np.array([row for row in who.tolist() if row in exponents], np.int64)

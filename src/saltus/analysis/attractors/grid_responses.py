@@ -156,7 +156,7 @@ def _sweep(
 def _gathered(
     result: SettledMotions, places: int, count: int, tolerance: np.ndarray, complete: bool
 ) -> GridResponses:
-    """Which trajectories at a value settled to the same response."""
+    """Group the trajectories of each value by the response they settled to."""
     of = result.kind.copy()
     rows: list[int] = []
     for place in range(places):
@@ -183,7 +183,7 @@ def _gathered(
 
 
 def _same(result: SettledMotions, a: int, b: int, tolerance: float) -> bool:
-    """Whether two trajectories at one value settled to the same response."""
+    """True where two trajectories at one value settled to the same response."""
     if result.kind[a] != result.kind[b] or result.orbits.period[a] != result.orbits.period[b]:
         return False
     if (
@@ -230,7 +230,7 @@ def numbers_of(
 
 
 def table_of(found: GridResponses, numbers: Measures, grid: Grid, method: Method) -> AttractorTable:
-    """What is known of each response."""
+    """Table of the responses."""
     map_ = grid.map(method).rows(found.place)
     kind, s, free = found.kind, found.motions, grid.every is not None
     period = np.where(kind == Kind.PERIODIC, found.period, 0)

@@ -1,4 +1,4 @@
-"""How fast small deviations from a motion grow, and what it costs to measure that.
+"""Growth rates of small deviations from a motion, and the cost to measure them.
 
 Costs are counted in iterates of the motion itself. D + 1 of them is what an iterate of the tangent
 flow costs, which carries D deviations of D states. Of many states the distance from a neighbour is
@@ -32,18 +32,19 @@ BUDGET = 10
 
 
 def tangent_cost(size: int) -> int:
-    """What an iterate of the tangent flow of so many states costs [iterates]."""
+    """Cost of an iterate of the tangent flow of so many states [iterates]."""
     return 1 + size
 
 
 def growth_cost(map_: Map, size: int) -> int:
-    """What growth over an iterate costs [iterates]."""
+    """Cost of measuring growth over an iterate [iterates]."""
     return 2 if by_neighbours(map_, size) else tangent_cost(size)
 
 
 def by_neighbours(map_: Map, size: int) -> bool:
-    """Whether growth is that of the distance from a neighbour: with many states, errors of rounding
-    only, and no law at a contact, which could take a neighbour for a start behind its wall.
+    """True where growth is measured by the distance from a neighbour: with many states, errors of
+    rounding only, and no law at a contact, which could take a neighbour for a start behind its
+    wall.
     """
     return (
         size > MOST_STATES
@@ -73,7 +74,7 @@ def growth_rates(
 
 
 def _tangents(map_: Map, start: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where a block leads from float64[k, D], and what becomes of a direction of each."""
+    """States after a block from float64[k, D], and the image of a direction of each."""
     k, size = start.shape
     directions = np.zeros((k, size, size))
     directions[:, :, 0] = direction

@@ -21,8 +21,8 @@ PLACES = np.array([0.0, 0.36, 0.71, 0.87])
 def limit_cycles(
     map_: Stroboscope, state: np.ndarray, window: float, scale: np.ndarray
 ) -> list[SampledMotion]:
-    """Attracting limit cycles on which some trajectories float64[k, D] lie, each by places in equal
-    steps of its time.
+    """Attracting limit cycles that these trajectories float64[k, D] are on, each sampled at equal
+    time steps.
 
     Parameters
     ----------

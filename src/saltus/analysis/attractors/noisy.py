@@ -106,8 +106,8 @@ def apart(runs: np.ndarray, points: np.ndarray, size: np.ndarray) -> np.ndarray:
 
 
 def blurred(map_: Map, orbit: ClosedMotion, scale: np.ndarray) -> Noisy | None:
-    """What errors of a map make of an orbit of the exact one: scatter about it; None if the motion
-    leaves it.
+    """Noisy orbit that errors of a map make of an orbit of the exact one; None if the motion leaves
+    it.
 
     The map is started on each point of the orbit for SURVEY_ITERATES iterates. So the scatter is a
     property of map and orbit: the starts from which the orbit was found change it by what the
@@ -162,8 +162,8 @@ def motion_size(map_: Map, orbit: ClosedMotion, scale: np.ndarray) -> np.ndarray
 def stray_of(
     map_: Map, orbit: ClosedMotion | None, iterates: np.ndarray, scale: np.ndarray
 ) -> Stray:
-    """How far a trajectory float64[m, D] of an inexact map strays from an exact orbit; unknown if
-    there is none.
+    """Largest distance of a trajectory float64[m, D] of an inexact map from an exact orbit; unknown
+    if there is none.
     """
     if orbit is None:
         return Stray(0, np.nan)
@@ -174,9 +174,7 @@ def stray_of(
 
 
 def stray_attrs(strays: Sequence[Stray]) -> dict[str, str | float]:
-    """What a result says of motions that never settled for errors of the method: attributes, none
-    if there are none.
-    """
+    """Attributes about motions that integration errors kept from settling; {} if there are none."""
     if not strays:
         return {}
     far = [one.distance for one in strays if one.period]
@@ -185,8 +183,8 @@ def stray_attrs(strays: Sequence[Stray]) -> dict[str, str | float]:
 
 
 def keep_to(attractors: Sequence[SampledMotion], runs: np.ndarray, inside: float) -> np.ndarray:
-    """Which of some attractors, known by where they go, trajectories float64[k, m, D] keep to with
-    such a share, int64[k]; -1 for none.
+    """Index of the attractor, known by samples, that each trajectory float64[k, m, D] keeps to with
+    at least a share ``inside`` of its points, int64[k]; -1 for none.
     """
     if not attractors:
         return np.full(len(runs), -1, np.int64)

@@ -71,8 +71,8 @@ class Cycle(ClosedMotion):
     rates: np.ndarray = field(kw_only=True)
 
     def nearest(self, states: np.ndarray) -> np.ndarray:
-        """Where on it states float64[m, D] are nearest, float64[m] in samples: from the nearest of
-        some samples on along the tangent.
+        """Positions on the cycle nearest to states float64[m, D], float64[m] in samples: from the
+        nearest of some samples on along the tangent.
         """
         offset = (states[:, None] - self.samples[None, :-1:COARSE]) / self.scale
         place = COARSE * np.argmin(np.einsum("mij,mij->mi", offset, offset), axis=1)
@@ -81,7 +81,7 @@ class Cycle(ClosedMotion):
         return np.asarray(place % SAMPLES)
 
     def _along(self, place: np.ndarray, states: np.ndarray) -> np.ndarray:
-        """How many samples further on states are nearest, by the tangent at a place."""
+        """Number of samples on to the point nearest to states, by the tangent at a place."""
         rate = self.rates[np.round(place).astype(int) % SAMPLES] * (self.time / SAMPLES)
         rate, offset = rate / self.scale, (states - self.at(place)) / self.scale
         size = np.einsum("mj,mj->m", rate, rate)
@@ -173,8 +173,8 @@ class Cycles(Family[Cycle]):
         return same
 
     def known(self, n: int) -> Known:
-        """What gives each known cycle as it is nearest to unknowns: the phase by their points, as
-        often round as their period has it.
+        """Return a function that gives each known cycle at the phase nearest to the unknowns, over
+        as many rotations as their period has.
         """
         cycles = tuple(self.motions)
 
@@ -298,7 +298,7 @@ def _parts(map_: Stroboscope, state: np.ndarray, time: np.ndarray, n: int) -> np
 
 # -- one cycle -------------------------------------------------------------------------------------
 def _apart(map_: Stroboscope, cycle: Cycle, states: np.ndarray) -> np.ndarray:
-    """How far states float64[m, D] lie from a cycle, in units of its range, float64[m]."""
+    """Distances of states float64[m, D] from a cycle, in units of its range, float64[m]."""
     rows, step = map_.rows(np.zeros(len(states), np.int64)), cycle.time / SAMPLES
     place = cycle.nearest(states)
     for _ in range(LOCATED):
@@ -312,8 +312,8 @@ def _apart(map_: Stroboscope, cycle: Cycle, states: np.ndarray) -> np.ndarray:
 
 
 def _repeats(whole: Stroboscope, points: np.ndarray, scale: np.ndarray, growth: float) -> bool:
-    """Whether the motion from the first of points float64[n, D] passes the others, and repeats in
-    a second period. At a point at which a held contact was let go it doesn't.
+    """True where the motion from the first of points float64[n, D] passes the others, and repeats
+    in a second period. At a point where a held contact was released it doesn't.
     """
     parts = FINER * len(points)
     seen = whole.run(points[:1], 2, Schedule.even(2, parts, beyond=1)).samples[0] / scale

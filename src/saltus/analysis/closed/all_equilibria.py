@@ -182,7 +182,7 @@ def _gap(piece: ModeEquations, gap: Expr, state: np.ndarray) -> tuple[float, flo
 
 
 def _holds(piece: ModeEquations, law: Law, state: np.ndarray) -> tuple[bool, bool]:
-    """Whether a contact is held at rest there, and not just about to be released."""
+    """True where a contact is held at the equilibrium, not just about to be released."""
     assert law.drive is not None
     assert law.pivot is not None
     drive, pivot = piece.one(law.drive, state), piece.one(law.pivot, state)
@@ -194,7 +194,7 @@ def _holds(piece: ModeEquations, law: Law, state: np.ndarray) -> tuple[bool, boo
 
 
 def _attracts(piece: ModeEquations, law: Law, state: np.ndarray) -> bool:
-    """Whether motions come to a held contact from beside it."""
+    """True where motions near a held contact come to it."""
     if law.kind == "impact":
         return law.restitution is None or piece.one(law.restitution, state) < 1.0
     assert law.pivot is not None
@@ -237,7 +237,7 @@ def _named(own: np.ndarray, dimension: int) -> tuple[str, bool]:
 
 
 def _same(a: Equilibrium, b: Equilibrium, scale: np.ndarray) -> bool:
-    """Whether two finds are one equilibrium: on a boundary it is one of both sides."""
+    """True where two finds are one equilibrium: on a boundary it belongs to both sides."""
     return near(a.state, b.state, scale) and (
         a.mode == b.mode or ("boundary" in (a.place, b.place) and a.dimension == b.dimension)
     )

@@ -202,8 +202,8 @@ def _returns(orbit: ClosedMotion) -> int:
 
 
 def _asked(orbit: ClosedMotion) -> float:
-    """What may be left of a distance after those returns: half way to what the norm promises, where
-    that is more than CONTRACTION.
+    """Share of a distance that may be left after those returns: half way to what the norm promises,
+    where that is more than CONTRACTION.
     """
     return max(
         CONTRACTION, 0.5 * (1.0 + _rate(float(np.abs(orbit.multipliers[0]))) ** _returns(orbit))
@@ -216,8 +216,8 @@ def _rate(radius: float) -> float:
 
 
 def _alike(met: list[np.ndarray], own: np.ndarray) -> bool:
-    """Whether all sequences of contacts are that of the orbit, but for a contact at its very start
-    or end.
+    """True where all sequences of contacts are that of the orbit, but for a contact at its very
+    start or end.
     """
     first, last = own[:1], own[-1:]
     ends = (

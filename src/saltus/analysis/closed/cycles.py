@@ -142,7 +142,7 @@ def _crossings(
     samples: np.ndarray,
     step: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where motions cross the plane across the flow at their start, with the flow.
+    """Crossings, along the flow, of the plane across the flow at the start of each motion.
 
     Parameters
     ----------

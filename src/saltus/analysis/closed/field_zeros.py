@@ -35,8 +35,8 @@ SHELLS = 0.5 ** np.arange(0.0, 12.0)
 
 
 def autonomous(system: System) -> bool:
-    """Whether nothing in the equations and contacts depends on time, so that equilibria and limit
-    cycles may be asked for.
+    """True where nothing in the equations and contacts depends on time: equilibria and limit cycles
+    may exist.
     """
     everything = (*system.field, *(guard.gap for guard in system.guards))
     return system.forced_at is None and not any(
@@ -140,7 +140,7 @@ def _jacobians(map_: Stroboscope, rests: ClosedMotions) -> Iterator[tuple[int, n
 def captured(
     map_: Stroboscope, rests: ClosedMotions, state: np.ndarray, scale: np.ndarray
 ) -> np.ndarray:
-    """Which states float64[k, D] lie where their equilibrium is known to capture, bool[k];
+    """True where a state of float64[k, D] lies where its equilibrium is known to capture, bool[k];
     float64[k, D] is the range of each state.
     """
     result, scale = np.zeros(len(state), bool), np.maximum(scale, DECAYED)

@@ -89,7 +89,7 @@ class Measures:
         return rms
 
     def by_name(self) -> dict[str, np.ndarray]:
-        """What is read off each motion, float64[m, K] by the names that results use."""
+        """Measures of each motion, float64[m, K], by the names that results use."""
         return {
             "maximum": self.maximum, "minimum": self.minimum, "peak": self.peak,
             "peak_to_peak": self.maximum - self.minimum,
@@ -98,8 +98,8 @@ class Measures:
         }  # fmt: skip
 
     def columns(self, period: np.ndarray) -> dict[str, Any]:
-        """What an :class:`saltus.results.AttractorTable` says of the first state and of contacts:
-        of those in a whole period int64[m], in one forcing period where it is 0.
+        """Columns of an :class:`saltus.results.AttractorTable` for the first state and the
+        contacts: of those in a whole period int64[m], in one forcing period where it is 0.
         """
         return {
             "period": period, "contacts": self.contacts * np.maximum(period, 1),
@@ -206,8 +206,8 @@ def _measured(
 
 @dataclass(frozen=True)
 class _Turns:
-    """Where a quantity turns: pieces int64[r], ascending, and places on them,
-    float64[r] in [0, 1].
+    """Turning points of a quantity: pieces int64[r], ascending, and positions on them, float64[r]
+    in [0, 1].
     """
 
     piece: np.ndarray

@@ -148,7 +148,7 @@ class ModeEquations:
         return float(self.at([entry], state[None])[0, 0])
 
     def vanishes(self, state: np.ndarray) -> bool:
-        """Whether a state is a zero."""
+        """True where a state is a zero."""
         return self._residual(state) <= RESIDUAL * (1.0 + float(np.abs(state / self.scale).max()))
 
     def _residual(self, state: np.ndarray) -> float:
@@ -218,5 +218,5 @@ class ModeEquations:
 
 
 def near(a: np.ndarray, b: np.ndarray, scale: np.ndarray) -> bool:
-    """Whether two states are one but for the errors of Newton's method."""
+    """True where two states are equal but for the errors of Newton's method."""
     return bool((np.abs(a - b) <= SAME * np.maximum(scale, np.abs(a))).all())

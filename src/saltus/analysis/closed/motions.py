@@ -124,8 +124,8 @@ class ClosedMotions:
 
     @property
     def stable(self) -> np.ndarray:
-        """Which are motions all of whose multipliers (but a trivial one) lie inside the unit circle
-        by more than rounding, bool[k].
+        """True where all multipliers (but a trivial one) lie inside the unit circle by more than
+        rounding, bool[k].
         """
         leading = np.where(
             self.time > 0,
@@ -151,7 +151,7 @@ class ClosedMotions:
         scale: np.ndarray,
         rows: np.ndarray | list[int] | slice = slice(None),
     ) -> np.ndarray:
-        """How far states float64[m, D] lie from the points of some rows (default all), in units of
+        """Distances of states float64[m, D] from the points of some rows (default all), in units of
         the scale; inf where there is none.
         """
         apart = np.abs((self.points[rows] - state[:, None]) / scale[:, None]).max(axis=2)
@@ -181,8 +181,8 @@ def from_smallest(points: np.ndarray) -> np.ndarray:
 
 
 def same(a: ClosedMotion, b: ClosedMotion, scale: np.ndarray, tolerance: float) -> bool:
-    """Whether two orbits are one, or one the other several times over: each point of one lies on
-    the other.
+    """True where two orbits are one, or one is the other several times over: each point of one lies
+    on the other.
     """
     if max(a.period, b.period) % min(a.period, b.period):
         return False

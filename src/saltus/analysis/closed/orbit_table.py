@@ -1,4 +1,4 @@
-"""What is known of periodic orbits: size, contacts, margin to a graze, kind of stability."""
+"""Table of periodic orbits: size, contacts, margin to a graze, kind of stability."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def table_of(
 
 
 def outside(multipliers: np.ndarray) -> int:
-    """How many multipliers lie on the unit circle or beyond it, but for rounding."""
+    """Number of multipliers on the unit circle or beyond it, but for rounding."""
     return int(np.count_nonzero(np.abs(multipliers) >= 1.0 - MARGINAL))
 
 

@@ -76,7 +76,7 @@ def find_orbits(
 def _closed(
     map_: Map, start: np.ndarray, n: np.ndarray, scale: np.ndarray, max_slow: int
 ) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
-    """Which rows Newton's method closes, int64[m], the points of their orbits, float64[n, D] each,
+    """Rows that Newton's method closes, int64[m], the points of their orbits, float64[n, D] each,
     and their mismatch, float64[m].
     """
     guess = Shooting(map_, np.arange(len(start)), start[:, None], scale, iterates=n)
@@ -107,8 +107,8 @@ def _period(points: np.ndarray, scale: np.ndarray, enough: float = SAME) -> int:
 def _averaged(
     map_: Map, start: np.ndarray, n: np.ndarray, scale: np.ndarray, noise: np.ndarray
 ) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
-    """Which trajectories of inexact maps settle on an orbit, the means of their last returns, and
-    how far these scatter.
+    """Trajectories of inexact maps that settle on an orbit, the means of their last returns, and
+    the scatter of these.
 
     One more iterate is run than is looked at: a step of ode45 ends there, and nowhere before.
     """

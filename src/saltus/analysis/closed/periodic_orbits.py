@@ -252,7 +252,7 @@ def _given(system: System, start: Any, box: Any) -> np.ndarray:
 
 
 def searches(each: Sequence[Search]) -> dict[str, Any]:
-    """What the searches came to, by the names of the variables."""
+    """Outcome of the searches, by the names of the variables."""
     return {
         "search_period": [one.period for one in each],
         **{

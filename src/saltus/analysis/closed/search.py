@@ -38,7 +38,7 @@ BESIDE = np.repeat([0.01, 0.1, 0.3], 6)
 
 @dataclass
 class Search:
-    """What a search came to.
+    """Outcome of a search.
 
     Attributes
     ----------
@@ -100,11 +100,11 @@ class Family(ABC, Generic[M]):
 
     @abstractmethod
     def same(self, motion: M, closed: Shooting) -> np.ndarray:
-        """Which of those that Newton's method found are a motion, bool[k]."""
+        """True where a row that Newton's method closed is this motion, bool[k]."""
 
     @abstractmethod
     def known(self, n: int) -> Known:
-        """What deflation takes out of the equations of n points."""
+        """Zeros that deflation takes out of the equations of n points."""
 
     @abstractmethod
     def beside(self, n: int, random: np.random.Generator) -> list[Shooting]:

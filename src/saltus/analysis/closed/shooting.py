@@ -137,9 +137,9 @@ class Shooting:
         return residual, derivative
 
     def shots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """How far images are from the next points, float64[k, n D], the derivative with respect to
-        the points, float64[k, n D, n D], both in units of the scale, and the images, float64[k, n,
-        D].
+        """Differences of images from the next points, float64[k, n D], the derivative with respect
+        to the points, float64[k, n D, n D], both in units of the scale, and the images, float64[k,
+        n, D].
         """
         k, n, size = self.points.shape
         end, matrix = self.parts().tangent(self.points.reshape(-1, size), self.iterates)

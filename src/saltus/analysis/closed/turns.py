@@ -1,4 +1,4 @@
-"""How often motions without forcing are looked at: about once a turn of theirs.
+"""Sampling interval of unforced motions: about one rotation.
 
 A turn is the time in which the direction of the motion, states in units of their ranges, goes round
 once. It needs no return, so chaotic motions have one too. What is told of attractors doesn't depend

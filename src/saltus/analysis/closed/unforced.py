@@ -1,4 +1,4 @@
-"""What motions without forcing come to: equilibria and limit cycles, found and verified in the same
+"""Equilibria and limit cycles that motions without forcing come to, found and verified in the same
 way for many trajectories at once.
 """
 
@@ -24,8 +24,8 @@ TORUS = 1e-2
 def attracted(
     map_: Stroboscope, state: np.ndarray, scale: np.ndarray, window: float, near: float
 ) -> tuple[ClosedMotions, np.ndarray]:
-    """Which trajectories have come to an equilibrium that captures where they are, or to an
-    attracting limit cycle.
+    """Find the equilibria that capture trajectories, and the attracting limit cycles that they have
+    come to.
 
     Parameters
     ----------
@@ -61,14 +61,12 @@ def attracted(
 
 
 def nearly_recurs(map_: Stroboscope, state: np.ndarray, window: float) -> np.ndarray:
-    """Which motions come back so near to where they were that they may be on their way to a limit
-    cycle, bool[k].
-    """
+    """True where a motion returns so near to its start that it may approach a cycle, bool[k]."""
     return np.asarray(returns(map_, state, window).apart < TORUS)
 
 
 def runs_away(iterates: np.ndarray) -> np.ndarray:
-    """Which motions float64[k, m, D] only grow: in each eighth of them more than before, and much
+    """True where a motion of float64[k, m, D] only grows: more in each eighth than before, and much
     in all, bool[k].
     """
     sizes = np.stack(

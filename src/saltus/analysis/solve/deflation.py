@@ -28,7 +28,7 @@ def weight(x: np.ndarray, scale: np.ndarray, known: Known | None) -> np.ndarray:
 
 
 def stretch(x: np.ndarray, step: np.ndarray, scale: np.ndarray, known: Known | None) -> np.ndarray:
-    """What the step of the deflated residual is of the plain one, float64[k]."""
+    """Ratio of the deflated Newton step to the plain one, float64[k]."""
     if known is None:
         return np.ones(len(x))
     apart, square = _apart(x, scale, known)

@@ -231,7 +231,7 @@ class _Iteration:
         return np.asarray(done)
 
     def ahead(self, rows: np.ndarray, damped: bool) -> None:
-        """Where to look next: steps away from known zeros, and shortened ones."""
+        """Set the next trials: deflated steps, shortened where damped."""
         if self.known is None and not damped:
             return
         x, scale, step = self.x[rows], self.scale[rows], self.newton_step[rows]
@@ -243,7 +243,7 @@ class _Iteration:
         self.trial[rows] = x + step * scale
 
     def zeros(self, bordered: bool) -> Zeros:
-        """What was found."""
+        """Return the zeros; known ones don't count as found."""
         found, derivative = self.found, self.derivative
         found[found] = is_new(self.x[found], self.scale[found], self.known)
         derivative = derivative[:, :-1] if bordered else derivative
