@@ -252,3 +252,22 @@ def test_what_cant_be_asked_for(arguments, words):
 def test_a_surface_that_is_a_guard_already_stands_beside_it():
     twice = with_surface(lab, lambda x, boundary: x - boundary)
     assert [guard.name for guard in twice.guards] == ["boundary", "surface"]
+
+
+@sl.system(states="x v", forced_at="f", units={"f": "Hz"})
+def hammer(t, x, v, *, gap=1e-4, f=28.0):
+    """A mass on a spring that chatters against a stop until it rests."""
+    push = 20.0 * sl.cos(2 * sl.pi * f * t) - 4.0 * v - 4e3 * x
+    return v, push, sl.impact(x < gap, v, restitution=0.8)
+
+
+def test_a_chatter_ends_where_its_turning_points_are_asked_for():
+    """Each flight has a node at its turning point, whose height is rounded: flights lower than that
+    rounding would all rebound with one speed, without an end.
+    """
+    run = sl.simulate(hammer, (0, 0), periods=60, progress=False, time_errors="local")
+    turns = sl.poincare(hammer, (0, 0), "x turns", periods=60, progress=False)
+    assert str(turns.status.values) == "ok"
+    impacts = int((run.contact_kind == "impact").sum())
+    assert turns.sizes["crossing"] < 3 * impacts
+    assert (run.contact_kind.values == "hold").any()

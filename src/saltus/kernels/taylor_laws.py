@@ -150,7 +150,9 @@ def strike(lanes, lane, batch, g, rate, slow):
         later = 0.0
         if rebound > 0.0:
             later = 2.0 * rebound / (pressing * (1.0 - restitution))
-        if later <= too_short(lanes, lane, g, restitution):
+        if later <= too_short(lanes, lane, g, restitution) or is_hidden(
+            lanes, lane, g, rebound, pressing
+        ):
             hold(lanes, lane, batch, g, later, slow)
     elif rebound <= 0.0:
         lanes.fresh[g, lane] = 2.0  # it leaves at once: gap and rate are known to be zero
@@ -251,6 +253,16 @@ def too_short(lanes, lane, g, restitution):
         scale = math.sqrt(second / fourth)
     now = lanes.clock[TAU, lane] + abs(lanes.clock[BASE, lane])
     return max(CHATTER * (1.0 - restitution) * scale, 4.0e-16 * now)
+
+
+@inner
+def is_hidden(lanes, lane, g, rebound, pressing):
+    """True if a flight stays within the rounding of its gap. Another boundary, such as the turning
+    point of a state, may put a node into the flight: its height there is rounded, and rebounds
+    wouldn't shrink any more.
+    """
+    height = 0.5 * rebound * rebound / pressing
+    return NGUARDS > 2 and height <= ROUNDING * lanes.prior[PRIOR_ROWS * g + NEW, lane]
 
 
 @inner
