@@ -186,3 +186,18 @@ CAPTURE = Interface(
     functions=MappingProxyType({}),
     truths=(),
 )
+
+#: The modal flow: what it needs of an equation are tables, which it is given.
+MODAL = Interface(
+    entry="propagate",
+    arguments=BATCH
+    + (_I1, _I1, _F1, _F2, _F2, _F2, _F2, _F2, _I2)
+    + (_F2, _F2, _F2, _F2, _F2, _F1, _F2, _F2, _F1, _F1, _F2, _F2, _F2, _F2, _F2),
+    layout="modal_layout",
+    templates=("modal_series", "modal_steps"),
+    sizes=(),
+    flags=(),
+    tables=MappingProxyType({}),
+    functions=MappingProxyType({}),
+    truths=(),
+)
