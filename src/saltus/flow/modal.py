@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from saltus.codegen.module import Flow, modal_module
+from saltus.errors import ParameterError
 from saltus.flow.counts import whole
 from saltus.flow.method import Method, explain_unknown_options, step_budget
 from saltus.flow.modal_tables import Tables
@@ -151,10 +152,12 @@ class ModalFlow:
 
 
 @functools.lru_cache(maxsize=64)
-def modal_flow(system: System) -> Flow | str:
-    """The modal flow of a system, or why it has none."""
+def modal_flow(system: System) -> ModalFlow:
+    """The modal flow of a system. Raises ParameterError, with the reason, if it has none."""
     linear = linear_pieces(system)
-    return linear if isinstance(linear, str) else ModalFlow(linear)
+    if isinstance(linear, str):
+        raise ParameterError(f"sl.Modal doesn't serve {system.name}: {linear}.")
+    return ModalFlow(linear)
 
 
 @explain_unknown_options
@@ -184,10 +187,15 @@ class Modal(Method):
             whole(self.max_steps, "max_steps")
         whole(self.max_events, "max_events")
 
+    def serving(self, system: System) -> Method:
+        """Taylor's method for a system that has no modal flow."""
+        if isinstance(linear_pieces(system), str):
+            return Taylor(max_steps=self.max_steps, max_events=self.max_events)
+        return self
+
     def kernels(self, system: System) -> Flow:
-        """The modal flow, or the Taylor flow of a system that has none."""
-        flow = modal_flow(system)
-        return Taylor().kernels(system) if isinstance(flow, str) else flow
+        """The modal flow."""
+        return modal_flow(system)
 
     def numbers(self, periods: float) -> np.ndarray:
         """Step budget, event budget."""
