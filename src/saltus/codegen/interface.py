@@ -192,7 +192,7 @@ MODAL = Interface(
     entry="propagate",
     arguments=BATCH
     + (_I1, _I1, _F1, _F2, _F2, _F2, _F2, _F2, _I2)
-    + (_F2, _F2, _F2, _F2, _F2, _F1, _F2, _F2, _F1, _F1, _F2, _F2, _F2, _F2, _F2),
+    + (_F2, _F2, _F2, _F2, _F2, _F2, _F1, _F2, _F2, _F1, _F1, _F2, _F2, _F2, _F2, _F2),
     layout="modal_layout",
     templates=("modal_series", "modal_steps"),
     sizes=(),

@@ -36,7 +36,7 @@ def check_method(method: Any) -> Method:
     that isn't one.
     """
     if method is None:
-        return Taylor()
+        return Modal() if __import__("os").environ.get("TRY_MODAL") else Taylor()
     if not isinstance(method, Method):
         what = method.__name__ + " itself" if isinstance(method, type) else shown(method)
         raise ParameterError(

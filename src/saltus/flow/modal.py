@@ -77,7 +77,8 @@ class ModalFlow:
             terms, lanes = layout.ORDER + 1, self._lanes
             empty = np.zeros
             self._memory.arrays = (
-                empty((2 * groups, lanes)), empty((2 * groups, lanes)), empty((terms + 3, lanes)),
+                empty((2 * groups, lanes)), empty((2 * groups, lanes)), empty((groups, lanes)),
+                empty((terms + 3, lanes)),
                 empty((max(rows, 1), terms)), empty((max(rows, 1), 3)), empty(terms),
                 empty((DEEPEST + 2, terms)), empty((DEEPEST + 2, 2)), empty(terms), empty(2),
                 empty((MOST_TOUCHES, 2)), empty((states, lanes)), empty((states, lanes)),

@@ -46,6 +46,6 @@ HUGE = 1.0e300
 
 Modal = namedtuple(
     "Modal",
-    "sizes row_of sign_of offset rate lag modes steady links y moved sums q errors p bern bounds "
+    "sizes row_of sign_of offset rate lag modes steady links y moved size sums q errors p bern bounds "
     "slopes out touches state answer angle found",
 )

@@ -23,7 +23,7 @@ from saltus.kernels.isolation import (
     to_bernstein,
 )
 from saltus.kernels.isolation import AT as PLACE
-from saltus.kernels.lanes import load, store
+from saltus.kernels.lanes import fma, load, root, store
 from saltus.kernels.status import (
     BUDGET_EVENTS,
     BUDGET_STEPS,
@@ -161,6 +161,40 @@ def place_of(i, g, tau, h, modes, steady, batch, m):
             break
         d = new
     return d
+
+
+@kernel
+def reach(i, tau, h, modes, steady, batch, m):
+    """The part of a step that is worth trying: as long as the modes that it follows leave less than
+    half of each gap, or of its rate where that decides, to those that it bounds.
+    """
+    groups, which, most = m.sizes[MODE_GROUPS], int(batch.carry[i, SET]), 0
+    for g in range(groups):
+        real, imaginary = load(m.y, g, LANES), load(m.y, groups + g, LANES)
+        store(m.moved, g, real)
+        store(m.moved, groups + g, imaginary)
+        store(m.size, g, root(fma(real, real, imaginary * imaginary)))
+    waves = modes + groups * (3 + 4 * LANES * m.sizes[STATE_GROUPS])
+    for g in range(m.sizes[GUARDS]):
+        r, side = m.row_of[g], side_of(g, batch.mode[i])
+        value, rate = gap_of_moved(r, modes, steady, which, m)
+        value, rate = side * (m.sign_of[g] * value + m.offset[which, g]), side * m.sign_of[g] * rate
+        fresh = (batch.fresh[i] >> g) & 1 == 1
+        slow = 0.5 * abs(rate) if fresh == (rate > 0.0) else 0.0
+        value = 0.0 if fresh else 0.5 * value
+        near, left, slope = groups, 0.0, 0.0
+        while near > most:
+            size = load(m.size, near - 1, LANES)
+            size = size * load(m.modes, waves + 3 * groups * r + 2 * groups + near - 1, LANES)
+            store(m.sums, 0, size)
+            store(m.sums, 1, size * load(m.modes, modes + 2 * groups + near - 1, LANES))
+            left, slope = left + total_of(m.sums, 0), slope + total_of(m.sums, 1)
+            if left > value and slope > slow:
+                break
+            near -= 1
+        most = max(most, near)
+    fastest = m.modes[modes + 2 * groups + most - 1, LANES - 1] if most > 0 else 0.0
+    return FOLLOWED / fastest if h * fastest > FOLLOWED else h
 
 
 @kernel
@@ -379,6 +413,8 @@ def advance(i, budget, batch, m):
             continue
         budget -= 1
         h = min(batch.carry[i, NEXT_STEP], end - tau)
+        drive(i, tau, batch, m)
+        h = reach(i, tau, h, modes, steady, batch, m)
         answer, d, hits = look(i, tau, h, modes, steady, batch, m)
         if batch.status[i] != RUNNING:
             status = batch.status[i]
@@ -428,8 +464,8 @@ def propagate(
     period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count,
     end_phase, counters, minima, sample_count, sample_fraction, cursor, samples, sample_mode,
     rec_first, rec_i, rec_f, rec_used, options, data, budget, sizes, row_of, sign_of, offset, rate,
-    lag, modes, steady, links, y, moved, sums, q, errors, p, bern, bounds, slopes, out, touches,
-    place, answer, angle, found,
+    lag, modes, steady, links, y, moved, size, sums, q, errors, p, bern, bounds, slopes, out,
+    touches, place, answer, angle, found,
 ):  # fmt: skip
     """Move every trajectory whose status is RUNNING and whose contact state has been made, `budget`
     steps at most. See kernels/batch.py for the arrays.
@@ -440,8 +476,8 @@ def propagate(
         rec_first, rec_i, rec_f, rec_used, options, data,
     )  # fmt: skip
     m = Modal(
-        sizes, row_of, sign_of, offset, rate, lag, modes, steady, links, y, moved, sums, q, errors,
-        p, bern, bounds, slopes, out, touches, place, answer, angle, found,
+        sizes, row_of, sign_of, offset, rate, lag, modes, steady, links, y, moved, size, sums, q,
+        errors, p, bern, bounds, slopes, out, touches, place, answer, angle, found,
     )  # fmt: skip
     waits = False
     for i in range(status.shape[0]):
