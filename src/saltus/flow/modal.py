@@ -126,9 +126,7 @@ class ModalFlow:
         carry[:, layout.LANDED_AT], carry[:, layout.RIDES] = -math.inf, fresh
         batch.carry[who, : layout.AMPLITUDES] = carry
 
-    def _ways(
-        self, which: int, mode: int, zero: np.ndarray, state: np.ndarray, time: float
-    ) -> int:
+    def _ways(self, which: int, mode: int, zero: np.ndarray, state: np.ndarray, time: float) -> int:
         """Bits of the guards at zero whose gaps open upwards: by the first derivative that isn't
         rounding.
         """
@@ -140,12 +138,16 @@ class ModalFlow:
         for order in range(1, WAYS + 1):
             forced = (piece.driven @ wave).real
             rate = piece.matrix @ rate + forced + steady
-            size = np.abs(piece.matrix) @ size + np.abs(piece.driven) @ np.abs(wave) + np.abs(steady)
+            size = (
+                np.abs(piece.matrix) @ size + np.abs(piece.driven) @ np.abs(wave) + np.abs(steady)
+            )
             steady, wave = 0.0 * steady, wave * (1j * given.rates)
             drive = (given.gaps.driven @ wave).real
             for g in sorted(open_):
                 value = float(given.gaps.matrix[g] @ rate + drive[g])
-                least = layout.ROUNDED * float(np.abs(given.gaps.matrix[g]) @ size + np.abs(drive[g]))
+                least = layout.ROUNDED * float(
+                    np.abs(given.gaps.matrix[g]) @ size + np.abs(drive[g])
+                )
                 if abs(value) > order * least:
                     open_.discard(g)
                     bits |= (1 << g) if value > 0 else 0

@@ -13,10 +13,6 @@ of which guards are plus or minus one, and an offset; H drives Re(e^{i (rate t +
 
 from collections import namedtuple
 
-import numpy as np
-
-from saltus.kernels.isolation import DEEPEST, MOST_TOUCHES
-
 #: Terms of a gap's series beyond the first, and what the last one's successor is divided by.
 ORDER = 15
 FACTORIAL = 20922789888000.0

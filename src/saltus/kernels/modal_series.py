@@ -6,7 +6,6 @@ from saltus.kernels.lanes import (
     coarse_exp2,
     fma,
     load,
-    magnitude,
     nearest_integer,
     root,
     splat,

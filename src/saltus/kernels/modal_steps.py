@@ -10,6 +10,7 @@ to end below zero. The place is then found by Newton's method on the modes thems
 import math
 
 from saltus.kernels.batch import Batch
+from saltus.kernels.isolation import AT as PLACE
 from saltus.kernels.isolation import (
     MARGIN,
     MOST_TOUCHES,
@@ -22,7 +23,6 @@ from saltus.kernels.isolation import (
     side_of_leaving,
     to_bernstein,
 )
-from saltus.kernels.isolation import AT as PLACE
 from saltus.kernels.lanes import fma, load, root, store
 from saltus.kernels.status import (
     BUDGET_EVENTS,
@@ -342,7 +342,9 @@ def land(i, tau, d, hits, modes, steady, batch, m):
     batch.mode[i], batch.fresh[i] = before ^ hits, hits
     batch.carry[i, AT], batch.carry[i, ENTERS] = at, 1.0
     now = time_of(i, tau + d, batch)
-    batch.carry[i, LANDINGS] = batch.carry[i, LANDINGS] + 1.0 if now == batch.carry[i, LANDED_AT] else 0.0
+    batch.carry[i, LANDINGS] = (
+        batch.carry[i, LANDINGS] + 1.0 if now == batch.carry[i, LANDED_AT] else 0.0
+    )
     batch.carry[i, LANDED_AT] = now
     return SLIDING if batch.carry[i, LANDINGS] >= MOST_LANDINGS else RUNNING
 

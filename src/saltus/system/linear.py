@@ -172,4 +172,3 @@ def _is_affine(root: Expr, drives: int) -> bool:
             case _:
                 degree[node] = 0 if node.args and not any(below) else math.inf
     return degree[root] <= 1
-
