@@ -1,4 +1,4 @@
-"""All benchmarks that the documentation shows: `python -m benchmarks`. Takes some ten minutes;
+"""Run all benchmarks that the documentation shows: `python -m benchmarks`. Takes some ten minutes;
 leave the machine alone meanwhile.
 """
 
@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-#: Where the page that compares finds its numbers.
+#: Folder from which the page of comparisons reads its numbers.
 FOLDER = "docs/comparison"
 #: One after the other: two at a time would time each other.
 BENCHMARKS = (
@@ -22,7 +22,7 @@ BENCHMARKS = (
 
 
 def main() -> int:
-    """Run each in a process of its own; returns how many failed."""
+    """Run each in a process of its own; return the number of failures."""
     commands = [[sys.executable, name, "--write", FOLDER] for name in BENCHMARKS]
     return sum(
         subprocess.run(command, cwd=ROOT, check=False).returncode != 0 for command in commands

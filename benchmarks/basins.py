@@ -1,5 +1,4 @@
-"""What a map of basins costs, and how far its labels can be trusted: saltus beside its rivals, same
-cells, same run.
+"""Cost of a map of basins, and trust in its labels: saltus beside its rivals, same cells, same run.
 
 Case b4 of the deLangre rig at 15 Hz, starts x in [-5, 5] mm, v in [-1, 1] m/s. Everything is
 compiled before the clock starts. Rivals are on one pinned core; too slow for every cell, they label
@@ -41,18 +40,18 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from benchmarks.record import Column, Record, Table, options_of
 from benchmarks.rivals import rig
 
-#: Periods that rivals let a trajectory settle, and those they look at: all but some 5 of 2000 cells
-#: follow an orbit then.
+#: Periods that rivals let a trajectory settle, and those they compare: all but about 5 of 2000
+#: cells follow an orbit then.
 PERIODS, KEEP = 600, 48
-#: Periods between two looks of the loop that stops early: the whole map takes 26 s with 12, 30 s
+#: Periods between two tests of the loop that stops early: the whole map takes 26 s with 12, 30 s
 #: with 24, 35 s with 48. With 3, also 26 s, one in 60 of the cells that settle in 50 to 100 periods
-#: is taken for settled while it only passes an orbit.
+#: counts as settled while it only passes an orbit.
 LOOK = 12
 #: heyoka's tolerances: that of benchmarks/flow.py, and its own default.
 TOLERANCE, OTHER_TOLERANCE = 1e-12, 2.0**-52
-#: Periods to settle that the cells are sorted by in the second table.
+#: Borders of the groups of cells by periods to settle, in the second table.
 SETTLING = (0, 50, 100, 150, 200, 300, 10_000)
-#: What is kept for the documentation.
+#: Columns kept for the documentation.
 COLUMNS = (
     Column("program"), Column("CPU time of the map [s]", ".1f"), Column("wall time [s]", ".1f"),
     Column("CPU, times saltus", ".3g"),
@@ -69,13 +68,13 @@ class Seconds:
     wall: float
 
     def scaled(self, factor: float) -> Seconds:
-        """So many times as long."""
+        """The times multiplied by a factor."""
         return Seconds(self.cpu * factor, self.wall * factor)
 
 
 @dataclass(frozen=True)
 class Rival:
-    """What a rival took for the whole map (scaled), and its labels int64[k] of the cells of the
+    """The time of a rival for the whole map (scaled), and its labels int64[k] of the cells of the
     subset.
     """
 
@@ -87,8 +86,8 @@ class Rival:
 
 @dataclass(frozen=True)
 class Subset:
-    """Random cells of a map: their place in the flattened map, their starts [m], [m/s], and our
-    label and periods to settle.
+    """Random cells of a map: their indices in the flattened map, their starts [m], [m/s], and our
+    labels and periods to settle.
     """
 
     cells: np.ndarray
@@ -98,7 +97,7 @@ class Subset:
     settling: np.ndarray
 
     def first(self, count: int) -> Subset:
-        """The first few of them: as random as all."""
+        """The first cells of the subset, as random as all."""
         return Subset(
             *(getattr(self, name)[:count] for name in ("cells", "x", "v", "labels", "settling"))
         )
@@ -106,7 +105,7 @@ class Subset:
 
 # -- clock -----------------------------------------------------------------------------------------
 def timed(job: Callable[[], object], repeats: int = 1) -> tuple[Seconds, object]:
-    """Smallest times of a job over some repeats, and what it returned."""
+    """Smallest times of a job over some repeats, and its result."""
     taken = []
     for _ in range(repeats):
         cpu, wall = time.process_time(), time.perf_counter()
@@ -154,7 +153,7 @@ def subset_of(ds: xr.Dataset, count: int, seed: int = 15) -> Subset:
 
 # -- rivals ----------------------------------------------------------------------------------------
 def absent(left_out: list[str], what: str) -> None:
-    """Say, and note, that a rival isn't there."""
+    """Print, and note, that a rival isn't installed."""
     left_out.append(what)
     print(f"{what}; left out", file=sys.stderr)
 
@@ -197,12 +196,12 @@ def pynamicalsys(
 
 # -- print -----------------------------------------------------------------------------------------
 def equal(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Where two programs name the same attractor."""
+    """True where two programs name the same attractor."""
     return (a == b) & (a >= 0)
 
 
 def percent(hits: np.ndarray) -> str:
-    """Share of hits among the cells, and how many those are."""
+    """Share of hits among the cells, and their number."""
     return f"{100 * hits.mean():.1f} % of {hits.size}" if hits.size else "no cells"
 
 
@@ -225,7 +224,7 @@ def heading(cells: int) -> None:
 
 
 def by_settling(subset: Subset, pairs: dict[str, np.ndarray]) -> Table:
-    """Print the share of equal labels by our periods to settle: what differs is decided after many
+    """Print the share of equal labels by our periods to settle: differences are decided after many
     periods on a chaotic saddle.
     """
     print("\nsame label [%] by how many periods a cell takes to settle:")
@@ -266,7 +265,7 @@ def _shares(settling: np.ndarray, same: np.ndarray) -> list[float | None]:
 
 
 def reasons(subset: Subset, other: np.ndarray, first: Rival, second: Rival) -> np.ndarray:
-    """Print what is wrong with the cells that saltus and heyoka label differently; returns where
+    """Print the reasons of the cells that saltus and heyoka label differently; return True where
     they agree among the steady ones.
     """
     same, lost = equal(subset.labels, first.labels), first.labels < 0
@@ -308,7 +307,7 @@ def rows(
     unit: Seconds,
     left_out: list[str],
 ) -> list[Rival]:
-    """Run and print one program's rows; no rows if it isn't installed."""
+    """Run and print one program's rows; none if it isn't installed."""
     rivals = []
     for rival in make(subset, orbits_of(ds), ds.basin.size, left_out):
         rivals.append(rival)
@@ -323,15 +322,15 @@ def rows(
 def kept_row(
     name: str, seconds: Seconds, unit: Seconds, same: float | None, cells: int
 ) -> tuple[str | float | None, ...]:
-    """One row of what is kept."""
+    """One row of the kept table."""
     return name, seconds.cpu, seconds.wall, seconds.cpu / unit.cpu, same, cells
 
 
 def beside(
     ds: xr.Dataset, unit: Seconds, subset: Subset, few: int, left_out: list[str]
 ) -> tuple[list[tuple], list[Table]]:
-    """Print the rivals' rows, the floors, and what is wrong where labels differ; returns those
-    rows, and the other tables to be kept.
+    """Print the rivals' rows, the floors, and the reasons of different labels; return those rows,
+    and the other tables to be kept.
     """
     with rig.one_core():
         taylor = rows(heyoka, subset, ds, unit, left_out)

@@ -1,4 +1,4 @@
-"""What the whole frequency response of a rig costs: all attractors, the branches that they lie on,
+"""Cost of the whole frequency response of a rig: all attractors, the branches that they lie on,
 stable and unstable, isolas, every bifurcation; from nothing.
 
 The rig of de Langre et al., case b at 4 N, from 2 to 30 Hz. No rival does the same work: AUTO-07p
@@ -37,21 +37,21 @@ BOX = {"x": ("-5 mm", "5 mm"), "v": ("-0.5 m/s", "0.5 m/s")}
 
 
 def timed(job: Any) -> tuple[Any, float, float]:
-    """What a job returns, its seconds of wall and of CPU."""
+    """The result of a job, and its seconds of wall and of CPU time."""
     wall, cpu = time.perf_counter(), time.process_time()
     found = job()
     return found, time.perf_counter() - wall, time.process_time() - cpu
 
 
 def whole() -> Any:
-    """Everything over the frequency."""
+    """Compute everything over the frequency."""
     return sl.frequency_response(
         RIG, ("2 Hz", "30 Hz", 29), "random 12", box=BOX, unstable=True, progress=False
     )
 
 
 def main_branch() -> Any:
-    """The main branch alone, from one start."""
+    """Compute the main branch alone, from one start."""
     return sl.branches(
         RIG, {"frequency": ("8 Hz", "22 Hz")}, ("5 mm", 0), at=1, longest=1, progress=False
     )

@@ -1,4 +1,4 @@
-"""What a new equation costs: from its definition to the first state, in a fresh process, beside
+"""Cost of a new equation: from its definition to the first state, in a fresh process, beside
 heyoka.
 
 Every row is a process of its own. It imports its program, then the clock runs: the equation is
@@ -78,7 +78,7 @@ def row_of_masses(masses: int, stops: int):
 
 
 def ours(name: str) -> Callable[[], object]:
-    """From the definition of an equation to its first state, by saltus."""
+    """Take an equation from its definition to its first state, by saltus."""
     import numpy as np
 
     import saltus as sl
@@ -113,7 +113,7 @@ def ours(name: str) -> Callable[[], object]:
 
 
 def heyokas(name: str) -> Callable[[], object] | None:
-    """The same by heyoka, where the equation is easily written for it."""
+    """The same by heyoka, if the equation is easily written for it."""
     from benchmarks.rivals import heyoka_compile
 
     tangent, base = name.endswith("_tangent"), name.removesuffix("_tangent")
@@ -131,7 +131,7 @@ def heyokas(name: str) -> Callable[[], object] | None:
 
 
 def cpu() -> float:
-    """CPU time of this process and of those that it has waited for [s]."""
+    """CPU time of this process and of its finished children [s]."""
     return sum(
         u.ru_utime + u.ru_stime
         for u in map(resource.getrusage, (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
@@ -139,7 +139,7 @@ def cpu() -> float:
 
 
 def one(program: str, name: str) -> None:
-    """What a process of a row does; prints [CPU, wall] in seconds, or null."""
+    """Run the process of a row; it prints [CPU, wall] in seconds, or null."""
     job = (ours if program == "saltus" else heyokas)(name)
     if job is None:
         print("null")
@@ -152,8 +152,8 @@ def one(program: str, name: str) -> None:
 def measured(
     program: str, name: str, cache: Path, kept: Callable[[Path], bool] = lambda _: False
 ) -> tuple[float, float] | None:
-    """(CPU, wall) of one fresh process; what it added to the cache is taken away again, but for
-    what is to be kept.
+    """(CPU, wall) of one fresh process; its additions to the cache are deleted again, except those
+    to be kept.
     """
     cache.mkdir(mode=0o700, exist_ok=True)
     shared = {path.name for path in cache.iterdir()}
@@ -176,8 +176,8 @@ def measured(
 
 
 def prepared(cache: Path) -> list[tuple[str, float, float]]:
-    """What is made once on a machine, by the method: (name, CPU, wall) beyond what the equation
-    itself takes.
+    """The work done once on a machine, by the method: (name, CPU, wall) beyond the time of the
+    equation itself.
     """
     rows = []
     for title, name in (("Taylor", "rig"), ("ode45", "rig_ode45")):
@@ -195,13 +195,13 @@ def prepared(cache: Path) -> list[tuple[str, float, float]]:
 
 
 def is_shared(path: Path) -> bool:
-    """Whether an entry of the cache serves all equations."""
+    """True if an entry of the cache serves all equations."""
     head = path.read_bytes()[:400]
     return b'"title": "taylor_' in head or b'"title": "pair, generic' in head
 
 
 def table(repeats: int, folder: Path | None) -> None:
-    """Print both tables, and keep them in a folder if there is one."""
+    """Print both tables, and write them to a folder if one is given."""
     from benchmarks.record import Column, Record, Table
 
     from saltus.cli.doctor import processor

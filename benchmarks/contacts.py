@@ -1,5 +1,5 @@
-"""What a forcing period costs where several contacts share a system: saltus beside heyoka, same
-work, same run.
+"""Cost of a forcing period if several contacts share a system: saltus beside heyoka, same work,
+same run.
 
 Masses in a row with stops, and the chain of two masses with two clearances: from random starts,
 every contact located. CPU time of one pinned core, medians over the repeats, the programs
@@ -45,7 +45,7 @@ COLUMNS = (
 
 
 def problems() -> list[tuple[str, sl.System, Any, np.ndarray]]:
-    """(title, system, what gives heyoka's problem, range of the starts) of each row."""
+    """(title, system, function that returns heyoka's problem, range of the starts) of each row."""
     chain = sl.models.chain()
     rows: list[tuple[str, sl.System, Any, np.ndarray]] = [
         (
@@ -86,7 +86,7 @@ def line(row: tuple[str | float | None, ...]) -> str:
 
 
 def main() -> None:
-    """Print every row, and keep the table if a folder is given."""
+    """Print every row, and write the table if a folder is given."""
     options = options_of("contacts", __doc__, 9, "runs of each program").parse_args()
     rig.pin()
     try:

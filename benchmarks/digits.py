@@ -1,5 +1,5 @@
-"""Numbers by which processors are compared: final states, contacts, orbits,
-bifurcations, an exponent.
+"""Numbers for the comparison of processors: final states, contacts, orbits, bifurcations, an
+exponent.
 
     python benchmarks/digits.py > here.json        compute them
     python benchmarks/digits.py A.json B.json ...  say which differ from those of A, and by how much
@@ -22,7 +22,7 @@ from saltus.codegen.machine import target
 
 RIG = sl.models.delangre("b", force="4 N", frequency="15 Hz")
 TAYLOR, ODE45 = sl.Taylor(), sl.ODE45(rtol=1e-4, atol=1e-7)
-#: What is moved: a published system, the method, the states that don't start at zero, and how far.
+#: Motions: a published system, the method, the states that don't start at zero, and the length.
 MOTIONS: dict[str, tuple[Any, Any, dict[str, float], dict[str, float]]] = {
     "rig, Taylor": (RIG, TAYLOR, {"x": 1e-3}, {"periods": 60}),
     "rig, ODE45": (RIG, ODE45, {"x": 1e-3}, {"periods": 5}),

@@ -1,5 +1,5 @@
-"""What one forcing period of one trajectory costs, and how exact it is: saltus beside its rivals,
-same work, same run.
+"""Cost and error of one forcing period of one trajectory: saltus beside its rivals, same work, same
+run.
 
 Case b4 of the deLangre rig at 15 Hz, starts x in [-5, 5] mm, v in [-1, 1] m/s, contacts located.
 CPU time of one pinned core, the smallest of three repeats, over 100 periods from 2048 starts
@@ -34,7 +34,7 @@ from benchmarks.record import Column, Record, Table  # noqa: E402
 from benchmarks.rivals import rig  # noqa: E402
 
 PERIODS = 100
-#: What is kept for the documentation.
+#: Columns kept for the documentation.
 COLUMNS = (
     Column("program"), Column("median error after 5 periods [m]", ".1e"),
     Column("largest error [m]", ".1e"),
@@ -82,8 +82,8 @@ def line(name: str, us: float, errors: np.ndarray, contacts: float, fastest: flo
 
 
 def rows(count: int, left_out: list[str]) -> Iterator[tuple[str, float, np.ndarray, float]]:
-    """(name, microseconds per period, errors, contacts per period) of everyone; who isn't there is
-    noted in ``left_out``.
+    """(name, microseconds per period, errors, contacts per period) of every program; missing ones
+    are noted in ``left_out``.
     """
     x, v = rig.starts(count)
     for method in (
@@ -125,7 +125,7 @@ def rows(count: int, left_out: list[str]) -> Iterator[tuple[str, float, np.ndarr
 
 
 def table(count: int, folder: Path | None = None) -> None:
-    """Print everyone's row, and keep them in a folder if there is one."""
+    """Print every row, and write them to a folder if one is given."""
     record = Record(
         "flow",
         f"Case b4 of the rig of de Langre et al. at 15 Hz, contacts located; {count} starts, "
@@ -162,7 +162,7 @@ def orders(count: int) -> None:
 
 
 def memory() -> None:
-    """Print what a stroboscope run from a million starts takes."""
+    """Print the memory of a stroboscope run from a million starts."""
     x, v = rig.starts(1_000_000)
     system = sl.models.delangre("b", force="4 N", frequency="15 Hz")
     sl.stroboscope(system, (0.0, 0.0), 1)

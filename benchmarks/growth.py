@@ -1,4 +1,4 @@
-"""How time grows with the size of a model: compile time, and time a forcing period of one
+"""Growth of time with the size of a model: compile time, and time per forcing period of one
 trajectory.
 
 The model is a chain of masses whose end strikes stops on both sides, by its lowest modes, driven
@@ -69,7 +69,7 @@ def main(arguments: list[str]) -> None:
     print("|---|---|---|---|---|---|", flush=True)
     with tempfile.TemporaryDirectory() as cache:
         for shown, row in ((False, (1, 1)), *((True, row) for row in rows)):
-            # the first prepares what all equations share, and isn't shown
+            # the first prepares the code that all equations share, and isn't shown
             subprocess.run(
                 [sys.executable, str(HERE), "--row", *map(str, row)],
                 env={**os.environ, "SALTUS_CACHE": cache},

@@ -1,5 +1,5 @@
-"""What a forcing period costs where contacts have laws - impacts, sticking - beside rivals, same
-work, same run.
+"""Cost of a forcing period with laws of contact - impacts, sticking - beside rivals, same work,
+same run.
 
 The impact oscillator x'' + 0.1 x' + x = cos t, x <= 1, e = 0.8 (Dankowicz & Schilder, Recipes for
 Continuation, section 15.2), and a block with dry friction that stops twice a period. CPU time of
@@ -51,7 +51,7 @@ def ours(system: sl.System, starts: np.ndarray, periods: int) -> Any:
 
 
 def rivals(name: str) -> Iterator[tuple[str, Callable[..., tuple[float, np.ndarray]]]]:
-    """Each rival that is installed and knows a problem: its name, what solves the problem."""
+    """Each installed rival that knows a problem: its name, and the function that solves it."""
     for rival in ("heyoka", "scipy"):
         try:
             module = __import__(f"benchmarks.rivals.{rival}_laws", fromlist=[name])

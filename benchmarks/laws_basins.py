@@ -1,6 +1,6 @@
-"""What maps of basins cost where impacts and sticking decide, and whether their labels are right:
-two oscillators, 400 x 400 starts each, and 2000 of these followed alone over 1500 periods, to the
-attractor that is nearest then.
+"""Cost and correctness of maps of basins with impacts and sticking: two oscillators, 400 x 400
+starts each. 2000 of these are followed alone over 1500 periods, to the attractor that is nearest
+then.
 
     python benchmarks/laws_basins.py              400 x 400 cells
     python benchmarks/laws_basins.py --cells 100  fewer
@@ -18,14 +18,14 @@ import saltus as sl
 
 #: Starts that are checked, and forcing periods over which they are followed.
 CHECKED, PERIODS = 2000, 1500
-#: Distance from the attractors beyond which a motion has come to none of them.
+#: Distance from all attractors above which a motion has reached none of them.
 FAR = 1e-3
 
 
 @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
 def struck(t, x, v, *, gap=0.0, restitution=0.6, damping=0.02, w=0.62):
-    """A stop that is struck three or four times a period; on the way there motions chatter and
-    rest.
+    """An oscillator with a stop that is struck three or four times a period; on the way there
+    motions chatter and rest.
     """
     return v, sl.cos(w * t) - damping * v - x, sl.impact(x < gap, v, restitution=restitution)
 
@@ -42,7 +42,7 @@ AXES = {struck: {"x": (-3, -0.001), "v": (-3, 3)}, stick_slip: {"x": (-3, 3), "v
 
 
 def nearest(found: xr.Dataset, x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The attractor that is nearest to each point, and how far it is."""
+    """The nearest attractor to each point, and its distance."""
     apart = [
         np.nanmin(np.hypot(x[:, None] - one_x.ravel(), v[:, None] - one_v.ravel()), axis=1)
         for one_x, one_v in zip(

@@ -1,4 +1,4 @@
-"""What a benchmark measured, as a file that the documentation shows: numbers, machine, date,
+"""The record of a benchmark, as a file that the documentation shows: numbers, machine, date,
 versions, and the command that made it.
 """
 
@@ -24,8 +24,8 @@ PACKAGES = ("saltus", "numpy", "llvmlite", "numba", "scipy", "heyoka", "pynamica
 def options_of(
     name: str, description: str | None, repeats: int, what: str
 ) -> argparse.ArgumentParser:
-    """The command line that benchmarks share: how often ``what`` is done, and where the tables are
-    kept as ``<name>.json``.
+    """The command line that benchmarks share: the number of repeats of ``what``, and the folder for
+    ``<name>.json``.
     """
     parser = argparse.ArgumentParser(
         description=description, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -39,7 +39,7 @@ def options_of(
 
 @dataclass(frozen=True)
 class Column:
-    """A column: its heading with the unit, and how its numbers are written (``""`` for text)."""
+    """A column: its heading with the unit, and the format of its numbers (``""`` for text)."""
 
     heading: str
     form: str = ""
@@ -76,13 +76,13 @@ class Record:
     left_out: list[str] = field(default_factory=list)
 
     def write(self, folder: Path) -> Path:
-        """Write ``<name>.json`` to a folder; returns the file."""
+        """Write ``<name>.json`` to a folder; return the file."""
         made = {
             "command": shlex.join(
                 ["python", f"benchmarks/{Path(sys.argv[0]).name}", *sys.argv[1:]]
             ),
             "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
-            "machine": f"{processor()}, {lane_width()} lanes",
+            "machine": machine(),
             "python": ".".join(map(str, sys.version_info[:3])),
             "versions": {name: _version(name) for name in PACKAGES if _version(name)},
         }
@@ -93,6 +93,11 @@ class Record:
             encoding="utf-8",
         )
         return file
+
+
+def machine() -> str:
+    """The processor, and how many lanes an equation has on it."""
+    return f"{processor()}, {lane_width()} lanes"
 
 
 def _version(package: str) -> str:

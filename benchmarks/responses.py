@@ -1,5 +1,5 @@
-"""How long the frequency response of a structure with stops takes, motion by motion: a cantilever
-beam of so many modes, from rest at each frequency, and all frequencies at once.
+"""Time of the frequency response of a structure with stops: a cantilever beam of some modes, from
+rest at each frequency, and all frequencies at once.
 
 Usage: ``python benchmarks/responses.py [MODES STOPS FREQUENCIES]``; by default 5 2 41.
 """
@@ -17,7 +17,7 @@ import numpy as np
 import saltus as sl
 
 EXAMPLE = Path(__file__).resolve().parent.parent / "examples" / "beam" / "beam.py"
-#: Nodes at which the stops are, the tip first; frequencies [Hz].
+#: Nodes at which the stops are, the tip first; range of frequencies [Hz].
 NODES, BAND = (20, 10, 15, 5, 18, 12, 8, 17), (5.0, 85.0)
 
 
@@ -35,7 +35,7 @@ def beam(modes: int, stops: int) -> sl.System:
 
 
 def kind(ds: object) -> str:
-    """1T, nT, or the word for what doesn't repeat."""
+    """1T, nT, or the kind of a motion that doesn't repeat."""
     word, period = ds.type.item(), int(ds.period.item())
     return word if word != "periodic" else "1T" if period == 1 else "nT"
 

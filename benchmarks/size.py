@@ -1,4 +1,4 @@
-"""How much there is to read in each package, without comments, docstrings, blank lines and imports.
+"""Amount of code to read in each package, without comments, docstrings, blank lines and imports.
 
 Lines of code depend on how wide they are; tokens (names, numbers, strings, operators) don't.
 
@@ -14,6 +14,7 @@ import tokenize
 from collections import defaultdict
 from pathlib import Path
 
+SOURCE = Path(__file__).parents[1] / "src" / "saltus"
 SKIPPED = {
     tokenize.COMMENT,
     tokenize.NL,
@@ -52,18 +53,23 @@ def left_out(tree: ast.Module) -> set[int]:
     }
 
 
-def main(root: Path) -> None:
-    """A row for each package, and their sum."""
+def counted(root: Path) -> dict[str, list[int]]:
+    """Files, lines, lines of code and tokens of each package, and of all."""
     rows: dict[str, list[int]] = defaultdict(lambda: [0, 0, 0, 0])
     for file in root.rglob("*.py"):
         text, parts = file.read_text(encoding="utf-8"), file.relative_to(root).parts
         for name in (parts[0] if len(parts) > 1 else ".", "all"):
             counts = (1, text.count("\n"), *lines_and_tokens(text))
             rows[name] = [a + b for a, b in zip(rows[name], counts, strict=True)]
+    return rows
+
+
+def main(root: Path) -> None:
+    """Print a row for each package, and their sum."""
     print(f"{'package':12s} {'files':>6s} {'lines':>7s} {'code':>7s} {'tokens':>8s}")
-    for name, row in sorted(rows.items(), key=lambda item: item[1][2]):
+    for name, row in sorted(counted(root).items(), key=lambda item: item[1][2]):
         print(f"{name:12s} {row[0]:6d} {row[1]:7d} {row[2]:7d} {row[3]:8d}")
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parents[1] / "src" / "saltus")
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else SOURCE)

@@ -1,5 +1,4 @@
-"""What it costs to begin: from the shell to the first trajectory, and one more in a process that
-has warmed up.
+"""Cost of a start: from the shell to the first trajectory, and of one more in a warm process.
 
 Case b4 of the deLangre rig at 15 Hz from rest. Every row of the first table is a fresh process that
 does what its name says and ends; its machine code lies on disk, as after any earlier run, and so
@@ -38,7 +37,7 @@ DEMO = (
 )
 BARE = 'import os; os.environ |= dict.fromkeys(("SALTUS_CACHE", "MPLCONFIGDIR"), os.getcwd()); '
 MODEL = 'import saltus as sl; rig = sl.models.delangre("b", force="4 N", frequency="15 Hz")'
-#: What each fresh process does.
+#: Programs of the fresh processes.
 PROGRAMS = {
     "python, nothing imported": "pass",
     "import numpy": "import numpy",
@@ -52,7 +51,7 @@ PROGRAMS = {
 }
 PERIODS = (20, 100)
 CALLS = 40
-#: What is kept for the documentation.
+#: Columns kept for the documentation.
 PROCESS_COLUMNS = (Column("process"), Column("CPU time [s]", ".2f"), Column("wall time [s]", ".2f"))
 CALL_COLUMNS = (
     Column("call"), Column("CPU time [ms]", ".2f"), Column("of it the engine [ms]", ".2f"),
@@ -81,11 +80,11 @@ def fresh(program: str) -> tuple[float, float]:
 
 
 def processes(repeats: int) -> list[tuple[str, float, float]]:
-    """(name, CPU time [s], wall time [s]) of every program. They take turns, so that all see the
+    """(name, CPU time [s], wall time [s]) of every program. They alternate, so that all see the
     same machine.
     """
     for program in PROGRAMS.values():
-        fresh(program)  # compiles what isn't there, and fills the caches of files
+        fresh(program)  # compiles missing code, and fills the caches of files
     taken = {name: [] for name in PROGRAMS}
     for _ in range(repeats):
         for name, program in PROGRAMS.items():
@@ -133,7 +132,7 @@ def calls(count: int) -> list[tuple[str, float, float, float]]:
 
 
 def table(repeats: int, folder: Path | None = None) -> None:
-    """Print both tables, and keep them in a folder if there is one."""
+    """Print both tables, and write them to a folder if one is given."""
     record = Record(
         "startup",
         f"Case b4 of the rig of de Langre et al. at 15 Hz, one start, 200 samples a period; "

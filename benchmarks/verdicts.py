@@ -1,5 +1,4 @@
-"""Whether two runs of a replication give the same verdicts: compares two claims.csv, claim by
-claim.
+"""Compare the verdicts of two runs of a replication: two claims.csv, claim by claim.
 
 Usage: ``python benchmarks/verdicts.py BEFORE.csv AFTER.csv``. Ends with 1 if a verdict differs, or
 a claim is missing.
@@ -11,7 +10,7 @@ import csv
 import sys
 from pathlib import Path
 
-#: Columns that hold what was read from the data.
+#: Columns with the readings of the data.
 READINGS = ("its own settings give here", "exact arithmetic gives")
 
 
@@ -25,7 +24,7 @@ def claims(file: Path) -> dict[str, dict[str, str]]:
 
 
 def main(before: dict[str, dict[str, str]], after: dict[str, dict[str, str]]) -> int:
-    """Tell what differs; returns how many verdicts do."""
+    """Print the differences; return the number of different verdicts."""
     wrong, read = 0, 0
     for name in dict.fromkeys([*before, *after]):
         old, new = (rows.get(name, {"verdict": "no such claim"}) for rows in (before, after))

@@ -8,13 +8,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from saltus.analysis.closed.orbits import Orbit, find_orbits
+from saltus.analysis.closed.motions import ClosedMotion
+from saltus.analysis.closed.orbits import find_orbits
 from saltus.analysis.lyapunov.segments import SAMPLED_BLOCKS, Segment, TangentFlow
 from saltus.flow.maps import Map
 from saltus.kernels import status as st
 
 
-def orbit_near(map_: Map, start: np.ndarray, n: int, scale: np.ndarray) -> Orbit | None:
+def orbit_near(map_: Map, start: np.ndarray, n: int, scale: np.ndarray) -> ClosedMotion | None:
     """The orbit of period n, or a part of it, near one state float64[D]: a batch of one. The noise
     is that of a box.
     """
@@ -22,7 +23,7 @@ def orbit_near(map_: Map, start: np.ndarray, n: int, scale: np.ndarray) -> Orbit
     return found[0] if found.period[0] else None
 
 
-def attracts(orbit: Orbit) -> bool:
+def attracts(orbit: ClosedMotion) -> bool:
     """Whether the largest multiplier lies inside the unit circle."""
     return bool(abs(orbit.multipliers[0]) < 1)
 

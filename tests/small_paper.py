@@ -12,7 +12,7 @@ from saltus import models
 from saltus.flow import Taylor
 from saltus.replication import Check, Claim, Finding, Job, Numbers, Paper, Picture
 from saltus.results import AttractorTable
-from saltus.study.table import TextTable
+from saltus.results.table import TextTable
 
 
 def small_result(value):

@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from saltus.study.answers.ask import questions_of
 from saltus.study.answers.basins import BasinMap
+from saltus.study.ask import questions_of
 from saltus.study.setting.inputs import Inputs
-from saltus.study.tables.spec import Study
+from saltus.study.spec import Study
 
 
 def maps_of(study: Study) -> list[BasinMap]:

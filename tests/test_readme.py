@@ -54,7 +54,7 @@ def test_ci_finds_the_test_command():
 
 
 def test_study_can_be_read():
-    from saltus.study.tables.read import parse
+    from saltus.study.read import parse
 
     (text,) = (text for _, language, text in BLOCKS if language == "toml")
     assert parse(text).simulate.periods == 500

@@ -1,3 +1,3 @@
-"""What a user would pick instead, used as well as we know how: same job, same clock (CPU time of
-one pinned core), same result.
+"""The programs that a user would pick instead, used as well as we know: same job, same clock (CPU
+time of one pinned core), same result.
 """

@@ -45,8 +45,8 @@ def labels(
 def labels_early(
     flow: Flow, x: np.ndarray, v: np.ndarray, orbits: Sequence[np.ndarray], most: int, look: int
 ) -> np.ndarray:
-    """The same, but a start is done when ``look`` points in a row follow an orbit, looked at every
-    so many periods up to ``most``.
+    """Orbit of each start as from :func:`labels`, but a start is done when ``look`` successive
+    points follow an orbit; it is tested every ``look`` periods up to ``most``.
     """
     found = np.full(x.size, -1, np.int64)
     going = np.arange(x.size)

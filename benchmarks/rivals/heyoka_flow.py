@@ -111,7 +111,7 @@ class Flow:
         grid = np.ascontiguousarray(np.repeat(times[:, None], self.lanes, axis=1))
         points = np.empty((x.size, keep, 2))
         for at in range(0, x.size, self.lanes):
-            # lanes to spare at the end do the first starts once more
+            # unused lanes at the end repeat the first starts
             these = np.arange(at, at + self.lanes) % x.size
             self._begin(x[these], v[these])
             points[these] = self.integrator.propagate_grid(grid)[-1][1:].transpose(2, 0, 1)

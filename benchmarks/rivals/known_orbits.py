@@ -1,4 +1,4 @@
-"""Which of the known orbits a trajectory has settled on: the label that rivals need and don't have,
+"""Find the known orbit that a trajectory has settled on: the label that rivals need and don't have,
 given to them for free.
 """
 

@@ -20,11 +20,11 @@ from pynamicalsys import ContinuousDynamicalSystem
 
 from . import known_orbits, rig
 
-#: RK4 steps a period: 5e-7 m of error after five periods (median). The cost goes with their number,
-#: agreement with our labels hardly does: on 160 cells 71 % with 64 and 128, 69 % with 256; on 64
-#: cells 73 % with 1024.
+#: RK4 steps a period: 5e-7 m of error after five periods (median). Cost is proportional to it,
+#: agreement with our labels hardly depends on it: on 160 cells 71 % with 64 and 128, 69 % with 256;
+#: on 64 cells 73 % with 1024.
 STEPS = 128
-#: Last points whose mean is clustered.
+#: Number of last points whose mean is clustered.
 KEEP = 120
 #: Reach of a cluster, of means in mm and m/s: 5T and 24T are 3.2e-3 apart, trajectories that reach
 #: one orbit 5e-5 at most.
@@ -69,8 +69,8 @@ class Rig:
         self.clusters(np.zeros(2), np.ones(2), KEEP + 1)
 
     def clusters(self, x: np.ndarray, v: np.ndarray, periods: int) -> np.ndarray:
-        """What pynamicalsys answers after so many periods: a number for each start, the same for
-        the same basin.
+        """The answer of pynamicalsys after so many periods: a number for each start, equal within a
+        basin.
         """
         start = np.stack([x / MM, v], axis=1)
         return self.system.basin_of_attraction(

@@ -1,5 +1,5 @@
-"""The job that every rival does: the deLangre rig in case b with 4 N at 15 Hz, many starts,
-contacts located.
+"""The job of every rival: the deLangre rig in case b with 4 N at 15 Hz, many starts, contacts
+located.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ HARDENING = CUBIC / MASS  # 1/(m s)^2
 
 @dataclass(frozen=True)
 class Measured:
-    """What a rival took, and what it found.
+    """The time and the results of a rival.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ def pin(core: int | None = None) -> None:
 
 @contextlib.contextmanager
 def one_core() -> Iterator[None]:
-    """Everything within on one pinned core."""
+    """Pin everything inside to one core."""
     before = os.sched_getaffinity(0)
     pin()
     try:
@@ -87,8 +87,8 @@ def alternating(jobs: list[Callable[[], object]], repeats: int) -> list[list[flo
 
 
 def warm(system: Any, method: Any) -> None:
-    """Let the code that long work ends with take over before the clock runs: saltus compiles it
-    beside the first seconds of work.
+    """Let the final code of long work take over before the clock runs: saltus compiles it beside
+    the first seconds of work.
     """
     kernels = method.kernels(system.origin)
     if kernels.tier != "full":

@@ -11,26 +11,22 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
 from saltus.results.dataset import schema
-from saltus.results.dataset.variable import Variable
 
 
 def markdown() -> str:
     """A section for each kind of result."""
-    return (
-        "\n\n".join("\n".join(_section(kind, table)) for kind, table in schema.TABLES.items())
-        + "\n"
-    )
+    return "\n\n".join("\n".join(_section(kind)) for kind in schema.NAMES) + "\n"
 
 
-def _section(kind: str, table: dict[str, Variable]) -> Iterator[str]:
-    makers = " and ".join(f"`sl.{name}`" for name in schema.MAKERS[kind].split(" or "))
+def _section(kind: str) -> Iterator[str]:
+    makers = " and ".join(f"`sl.{name}`" for name in schema.KINDS[kind].makers.split(" or "))
     yield f"## {kind.replace('_', ' ').capitalize()}"
     yield ""
     yield f"From {makers}."
     yield ""
     yield "| variable | dims | unit | meaning |"
     yield "|---|---|---|---|"
-    for name, one in table.items():
+    for name, one in schema.KINDS[kind].variables.items():
         unit = {"": "text" if one.dtype == "str" else "", "1": ""}.get(one.units, one.units)
         yield (
             f"| `{name}` | {_cell(', '.join(one.dims))} | {_cell(unit)} | {_cell(one.long_name)} |"

@@ -15,8 +15,8 @@ from pydantic_core import PydanticUndefined
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
-from saltus.study.tables.spec import Study, Table
-from saltus.study.tables.wording import toml
+from saltus.study.spec import Study, Table
+from saltus.study.tables.toml import toml
 
 #: What the types of keys are called.
 _WORDS = {int: "whole number", float: "number", str: "text", bool: "true or false"}

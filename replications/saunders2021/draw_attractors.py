@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from saltus.analysis.basins.compare import compare
-from saltus.plot import maps
+from saltus.plot import cells
 from saltus.plot.style import display_scale
 from saltus.replication.claims import Data
 from saltus.results.dataset.schema import kind_text
@@ -204,4 +204,4 @@ def _title(data: Data, figure: str, setting: str, trio: Trio) -> str:
             ].values[trio.number[look.end], 0]
             texts.append(f"{look.label.removeprefix('ode45, ')} {round(float(found), 2) + 0.0:.2f}")
     name = kind_text(trio.kind, trio.period)
-    return f"{name}, {maps.peak_text(one)};  exponent along it [1/s]: {', '.join(texts)}"
+    return f"{name}, {cells.peak_text(one)};  exponent along it [1/s]: {', '.join(texts)}"

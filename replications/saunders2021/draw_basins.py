@@ -17,8 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from saltus.analysis.basins.compare import compare
-from saltus.plot import maps
-from saltus.plot.basins import paint
+from saltus.plot import cells
 from saltus.plot.palette import hues
 from saltus.replication.claims import Data
 from saltus.results.dataset.schema import kind_text
@@ -108,21 +107,22 @@ def _common(found: dict[str, xr.Dataset]) -> _Row:
 def _words(one: xr.Dataset) -> str:
     return (
         f"{kind_text(str(one['attractor_type'].item()), int(one['attractor_period']))}, "
-        f"{maps.peak_text(one)}"
+        f"{cells.peak_text(one)}"
     )
 
 
 def _panel(ax: Axes, ds: xr.Dataset, row: _Row, look: Look) -> None:
     colors = dict(enumerate(hues(max(len(row.entries), 1))))
-    pair = maps.plane(ds, "basin")
-    scales = maps.scale_of(ds, pair[0]), maps.scale_of(ds, pair[1])
-    maps.draw_cells(ax, ds, pair, scales, paint(row.cells[look.label], colors))
+    sides = cells.plane(ds, "basin")
+    cells.draw_cells(ax, sides, cells.paint(row.cells[look.label], colors))
     values = json.loads(ds.attrs["parameters"])
     for place in (-values["lower_gap"], values["upper_gap"]):
-        ax.axvline(place * scales[0].factor, color="#222222", lw=0.6, ls=(0, (4, 3)), alpha=0.6)
+        ax.axvline(
+            place * sides[0].scale.factor, color="#222222", lw=0.6, ls=(0, (4, 3)), alpha=0.6
+        )
     share = row.agreement.get(look.label)
     ax.set_title(
-        look.label if share is None else f"{look.label}: {maps.share_text(share)} as exact",
+        look.label if share is None else f"{look.label}: {cells.share_text(share)} as exact",
         fontsize=8,
     )
 
@@ -132,11 +132,11 @@ def _legend(ax: Axes, row: _Row, exact: xr.Dataset) -> None:
     colors = hues(max(len(row.entries), 1))
     handles: list[Any] = []
     for entry, color in zip(row.entries, colors, strict=False):
-        shares = " | ".join("–" if np.isnan(one) else maps.share_text(one) for one in entry.shares)
+        shares = " | ".join("–" if np.isnan(one) else cells.share_text(one) for one in entry.shares)
         handles.append(Patch(fc=color, label=f"{entry.text}\n{shares}"))
     lost = [int((cells < 0).sum()) for cells in row.cells.values()]
     if any(lost):
-        handles.append(Patch(fc=maps.UNSETTLED[-2].color, label="not settled"))
+        handles.append(Patch(fc=cells.UNSETTLED[-2].color, label="not settled"))
     title = f"located | not located | exact\nof {exact['basin'].size} starts"
     legend = ax.legend(
         handles=handles,

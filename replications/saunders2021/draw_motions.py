@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from saltus import plot
-from saltus.plot import maps
+from saltus.plot import cells
 from saltus.plot.style import OKABE_ITO
 from saltus.replication.claims import Data
 from saltus.study.answers.compare import residuals
@@ -210,14 +210,14 @@ def where_a_step_leads(data: Data) -> Figure:
     frequency changes.
     """
     ds, run = data["fig4/step"], data["fig4/exact"].isel(trajectory=0)
-    colors = maps.colors_of(ds, None)
+    colors = cells.colors_of(ds, None)
     dim = run["x"].dims[0]
     last = run.isel({dim: slice(-201, -1)})
     figure, ax = plt.subplots(figsize=(5.6, 3.6), layout="constrained")
     ax.plot(last["x"] * 1e3, last["v"], color="#BBBBBB", lw=1.0, zorder=1)
     for key in ds["attractor"].values.tolist():
         here = ds["basin"].values == key
-        label = f"{maps.describe(ds.sel(attractor=key))}: {maps.share_text(here.mean())}"
+        label = f"{cells.describe(ds.sel(attractor=key))}: {cells.share_text(here.mean())}"
         ax.plot(
             last["x"].values[here] * 1e3,
             last["v"].values[here],

@@ -17,7 +17,8 @@ from saltus.analysis.basins.basins import map_of
 from saltus.analysis.basins.pipeline import basin_plan
 from saltus.analysis.branches.branches import branches
 from saltus.analysis.closed.capture import Neighbourhoods
-from saltus.analysis.closed.orbits import Orbit, find_orbits, same
+from saltus.analysis.closed.motions import ClosedMotion, same
+from saltus.analysis.closed.orbits import find_orbits
 from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.lyapunov.lyapunov import lyapunov
 from saltus.analysis.methods.compare_methods import compare_methods, methods_dataset
@@ -30,9 +31,9 @@ from saltus.flow import ODE45, Taylor
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.replication import Job
+from saltus.study.read import read
 from saltus.study.setting.setting import method_of, system_of
-from saltus.study.tables.read import read
-from saltus.study.tables.spec import Study
+from saltus.study.spec import Study
 from saltus.system import System
 from saltus.units import to_si
 
@@ -261,7 +262,7 @@ class _Plan:
     def maps(self, name: str) -> list[Job]:
         """A job for each basin map of a study file."""
         study, system, text = self._study(name)
-        assert study.basins is not None
+        basins: Any = dict(study.questions())["basins"]
         count = QUICK_CELLS[name] if self.quick else None
         arguments: dict[str, Any] = {
             "axes": {
@@ -278,7 +279,7 @@ class _Plan:
                 method_of(one.method or study.method),
                 arguments,
             )
-            for one in study.basins.map
+            for one in basins.map
         ]
 
     def fig6(self) -> list[Job]:
@@ -442,7 +443,7 @@ def halved(
     closed = find_orbits(
         map_, start, period, np.broadcast_to(scale, start.shape), np.full(len(near), map_.noise)
     )
-    orbits: list[Orbit] = []
+    orbits: list[ClosedMotion] = []
     for orbit in closed.rows(closed.period > 0):
         if not any(same(orbit, one, scale, SAME) and orbit.period == one.period for one in orbits):
             orbits.append(orbit)

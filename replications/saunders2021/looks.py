@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.closed.orbits import phase_distances
+from saltus.analysis.closed.motions import phase_distances
 from saltus.plot.style import OKABE_ITO
 
 

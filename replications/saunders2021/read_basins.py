@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.basins.compare import compare
-from saltus.plot.maps import share_text
+from saltus.plot.cells import share_text
 from saltus.replication.claims import Data
 from saltus.results.dataset.schema import period_text
 

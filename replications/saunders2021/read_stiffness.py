@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.plot.maps import share_text
+from saltus.plot.cells import share_text
 from saltus.replication.claims import Data, power
 from saltus.results.dataset.schema import period_text
 

@@ -9,8 +9,8 @@ import xarray as xr
 
 from saltus.replication.claims import Data
 from saltus.results.dataset.schema import kind_text
+from saltus.results.table import TextTable
 from saltus.study.answers.compare import residuals
-from saltus.study.table import TextTable
 
 from . import printed
 from .draw_attractors import trios

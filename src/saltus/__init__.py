@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import importlib
 import re
+import sys
 from typing import Any
 
 __version__ = "0.2.0"
@@ -30,7 +31,8 @@ def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         from saltus.system.elsewhere import instead
 
-        raise AttributeError(f"saltus has no {name!r}. {instead(name, __all__)}")
+        message = f"saltus has no {name!r}. {instead(name, __all__)}"
+        raise AttributeError(message, name=name, obj=sys.modules[__name__])
     with ctrl_c_waits():
         if _HOMES[name] == __name__:
             return importlib.import_module(f"{__name__}.{name}")

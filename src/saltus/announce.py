@@ -1,4 +1,4 @@
-"""What is said to somebody who waits for an equation: what is being compiled, and for how long."""
+"""Announcements to a user who waits for an equation: the system being compiled, and the time."""
 
 from __future__ import annotations
 

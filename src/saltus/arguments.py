@@ -19,7 +19,7 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from saltus.errors import ParameterError, nearest, shown
+from saltus.errors import ParameterError, TraceError, nearest, shown
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -130,6 +130,29 @@ class Kinds:
                 raise ParameterError(
                     f"{caller}: {name} must be {' or '.join(words)}, not {shown(value)}.{default}"
                 )
+
+
+class CallError(TraceError, TypeError):
+    """A function of equations was called with other arguments than it has."""
+
+
+def written(call: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Make a function of equations one that says how it is called where it is called otherwise."""
+
+    def made(function: Callable[P, R]) -> Callable[P, R]:
+        @functools.wraps(function)
+        def called(*args: P.args, **kwargs: P.kwargs) -> R:
+            try:
+                return function(*args, **kwargs)
+            except TypeError as error:
+                if error.__traceback__ is None or error.__traceback__.tb_next is not None:
+                    raise  # inside the function
+                why = f"{error}".rstrip(".")
+                raise CallError(lambda say: f"{say.sl}{why}. Write {say.sl}{call}.") from None
+
+        return called
+
+    return made
 
 
 #: What isn't said to a picture but to its axes.

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import difflib
 import linecache
-import reprlib
 import traceback
 import unicodedata
 from collections.abc import Iterable
-from typing import Any
+
+from saltus.sentences import PYTHON, Dialect, Given, Text, said
+from saltus.sentences import shown as shown
 
 #: Characters of a message: some 20 lines of a terminal.
 LONGEST = 2000
-#: Digits up to which a whole number is written out. Python refuses to write those of 4300 or more.
-_DIGITS = 60
 #: Most names that a message lists.
 MOST_NAMES = 24
 
@@ -23,10 +22,25 @@ class SaltusError(Exception):
 
     A message is at most :data:`LONGEST` characters long: of a longer one, which repeats what
     somebody gave, the middle is left out.
+
+    Parameters
+    ----------
+    *parts : str, callable or Exception
+        The sentence. What holds code, which Python writes in another way than a study file, is
+        made of how those write to whom it is shown: ``lambda say: f"Give {say.key('t_end')}."``.
+        ``str(error)`` is for those who write Python.
     """
 
-    def __init__(self, *args: object) -> None:
-        super().__init__(*(_cut(part) if isinstance(part, str) else part for part in args))
+    def __init__(self, *parts: Text) -> None:
+        self.parts = parts
+        super().__init__(self.said(PYTHON))
+
+    def __reduce__(self) -> tuple[type[SaltusError], tuple[str]]:
+        return type(self), (str(self),)  # what makes a sentence has no name to be found by
+
+    def said(self, dialect: Dialect) -> str:
+        """The message for those who write so."""
+        return _cut(said(self, dialect))
 
     def _render_traceback_(self) -> list[str]:
         """What IPython shows in place of a traceback: the user's own line, and the message."""
@@ -87,41 +101,6 @@ def _cut(message: str) -> str:
     )
 
 
-class _Repr(reprlib.Repr):
-    """``repr`` of anything that somebody may give: numbers and texts of NumPy as plain ones, never
-    an exception, never without an end.
-    """
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.maxdict = self.maxlist = self.maxtuple = self.maxset = self.maxfrozenset = (
-            self.maxdeque
-        ) = 40
-        self.maxstring = self.maxother = 10_000
-
-    def repr1(self, x: Any, level: int) -> str:
-        if type(x).__module__ == "numpy" and not getattr(x, "ndim", 1) and x.dtype.kind in "fiubU":
-            x = x.item()
-        return super().repr1(x, level)
-
-    def repr_int(self, x: int, _level: int) -> str:
-        return (
-            repr(x)
-            if abs(x) < 10**_DIGITS
-            else (f"a whole number of some {int(x.bit_length() * 0.30103) + 1} digits")
-        )
-
-
-def shown(value: object, limit: int = 80) -> str:
-    """A value as a message shows it: on one line, cut if it is long."""
-    try:
-        text = _Repr().repr(value)
-    except Exception:  # whatever an object of somebody else does when it is looked at
-        text = f"<{type(value).__name__}>"
-    text = text if isinstance(value, str) else " ".join(text.split())
-    return text if len(text) <= limit else f"{text[: limit - 4]}...{text[-1]}"
-
-
 def counted(number: int, word: str) -> str:
     """``1 branch``, ``2 branches``, ``3 equilibria``."""
     if number == 1:
@@ -133,6 +112,28 @@ def counted(number: int, word: str) -> str:
     return f"{number} {word}{'es' if word.endswith('ch') else 's'}"
 
 
+def must_be(name: str, what: Text, given: object, *more: Text) -> ParameterError:
+    """The error of an argument of another kind: ``every must be a positive time, not -1.``"""
+    return ParameterError(f"{name} must be ", what, f", not {shown(given)}.", *more)
+
+
+def unknown(what: str, name: object, known: Iterable[str], *more: Text) -> ParameterError:
+    """The error of a name: ``rig has no state 'y'. Did you mean 'x'?``"""
+    return ParameterError(f"{what} {shown(name)}. {nearest(name, known)}", *more)
+
+
+def one_of(words: Iterable[str], before: str = "", **given: object) -> None:
+    """Raise ParameterError unless an argument is one of some words: ``one_of(WINDOWS,
+    window=window)``; ``before`` begins the message.
+    """
+    ((name, value),) = given.items()
+    if not among(value, words):
+        raise ParameterError(
+            before,
+            lambda say: f"{say.key(**{name: Given(value)})} isn't known. {nearest(value, words)}",
+        )
+
+
 def among(value: object, words: Iterable[str]) -> bool:
     """Whether a value is text, and one of some words. Lists and arrays, for which ``in`` fails or
     asks each entry, are none of them.
@@ -140,22 +141,30 @@ def among(value: object, words: Iterable[str]) -> bool:
     return isinstance(value, str) and value in words
 
 
-def nearest(name: object, known: Iterable[str], cutoff: float = 0.5) -> str:
-    """A sentence that offers the nearest known name, or lists them in their order, many of them
-    shortened; ``cutoff`` is the likeness from which on a name is near.
+def closest(name: object, known: Iterable[str], cutoff: float = 0.5) -> str | None:
+    """The known name that is nearest, if one is near; ``cutoff`` is the likeness from which on."""
+    if not isinstance(name, str):
+        return None
+    return next(iter(difflib.get_close_matches(name, list(known), n=1, cutoff=cutoff)), None)
+
+
+def nearest(
+    name: object, known: Iterable[str], cutoff: float = 0.5, otherwise: str | None = None
+) -> str:
+    """A sentence that offers the :func:`closest` known name; if none is near ``otherwise``, by
+    default a list of all in their order, many of them shortened.
     """
     known = sorted(known) if isinstance(known, set | frozenset) else list(dict.fromkeys(known))
-    if not isinstance(name, str):
-        return f"Known: {_listed(known)}."
-    alike = unicodedata.normalize("NFKC", name)
-    if alike != name and alike in known:
-        return (
-            f"Write {alike!r} ({alike!a}), which is how Python reads {name!r} ({name!a}) "
-            f"in the "
-            f"function: they only appear alike."
-        )
-    close = difflib.get_close_matches(name, known, n=1, cutoff=cutoff)
-    return f"Did you mean {close[0]!r}?" if close else f"Known: {_listed(known)}."
+    if isinstance(name, str):
+        alike = unicodedata.normalize("NFKC", name)
+        if alike != name and alike in known:
+            return (
+                f"Write {alike!r} ({alike!a}), which is how Python reads {name!r} ({name!a}) in "
+                f"the function: they only appear alike."
+            )
+    if close := closest(name, known, cutoff):
+        return f"Did you mean {close!r}?"
+    return f"Known: {_listed(known)}." if otherwise is None else otherwise
 
 
 def _listed(names: list[str]) -> str:

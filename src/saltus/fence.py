@@ -119,7 +119,7 @@ def text(data: bytes) -> str:
 
 
 def has_control(value: str) -> bool:
-    """Whether a text holds characters that a terminal would obey."""
+    """True if a text holds characters that a terminal would obey."""
     return bool(_CONTROL.search(value))
 
 
@@ -149,8 +149,8 @@ def csv_cell(value: Any) -> Any:
 
 # -- TOML ------------------------------------------------------------------------------------------
 def toml(source: str) -> dict[str, Any]:
-    """What TOML holds: text without control characters, keys and whole numbers of a sensible size,
-    not too many levels.
+    """The data of a TOML text: text without control characters, keys and whole numbers of a
+    sensible size, not too many levels.
 
     Raises
     ------

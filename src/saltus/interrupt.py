@@ -38,12 +38,12 @@ class Interrupted(KeyboardInterrupt):
 
     @property
     def partial(self) -> Any:
-        """What was finished, as the function returns it; None if nothing was."""
+        """The finished part of the result, as the function returns it; None if there is none."""
         return self._assemble and self._assemble()
 
     @property
     def has_partial(self) -> bool:
-        """Whether anything was finished."""
+        """True if a part was finished."""
         return self._assemble is not None
 
     def then(self, result: Callable[[Any], Any]) -> Interrupted:
@@ -148,14 +148,12 @@ class Stop:
         self._asked.set()
 
     def is_set(self) -> bool:
-        """Whether it was made."""
+        """True if it was made."""
         return self._asked.is_set() or (self._outer is not None and self._outer.is_set())
 
     @property
     def inside(self) -> bool:
-        """Whether the work is part of other work, which Ctrl-C asks to stop and
-        doesn't interrupt.
-        """
+        """True if the work is part of other work, which Ctrl-C asks to stop, not interrupts."""
         return self._outer is not None and (self._outer._works or self._outer.inside)
 
     def hold(self) -> None:

@@ -71,7 +71,7 @@ class Unit:
 
     @property
     def turns(self) -> Fraction:
-        """How many of its radians are turns: the exponent of Hz."""
+        """Number of its radians that are rotations: the exponent of Hz."""
         return self.parts.get("Hz", Fraction(0))
 
     def convert(self, number: Decimal, other: Unit) -> Decimal:

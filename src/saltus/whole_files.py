@@ -12,12 +12,12 @@ import hashlib
 import json
 import os
 import time
-from collections.abc import Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, SaltusError
 
 #: Age [s] from which on nobody is writing a draft any more.
 ABANDONED = 86_400.0
@@ -45,15 +45,44 @@ def put(path: Path, data: bytes, draft: Path, *, lasting: bool = True, mode: int
     OSError
         If it can't be written. What stood under the name before stays, and no draft.
     """
-    try:
+    with drafted([path], [draft], lasting=lasting):
         write(draft, data, lasting=lasting, mode=mode)
-        if lasting:
-            rename([draft], [path])
-        else:
+
+
+@contextmanager
+def drafted(
+    paths: Sequence[Path], drafts: Sequence[Path], *, lasting: bool = True
+) -> Iterator[None]:
+    """Within, drafts are written, which take the names of ``paths`` together at the end, in this
+    order: the last one tells that the others are complete.
+
+    Where ``lasting``, each draft must be on the disk by then. If anything fails, what stood under
+    the names before stays, and no draft.
+    """
+    try:
+        yield
+        for draft, path in zip(drafts, paths, strict=True):
             os.replace(draft, path)
+        if lasting:
+            flush(paths[-1].parent)
     finally:
-        with suppress(OSError):  # of a killed process it stays, and is swept away later
-            draft.unlink(missing_ok=True)
+        for draft in drafts:
+            with suppress(OSError):  # of a killed process it stays, and is swept away later
+                draft.unlink(missing_ok=True)
+
+
+@contextmanager
+def refused_as(error: type[OSError], what: str, advice: str) -> Iterator[None]:
+    """Within, what the disk refuses is raised as ``error``, such as "PATH can't be written: no
+    space left on device. Free some space."
+    """
+    try:
+        yield
+    except SaltusError:
+        raise
+    except OSError as refused:
+        reason = refused.strerror or refused
+        raise error(f"{what}: {reason}. {advice}") from refused
 
 
 def write(path: Path, data: bytes, *, lasting: bool = True, mode: int = 0o666) -> None:
@@ -64,17 +93,6 @@ def write(path: Path, data: bytes, *, lasting: bool = True, mode: int = 0o666) -
         file.flush()
         if lasting:
             os.fsync(file.fileno())
-
-
-def rename(drafts: Iterable[Path], paths: Iterable[Path]) -> None:
-    """Give drafts that are on the disk their names, in this order, and wait until the last of these
-    is there too.
-    """
-    path = None
-    for draft, path in zip(drafts, paths, strict=True):
-        os.replace(draft, path)
-    if path is not None:
-        flush(path.parent)
 
 
 def flush(path: Path) -> None:
@@ -109,17 +127,16 @@ def seal(values: Mapping[str, Any]) -> bytes:
     return _text({**values, "checksum": sha256(_text(values))})
 
 
-def unseal(data: bytes) -> dict[str, Any] | None:
-    """What :func:`seal` was given; None if one bit of it is not what it was."""
+def unseal(data: bytes | None, **identity: object) -> dict[str, Any] | None:
+    """What :func:`seal` was given; None if one bit of it is not what it was, there is no data, or
+    the values of ``identity`` don't stand in it: it belongs somewhere else then.
+    """
     try:
-        values = json.loads(data)
-        return (
-            values
-            if seal({name: value for name, value in values.items() if name != "checksum"}) == data
-            else None
-        )
+        values = json.loads(data or b"")
+        whole = seal({name: value for name, value in values.items() if name != "checksum"}) == data
     except (ValueError, AttributeError, RecursionError):
         return None
+    return values if whole and identity.items() <= values.items() else None
 
 
 def _text(values: Mapping[str, Any]) -> bytes:

@@ -189,7 +189,7 @@ def test_a_result_is_a_dataset_of_its_kind_in_which_all_has_units(verb):
     assert isinstance(found, Result)
     kind = schema.kind_of(found)
     if verb != "transmissibility":  # which adds two variables to a response
-        assert f"sl.{verb}" in schema.MAKERS[kind].split(" or ")
+        assert f"sl.{verb}" in schema.KINDS[kind].makers.split(" or ")
     schema.check(found, caller=f"sl.{verb}", kinds=(kind,))
     for name, variable in found.variables.items():
         assert isinstance(variable.attrs["units"], str), name
@@ -218,6 +218,25 @@ def test_a_result_says_where_it_comes_from(verb):
 @every
 def test_asked_again_in_other_units_it_is_the_same_to_the_bit(verb):
     assert file_hash(numbers(given(verb, "in units"))) == file_hash(numbers(given(verb)))
+
+
+@every
+def test_a_result_says_in_lines_and_in_rows_what_it_holds(verb):
+    found = given(verb)
+    kind = schema.KINDS[schema.kind_of(found)]
+    lines = kind.account(found)
+    assert lines
+    assert set(lines) <= set(sl.describe(found).splitlines())
+    tables = kind.rows("what it holds", found)
+    assert tables[0].title == "what it holds"
+    for table in tables:
+        assert table.columns
+        assert {len(row) for row in table.rows} <= {len(table.columns)}
+        assert len(table.data) - 1 >= len(table.rows)
+
+
+def test_every_kind_of_result_is_given_by_a_verb():
+    assert {schema.kind_of(given(verb)) for verb in VERBS} == set(schema.NAMES)
 
 
 @every

@@ -33,12 +33,12 @@ from saltus.analysis.basins.serial import found_data
 from saltus.cli.commands import app
 from saltus.kernels import status as st
 from saltus.results import load
+from saltus.results.kinds.basins import rows
 from saltus.results.store.store import Store
-from saltus.study.answers.basins_rows import attractor_table
+from saltus.study.read import parse
 from saltus.study.run import maps
 from saltus.study.run.maps import compute, finish, open_store
 from saltus.study.run.running import Resources
-from saltus.study.tables.read import parse
 from small_maps import small_maps
 from small_study import maps_of, small_study
 
@@ -60,7 +60,7 @@ saltus.analysis.basins.pipeline.CHUNK = 24
 saltus.analysis.basins.pipeline.SCOUTS, saltus.analysis.basins.pipeline.CHECKED = 64, 64
 
 if __name__ == "__main__":  # a process of --workers computes chunks only
-    import saltus.plot, saltus.study.run.maps, saltus.study.tables.read, saltus.study.run.study
+    import saltus.plot, saltus.study.run.maps, saltus.study.read, saltus.study.run.study
     from saltus.cli import main
     from saltus.results.store.store import Store
 
@@ -653,4 +653,4 @@ def test_a_poison_cell_hurts_only_itself(healthy, poisoned, start, method, label
     told = (
         f"{int((poisoned_.basin == label).sum())} starts {'escaped' if label == -1 else 'failed'}:"
     )
-    assert told in " ".join(attractor_table("a", poisoned_).notes)
+    assert told in " ".join(rows("a", poisoned_)[0].notes)

@@ -15,10 +15,10 @@ from typer.testing import CliRunner
 from faults.mutated_studies import ROOT, SEEDS, mutated
 from saltus.cli.commands import app
 from saltus.errors import SaltusError, StudyError
-from saltus.study.answers.ask import questions_of
+from saltus.study.ask import questions_of
+from saltus.study.read import parse, read
 from saltus.study.run.copies import keep_copy
 from saltus.study.setting.inputs import Input, Inputs
-from saltus.study.tables.read import parse, read
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="pipes and links are POSIX")
 HEAD = (

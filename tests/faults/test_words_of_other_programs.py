@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 import saltus as sl
 from saltus.cli.commands import app
 from saltus.errors import SaltusWarning
-from saltus.study.tables.read import parse
+from saltus.study.read import parse
 
 rig = sl.models.delangre("b", force="4 N", frequency="15 Hz")
 COUNT = itertools.count(1)

@@ -19,10 +19,10 @@ from saltus.analysis.basins.basins import label_all
 from saltus.analysis.basins.labels import Settling
 from saltus.analysis.motion.settled import settled
 from saltus.results import load
+from saltus.study.read import parse, read
 from saltus.study.run import maps
 from saltus.study.run.running import Resources
 from saltus.study.run.study import run_study
-from saltus.study.tables.read import parse, read
 from small_study import maps_of
 
 FOLDER = Path(__file__).parents[2] / "replications" / "saunders2021"

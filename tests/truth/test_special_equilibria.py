@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import saltus as sl
-from saltus.analysis.branches.special_equilibria import boundary_equilibrium, fold_point, hopf_point
+from saltus.analysis.branches.criticality import first_lyapunov
+from saltus.analysis.branches.rests import Rests
 
 
 @sl.system(states="x y")
@@ -23,21 +24,48 @@ def cusp(t, x, v, *, load=-0.3, damping=0.5):
     return v, load - damping * v + x - x**3
 
 
+def events(system, vary, start, kind):
+    """The parameter, states and eigenvalues at the events of a kind."""
+    found = sl.branches(system, vary, start, at=2, switch=(), progress=False)
+    found = found.isel(event=np.flatnonzero(found.event_kind.values == kind))
+    (name,) = vary
+    states = np.stack([found[f"event_{state}"].values[:, 0] for state in system.states], axis=1)
+    own = found.event_eigenvalue_real.values + 1j * found.event_eigenvalue_imag.values
+    return found[f"event_{name}"].values, states, own, found.event_outcome.values
+
+
+def coefficient(system, name, state, scale=None):
+    """The first Lyapunov coefficient at a Hopf point."""
+    scale = np.ones(len(state) + 1) if scale is None else np.append(scale, 1.0)
+    rests, z = Rests(system, name, scale[None]), np.append(state, system.values[name])
+    rests.accepted(z[None], np.zeros(1, np.int64))
+    return first_lyapunov(rests, 0, z)
+
+
 def test_the_hopf_point_of_the_valve():
-    valve = sl.models.relief_valve(flow=8.0)
-    found = hopf_point(valve, "flow", np.array([2.2, 0.0, 12.0]))
-    assert found.value == pytest.approx(8.4911176351833271, rel=1e-13)
-    assert found.frequency == pytest.approx(3.0907088479743406, rel=1e-13)
-    assert found.state[0] * np.sqrt(found.state[2]) == pytest.approx(found.value, rel=1e-13)
+    start = {"x": 2.5, "v": 0.0, "pressure": 12.5}
+    value, state, own, _ = events(sl.models.relief_valve(), {"flow": (8.2, 9.0)}, start, "hopf")
+    assert value == pytest.approx([8.4911176351833271], rel=1e-13)
+    assert own[0, 0].imag == pytest.approx(3.0907088479743406, rel=1e-13)
+    assert state[0, 0] * np.sqrt(state[0, 2]) == pytest.approx(value[0], rel=1e-13)
 
 
 @pytest.mark.parametrize("cubic", [-1.0, 0.7])
 def test_the_coefficient_of_the_normal_form(cubic):
     """x + iy = sqrt(2) z for a unit eigenvector, so |z|^2 z has the coefficient 2 cubic."""
-    found = hopf_point(normal_form.with_values(cubic=cubic), "mu", np.array([0.01, 0.02]))
-    assert found.value == pytest.approx(0.0, abs=1e-15)
-    assert found.frequency == pytest.approx(2.0, rel=1e-14)
-    assert found.coefficient == pytest.approx(2 * cubic / 2.0, rel=1e-12)
+    system = normal_form.with_values(cubic=cubic, mu=0.0)
+    found, frequency = coefficient(system, "mu", np.zeros(2))
+    assert frequency == pytest.approx(2.0, rel=1e-14)
+    assert found == pytest.approx(2 * cubic / 2.0, rel=1e-12)
+
+
+def test_the_normal_form_loses_its_rest_at_zero():
+    value, _, own, outcome = events(
+        normal_form, {"mu": (-0.1, 0.15)}, {"x": 0.01, "y": 0.02}, "hopf"
+    )
+    assert value == pytest.approx([0.0], abs=1e-15)
+    assert own[0, 0].imag == pytest.approx(2.0, rel=1e-14)
+    assert outcome.tolist() == ["supercritical"]
 
 
 @sl.system(states="x v")
@@ -47,38 +75,41 @@ def skewed(t, x, v, *, mu=0.0, square=1.0, product=0.5):
 
 def test_the_coefficient_tells_the_size_of_the_cycle_with_square_terms():
     """|z|^2 = -(mu/2)/l1, and x = sqrt(2) |z| cos t to first order."""
-    found = hopf_point(skewed, "mu", np.array([0.01, 0.0]))
+    found, _ = coefficient(skewed, "mu", np.zeros(2))
     mu = 1e-3
     cycle = sl.attractors(skewed.with_values(mu=mu), [0.05, 0.0], every=6.0)
     x = cycle.attractor_x.values[0]
     size = 0.5 * (np.nanmax(x) - np.nanmin(x))
     assert cycle.attractor_type.item() == "limit_cycle"
-    assert size == pytest.approx(np.sqrt(mu / -found.coefficient), rel=1e-2)
+    assert size == pytest.approx(np.sqrt(mu / -found), rel=1e-2)
 
 
 def test_lorenz_loses_its_rest_to_an_unstable_cycle():
     """rho = sigma (sigma + beta + 3)/(sigma - beta - 1), subcritical (Marsden & McCracken 1976)."""
-    found = hopf_point(lorenz, "rho", np.array([7.8, 7.8, 23.0]))
+    start = {"x": 7.8, "y": 7.8, "z": 23.0}
+    value, _, own, outcome = events(lorenz, {"rho": (20.0, 26.0)}, start, "hopf")
     sigma, beta = 10.0, 8 / 3
     rho = sigma * (sigma + beta + 3) / (sigma - beta - 1)
-    assert found.value == pytest.approx(rho, rel=1e-13)
-    assert found.frequency == pytest.approx(np.sqrt(beta * (sigma + rho)), rel=1e-13)
-    assert found.coefficient > 0
+    np.testing.assert_allclose(value, rho, rtol=1e-13)  # on both sides
+    np.testing.assert_allclose(own[:, 0].imag, np.sqrt(beta * (sigma + rho)), rtol=1e-13)
+    assert set(outcome) == {"subcritical"}
 
 
-def test_the_unit_of_a_state_changes_no_point():
-    points = [
-        hopf_point(lorenz, "rho", np.array([7.8, 7.8, 23.0]), np.array(scale))
-        for scale in ([1.0, 1.0, 1.0], [1e-3, 10.0, 1e3])
-    ]
-    assert points[0].value == pytest.approx(points[1].value, rel=1e-12)
-    assert points[1].coefficient > 0
+def test_the_unit_of_a_state_changes_no_sign_of_the_coefficient():
+    sigma, beta = 10.0, 8 / 3
+    rho = sigma * (sigma + beta + 3) / (sigma - beta - 1)
+    rest = np.array([np.sqrt(beta * (rho - 1))] * 2 + [rho - 1])
+    for scale in ([1.0, 1.0, 1.0], [1e-3, 10.0, 1e3]):
+        found, frequency = coefficient(lorenz.with_values(rho=rho), "rho", rest, scale)
+        assert found > 0
+        assert frequency == pytest.approx(np.sqrt(beta * (sigma + rho)), rel=1e-12)
 
 
 def test_a_fold_of_equilibria_is_where_the_cubic_turns():
-    found = fold_point(cusp.with_values(load=0.35), "load", np.array([-0.65, 0.0]))
-    assert found.value == pytest.approx(2 / (3 * np.sqrt(3)), rel=1e-13)
-    assert found.state[0] == pytest.approx(-1 / np.sqrt(3), rel=1e-13)
+    value, state, _, _ = events(cusp, {"load": (-0.6, 0.6)}, {"x": 1.0, "v": 0.0}, "fold")
+    order = np.argsort(value)
+    np.testing.assert_allclose(value[order], 2 / (3 * np.sqrt(3)) * np.array([-1, 1]), rtol=1e-13)
+    np.testing.assert_allclose(state[order, 0], np.array([1, -1]) / np.sqrt(3), rtol=1e-13)
 
 
 def test_a_diagram_has_the_hopf_point_of_the_valve_to_rounding():
@@ -89,18 +120,22 @@ def test_a_diagram_has_the_hopf_point_of_the_valve_to_rounding():
 
 
 def test_the_valve_closes_where_nothing_flows():
-    valve = sl.models.relief_valve(flow=0.5)
-    found = boundary_equilibrium(valve, "flow", 0, np.array([0.2, 0.0, 10.0]))
-    assert found.value == pytest.approx(0.0, abs=1e-14)
-    np.testing.assert_allclose(found.state, [0.0, 0.0, 10.0], atol=1e-13)
+    start = {"x": 0.2, "v": 0.0, "pressure": 10.0}
+    value, state, _, _ = events(
+        sl.models.relief_valve(), {"flow": (-0.1, 1.0)}, start, "boundary_equilibrium"
+    )
+    assert value == pytest.approx([0.0], abs=1e-14)
+    np.testing.assert_allclose(state[0], [0.0, 0.0, 10.0], atol=1e-13)
 
 
 def test_chuas_circuit_meets_a_kink_where_its_slopes_say():
     """x = (m1 - m0)/(1 + m1) is the outer equilibrium; it is 1 for m0 = -1."""
-    circuit = sl.models.double_scroll(inner_slope=-1.2)
-    number = [guard.name for guard in circuit.guards].index("x = 1")
-    found = boundary_equilibrium(circuit, "inner_slope", number, np.array([1.5, 0.0, -1.5]))
-    assert found.value == pytest.approx(-1.0, rel=1e-13)
+    start = {"x": 1.5, "y": 0.0, "z": -1.5}
+    value, state, _, _ = events(
+        sl.models.double_scroll(), {"inner_slope": (-1.3, -0.9)}, start, "boundary_equilibrium"
+    )
+    np.testing.assert_allclose(value, -1.0, rtol=1e-13)
+    np.testing.assert_allclose(np.abs(state[:, 0]), 1.0, rtol=1e-13)
 
 
 def test_nothing_is_found_where_nothing_is():
@@ -108,5 +143,7 @@ def test_nothing_is_found_where_nothing_is():
     def free(t, x, v, *, stiffness=1.0, damping=0.1):
         return v, -stiffness * x - damping * v
 
-    assert hopf_point(free.with_values(damping=3.0), "stiffness", np.zeros(2)) is None
-    assert hopf_point(free, "damping", np.zeros(2)).value == pytest.approx(0.0, abs=1e-14)
+    overdamped, start = free.with_values(damping=3.0), {"x": 0.1, "v": 0.0}
+    assert not len(events(overdamped, {"stiffness": (0.5, 2.0)}, start, "hopf")[0])
+    value = events(free, {"damping": (-0.1, 0.2)}, start, "hopf")[0]
+    assert value == pytest.approx([0.0], abs=1e-14)

@@ -9,7 +9,7 @@ from scipy.optimize import root
 
 import saltus as sl
 from saltus.analysis.closed.cycles import find_cycles, returns
-from saltus.analysis.closed.field_zeros import find_equilibria
+from saltus.analysis.closed.field_zeros import captured, find_equilibria
 from saltus.flow.maps import Stroboscope
 
 FAST = sl.Taylor(order=12, lanes=2)
@@ -194,10 +194,11 @@ def test_a_guess_at_several_turns_gives_one_turn():
 
 def test_an_unstable_equilibrium_is_found_and_captures_nothing():
     family = Stroboscope(planar, FAST, np.array([[1.0, 1.0, 1.0], [-1.0, 1.0, 1.0]]), 1.0)
-    found = find_equilibria(family, np.full((2, 2), 0.01), np.ones((2, 2)))
-    np.testing.assert_allclose(found.place, 0.0, atol=1e-12)
+    near, scale = np.full((2, 2), 0.01), np.ones((2, 2))
+    found = find_equilibria(family, near, scale)
+    np.testing.assert_allclose(found.points[:, 0], 0.0, atol=1e-12)
     assert found.stable.tolist() == [False, True]
-    assert found.holds(np.full((2, 2), 0.01)).tolist() == [False, True]
+    assert captured(family, found, near, scale).tolist() == [False, True]
 
 
 @pytest.mark.parametrize("every", [0.3, 2 * np.pi / 5, 4.0])

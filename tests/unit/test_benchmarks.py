@@ -69,3 +69,44 @@ def test_what_it_costs_to_begin(monkeypatch):
     ]
     assert all(0 < inside < cpu and wall > 0 for _, cpu, inside, wall in rows)
     assert startup.engine.run is plain
+
+
+@pytest.fixture
+def releases(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT)
+    from benchmarks import releases
+
+    return releases
+
+
+def test_a_release_has_one_row_a_machine(releases, monkeypatch, tmp_path):
+    file = tmp_path / "releases.csv"
+    assert releases.as_text(releases.kept(file)).startswith("no release")
+    monkeypatch.setattr(releases, "MEASURED", {"map [s]": (lambda: 1.25, ".1f")})
+    for version, machine in (("0.1", "a"), ("0.2", "a"), ("0.2", "b"), ("0.2", "a")):
+        monkeypatch.setattr(releases.sl, "__version__", version)
+        monkeypatch.setattr(releases, "machine", lambda machine=machine: machine)
+        releases.keep(releases.measured(), file)
+    rows = releases.kept(file)
+    assert [(row["version"], row["machine"]) for row in rows] == [
+        ("0.1", "a"),
+        ("0.2", "b"),
+        ("0.2", "a"),
+    ]
+    assert {row["map [s]"] for row in rows} == {"1.2"}
+    assert releases.as_text(rows).splitlines()[1].split()[0] == "0.1"
+
+
+def test_a_column_that_is_new_is_empty_in_older_rows(releases, tmp_path):
+    file = tmp_path / "releases.csv"
+    releases.keep({"version": "0.1", "machine": "a"}, file)
+    releases.keep({"version": "0.2", "machine": "a", "map [s]": "1.2"}, file)
+    assert [row["map [s]"] for row in releases.kept(file)] == ["", "1.2"]
+    assert "1.2" in releases.as_text(releases.kept(file))
+
+
+def test_all_that_a_release_takes_can_be_measured(releases, monkeypatch):
+    monkeypatch.setattr(releases.compile, "measured", lambda *_: (0.5, 0.6))  # takes long, else
+    small = {"import [s]": (1,), "period [us]": (32,), "map [s]": (4,), "diagram [s]": (3,)}
+    for name, (measure, form) in releases.MEASURED.items():
+        assert float(format(measure(*small.get(name, ())), form)) > 0, name

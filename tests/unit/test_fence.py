@@ -110,7 +110,7 @@ def test_long_values_are_cut():
 
 def test_a_terminal_obeys_nothing(capsys):
     from saltus.cli import screen
-    from saltus.study.table import TextTable
+    from saltus.results.table import TextTable
 
     screen.say("a\x1b]0;owned\x07b")
     screen.fail("c\x1b[31m")

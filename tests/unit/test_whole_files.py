@@ -2,10 +2,13 @@
 
 import os
 import stat
+from pathlib import Path
 
 import pytest
 
+import saltus
 from saltus import whole_files
+from saltus.errors import CacheError
 
 
 def test_a_file_is_whole_and_private_as_asked(tmp_path):
@@ -40,3 +43,24 @@ def test_what_is_to_last_is_on_the_disk_before_its_name_is(tmp_path, monkeypatch
     monkeypatch.setattr(os, "replace", lambda *both: (steps.append("name"), replace(*both)))
     whole_files.put(tmp_path / "a", b"whole", tmp_path / ".a.part")
     assert steps == ["flush", "name"] + ["flush"] * (os.name != "nt")
+
+
+def test_what_the_disk_refuses_is_said_once_in_words():
+    class RefusedError(OSError):
+        pass
+
+    def refused(error):
+        with whole_files.refused_as(RefusedError, "a can't be written", "Make room."):
+            raise error
+
+    with pytest.raises(RefusedError, match=r"a can't be written: No space left\. Make room\."):
+        refused(OSError(28, "No space left"))
+    with pytest.raises(CacheError, match=r"^own words$"):
+        refused(CacheError("own words"))
+
+
+def test_no_other_file_gives_a_draft_its_name():
+    """A draft that takes its name elsewhere may not be on the disk by then."""
+    root = Path(saltus.__file__).parent
+    naming = [file.name for file in root.rglob("*.py") if "os.replace(" in file.read_text("utf-8")]
+    assert naming == ["whole_files.py"]

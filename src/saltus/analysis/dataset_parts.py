@@ -55,14 +55,14 @@ def subject(
     guards: Guards | None = None,
     varied: Mapping[str, Any] | None = None,
 ) -> Subject:
-    """What a Dataset of this system is about."""
+    """The subject of a Dataset of this system."""
     return Subject(system.states, system.units, attrs, guards, gap_unit(system), varied or {})
 
 
 def trajectories(
     system: System, method: Method, group: Ensemble, forcing_period: float | np.ndarray | None
 ) -> Subject:
-    """What the Datasets of some trajectories are about."""
+    """The subject of Datasets of some trajectories."""
     return Subject(
         states=system.states, units=system.units, guards=guards(system, group), varied=group.varied,
         batch=group.batch,
@@ -72,7 +72,7 @@ def trajectories(
 
 
 def endings(outcome: Outcome, counters: Iterable[str] = st.COUNTERS) -> dict[str, Any]:
-    """How each trajectory ended, and what was counted on the way."""
+    """The end of each trajectory, and the counters on its way."""
     status = {"status": [st.STATUS[int(code)][0] for code in outcome.status]}
     return status | {name: outcome.counters[:, st.COUNTERS.index(name)] for name in counters}
 

@@ -1,5 +1,5 @@
-"""What to tell people about trajectories that didn't end well: what, how many, where first, and
-what to do next.
+"""Messages about trajectories that didn't end well: the kind of end, their number, the first place,
+and advice.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ def messages(run: xr.Dataset, asked: Span | None = None, system: System | None =
 
 
 def _is_finite(run: xr.Dataset, index: int, system: System | None) -> bool:
-    """Whether the state at the end of a trajectory, and its parameters, are numbers."""
+    """True if the state at the end of a trajectory, and its parameters, are numbers."""
     place = run.isel(trajectory=index) if "trajectory" in run.dims else run
     names = [f"end_{name}" for name in str(run.attrs["states"]).split()]
     names += [] if system is None else system.values
@@ -130,7 +130,9 @@ def _where(run: xr.Dataset, index: int) -> str:
 
 
 def _outlook(run: xr.Dataset, asked: Span, index: int) -> str:
-    """How many steps the whole run of a trajectory takes, if it goes on as it began."""
+    """The number of steps that the whole run of a trajectory takes at its pace so far, as a
+    sentence.
+    """
     place = run.isel(trajectory=index) if "trajectory" in run.dims else run
     whole = asked.count[index] * asked.period[index] + asked.phase[index]
     done, steps = place["end_time"].item() - asked.t_start, place["steps"].item()
@@ -144,8 +146,8 @@ def _outlook(run: xr.Dataset, asked: Span, index: int) -> str:
 
 
 def _singular(run: xr.Dataset, asked: Span, index: int, system: System) -> str:
-    """That no number of steps leads on, if the equations change far faster where a trajectory
-    stands than the rest of its time is long.
+    """A sentence about a singular point if the equations change far faster at a trajectory's end
+    than its remaining time allows; "" if they don't.
     """
     place, time, state, values = _end(run, index, system)
     rest = asked.t_start + asked.count[index] * asked.period[index] + asked.phase[index] - time
@@ -173,7 +175,7 @@ def _singular(run: xr.Dataset, asked: Span, index: int, system: System) -> str:
 
 
 def _surfaces(run: xr.Dataset, index: int, system: System | None) -> str:
-    """On which boundaries a trajectory stands at its end, and what would follow it."""
+    """The boundaries on which a trajectory ends, and a method that follows it, as a sentence."""
     if run.attrs.get("method", "Taylor") != "Taylor":
         return "sl.Taylor(), the default, follows the motion along such a boundary. "
     if system is None:
@@ -188,7 +190,9 @@ def _surfaces(run: xr.Dataset, index: int, system: System | None) -> str:
 
 
 def _root(run: xr.Dataset, index: int, system: System) -> str:
-    """That a root of the equations is zero where a trajectory stands, and what to write instead."""
+    """A sentence about a root of the equations that is zero where a trajectory ends, with a remedy;
+    "" if none is.
+    """
     _, time, state, values = _end(run, index, system)
     gaps = set(walk(*(guard.gap for guard in system.guards)))
     roots = [node for node in walk(*gaps, *system.field) if node.op == "sqrt" and varies(node)]

@@ -25,7 +25,7 @@ from saltus.whole_files import ABANDONED, is_older
 #: Suffixes of the names of entries, by content.
 KERNEL, HASH = ".kernel", ".hash"
 _CALLED = {KERNEL: "compiled kernel", HASH: "hash of the code"}
-#: Age from which the hash of code is one of old code [s].
+#: Age from which a hash of code counts as old [s].
 _OLD = 30 * ABANDONED
 
 
@@ -40,8 +40,8 @@ class Entry:
 
 
 def folder() -> Path:
-    """``$SALTUS_CACHE``, a ``~`` at its beginning being the home folder as in a shell; else
-    saltus's folder in the user's cache.
+    """The folder of the cache: ``$SALTUS_CACHE`` with ``~`` for the home folder, else saltus's
+    folder in the user's cache.
     """
     chosen = os.environ.get("SALTUS_CACHE")
     return (
@@ -60,7 +60,7 @@ def kernels() -> list[Entry]:
 
 
 def clear() -> int:
-    """Delete every entry and every unfinished one; returns how many kernels there were."""
+    """Delete every entry and every unfinished one; return the number of kernels."""
     found = kernels()
     for path in folder().iterdir() if folder().is_dir() else ():
         old = (path / "kernels.py").exists() and (path / "manifest.json").exists()
@@ -77,7 +77,7 @@ def _delete(path: Path) -> None:
 
 
 def read(key: str, kind: str = KERNEL) -> bytes | None:
-    """What an entry holds, None if there is none that can be used; a warning says why not."""
+    """The bytes of an entry, None if there is none that can be used; a warning says why not."""
     final = folder() / (key + kind)
     try:
         return entry.read(final) if _usable() else None
@@ -89,16 +89,16 @@ def read(key: str, kind: str = KERNEL) -> bytes | None:
 
 
 def keep(key: str, title: str, data: bytes, kind: str = KERNEL) -> None:
-    """Write an entry, where that can be done.
+    """Write an entry, if possible.
 
     Parameters
     ----------
     key : str
         Its name.
     title : str
-        What `saltus cache` shows for it.
+        Its title in `saltus cache`.
     data : bytes
-        What it holds.
+        Its content.
     kind : str
         :data:`KERNEL` or :data:`HASH`.
     """
@@ -114,33 +114,33 @@ def keep(key: str, title: str, data: bytes, kind: str = KERNEL) -> None:
 
 
 def _usable() -> bool:
-    """Whether the folder can be used, made if it isn't there; a warning says why not."""
-    place = folder()
+    """True if the folder can be used, made if it doesn't exist; a warning says why not."""
+    directory = folder()
     try:
-        place.mkdir(parents=True, exist_ok=True, mode=0o700)
-        entry.check_folder(place)
+        directory.mkdir(parents=True, exist_ok=True, mode=0o700)
+        entry.check_folder(directory)
     except entry.NotOurs as why:
         _warn(
-            f"saltus: the folder of compiled kernels {place} {why}, so whoever writes there could "
-            f"run code as you. It isn't used: kernels "
+            f"saltus: the folder of compiled kernels {directory} {why}, so whoever writes there "
+            f"could run code as you. It isn't used: kernels "
             "are compiled for this process only. Close it (chmod go-w), or set SALTUS_CACHE to a "
             "folder of yours."
         )
         return False
     except OSError as error:
-        _cannot_write(place, error)
+        _cannot_write(directory, error)
         return False
     return True
 
 
-def _sweep(place: Path) -> None:
-    """Delete what processes left unfinished that were killed long ago, and hashes of old code."""
+def _sweep(directory: Path) -> None:
+    """Delete unfinished entries of processes that were killed long ago, and hashes of old code."""
     for pattern, age in ((f"{entry.DRAFT}*", ABANDONED), (f"*{HASH}", _OLD)):
-        _sweep_older(place, pattern, age)
+        _sweep_older(directory, pattern, age)
 
 
-def _sweep_older(place: Path, pattern: str, age: float) -> None:
-    for path in place.glob(pattern):
+def _sweep_older(directory: Path, pattern: str, age: float) -> None:
+    for path in directory.glob(pattern):
         try:
             if is_older(path, age):
                 _delete(path)
@@ -148,10 +148,10 @@ def _sweep_older(place: Path, pattern: str, age: float) -> None:
             continue
 
 
-def _cannot_write(place: Path, error: OSError) -> None:
+def _cannot_write(directory: Path, error: OSError) -> None:
     _warn(
-        f"saltus: {place} can't be written ({error.strerror or error}); kernels are compiled for "
-        f"this process only. "
+        f"saltus: {directory} can't be written ({error.strerror or error}); kernels are compiled "
+        f"for this process only. "
         "Set SALTUS_CACHE to a folder of yours with free space."
     )
 

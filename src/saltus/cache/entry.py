@@ -1,5 +1,5 @@
-"""One entry of the cache: a file that is read whole, through one handle, and believed only if its
-owner and its checksum say so.
+"""One entry of the cache: a file that is read at once, through one handle, and used only if its
+owner and its checksum are right.
 
 What stands in it is code. So it counts only if it is a regular file of this user (or of the
 administrator) that nobody else may write to; that is asked of the opened file, so nothing can be
@@ -17,13 +17,13 @@ from pathlib import Path
 
 from saltus.whole_files import put, sha256
 
-#: First word of an entry; another one is another format.
+#: First word of an entry; it differs for other formats.
 FORMAT = "saltus-kernel/1"
 #: Prefix of the names of unfinished entries.
 DRAFT = ".building-"
-#: Largest entry [bytes]: some hundred times those of the largest equations.
+#: Largest entry [bytes]: some hundred times the size for the largest equations.
 MOST = 1 << 28
-#: Bits of a mode with which others than the owner may write.
+#: Permission bits with which others than the owner may write.
 _GROUP, _OTHERS = stat.S_IWGRP, stat.S_IWOTH
 
 
@@ -32,7 +32,7 @@ class NotOurs(Exception):  # noqa: N818  (a finding about a file, not an error)
 
 
 class Damaged(Exception):  # noqa: N818
-    """An entry that isn't as it was written."""
+    """An entry that was changed after it was written."""
 
 
 def check_ours(seen: os.stat_result) -> None:
@@ -49,8 +49,8 @@ def check_ours(seen: os.stat_result) -> None:
 
 
 def _private_group(group: int, user: int) -> bool:
-    """Whether a group is this user's own and holds nobody else: the common default, with which
-    users' files are writable to it.
+    """True if a group belongs to this user alone. That is the common default, with files writable
+    to the group.
     """
     import grp
     import pwd
@@ -67,8 +67,8 @@ def _private_group(group: int, user: int) -> bool:
 
 
 def check_folder(folder: Path) -> None:
-    """Raise NotOurs unless a folder, and the link that stands for it if there is one, are this
-    user's alone; OSError if it isn't there.
+    """Raise NotOurs unless a folder, and the link to it if there is one, belong to this user alone;
+    OSError if it doesn't exist.
     """
     link = os.lstat(folder)
     if (
@@ -105,20 +105,20 @@ def read(path: Path) -> bytes:
     header, data = _split(_content(path))
     try:
         fields = json.loads(header)
-        whole = (
+        intact = (
             fields["format"] == FORMAT
             and fields["key"] == path.stem
             and fields["sha256"] == sha256(data)
         )
     except (ValueError, KeyError, TypeError, RecursionError):
-        whole = False
-    if not whole:
+        intact = False
+    if not intact:
         raise Damaged("is damaged")
     return data
 
 
 def title_of(path: Path) -> str:
-    """What an entry was made for, for a list of them."""
+    """The title of an entry, for a list of entries."""
     try:
         return str(json.loads(_split(_content(path))[0])["title"])
     except (OSError, NotOurs, Damaged, ValueError, KeyError, TypeError, RecursionError):
@@ -157,7 +157,7 @@ def _split(content: bytes) -> tuple[bytes, bytes]:
 
 
 def remove(path: Path) -> None:
-    """Delete a file if it can be done."""
+    """Delete a file, if possible."""
     with contextlib.suppress(OSError):
         if os.name == "nt":  # read-only files can't be deleted there
             os.chmod(path, 0o600)

@@ -1,5 +1,5 @@
-"""The command `saltus`. No logic here: read what was typed, call :mod:`saltus.study`, show the
-tables that it returns.
+"""The command `saltus`. It contains no logic: it reads the arguments, calls :mod:`saltus.study`,
+and prints the tables that come back.
 
 This module imports typer and nothing else that is heavy, so that ``saltus --help`` is there at
 once; each command imports its own modules.
@@ -14,9 +14,7 @@ from saltus.interrupt import EXIT_CODE, ctrl_c_waits, no_ctrl_c_is_lost
 
 
 def main() -> None:
-    """Entry point of the command. Ctrl-C ends it with a word wherever it comes, while modules are
-    imported too.
-    """
+    """Entry point of the command. Ctrl-C ends it with a word at any time, also during imports."""
     _replace_closed_streams()
     # pictures go to files; a window needs what a terminal may not have
     os.environ["MPLBACKEND"] = "Agg"
@@ -31,8 +29,8 @@ def main() -> None:
 
 
 def _replace_closed_streams() -> None:
-    """Discard output to a closed standard stream (``>&-``); else the next file opened would take
-    its place.
+    """Discard output to a closed standard stream (``>&-``); otherwise the next opened file would
+    take its number.
     """
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         try:

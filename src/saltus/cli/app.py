@@ -1,4 +1,6 @@
-"""The application without its commands, which register on it: how errors and Ctrl-C end it."""
+"""The application without its commands, which register on it, and the handling of errors and
+Ctrl-C.
+"""
 
 from __future__ import annotations
 
@@ -12,15 +14,17 @@ from typer.core import TyperGroup
 from saltus.errors import SaltusError
 from saltus.interrupt import EXIT_CODE
 
-#: Exit code where what was asked for can't be done as asked.
+#: Exit code if the task can't be done as asked.
 REFUSED = 2
 
 
 class Commands(TyperGroup):
-    """Runs a command; ends errors of ours, and Ctrl-C, with a message instead of a traceback."""
+    """Runs a command; ends saltus's own errors, and Ctrl-C, with a message instead of a
+    traceback.
+    """
 
     def invoke(self, ctx: Any) -> Any:
-        """Run the command that was typed."""
+        """Run the command."""
         from saltus.cli import screen
 
         try:
@@ -72,7 +76,7 @@ app = typer.Typer(
 def version(
     version: bool = typer.Option(False, "--version", help="Print the version and stop."),
 ) -> None:
-    """Print the version if it is asked for."""
+    """Print the version if asked for."""
     if version:
         from importlib import metadata
 

@@ -14,10 +14,10 @@ from saltus.cli.app import app as app
 from saltus.errors import StudyError
 
 if TYPE_CHECKING:
+    from saltus.results.table import TextTable
     from saltus.study.run.running import Resources
     from saltus.study.setting.inputs import Inputs
-    from saltus.study.table import TextTable
-    from saltus.study.tables.spec import Study
+    from saltus.study.tables.study import Study
     from saltus.system import System
 
 
@@ -52,7 +52,7 @@ class Kind(StrEnum):
 
 
 class Progress(StrEnum):
-    """How progress is shown."""
+    """Displays of the progress."""
 
     bar = "bar"
     json = "json"
@@ -106,6 +106,7 @@ def demo(
     from saltus.cli import demo as study
     from saltus.cli import screen
     from saltus.results import save, usable_folder
+    from saltus.results.files.sheets import write_table
 
     usable_folder(out)
     files = study.prepare_files(plot)
@@ -114,7 +115,7 @@ def demo(
         result = study.demo(frequency, case.value, force, periods, progress)
     files.join()
     screen.show(result.table)
-    written = [save(result.run, out / "demo.nc"), result.table.write_csv(out / "demo.csv")]
+    written = [save(result.run, out / "demo.nc"), write_table(result.table, out / "demo.csv")]
     if plot:
         written.append(study.draw(result, out / "demo.png"))
     screen.files(written)
@@ -162,15 +163,15 @@ def run(
     from saltus.cli.own_system import check_beside, own_system
     from saltus.results import usable_folder
     from saltus.results.files.atomic import no_folder_left
+    from saltus.study.read import read
     from saltus.study.setting.inputs import Inputs
-    from saltus.study.tables.read import read
 
     spec, text = read(study)
     for place in inputs or []:
         if not place.is_dir():
             raise StudyError(f"--inputs {place}: there is no such folder.")
-    own = own_system(system) if system else None
-    if own is None and spec.system.model is None and not spec.system.rates:
+    user_system = own_system(system) if system else None
+    if user_system is None and spec.system.model is None and not spec.system.rates:
         check_beside(study)
     resources = _resources(spec, threads, workers, scheduler, shard)
     folder = out or Path("saltus-runs") / study.stem
@@ -178,7 +179,7 @@ def run(
     again = _again(folder, system)
     with no_folder_left(folder):
         usable_folder(folder)
-        _run(spec, text, folder, found, own, only or [], resources, progress, again)
+        _run(spec, text, folder, found, user_system, only or [], resources, progress, again)
 
 
 def _resources(
@@ -186,7 +187,7 @@ def _resources(
 ) -> Resources:
     from saltus.study.run.running import Resources, shard_of
 
-    if spec.basins is None and (workers or scheduler or shard):
+    if "basins" not in dict(spec.questions()) and (workers or scheduler or shard):
         raise StudyError(
             "--workers, --scheduler and --shard are for studies of basins; this one "
             "has no [basins]. Leave them out."
@@ -195,9 +196,8 @@ def _resources(
 
 
 def _run(
-    spec: Study, text: str, folder: Path, inputs: Inputs, own: System | None, only: list[str],
-    resources: Resources, progress: Progress,
-    again: str,
+    spec: Study, text: str, folder: Path, inputs: Inputs, user_system: System | None,
+    only: list[str], resources: Resources, progress: Progress, again: str,
 ) -> None:  # fmt: skip
     from saltus.cli import screen
     from saltus.study.run.study import run_study
@@ -205,7 +205,7 @@ def _run(
     try:
         with screen.reporting(progress.value) as (report, say):
             outcome = run_study(
-                spec, text, folder, own, resources, report, say, inputs=inputs, only=only
+                spec, text, folder, user_system, resources, report, say, inputs=inputs, only=only
             )
     except KeyboardInterrupt:
         screen.fail(f"stopped; results so far are stored. Go on with: {again}")
@@ -218,7 +218,7 @@ def _run(
 
 
 def _again(folder: Path, system: str) -> str:
-    """The command that goes on, with the system of one's own that the study was run with."""
+    """The command that resumes the study, with the user's own system if there is one."""
     return shlex.join(["saltus", "resume", str(folder), *(["--system", system] if system else [])])
 
 
@@ -258,18 +258,18 @@ def resume(
     Example: `saltus resume saltus-runs/fig6b`
     """
     from saltus.cli.own_system import own_system
+    from saltus.study.read import read
     from saltus.study.run.copies import copy_of, inputs_of
-    from saltus.study.tables.read import read
 
     spec, text = read(copy_of(store))
-    own = own_system(system) if system else None
+    user_system = own_system(system) if system else None
     resources = _resources(spec, threads, workers, scheduler, shard)
     _run(
         spec,
         text,
         store,
         inputs_of(store, text),
-        own,
+        user_system,
         only or [],
         resources,
         progress,
@@ -350,7 +350,7 @@ def reproduce(
 
     from saltus import replication
     from saltus.cli import screen
-    from saltus.study.table import TextTable
+    from saltus.results.table import TextTable
 
     if not paper:
         screen.show(
@@ -403,9 +403,9 @@ def models(
 
 
 def _models_table(width: int) -> TextTable:
-    """A line for each model; sources are cut where the screen ends."""
+    """A line for each model; sources are cut to the width of the screen."""
     from saltus import models as published
-    from saltus.study.table import TextTable
+    from saltus.results.table import TextTable
 
     systems = {name: model() for name, model in published.MODELS.items()}
     left = max(width - max(map(len, systems)) - len("  states  contacts  "), 20)
@@ -452,7 +452,7 @@ def schema() -> None:
     """
     import json
 
-    from saltus.study.tables.spec import Study
+    from saltus.study.spec import Study
 
     typer.echo(json.dumps(Study.model_json_schema(), indent=2, ensure_ascii=False))
 
@@ -481,7 +481,7 @@ def cache_show() -> None:
     """
     from saltus import cache as entries
     from saltus.cli import screen
-    from saltus.study.table import TextTable
+    from saltus.results.table import TextTable
 
     rows = tuple(
         (entry.name[:12], entry.system, f"{entry.size_bytes / 1e6:.2f}")

@@ -1,5 +1,5 @@
-"""The demo: one rig, six starts, what each settles to, and whether a start one nanometre away
-settles to the same.
+"""The demo: one rig, six starts, the response that each settles to, and that of starts one
+nanometre away.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ import numpy as np
 
 from saltus.analysis.motion.settled import LAST, settled
 from saltus.results.dataset.schema import period_text
-from saltus.study.answers.simulate_rows import response_texts
-from saltus.study.table import Column, TextTable, quantity, table, words
+from saltus.results.table import Column, TextTable, quantity, table, words
+from saltus.study.answers.simulate import response_texts
 from saltus.units import from_si
 
 if TYPE_CHECKING:
@@ -26,18 +26,20 @@ if TYPE_CHECKING:
 
 #: Callable that takes the share done, or None.
 Progress = Callable[[float], None] | None
-#: Starts (x [m], v [m/s]): the four that Saunders et al. (2021), Fig. 5, name; then 1.9 mm, which
-#: reaches the 4T that they report from 2 mm (there the outcome changes from one nanometre to the
-#: next); and a high one, which reaches the T-periodic response.
+#: Starts (x [m], v [m/s]): the four of Saunders et al. (2021), Fig. 5; then 1.9 mm, which reaches
+#: the 4T that they report from 2 mm (there the outcome changes from one nanometre to the next); and
+#: a high one, which reaches the T-periodic response.
 STARTS = ((1.0e-3, 0.0), (0.2e-3, 0.0), (0.4e-3, 0.0), (2.0e-3, 0.0), (1.9e-3, 0.0), (4.0e-3, 0.3))
-#: Distance [m] of the neighbours that are started on either side: less than any experiment can set.
+#: Distance [m] of the neighbouring starts on either side: less than any experiment can set.
 NEIGHBOUR = 1e-9
-#: Long enough for the slowest of them, 24T from x = 0.4 mm, to repeat to ten digits.
+#: Periods to run: enough for the slowest response, 24T from x = 0.4 mm, to repeat to ten digits.
 PERIODS = 2000
-#: Forcing periods drawn in a time history, and in the phase portrait of a response that doesn't
-#: repeat.
-SHOWN, SHOWN_IF_APERIODIC = 12, 24
-#: Room about the panels, in shares of the figure: to look for it takes longer than to draw.
+#: Forcing periods drawn in a time history.
+SHOWN = 12
+#: Forcing periods drawn in the phase portrait of a response that doesn't repeat.
+SHOWN_IF_APERIODIC = 24
+#: Margins of the panels, in shares of the figure: fixed, since searching them takes longer than
+#: drawing.
 MARGINS = {
     "left": 0.075, "right": 0.985, "bottom": 0.075, "top": 0.975, "hspace": 0.6, "wspace": 0.36,
 }  # fmt: skip
@@ -45,18 +47,18 @@ MARGINS = {
 
 @dataclass(frozen=True)
 class Demo:
-    """What the demo computed.
+    """The results of the demo.
 
     Attributes
     ----------
     run : Dataset
         The motions, a trajectory for each start.
     settled : Dataset
-        What they settled to.
+        The responses that they settled to.
     neighbours : array of int, shape (2, trajectory)
         Periods of the responses from one nanometre to either side, 0 if none was found.
     table : TextTable
-        What to print.
+        The table to print.
     """
 
     run: xr.Dataset
@@ -72,7 +74,7 @@ def demo(
     periods: int = PERIODS,
     progress: Progress = None,
 ) -> Demo:
-    """Move the rig from six starts, and from their neighbours, until it settles.
+    """Run the rig from six starts, and from their neighbours, until it settles.
 
     Parameters
     ----------
@@ -109,13 +111,13 @@ def demo(
 
 
 def prepare_files(plot: bool) -> threading.Thread:
-    """Begin to import what the files need, in a thread to be joined before they are written: while
-    the demo computes, or waits for another process to compile, a processor is free.
+    """Import the modules for the files in a thread, which is joined before they are written. A
+    processor is free while the demo computes, or waits for another process to compile.
     """
 
     def imported() -> None:
         for begin in (_netcdf, _fonts) if plot else (_netcdf,):
-            with contextlib.suppress(Exception):  # `save` or `draw` meets it again, and says it
+            with contextlib.suppress(Exception):  # `save` or `draw` fails again, and reports it
                 begin()
 
     thread = threading.Thread(target=imported, name="imports for the files", daemon=True)
@@ -143,7 +145,7 @@ def _pyplot() -> Any:
 
 
 def _fonts() -> None:
-    """A first picture reads the fonts, which takes as long as a row of the demo's."""
+    """Load the fonts, which takes the first picture as long as a row of the demo's."""
     plt = _pyplot()
     figure = plt.figure(figsize=(1.0, 1.0))
     figure.add_subplot().plot([0.0, 1.0])
@@ -152,8 +154,8 @@ def _fonts() -> None:
 
 
 def draw(result: Demo, file: Path) -> Path:
-    """A row for each start, the time history and the phase portrait of its response; returns the
-    file.
+    """Draw a row for each start, with the time history and the phase portrait of its response;
+    return the file.
     """
     plt = _pyplot()
     from saltus import plot
@@ -235,7 +237,7 @@ def _table(run: xr.Dataset, found: xr.Dataset, neighbours: np.ndarray, title: st
 
 
 def _shifted(n: int, neighbours: list[int]) -> str:
-    """Responses of the neighbours of a start, if it settles itself."""
+    """The responses of the neighbours of a start, if it settles itself."""
     if n == 0:
         return "-"
     return "same" if set(neighbours) == {n} else ", ".join(map(period_text, neighbours))

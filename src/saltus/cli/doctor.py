@@ -1,4 +1,4 @@
-"""What saltus runs on here, and whether its answers are right here: two cases with closed forms."""
+"""The self-check: versions and processor of this installation, and two cases with closed forms."""
 
 from __future__ import annotations
 
@@ -8,16 +8,17 @@ import platform
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from saltus.study.table import TextTable
+from saltus.results.table import TextTable
 
 if TYPE_CHECKING:
     from saltus.flow.methods import Method
     from saltus.system import System
 
-#: x'' = -2 from x = 0, v = 2 meets 0.999 twice in one step, at 1 -+ sqrt(0.001) s.
+#: Contact times [s] of x'' = -2 from x = 0, v = 2 with 0.999: twice in one step, at 1 -+
+#: sqrt(0.001).
 PARABOLA_TIMES = (1 - math.sqrt(0.001), 1 + math.sqrt(0.001))
-#: Largest error [s] of those times that passes: a contact this shallow magnifies the rounding of x
-#: by 1/|v| = 16.
+#: Largest error [s] of those times that passes: so shallow a contact magnifies the rounding of x by
+#: 1/|v| = 16.
 PARABOLA_TOLERANCE = 1e-14
 #: Largest error of an undamped oscillator of unit amplitude after 10 cycles that passes.
 OSCILLATOR_TOLERANCE = 1e-13
@@ -35,7 +36,7 @@ class Check:
 
     @property
     def passed(self) -> bool:
-        """Whether the error is small enough; a NaN is not."""
+        """True if the error is small enough; False for NaN."""
         return self.error <= self.tolerance
 
 
@@ -87,7 +88,7 @@ def check_table(found: list[Check]) -> TextTable:
 
 
 def _parabola(method: Method) -> float:
-    """Largest error of the contact times [s]; infinite if there aren't two."""
+    """Largest error of the contact times [s]; infinite unless there are two."""
     from saltus.analysis.motion.simulate import simulate
 
     run = simulate(

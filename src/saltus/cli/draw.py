@@ -1,14 +1,11 @@
-"""Draw a result that stands in a file."""
+"""Draw the result in a file."""
 
 from __future__ import annotations
 
+import inspect
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from saltus.errors import ParameterError
-
-if TYPE_CHECKING:
-    pass
 
 _WORDS = {
     "trajectory": "a run", "stroboscope": "points at whole periods", "basins": "basins",
@@ -20,8 +17,6 @@ _WORDS = {
     "branches": "branches of periodic orbits", "orbits": "periodic orbits",
     "bifurcation_curve": "a curve of bifurcations", "backbone": "a backbone",
 }  # fmt: skip
-#: Pictures that show trajectories of a batch.
-OF_TRAJECTORIES = ("history", "phase", "section", "spectrum", "impacts", "energy", "exponents")
 
 
 def draw(result: Path, kind: str | None, trajectory: int | None, file: Path | None) -> Path:
@@ -32,7 +27,7 @@ def draw(result: Path, kind: str | None, trajectory: int | None, file: Path | No
     result : Path
         A ``.nc`` file that saltus wrote.
     kind : str, optional
-        Which picture, one of :data:`saltus.plot.choice.PICTURES`; by default the one that fits the
+        Which picture, one of :data:`saltus.plot.choice.TAKES`; by default the one that fits the
         result.
     trajectory : int, optional
         Which of a batch; all of them, at most 8, by default.
@@ -60,12 +55,12 @@ def draw(result: Path, kind: str | None, trajectory: int | None, file: Path | No
     from matplotlib.backend_bases import FigureCanvasBase
 
     from saltus import plot
-    from saltus.plot.choice import PICTURES, default_kind
+    from saltus.plot.choice import default_kind, pictures_of
     from saltus.results import load
     from saltus.results.dataset.schema import kind_of
 
     ds = load(result)
-    possible = PICTURES.get(kind_of(ds), ())
+    possible = pictures_of(kind_of(ds))
     if not possible:
         raise ParameterError(f"{result} holds {kind_of(ds)}, for which there is no picture yet.")
     kind = kind or default_kind(ds)
@@ -74,7 +69,9 @@ def draw(result: Path, kind: str | None, trajectory: int | None, file: Path | No
             f"{result} holds {_WORDS[kind_of(ds)]}: it can't be drawn as {kind}. "
             f"Known: {', '.join(possible)}."
         )
-    if trajectory is not None and kind not in OF_TRAJECTORIES:
+    picture = getattr(plot, kind)
+    of_trajectories = "trajectory" in inspect.signature(picture).parameters
+    if trajectory is not None and not of_trajectories:
         raise ParameterError(
             f"{result} holds {_WORDS[kind_of(ds)]}, no trajectories. Leave --trajectory out."
         )
@@ -85,9 +82,7 @@ def draw(result: Path, kind: str | None, trajectory: int | None, file: Path | No
             f"a picture can't be written as {file.name!r}. Known: "
             f"{', '.join('.' + name for name in sorted(formats))}."
         )
-    axes = getattr(plot, kind)(
-        ds, **({"trajectory": trajectory} if kind in OF_TRAJECTORIES else {})
-    )
+    axes = picture(ds, **({"trajectory": trajectory} if of_trajectories else {}))
     first = axes.flat[0] if hasattr(axes, "flat") else axes
     first.figure.savefig(file)
     plt.close("all")

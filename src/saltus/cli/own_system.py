@@ -1,4 +1,4 @@
-"""A system of one's own, named on the command line: ``my_rig.py:rig``. The only place where saltus
+"""A user's own system, named on the command line: ``my_rig.py:rig``. The only place where saltus
 runs a file of the user's.
 """
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def own_system(reference: str) -> System:
-    """The system that a Python file holds.
+    """The system in a Python file.
 
     Parameters
     ----------
@@ -63,8 +63,8 @@ def own_system(reference: str) -> System:
 
 
 def check_beside(study: Path) -> None:
-    """Raise a StudyError for a study without a system of its own beside which a Python file lies
-    that may hold it: says how the two are run together.
+    """Raise a StudyError for a study without a system of its own if a Python file beside it may
+    hold one: the message says how to run the two together.
     """
     for file in sorted(study.parent.glob("*.py")):
         with suppress(OSError, UnicodeDecodeError):

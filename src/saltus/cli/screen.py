@@ -1,4 +1,4 @@
-"""What the commands print: tables, notes, files, messages."""
+"""The output of the commands: tables, notes, files, messages."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from rich.table import Table
 from saltus.fence import printable
 
 if TYPE_CHECKING:
+    from saltus.results.table import TextTable
     from saltus.study.run.running import Report
-    from saltus.study.table import TextTable
 
-#: Columns assumed where the output isn't a terminal: a table in a log file isn't cut.
+#: Columns assumed if the output isn't a terminal: a table in a log file isn't cut.
 LOG_WIDTH = 220
 
 
@@ -38,7 +38,7 @@ def console(stderr: bool = False) -> Console:
 
 
 def show(table: TextTable) -> None:
-    """Print a table and its notes; row by row where the terminal is too narrow for it."""
+    """Print a table and its notes; row by row if the terminal is too narrow for it."""
     screen = console()
     screen.print(_plain(table.title), style="bold")
     grid = Table(
@@ -71,25 +71,25 @@ def show(table: TextTable) -> None:
 
 
 def say(text: str) -> None:
-    """Print a line as it is."""
+    """Print a line unchanged."""
     console().print(_plain(text))
 
 
 def files(paths: Iterable[Path]) -> None:
-    """Print where files were written."""
+    """Print the paths of written files."""
     for path in paths:
         say(f"wrote {path}")
 
 
 def fail(text: str) -> None:
-    """Print a message of what went wrong to standard error."""
+    """Print an error message to standard error."""
     console(stderr=True).print(f"[bold red]saltus:[/] {_plain(text)}")
 
 
 @contextmanager
 def working() -> Iterator[Callable[[float], None]]:
-    """Show that something is being computed, and afterwards how long it took; yields what to call
-    with the share done.
+    """Show that something is being computed, and afterwards the time it took. Yields a function of
+    the share done.
     """
     begin = time.perf_counter()
     with console(stderr=True).status("working ...") as status:
@@ -99,7 +99,7 @@ def working() -> Iterator[Callable[[float], None]]:
 
 @contextmanager
 def reporting(kind: str) -> Iterator[tuple[Callable[[Report], None], Callable[[str], None]]]:
-    """Show how far questions are; yields what to call with a report, and with a sentence.
+    """Show the progress of questions. Yields a function of a report, and one of a sentence.
 
     ``kind`` "bar" shows a line that changes, "json" prints a JSON object a line to standard error,
     "none" nothing.
@@ -141,9 +141,7 @@ def reporting(kind: str) -> Iterator[tuple[Callable[[Report], None], Callable[[s
 
 
 def _log_lines() -> Callable[[Report], None]:
-    """What to call with reports where standard error is a log: a line now and then for each
-    question.
-    """
+    """A function of reports for standard error in a log: a line now and then for each question."""
     from saltus.flow.progress import Lines
 
     lines: dict[str, Lines] = {}
@@ -174,7 +172,9 @@ def _progress_text(report: Report) -> str:
 
 
 def _plain(text: str) -> str:
-    """A text that is shown as it is: no markup, and nothing that a terminal would obey."""
+    """A text that is shown unchanged: without markup, and without characters that a terminal
+    obeys.
+    """
     return escape(printable(text))
 
 

@@ -1,3 +1,3 @@
-"""From a traced System to its compiled kernels: series, lane code, scalar code, the module on disk
-and its cache.
+"""Compile the kernels of a traced System: series, lane code, scalar code, the module on disk and
+its cache.
 """

@@ -1,4 +1,4 @@
-"""A process that compiles for another one ends when the other has died, even by SIGKILL."""
+"""End a process that compiles for another one when that one has died, even by SIGKILL."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ CHECK_INTERVAL = 0.5
 
 
 def end_with_asker() -> None:
-    """End this process as soon as its parent isn't the process in PARENT_ID any more; go on if none
-    is given.
+    """End this process as soon as its parent isn't the process in PARENT_ID any more; do nothing
+    without a PARENT_ID.
     """
     asker = os.environ.pop(PARENT_ID, "")
     if asker.isdigit():

@@ -1,5 +1,5 @@
-"""Long straight-line functions in blocks: the time that LLVM takes grows faster than the length of
-a function.
+"""Split long straight-line functions into blocks: LLVM's time grows faster than the length of a
+function.
 
 A value that a later block needs goes through memory; the operations and their order are the same,
 so not a digit changes.
@@ -14,7 +14,7 @@ from saltus.errors import TraceError
 
 #: Most lines of a function that isn't split, and lines of a block.
 WHOLE, LENGTH = 1000, 60
-#: Most bytes of the stack for the values that blocks share: threads have 8 MB on Linux, and less
+#: Most bytes of the stack for shared values of blocks: threads have 8 MB on Linux, and less
 #: elsewhere.
 MAX_STACK = 4_000_000
 
@@ -22,7 +22,7 @@ _VALUE = re.compile(r"%r\d+\b")
 
 
 class Line(NamedTuple):
-    """One line of IR; the value that it gives and its type, "" if it gives none."""
+    """One line of IR; its value and the type of that, "" if it has none."""
 
     text: str
     name: str
@@ -77,7 +77,7 @@ def _kinds(parameters: str) -> list[str]:
 
 
 class _Slot(NamedTuple):
-    """Memory of a value: its place, its type, the block that computes it."""
+    """Memory of a value: its index, its type, the block that computes it."""
 
     place: int
     type: str
@@ -85,12 +85,12 @@ class _Slot(NamedTuple):
 
     @property
     def width(self) -> int:
-        """Places that it takes: a pair of vectors, as sine and cosine are, takes two."""
+        """Slots of the value: two for a pair of vectors, as of sine and cosine."""
         return max(self.type.count("double"), 1)
 
 
 def _slots(blocks: list[list[Line]]) -> dict[str, _Slot]:
-    """Places for the values that another block than their own uses."""
+    """Slots of the values that another block than their own uses."""
     home = {
         line.name: (i, line.type) for i, block in enumerate(blocks) for line in block if line.name
     }
@@ -106,8 +106,8 @@ def _slots(blocks: list[list[Line]]) -> dict[str, _Slot]:
 
 
 def _one_block(block: list[Line], i: int, slots: dict[str, _Slot], lanes: int, last: bool) -> str:
-    """The lines of a block: values of others are loaded where they are first used, its own are
-    stored if others use them.
+    """The lines of a block: values of other blocks are loaded at their first use, values that
+    others use are stored.
     """
     out, here = [], set()
     for line in block:

@@ -1,4 +1,4 @@
-"""Compile one object: what a process does that another one started for it (building.py).
+"""Compile one object, in a process that another one started for it (building.py).
 
 Reads ``[template, texts, called symbols, target, whether sizes are open]`` as JSON from standard
 input; writes the object to standard output, or, given a key and a title, to the cache.
@@ -17,7 +17,7 @@ from saltus.codegen.asker import end_with_asker
 if __name__ == "__main__":
     end_with_asker()
     answer = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what anything prints is no part of the answer
+    os.dup2(2, 1)  # printed text is no part of the answer
     template, texts, called, target, open_sizes = json.load(sys.stdin)
     code = building.bitcode(template) if template else None
     made = machine.object_code(

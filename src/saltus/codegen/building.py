@@ -1,4 +1,4 @@
-"""Objects from the cache, or made: here if that takes a moment, by another process if it takes
+"""Objects from the cache, or compiled: in this process if that is quick, in another one if it takes
 long, so that Ctrl-C ends the wait.
 """
 
@@ -30,11 +30,13 @@ from saltus.interrupt import check_stop, ctrl_c_waits
 
 #: Time between two checks for a stop [s].
 CHECK_INTERVAL = 0.1
-#: Seconds of LLVM's work for a million characters of an equation, and for a template, as announced.
+#: Announced times of LLVM [s]: for a million characters of an equation, for a template, and for
+#: lowering templates.
 SECONDS_PER_MEGABYTE, SECONDS_OF_TEMPLATE, SECONDS_OF_LOWERING = 1.0, 2.5, 20.0
-#: Durations from which another process compiles, and from which a compilation is announced [s].
+#: Estimated times [s] above which another process compiles, and above which a compilation is
+#: announced.
 OTHER_PROCESS, ANNOUNCEMENT = 0.5, 1.0
-#: Objects in memory.
+#: Most objects in memory.
 _MAX_OBJECTS = 32
 
 _COMPILING: weakref.WeakSet[subprocess.Popen[bytes]] = weakref.WeakSet()
@@ -45,7 +47,7 @@ _OBJECTS: OrderedDict[str, bytes] = OrderedDict()
 
 @dataclass(frozen=True)
 class Order:
-    """An object that is wanted.
+    """An object to be built.
 
     Attributes
     ----------
@@ -56,7 +58,7 @@ class Order:
     called : tuple of str
         Its symbols that others use.
     title : str
-        What `saltus cache` shows for it.
+        Its title in `saltus cache`.
     said : str
         What is said to be compiled, if it takes long; "" to say nothing.
     open_sizes : bool
@@ -86,7 +88,7 @@ class Order:
 
     @property
     def seconds(self) -> float:
-        """About how long it takes to make on a quiet machine [s]."""
+        """Estimated time to build it on a quiet machine [s]."""
         return sum(map(len, self.texts)) / 1e6 * SECONDS_PER_MEGABYTE + (
             SECONDS_OF_TEMPLATE if self.template in _SLOW else 0.0
         )
@@ -96,7 +98,7 @@ _SLOW = frozenset(name for name in templates.BITCODE if name != "capture")
 
 
 def built(order: Order) -> bytes:
-    """The object of an order, from memory, from the cache, or made now.
+    """The object of an order: from memory, from the cache, or compiled now.
 
     Raises
     ------
@@ -123,8 +125,8 @@ def built(order: Order) -> bytes:
 
 
 def built_to_keep(order: Order) -> bytes:
-    """As :func:`built`, by a process that goes on when this one ends: what took a while to be worth
-    it stands on disk for the next, however short this one was.
+    """The object as from :func:`built`, compiled by a process that outlives this one. An object
+    that took long is then on disk for the next process.
     """
     with _held(_LOCKS[order.key]):
         found = _OBJECTS.get(order.key) or cache.read(order.key)
@@ -143,8 +145,8 @@ def made(order: Order) -> bytes:
 
 
 def bitcode(name: str) -> bytes:
-    """The templates' bitcode: what the package brings, or, if the templates were edited since, made
-    of them now.
+    """The templates' bitcode: that of the package, or bitcode made now if the templates were edited
+    since.
 
     Raises
     ------
@@ -175,7 +177,7 @@ def bitcode(name: str) -> bytes:
 
 @contextmanager
 def _held(lock: threading.Lock) -> Iterator[None]:
-    """Hold a lock; a stop is heeded while waiting for it."""
+    """Hold a lock; a request to stop ends the wait for it."""
     while not lock.acquire(timeout=CHECK_INTERVAL):
         check_stop()
     try:
@@ -201,7 +203,7 @@ def _made_elsewhere(order: Order) -> bytes | None:
 
 
 def _kept_elsewhere(order: Order) -> None:
-    """Compile and store in a process of its own, which nobody ends; returns when it has ended."""
+    """Compile and store in a process of its own, which nobody ends; return when it has ended."""
     with contextlib.suppress(OSError), tempfile.TemporaryFile() as file:
         file.write(_given(order))
         file.seek(0)
@@ -232,8 +234,8 @@ def _environment() -> dict[str, str]:
 
 
 def _answer_of(module: str, options: tuple[str, ...], given: bytes, title: str) -> bytes | None:
-    """What a module writes when it is run by another process and given these bytes; None if there
-    is none, or it doesn't succeed.
+    """The output of a module that another process runs on these bytes; None if there is no process,
+    or it doesn't succeed.
     """
     environment = {**_environment(), PARENT_ID: str(os.getpid())}
     process: subprocess.Popen[bytes] | None = None
@@ -244,14 +246,14 @@ def _answer_of(module: str, options: tuple[str, ...], given: bytes, title: str) 
             file.seek(0)
             with ctrl_c_waits():  # half started, nobody would end it and close its pipe
                 process = subprocess.Popen(
-                    # -P: not what lies in the working folder
+                    # -P: no modules from the working folder
                     [sys.executable, "-P", "-m", module, *options],
                     stdin=file, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment,
                     start_new_session=True,  # Ctrl-C is for this process
                 )  # fmt: skip
                 _COMPILING.add(process)
         data = _wait(process)
-    except OSError:  # no processes here, or none that can be heard
+    except OSError:  # no processes here, or none that can be read
         return None
     finally:
         if process is not None:
@@ -274,7 +276,7 @@ def _wait(process: subprocess.Popen[bytes]) -> bytes:
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    """Whatever has happened, leave no process behind."""
+    """End the process, whatever has happened."""
     if process.poll() is None:
         process.kill()
         process.wait()
@@ -285,7 +287,7 @@ def _end(process: subprocess.Popen[bytes]) -> None:
 
 
 def end_all() -> None:
-    """End what still compiles when this process ends."""
+    """End all compiling processes when this process ends."""
     for process in list(_COMPILING):
         with contextlib.suppress(OSError):
             process.kill()

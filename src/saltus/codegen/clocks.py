@@ -1,5 +1,5 @@
 """The clocks of a system in generated code: the tables of kernels/clocks.py, and the code that
-reads its state.
+reads their state.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ class Clocks:
         }
 
     def function(self) -> str:
-        """``numbers_of_clocks(p, n)``: their numbers, of parameters only."""
+        """Code of ``numbers_of_clocks(p, n)``: the numbers that depend on parameters only."""
         code = ScalarCode(parameter_leaf(self._system))
         for j, numbers in enumerate(self._numbers):
             for i, value in enumerate(code.values(numbers)):
@@ -118,7 +118,7 @@ class Clocks:
 
 
 def _values(roots: Iterable[Expr]) -> Iterator[Expr]:
-    """Every node that has a value in the code: conditions have none."""
+    """Every node that has a value in the code; conditions have none."""
     return ex.walk(*roots, conditions=False)
 
 

@@ -1,5 +1,5 @@
-"""Lane code in two parts: what all columns of a tangent share, and one column, which serves for
-each of them.
+"""Lane code in two parts: shared code of all columns of a tangent, and code of one column, which
+serves for each of them.
 
 The columns of a tangent obey the same equations. Their coefficients - the series of the Jacobian
 along the motion - are worked out once; the lines of one column are a function of their own, called
@@ -17,7 +17,7 @@ _CONSTANT = re.compile(r"(?!load\(y,)\w+\([^()]*\)")
 
 
 class Lines:
-    """Assignments and stores of straight-line lane code, in the order in which they come.
+    """Assignments and stores of straight-line lane code, in order.
 
     What is made of a value of the column belongs to the column. Its code reads shared values from
     rows of ``shared``; constants stand in it themselves.
@@ -38,8 +38,8 @@ class Lines:
         self._of_column: set[str] = set()
 
     def assign(self, names: str, code: str, of_column: bool = False) -> None:
-        """``names = code``, one name or two; belongs to the column if it is said so, or reads what
-        does.
+        """Add ``names = code``, with one name or two. It belongs to the column if ``of_column``, or
+        if it reads a value that does.
         """
         if of_column or not self._of_column.isdisjoint(_VALUE.findall(code)):
             self._of_column.update(names.split(", "))
@@ -50,7 +50,7 @@ class Lines:
             self._constants[names] = code
 
     def do(self, code: str, of_column: bool = False) -> None:
-        """A statement that gives no value."""
+        """Add a statement without a value."""
         if of_column:
             self.column.append(self._in_column(code))
         else:

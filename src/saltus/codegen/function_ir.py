@@ -1,5 +1,5 @@
-"""One function of a generated head as LLVM IR: a translator of the few forms of Python that heads
-are written in.
+"""Translate one function of a generated head to LLVM IR: the few forms of Python in which heads are
+written.
 
 A head is straight-line code on doubles and lanes; the text that runs as plain Python with the JIT
 off is the text that is translated here, so there is one source. Each operation becomes the
@@ -41,7 +41,7 @@ _COMPARE_WHOLE = {
     ast.Eq: "eq",
     ast.NotEq: "ne",
 }
-#: Functions that are instructions of LLVM; the others are those of the C library.
+#: Functions that are instructions of LLVM; the others come from the C library.
 _INTRINSIC = {
     "sin": "sin", "cos": "cos", "exp": "exp", "log": "log", "sqrt": "sqrt", "fabs": "fabs",
     "pow": "pow",
@@ -57,7 +57,7 @@ class Value(NamedTuple):
 
 
 class UntranslatableError(TypeError):
-    """A form of Python that heads aren't written in: a fault of the generator."""
+    """A form of Python in which heads aren't written: a fault of the generator."""
 
 
 def literal(number: float) -> str:
@@ -89,7 +89,7 @@ class _Body:
 
     # -- lines -------------------------------------------------------------------------------------
     def new(self, kind: str, code: str, kind_of_line: str | None = None) -> Value:
-        """A line that gives a value."""
+        """Add a line with a value."""
         name = f"%r{len(self.lines)}"
         self.lines.append(
             Line(f"{name} = {code}", name, kind_of_line or self.types.get(kind, kind))
@@ -97,7 +97,7 @@ class _Body:
         return Value(kind, name)
 
     def do(self, code: str) -> None:
-        """A line that gives none."""
+        """Add a line without a value."""
         self.lines.append(Line(code, "", ""))
 
     def _label(self) -> int:
@@ -106,7 +106,7 @@ class _Body:
 
     # -- conversions -------------------------------------------------------------------------------
     def number(self, value: Value) -> Value:
-        """A whole number as a double; anything else as it is."""
+        """A whole number as a double; any other value unchanged."""
         return (
             self.new(NUMBER, f"sitofp i64 {value.text} to double")
             if value.kind == INTEGER
@@ -114,7 +114,7 @@ class _Body:
         )
 
     def lane(self, value: Value) -> Value:
-        """A number in every lane; a lane as it is."""
+        """A number in every lane; a lane unchanged."""
         if value.kind == LANE:
             return value
         value = self.number(value)
@@ -356,7 +356,7 @@ class _Body:
                 self._give(target, self.value(value))
 
     def _give(self, target: ast.expr, value: Value) -> None:
-        """A value to a name, or to an entry of an array."""
+        """Assign a value to a name, or to an entry of an array."""
         match target:
             case ast.Name(id=name):
                 self.names[name] = value
@@ -414,8 +414,8 @@ class _Body:
                 self.do(f"ret {self.types[found.kind]} {found.text}")
 
     def _helper(self, name: str, arguments: list[ast.expr]) -> None:
-        """Call another function of the head with values and with arrays, whole or
-        from some row on.
+        """Call another function of the head with values and with arrays, whole or from
+        some row on.
         """
         given = []
         for argument in arguments:
@@ -441,7 +441,7 @@ class _Body:
             self.names[name] = self.new(kind, f"extractvalue {pair} {both.text}, {i}")
 
     def _where_any(self, mask: Value, body: list[ast.stmt]) -> None:
-        """Work that is done only if the mask holds in any lane."""
+        """Do work only if the mask holds in any lane."""
         label, before = self._label(), dict(self.names)
         bits = self.new(
             f"i{self.lanes}", f"bitcast {self.types[MASK]} {mask.text} to i{self.lanes}"

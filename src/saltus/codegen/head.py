@@ -1,5 +1,5 @@
-"""The generated head of a method for one equation: numbers and functions that the templates leave
-open.
+"""The generated head of a method for one equation: the numbers and functions that the templates
+leave open.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ Constant = int | float | bool | tuple[int | float, ...]
 
 @dataclass(frozen=True)
 class Head:
-    """What codegen/interface.py names.
+    """The numbers and functions that codegen/interface.py names.
 
     Attributes
     ----------
@@ -26,7 +26,7 @@ class Head:
 
     @property
     def text(self) -> str:
-        """All of it as Python, to stand above the templates."""
+        """The whole head as Python, to be put above the templates."""
         return (
             "\n".join(f"{name} = {value!r}" for name, value in self.constants.items())
             + "\n\n"

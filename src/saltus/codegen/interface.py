@@ -1,5 +1,5 @@
-"""What the generated head of an equation supplies to the templates: sizes, tables, and functions
-with their arguments.
+"""The interface between the generated head of an equation and the templates: sizes, tables, and
+functions with their arguments.
 
 The templates are compiled once, for every equation to come: they read sizes and tables from symbols
 ``saltus_NAME``, and call functions of these names. A new equation brings them (codegen/lane_ir.py).
@@ -12,13 +12,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-#: What an argument of a head's function is: an array of doubles, a whole number, a double.
+#: Types of arguments of a head's function: an array of doubles, a whole number, a double.
 ARRAY, WHOLE, REAL = "ptr", "i64", "double"
 
 
 @dataclass(frozen=True, eq=False)  # each stands for itself
 class Interface:
-    """What the head of one method supplies.
+    """The names that the head of one method supplies.
 
     Attributes
     ----------
@@ -33,9 +33,9 @@ class Interface:
     sizes, flags : tuple of str
         Whole numbers and truth values that the head supplies.
     tables : mapping
-        What the entries of each table are, by its name.
+        Content of each table, by name.
     functions : mapping
-        What the arguments of each function are, by its name.
+        Arguments of each function, by name.
     truths : tuple of str
         Functions that return a truth value; the others return nothing.
     """
@@ -53,7 +53,7 @@ class Interface:
 
 _F1, _F2, _F3 = "float64[::1]", "float64[:, ::1]", "float64[:, :, ::1]"
 _I1, _I2 = "int64[::1]", "int64[:, ::1]"
-#: Types of a batch, the first arguments of every `propagate`, in order (kernels/batch.py), and the
+#: Types of the first arguments of every `propagate`, in order: a batch (kernels/batch.py), and the
 #: budget.
 BATCH = (
     _F1, _F1, _F2, "int64", _F2, _I1, _F1, _I1, _I1, _F2, _I1, _I1, _F1, _I2, _F2,
@@ -66,7 +66,7 @@ _RESET = {"reset": (REAL, ARRAY, ARRAY, ARRAY, WHOLE, WHOLE, WHOLE, ARRAY)}
 _LEVELS = {"levels": (REAL, ARRAY, ARRAY, ARRAY, WHOLE, ARRAY)}
 _SETTLE = {"settle": (REAL, ARRAY, ARRAY, ARRAY, WHOLE, WHOLE)}
 
-#: What the layouts' ``workspace()`` return.
+#: Types of the arrays that the layouts' ``workspace()`` return.
 _TAYLOR_WORK = (_F2,) * 14 + (_I2,) + (_F1, _F2, _F2, _F1, _F1, _F1, _F1, _F2, _F1, _F1)
 
 TAYLOR = Interface(
@@ -135,7 +135,7 @@ def _one_by_one(
     sizes: tuple[str, ...] = (),
     functions: Mapping[str, tuple[str, ...]] = _OF_RATES,
 ) -> Interface:
-    """What the head of a method supplies that runs one trajectory after the other."""
+    """The interface of a method that runs one trajectory after the other."""
     return Interface(
         entry="propagate",
         arguments=(*BATCH, _F1),
@@ -174,7 +174,7 @@ NDF = _one_by_one(
     ("clocks", "rates", *_MATLAB, "ndf"), functions=_OF_RATES | {"jacobian": (REAL,) + (ARRAY,) * 5}
 )
 
-#: The test of capture: nothing of it depends on an equation.
+#: The test of capture, which doesn't depend on an equation.
 CAPTURE = Interface(
     entry="capture",
     arguments=(_F3, _F2, _F3, _I1, _F1, _I1, _I1),

@@ -25,9 +25,9 @@ from saltus.language import expression as ex
 from saltus.language.expression import Expr
 
 MASK_WORDS = ("&", "|", "~")
-#: Terms beyond this one are too small, within a step, for the rounding of 1/k to matter.
+#: Terms beyond this one are so small, within a step, that the rounding of 1/k doesn't matter.
 LAST_EXACT_DIVISOR = 12
-#: Operations, one after the other, in a sine.
+#: Consecutive operations in a sine.
 SINE = 12
 
 
@@ -36,12 +36,12 @@ MOVING = ("select", "held")
 
 
 def held(row: int) -> str:
-    """Code for what a clock holds."""
+    """Code for a row of the clocks' data."""
     return f"load(clock, CLOCK_ROW + {row}, LANES)"
 
 
 class Constants:
-    """Parameter-only values, worked out once per trajectory: each gets a row of the table ``c``."""
+    """Parameter-only values, computed once per trajectory: each gets a row of the table ``c``."""
 
     def __init__(self) -> None:
         self.rows: dict[Expr, int] = {}
@@ -52,7 +52,7 @@ class Constants:
 
 
 def _number(coefficient: Expr) -> float:
-    """A literal coefficient's value, else NaN."""
+    """The value of a literal coefficient, else NaN."""
     return float(coefficient.payload) if coefficient.op == "const" else math.nan
 
 
@@ -66,7 +66,7 @@ class JetCode:
     fields : tuple of Linear
         Their right-hand sides in linear form.
     builder : SeriesBuilder
-        What made them.
+        The builder that made them.
     constants : Constants
         Receives the parameter-only coefficients.
     shared : int, optional
@@ -107,7 +107,7 @@ class JetCode:
         return name
 
     def _wait(self, code: str) -> int:
-        """Operations that must end, one after the other, before this code can begin."""
+        """Number of consecutive operations that must end before this code can begin."""
         return max((self._depth.get(name, 0) for name in re.findall(r"\bs\d+\b", code)), default=0)
 
     def coefficient(self, node: Expr) -> str:
@@ -180,8 +180,8 @@ class JetCode:
         return self._assign(f"{value} * {number!r}")
 
     def _over(self, value: str | None, k: int) -> str | None:
-        """A value over k, rounded once: the rounding of 1/k alone would bend every step the same
-        way, and energy would drift with time.
+        """A value over k, rounded once. The rounding of 1/k alone would have the same sign in every
+        step, and energy would drift with time.
         """
         rest = float(Fraction(1, k) - Fraction(1.0 / k))
         if value is None or rest == 0.0 or k > LAST_EXACT_DIVISOR:
@@ -210,7 +210,7 @@ class JetCode:
         return total
 
     def _term(self, series: Series, coefficient: Expr, k: int) -> tuple[str, Expr] | None:
-        """Coefficient k of a series and its factor: a forcing's amplitude goes into its recurrence,
+        """Coefficient k of a series and its factor. A forcing's amplitude goes into its recurrence,
         once for all k.
         """
         frequency = (
@@ -561,8 +561,8 @@ class JetCode:
         return total
 
     def rounding(self, form: Linear) -> str:
-        """What rounding errors of a linear form are measured by where those of its arguments count:
-        the cosine of an angle next to pi/2 is as wrong as the angle.
+        """Scale of the rounding error of a linear form with the errors of its arguments: the cosine
+        of an angle next to pi/2 is as wrong as the angle.
         """
         total = self._assign(
             f"magnitude({self._as_lane(self.coefficient(form.offset), form.offset)})"
@@ -575,7 +575,7 @@ class JetCode:
         return total
 
     def _rounding(self, series: Series) -> str:
-        """The same of one series, to first order in the errors of its operands."""
+        """The same scale for one series, to first order in the errors of its operands."""
         key = (series, 0, "rounding")
         if key not in self._memo:
             self._memo[key] = self._assign(self._rounding_code(series))

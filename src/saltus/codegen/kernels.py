@@ -1,5 +1,5 @@
-"""The compiled flow of one equation, as the engine calls it: at once with sizes that are read as it
-runs, and made again once it has work.
+"""The compiled flow of one equation for the engine: first with sizes read at run time, compiled
+again once it has work.
 
 Two tiers give the same bits, for they are the same operations in the same order:
 
@@ -35,10 +35,10 @@ from saltus.codegen.lane_ir import constants_ir, equation_ir
 GENERIC, FULL = TIERS = ("generic", "full")
 #: Final tier of a flow.
 STEADY = FULL
-#: Seconds of work before the full tier is compiled: that takes some three seconds of another
+#: Seconds of work after which the full tier is compiled. That takes some three seconds of another
 #: processor, and gains a tenth (the rig) to a half (five modes with two stops).
 STEADY_AFTER = 2.0
-#: Constants that the generic code knows too: loops over them are unrolled.
+#: Constants known to the generic code too, so that loops over them are unrolled.
 _BAKED = (
     "ORDER", "NEWTON_DEGREE_1", "NEWTON_DEGREE_2", "HORNER", "FINER", "SHORTEST",
     "STAGES", "STAGE_TIME", "WEIGHT", "ERROR_WEIGHT", "DENSE_WEIGHT", "RULES",
@@ -46,7 +46,8 @@ _BAKED = (
 _DTYPES = {"float64": np.dtype(np.float64), "int64": np.dtype(np.int64)}
 
 
-#: Where a contiguous array lies, in a quarter of the time of ``array.ctypes``: a call has fifty.
+#: The address of a contiguous array, in a quarter of the time of ``array.ctypes``: a call has
+#: fifty.
 _beginning: Callable[[Any], Any] = ctypes.c_char.from_buffer
 _place: Callable[[Any], int] = ctypes.addressof
 
@@ -59,8 +60,8 @@ def _refused(array: np.ndarray, dtype: np.dtype, axes: int) -> TypeError:
 
 
 class Call:
-    """The arguments of a compiled function as one block of numbers: of each array where it lies,
-    its shape and its strides.
+    """The arguments of a compiled function as one block of numbers: address, shape and strides of
+    each array.
     """
 
     def __init__(self, arguments: tuple[str, ...]) -> None:
@@ -68,7 +69,7 @@ class Call:
             (None if kind == "int64" else _DTYPES[kind.partition("[")[0]], kind.count(",") + 1)
             for kind in arguments
         ]
-        # of each argument the one number that a shape doesn't say: its value, or where it lies
+        # for each argument the number that its shape doesn't contain: its value, or its address
         places, used = [], 0
         for dtype, axes in self._kinds:
             places.append(used if dtype is None else used + 4)
@@ -111,7 +112,7 @@ class Call:
         return block
 
     def _of_shapes(self, shapes: tuple[tuple[int, ...], ...]) -> np.ndarray:
-        """The block of arrays of some shapes, but for where they lie."""
+        """The block for arrays of some shapes, without their addresses."""
         numbers: list[int] = []
         given = iter(shapes)
         for dtype, _ in self._kinds:
@@ -130,13 +131,13 @@ class Kernels:
     Parameters
     ----------
     interface : Interface
-        What the templates leave open.
+        The names that the templates leave open.
     template : str
         Name of their bitcode.
     head : Head
-        What the equation supplies.
+        The numbers and functions of the equation.
     title : str
-        What `saltus cache` shows for it.
+        Its title in `saltus cache`.
     what : str
         What is said to be compiled, if that takes long.
 
@@ -158,22 +159,22 @@ class Kernels:
         self._own = Call(interface.arguments[len(BATCH) :])
         self._worked, self._asked = 0.0, threading.Lock()
         self._memory = threading.local()
-        self._kept: list[machine.Loaded] = []  # what has been called once may be running
+        self._kept: list[machine.Loaded] = []  # a function that was called may still be running
         self.tier = ""
         order = self._order(STEADY)
         found = cache.read(order.key)
         self._begin(STEADY, [found]) if found is not None else self.exchange(GENERIC)
 
     def __getattr__(self, name: str) -> Any:
-        """What the layout says: CARRY, STEP_RECORDS."""
+        """Names of the layout, such as CARRY and STEP_RECORDS."""
         try:
             return self.__dict__["_layout"][name]
         except KeyError:
             raise AttributeError(f"{type(self).__name__} has no {name!r}") from None
 
     def workspace(self) -> tuple[np.ndarray, ...]:
-        """The memory that one call works in; one set for each thread, made once: many a call takes
-        no longer than making it.
+        """The work arrays of one call; one set for each thread, made once: many calls take no
+        longer than making it.
         """
         memory = self._memory
         if not hasattr(memory, "arrays"):
@@ -187,7 +188,7 @@ class Kernels:
         return self._run(self._block(values))
 
     def bound(self, *values: Any) -> Callable[[], int]:
-        """The call with these arrays, as often as it is wanted, on this thread."""
+        """A call with these arrays, to be repeated as often as wanted, on this thread."""
         block = self._block(values)
 
         def call() -> int:
@@ -196,7 +197,7 @@ class Kernels:
         return call
 
     def _run(self, block: np.ndarray, _: tuple[Any, ...] = ()) -> int:
-        """Call with a block of arguments; the arrays that it names are alive meanwhile."""
+        """Call with a block of arguments, while the arrays in it are alive."""
         begun = time.perf_counter()
         answer = int(self._entry(_place(_beginning(block))))
         self._worked += time.perf_counter() - begun
@@ -211,7 +212,7 @@ class Kernels:
         return answer
 
     def _block(self, values: tuple[Any, ...]) -> np.ndarray:
-        """The arguments of a call; where those of the workspace lie is known."""
+        """The arguments of a call; the addresses of the workspace are known."""
         rest = len(values) - len(self._own)
         given, own = values[rest:], getattr(self._memory, "arrays", ())
         known = len(own) > 0 and all(a is b for a, b in zip(given, own, strict=True))
@@ -219,14 +220,14 @@ class Kernels:
         return np.concatenate([self._call.block(values[:rest]), behind])
 
     def exchange(self, tier: str) -> None:
-        """Go on with another tier, made here if it isn't on disk. The next call uses it; a call
+        """Change to another tier, made here if it isn't on disk. The next call uses it; a call
         under way ends as it began.
         """
         self._begin(tier, [built(order) for order in self._orders(tier)])
 
     def _settle(self) -> None:
-        """In a thread that no Ctrl-C of the caller's work ends. What goes wrong here costs speed,
-        no result.
+        """Compile the full tier in a thread that no Ctrl-C of the caller's work ends. A failure
+        here costs speed, no result.
         """
         with contextlib.suppress(Exception):
             self._begin(STEADY, [built_to_keep(order) for order in self._orders(STEADY)])
@@ -240,7 +241,7 @@ class Kernels:
         self.tier = tier
 
     def _orders(self, tier: str) -> list[Order]:
-        """The objects that a tier is made of."""
+        """The objects of a tier."""
         return [self._order(tier)] if tier == FULL else [self._order(tier), self._equation()]
 
     def _order(self, tier: str) -> Order:
@@ -282,8 +283,8 @@ def layout_of(interface: Interface, constants: dict[str, Constant]) -> dict[str,
 def _open_constants(
     interface: Interface, constants: dict[str, Constant], layout: dict[str, Any]
 ) -> dict[str, Constant]:
-    """Everything that the templates read: sizes, flags, tables, and what the layout works out from
-    them.
+    """All constants that the templates read: sizes, flags, tables, and the values that the layout
+    derives from them.
     """
     names = [*interface.sizes, *interface.flags, *interface.tables]
     return {name: constants[name] for name in names} | {

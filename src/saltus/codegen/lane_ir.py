@@ -21,12 +21,12 @@ from saltus.codegen.function_ir import (
 from saltus.codegen.head import Constant
 from saltus.codegen.interface import REAL, WHOLE, Interface
 
-#: Functions whose arrays hold a lane in each row; those of the others hold numbers.
+#: Functions whose arrays hold a lane in each row; arrays of the others hold numbers.
 OF_LANES = ("jets", "rates")
 
 
 def _part_by_part(tree: ast.FunctionDef, signature: Signature, lanes: int, name: str) -> str:
-    """A function that calls another for so many lanes of each row after the other."""
+    """A function that calls another for a few lanes of each row at a time."""
     arguments = [argument.arg for argument in tree.args.args]
     lines = []
     for first in range(0, signature.row, lanes):
@@ -110,11 +110,11 @@ def equation_ir(
     constants : mapping
         Its sizes and tables.
     interface : Interface
-        What the templates call.
+        The functions and names that the templates use.
     lanes : int
         Trajectories in a row.
     register : int, optional
-        How many of them a register holds. Default: all.
+        Number of them in a register. Default: all.
     """
     part = min(register or lanes, lanes)
     shared, declared = _trigonometry(part)

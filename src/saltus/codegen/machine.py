@@ -1,5 +1,5 @@
-"""Machine code: LLVM modules made into objects for this processor, and objects loaded and called.
-The only place that drives LLVM.
+"""Machine code: LLVM modules compiled to objects for this processor, and objects loaded and called.
+The only module that drives LLVM.
 """
 
 from __future__ import annotations
@@ -15,27 +15,29 @@ import llvmlite.binding as llvm
 
 from saltus.errors import CacheError, ParameterError, nearest, shown
 
-#: Rises when the same templates and equations would be made into other code: entries of the cache
-#: carry it in their names.
+#: Version of the code made from the same templates and equations; it is part of the names of cache
+#: entries.
 PIPELINE = 4
-#: LLVM's level for a template, and for an equation alone: that is straight lines of lanes, of which
-#: level 3 makes nothing faster (0026).
+#: LLVM's level for a template, and for an equation alone: straight lines of lanes, which level 3
+#: doesn't make faster (0026).
 LEVEL, LEVEL_ALONE = 3, 1
-#: Only one thread at a time: LLVM keeps modules in one context.
+#: Lock on LLVM: it keeps modules in one context.
 _LLVM = threading.Lock()
 _NUMBER = itertools.count()
 
 
 class Target(NamedTuple):
-    """What code is made for: platform, processor, and its features, such as ``+avx2,-avx512f``."""
+    """The target of compilation: platform, processor, and its features, such as
+    ``+avx2,-avx512f``.
+    """
 
     triple: str
     processor: str
     features: str
 
 
-#: Levels of x86-64 that ``$SALTUS_PROCESSOR`` may name, and features of this machine without which
-#: their code would crash.
+#: Levels of x86-64 that ``$SALTUS_PROCESSOR`` may name, and the features of this machine that their
+#: code needs.
 LEVELS = {
     "x86-64": (), "x86-64-v2": ("sse4.2", "popcnt"), "x86-64-v3": ("avx2", "fma", "bmi2"),
     "x86-64-v4": ("avx512f", "avx512dq", "avx512bw", "avx512vl"),
@@ -44,8 +46,8 @@ LEVELS = {
 
 @cache
 def target() -> Target:
-    """The machine at hand; ``$SALTUS_PROCESSOR``, such as ``x86-64-v3``, names an older processor
-    of its family instead.
+    """The machine at hand, or an older processor of its family named by ``$SALTUS_PROCESSOR``, such
+    as ``x86-64-v3``.
 
     Raises
     ------
@@ -80,7 +82,7 @@ def register_width() -> int:
 
 
 def versions() -> tuple[str, ...]:
-    """Versions of what makes the code."""
+    """Versions of the packages that make the code."""
     import llvmlite
 
     return (llvmlite.__version__, ".".join(map(str, llvm.llvm_version_info)), str(PIPELINE))
@@ -103,7 +105,7 @@ def object_code(
     texts : sequence of str
         LLVM IR: constants that the template leaves open, functions that it calls.
     called : collection of str
-        What others refer to; the rest is this object's own.
+        Symbols that others refer to; the rest is this object's own.
     chosen : Target, optional
         Default: this machine.
     open_sizes : bool
@@ -148,17 +150,17 @@ def _target_machine(made_for: Target, level: int = LEVEL) -> llvm.TargetMachine:
 
 
 def _optimise(module: llvm.ModuleRef, machine: llvm.TargetMachine, level: int) -> None:
-    """LLVM's passes. Lanes are vectors already: nothing is to be made into vectors, least of all
-    sums of doubles.
+    """Run LLVM's passes, without vectorising: lanes are vectors already, and sums of doubles must
+    keep their order.
     """
     builder = llvm.create_pass_builder(machine, _options(level))
     builder.getModulePassManager().run(module, builder)
 
 
 def _optimise_open(module: llvm.ModuleRef, machine: llvm.TargetMachine) -> None:
-    """Passes for a template whose sizes are open: LLVM's own for each function, and few across
-    functions. Its pipeline for modules takes three times as long: it follows pointers to functions,
-    of which there are none, and simplifies everything twice (0028).
+    """Run the passes for a template whose sizes are open: LLVM's own for each function, and few
+    across functions. Its pipeline for modules takes three times as long: it follows pointers to
+    functions, of which there are none, and simplifies everything twice (0028).
     """
     options = _options(LEVEL_ALONE)
     options.loop_unrolling, options.inlining_threshold = False, 0
@@ -203,14 +205,14 @@ def _jit() -> llvm.LLJIT:
 
 
 class Loaded(NamedTuple):
-    """A function in memory: its address, and what keeps it there."""
+    """A function in memory: its address, and the objects that keep it there."""
 
     address: int
     keeper: Any
 
 
 def loaded(objects: Sequence[bytes], symbol: str) -> Loaded:
-    """Objects that refer to one another and to the C library, in memory, and the address of one
+    """Load objects that refer to one another and to the C library, and return the address of one
     function.
 
     Raises

@@ -1,4 +1,4 @@
-"""The flows of a system, compiled; with the JIT off the same templates as plain Python."""
+"""The compiled flows of a system; with the JIT off the same templates as plain Python."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from saltus.system.quantity import acting_guards
 
 #: Modes that a step of the modal flow holds in a lane each.
 MODAL_LANES = templates.BITCODE["modal"][1]
-#: Above the templates when they are run as plain Python.
+#: Text above the templates when they run as plain Python.
 _PREAMBLE = """
 import math
 import numpy as np
@@ -46,24 +46,24 @@ from saltus.kernels.trigonometry import sincos, turned
 
 
 class Flow(Protocol):
-    """What the engine needs of a compiled flow."""
+    """The part of a compiled flow that the engine needs."""
 
-    #: Columns of `carry`; records that one step may write at most.
+    #: Columns of `carry`; most records of one step.
     CARRY: int
     STEP_RECORDS: int
 
     def workspace(self) -> tuple[np.ndarray, ...]:
-        """The memory that one call works in; one set for each thread."""
+        """The work arrays of one call; one set for each thread."""
 
     def propagate(self, *values: Any) -> int:
         """Move the trajectories of a batch (kernels/batch.py)."""
 
     def bound(self, *values: Any) -> Callable[[], int]:
-        """The same with these arrays, as often as it is wanted, on this thread."""
+        """A repeatable call of :meth:`propagate` with these arrays, on this thread."""
 
 
 def jit_disabled() -> bool:
-    """Whether ``SALTUS_DISABLE_JIT=1`` asks for plain Python: slow, for debuggers and for the
+    """True if ``SALTUS_DISABLE_JIT=1`` asks for plain Python: slow, for debuggers and for the
     coverage of the kernels.
     """
     return os.environ.get("SALTUS_DISABLE_JIT", "0") not in ("", "0")
@@ -93,7 +93,7 @@ def taylor_module(system: System, order: int, lanes: int) -> Flow:
         return _flow(TAYLOR, f"taylor_{lanes}", head, title, f"{_described(system)} for Taylor")
 
 
-#: Name of each other method: templates, their bitcode, and the numbers that they are given.
+#: Templates, bitcode, and numbers of each other method, by name.
 _STEPS: dict[str, tuple[Interface, str, Mapping[str, Constant]]] = {
     "ODE45": (PAIR, "pair", tableaux.DORMAND_PRINCE),
     "ODE23": (PAIR, "pair", tableaux.BOGACKI_SHAMPINE),
@@ -141,7 +141,9 @@ def modal_module() -> Any:
 
 
 def _described(system: System) -> str:
-    """What is compiled, for people who wait: a verb of its own compiles an equation of its own."""
+    """The compiled system in words for the user who waits: a verb that extends the equation says
+    so.
+    """
     if system.tangent_of is not None:
         return f"the tangent flow of {system.name}"
     return (
@@ -152,7 +154,7 @@ def _described(system: System) -> str:
 
 
 def _sized(system: System) -> str:
-    """What is compiled, and how large it is."""
+    """The compiled system in words, with its size."""
     operations = sum(1 for _ in walk(*system.field, *expressions_of(system.guards)))
     return f"{_described(system)} ({len(system.guards)} boundaries, {operations} operations)"
 
@@ -166,7 +168,7 @@ def _flow(interface: Interface, template: str, head: Head, title: str, what: str
 
 
 def _interpreted(interface: Interface, head: Head) -> ModuleType:
-    """Head and templates as plain Python, each template under its own file name so that coverage
+    """Head and templates as plain Python, each template under its own file name, so that coverage
     and debuggers see it.
     """
     module = ModuleType(f"saltus_{interface.entry}")

@@ -29,7 +29,7 @@ def series_module(system: System, order: int) -> ModuleType:
 
 @lru_cache(maxsize=256)
 def _plain(head: str) -> ModuleType:
-    """A head and the templates of a step as a Python module, its lanes whole arrays."""
+    """A head and the templates of a step as a Python module, with whole arrays for lanes."""
     module = ModuleType(f"saltus_series_{hashlib.sha256(head.encode()).hexdigest()[:32]}")
     names = module.__dict__
     names |= {

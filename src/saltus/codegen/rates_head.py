@@ -1,5 +1,5 @@
 """The generated head of the methods that run one trajectory after the other: the right-hand side in
-the user's own order of operations, split by what changes when.
+the user's own order of operations, split by dependence.
 
 Parameter-only parts are worked out once a trajectory (``prepare``), time-only parts once a stage
 time (``drive``): the same operations on the same numbers, so not a digit changes, but the cosine of
@@ -50,8 +50,8 @@ def _level(node: Expr) -> int:
 
 
 class _Stages:
-    """Leaves for the state-dependent code: whatever doesn't depend on the state is read from ``c``
-    or ``q``.
+    """Leaves of the state-dependent code: everything that doesn't depend on the state is read from
+    ``c`` or ``q``.
     """
 
     def __init__(self, system: System) -> None:
@@ -79,14 +79,14 @@ class _Stages:
 def _with_sides(
     system: System, stages: _Stages, roots: Iterable[Expr], *, of_mode: bool = False
 ) -> ScalarCode:
-    """Code that first takes from the state the sides that the roots ask about; ``of_mode``: from
-    the bits of the mode, unless that is negative.
+    """Code that first determines the sides that the roots need from the state; with ``of_mode``
+    from the bits of the mode, unless that is negative.
     """
     roots = list(roots)
     asked = {g for root in roots for g in _asked_by(root)}
     code = ScalarCode(stages.state_leaf, side=lambda i: f"b{i}", switch=stages.clocks.side)
     waiting = list(asked)
-    while waiting:  # gaps ask about sides too, to any depth
+    while waiting:  # gaps need sides too, to any depth
         more = _asked_by(system.guards[waiting.pop()].gap) - asked
         asked |= more
         waiting += more
@@ -100,7 +100,7 @@ def _with_sides(
 
 
 def _asked_by(root: Expr) -> set[int]:
-    """Guards whose sides an expression itself asks about."""
+    """Guards whose sides an expression needs."""
     return {g for node in ex.walk(root) if node.op == "select" for g in bits_of(node.payload)}
 
 
@@ -154,8 +154,8 @@ def never_held(system: System) -> System:
 
 
 def rates_head(system: System, numbers: Mapping[str, Constant], jacobian: bool = False) -> Head:
-    """Everything that kernels/trajectory.py and the templates of a method expect to stand above
-    them; ``numbers`` are those of the method (codegen/tableaux.py).
+    """The head that kernels/trajectory.py and the templates of a method expect; ``numbers`` are
+    those of the method (codegen/tableaux.py).
     """
     system = never_held(system)
     laws = tables_of_laws(system)

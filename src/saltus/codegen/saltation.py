@@ -1,5 +1,5 @@
-"""What happens to states and tangent at a contact, generated: jumps by a law of contact, and the
-saltation matrix.
+"""Generated code for states and tangent at a contact: jumps by a law of contact, and the saltation
+matrix.
 
 Where the mode changes, S = I + (f_after - f_before) n' / (n' f_before + g_t): the identity where
 the force is continuous. Where the state jumps to J(t, y), S = J_y + (f_after - J_y f_before - J_t)
@@ -21,8 +21,8 @@ from saltus.language.expression import Expr
 from saltus.system import System
 from saltus.system.tangent import first_column
 
-#: Part of the size of its terms by which rounding, and a contact met a little beside its boundary,
-#: may make a friction negative that fades out.
+#: Part of the size of its terms by which rounding, and a landing beside the boundary, may make a
+#: vanishing friction negative.
 _LEVEL_ROUNDING = 1e-9
 
 
@@ -37,7 +37,7 @@ def jump_function(system: System, clocks: Clocks) -> str:
     if base is None or not base.guards:
         return "@kernel\ndef jump(t, y, p, h, before, after, g):\n    pass\n"
     size = len(base.states)
-    # what has no derivative on the boundary is zero on it, and no jump
+    # terms without a derivative on the boundary are zero on it, and don't jump
     aside = set_aside(base.field, base.guards)
     leaf = parameter_leaf(base, "y", clocks.value)
     lines = []
@@ -173,9 +173,9 @@ def _reset_of_tangent(
 
 
 def levels_of(system: System) -> list[tuple[int, Expr, tuple[Expr, ...] | None]]:
-    """What may become negative on the way: coefficients of friction, each with the guard that says
-    whether its contact is held, and forces of friction, with -1. Last, expressions of parameters of
-    which one must be negative for that, if it can be told.
+    """Expressions that may become negative on the way: coefficients of friction, each with the
+    guard that says that its contact is held, and forces of friction, with -1. The last entry holds
+    expressions of parameters of which one must be negative for that, if it can be told.
     """
     guards = (system.tangent_of or system).guards
     laws = [guard.law for guard in guards if guard.law]
@@ -211,7 +211,7 @@ def levels_function(system: System, clocks: Clocks) -> str:
 
 
 def _size_of_terms(root: Expr) -> Expr:
-    """The size of an expression if none of its terms took anything from the others."""
+    """The size of an expression if none of its terms cancelled."""
     sizes: dict[Expr, Expr] = {}
     for node in ex.walk(root, conditions=False):
         args = [sizes[one] for one in node.args]
@@ -281,7 +281,7 @@ def settle_function(system: System, clocks: Clocks) -> str:
 
 
 def _dot(a: Sequence[Expr], b: Sequence[Expr]) -> Expr:
-    """Sum of products, without those that are zero."""
+    """The sum of products, without zeros."""
     total = ex.constant(0.0)
     for one, other in zip(a, b, strict=True):
         if not any(x.op == "const" and x.payload == 0 for x in (one, other)):
@@ -290,13 +290,13 @@ def _dot(a: Sequence[Expr], b: Sequence[Expr]) -> Expr:
 
 
 def _bit_in(word: str) -> Callable[[int], str]:
-    """Code for the side of a guard in a mode that a function is given."""
+    """Code for the side of a guard in a given mode."""
     return lambda guard: f"(({word} >> {guard}) & 1) == 1"
 
 
 def _bit_of(word: str, aside: SetAside) -> Callable[[int], str]:
-    """Code for the side of a guard in a mode; beyond the guards, for the bits that set terms aside:
-    those of the boundary crossed.
+    """Code for the side of a guard in a mode. Beyond the guards are the bits that set terms aside:
+    those of the crossed boundary.
     """
     return lambda i: (
         f"(({word} >> {i}) & 1) == 1"

@@ -21,8 +21,8 @@ def indented(lines: list[str]) -> str:
 def parameter_leaf(
     system: System, states: str | None = None, clocked: Callable[[Expr], str | None] | None = None
 ) -> Callable[[Expr], str | None]:
-    """Code for parameters ``p[i]``, states ``y[i]`` and time ``t`` in scalar functions, and for
-    what ``clocked`` knows.
+    """Code for parameters ``p[i]``, states ``y[i]`` and time ``t`` in scalar functions, and for the
+    nodes of ``clocked``.
     """
     names, state_names = tuple(system.values), system.states
 
@@ -44,8 +44,8 @@ def condition_code(
     switch: Callable[[ex.Relation], str],
     words: tuple[str, str, str] = ("and", "or", "not"),
 ) -> str:
-    """A condition as code: ``bit(i)`` is the code for side i, ``switch(relation)`` that for what
-    time decides, ``words`` are the operators (``& | ~`` for lane masks).
+    """A condition as code: ``bit(i)`` is the code for side i, ``switch(relation)`` that for a
+    comparison of time, ``words`` are the operators (``& | ~`` for lane masks).
     """
     match condition:
         case ex.Bit(guard):

@@ -18,7 +18,7 @@ from saltus.codegen.clocks import Clocks
 from saltus.language import expression as ex
 from saltus.language.expression import Expr
 
-#: Series kinds whose value is finite wherever their operands are.
+#: Kinds of series whose value is finite wherever their operands are.
 _TOTAL = ("state", "time", "since", "product", "sin", "cos", "atan", "tanh", "linear")
 #: Most branches into which a factor is pushed: those of a product of pieces multiply.
 _MOST_BRANCHES = 64
@@ -46,7 +46,7 @@ class Series:
 
     @property
     def total(self) -> bool:
-        """Whether the series is finite wherever the states are."""
+        """True if the series is finite wherever the states are."""
         return self.kind in _TOTAL and all(s.total for s in self.operands)
 
 
@@ -61,13 +61,13 @@ class Linear:
 
 
 def is_constant(coefficient: Expr, value: float) -> bool:
-    """Whether a coefficient is the literal ``value``."""
+    """True if a coefficient is the literal ``value``."""
     return coefficient.op == "const" and coefficient.payload == value
 
 
 def _scale(factor: Expr, c: Expr, by_division: bool = False) -> Expr:
     """``c * factor`` (or ``c / factor``), pushed into the branches of a mode selection so that
-    nothing is divided at run time; where these are many it stands as it is.
+    nothing is divided at run time; with many branches the product is kept.
     """
     pushed = _branches(c) * (1 if by_division else _branches(factor)) <= _MOST_BRANCHES
     return _scaled_branches(factor, c, by_division, pushed, {})
@@ -95,7 +95,7 @@ def _scaled_branches(
 
 
 def _branches(c: Expr) -> int:
-    """How many different branches a coefficient has, counted until they are too many."""
+    """Number of different branches of a coefficient, counted until they are too many."""
     seen, stack, count = {c}, [c], 0
     while stack and count <= _MOST_BRANCHES:
         top = stack.pop()
@@ -123,15 +123,15 @@ def _degree_in_time(series: Series) -> int:
 
 
 def _of_time(series: Series) -> bool:
-    """Whether a series is time, or a linear form of time only."""
+    """True if a series is time, or a linear form of time only."""
     return series.kind in ("time", "since") or (
         series.kind == "linear" and all(s.kind in ("time", "since") for s in series.operands)
     )
 
 
 class SeriesBuilder:
-    """Turns expressions into :class:`Linear` forms over shared series; ``clocks`` numbers what time
-    alone decides in them.
+    """Turns expressions into :class:`Linear` forms over shared series; ``clocks`` numbers the
+    switches, remainders and tables in them.
     """
 
     def __init__(self, clocks: Clocks | None = None) -> None:
@@ -156,7 +156,7 @@ class SeriesBuilder:
         return self._clocks.row_of_side(relation)
 
     def may_hide(self) -> bool:
-        """Whether some series can be negligible where it is expanded and large within the step, so
+        """True if a series can be negligible where it is expanded and large within the step, so
         that its coefficients don't show it.
 
         ``tanh`` and ``exp`` far from their bend, a high power of time: all but sums and products of
@@ -241,8 +241,8 @@ class SeriesBuilder:
         )
 
     def _split_factor(self, form: Linear) -> tuple[Expr, Series]:
-        """A form as coefficient times series, the coefficient pulled out where there is only one
-        term.
+        """A form as coefficient times series, the coefficient pulled out if there is
+        only one term.
         """
         if len(form.terms) == 1 and is_constant(form.offset, 0.0):
             ((series, coefficient),) = form.terms.items()

@@ -1,4 +1,4 @@
-"""The numbers of Runge-Kutta methods, as the heads of kernels/runge_kutta.py hold them.
+"""The coefficients of Runge-Kutta methods, as the heads of kernels/runge_kutta.py hold them.
 
 Every method's last stage is its rate at the end of the step, so the last row of weights is the
 method itself. Interpolants are cubic or quartic polynomials that keep both ends and their rates.
@@ -14,8 +14,8 @@ from saltus.codegen.head import Constant
 def rooms(
     rows: int, numbers: int, *, matrices: int = 0, multistep: bool = False
 ) -> dict[str, Constant]:
-    """How many vectors of states, numbers and matrices a method works with, and whether it looks
-    back (kernels/steps_layout.py).
+    """Sizes of a method's work: vectors of states, numbers and matrices, and 1 if it is a multistep
+    method (kernels/steps_layout.py).
     """
     return {
         "ROWS": rows,
@@ -32,7 +32,7 @@ def _tableau(
     dense: Sequence[Sequence[float]],
     **more: Constant,
 ) -> dict[str, Constant]:
-    """Rows filled up with zeros, as the templates index them."""
+    """Rows padded with zeros, as the templates index them."""
     stages = len(times)
     rows = [(*row, *[0.0] * (stages - len(row))) for row in ((), *weights)]
     return {
@@ -90,9 +90,9 @@ CLASSICAL = _tableau(
     dense=((-3 / 2, 2 / 3), (1, -2 / 3), (1, -2 / 3), (1 / 2, -1 / 3), (-1, 1)),
 )
 
-#: Of kernels/adams.py: the rate at both ends, 14 differences, a state; seven arrays of 14, five
-#: numbers.
+#: Work of kernels/adams.py: the rate at both ends, 14 differences, a state; seven arrays of 14,
+#: five numbers.
 ADAMS = rooms(17, 103, multistep=True)
-#: Of kernels/ndf.py: the rate at both ends, seven differences, seven vectors; eleven numbers and
-#: two matrices of 6 by 6; the Jacobian and its factors.
+#: Work of kernels/ndf.py: the rate at both ends, seven differences, seven vectors; eleven numbers
+#: and two matrices of 6 by 6; the Jacobian and its factors.
 NDF = rooms(16, 83, matrices=2, multistep=True)

@@ -30,8 +30,8 @@ FIRST_TURN = 2
 
 
 def gaps_function(system: System, clocks: Clocks) -> str:
-    """``gaps(t, y, p, h, out)``: value of every guard, sides taken from the state; h is what the
-    clocks hold.
+    """Code of ``gaps(t, y, p, h, out)``: the value of every guard, with sides from the state; h is
+    the data of the clocks.
 
     Whether a contact is held, and the side of a gap that is zero or on whose boundary the state is
     known to stand (twice the side), are taken from out. Behind the gaps come, for a guard whose
@@ -69,13 +69,13 @@ def gaps_function(system: System, clocks: Clocks) -> str:
                 for block, value in enumerate(behind)
                 if value is not None
             ]
-    code.lines += held  # behind all that reads whether contacts are held
+    code.lines += held  # after all code that reads the sides of hold guards
     return f"@kernel\ndef gaps(t, y, p, h, out):\n{indented(code.lines)}\n"
 
 
 def evaluation_order(system: System) -> list[int]:
-    """Guards ordered so that a gap comes after the guards on whose sides it depends; without those
-    that say whether a contact is held, which depend on one another in circles.
+    """Guards ordered so that a gap comes after the guards on whose sides it depends; without hold
+    guards, which depend on one another in circles.
     """
     order: list[int] = []
 
@@ -95,7 +95,7 @@ def evaluation_order(system: System) -> list[int]:
 
 
 def bits_of(condition: ex.Condition) -> set[int]:
-    """Guards that a condition asks about."""
+    """Guards that a condition needs."""
     match condition:
         case ex.Bit(guard):
             return {guard}
@@ -134,9 +134,9 @@ def _state_boundary(form: Linear) -> tuple[str, float, Expr] | None:
 
 
 def _gap_form(builder: SeriesBuilder, number: int, guard: Guard, gap: Expr) -> Linear:
-    """The series of a gap. While the contact is held its gap stays zero, and a difference of states
-    and times would leave rounding in its place, whose series allows no step: there it is zero. So
-    is how far a contact that isn't held is from its release, where that may have poles.
+    """The series of a gap. While the contact is held its gap is zero: a difference of states and
+    times would leave rounding in its place, whose series allows no step. The margin to release of a
+    contact that isn't held is zero too, as it may have poles.
     """
     form = builder.form(gap)
     if guard.law is None or guard.law.partner < 0:
@@ -150,7 +150,7 @@ def _gap_form(builder: SeriesBuilder, number: int, guard: Guard, gap: Expr) -> L
 
 
 def taylor_head(system: System, order: int, lanes: int) -> Head:
-    """Everything that kernels/taylor_*.py expect to stand above it."""
+    """The head that kernels/taylor_*.py expect above them."""
     clocks = Clocks(system)
     builder, constants = SeriesBuilder(clocks), Constants()
     aside = set_aside(system.field, system.guards)
@@ -220,16 +220,16 @@ def taylor_head(system: System, order: int, lanes: int) -> Head:
 
 
 def count_moved(system: System) -> int:
-    """How many states of a system move by its equation: those before a tangent and before what is
-    remembered.
+    """Number of states that move by the system's equation: those before a tangent and before
+    remembered states.
     """
     own = (system.tangent_of or system).states
     return len([name for name in own if not is_remembered(name)])
 
 
 def tables_of_laws(system: System) -> dict[str, list[float]]:
-    """Tables of the laws of contact, for each guard: its kind, the guard that says whether it is
-    held (of that one: whose contact), the one without which it can't be, its side.
+    """Tables of the laws of contact, for each guard: its kind, its hold guard (of a hold guard: its
+    owner), the guard of the contact that supports it, its side.
     """
     laws = [guard.law for guard in system.guards]
     return dict(
@@ -258,7 +258,7 @@ def _rates(
 
 
 def _constants_function(system: System, constants: Constants) -> str:
-    """``constants(p, c, lane)``: what depends on parameters only."""
+    """Code of ``constants(p, c, lane)``: values that depend on parameters only."""
     code = ScalarCode(parameter_leaf(system))
     for node, i in constants.rows.items():
         value = code.value(node)
@@ -267,8 +267,8 @@ def _constants_function(system: System, constants: Constants) -> str:
 
 
 def _jets_functions(code: JetCode, columns: int, handed_row: int, terms: int) -> str:
-    """``jets(y, side, c, clock, work)``; for a tangent it calls a function of one column for each
-    of them.
+    """Code of ``jets(y, side, c, clock, work)``; for a tangent it calls a function of one column
+    for each column.
     """
     lines, texts = list(code.lines.shared(handed_row)), []
     if columns:
@@ -284,7 +284,7 @@ def _jets_functions(code: JetCode, columns: int, handed_row: int, terms: int) ->
 
 
 def tables(**rows: Sequence[float]) -> dict[str, Constant]:
-    """Tables as they stand in a head: never empty."""
+    """Tables as in a head: never empty."""
     return {name: tuple(entries) or (0,) for name, entries in rows.items()}
 
 
@@ -296,8 +296,8 @@ def _write_guards(
     constants: Constants,
     order: int,
 ) -> tuple[_Guards, int]:
-    """Write every gap to the work rows, and the size of its terms, held or not; guards of one state
-    share that state's rows.
+    """Write every gap, and the size of its terms, to the work rows, held or not; guards of one
+    state share that state's rows.
     """
     guards, rows = _Guards(), len(system.states) * (order + 1)
     boundaries = [
@@ -333,8 +333,8 @@ def _write_guards(
 
 
 def _turns_function(system: System, code: JetCode) -> str:
-    """``turns(p, origin, period, count, lane, clock)``: phase of every harmonic at the start of a
-    period; whether one of them drifts.
+    """Code of ``turns(p, origin, period, count, lane, clock)``: phase of every harmonic at the
+    start of a period; true if one of them drifts.
     """
     scalar = ScalarCode(parameter_leaf(system))
     drifting = []

@@ -1,5 +1,5 @@
-"""The templates' bitcode that the package brings: codegen/lowering makes it, once for every
-equation and every processor.
+"""The templates' bitcode in the package: codegen/lowering makes it, once for every equation and
+every processor.
 """
 
 from __future__ import annotations
@@ -34,19 +34,19 @@ BITCODE: dict[str, tuple[Interface, int]] = {
 }  # fmt: skip
 #: Kernels that the templates import.
 _SHARED = ("lanes", "trigonometry", "isolation", "status", "batch", "parts", "clocks_layout")
-#: Rises when codegen/lowering makes other bitcode of the same templates.
+#: Raised when codegen/lowering makes other bitcode of the same templates.
 BITCODE_VERSION = 2
 
 
 @cache
 def text(name: str) -> str:
-    """A template, or a kernel that templates import."""
+    """The text of a template, or of a kernel that templates import."""
     source = resources.files("saltus.kernels").joinpath(f"{name}.py").read_text(encoding="utf-8")
     return source.replace("from __future__ import annotations\n", "\n")
 
 
 def _texts(name: str) -> list[str]:
-    """The texts that a bitcode is made of."""
+    """The texts from which a bitcode is made."""
     interface, _ = BITCODE[name]
     return [
         text(one) for one in (*filter(None, [interface.layout]), *interface.templates, *_SHARED)
@@ -62,15 +62,15 @@ def _hash(name: str, texts: list[str]) -> str:
 
 @cache
 def source_hash(name: str) -> str:
-    """Hash of all that a bitcode is made of, comments and docstrings left out: what says whether it
-    is still what the templates give.
+    """Hash of everything that a bitcode is made of, without comments and docstrings: it tells if
+    the bitcode is current.
     """
     return _hash(name, [_code_of(one) for one in _texts(name)])
 
 
 @cache
 def text_hash(name: str) -> str:
-    """The same of the texts to the character: quick, and enough for unchanged files."""
+    """Hash of the same texts to the character: quick, and enough for unchanged files."""
     return _hash(name, _texts(name))
 
 
@@ -91,13 +91,14 @@ def tree_of(source: str) -> ast.Module:
 
 
 def _code_of(source: str) -> str:
-    """A Python text without comments, docstrings and its own layout."""
+    """A Python text without comments, docstrings and layout."""
     return ast.unparse(_WithoutDocstrings().visit(tree_of(source)))
 
 
 @cache
 def manifest() -> dict[str, Any]:
-    """What is known of the bitcode: hashes of its sources and of itself, and what made it.
+    """The manifest of the bitcode: hashes of its sources and of itself, and the versions that made
+    it.
 
     Raises
     ------
@@ -118,7 +119,7 @@ def manifest() -> dict[str, Any]:
 
 
 def _brought(file: str) -> bytes:
-    """A file of the bitcode as it was installed."""
+    """A file of the bitcode, as installed."""
     try:
         return resources.files("saltus.kernels").joinpath(f"bitcode/{file}").read_bytes()
     except OSError as error:
@@ -145,7 +146,7 @@ def bitcode(name: str) -> bytes:
 
 @cache
 def is_current(name: str) -> bool:
-    """Whether a bitcode is what the templates of this installation give."""
+    """True if a bitcode is made from the templates of this installation."""
     known: dict[str, str] = manifest()["bitcode"][name]
     return known["texts"] == text_hash(name) or known["sources"] == source_hash(name)
 
@@ -180,5 +181,5 @@ def open_names_of(interface: Interface) -> tuple[str, ...]:
 
 @cache
 def layout_code(name: str) -> Any:
-    """A layout, compiled as Python: it says what the work arrays hold for the sizes of a head."""
+    """A layout, compiled as Python: it computes the work arrays for the sizes of a head."""
     return compile(text(name), f"<saltus.kernels.{name}>", "exec")

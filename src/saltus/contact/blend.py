@@ -1,4 +1,4 @@
-"""Blends in place of pieces: every side of a guard gets a weight, a smoothed step of its gap."""
+"""Blends in place of pieces: each side of a guard gets a weight, a smoothed step of its gap."""
 
 from __future__ import annotations
 
@@ -57,8 +57,8 @@ def blended(
     step: Step,
     parameters: Mapping[int, str],
 ) -> tuple[tuple[Expr, ...], tuple[Guard, ...]]:
-    """Field and guards of the stand-in of a system; the width of each guard that is blended by its
-    number. Raises TraceError if the blends can't be equations.
+    """Return field and guards of a regularised system; ``parameters`` holds the width of each
+    blended guard, by number. Raises TraceError if the blends can't be equations.
     """
     blend = _Blend(step, parameters)
     for guard in guards:
@@ -74,7 +74,7 @@ def blended(
 def _with_old_names(
     old: Sequence[Guard], sides: Sequence[Any], guards: Sequence[Guard]
 ) -> tuple[Guard, ...]:
-    """The guards, those that stay with the names that they had."""
+    """The guards; those that stay keep the names they had."""
     kept = {
         number: guard.name
         for guard, side in zip(old, sides, strict=True)
@@ -92,7 +92,7 @@ class _Blend:
         self._rewritten: dict[Expr, Expr] = {}
 
     def add(self, guard: Guard) -> None:
-        """The next guard: its weight, or the comparison that it stays."""
+        """Add the next guard: its weight, or its comparison if it stays."""
         number, gap = len(self.sides), self.rewrite(guard.gap)
         name = self._parameters.get(number)
         if name is not None:
@@ -101,7 +101,7 @@ class _Blend:
             self.sides.append(Relation(gap))
 
     def keep_friction(self, number: int, law: Law) -> None:
-        """Let the comparison that a guard stays decide friction, as its law does."""
+        """Decide friction by the comparison of a guard that stays, as its law does."""
         side = self.sides[number]
         if isinstance(side, Relation) and law.limit is not None:
             # both sides have one limit on the boundary itself
@@ -127,7 +127,7 @@ class _Blend:
         return memo[root]
 
     def _side(self, condition: Condition) -> Expr | Condition:
-        """The weight of a condition; a condition of boundaries that stay is still one."""
+        """The weight of a condition; a condition of boundaries that stay is kept."""
         match condition:
             case Bit(number):
                 return self.sides[number]

@@ -1,4 +1,4 @@
-"""From the laws that an equation declares, and from two-valued forces, to laws of guards."""
+"""Convert the laws that an equation declares, and its two-valued forces, to laws of guards."""
 
 from __future__ import annotations
 
@@ -31,21 +31,22 @@ from saltus.language.roots import with_root, zero_where_idle
 from saltus.language.sums import dot, ratio
 
 _ZERO, _ONE = ex.constant(0.0), ex.constant(1.0)
-#: States and parameters at which a velocity is compared with the rate of its gap, and the part of
-#: their size by which rounding may make them differ.
-_PLACES, _ROUNDING = 16, 1e-9
+#: Samples at which a velocity is compared with the rate of its gap.
+_PLACES = 16
+#: Relative difference of the two that rounding explains.
+_ROUNDING = 1e-9
 
 Field = tuple[Expr, ...]
 
 
-#: Share of a pivot without friction at which one with friction counts as none: the force that it
-#: takes to hold the contact grows beyond all bounds.
+#: A pivot with friction below this share of the one without counts as zero: the force that holds
+#: the contact grows without bound.
 _NO_PIVOT = ex.constant(2.0**-40)
 
 
 @dataclass(frozen=True, eq=False)
 class _Met:
-    """A declared law, its comparison and parts written with bits."""
+    """A declared law, with its comparison and parts written with bits."""
 
     law: Declared
     number: int
@@ -55,7 +56,7 @@ class _Met:
 
 @dataclass(frozen=True, eq=False)
 class _Rubbing:
-    """The friction of a contact that rests.
+    """The friction of a contact at rest.
 
     Attributes
     ----------
@@ -66,7 +67,7 @@ class _Rubbing:
     sign : Expr
         Of the velocity of sliding: 1 or -1, by its guard.
     direction : tuple of Expr
-        What a unit of force against a positive velocity adds to the field.
+        Change of the field by a unit of force against a positive velocity.
     along : int
         Sign of the gap where that velocity is positive.
     """
@@ -82,7 +83,7 @@ class _Rubbing:
 def find_contacts(
     rates: Sequence[Expr], declared: Sequence[Declared], states: Sequence[str]
 ) -> tuple[Field, tuple[Guard, ...]]:
-    """Field and guards of traced rates and the laws that follow them. Hold guards stand behind all
+    """Field and guards of traced rates and the laws that follow them. Hold guards come after all
     others.
 
     Raises
@@ -115,7 +116,7 @@ def find_contacts(
 
 
 def _met(law: Declared, comparison: Expr, parts: Sequence[Expr]) -> _Met:
-    """A declared law by the guard of its comparison, checked."""
+    """The declared law with the guard of its comparison, checked."""
     found = comparison.payload if comparison.op == "select" else None
     bit = found.inner if isinstance(found, Not) else found
     if not isinstance(bit, Bit):
@@ -133,7 +134,7 @@ def _met(law: Declared, comparison: Expr, parts: Sequence[Expr]) -> _Met:
 
 
 def _add_limit(limits: dict[int, Expr], number: int, limit: Expr, guards: Sequence[Guard]) -> None:
-    """Static over kinetic force, by the number of the guard."""
+    """Add the ratio of static to kinetic force, by the number of the guard."""
     if limits.setdefault(number, limit) is not limit:
         raise TraceError(
             f"two friction laws with different limits act where "
@@ -149,8 +150,8 @@ def with_laws(
     limits: Mapping[int, Expr] | None = None,
     levels: Mapping[int, Field] | None = None,
 ) -> tuple[Field, tuple[Guard, ...]]:
-    """The field, reduced where contacts are held, and the guards with their laws; hold guards stand
-    behind them. Where no guard has a law both are as they were.
+    """The field, reduced where contacts are held, and the guards with their laws; hold guards come
+    after the others. Without laws both are returned as they were.
 
     Raises
     ------
@@ -168,12 +169,12 @@ def with_laws(
             if isinstance(declared.law, Impact)
             else _jump(declared, states)
         )
-    rubbing = [one for one in (_rubbing(each, states) for each in met) if one]
+    rubbing = [contact for contact in (_rubbing(each, states) for each in met) if contact]
     _check_rubbing(rubbing, laws, field, guards)
     laws |= {
         number: Law("surface", constraint=guards[number].gap, levels=levels.get(number, ()))
         for number in range(len(guards))
-        if number in {one.guard for one in rubbing}
+        if number in {contact.guard for contact in rubbing}
         or (number not in laws and is_surface(number, field, guards, states))
     }
     if not laws:
@@ -183,15 +184,19 @@ def with_laws(
     owners, holds = list(guards), []
     for number, law in laws.items():
         owners[number] = replace(guards[number], law=law)
-    for one in held:
-        law = _completed(laws[one.owner], one, forces, limits.get(one.owner, _ONE), states)
-        owners[one.owner] = replace(owners[one.owner], law=law)
+    for contact in held:
+        law = _completed(
+            laws[contact.owner], contact, forces, limits.get(contact.owner, _ONE), states
+        )
+        owners[contact.owner] = replace(owners[contact.owner], law=law)
         assert law.drive is not None
         assert law.pivot is not None
         gap = hold_gap(law.kind, law.drive, law.pivot, law.limit)
         if law.remaining is not None:
             gap = ex.mul(gap, ex.sub(law.remaining, _NO_PIVOT))
-        holds.append(Guard(hold_name(owners[one.owner]), gap, law=Law("hold", partner=one.owner)))
+        holds.append(
+            Guard(hold_name(owners[contact.owner]), gap, law=Law("hold", partner=contact.owner))
+        )
     return forces.elimination.reduced(), (*owners, *holds)
 
 
@@ -202,7 +207,7 @@ def hold_name(owner: Guard) -> str:
 
 
 def renamed(guards: Sequence[Guard], names: Mapping[int, str]) -> tuple[Guard, ...]:
-    """Guards with other names for some; hold guards follow the names of their owners."""
+    """Rename some guards; hold guards follow the names of their owners."""
     new = [
         replace(guard, name=names.get(number, guard.name)) for number, guard in enumerate(guards)
     ]
@@ -221,13 +226,11 @@ def _held_contacts(
     laws: Mapping[int, Law],
     rubbing: Sequence[_Rubbing],
 ) -> tuple[list[Held], Field]:
-    """The contacts that can be held, and the field with the middle of each surface where it is
-    held.
-    """
+    """The contacts that can be held, and the field with the middle of each held surface."""
     of_contacts = {one.guard: one for one in rubbing}
     surfaces = sorted(number for number, law in laws.items() if law.kind == "surface")
     order = sorted(number for number, law in laws.items() if law.kind != "jump")
-    holds = {number: len(guards) + place for place, number in enumerate(order)}
+    holds = {number: len(guards) + index for index, number in enumerate(order)}
     directions = {number: law.direction for number, law in laws.items() if law.kind == "impact"}
     for one in rubbing:
         directions[one.guard] = _scaled(-one.along, one.direction)
@@ -240,18 +243,18 @@ def _held_contacts(
     for number in surfaces:
         if number in of_contacts:
             continue
-        place = OnSurface(guards[number].gap, states)
+        on_surface = OnSurface(guards[number].gap, states)
         apart = {
             holds[other]
             for other, i in alone.items()
             if other < number and i is not None and i == alone[number]
         }
         free = tuple(_known(entry, apart, False) for entry in field)
-        surface = split(number, free, place)
+        surface = split(number, free, on_surface)
         directions = {
             other: direction
             if holds[other] in apart
-            else tuple(averaged(entry, number, holds[number], place) for entry in direction)
+            else tuple(averaged(entry, number, holds[number], on_surface) for entry in direction)
             for other, direction in directions.items()
         }
         directions[number] = surface.halves
@@ -271,15 +274,15 @@ def _held_contacts(
 
 
 def _moved_alone(number: int, field: Field) -> int | None:
-    """The state whose rate a surface decides, if that is just one: of several surfaces that decide
-    only the same rate one can be held at a time, and no term is written for two at once.
+    """The state whose rate a surface decides, if it is just one. Of several surfaces that decide
+    only the same rate, one can be held at a time, so no term for two of them is written.
     """
     moved = [i for i, entry in enumerate(field) if number in bits_in([entry])]
     return moved[0] if len(moved) == 1 else None
 
 
 def _known(entry: Expr, bits: Iterable[int], value: bool) -> Expr:
-    """An expression with some bits known."""
+    """The expression with some bits known."""
     for bit in bits:
         entry = assuming(entry, bit, value)
     return entry
@@ -290,7 +293,7 @@ def _scaled(factor: Operand, direction: Sequence[Expr]) -> Field:
 
 
 class _Forces:
-    """What holds each contact, all others that are held eliminated.
+    """The force that holds each contact, with all other held contacts eliminated.
 
     Parameters
     ----------
@@ -316,36 +319,36 @@ class _Forces:
         self._smooth = Elimination(field, smooth) if rubbing else self.elimination
         self._smoothly = dict(zip(self._held, smooth, strict=True))
 
-    def _without_friction(self, one: Held) -> Held:
-        rubbing = self._by_contact.get(one.owner)
+    def _without_friction(self, held: Held) -> Held:
+        rubbing = self._by_contact.get(held.owner)
         if rubbing is None:
-            return one
+            return held
         sticks = self._held[rubbing.guard].hold
-        return replace(one, direction=tuple(assuming(x, sticks, True) for x in one.direction))
+        return replace(held, direction=tuple(assuming(x, sticks, True) for x in held.direction))
 
-    def without_friction(self, one: Held) -> Expr:
+    def without_friction(self, held: Held) -> Expr:
         """The pivot of a contact without its friction."""
-        _, pivot, _ = self._smooth.own(self._smoothly[one.owner])
+        _, pivot, _ = self._smooth.own(self._smoothly[held.owner])
         return pivot
 
-    def own(self, one: Held) -> tuple[Expr, Expr, Field, int]:
-        """Drive, pivot and direction of a contact as :class:`Law` has them, and what supports it:
-        the force of friction is in units of its limit.
+    def own(self, held: Held) -> tuple[Expr, Expr, Field, int]:
+        """Drive, pivot and direction of a contact as :class:`Law` has them, and the force that
+        supports it. The force of friction is in units of its limit.
         """
-        drive, pivot, direction = self.elimination.own(one)
-        if one.owner not in self._by_guard:
+        drive, pivot, direction = self.elimination.own(held)
+        if held.owner not in self._by_guard:
             return drive, pivot, direction, -1
-        rubbing = self._by_guard[one.owner]
+        rubbing = self._by_guard[held.owner]
         contact = self._held[rubbing.contact]
         pressed, by, _ = self.elimination.own(contact)
-        force = ex.neg(ex.div(assuming(pressed, one.hold, True), assuming(by, one.hold, True)))
+        force = ex.neg(ex.div(assuming(pressed, held.hold, True), assuming(by, held.hold, True)))
         limit = ex.mul(rubbing.coefficient, assuming(force, contact.hold, True))
         most = ex.select(Bit(contact.hold), ex.mul(limit, pivot), _ZERO)
         return drive, most, direction, contact.hold
 
 
 def _completed(law: Law, held: Held, forces: _Forces, limit: Expr, states: Sequence[str]) -> Law:
-    """The law of a contact with what holding it needs."""
+    """The law of a contact, completed with the expressions that holding it needs."""
     drive, pivot, direction, support = forces.own(held)
     surface = law.kind == "surface"
     rough = law.friction is not None
@@ -365,16 +368,18 @@ def _completed(law: Law, held: Held, forces: _Forces, limit: Expr, states: Seque
 
 
 def _settled(held: Held, states: Sequence[str]) -> Field:
-    """The state on a surface: its pivot from the constraint, or else a step along the normal."""
-    own = [ex.state(name) for name in states]
+    """The state moved onto a surface: its pivot from the constraint, or else a step along the
+    normal.
+    """
+    settled = [ex.state(name) for name in states]
     if held.pivot is not None:
         i = held.pivot
-        own[i] = level(held.constraint, states[i], held.normal[i])
-        return tuple(own)
+        settled[i] = level(held.constraint, states[i], held.normal[i])
+        return tuple(settled)
     share = ex.div(held.constraint, dot(held.normal, held.normal))
     return tuple(
         ex.sub(state, ex.mul(slope, share)) if slope is not _ZERO else state
-        for state, slope in zip(own, held.normal, strict=True)
+        for state, slope in zip(settled, held.normal, strict=True)
     )
 
 
@@ -382,8 +387,8 @@ def _settled(held: Held, states: Sequence[str]) -> Field:
 def _shares(
     met: _Met, velocity: Expr, moved: Sequence[str], states: Sequence[str], said: tuple[str, str]
 ) -> list[Expr]:
-    """What an impulse of one along a velocity changes each state by: the slope over the mass, zero
-    of states that it doesn't move. Raises TraceError where the velocity isn't linear in them.
+    """Change of each state by a unit impulse along a velocity: the slope over the mass, zero for
+    states that it doesn't move. Raises TraceError where the velocity isn't linear in them.
     """
     normal = gradient(velocity, states)
     for name in moved:
@@ -424,7 +429,7 @@ def _impact(met: _Met, field: Field, guards: Sequence[Guard], states: Sequence[s
 def _struck(
     w: Expr, impulse: Sequence[Expr], restitution: Expr, moved: Sequence[str], states: Sequence[str]
 ) -> Field:
-    """The state after an impact: w becomes -restitution*w by an impulse."""
+    """The state after an impact: an impulse changes w to -restitution*w."""
     after = [ex.state(name) for name in states]
     normal = gradient(w, states)
     if len(moved) == 1:
@@ -443,7 +448,7 @@ def _struck(
 
 
 def _check_velocity(met: _Met, guard: Guard, field: Field, states: Sequence[str]) -> None:
-    """Raise a TraceError unless the closing velocity is minus the rate of the gap, to a positive
+    """Raise a TraceError unless the closing velocity is minus the rate of the gap, times a positive
     number.
     """
     w = met.parts["velocity"]
@@ -466,7 +471,7 @@ def _check_velocity(met: _Met, guard: Guard, field: Field, states: Sequence[str]
 
 
 def _equal(a: Expr, b: Expr) -> bool:
-    """Whether two expressions have equal values at samples."""
+    """True if two expressions have equal values at samples."""
     random = np.random.default_rng(11)
     leaves = {(node.op, node.payload) for node in ex.walk(a, b) if node.op in ("state", "param")}
     states, values = (
@@ -509,21 +514,23 @@ def _rubbing(met: _Met, states: Sequence[str]) -> _Rubbing | None:
 def _check_rubbing(
     rubbing: Sequence[_Rubbing], laws: Mapping[int, Law], field: Field, guards: Sequence[Guard]
 ) -> None:
-    """Raise a TraceError where something else happens at the velocity at which a contact turns."""
+    """Raise a TraceError if another guard acts at the velocity at which a contact's sliding
+    reverses.
+    """
     owned = set(laws) | bits_in(field)
-    for one in rubbing:
-        if one.guard in owned:
+    for contact in rubbing:
+        if contact.guard in owned:
             raise TraceError(
                 f"the friction of a contact changes its direction where "
-                f"{equation_of(one.guard, guards)}, and another force or law does too. Leave "
+                f"{equation_of(contact.guard, guards)}, and another force or law does too. Leave "
                 f"friction= and slip_velocity= out, or the other."
             )
-        owned.add(one.guard)
+        owned.add(contact.guard)
 
 
 # -- jumps -----------------------------------------------------------------------------------------
 def _jump(met: _Met, states: Sequence[str]) -> Law:
-    """A jump of the state, from the side where the comparison doesn't hold."""
+    """A jump of the state, from the side on which the comparison doesn't hold."""
     assert isinstance(met.law, Jump)
     for name in met.parts:
         if name not in states:

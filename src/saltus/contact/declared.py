@@ -10,6 +10,7 @@ from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from typing import Any, ClassVar, TypeVar
 
+from saltus.arguments import written
 from saltus.errors import TraceError, shown
 from saltus.language.dimensions import DimensionCheck
 from saltus.language.expression import (
@@ -23,8 +24,8 @@ from saltus.language.expression import (
     walk,
 )
 
-#: Names of the parts of an impact with friction: its coefficient, the velocity of sliding, and the
-#: sign of that.
+#: Names of the parts of an impact with friction: its coefficient, the sliding velocity, and the
+#: sign of that velocity.
 FRICTION, SLIP, FACING = "friction", "slip_velocity", "the sign of slip_velocity"
 
 Made = TypeVar("Made")
@@ -33,7 +34,7 @@ _MADE: ContextVar[list[Declared] | None] = ContextVar("made", default=None)
 
 
 class Declared:
-    """A law of a contact, as it was written: its comparison, and expressions by their names."""
+    """A law of a contact as it was written: its comparison, and expressions by name."""
 
     name: ClassVar[str] = ""
 
@@ -66,7 +67,7 @@ class Declared:
 
 
 class Impact(Declared):
-    """What :func:`impact` returns."""
+    """The result of :func:`impact`."""
 
     name = "sl.impact"
 
@@ -88,20 +89,19 @@ class Impact(Declared):
 
     @property
     def rubs(self) -> bool:
-        """Whether friction acts in the contact while it rests."""
+        """True if friction acts in the contact while it rests."""
         return SLIP in self.parts
 
 
 class Jump(Declared):
-    """What :func:`jump` returns."""
+    """The result of :func:`jump`."""
 
     name = "sl.jump"
 
 
 def check_law(law: Declared, dimensions: DimensionCheck) -> None:
-    """Raise a UnitError unless the velocity of an impact is the unit of its gap per second, its
-    restitution a plain number, and each new value of a jump in the unit of its state; where they
-    are known.
+    """Raise a UnitError where known units don't fit: the velocity of an impact has the unit of its
+    gap per second, its restitution none, and each new value of a jump the unit of its state.
     """
     for name, part in law.parts.items():
         what = f"{law!r}: {name}"
@@ -115,7 +115,7 @@ def check_law(law: Declared, dimensions: DimensionCheck) -> None:
 
 @contextmanager
 def gathered(made: ContextVar[list[Made] | None]) -> Iterator[list[Made]]:
-    """What is added to the list of a context variable inside."""
+    """Collect the items that are added to the list of a context variable inside."""
     found: list[Made] = []
     token = made.set(found)
     try:
@@ -125,10 +125,11 @@ def gathered(made: ContextVar[list[Made] | None]) -> Iterator[list[Made]]:
 
 
 def declarations() -> AbstractContextManager[list[Declared]]:
-    """The laws that are made inside."""
+    """Collect the laws that are made inside."""
     return gathered(_MADE)
 
 
+@written("impact(x < gap, v, restitution=0.8), after the rates")
 def impact(
     allowed: Condition,
     velocity: Operand,
@@ -227,12 +228,12 @@ def impact(
 
 
 def weight(name: str) -> str:
-    """Name of the part of an impact that is the inertia of a state."""
+    """Name of an impact's part that holds the inertia of a state."""
     return f"inertia of {name}"
 
 
 def _rubbing(friction: Operand | None, slip_velocity: Operand | None) -> dict[str, Expr]:
-    """The parts of an impact with friction; none without."""
+    """The parts of an impact with friction; empty without friction."""
     if friction is None and slip_velocity is None:
         return {}
     if friction is None or slip_velocity is None:
@@ -253,18 +254,18 @@ def _rubbing(friction: Operand | None, slip_velocity: Operand | None) -> dict[st
 
 
 def pushes_on(friction: float) -> str:
-    """What to say of a negative coefficient of friction."""
+    """The message about a negative coefficient of friction."""
     return f"the coefficient of friction {friction:g} is negative: friction never pushes on."
 
 
 def _states_in(*expressions: Expr) -> list[str]:
-    """Names of the states in expressions, in the order in which they stand there."""
+    """Names of the states in expressions, in the order of their first appearance."""
     nodes = (node for one in expressions for node in walk(one, conditions=False))
     return list(dict.fromkeys(node.payload for node in nodes if node.op == "state"))
 
 
 def outside(restitution: float) -> str:
-    """What to say of a coefficient of restitution outside [0, 1]."""
+    """The message about a coefficient of restitution outside [0, 1]."""
     return (
         f"the restitution {restitution:g} is outside [0, 1]: 0 is an impact without a rebound, 1 "
         f"one without a loss."
@@ -272,7 +273,7 @@ def outside(restitution: float) -> str:
 
 
 def _inertias(velocity: Expr, rubbing: Mapping[str, Expr], inertia: Any) -> dict[str, Expr]:
-    """Inertia of each state that an impact moves, or its friction, by its name."""
+    """Inertia of each state that an impact, or its friction, changes; by name."""
     states = _states_in(velocity)
     if not states:
         raise TraceError(

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from saltus.arguments import written
 from saltus.errors import TraceError
 from saltus.language.compositions import sign
 from saltus.language.expression import Expr, Friction, Operand, as_expr, select
 
 
+@written("friction(v, slip=..., stick=...)")
 def friction(velocity: Operand, *, slip: Operand, stick: Operand | None = None) -> Any:
     """The force of dry friction, ``slip*sign(velocity)``: it sticks where the force that this needs
     is smaller than ``stick``.
@@ -52,7 +54,7 @@ def friction(velocity: Operand, *, slip: Operand, stick: Operand | None = None) 
 
 
 def drives(force: float) -> str:
-    """What to say of a negative friction force."""
+    """The message about a negative friction force."""
     return (
         f"the friction force slip = {force:g} is negative: friction never pushes on. Give its "
         f"size, and subtract sl.friction(...) in the equation of motion."
@@ -60,7 +62,9 @@ def drives(force: float) -> str:
 
 
 def sticks_less(limit: float) -> str:
-    """What to say of a friction force that is smaller at rest than in motion, or has no ratio."""
+    """The message about a friction force that is smaller at rest than in motion, or has no
+    ratio.
+    """
     if not math.isfinite(limit):
         return (
             "slip is 0, and what a contact holds at rest is a multiple of it, stick/slip. Leave "

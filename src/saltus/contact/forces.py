@@ -1,14 +1,19 @@
-"""Contact laws: short-hands for the piecewise forces that come up most."""
+"""Contact laws: short forms of the most common piecewise forces."""
 
 from __future__ import annotations
 
 from typing import Any
 
+from saltus.arguments import written
 from saltus.errors import TraceError
 from saltus.language.expression import Expr, Operand, as_expr
 from saltus.language.functions import piecewise
 
 
+@written(
+    "freeplay(x, stiffness=..., gap=...),"
+    " or lower_gap= and upper_gap=, damping= with velocity=, preload="
+)
 def freeplay(
     x: Operand,
     *,
@@ -75,12 +80,16 @@ def freeplay(
     if gap is not None:
         if lower_gap is not None or upper_gap is not None:
             raise TraceError(
-                "sl.freeplay got gap= besides lower_gap= or upper_gap=. gap= means "
-                "the same clearance on both sides."
+                lambda say: (
+                    f"{say.sl}freeplay got gap= besides lower_gap= or upper_gap=. gap= means the "
+                    "same clearance on both sides."
+                )
             )
         lower_gap = upper_gap = gap
     if lower_gap is None and upper_gap is None:
-        raise TraceError("sl.freeplay needs gap=, or lower_gap= or upper_gap= or both.")
+        raise TraceError(
+            lambda say: f"{say.sl}freeplay needs gap=, or lower_gap= or upper_gap= or both."
+        )
     x, stiffness, damping, preload = map(_number, (x, stiffness, damping, preload))
     lower_gap, upper_gap, velocity = (
         None if one is None else _number(one) for one in (lower_gap, upper_gap, velocity)
@@ -88,7 +97,9 @@ def freeplay(
     damped = isinstance(damping, Expr) or damping != 0
     if damped and velocity is None:
         raise TraceError(
-            "sl.freeplay got damping= but no velocity=. Give the time derivative of x."
+            lambda say: (
+                f"{say.sl}freeplay got damping= but no velocity=. Give the time derivative of x."
+            )
         )
 
     def spring(deflection: Operand) -> Any:
@@ -113,7 +124,7 @@ def hertz(depth: Operand, *, stiffness: Operand, exponent: Operand = 1.5) -> Any
     Parameters
     ----------
     depth : Expr or float
-        How far they are pressed together [m], such as ``x - gap``; negative where they don't touch.
+        Compression [m], such as ``x - gap``; negative where they don't touch.
     stiffness : Expr or float
         [N/m**exponent].
     exponent : Expr or float
@@ -162,7 +173,7 @@ def hunt_crossley(
     Parameters
     ----------
     depth : Expr or float
-        How far the bodies are pressed together [m], such as ``x - gap``; negative where they don't
+        Compression [m], such as ``x - gap``; negative where they don't
         touch.
     velocity : Expr or float
         Time derivative of the depth [m/s].
@@ -307,15 +318,18 @@ def _restitution(name: str, restitution: Operand) -> Any:
     bounce = _number(restitution)
     if not isinstance(bounce, Expr) and not 0 < bounce <= 1:
         raise TraceError(
-            f"sl.{name}: the restitution {bounce:g} is outside (0, 1]: 1 is a contact without a "
-            f"loss. For a contact without a rebound take sl.impact with restitution=0."
+            lambda say: (
+                f"{say.sl}{name}: the restitution {bounce:g} is outside (0, 1]: 1 is a contact "
+                f"without a loss. For a contact without a rebound take {say.sl}impact with "
+                "restitution=0."
+            )
         )
     return bounce
 
 
 def _number(operand: Operand) -> Operand:
-    """An expression as it is, any other number as a plain one. Raises TraceError for
-    anything else.
+    """Return an expression as it is, any other number as a float. Raises TraceError for anything
+    else.
     """
     found = as_expr(operand)
     return operand if isinstance(operand, Expr) else float(found.payload)

@@ -25,7 +25,7 @@ from saltus.language.text import Writer
 
 @dataclass(frozen=True, eq=False)
 class Law:
-    """What a contact does beyond changing the equations: the state jumps, or the contact is held.
+    """A contact that does more than change the equations: the state jumps, or the contact is held.
 
     A contact that can be held - at rest, stuck, sliding along its boundary - has a *hold guard*
     behind all others, whose bit says that it is. There the field is the reduced one.
@@ -98,7 +98,7 @@ class Law:
         return (*several, *(one for one in single if one is not None))
 
     def extended(self, states: Sequence[Expr]) -> Law:
-        """The law of a system with more states, which it doesn't touch."""
+        """The law for a system with more states, which it doesn't change."""
         none = (ex.constant(0.0),) * len(states)
         return replace(
             self,
@@ -147,7 +147,7 @@ def expressions_of(guards: Iterable[Guard]) -> list[Expr]:
 
 
 def is_hold(guard: Guard) -> bool:
-    """Whether a guard says that another one's contact is held."""
+    """True if the guard says that the contact of another one is held."""
     return guard.law is not None and guard.law.kind == "hold"
 
 
@@ -169,8 +169,8 @@ def find_guards(field: Iterable[Expr]) -> tuple[tuple[Expr, ...], tuple[Guard, .
 def join_guards(
     roots: Iterable[Expr], known: Sequence[Guard]
 ) -> tuple[tuple[Expr, ...], tuple[Guard, ...]]:
-    """As :func:`find_guards`, for expressions that join a system: its guards don't change, and new
-    ones follow them.
+    """Extend known guards by those of expressions that join a system: known guards don't change,
+    and new ones follow them. As :func:`find_guards` otherwise.
 
     Raises
     ------
@@ -185,8 +185,8 @@ def join_guards(
 
 
 def surface_guard(gap: Expr, name: str) -> Guard:
-    """The guard of a surface: its gap is the expression as it stands, sign and scale included, but
-    for a root (:func:`without_root`); conditions in it hold bits.
+    """The guard of a surface. Its gap is the expression as it stands, with sign and scale, but
+    without a root (:func:`without_root`); conditions in it hold bits.
 
     Raises
     ------
@@ -202,7 +202,7 @@ def surface_guard(gap: Expr, name: str) -> Guard:
 
 
 def number_of(condition: Relation, guards: Sequence[Guard]) -> int | None:
-    """Which of some guards a comparison means, however it is written; None if it means none of
+    """Number of the guard that a comparison means, however it is written; None if it means none of
     them.
 
     ``x > gap`` also means ``k*(x - gap) = 0``, if that is the only multiple of it.
@@ -231,7 +231,7 @@ def number_of(condition: Relation, guards: Sequence[Guard]) -> int | None:
 
 
 def relations(roots: Sequence[Expr]) -> Iterator[Relation]:
-    """Every relation below the roots in the order of reading, those inside a gap before it; a
+    """Every relation below the roots in the order of reading, those inside a gap before it. A
     relation may come more than once.
     """
     seen: set[Expr] = set()
@@ -249,7 +249,7 @@ def relations(roots: Sequence[Expr]) -> Iterator[Relation]:
 
 
 class _Finder:
-    """Collects guards and knows what became of every relation."""
+    """Collects guards and remembers the outcome of every relation."""
 
     def __init__(self, known: Sequence[Guard] = ()) -> None:
         self.guards: list[Guard] = list(known)
@@ -306,7 +306,7 @@ class _Finder:
         return memo[root]
 
     def _condition(self, condition: Condition) -> Condition | bool:
-        """A condition on bits, or its value where that is certain."""
+        """The condition in terms of bits, or its value where that is certain."""
         match condition:
             case Relation():
                 return self.outcome[condition]
@@ -330,7 +330,7 @@ def _opposite(condition: Condition) -> Condition:
 
 
 def _check_moves(gap: Expr, kinds: frozenset[str]) -> None:
-    """Raise unless the gap changes with a state inside a mode."""
+    """Raise a TraceError unless the gap changes with a state inside a mode."""
     if "state" in kinds:
         return
     what = f"the boundary {gap!r} = 0"
@@ -354,7 +354,7 @@ def _check_moves(gap: Expr, kinds: frozenset[str]) -> None:
 
 # -- the form of a guard ---------------------------------------------------------------------------
 def _guard(gap: Expr, canonical: Canonical) -> tuple[Guard, bool]:
-    """The guard of a gap, and whether both have the same sign. Guards get their names later."""
+    """The guard of a gap, and True if both have the same sign. Guards get their names later."""
     gap, positive = _without_factor(gap)
     if gap.op == "sub" and not ex.varies(gap.args[0]):
         gap, positive = ex.sub(gap.args[1], gap.args[0]), not positive
@@ -369,7 +369,7 @@ def _guard(gap: Expr, canonical: Canonical) -> tuple[Guard, bool]:
 
 
 def _without_factor(gap: Expr) -> tuple[Expr, bool]:
-    """The gap without a numeric factor around it, and whether that factor is positive."""
+    """The gap without a numeric factor around it, and True if that factor is positive."""
     positive = True
     while True:
         match gap.op, gap.args:
@@ -384,7 +384,7 @@ def _without_factor(gap: Expr) -> tuple[Expr, bool]:
 
 
 def _negated(a: Expr) -> Expr:
-    """``-a``, the sign taken inside sums; equal to ``-a`` in every bit."""
+    """``-a`` with the sign taken inside sums; equal to ``-a`` in every bit."""
     match a.op, a.args:
         case "sub", (left, right):
             return ex.add(left.args[0], right) if left.op == "neg" else ex.sub(right, left)
@@ -397,7 +397,7 @@ def _negated(a: Expr) -> Expr:
 def _used_only(
     field: tuple[Expr, ...], guards: Sequence[Guard], known: int
 ) -> tuple[tuple[Expr, ...], tuple[Guard, ...]]:
-    """Drop guards on which nothing depends, renumber and name the rest; the first ``known`` don't
+    """Drop guards on which nothing depends, renumber and name the others. The first ``known`` don't
     change.
     """
     used = bits_in(field) | set(range(known))
@@ -420,7 +420,7 @@ def bits_in(roots: Iterable[Expr]) -> set[int]:
 
 
 def _renumbered(root: Expr, new: Mapping[int, int]) -> Expr:
-    """The expression with other numbers for its bits."""
+    """The expression with its bits renumbered."""
 
     def condition(old: Condition) -> Condition:
         match old:
@@ -449,7 +449,7 @@ def equation_of(number: int, guards: Sequence[Guard]) -> str:
 
 
 def at_equality(side: str) -> str:
-    """A comparison as the equation of its boundary; those within brackets stay as they are."""
+    """The comparison as the equation of its boundary; comparisons within brackets are kept."""
     depth = 0
     for place, sign in enumerate(side):
         depth += (sign == "(") - (sign == ")")

@@ -1,4 +1,4 @@
-"""Contacts with a memory: play, Jenkins and Iwan elements. Each brings a state of its own.
+"""Contacts with a memory: play, Jenkins and Iwan elements. Each adds a state of its own.
 
 All of them rest on one element, the *stop operator*: p follows the input x, and stays at its limit
 while x pushes on::
@@ -42,12 +42,13 @@ _MADE: ContextVar[list[Element] | None] = ContextVar("elements", default=None)
 
 
 def elements() -> AbstractContextManager[list[Element]]:
-    """The elements that are made inside."""
+    """Collect the elements that are made inside."""
     return gathered(_MADE)
 
 
 def play(x: Operand, *, gap: Operand, name: str | None = None) -> Any:
-    """A play, or backlash: what a part carries along that has a clearance on both sides of it.
+    """A play, or backlash: the position of a part that x carries along through a clearance on both
+    sides.
 
     The value rests while x moves inside the clearance, and goes with x where that pushes on.
 
@@ -153,7 +154,7 @@ def iwan(
     stiffnesses, limits : sequence of Expr or float
         Of each element, as :func:`slider` takes them.
     name : str, optional
-        What the names of the states begin with: ``iwan``; each has its number behind it.
+        Prefix of the names of the states: ``iwan``; each has its number behind it.
 
     Returns
     -------
@@ -185,7 +186,7 @@ def iwan(
     if not len(stiffnesses) or len(stiffnesses) != len(limits):
         raise TraceError(
             f"sl.iwan has {len(stiffnesses)} stiffnesses and {len(limits)} limits. Give one of "
-            f"each for every element."
+            "each for every element."
         )
     force: Expr = ex.constant(0.0)
     for number, (k, limit) in enumerate(zip(stiffnesses, limits, strict=True), 1):
@@ -201,7 +202,7 @@ def _taken(name: str) -> bool:
 def _check_positive(law: str, what: str, value: Expr) -> None:
     """Raise a TraceError for a number that isn't positive."""
     if value.op == "const" and not value.payload > 0:
-        raise TraceError(f"sl.{law}: {what} = {value.payload:g} must be positive.")
+        raise TraceError(lambda say: f"{say.sl}{law}: {what} = {value.payload:g} must be positive.")
 
 
 def _stop(law: str, x: Expr, limit: Expr, name: str | None, what: str) -> Expr:
@@ -209,23 +210,29 @@ def _stop(law: str, x: Expr, limit: Expr, name: str | None, what: str) -> Expr:
     made = _MADE.get()
     if made is None:
         raise TraceError(
-            f"sl.{law} brings a state of its own, which only an equation of motion can have: write "
-            f"it inside the function under @sl.system."
+            lambda say: (
+                f"{say.sl}{law} brings a state of its own, which only an equation of motion can "
+                f"have: write it inside the function under {say.system()}."
+            )
         )
     _check_positive(law, what, limit)
     if ex.depends_on(x, ("table",)):
         raise TraceError(
-            f"sl.{law}: a record or table drives it, and where that turns isn't known beforehand. "
-            f"Let it drive a mass, and give the element the place of the mass."
+            lambda say: (
+                f"{say.sl}{law}: a record or table drives it, and where that turns isn't known "
+                "beforehand. Let it drive a mass, and give the element the place of the mass."
+            )
         )
     if name is None:
         numbered = (law if i == 1 else f"{law}_{i}" for i in itertools.count(1))
         name = next(one for one in numbered if not _taken(one))
     elif why_no_name(name) is not None:
-        raise TraceError(f"sl.{law}: {shown(name)} can't be the name of a state.")
+        raise TraceError(lambda say: f"{say.sl}{law}: {shown(name)} can't be the name of a state.")
     elif _taken(name):
         raise TraceError(
-            f"sl.{law}: two elements are called {shown(name)}. Give each its own name=."
+            lambda say: (
+                f"{say.sl}{law}: two elements are called {shown(name)}. Give each its own name=."
+            )
         )
     made.append(Element(name, x, limit))
     return ex.state(name)
@@ -234,23 +241,23 @@ def _stop(law: str, x: Expr, limit: Expr, name: str | None, what: str) -> Expr:
 def rates_of(
     made: Sequence[Element], states: Sequence[str], rates: Sequence[Expr]
 ) -> dict[str, Expr]:
-    """The rate of each element's state, from the rates of an equation's own states."""
+    """The rate of each element's state, from the rates of the equation's own states."""
     known = dict(zip(states, rates, strict=True))
-    own = [*states, *(one.name for one in made)]
-    for one in made:
-        total = time_derivative(one.x)
-        for name, slope in zip(own, gradient(one.x, own), strict=True):
+    all_states = [*states, *(element.name for element in made)]
+    for element in made:
+        total = time_derivative(element.x)
+        for name, slope in zip(all_states, gradient(element.x, all_states), strict=True):
             if slope.op == "const" and slope.payload == 0:
                 continue
             if name not in known:
-                raise TraceError(f"the element {one.name!r} moves what moves it.")
+                raise TraceError(f"the element {element.name!r} moves what moves it.")
             total = ex.add(total, ex.mul(slope, known[name]))
-        p, limit = ex.state(one.name), one.limit
+        p, limit = ex.state(element.name), element.limit
         pushes = _either(
             _both(p >= limit, _is_positive(total)), _both(p <= -limit, _is_positive(ex.neg(total)))
         )
-        known[one.name] = piecewise((0.0, pushes), otherwise=total)
-    return {one.name: known[one.name] for one in made}
+        known[element.name] = piecewise((0.0, pushes), otherwise=total)
+    return {element.name: known[element.name] for element in made}
 
 
 def _both(a: Condition, b: Condition | bool) -> Condition | bool:
@@ -264,7 +271,7 @@ def _either(a: Condition | bool, b: Condition | bool) -> Condition | bool:
 
 
 def _is_positive(rate: Expr) -> Condition | bool:
-    """Whether a rate is positive; of one with pieces in it, piece by piece."""
+    """The condition that a rate is positive; for a rate with pieces, piece by piece."""
     for node in ex.walk(rate):
         if node.op == "select":
             yes, no = (_is_positive(ex.substituted(rate, {node: one})) for one in node.args)

@@ -1,5 +1,5 @@
-"""Pieces that hide one another: two stops whose boundaries have changed places, as a clearance with
-a negative gap would have them.
+"""Pieces that hide one another: two stops whose boundaries have changed places, as with a negative
+gap of a clearance.
 
 `sl.piecewise` takes the first piece whose condition holds. Of ``(k*(x + gap), x < -gap), (k*(x -
 gap), x > gap)`` at most one holds while ``gap >= 0``. Beyond that both do between the boundaries,
@@ -19,6 +19,7 @@ from saltus.contact.guards import Guard, equation_of, is_hold
 from saltus.language.canonical import Canonical
 from saltus.language.evaluate import evaluate
 from saltus.language.expression import Bit, Condition, Expr, Not, add, neg, walk
+from saltus.sentences import Text
 
 
 def overlapping(
@@ -26,9 +27,9 @@ def overlapping(
     guards: tuple[Guard, ...],
     states: Sequence[str],
     values: Mapping[str, Any],
-) -> str | None:
-    """What is wrong if two pieces, one below a boundary and one above another, overlap; None if
-    none do.
+) -> Text | None:
+    """The message about two overlapping pieces, one below a boundary and one above another; None if
+    none overlap.
 
     Parameters
     ----------
@@ -38,7 +39,7 @@ def overlapping(
         Values of all parameters [SI]; arrays of one length, one for each trajectory.
     """
     for first, second, width in _opposed(field, guards):
-        # states cancel in it
+        # the states cancel in the width
         (overlap,) = evaluate([width], states=dict.fromkeys(states, 0.0), values=values)
         if not np.any(overlap > 0):
             continue
@@ -50,12 +51,12 @@ def overlapping(
         )
         entry = f" (trajectory {worst} of {np.size(overlap)})" if np.ndim(overlap) else ""
         places = " and ".join(equation_of(number, guards) for number in (first, second))
-        return (
+        return lambda say: (
             f"with {given}{entry} the contacts at {places} overlap, and the first "
             f"piece would hide the second. A "
             f"clearance can't be negative. Springs that touch on both sides at once are the sum of "
             f"two one-sided contacts: "
-            f"sl.freeplay(x, stiffness=k, lower_gap=gap) + sl.freeplay(x, stiffness=k, "
+            f"{say.sl}freeplay(x, stiffness=k, lower_gap=gap) + {say.sl}freeplay(x, stiffness=k, "
             f"upper_gap=gap)."
         )
     return None
@@ -65,8 +66,8 @@ def overlapping(
 def _opposed(
     field: tuple[Expr, ...], guards: tuple[Guard, ...]
 ) -> tuple[tuple[int, int, Expr], ...]:
-    """Guards of a piece and of the next one, and how far they overlap: the sum of their gaps, where
-    it depends on parameters only.
+    """Guards of a piece and of the next one, and their overlap: the sum of their gaps, where it
+    depends on parameters only.
     """
     return tuple(_pairs(field, guards))
 
@@ -94,7 +95,7 @@ def _pairs(field: tuple[Expr, ...], guards: tuple[Guard, ...]) -> Iterator[tuple
 
 
 def _side(condition: Condition) -> tuple[int, bool] | None:
-    """The guard of a condition on one side of it, and whether that is the positive one."""
+    """The guard of a condition on one side of it, and True for the positive side."""
     match condition:
         case Bit(guard):
             return guard, True

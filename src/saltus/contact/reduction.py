@@ -1,4 +1,4 @@
-"""Contacts that are held: hold guards, and the field reduced by elimination of contact forces.
+"""Contacts that are held: hold guards, and the field reduced by the elimination of contact forces.
 
 A contact j that can be held has a constraint w_j (closing velocity, or a surface's function) and a
 direction D_j: what a unit of its own force adds to the field. While it is held that force keeps
@@ -24,8 +24,8 @@ from saltus.language.known_sides import assuming
 from saltus.language.sums import dot, ratio, total
 
 _ZERO, _ONE = ex.constant(0.0), ex.constant(1.0)
-#: Most contacts that one rate may hold for its terms to be written for each of them apart, held and
-#: not: with each the terms double.
+#: Most contacts in one rate for which its terms are written twice, held and free: each more contact
+#: doubles them.
 _MOST_KNOWN = 4
 
 
@@ -44,7 +44,7 @@ class Held:
     drift : Expr
         Partial derivative of w with respect to t.
     direction : tuple of Expr
-        What a unit of its force adds to the field.
+        Change of the field by a unit of its force.
     pivot : int or None
         The state whose rate follows from the constraint, exactly.
     """
@@ -73,9 +73,10 @@ def held_contact(
 
 
 def with_pivots(contacts: Sequence[Held]) -> list[Held]:
-    """The contacts with their pivots: of the states in which a constraint is linear, one that the
-    contact's force moves and that is no other contact's. If that force moves just one state, it is
-    this one: of several that move only the same state one can be held at a time.
+    """The contacts with their pivots. A pivot is a state in which the constraint is linear, which
+    the contact's force changes, and which is no other contact's pivot. If the force changes just
+    one state, that is the pivot: of several contacts that change only the same state, one can be
+    held at a time.
     """
     chosen: dict[int, int] = {}
     candidates = {number: _linear_states(one) for number, one in enumerate(contacts)}
@@ -91,12 +92,14 @@ def with_pivots(contacts: Sequence[Held]) -> list[Held]:
     return [replace(one, pivot=chosen.get(number)) for number, one in enumerate(contacts)]
 
 
-def _linear_states(one: Held) -> list[int]:
-    """The states in which a constraint is linear, those that its force moves first."""
+def _linear_states(contact: Held) -> list[int]:
+    """The states in which a constraint is linear, those that its force changes first."""
     linear = [
-        i for i, slope in enumerate(one.normal) if slope is not _ZERO and not ex.varies(slope)
+        i for i, slope in enumerate(contact.normal) if slope is not _ZERO and not ex.varies(slope)
     ]
-    return sorted(linear, key=lambda i: (one.direction[i] is _ZERO, one.normal[i].op != "const"))
+    return sorted(
+        linear, key=lambda i: (contact.direction[i] is _ZERO, contact.normal[i].op != "const")
+    )
 
 
 class Elimination:
@@ -117,15 +120,16 @@ class Elimination:
         self._known = all(len(holds & bits_in([entry])) <= _MOST_KNOWN for entry in field)
 
     def reduced(self) -> tuple[Expr, ...]:
-        """The field: the reduced one where hold guards say so."""
+        """The field, reduced where hold guards say so."""
         field, _ = self._without(None)
         for one in self._in_order():
             field = self._put(one, field, one.drift, field)
         return field
 
     def own(self, contact: Held) -> tuple[Expr, Expr, tuple[Expr, ...]]:
-        """(N, P, D) of a contact, all others that are held eliminated: the rate of its constraint
-        without its own force, what a unit of that changes, and the change of the field.
+        """(N, P, D) of a contact, with all other held contacts eliminated: the rate of its
+        constraint without its own force, the change of that rate by a unit of force, and the change
+        of the field.
         """
         field, directions = self._without(contact)
         field = tuple(assuming(entry, contact.hold, True) for entry in field)
@@ -138,64 +142,72 @@ class Elimination:
     ) -> tuple[tuple[Expr, ...], dict[int, tuple[Expr, ...]]]:
         """Field and directions after the elimination of all contacts but one."""
         field = self._field
-        directions = {one.hold: one.direction for one in self._contacts}
-        for number, one in enumerate(self._contacts):
-            if one is left_out:
+        directions = {contact.hold: contact.direction for contact in self._contacts}
+        for number, contact in enumerate(self._contacts):
+            if contact is left_out:
                 continue
-            across = dot(one.normal, directions[one.hold])
+            across = dot(contact.normal, directions[contact.hold])
             if _is_nothing(across):
-                continue  # with those before it held its force changes nothing: it can't be
+                continue  # its force changes nothing once those before are held: it can't be
             later = [other for other in self._contacts[number + 1 :] if other is not left_out]
             later += [left_out] if left_out else []
-            own = directions[one.hold]
-            rate = ex.add(dot(one.normal, field), one.drift)
-            field = self._take(one, field, own, ratio(rate, across), one.drift)
+            direction = directions[contact.hold]
+            rate = ex.add(dot(contact.normal, field), contact.drift)
+            field = self._take(contact, field, direction, ratio(rate, across), contact.drift)
             for other in later:
-                along = dot(one.normal, directions[other.hold])
+                along = dot(contact.normal, directions[other.hold])
                 if self._canonical.polynomial(along):
                     directions[other.hold] = self._take(
-                        one, directions[other.hold], own, ratio(along, across), _ZERO
+                        contact, directions[other.hold], direction, ratio(along, across), _ZERO
                     )
         return field, directions
 
     def _take(
-        self, one: Held, entries: tuple[Expr, ...], own: Sequence[Expr], share: Expr, drift: Expr
+        self,
+        contact: Held,
+        entries: tuple[Expr, ...],
+        direction: Sequence[Expr],
+        share: Expr,
+        drift: Expr,
     ) -> tuple[Expr, ...]:
-        """Entries minus a share of a contact's direction, where it is held."""
+        """Entries minus a share of a contact's direction, where the contact is held."""
         new = tuple(
-            self._held(one, ex.sub(entry, ex.mul(by, share)), entry)
-            if by is not _ZERO and i != one.pivot
+            self._held(contact, ex.sub(entry, ex.mul(by, share)), entry)
+            if by is not _ZERO and i != contact.pivot
             else entry
-            for i, (entry, by) in enumerate(zip(entries, own, strict=True))
+            for i, (entry, by) in enumerate(zip(entries, direction, strict=True))
         )
-        return self._put(one, new, drift, entries) if one.pivot is not None else new
+        return self._put(contact, new, drift, entries) if contact.pivot is not None else new
 
     def _put(
-        self, one: Held, entries: tuple[Expr, ...], drift: Expr, free: tuple[Expr, ...]
+        self, contact: Held, entries: tuple[Expr, ...], drift: Expr, free: tuple[Expr, ...]
     ) -> tuple[Expr, ...]:
-        """The pivot's entry from the constraint, exactly, where the contact is held."""
-        if one.pivot is None:
+        """Entries with the pivot's one taken from the constraint, exactly, where the contact is
+        held.
+        """
+        if contact.pivot is None:
             return entries
-        i = one.pivot
+        i = contact.pivot
         others = [
             ex.mul(slope, entry)
-            for k, (slope, entry) in enumerate(zip(one.normal, entries, strict=True))
+            for k, (slope, entry) in enumerate(zip(contact.normal, entries, strict=True))
             if k != i and slope is not _ZERO and entry is not _ZERO
         ]
-        exact = ratio(ex.neg(total([drift, *others])), one.normal[i])
-        return (*entries[:i], self._held(one, exact, free[i]), *entries[i + 1 :])
+        exact = ratio(ex.neg(total([drift, *others])), contact.normal[i])
+        return (*entries[:i], self._held(contact, exact, free[i]), *entries[i + 1 :])
 
-    def _held(self, one: Held, value: Expr, otherwise: Expr) -> Expr:
-        """``value`` where a contact is held."""
+    def _held(self, contact: Held, value: Expr, otherwise: Expr) -> Expr:
+        """``value`` where the contact is held, else ``otherwise``."""
         if self._known:
             value, otherwise = (
-                assuming(root, one.hold, side) for root, side in ((value, True), (otherwise, False))
+                assuming(root, contact.hold, side)
+                for root, side in ((value, True), (otherwise, False))
             )
-        return ex.select(Bit(one.hold), value, otherwise)
+        return ex.select(Bit(contact.hold), value, otherwise)
 
     def _in_order(self) -> list[Held]:
-        """The contacts with pivots, each behind those whose pivots its own rate follows from; those
-        that go in a circle are left as they are.
+        """The contacts with pivots, each after those whose pivots its own rate follows from;
+        contacts in a circle keep their order.
         """
         waiting = [one for one in self._contacts if one.pivot is not None]
         order: list[Held] = []
@@ -221,7 +233,7 @@ def _is_nothing(node: Expr) -> bool:
 
 
 def hold_gap(kind: str, drive: Expr, pivot: Expr, limit: Expr | None) -> Expr:
-    """How far a held contact is from its release: positive while it stays held."""
+    """Margin of a held contact to its release: positive while it stays held."""
     if kind == "impact":
         return drive
     most = pivot if limit is None or limit is _ONE else ex.mul(limit, pivot)
@@ -229,7 +241,7 @@ def hold_gap(kind: str, drive: Expr, pivot: Expr, limit: Expr | None) -> Expr:
 
 
 def free_field(field: Sequence[Expr], guards: Sequence[Guard]) -> tuple[Expr, ...]:
-    """The field as it was written: no contact is held."""
+    """The field as it was written, with no contact held."""
     for number, guard in enumerate(guards):
         if guard.law is not None and guard.law.kind == "hold":
             field = [assuming(entry, number, False) for entry in field]

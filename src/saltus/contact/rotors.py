@@ -72,7 +72,7 @@ def clearance(
     (0.0, 0.0)
     """
     for operand in (x, y, stiffness, gap, friction, slip):
-        as_expr(operand)  # refuses what is neither a number nor traced
+        as_expr(operand)  # refuses anything that is neither a number nor traced
     r = hypot(x, y)
     if not isinstance(r, Expr) and not isinstance(gap, Expr) and r <= gap:
         return 0.0, 0.0

@@ -1,4 +1,4 @@
-"""What of an expression's sign can be told from how it is written."""
+"""Signs of expressions, as far as they follow from how the expressions are written."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from saltus.contact.guards import Guard, is_hold
 from saltus.language.canonical import Canonical, Polynomial, proportion
 from saltus.language.expression import And, Bit, Condition, Expr, Not, Or, Relation, varies
 
-#: Expressions of parameters, each once.
+#: Distinct expressions of parameters.
 Known = tuple[Expr, ...]
-#: Gaps whose sign is known, each with it.
+#: Gaps with a known sign, and that sign.
 Facts = tuple[tuple[Polynomial, int], ...]
 
 
 def never_negative_if(root: Expr, guards: Sequence[Guard]) -> Known | None:
-    """Expressions of parameters of which none may be negative for another expression never to be,
-    on any motion; None if it may be all the same, or nothing can be told.
+    """Expressions of parameters that must not be negative, so that another expression never is on
+    any motion; None if it still may be, or nothing can be told.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class _Signs:
         self._canonical, self._guards = Canonical(), guards
 
     def of(self, node: Expr, facts: Facts) -> Known | None:
-        """As :func:`never_negative_if`, where some gaps have a known sign."""
+        """The result of :func:`never_negative_if` if the signs of some gaps are known."""
         if node.op == "const":
             return () if node.payload >= 0 else None
         if not varies(node):

@@ -28,13 +28,13 @@ from saltus.language.known_sides import assuming
 _ZERO = ex.constant(0.0)
 #: Order of a logarithm: below every power.
 _LOG = -1e-9
-#: Most branches of a function of pieces: a sum of k pieces has 2**k values.
+#: Most branches of a function of pieces; a sum of k pieces has 2**k of them.
 _MOST_BRANCHES = 256
 
 
 class Order(NamedTuple):
-    """How an expression behaves on a boundary: like gap**order, or smaller; ``singular`` if it has
-    no Taylor series there.
+    """Order of an expression on a boundary: it is like gap**order, or smaller; ``singular`` if it
+    has no Taylor series there.
     """
 
     order: float
@@ -42,7 +42,7 @@ class Order(NamedTuple):
 
 
 class SetAside(NamedTuple):
-    """A field whose terms without a series can be switched off.
+    """A field with terms that have no series, which can be switched off.
 
     Attributes
     ----------
@@ -86,8 +86,8 @@ def set_aside(field: Sequence[Expr], guards: Sequence[Guard]) -> SetAside:
 
 
 def check_finite(field: Sequence[Expr], guards: Sequence[Guard], states: Sequence[str]) -> None:
-    """Raise a TraceError if a piece of the field is infinite on its own boundary: nothing can be
-    said of a motion that meets it.
+    """Raise a TraceError if a piece of the field is infinite on its own boundary: the motion isn't
+    defined there.
     """
     if not _may_break(field):
         return
@@ -110,8 +110,8 @@ def check_finite(field: Sequence[Expr], guards: Sequence[Guard], states: Sequenc
 
 
 def is_steep(jacobian: Iterable[Expr], guards: Sequence[Guard]) -> bool:
-    """Whether a derivative of the field is infinite on a boundary where its piece begins, as that
-    of ``d**0.25`` is: no tangent can be integrated through there.
+    """True if a derivative of the field is infinite on a boundary where its piece begins, as that
+    of ``d**0.25``: no tangent can be integrated through it.
     """
     entries = [entry for entry in jacobian if entry.op != "const"]
     if not _may_break(entries):
@@ -126,28 +126,28 @@ def is_steep(jacobian: Iterable[Expr], guards: Sequence[Guard]) -> bool:
 
 
 def check_gaps(guards: Sequence[Guard]) -> None:
-    """Raise a TraceError if a gap has a power, root or logarithm of a piece that vanishes: there
-    the gap is zero, and on no side.
+    """Raise a TraceError if a gap has a power, root or logarithm of a piece that vanishes: the gap
+    is zero there, on neither side.
     """
     boundaries = _Boundaries(guards)
     for guard in guards:
         for node in ex.walk(guard.gap):
-            whole = (
+            whole_power = (
                 node.op == "pow"
                 and node.args[1].op == "const"
                 and float(node.args[1].payload).is_integer()
             )
             if (
                 node.op in ("pow", "sqrt", "log")
-                and not whole
+                and not whole_power
                 and boundaries.lifted(node) is not node
             ):
                 raise TraceError(
                     f"the boundary {guard.name!r} asks for the sign of a law that has no Taylor "
-                    f"series where its own piece begins. Write it "
-                    f"as one piece with all of its conditions: for a contact without tension, d = "
-                    f"x - gap and "
-                    f"sl.piecewise((K*d**1.5*(1 + c*v), (d > 0) & (1 + c*v > 0)), otherwise=0)."
+                    "series where its own piece begins. Write it as one piece with all of its "
+                    "conditions: for a contact without tension, d = x - gap and ",
+                    lambda say: f"{say.sl}piecewise((K*d**1.5*(1 + c*v), ",
+                    "(d > 0) & (1 + c*v > 0)), otherwise=0).",
                 )
 
 
@@ -167,8 +167,8 @@ def lifted(field: Iterable[Expr], guards: Sequence[Guard]) -> tuple[Expr, ...]:
 
 
 def _may_break(roots: Iterable[Expr]) -> bool:
-    """Whether anything below the roots could have no Taylor series: only these operations can, and
-    to look for zeros on every boundary takes long in a field of a thousand terms.
+    """True if any operation below the roots could have no Taylor series. This test is cheap;
+    looking for zeros on every boundary takes long in a field of a thousand terms.
     """
     for node in ex.walk(*roots):
         match node.op:
@@ -182,7 +182,7 @@ def _may_break(roots: Iterable[Expr]) -> bool:
 
 
 def _is_whole(exponent: Expr) -> bool:
-    """Whether an exponent is a whole number, not negative."""
+    """True if an exponent is a whole number, not negative."""
     return exponent.op == "const" and exponent.payload >= 0 and exponent.payload % 1 == 0
 
 
@@ -211,8 +211,8 @@ class _Boundaries:
         self._there: list[dict[Expr, Expr | None]] = [{} for _ in guards]
 
     def singular_terms(self, field: Sequence[Expr], number: int) -> list[Expr]:
-        """The nodes at which a series ends to exist on a boundary: powers, roots, logarithms and
-        quotients of what vanishes there.
+        """The nodes with no Taylor series on a boundary: powers, roots, logarithms and quotients of
+        something that vanishes there.
         """
         orders = self.orders(field, number)
         return [node for node in ex.walk(*field) if self._breaks(node, orders)]
@@ -231,7 +231,7 @@ class _Boundaries:
         return False
 
     def orders(self, field: Sequence[Expr], number: int) -> dict[Expr, Order]:
-        """Order of every node on boundary ``number``, and of those asked for before."""
+        """Order of every node on boundary ``number``, with those computed before."""
         orders = self._orders[number]
         for node in ex.walk(*field, known=orders):
             orders[node] = self._order(node, orders, number)
@@ -270,8 +270,8 @@ class _Boundaries:
         return _order_of_function(node.op, parts[0])
 
     def _vanishes(self, node: Expr, number: int) -> bool:
-        """Whether a node is zero on a boundary: the gap times a factor, or zero once the state is
-        put there.
+        """True if a node is zero on a boundary: the gap times a factor, or zero once the state is
+        substituted.
         """
         if not self._states_in(self._guards[number].gap) & self._states_in(node):
             return False
@@ -281,7 +281,7 @@ class _Boundaries:
         return there is not None and not self._canonical.polynomial(there)
 
     def _states_in(self, root: Expr) -> int:
-        """The states below a node, each by a bit of a number."""
+        """The states below a node, as bits of a number."""
         known = self._states
         for node in ex.walk(root, known=known):
             own = next(self._one_more) if node.op == "state" else 0
@@ -289,8 +289,8 @@ class _Boundaries:
         return known[root]
 
     def _on_boundary(self, root: Expr, number: int) -> Expr | None:
-        """A node where the state of a boundary is put there; None of a boundary that is no level,
-        and of what is no number there.
+        """A node with the state of a boundary substituted; None if the boundary is no level, or the
+        node no number there.
         """
         guard, known = self._guards[number], self._there[number]
         if guard.state is None or guard.boundary is None:
@@ -310,7 +310,7 @@ class _Boundaries:
         return known[root]
 
     def _is_gap(self, node: Expr, number: int) -> bool:
-        """Whether a node is the gap of a guard times a factor."""
+        """True if a node is the gap of a guard times a factor."""
         return is_multiple(self._canonical.polynomial(node), self._gaps[number])
 
     def lifted(self, node: Expr) -> Expr:
@@ -336,7 +336,9 @@ class _Boundaries:
         )
 
     def _spread(self, node: Expr, branches: Iterator[int]) -> Expr:
-        """A function of a piece as a piece of functions; raises _TooManyError if these are many."""
+        """Write a function of a piece as a piece of functions; raises _TooManyError if these are
+        many.
+        """
         if next(branches) > _MOST_BRANCHES:
             raise _TooManyError
         operand = node.args[0]
@@ -354,15 +356,15 @@ class _Boundaries:
 
 
 def _one_by_one(node: Expr) -> Expr:
-    """A function of a sum of many pieces, each zero on one side: apart where one of them acts
-    alone, since only there it may vanish on a boundary, and where none does.
+    """Split a function of a sum of many pieces, each zero on one side: the cases in which one piece
+    acts alone, since only there it may vanish on a boundary, and the case in which none acts.
     """
     operand, acts = node.args[0], dict[Condition, None]()
     for below in ex.walk(operand):
         if (acting := _acting(below)) is not None:
             acts[acting] = None
 
-    def where(one: Condition | None) -> Expr:
+    def where(condition: Condition | None) -> Expr:
         """The function where one of the pieces acts, or none."""
         new: dict[Expr, Expr] = {}
         for below in ex.walk(operand):
@@ -370,28 +372,28 @@ def _one_by_one(node: Expr) -> Expr:
             if acting is None:
                 new[below] = ex.rebuild(below, args, below.payload)
             else:
-                new[below] = args[args[0] is _ZERO] if acting is one else _ZERO
+                new[below] = args[args[0] is _ZERO] if acting is condition else _ZERO
         return ex.rebuild(node, (new[operand], *node.args[1:]), node.payload)
 
     none = where(None)
     if none.op != "const":
         return node
     lifted = ex.select(reduce(Or, acts), node, none)
-    for one in acts:
-        rest = [Not(other) for other in acts if other is not one]
-        lifted = ex.select(reduce(And, rest, one), where(one), lifted)
+    for condition in acts:
+        rest = [Not(other) for other in acts if other is not condition]
+        lifted = ex.select(reduce(And, rest, condition), where(condition), lifted)
     return lifted
 
 
 def _acting(node: Expr) -> Condition | None:
-    """The condition in which a piece isn't zero, if it is elsewhere."""
+    """The condition under which a piece isn't zero, if it is zero elsewhere."""
     if node.op != "select" or all(one is not _ZERO for one in node.args):
         return None
     return node.payload if node.args[1] is _ZERO else Not(node.payload)
 
 
 class _TooManyError(Exception):
-    """A function would have more branches than are looked at."""
+    """A function has more branches than are tried."""
 
 
 def _outermost_bit(node: Expr) -> int | None:
@@ -410,7 +412,7 @@ def _outermost_bit(node: Expr) -> int | None:
 
 
 def _order_of_power(base: Order, exponent: Expr) -> Order:
-    """Of ``base**exponent``; an exponent that is a parameter is taken to be positive, and not
+    """Order of ``base**exponent``. An exponent that is a parameter is assumed positive and not
     whole.
     """
     if base.order == math.inf:
@@ -433,12 +435,12 @@ def _order_of_function(op: str, inner: Order) -> Order:
     if op == "log":
         return Order(_LOG, True) if inner.order > 0 else Order(0.0, inner.singular)
     if inner.singular and inner.order < 0:
-        return Order(_LOG, True)  # a function of something infinite: no limit is known
+        return Order(_LOG, True)  # a function of something infinite: its limit is unknown
     return Order(0.0 if op in ("exp", "cos") else max(inner.order, 0.0), inner.singular)
 
 
 def _exponent_of_power(node: Expr, orders: dict[Expr, Order]) -> bool:
-    """Whether this is ``exp(y*log(u))``, the form of ``u**y`` with an exponent that varies."""
+    """True if the node is ``exp(y*log(u))``, the form of ``u**y`` with an exponent that varies."""
     if node.op != "exp" or node.args[0].op != "mul":
         return False
     factor = node.args[0].args[1]

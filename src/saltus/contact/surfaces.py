@@ -24,9 +24,12 @@ from saltus.language.sums import ratio, total
 
 _SIGMA = ex.parameter("\0sigma")
 _ZERO = ex.constant(0.0)
-#: Places on a surface where a jump is tried, Newton steps that lead there, and the part of the
-#: terms' size below which their sum is rounding.
-_PLACES, _STEPS, _ROUNDING = 512, 8, 1e-9
+#: Samples of a surface where a jump is tried.
+_PLACES = 512
+#: Newton steps that lead onto the surface.
+_STEPS = 8
+#: A sum below this share of its terms is rounding.
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +58,7 @@ class Surface:
 def is_surface(
     number: int, field: Sequence[Expr], guards: Sequence[Guard], states: Sequence[str]
 ) -> bool:
-    """Whether the rate of a guard's gap jumps across it. Gaps with clocks in them count as none."""
+    """True if the rate of a guard's gap jumps across it. Gaps with clocks are excluded."""
     gap = guards[number].gap
     if has_clock(gap):
         return False
@@ -74,7 +77,7 @@ def is_surface(
 
 
 class OnSurface:
-    """What expressions are where a gap is zero."""
+    """Expressions where a gap is zero."""
 
     def __init__(self, gap: Expr, states: Sequence[str]) -> None:
         self._canonical = Canonical()
@@ -86,7 +89,7 @@ class OnSurface:
                 break
 
     def is_zero(self, expression: Expr) -> bool:
-        """Whether an expression is certainly zero on the surface."""
+        """True if an expression is certainly zero on the surface."""
         polynomial = self._canonical.polynomial(expression)
         if not polynomial or is_multiple(polynomial, self._gap):
             return True
@@ -100,7 +103,7 @@ class OnSurface:
 
 
 def level(gap: Expr, name: str, slope: Expr) -> Expr:
-    """The value of a state at which a gap is zero that is linear in it."""
+    """The value of a state at which a gap, linear in it, is zero."""
     rest = ex.substituted(gap, {ex.state(name): _ZERO})
     return ratio(ex.neg(rest), slope)
 
@@ -110,7 +113,7 @@ def _is_zero(node: Expr) -> bool:
 
 
 def has_clock(expression: Expr) -> bool:
-    """Whether a remainder or a table of time, or a comparison of time, stands in an expression."""
+    """True if an expression holds a remainder or a table of time, or a comparison of time."""
     if ex.depends_on(expression, ("mod", "table")):
         return True
     pieces = (node for node in ex.walk(expression) if node.op == "select")
@@ -120,8 +123,9 @@ def has_clock(expression: Expr) -> bool:
 def _jumps(
     jump: Expr, number: int, guards: Sequence[Guard], field: Sequence[Expr], states: Sequence[str]
 ) -> bool:
-    """Whether the jump of a gap's rate is more than rounding somewhere on the surface, by samples:
-    what is zero there needn't look so, as where the pieces of a curve meet.
+    """True if the jump of a gap's rate exceeds rounding somewhere on the surface. Tested by
+    sampling: an expression may be identically zero without simplifying to 0, e.g. where two spline
+    pieces meet.
     """
     random = np.random.default_rng(7)
     gap = guards[number].gap
@@ -137,7 +141,9 @@ def _jumps(
     t = random.uniform(0.0, 1.5, _PLACES)
 
     def sides(roots: Sequence[Expr]) -> dict[int, np.ndarray]:
-        """Sides of the guards whose bits stand in some expressions, and in the gaps of those."""
+        """Samples of the sides of guards whose bits stand in some expressions, and in the gaps of
+        those.
+        """
         needed, bits = bits_in(roots), dict[int, np.ndarray]()
         for other in range(len(guards) - 1, -1, -1):
             needed |= bits_in([guards[other].gap]) if other in needed else set()
@@ -160,7 +166,7 @@ def _jumps(
         return bool(np.any(np.abs(found) > _ROUNDING * size))
 
 
-def split(number: int, field: Sequence[Expr], place: OnSurface) -> Surface:
+def split(number: int, field: Sequence[Expr], surface: OnSurface) -> Surface:
     """Middle and halves of a field in terms of the sigma of a guard."""
     pieces: dict[Expr, tuple[Expr, Expr]] = {}
     spread: dict[Expr, Expr] = {}
@@ -168,29 +174,29 @@ def split(number: int, field: Sequence[Expr], place: OnSurface) -> Surface:
         spread[node] = ex.rebuild(node, tuple(spread[child] for child in node.args), node.payload)
         if node.op == "select" and node.payload.bits >> number & 1:
             up, down = (assuming(node, number, side) for side in (True, False))
-            half = _ZERO if place.is_zero(ex.sub(up, down)) else _half(up, down, place)
-            pieces[node] = (_mean(up, down, place), half)
+            half = _ZERO if surface.is_zero(ex.sub(up, down)) else _half(up, down, surface)
+            pieces[node] = (_mean(up, down, surface), half)
             spread[node] = _at(*pieces[node], _SIGMA)
     halves: list[Expr] = []
-    whole: dict[int, Expr] = {}
+    means: dict[int, Expr] = {}
     for i, entry in enumerate(field):
         half = differentiate(spread[entry], _SIGMA)
         if _SIGMA in set(ex.walk(half)) or number in bits_in([spread[entry]]):
             up, down = (assuming(entry, number, side) for side in (True, False))
-            half, whole[i] = _half(up, down, place), _mean(up, down, place)
+            half, means[i] = _half(up, down, surface), _mean(up, down, surface)
         halves.append(half)
-    return Surface(number, pieces, tuple(halves), whole)
+    return Surface(number, pieces, tuple(halves), means)
 
 
-def _mean(up: Expr, down: Expr, place: OnSurface) -> Expr:
+def _mean(up: Expr, down: Expr, surface: OnSurface) -> Expr:
     """The value halfway between two sides."""
     both = ex.add(up, down)
-    return _ZERO if place.is_zero(both) else ex.mul(0.5, both)
+    return _ZERO if surface.is_zero(both) else ex.mul(0.5, both)
 
 
-def _half(up: Expr, down: Expr, place: OnSurface) -> Expr:
+def _half(up: Expr, down: Expr, surface: OnSurface) -> Expr:
     """Half of the difference of two sides."""
-    return up if place.is_zero(ex.add(up, down)) else ex.mul(0.5, ex.sub(up, down))
+    return up if surface.is_zero(ex.add(up, down)) else ex.mul(0.5, ex.sub(up, down))
 
 
 def _at(mean: Expr, half: Expr, sigma: Expr) -> Expr:
@@ -200,7 +206,7 @@ def _at(mean: Expr, half: Expr, sigma: Expr) -> Expr:
 def held_at(
     field: Sequence[Expr], surface: Surface, hold: int, sigma: Expr = _ZERO
 ) -> tuple[Expr, ...]:
-    """The field at a sigma of a surface where its hold guard says so; elsewhere as it was."""
+    """The field at a sigma of a surface where its hold guard says so; elsewhere unchanged."""
     memo: dict[Expr, Expr] = {}
     for node in ex.walk(*field, conditions=False):
         new = ex.rebuild(node, tuple(memo[child] for child in node.args), node.payload)
@@ -216,8 +222,8 @@ def held_at(
 
 
 def with_held_signs(root: Expr, guards: Sequence[Guard], states: Sequence[str]) -> Expr:
-    """An expression that joins a system, with the sign that a held surface takes: the force of
-    friction that sticks is the one that holding it needs.
+    """An expression that joins a system, with the sign that a held surface takes: friction that
+    sticks is the force that holding it needs.
     """
     for number, guard in enumerate(guards):
         law = guard.law
@@ -231,8 +237,8 @@ def with_held_signs(root: Expr, guards: Sequence[Guard], states: Sequence[str]) 
     return root
 
 
-def averaged(entry: Expr, number: int, hold: int, place: OnSurface) -> Expr:
-    """An expression with the mean of its two sides where a surface is held."""
+def averaged(entry: Expr, number: int, hold: int, surface: OnSurface) -> Expr:
+    """The expression with the mean of its two sides where a surface is held."""
     if number not in bits_in([entry]):
         return entry
-    return held_at([entry], split(number, [entry], place), hold)[0]
+    return held_at([entry], split(number, [entry], surface), hold)[0]

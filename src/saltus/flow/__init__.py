@@ -1,4 +1,4 @@
-"""Flows: methods that move states and cross contacts. Arrays in, arrays out; people use
+"""Flows: methods that integrate states through contacts. They take and return arrays; users call
 :mod:`saltus.analysis`.
 """
 

@@ -97,14 +97,14 @@ class ContactTable:
 
     @property
     def changes_side(self) -> np.ndarray:
-        """Whether the guard's own side changed, bool[c]: it doesn't at a graze."""
+        """True where the guard itself changed its side, bool[c]; a graze doesn't change it."""
         changes: np.ndarray = ((self.mode_before ^ self.mode_after) >> self.guard) & 1 == 1
         return changes
 
     @property
     def chatters(self) -> np.ndarray:
-        """Whether a contact is one of the impacts, ever smaller, with which one guard's contact
-        comes to rest, bool[c]: how many of them there are says nothing.
+        """True where a contact is one of the ever smaller impacts with which a guard comes to rest,
+        bool[c]. The number of these impacts means nothing.
         """
         impact: np.ndarray = self.kind == st.IMPACT
         rows = np.flatnonzero(impact)
@@ -124,17 +124,17 @@ class ContactTable:
         return impact
 
     def moved(self, by: int) -> ContactTable:
-        """The same contacts of trajectories with other numbers."""
+        """The same contacts, with ``by`` added to the numbers of their trajectories."""
         integers = self.integers.copy()
         integers[:, st.REC_TRAJECTORY] += by
         return ContactTable(integers, self.floats)
 
     def rows(self, which: np.ndarray | slice) -> ContactTable:
-        """Some of the contacts: views for a slice."""
+        """The contacts of these indices; views for a slice."""
         return ContactTable(self.integers[which], self.floats[which])
 
     def begins(self, count: int, first: int = 0) -> np.ndarray:
-        """Where the contacts of ``count`` trajectories from ``first`` on begin, and where the last
-        ends: int64[count + 1].
+        """Index of the first contact of each of ``count`` trajectories from ``first`` on, and the
+        end of the last one: int64[count + 1].
         """
         return np.searchsorted(self.trajectory, first + np.arange(count + 1))

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.errors import ParameterError, shown
+from saltus.errors import must_be
 
 #: The largest count that means anything here: at a million periods a second, 1e12 take eleven days.
 MOST = 10**12
@@ -26,12 +26,9 @@ def whole(value: Any, name: str, least: int = 1, most: int = MOST) -> int:
         or value != int(value)
         or value < least
     ):
-        raise ParameterError(
-            f"{name} must be a whole number of at least {least}{_and_most(most)}, "
-            f"not {shown(value)}."
-        )
+        raise must_be(name, f"a whole number of at least {least}{_and_most(most)}", value)
     if value > most:
-        raise ParameterError(f"{name} must be at most {_power(most)}, not {shown(value)}.")
+        raise must_be(name, f"at most {_power(most)}", value)
     return int(value)
 
 

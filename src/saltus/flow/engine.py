@@ -36,7 +36,7 @@ from saltus.system import System
 CHUNK = 1024
 #: Threads of one call.
 MOST_THREADS = 4096
-#: Steps of the lanes between two checks for Ctrl-C, for two states: some ten milliseconds.
+#: Steps of the lanes between two checks for Ctrl-C, for two states: about ten milliseconds.
 SLICE = 50_000
 #: Contacts that a chunk's table holds before it is emptied, besides room for those of one step.
 RECORDS = 8192
@@ -48,8 +48,8 @@ class RunInterrupted(Interrupted):
 
 @dataclass
 class _Chunk:
-    """A run of trajectories and the arrays of its kernel call (views of the outcome's arrays where
-    possible).
+    """A slice of the trajectories and the arrays of its kernel call (views of the outcome's arrays
+    where possible).
     """
 
     first: int
@@ -73,9 +73,9 @@ def run(
     system : System
         The equations; its own parameter values aren't used.
     method : Method
-        How to integrate.
+        The method of integration.
     request : Request
-        What to compute.
+        The trajectories to compute.
     threads : int, optional
         Threads to use; default all processors this process may run on. The result doesn't depend on
         it.
@@ -90,13 +90,13 @@ def run(
     threads = threads if threads is None else whole_number(threads, "threads", 1, MOST_THREADS)
     method = method.serving(system.origin)
     module = method.kernels(system.origin)
-    outcome, whole = allocate(request, system, module)
+    outcome, arrays = allocate(request, system, module)
     periods = float(np.max(request.end_count + request.end_phase / request.period, initial=0.0))
     data, due = tables_of(system.origin), method.due(periods)
-    whole["options"] = options_of(method, periods, len(request.start), request.checks)
+    arrays["options"] = options_of(method, periods, len(request.start), request.checks)
     check_steps(system, method, request.period)
     chunks = [
-        _cut(request, whole, first, data, due) for first in range(0, len(request.start), CHUNK)
+        _cut(request, arrays, first, data, due) for first in range(0, len(request.start), CHUNK)
     ]
     workers = threads or usable_processors()
     stop, room = Stop(), Contacts(len(system.states))
@@ -104,7 +104,7 @@ def run(
         _run_chunks(chunks, module, stop, room, progress, workers)
     except KeyboardInterrupt:
         outcome.complete = False
-        raise RunInterrupted(lambda: _finish(outcome, whole, chunks, request.t_end)) from None
+        raise RunInterrupted(lambda: _finish(outcome, arrays, chunks, request.t_end)) from None
     if room.stopped:
         warnings.warn(
             f"the contacts of this call, {room.count} by now, filled half of the free memory: "
@@ -114,7 +114,7 @@ def run(
             SaltusWarning,
             stacklevel=4,
         )
-    _finish(outcome, whole, chunks, request.t_end)
+    _finish(outcome, arrays, chunks, request.t_end)
     if method.fixed:
         companion = method.companion()
         try:
@@ -131,8 +131,8 @@ def check_steps(system: System, method: Method, period: np.ndarray) -> None:
 
 
 def options_of(method: Method, periods: float, count: int, checks: int = 0) -> np.ndarray:
-    """The numbers of a method as its kernels read them, for ``count`` trajectories, the last
-    ``checks`` of them checks.
+    """The numbers of a method as its kernels read them, for ``count`` trajectories. The last
+    ``checks`` of these measure errors.
     """
     numbers = method.numbers(periods)
     options = np.full((count, len(numbers)), numbers)
@@ -151,9 +151,7 @@ def tables_of(system: System) -> np.ndarray:
 def allocate(
     request: Request, system: System, module: Flow
 ) -> tuple[Outcome, dict[str, np.ndarray]]:
-    """The arrays that all chunks write to, at the start of a run, and the outcome
-    that shows them.
-    """
+    """Allocate the arrays that all chunks write to, and the outcome that shows them."""
     n, m, states = len(request.start), len(request.schedule.count), len(system.states)
     sampled = n - request.checks
     finite = np.isfinite(request.start).all(axis=1) & np.isfinite(request.parameters).all(axis=1)
@@ -163,7 +161,7 @@ def allocate(
     finite &= ~beyond
     zeros, counts = np.zeros((2, n)), np.zeros((4, n), np.int64)
     counts[2, sampled:] = counts[3] = -1
-    whole = {
+    arrays = {
         "period": request.period,
         "origin": zeros[0] + request.origin,
         "state": start,
@@ -183,11 +181,11 @@ def allocate(
         **marks(n),
     }
     outcome = Outcome(
-        whole["state"], whole["phase"], whole["status"], whole["mode"], whole["counters"],
-        whole["minima"], whole["samples"],
-        whole["sample_mode"], ContactTable.empty(0, states),
+        arrays["state"], arrays["phase"], arrays["status"], arrays["mode"], arrays["counters"],
+        arrays["minima"], arrays["samples"],
+        arrays["sample_mode"], ContactTable.empty(0, states),
     )  # fmt: skip
-    return outcome, whole
+    return outcome, arrays
 
 
 #: Order of the arguments of every `propagate`.
@@ -195,12 +193,16 @@ ARGUMENTS = Batch._fields
 
 
 def _cut(
-    request: Request, whole: dict[str, np.ndarray], first: int, data: np.ndarray, due: float | None
+    request: Request,
+    all_arrays: dict[str, np.ndarray],
+    first: int,
+    data: np.ndarray,
+    due: float | None,
 ) -> _Chunk:
-    """The arrays of one chunk: views of the whole, and tables of its own."""
+    """The arrays of one chunk: views of the shared arrays, and tables of its own."""
     rows = slice(first, min(first + CHUNK, len(request.start)))
     parameters = request.parameters if len(request.parameters) == 1 else request.parameters[rows]
-    arrays = {name: array[rows] for name, array in whole.items()} | shared_arrays(
+    arrays = {name: array[rows] for name, array in all_arrays.items()} | shared_arrays(
         rows.stop - first, parameters, request.schedule, data
     )
     arrays["rec_first"] += request.record_from or 0
@@ -234,9 +236,7 @@ def move_to_end(move: Callable[[], int], arrays: dict[str, np.ndarray], due: flo
 
 
 def _open_tables(chunk: _Chunk, module: Flow) -> None:
-    """The chunk's table of contacts, made when its turn comes so that waiting chunks hold no
-    memory.
-    """
+    """Allocate a chunk's table of contacts when its turn comes: waiting chunks hold no memory."""
     size = RECORDS + module.STEP_RECORDS if chunk.keeps_contacts else 0
     chunk.arrays["rec_i"], chunk.arrays["rec_f"] = ContactTable.empty(
         size, chunk.arrays["state"].shape[1]
@@ -255,16 +255,16 @@ def _empty_table(chunk: _Chunk, room: Contacts) -> None:
 
 
 def _finish(
-    outcome: Outcome, whole: dict[str, np.ndarray], chunks: list[_Chunk], t_end: float
+    outcome: Outcome, arrays: dict[str, np.ndarray], chunks: list[_Chunk], t_end: float
 ) -> Outcome:
-    """Times at the end, and the contacts of all chunks in one sorted table; none is later than the
-    end, not by rounding either.
+    """Fill in the end times, and sort the contacts of all chunks into one table. No contact is
+    later than the end, not even by rounding.
     """
     outcome.time = np.minimum(
-        whole["origin"] + whole["count"] * whole["period"] + whole["phase"], t_end
+        arrays["origin"] + arrays["count"] * arrays["period"] + arrays["phase"], t_end
     )
-    running, begun = whole["status"] == st.RUNNING, whole["counters"][:, st.STEPS] > 0
-    whole["status"][running] = np.where(begun[running], st.INTERRUPTED, st.NOT_COMPUTED)
+    running, begun = arrays["status"] == st.RUNNING, arrays["counters"][:, st.STEPS] > 0
+    arrays["status"][running] = np.where(begun[running], st.INTERRUPTED, st.NOT_COMPUTED)
     if parts := [part for chunk in chunks for part in chunk.contacts]:
         contacts = ContactTable.joined(parts)
         if (outcome.status == st.SLIDING).any():
@@ -275,8 +275,8 @@ def _finish(
 
 
 def _returns_where_sliding_begins(contacts: ContactTable, status: np.ndarray) -> np.ndarray:
-    """The last contact of a trajectory that slides, where it is the return from the one before it
-    at the same instant: bool[contacts].
+    """True where the last contact of a sliding trajectory is the return, at the same instant, from
+    the contact before it: bool[contacts].
     """
     who, guard, direction, time = (
         contacts.trajectory,
@@ -297,7 +297,9 @@ def _returns_where_sliding_begins(contacts: ContactTable, status: np.ndarray) ->
 
 # -- work ------------------------------------------------------------------------------------------
 def slice_of(states: int) -> int:
-    """Steps of the lanes between two checks for Ctrl-C: steps of many states take longer."""
+    """Steps of the lanes between two checks for Ctrl-C: fewer for many states, whose steps take
+    longer.
+    """
     return max(SLICE * 4 // max(states, 2) ** 2, 1)
 
 
@@ -309,7 +311,7 @@ def _advance(
     room: Contacts,
     show: Callable[[float], None] | None = None,
 ) -> None:
-    """Move a chunk to its end in slices; empties its table of contacts after each. It ends early if
+    """Move a chunk to its end in slices, and empty its table of contacts after each. Stop early if
     the memory for contacts is full.
     """
     arrays = chunk.arrays
@@ -329,7 +331,7 @@ def _advance(
 
 
 def _share_done(chunks: list[_Chunk]) -> float:
-    """Share of all periods that lie behind the trajectories."""
+    """Share of all periods that the trajectories have passed."""
     done = sum(_behind(chunk.arrays) for chunk in chunks)
     return done / max(sum(len(chunk.arrays["status"]) for chunk in chunks), 1)
 
@@ -348,17 +350,19 @@ def _run_chunks(
     progress: Callable[[float], None] | None,
     workers: int,
 ) -> None:
-    """All chunks; Ctrl-C never comes in the midst of one, which would cut a table of contacts in
+    """Run all chunks. Ctrl-C never interrupts a chunk midway: a table of contacts would be cut in
     two.
 
     A single chunk that is moved by this very thread reports its own progress: a thread only for
     that would take as long as a short run.
     """
-    here = len(chunks) == 1 and may_wait(stop)
+    in_this_thread = len(chunks) == 1 and may_wait(stop)
 
     def work(chunk: _Chunk) -> None:
         _open_tables(chunk, module)
-        _advance(chunk, module, module.workspace(), stop, room, progress if here else None)
+        _advance(
+            chunk, module, module.workspace(), stop, room, progress if in_this_thread else None
+        )
 
-    show = None if progress is None or here else lambda _: progress(_share_done(chunks))
+    show = None if progress is None or in_this_thread else lambda _: progress(_share_done(chunks))
     on_threads(work, chunks, lambda *_: None, workers, show, stop)

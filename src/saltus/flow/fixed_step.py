@@ -12,7 +12,7 @@ from saltus.flow.method import check_positive, explain_unknown_options
 from saltus.flow.one_by_one import OneByOne
 from saltus.units import to_si
 
-#: Steps that a forcing period takes at least: fewer don't see what drives the motion.
+#: Least steps in a forcing period: fewer miss changes of the forcing.
 STEPS_PER_FORCING = 10
 
 
@@ -38,7 +38,7 @@ class RK4(OneByOne):
         about within the step that crossed, the first two end with status ``turned``; at an impact,
         also where its rate more than doubles in the step.
     tolerance : float
-        How closely ``"bisect"`` brackets a contact, as a share of a step [-].
+        Bracket of a contact after ``"bisect"``, as a share of a step [-].
     max_steps, max_events : int, optional
         Budgets of one trajectory. Default: 10 000 steps per period and a million more; 10 million
         contacts.
@@ -72,7 +72,7 @@ class RK4(OneByOne):
 
     @property
     def fixed(self) -> bool:
-        """They have."""
+        """True: the steps have one length."""
         return True
 
     def check_forcing(self, period: float) -> None:
@@ -80,17 +80,19 @@ class RK4(OneByOne):
         longest = period / STEPS_PER_FORCING
         if float(self.step) > longest * (1 + 1e-9):
             raise ParameterError(
-                f"RK4's step of {float(self.step):g} s is longer than a tenth of the forcing's "
-                f"period of {period:g} s: too long to follow it. Take at most "
-                f"RK4({longest:.3g}), or sl.Taylor(), which finds its steps itself."
+                lambda say: (
+                    f"RK4's step of {float(self.step):g} s is longer than a tenth of the "
+                    f"forcing's period of {period:g} s: too long to follow it. Take at most "
+                    f"RK4({longest:.3g}), or {say.method('Taylor')}, which finds its steps itself."
+                )
             )
 
     @property
     def label(self) -> str:
-        """Such as ``RK4 henon (0.001)``."""
+        """A label such as ``RK4 henon (0.001)``."""
         return f"{self.name} {self.events} ({float(self.step):g})"
 
     @property
     def noise(self) -> float:
-        """Nothing measures the errors of fixed steps: what they are taken to be."""
+        """The assumed error: nothing measures the errors of fixed steps."""
         return 1e-3 if self.records_contacts else 0.01

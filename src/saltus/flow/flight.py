@@ -1,6 +1,4 @@
-"""A flight: many trajectories on their way, moved some periods at a time and thinned out as they
-arrive.
-"""
+"""Flights: many trajectories moved some periods at a time; those that have arrived are dropped."""
 
 from __future__ import annotations
 
@@ -24,7 +22,7 @@ from saltus.interrupt import check_stop
 from saltus.kernels import status as st
 from saltus.system import System
 
-#: Per-trajectory arrays of a batch that follow a trajectory when others leave.
+#: Arrays of a batch with a row for each trajectory, thinned out when trajectories leave.
 _FOLLOW = (
     "period",
     "origin",
@@ -52,7 +50,7 @@ class Flight:
     system : System
         The equations.
     method : Method
-        How to integrate.
+        The method of integration.
     start : float64[k, D]
         States at a whole period.
     parameters : float64[1 or k, P]
@@ -94,7 +92,7 @@ class Flight:
 
     @property
     def status(self) -> np.ndarray:
-        """Status codes, int64[k]; OK for those that are still on their way."""
+        """Status codes, int64[k]; OK for trajectories that can go on."""
         return self._arrays["status"]
 
     @property
@@ -104,7 +102,7 @@ class Flight:
 
     @property
     def going(self) -> np.ndarray:
-        """Which trajectories can go on, bool[k]."""
+        """True where a trajectory can go on, bool[k]."""
         return np.isin(self.status, (st.RUNNING, st.OK, st.GRAZE_UNRESOLVED))
 
     def advance(self, periods: int) -> np.ndarray:
@@ -137,7 +135,7 @@ class Flight:
         return samples
 
     def keep(self, wanted: np.ndarray) -> None:
-        """Let go of the trajectories that aren't wanted, bool[k]."""
+        """Keep only the wanted trajectories, bool[k]."""
         if len(self._parameters) > 1:
             self._parameters = self._parameters[wanted]
         for name in _FOLLOW:

@@ -1,5 +1,5 @@
-"""Motions that only the errors of fixed steps let grow: steps beyond what a method is stable for
-multiply them each time, and the end is a number like any other.
+"""Detect motions that grow only by the errors of fixed steps. Steps beyond a method's limit of
+stability multiply their errors, and the end looks like any other number.
 """
 
 from __future__ import annotations
@@ -15,21 +15,22 @@ from saltus.kernels import status as st
 if TYPE_CHECKING:
     from saltus.flow.request import Outcome, Request
 
-#: A motion that ends at a state of so many SI units, or times its start, is computed again.
+#: A motion that ends beyond this magnitude [SI], or beyond this multiple of its start, is computed
+#: again.
 LARGE = 1e3
-#: It grew by errors alone if its end is so many times that of the exact motion.
+#: A motion grew by errors alone if its end exceeds that of the exact motion by this factor.
 TOO_LARGE = 1e3
 
 
 def mark_growth(outcome: Outcome, request: Request, exactly: Callable[[Request], Outcome]) -> None:
-    """Give the status ``nonfinite`` to trajectories that reached the end only by errors that grew.
+    """Give the status ``nonfinite`` to trajectories whose end was reached only by errors that grew.
 
     Parameters
     ----------
     outcome : Outcome
-        What came out of steps of a fixed length.
+        The outcome of steps of a fixed length.
     request : Request
-        What was asked for.
+        Its request.
     exactly : callable
         The outcome of a request by an exact method.
     """

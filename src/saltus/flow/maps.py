@@ -1,5 +1,5 @@
-"""Maps: what orbits, attractors, responses and exponents are asked of. The stroboscope of a flow,
-or any function of states.
+"""Maps, of which orbits, attractors, responses and exponents are computed: the stroboscope of a
+flow, or any function of states.
 """
 
 from __future__ import annotations
@@ -12,43 +12,36 @@ from typing import Protocol
 
 import numpy as np
 
-from saltus.errors import ParameterError, shown
+from saltus.errors import ParameterError, must_be
 from saltus.flow import engine
 from saltus.flow.flight import Flight
 from saltus.flow.methods import Method
 from saltus.flow.request import Outcome, Request, Schedule
 from saltus.flow.shots import Shots
 from saltus.kernels import status as st
+from saltus.sentences import Dialect
 from saltus.system import System, check_values
 from saltus.system.tangent import tangent_system
 
-#: Step of differences, relative to the range of a state: errors of rounding and of the fourth order
-#: are both some 1e-11 where a contact is a hundredth as deep as the motion is wide.
+#: Step of differences, relative to the range of a state. Errors of rounding and of the fourth order
+#: are both about 1e-11 where a contact is a hundredth as deep as the motion is wide.
 STEP = 2e-5
 #: Samples of the mode in each period, where contacts aren't located.
 MODE_SAMPLES = 32
-#: End of the message for a system without forcing.
-NO_PERIOD = (
-    "has no forcing period: give every=, the time between two samples of the motion, such as "
-    'every="0.1 s", about one rotation. '
-    "Answers don't depend on it."
-)
-#: End of the message where a time is given for a forced one.
-FORCED = "is forced: it is sampled once a forcing period. Leave every= out."
-#: The noise of a method is relative to a box of starts; a motion is some ten times smaller.
-#: Measured for ode45 at (1e-4, 1e-7) on the rig's responses: its returns scatter by 0.05 to 2 % of
-#: their range with location, by 0.3 to 4 % without.
+#: Noise of a method relative to a motion, over that relative to a box of starts. Measured for ode45
+#: at (1e-4, 1e-7) on the rig's responses: returns scatter by 0.05 to 2 % of their range with
+#: location, by 0.3 to 4 % without.
 BOX_PER_MOTION = 10.0
-#: Share of the range of a motion beyond which a mismatch is no noise.
+#: A mismatch beyond this share of a motion's range is no noise.
 MAX_NOISE = 0.03
-#: Starts that are few: one thread moves them, and what stands around the kernel takes its time.
+#: Up to this number of starts one thread moves them, and the overhead around the kernel counts.
 FEW = 64
-#: Kinds of short runs whose arrays a map keeps.
+#: Most short runs (by thread, starts and periods) whose arrays a map keeps.
 KEPT = 64
 
 
 class Travel(Protocol):
-    """Trajectories of a map on their way; see :class:`saltus.flow.flight.Flight`."""
+    """Trajectories of a map that can be advanced; see :class:`saltus.flow.flight.Flight`."""
 
     age: int
 
@@ -60,7 +53,7 @@ class Travel(Protocol):
 
     @property
     def going(self) -> np.ndarray:
-        """Which can go on, bool[k]."""
+        """True where a trajectory can go on, bool[k]."""
 
     @property
     def status(self) -> np.ndarray:
@@ -68,13 +61,26 @@ class Travel(Protocol):
 
     @property
     def unresolved(self) -> np.ndarray:
-        """Grazes too shallow to be sure of, int64[k]."""
+        """Grazes too shallow to be certain, int64[k]."""
 
     def advance(self, periods: int) -> np.ndarray:
         """States at the next iterates, float64[k, periods, D]."""
 
     def keep(self, wanted: np.ndarray) -> None:
-        """Let go of those that aren't wanted, bool[k]."""
+        """Keep only the wanted trajectories, bool[k]."""
+
+
+def no_period(say: Dialect) -> str:
+    """End of the message for a system without forcing."""
+    return (
+        f"has no forcing period: give {say.key('every')}, the time between two samples of the "
+        f"motion, such as {say.key(every='0.1 s')}, about one rotation. Answers don't depend on it."
+    )
+
+
+def forced(say: Dialect) -> str:
+    """End of the message where a time is given for a forced one."""
+    return f"is forced: it is sampled once a forcing period. Leave {say.key('every')} out."
 
 
 class Map(Protocol):
@@ -102,22 +108,24 @@ class Map(Protocol):
 
     @property
     def exact(self) -> bool:
-        """Whether these errors are rounding, so that Newton's method closes orbits."""
+        """True if the map's errors are rounding, so that Newton's method closes orbits."""
 
     @property
     def exact_map(self) -> Map | None:
-        """Of a map that isn't exact: the map without its errors. None of an exact one."""
+        """The map without its errors, for a map that isn't exact; None for an exact one."""
 
     def noise_of(self, scale: np.ndarray) -> np.ndarray:
         """The noise relative to the ranges float64[m, D] of motions, float64[m]."""
 
     def rows(self, which: np.ndarray) -> Map:
         """The map of some of the rows: int64[m], with repeats if wanted, or bool[k]. A single row
-        is repeated for each.
+        is repeated for each of them.
         """
 
     def launch(self, start: np.ndarray, longest: float) -> Travel:
-        """Trajectories from float64[k, D]; they will be asked for ``longest`` iterates at most."""
+        """Launch trajectories from float64[k, D], to be advanced by ``longest`` iterates at
+        most.
+        """
 
     def tangent(
         self, start: np.ndarray, count: np.ndarray | int, directions: np.ndarray | None = None
@@ -140,7 +148,7 @@ class Stroboscope:
     system : System
         Equations and values.
     method : Method
-        How to integrate.
+        The method of integration.
     parameters : float64[k, P], optional
         Values in the order of ``system.values``: one row for all points, or a row for each.
         Default: those of the system.
@@ -159,9 +167,9 @@ class Stroboscope:
         threads: int | None = None,
     ):
         if (every is None) == (system.forced_at is None):
-            raise ParameterError(f"{system.name} {NO_PERIOD if every is None else FORCED}")
+            raise ParameterError(f"{system.name} ", no_period if every is None else forced)
         if every is not None and not (np.isfinite(every) & (np.asarray(every) > 0)).all():
-            raise ParameterError(f"every must be a positive time, not {shown(every)}.")
+            raise must_be("every", "a positive time", every)
         self.system, self.method, self.states, self.threads = system, method, system.states, threads
         self.parameters = np.atleast_2d(
             np.array(list(system.values.values()) if parameters is None else parameters, float)
@@ -246,8 +254,8 @@ class Stroboscope:
         schedule: Schedule | None = None,
         record: int | None = None,
     ) -> Outcome:
-        """Trajectories over ``periods`` each, with samples at a schedule and the contacts from
-        period ``record`` on.
+        """Integrate over ``periods`` each, with samples at a schedule and the contacts from period
+        ``record`` on.
         """
         request = Request.periods(
             start,
@@ -260,8 +268,8 @@ class Stroboscope:
         return engine.run(self.system, self.method, request, self.threads)
 
     def ends(self, start: np.ndarray, count: np.ndarray | int) -> tuple[np.ndarray, np.ndarray]:
-        """States float64[k, D] after ``count`` periods, and the status of each, int64[k]: as
-        :meth:`run` has them, with little besides the kernel's own time where they are few.
+        """States float64[k, D] after ``count`` periods, and the status of each, int64[k]: the same
+        as :meth:`run` gives, with less overhead for few starts.
         """
         k, periods = len(start), count if isinstance(count, int) else int(np.max(count, initial=0))
         if k > FEW or self.method.fixed:
@@ -277,7 +285,7 @@ class Stroboscope:
 
     @functools.cached_property
     def _shots(self) -> dict[tuple[int, int, int], Shots]:
-        """Runs that were asked for before, by thread, number of starts and periods."""
+        """Arrays of short runs made before, by thread, number of starts and periods."""
         return {}
 
     def tangent(
@@ -296,9 +304,10 @@ class Stroboscope:
     def _by_differences(
         self, start: np.ndarray, count: np.ndarray | int, directions: np.ndarray | None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """What :meth:`tangent` returns, by central differences of fourth order (Abramowitz and
-        Stegun, 25.3.6), of steps relative to the range of each state over an iterate. The flow is
-        smooth where its equations are steep: how a motion leaves a boundary depends on its speed.
+        """The result of :meth:`tangent` by central differences of fourth order (Abramowitz and
+        Stegun, 25.3.6). Their steps are relative to the range of each state over an iterate. The
+        flow is smooth where its equations are steep: how a motion leaves a boundary depends on its
+        speed.
         """
         k, size = start.shape
         way = np.broadcast_to(np.eye(size) if directions is None else directions, (k, size, size))
@@ -328,7 +337,7 @@ class Stroboscope:
         self, start: np.ndarray, count: np.ndarray | int, schedule: Schedule
     ) -> np.ndarray:
         """States at the times of a schedule, float64[k, M, D], by the flow that :meth:`tangent`
-        runs: no other one is compiled for them.
+        runs, so that no other flow is compiled.
         """
         outcome = self._tangent_map.run(_with_tangent(start, None), count, schedule)
         return outcome.samples[:, :, : start.shape[1]]
@@ -340,7 +349,7 @@ class Stroboscope:
 
     def sequences(self, start: np.ndarray, count: int) -> tuple[np.ndarray, list[np.ndarray]]:
         """See :class:`Map`."""
-        # the modes in which the motion is seen, one after the other, stand for contacts
+        # without located contacts, the sequence of modes seen in the samples stands for them
         if not self.method.records_contacts:
             outcome = self.run(start, count, Schedule.even(count, MODE_SAMPLES))
             return outcome.state, [

@@ -51,12 +51,14 @@ class Matlab(OneByOne):
         self._check_common()
 
     def _own_numbers(self) -> tuple[float, float, float]:
-        """RelTol, AbsTol, whether contacts are located."""
+        """RelTol, AbsTol, and 1 if contacts are located."""
         return self.rtol, self.atol, float(self.EVENTS.index(self.events))
 
     @property
     def label(self) -> str:
-        """Such as ``ode45 located (0.0001, 1e-07)``, ``ode45 not located (0.0001, 1e-07)``."""
+        """A label such as ``ode45 located (0.0001, 1e-07)``, ``ode45 not located
+        (0.0001, 1e-07)``.
+        """
         return (
             f"{self.name.lower()} {'' if self.events == 'locate' else 'not '}located "
             f"({self.rtol:g}, {self.atol:g})"
@@ -64,26 +66,26 @@ class Matlab(OneByOne):
 
     @property
     def noise(self) -> float:
-        """Errors over some periods: the map isn't even continuous where step counts change, and
+        """Errors over some periods. The map isn't even continuous where step counts change, and
         contacts stepped over cost more.
         """
         return min((5.0 if self.events == "locate" else 20.0) * self._error(), 0.01)
 
     def _error(self) -> float:
-        """Errors as a multiple of those of ode45: how they depend on RelTol. Measured on a forced
-        oscillator over three turns [RelTol]: ode45 2, ode23 18, ode113 9, ode15s 8 RelTol^(-1/6).
+        """Errors as a multiple of those of ode45, by RelTol. Measured on a forced oscillator over
+        three turns [RelTol]: ode45 2, ode23 18, ode113 9, ode15s 8 RelTol^(-1/6).
         """
         return self.rtol
 
     def noise_of(self, scale: np.ndarray) -> np.ndarray:
-        """The same, with the errors that AbsTol allows to small states."""
+        """The noise of these motions, with the errors that AbsTol allows to small states."""
         factor = np.maximum(1.0, self.atol / (self.rtol * scale)).max(axis=1)
         noise: np.ndarray = self.noise * factor
         return noise
 
 
 def _documented(cls: type[_M]) -> type[_M]:
-    """The options, which all have in common, in the docstring before the references."""
+    """Insert the common options into the docstring, before the references."""
     first, rule, rest = (cls.__doc__ or "").partition("\n    References\n")
     cls.__doc__ = first + _PARAMETERS + rule + rest
     return explain_unknown_options(cls)

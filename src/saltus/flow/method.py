@@ -1,4 +1,4 @@
-"""What every method is: a small option object that names a compiled flow and hands it its
+"""The base of every method: a small option object that names a compiled flow and gives it its
 numbers.
 """
 
@@ -15,17 +15,17 @@ from typing import Any, TypeVar
 import numpy as np
 
 from saltus.codegen.module import Flow
-from saltus.errors import ParameterError, nearest, shown
+from saltus.errors import ParameterError, must_be, nearest, shown
 from saltus.system import System
 
-#: Steps that a trajectory may take for each of its periods; a healthy one takes ten to a hundred.
+#: Default step budget per period; a healthy trajectory takes ten to a hundred steps.
 STEPS_PER_PERIOD = 10_000
-#: Steps that any trajectory may take.
+#: Least step budget of a trajectory.
 STEPS_AT_LEAST = 1_000_000
 
 
 def step_budget(given: int | None, periods: float) -> float:
-    """Steps that a trajectory of so many periods may take, if not so many are given."""
+    """The step budget of a trajectory over ``periods``: the given one, or the default."""
     return (
         float(given)
         if given is not None
@@ -40,11 +40,11 @@ def check_positive(name: str, value: Any) -> None:
         or not isinstance(value, int | float | np.integer | np.floating)
         or not 0 < value <= sys.float_info.max
     ):
-        raise ParameterError(f"{name} must be a positive number, not {shown(value)}.")
+        raise must_be(name, "a positive number", value)
 
 
 _M = TypeVar("_M", bound="Method")
-#: Names of ode45's options here.
+#: Options of ode45 by their names in MATLAB.
 _MATLAB: Mapping[str, str] = {"reltol": "rtol", "abstol": "atol", "events": "events"}
 
 
@@ -82,7 +82,7 @@ def explain_unknown_options(cls: type[_M]) -> type[_M]:
 
 
 class Method:
-    """What every method offers to the engine."""
+    """Interface of every method to the engine."""
 
     @property
     def name(self) -> str:
@@ -102,7 +102,7 @@ class Method:
         raise NotImplementedError
 
     def check_forcing(self, period: float) -> None:
-        """Raise ParameterError if its steps are too long for a forcing of this period [s]."""
+        """Raise ParameterError if the steps are too long for a forcing of this period [s]."""
 
     def due(self, periods: float) -> float | None:  # noqa: ARG002
         """Least progress in :data:`saltus.flow.pace.LONG_CHECK_STEPS` steps, in periods; None if
@@ -122,7 +122,7 @@ class Method:
 
     @property
     def label(self) -> str:
-        """The method in a few words: its name, and the options that aren't the usual ones."""
+        """The method in a few words: its name, and the options that differ from the defaults."""
         usual = {f.name: f.default for f in fields(self)}  # type: ignore[arg-type]
         own = {name: value for name, value in self.options().items() if value != usual[name]}
         listed = ", ".join(
@@ -133,24 +133,24 @@ class Method:
 
     @property
     def records_contacts(self) -> bool:
-        """Whether contacts are located, so that there is something to count."""
+        """True if contacts are located, so that they can be counted."""
         return True
 
     @property
     def noise(self) -> float:
-        """Mismatch of a periodic orbit, relative to the range of the states, that this method's own
-        errors explain.
+        """Mismatch of a periodic orbit, relative to the range of the states, that the errors of
+        this method explain.
         """
         raise NotImplementedError
 
     @property
     def fixed(self) -> bool:
-        """Whether its steps have one length, so that nothing keeps errors from growing."""
+        """True if the steps have one length, so that nothing keeps errors from growing."""
         return False
 
     @property
     def exact(self) -> bool:
-        """Whether its errors are rounding, so that Newton's method closes its orbits."""
+        """True if the errors are rounding, so that Newton's method closes orbits."""
         return False
 
     def noise_of(self, scale: np.ndarray) -> np.ndarray:
@@ -158,7 +158,5 @@ class Method:
         return np.full(len(scale), self.noise)
 
     def companion(self) -> Method:
-        """A more exact method: the distance of its contact times from this one's measures their
-        errors.
-        """
+        """A more exact method: contact times differ from this method's by about their errors."""
         raise NotImplementedError

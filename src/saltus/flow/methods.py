@@ -1,4 +1,4 @@
-"""The methods that there are, by name."""
+"""The methods, by name."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ METHODS: Mapping[str, type[Method]] = {
 
 
 def check_method(method: Any) -> Method:
-    """The method itself, the default for None. Raises ParameterError for anything
-    that isn't one.
+    """Return the method, or the default for None. Raises ParameterError for anything that isn't a
+    method.
     """
     if method is None:
-        return Modal() if __import__("os").environ.get("TRY_MODAL") else Taylor()
+        return Taylor()
     if not isinstance(method, Method):
         what = method.__name__ + " itself" if isinstance(method, type) else shown(method)
         raise ParameterError(
@@ -46,13 +46,15 @@ def check_method(method: Any) -> Method:
 
 
 def exact_method(method: Any, asked: str) -> Method:
-    """The same for what closes orbits by Newton's method, ``asked``: a ParameterError for methods
-    whose errors are more than rounding.
+    """Return the method for ``asked``, a verb that closes orbits by Newton's method. Raises
+    ParameterError for methods with errors beyond rounding.
     """
     checked = check_method(method)
     if not checked.exact:
         raise ParameterError(
-            f"{asked} needs a method whose errors are rounding, not {checked.name}: Newton's "
-            "method doesn't close its orbits. Leave method= out."
+            lambda say: say.either(f"{asked} needs", "needs"),
+            f" a method whose errors are rounding, not {checked.name}: Newton's method doesn't "
+            "close its orbits. ",
+            lambda say: f"Leave {say.key('method')} out.",
         )
     return checked

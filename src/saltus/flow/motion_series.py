@@ -1,5 +1,5 @@
-"""The Taylor series of motions: from the places where a flow knows them, with those of any function
-of them.
+"""Taylor series of motions, and of functions of them, from the nodes at which a flow knows the
+states.
 
 The series are those that the flow itself steps by: :mod:`saltus.codegen` writes them, NumPy
 evaluates them for thousands of places at once, and nothing is compiled.
@@ -20,12 +20,14 @@ from saltus.flow.set_aside import Boundaries
 from saltus.kernels.isolation import ROUNDING
 from saltus.system import System
 
-#: Order and log2 of the tolerance of the series: their truncation is rounding.
-ORDER, LOG2_TOLERANCE = 20, -50.0
-#: Pieces between two nodes; more mean a pole.
+#: Order of the series.
+ORDER = 20
+#: log2 of their tolerance: truncation is rounding.
+LOG2_TOLERANCE = -50.0
+#: Most pieces between two nodes; more mean a pole.
 MOST_PIECES = 1000
-#: A boundary nearer than this to the start of a piece is the one at which the piece starts [lengths
-#: of the piece].
+#: A boundary nearer than this to the start of a piece is the boundary it starts at [lengths of the
+#: piece].
 START_TOLERANCE = 1e-9
 
 
@@ -42,7 +44,7 @@ class Pieces:
     phase : float64[p]
         the time after them at which it begins [s].
     length : float64[p]
-        How long it lasts [s].
+        Its duration [s].
     terms : float64[n + 1, q, p]
         Polynomials on [0, 1] of the q quantities [their units].
     noise : float64[q, p]
@@ -57,14 +59,14 @@ class Pieces:
     noise: np.ndarray
 
     def rows(self, which: np.ndarray) -> Pieces:
-        """Some of them."""
+        """The pieces of these indices."""
         return Pieces(*(getattr(self, name)[..., which] for name in self.__dataclass_fields__))
 
 
 @dataclass(frozen=True)
 class Nodes:
-    """Where motions are known: row by row in the order of motion and time; each lasts until the
-    next.
+    """Nodes, at which the states of motions are known: sorted by motion and time; each lasts until
+    the next.
     """
 
     motion: np.ndarray
@@ -75,13 +77,13 @@ class Nodes:
     mode: np.ndarray
 
     def rows(self, which: np.ndarray | slice) -> Nodes:
-        """Some of them."""
+        """The nodes of these indices."""
         return Nodes(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
 
 
 class MotionSeries:
-    """The Taylor series of a map_'s states, of some quantities (the last guards of ``watched``) and
-    of its gaps.
+    """Taylor series of a map's states, of some quantities (the last guards of ``watched``) and of
+    its gaps.
     """
 
     def __init__(self, map_: Stroboscope, watched: System, guards: int):
@@ -100,7 +102,7 @@ class MotionSeries:
             self._drifts[i] = module.turns(row, 0.0, map_.period[i], 0, i, self._turns)
 
     def none(self) -> Pieces:
-        """No pieces at all."""
+        """An empty set of pieces."""
         numbers, reals = np.zeros(0, np.int64), np.zeros(0)
         size = self._module.NSTATES + len(self._asked)
         return Pieces(
@@ -108,8 +110,8 @@ class MotionSeries:
         )
 
     def of(self, nodes: Nodes, cubic: bool) -> list[Pieces]:
-        """The pieces that begin at nodes and fill them; for cubics the first terms of
-        each will do.
+        """The pieces that begin at the nodes and fill the time to the next; for cubics one piece a
+        node with the lowest terms.
         """
         result, state, left = [], nodes.state.T.copy(), nodes.length.copy()
         # -1: no term is left out
@@ -146,8 +148,8 @@ class MotionSeries:
     def _step(
         self, nodes: Nodes, state: np.ndarray, side: np.ndarray, new: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """All terms at some places, and how far they reach. At new nodes the sides of guards of the
-        quantities' own are found first.
+        """All terms at the nodes, and the lengths they hold for. At new nodes the sides of the
+        quantities' own guards are found first.
         """
         module, motion = self._module, nodes.motion
         constants, (clock, room) = self._constants[:, motion], self._clock(nodes)
@@ -170,8 +172,8 @@ class MotionSeries:
         return work, h
 
     def _clock(self, nodes: Nodes) -> tuple[np.ndarray, np.ndarray]:
-        """Phase, time at phase zero, the phases of all harmonics there, what the clocks hold; and
-        the time to the next break of one.
+        """Phase, time at phase zero, the phases of all harmonics there, the state of the clocks;
+        and the time to the next break of a clock.
         """
         module, motion = self._module, nodes.motion
         clock = self._turns[:, motion]
@@ -215,8 +217,8 @@ class MotionSeries:
         work: np.ndarray,
         h: np.ndarray,
     ) -> np.ndarray:
-        """Steps cut down to where the right-hand side agrees with the series: a term may sleep at
-        the node.
+        """Shorten steps to where the right-hand side agrees with the series: a term may be
+        negligible at the node, and not after it.
         """
         module, width = self._module, len(h)
         period = self._map.period[nodes.motion]
@@ -232,17 +234,17 @@ class MotionSeries:
 
     def _until_own_boundary(self, work: np.ndarray, h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Lengths up to the first boundary of the quantities' own, and the guards float64[guards,
-        n] that flip there.
+        n] that change there.
         """
         flips = np.zeros((self._module.NGUARDS + self._module.SINGULAR, len(h)), bool)
         for guard in range(self._own, self._guards):
-            which, place = polynomials.sign_changes(
+            which, root = polynomials.sign_changes(
                 self._gap(work, guard) * h ** np.arange(ORDER + 1)[:, None]
             )
-            which, place = which[place > START_TOLERANCE], place[place > START_TOLERANCE]
+            which, root = which[root > START_TOLERANCE], root[root > START_TOLERANCE]
             which, first = np.unique(which, return_index=True)
             sooner = np.ones(len(h))
-            sooner[which] = place[first]
+            sooner[which] = root[first]
             nearer = sooner < 1.0
             flips[:, nearer] = False
             flips[guard, nearer] = True
@@ -254,7 +256,7 @@ class MotionSeries:
         return work[first : first + ORDER + 1]
 
     def _gap(self, work: np.ndarray, guard: int) -> np.ndarray:
-        """Terms of a gap, or of a quantity."""
+        """Terms of the gap of a guard, or of a quantity."""
         module = self._module
         terms: np.ndarray = module.GUARD_SIGN[guard] * self._rows(work, module.GUARD_ROW[guard])
         terms[0] = work[module.GAP_ROW + guard]
@@ -265,7 +267,7 @@ class MotionSeries:
         return noise
 
     def _piece(self, nodes: Nodes, work: np.ndarray, h: np.ndarray) -> Pieces:
-        """What is asked for, over lengths h."""
+        """The pieces of states, quantities and gaps, over lengths h."""
         states = [self._rows(work, i * (ORDER + 1)) for i in range(self._module.NSTATES)]
         terms = np.stack([*states, *(self._gap(work, guard) for guard in self._asked)], axis=1)
         terms *= (h ** np.arange(ORDER + 1)[:, None])[:, None]

@@ -1,4 +1,4 @@
-"""What the methods have in common that move one trajectory after the other: all but Taylor's."""
+"""Common parts of the methods that move one trajectory after the other: all but Taylor's."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from saltus.codegen.module import Flow, steps_module
-from saltus.errors import ParameterError, shown
+from saltus.errors import must_be
 from saltus.flow.counts import whole
 from saltus.flow.method import Method, step_budget
 from saltus.flow.taylor import Taylor
@@ -15,7 +15,7 @@ from saltus.system import System
 
 
 class OneByOne(Method):
-    """A method whose kernels are those of kernels/trajectory.py."""
+    """A method with the kernels of kernels/trajectory.py."""
 
     #: Ways of crossing a boundary, ``"ignore"`` among them.
     EVENTS: ClassVar[tuple[str, ...]]
@@ -24,10 +24,10 @@ class OneByOne(Method):
     max_events: int
 
     def _check_common(self) -> None:
-        """Raise ParameterError for an unknown way of crossing, or a budget that is none."""
+        """Raise ParameterError for an unknown way of crossing, or a bad step budget."""
         if not isinstance(self.events, str) or self.events not in self.EVENTS:
             ways = ", ".join(f'"{way}"' for way in self.EVENTS)
-            raise ParameterError(f"events must be one of {ways}, not {shown(self.events)}.")
+            raise must_be("events", f"one of {ways}", self.events)
         if self.max_steps is not None:
             whole(self.max_steps, "max_steps")
         whole(self.max_events, "max_events")
@@ -47,7 +47,7 @@ class OneByOne(Method):
 
     @property
     def records_contacts(self) -> bool:
-        """Only if they are located."""
+        """True if contacts are located."""
         return self.events != "ignore"
 
     def companion(self) -> Taylor:

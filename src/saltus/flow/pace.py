@@ -13,9 +13,11 @@ import numpy as np
 
 from saltus.kernels import status as st
 
-#: Steps between two checks of a trajectory; steps over which its average pace is measured.
-CHECK_STEPS, LONG_CHECK_STEPS = 20_000, 1_000_000
-#: Share of the rest of a run that CHECK_STEPS steps must bring. Less would need 2e11 steps to the
+#: Steps between two checks of a trajectory's pace.
+CHECK_STEPS = 20_000
+#: Steps between two long checks, over which its average pace is measured.
+LONG_CHECK_STEPS = 1_000_000
+#: Share of the remaining run that CHECK_STEPS steps must bring. Less would need 2e11 steps to the
 #: end: days.
 MIN_PROGRESS = 1e-7
 
@@ -36,8 +38,7 @@ def marks(count: int) -> dict[str, np.ndarray]:
 
 
 def resume(arrays: dict[str, np.ndarray], due: float) -> bool:
-    """Resume the trajectories that were stopped for a check and are fast enough; returns whether
-    there are any.
+    """Resume the stopped trajectories that are fast enough; True if there are any.
 
     Parameters
     ----------
@@ -46,19 +47,19 @@ def resume(arrays: dict[str, np.ndarray], due: float) -> bool:
     due : float
         Periods that LONG_CHECK_STEPS steps must bring.
     """
-    here = np.flatnonzero(arrays["status"] == st.BUDGET_STEPS)
-    if not len(here):
+    stopped = np.flatnonzero(arrays["status"] == st.BUDGET_STEPS)
+    if not len(stopped):
         return False
-    steps = arrays["counters"][here, st.STEPS]
-    rest = -_since(arrays, here, "end")
-    still = (steps - arrays["check_steps"][here] < 2 * CHECK_STEPS) & (
-        _since(arrays, here, "check") < MIN_PROGRESS * rest
+    steps = arrays["counters"][stopped, st.STEPS]
+    rest = -_since(arrays, stopped, "end")
+    still = (steps - arrays["check_steps"][stopped] < 2 * CHECK_STEPS) & (
+        _since(arrays, stopped, "check") < MIN_PROGRESS * rest
     )
-    long = steps - arrays["long_steps"][here]
+    long = steps - arrays["long_steps"][stopped]
     slow = (long >= LONG_CHECK_STEPS) & ~(
-        _since(arrays, here, "long") >= due * long / LONG_CHECK_STEPS
+        _since(arrays, stopped, "long") >= due * long / LONG_CHECK_STEPS
     )
-    on = here[~(still | slow)]
+    on = stopped[~(still | slow)]
     for which, who in (("check", on), ("long", on[(long >= LONG_CHECK_STEPS)[~(still | slow)]])):
         arrays[f"{which}_steps"][who] = arrays["counters"][who, st.STEPS]
         arrays[f"{which}_count"][who], arrays[f"{which}_phase"][who] = (
@@ -70,8 +71,8 @@ def resume(arrays: dict[str, np.ndarray], due: float) -> bool:
 
 
 def _since(arrays: dict[str, np.ndarray], who: np.ndarray, which: str) -> np.ndarray:
-    """Periods since a mark: whole ones and the rest apart, so that no digit is lost
-    in a long run.
+    """Periods since a mark. Whole periods and the rest are subtracted apart, so that a long run
+    loses no digits.
     """
     whole, phase = (
         arrays["count"][who] - arrays[f"{which}_count"][who],

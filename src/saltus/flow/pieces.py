@@ -1,5 +1,4 @@
-"""Motions as polynomials: what a compiled flow has computed, with everything between its samples
-and contacts.
+"""Motions as polynomials between the samples and contacts of a compiled flow.
 
 The flow hands over its states some times a period and at every contact, and the mode in between.
 From each of these nodes the motion is the Taylor series of the equations in that mode:
@@ -25,12 +24,15 @@ from saltus.flow.request import Outcome, Schedule
 from saltus.language.expression import Expr
 from saltus.system import System
 
-#: Samples of a period besides the contacts: for an exact method, for another method, and for
-#: cubics.
-NODES, NODES_INEXACT, SAMPLES = 8, 64, 1000
-#: Nodes whose series are worked out at a time: some thousand rows of them fill a few ten megabytes.
+#: Nodes of a period besides the contacts.
+NODES = 8
+#: Nodes of a period for a method whose errors are more than rounding.
+NODES_INEXACT = 64
+#: Samples of a period for cubics.
+SAMPLES = 1000
+#: Nodes whose series are computed at a time: some tens of megabytes.
 WIDTH = 2048
-#: A sample that lies less than this behind a contact is the contact [forcing periods].
+#: A sample within this time after a contact is the contact [forcing periods].
 SAME = 1e-9
 
 
@@ -63,31 +65,31 @@ def pieces(
         that didn't reach the end has no pieces.
     """
     watched = _watched(map_.system.origin, tuple(guards), tuple(quantities))
-    whole, outcome = _pieces(
+    found, outcome = _pieces(
         map_, start, periods, watched, len(guards), not map_.method.records_contacts
     )
     if map_.method.records_contacts:
         without = np.setdiff1d(
-            np.arange(len(start)), whole.motion[np.isfinite(whole.terms).all(axis=(0, 1))]
+            np.arange(len(start)), found.motion[np.isfinite(found.terms).all(axis=(0, 1))]
         )
-        bad = np.union1d(without, whole.motion[~np.isfinite(whole.terms).all(axis=(0, 1))])
+        bad = np.union1d(without, found.motion[~np.isfinite(found.terms).all(axis=(0, 1))])
         bad = bad[np.isfinite(outcome.state[bad]).all(axis=1)]
         if len(bad):  # a pole, or a law whose series isn't known where it begins
             cubics = _pieces(map_.rows(bad), start[bad], periods, watched, len(guards), True)[0]
-            good = whole.rows(~np.isin(whole.motion, bad))
-            whole = _joined([[good, replace(cubics, motion=bad[cubics.motion])]])
-    return whole, outcome
+            good = found.rows(~np.isin(found.motion, bad))
+            found = _joined([[good, replace(cubics, motion=bad[cubics.motion])]])
+    return found, outcome
 
 
 @lru_cache(maxsize=256)
 def _watched(system: System, guards: tuple[Guard, ...], quantities: tuple[Expr, ...]) -> System:
-    """A system whose last guards are quantities: made once, since its series are."""
+    """The system with the quantities as its last guards; cached, since its series are costly."""
     asked = tuple(Guard(f"quantity {i}", quantity) for i, quantity in enumerate(quantities))
     return replace(system, guards=(*guards, *asked))
 
 
 def nodes_of(map_: Stroboscope, cubic: bool = False) -> int:
-    """Samples of a period."""
+    """Nodes of a period."""
     if cubic or not map_.method.records_contacts:
         return SAMPLES
     return NODES if map_.exact else NODES_INEXACT
@@ -96,7 +98,7 @@ def nodes_of(map_: Stroboscope, cubic: bool = False) -> int:
 def _pieces(
     map_: Stroboscope, start: np.ndarray, periods: int, watched: System, guards: int, cubic: bool
 ) -> tuple[Pieces, Outcome]:
-    """The pieces by Taylor series, or by cubics, and what the flow computed."""
+    """The pieces by Taylor series or by cubics, and the outcome of the flow."""
     count = nodes_of(map_, cubic)
     schedule = Schedule.even(periods, count, beyond=int(cubic))
     outcome = map_.run(start, periods, schedule, record=0)
@@ -116,10 +118,10 @@ def _pieces(
 def _nodes(
     map_: Stroboscope, outcome: Outcome, periods: int, schedule: Schedule, cubic: bool
 ) -> Nodes:
-    """Samples and contacts in one list, without what lies at one instant with the next."""
+    """Samples and contacts in one list, one of them for each instant."""
     k, m, size = outcome.samples.shape
     contacts = outcome.contacts
-    whole = np.isfinite(outcome.samples).all(axis=(1, 2)) & (m > 0)
+    complete = np.isfinite(outcome.samples).all(axis=(1, 2)) & (m > 0)
     nodes = Nodes(
         np.concatenate([np.repeat(np.arange(k), m), contacts.trajectory]),
         np.concatenate([np.tile(schedule.count, k), contacts.period]),
@@ -137,7 +139,7 @@ def _nodes(
         np.diff(nodes.period * period + nodes.phase) < SAME * period[1:]
     )
     behind[1:] = follows & (nodes.length[1:] == 0.0) & (nodes.length[:-1] == 1.0)
-    keep = whole[nodes.motion] & ~behind
+    keep = complete[nodes.motion] & ~behind
     nodes, period = nodes.rows(keep), period[keep]
     last = np.append(np.diff(nodes.motion) != 0, True)[: len(period)]
     until_period = np.where(last, periods, np.roll(nodes.period, -1))
@@ -153,8 +155,8 @@ def _nodes(
 
 
 def _joined(parts: list[list[Pieces]]) -> Pieces:
-    """All pieces in the order of motion and time; cubics have as many terms as the others, the last
-    ones zero.
+    """All pieces in the order of motion and time. Cubics are padded with zero terms to the length
+    of the others.
     """
     flat = [piece for part in parts for piece in part]
     longest = max(len(piece.terms) for piece in flat)
@@ -162,29 +164,29 @@ def _joined(parts: list[list[Pieces]]) -> Pieces:
         replace(piece, terms=np.pad(piece.terms, ((0, longest - len(piece.terms)), (0, 0), (0, 0))))
         for piece in flat
     ]
-    whole = Pieces(
+    joined = Pieces(
         *(
             np.concatenate([getattr(piece, name) for piece in flat], axis=-1)
             for name in Pieces.__dataclass_fields__
         )
     )
-    return whole.rows(np.lexsort((whole.phase, whole.period, whole.motion)))
+    return joined.rows(np.lexsort((joined.phase, joined.period, joined.motion)))
 
 
-def _between(whole: Pieces) -> Pieces:
-    """Cubics from each node to the next, through values and rates at both: the node at the end of a
-    motion closes its last piece.
+def _between(nodes: Pieces) -> Pieces:
+    """Cubics from each node to the next, through values and rates at both. The node at the end of a
+    motion only closes its last piece.
     """
-    first = np.flatnonzero(np.diff(whole.motion) == 0)
-    length = whole.length[first]
-    rate = whole.terms[1] / whole.length
-    (a, b), (da, db) = ((of[:, first], of[:, first + 1]) for of in (whole.terms[0], rate))
+    first = np.flatnonzero(np.diff(nodes.motion) == 0)
+    length = nodes.length[first]
+    rate = nodes.terms[1] / nodes.length
+    (a, b), (da, db) = ((of[:, first], of[:, first + 1]) for of in (nodes.terms[0], rate))
     terms = polynomials.hermite(a, b, da * length, db * length)
     return Pieces(
-        whole.motion[first],
-        whole.period[first],
-        whole.phase[first],
+        nodes.motion[first],
+        nodes.period[first],
+        nodes.phase[first],
         length,
         terms,
-        whole.noise[:, first],
+        nodes.noise[:, first],
     )

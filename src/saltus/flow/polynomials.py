@@ -1,5 +1,4 @@
-"""Many polynomials on [0, 1] at once: values, integrals, and every place where one changes its
-sign.
+"""Many polynomials on [0, 1] at once: values, integrals, and every change of sign.
 
 A polynomial is a column of ``terms`` float64[n + 1, p]: ``sum(terms[k] * x**k)``. Roots are
 isolated by the sign variations of Bernstein coefficients, halving the interval while there are more
@@ -14,14 +13,16 @@ import math
 
 import numpy as np
 
-#: Halvings after which the roots left in an interval are one.
+#: Most halvings; the roots left in such an interval count as one.
 DEEPEST = 40
-#: Newton steps and bisections of an isolated root; a step that changes it by less is the last.
-MOST_STEPS, CONVERGED = 80, 4e-16
+#: Most Newton steps and bisections of an isolated root.
+MOST_STEPS = 80
+#: A step that changes a root by less is the last.
+CONVERGED = 4e-16
 
 
 def value(terms: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Each polynomial at a place of its own: terms float64[n + 1, ..., p], x float64[p];
+    """Value of each polynomial at its own x: terms float64[n + 1, ..., p], x float64[p];
     float64[..., p].
     """
     total: np.ndarray = terms[-1]
@@ -51,14 +52,14 @@ def leading_signs(terms: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def sign_changes(terms: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where polynomials change their sign inside (0, 1).
+    """Locate the changes of sign of polynomials inside (0, 1).
 
     Returns
     -------
     which : int64[r]
         The polynomial, ascending.
     place : float64[r]
-        Where, ascending for each polynomial.
+        Places of the zeros, ascending for each polynomial.
     """
     coefficients = bernstein(len(terms) - 1) @ terms
     which = np.arange(terms.shape[1])
@@ -105,7 +106,7 @@ def _halves(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _refined(terms: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """The one root of each polynomial between low and high, by Newton's method inside a shrinking
+    """The root of each polynomial between low and high, by Newton's method inside a shrinking
     bracket.
     """
     rates = derivative(terms)
@@ -113,14 +114,14 @@ def _refined(terms: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray
     rises, which = value(terms, high) > value(terms, low), np.arange(len(root))
     for _ in range(MOST_STEPS):
         x = root[which]
-        here = value(terms, x)
-        below = (here < 0.0) == rises
+        residual = value(terms, x)
+        below = (residual < 0.0) == rises
         low, high = np.where(below, x, low), np.where(below, high, x)
         with np.errstate(all="ignore"):
-            new = x - here / value(rates, x)
+            new = x - residual / value(rates, x)
         new = np.where((new >= low) & (new <= high), new, 0.5 * (low + high))
-        root[which] = np.where(here == 0.0, x, new)
-        on = (np.abs(new - x) > CONVERGED) & (here != 0.0)
+        root[which] = np.where(residual == 0.0, x, new)
+        on = (np.abs(new - x) > CONVERGED) & (residual != 0.0)
         if not on.any():
             break
         if not on.all():
@@ -152,8 +153,8 @@ def _bends(
 
 @functools.cache
 def gauss(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Places in (0, 1) and weights of Gauss's rule, float64[count] each: exact up to the degree 2
-    count - 1.
+    """Nodes in (0, 1) and weights of Gauss's rule, float64[count] each: exact up to degree 2 count
+    - 1.
     """
     places, weights = np.polynomial.legendre.leggauss(count)
     return 0.5 * (places + 1.0), 0.5 * weights

@@ -1,5 +1,5 @@
-"""Progress of long work: a callable of the user's, a bar on a terminal, lines elsewhere; both only
-if the work lasts.
+"""Progress of long work: a callable of the user's, a bar on a terminal, or lines elsewhere. Bar and
+lines appear only if the work lasts.
 """
 
 from __future__ import annotations
@@ -59,8 +59,7 @@ def _to_stderr(text: str) -> None:
 
 
 class Lines:
-    """Lines for a log, which is read afterwards: at 25, 50 and 75 %, and at least one in five
-    minutes, once the work lasts.
+    """Lines for a log: at 25, 50 and 75 %, and at least one in five minutes, once the work lasts.
 
     Parameters
     ----------
@@ -81,7 +80,7 @@ class Lines:
         self._first: tuple[float, float] | None = None
 
     def show(self, share: float) -> None:
-        """Say the share done, if it is time to."""
+        """Write the share done, if a line is due."""
         now, quarter = self._clock(), int(4 * share)
         if self._first is None:
             self._first = now, share
@@ -101,13 +100,13 @@ class Lines:
 
 
 def _in_notebook() -> bool:
-    """Whether this runs in a kernel, which shows outputs below cells."""
+    """True in a notebook, which shows outputs below cells."""
     ipython = sys.modules.get("IPython")
     return ipython is not None and hasattr(ipython.get_ipython(), "kernel")
 
 
 class _NotebookBar:
-    """A bar below a cell that appears only if the work lasts, and leaves nothing there."""
+    """A bar below a cell that appears only if the work lasts, and is removed at the end."""
 
     PATIENCE, EVERY = 2.0, 0.2
 
@@ -131,7 +130,7 @@ class _NotebookBar:
         )
 
     def close(self) -> None:
-        """Take the bar away."""
+        """Remove the bar."""
         if self._output is not None:
             self._put({})
 
@@ -180,6 +179,6 @@ class _Bar:
         self._bar.update(self._bar.task_ids[0], completed=share)
 
     def close(self) -> None:
-        """Take the bar away."""
+        """Remove the bar."""
         if self._bar is not None:
             self._bar.stop()

@@ -1,4 +1,4 @@
-"""What a run of the engine is asked, and what comes of it."""
+"""The request to the engine, and its outcome."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from saltus.flow.contact_table import ContactTable
 
 @dataclass(frozen=True)
 class Schedule:
-    """When states are wanted: at ``(count + fraction)`` periods after the start, ascending.
+    """Times of samples: at ``(count + fraction)`` periods after the start, ascending.
 
     Attributes
     ----------
@@ -25,7 +25,7 @@ class Schedule:
 
     @classmethod
     def none(cls) -> Schedule:
-        """No samples."""
+        """A schedule without samples."""
         return cls(np.zeros(0, np.int64), np.zeros(0))
 
     @classmethod
@@ -39,7 +39,7 @@ class Schedule:
 
 @dataclass(frozen=True, kw_only=True)
 class Request:
-    """What to compute. n trajectories, D states, P parameters.
+    """The trajectories to compute: n trajectories, D states, P parameters.
 
     Attributes
     ----------
@@ -102,8 +102,8 @@ class Request:
 
 @dataclass
 class Outcome:
-    """What came out; arrays have the trajectory first. Contacts are sorted by trajectory, then
-    time.
+    """The outcome of a request; arrays have the trajectory first. Contacts are sorted by
+    trajectory, then time.
     """
 
     state: np.ndarray
@@ -118,16 +118,14 @@ class Outcome:
     complete: bool = True
 
     def reached(self) -> int:
-        """How many samples there are: of a run that was interrupted those that some trajectory has
-        reached.
-        """
+        """Number of samples; of an interrupted run, those that some trajectory has reached."""
         if self.complete:
             count: int = self.samples.shape[1]
             return count
         return int(np.flatnonzero((self.sample_mode >= 0).any(axis=0)).max(initial=0)) + 1
 
     def of(self, first: int, last: int) -> Outcome:
-        """That of some of the trajectories, as if they had been moved alone."""
+        """The outcome of some of the trajectories, as if they had been computed alone."""
         begins = self.contacts.begins(last - first, first)
         each = {name: getattr(self, name)[first:last] for name in _EACH}
         return replace(

@@ -7,21 +7,24 @@ import threading
 from pathlib import Path
 
 from saltus.errors import ParameterError
+from saltus.sentences import Text
 
 #: Share of the free memory that one call may take.
 SHARE = 0.5
-#: Always allowed, without a measurement of the free memory [bytes].
+#: Size that is allowed without measuring the free memory [bytes].
 ALWAYS_ALLOWED = 2**24
 #: Free memory if the system doesn't report it [bytes].
 DEFAULT_FREE = 4 * 2**30
-#: Memory of a contact of D states, from the kernel's table to the Dataset with both runs of
-#: measured time errors [bytes]. Measured: 401 for two states in one run; the second keeps its own.
-CONTACT, CONTACT_OF_A_STATE = 640, 80
+#: Memory of a contact [bytes], from the kernel's table to the Dataset with both runs of measured
+#: time errors. Measured: 401 for two states in one run; the second run keeps as many.
+CONTACT = 640
+#: Memory of each state in a contact [bytes].
+CONTACT_OF_A_STATE = 80
 
 
 def free() -> int:
-    """Memory that this process can have without taking it from others [bytes]; the limit of a
-    container counts.
+    """Memory that this process can have without taking it from others [bytes], within the limit of
+    its container.
     """
     amounts = []
     try:
@@ -46,7 +49,7 @@ def free() -> int:
     return min(amounts)
 
 
-def check_room(size: float, what: str, instead: str) -> None:
+def check_room(size: float, what: str, instead: Text) -> None:
     """Raise ParameterError if ``size`` is more than one call may take.
 
     Parameters
@@ -55,7 +58,7 @@ def check_room(size: float, what: str, instead: str) -> None:
         Estimate [bytes].
     what : str
         The contents, in the plural: ``"4 trajectories with 100 samples each"``.
-    instead : str
+    instead : str or callable
         Advice, as a sentence.
     """
     if size <= ALWAYS_ALLOWED:
@@ -65,12 +68,13 @@ def check_room(size: float, what: str, instead: str) -> None:
         raise ParameterError(
             f"{what} are more than fits here: they need about {size / 1e9:.3g} GB of memory, and "
             f"half of the free memory is "
-            f"{room / 1e9:.3g} GB. {instead}"
+            f"{room / 1e9:.3g} GB. ",
+            instead,
         )
 
 
 class Contacts:
-    """Room for the contacts of one run, shared by its threads.
+    """Memory for the contacts of one run, shared by its threads.
 
     Parameters
     ----------
@@ -94,5 +98,5 @@ class Contacts:
 
     @property
     def full(self) -> bool:
-        """Whether the memory for contacts is full."""
+        """True if the memory for contacts is full."""
         return self.count * self._each > ALWAYS_ALLOWED and self.count >= self.most

@@ -1,5 +1,5 @@
-"""Series of motions near a boundary on which a law has none, such as ``d**1.5`` where a contact
-begins: the steps of the compiled flow.
+"""Series of motions near a boundary on which a law has no Taylor series, such as ``d**1.5`` where a
+contact begins.
 
 As in kernels/taylor_singular.py, in NumPy and without the flow's care for its last digits: the flow
 knows the states at contacts already. Behind the boundary a series reaches at most as far as the
@@ -16,9 +16,9 @@ import numpy as np
 from saltus.flow import polynomials
 from saltus.kernels.isolation import ROUNDING
 
-#: Share of the way to a boundary that a series is used for.
+#: A series is used for this share of the way to a boundary.
 REACH = 0.9
-#: Relative change of a state by the terms left out.
+#: Largest relative change of a state by the terms left out.
 NEGLIGIBLE = 2.0**-46
 #: A gap is nonzero beyond this many rounding errors.
 NONZERO_ROUNDINGS = 1024.0
@@ -27,7 +27,7 @@ TRIALS = 60
 
 
 class Boundaries:
-    """The boundaries of a series module on which terms have no series, for motions at given places.
+    """The boundaries of a series module on which terms have no series, for motions at given nodes.
 
     Parameters
     ----------
@@ -54,8 +54,8 @@ class Boundaries:
         )
 
     def jets(self, work: np.ndarray) -> np.ndarray:
-        """Fill in all terms; returns where some were set aside, bool[n]: those that act near their
-        own boundary.
+        """Fill in all terms; True where some were set aside, bool[n]: those that act near their own
+        boundary.
         """
         module, aside = self._module, np.zeros(work.shape[1], bool)
         for _ in range(module.SINGULAR + 1):
@@ -71,7 +71,7 @@ class Boundaries:
         return aside
 
     def shortened(self, work: np.ndarray, h: np.ndarray, aside: np.ndarray) -> np.ndarray:
-        """Lengths float64[n] no longer than the terms hold for."""
+        """Shorten lengths float64[n] to those that the terms hold for."""
         module = self._module
         for j in range(module.SINGULAR):
             there = self._acts(work, j) & (self._side[module.NGUARDS + j] < 0.0)
@@ -109,8 +109,8 @@ class Boundaries:
         return acts
 
     def _near(self, work: np.ndarray, j: int) -> np.ndarray:
-        """Motions on the boundary of an acting term up to rounding, or so near that the term
-        changes nothing before it is reached.
+        """True where a motion is on the boundary of an acting term, up to rounding, or so near that
+        the term changes nothing until it is reached.
         """
         module, count = self._module, _terms(self._module)
         nonzero = (

@@ -1,5 +1,5 @@
-"""Shots: the same short run again and again from other starts, as Newton's method asks for
-thousands of them. Its arrays and the arguments of its kernel are made once.
+"""Shots: the same short run repeated from other starts, thousands of times in Newton's method. Its
+arrays and the arguments of its kernel are made once.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ from saltus.flow.stops import on_allowed_sides
 from saltus.kernels import status as st
 from saltus.system import System
 
-#: What a run leaves behind in its arrays, besides the states.
+#: Arrays that a run changes, besides the states.
 _LEFT = ("count", "phase", "mode", "fresh", "carry", "counters", "minima", "cursor", *marks(0))
 
 
 class Shots:
-    """k trajectories of one system over ``periods`` whole periods at most, on one thread; nothing
-    but their ends is kept.
+    """k trajectories of one system over ``periods`` whole periods at most, on one thread; only
+    their ends are kept.
 
     Parameters
     ----------
     system : System
         The equations.
     method : Method
-        How to integrate: one whose steps adapt.
+        The method of integration: one whose steps adapt.
     parameters : float64[1 or k, P]
         Values in the order of ``system.values``.
     period : float64[k]
@@ -73,7 +73,7 @@ class Shots:
 
     @property
     def counters(self) -> np.ndarray:
-        """What the last run counted, int64[k, ..]: see kernels/status.py."""
+        """The counters of the last run, int64[k, ..]: see kernels/status.py."""
         return self._arrays["counters"]
 
     def run(self, start: np.ndarray, count: np.ndarray | int) -> tuple[np.ndarray, np.ndarray]:

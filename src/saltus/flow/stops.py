@@ -1,4 +1,4 @@
-"""Starts that lie at a stop, or beyond it."""
+"""Starts at a stop, or beyond it."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ def on_allowed_sides(
     period: np.ndarray,
     roundings: float = ROUNDINGS,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The starts, those that rounding has put beyond a stop back on the side that it allows; and
-    which starts lie where an impact allows no motion.
+    """Move starts that rounding has put beyond a stop back to its allowed side, and mark those on a
+    side where an impact allows no motion.
 
     The end of a run at rest on a moving stop is a start of the next: it lies on the stop but for
     the rounding of its place, and of the way that it goes in a period.
@@ -40,7 +40,7 @@ def on_allowed_sides(
     period : float64[n]
         Forcing period, or the span of a run without forcing [s].
     roundings : float
-        How many roundings beyond a stop a start may lie.
+        Most roundings beyond a stop of a start that lies on it.
 
     Returns
     -------

@@ -8,17 +8,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from saltus.codegen.module import Flow, lane_width, taylor_module
-from saltus.errors import ParameterError, shown
+from saltus.errors import must_be
 from saltus.flow.counts import whole
 from saltus.flow.method import STEPS_PER_PERIOD, Method, check_positive, explain_unknown_options
 from saltus.flow.pace import CHECK_STEPS, LONG_CHECK_STEPS
 from saltus.system import System
 
-#: Trajectories of a small batch, and its lanes: one and the three copies that measure its errors.
-#: 16 lanes take twice as long (0028).
+#: Most trajectories of a small batch, and its lanes: one trajectory and the three copies that
+#: measure its errors. 16 lanes take twice as long (0028).
 SMALL_BATCH = 4
-#: Share of its span that LONG_CHECK_STEPS steps must bring: a trajectory of 1e9 steps, minutes,
-#: runs to its end.
+#: Share of its span that LONG_CHECK_STEPS steps must bring: a trajectory of 1e9 steps, minutes of
+#: work, runs to its end.
 SLOWEST_SHARE = 1e-3
 
 
@@ -63,7 +63,7 @@ class Taylor(Method):
         if self.lanes is not None and (
             not isinstance(self.lanes, int) or self.lanes not in (2, 4, 8, 16)
         ):
-            raise ParameterError(f"lanes must be 2, 4, 8 or 16, not {shown(self.lanes)}.")
+            raise must_be("lanes", "2, 4, 8 or 16", self.lanes)
         if self.max_steps is not None:
             whole(self.max_steps, "max_steps")
         whole(self.max_events, "max_events")
@@ -73,7 +73,7 @@ class Taylor(Method):
         return taylor_module(system, self.order, self.lanes or lane_width())
 
     def suited_to(self, count: int) -> Taylor:
-        """With few lanes for few trajectories, unless the user has chosen."""
+        """The method with few lanes for few trajectories, unless the user has chosen the lanes."""
         return (
             replace(self, lanes=min(SMALL_BATCH, lane_width()))
             if self.lanes is None and count <= 2 * SMALL_BATCH
@@ -107,12 +107,12 @@ class Taylor(Method):
 
     @property
     def exact(self) -> bool:
-        """Yes."""
+        """True: the errors are rounding."""
         return True
 
     def companion(self) -> Taylor:
-        """The same series with steps an eighth shorter, which leaves a twentieth of the truncation;
-        the same compiled kernel.
+        """The same series with steps an eighth shorter, which leave a twentieth of the truncation;
+        it uses the same compiled kernel.
         """
         return Taylor(
             self.order, self.tolerance * 2.0**-4, self.lanes, self.max_steps, self.max_events

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import _signal  # signal without its enumerations, which take a tenth of the time of a short run
+import _signal  # signal without its enumerations, which cost a tenth of a short run
 import contextlib
 import os
 import signal
@@ -45,14 +45,14 @@ def on_threads(
     """
     stop = stop or Stop()
 
-    def one(item: Item) -> tuple[Item, Result] | None:
+    def run_item(item: Item) -> tuple[Item, Result] | None:
         stop.hold()
         return None if stop.is_set() else (item, work(item))
 
     handler = _ctrl_c_of(stop)
     if len(items) == 1 and progress is None and _is_ours(handler):
         with _ctrl_c_asks(stop) if handler is signal.default_int_handler else nullcontext():
-            result = copy_context().run(one, items[0])
+            result = copy_context().run(run_item, items[0])
         if result is not None:
             done(*result)
         check_stop()
@@ -64,11 +64,11 @@ def on_threads(
     ):
         waiting: set[Future[Any]] = set()
         try:
-            waiting |= {pool.submit(copy_context().run, one, item) for item in items}
+            waiting |= {pool.submit(copy_context().run, run_item, item) for item in items}
             while waiting:
                 ready, waiting = wait(waiting, timeout=0.1, return_when=FIRST_COMPLETED)
                 for result in (future.result() for future in ready):
-                    if result is not None:  # None: left, because it is to stop
+                    if result is not None:  # None: left out, because the work is to stop
                         done(*result)
                 if progress:
                     progress(1.0 - len(waiting) / len(items))
@@ -80,14 +80,14 @@ def on_threads(
 
 
 def may_wait(stop: Stop) -> bool:
-    """Whether Ctrl-C can wait until a piece of work in this thread has ended: wherever nobody has a
-    handler of his own for it.
+    """True if Ctrl-C can wait until a piece of work in this thread has ended: wherever no handler
+    of the user's is installed.
     """
     return _is_ours(_ctrl_c_of(stop))
 
 
 def _ctrl_c_of(stop: Stop) -> Any:
-    """What Ctrl-C calls in the midst of this thread's work; None where it doesn't arrive."""
+    """The handler of Ctrl-C during this thread's work; None where it doesn't arrive."""
     if stop.inside or threading.current_thread() is not threading.main_thread():
         return None
     return _signal.getsignal(_CTRL_C)
@@ -99,8 +99,8 @@ def _is_ours(handler: Any) -> bool:
 
 @contextmanager
 def _ctrl_c_asks(stop: Stop) -> Iterator[None]:
-    """Ctrl-C asks to stop, and is raised where the block ends: in the midst of it, it would cut a
-    table of contacts in two.
+    """Delay Ctrl-C to the end of the block, and ask the work to stop. Raised inside the block it
+    would cut a table of contacts in two.
     """
     pressed = False
 
@@ -119,7 +119,7 @@ def _ctrl_c_asks(stop: Stop) -> Iterator[None]:
 
 
 class _OneThread(Executor):
-    """A thread for a single piece of work: a pool takes three times as long to make and to end,
+    """A thread for a single piece of work. A pool takes three times as long to make and to end,
     which a single trajectory would feel.
     """
 
@@ -140,7 +140,7 @@ class _OneThread(Executor):
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:  # noqa: ARG002  (it has begun already)
-        """Wait for its end."""
+        """Wait for the piece to end."""
         if wait and self._thread is not None:
             with contextlib.suppress(RuntimeError):  # Ctrl-C came before it was started
                 self._thread.join()

@@ -1,3 +1,3 @@
-"""Templates of kernels and their pure helpers: numbers in, numbers out, nothing allocated in a
-loop, nothing raised.
+"""Templates of kernels and their pure helpers: functions of numbers that allocate nothing in a loop
+and raise nothing.
 """

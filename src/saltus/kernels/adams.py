@@ -1,5 +1,5 @@
-"""Template: ode113, Adams-Bashforth-Moulton formulas of orders 1 to 13 in PECE mode, with steps of
-any length and orders of its own choice.
+"""Template: ode113, Adams-Bashforth-Moulton formulas of orders 1 to 13 in PECE mode, with variable
+step length and order.
 
 The step is that of Shampine & Gordon, Computer Solution of Ordinary Differential Equations (1975),
 with the error control of Shampine & Reichelt, The MATLAB ODE Suite, SIAM J. Sci. Comput. 18 (1997).
@@ -26,7 +26,7 @@ GAMMA = (0.0, 0.5, 0.0833, 0.0417, 0.0264, 0.0188, 0.0143, 0.0114, 0.00936, 0.00
 
 @inner
 def phi(i):
-    """Where difference i stands; after the last, the state at the end of the step."""
+    """Index of difference i; after the last one, that of the state at the end of the step."""
     return K1 + NSTATES * i
 
 
@@ -54,7 +54,7 @@ def begin_leg(i, t, t_end, batch, work):
 
 @kernel
 def coefficients(k, h, ns, work):
-    """alpha, beta, sigma, psi and g of a step, those that its length has changed."""
+    """The entries of alpha, beta, sigma, psi and g that the step length has changed."""
     last = int(work[S + LAST_ORDER])
     work[S + BETA + ns], work[S + ALPHA + ns], work[S + SIGMA + ns + 1] = 1.0, 1.0 / ns, 1.0
     sum_now = h * ns
@@ -86,7 +86,7 @@ def coefficients(k, h, ns, work):
 
 @kernel
 def predict(t_new, h, k, ns, work):
-    """p to POINT, its rate to K_END; the differences become those that p has at t_new."""
+    """Predict p to POINT and its rate to K_END; the differences become those of p at t_new."""
     for j in range(NSTATES):
         for i in range(ns + 1, k + 1):
             work[phi(i) + j] *= work[S + BETA + i]
@@ -128,7 +128,7 @@ def size_of(row, change, theta, work):
 
 @kernel
 def correct(t_new, h, k, work):
-    """The end of the step, to NEXT, its rate to K_END, and the differences there."""
+    """Correct: the end of the step to NEXT, its rate to K_END, and the differences there."""
     for j in range(NSTATES):
         change = work[K_END + j] - work[phi(1) + j]
         work[ERROR + j] = (work[S + G + k] - work[S + G + k + 1]) * change
@@ -144,8 +144,8 @@ def correct(t_new, h, k, work):
 
 @kernel
 def step(i, t, t_stop, t_leg, t_end, batch, work):
-    """One accepted step: (t_new, h, whether it is fine, rejections). It isn't if not err <= rtol:
-    NaN, or no step is short enough.
+    """One accepted step: (t_new, h, True if it succeeded, rejections). It fails unless err <= rtol:
+    for NaN, or if no step is short enough.
     """
     rtol, theta = batch.options[i, RTOL], batch.options[i, ATOL] / batch.options[i, RTOL]
     h, shortest, last = length_asked(i, t, t_stop, t_leg, t_end, batch)

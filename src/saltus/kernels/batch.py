@@ -1,5 +1,5 @@
-"""The batch: every array that a `propagate` reads and writes, for n trajectories of D states. The
-same for all methods.
+"""The batch: every array that a `propagate` reads and writes, for n trajectories of D states. All
+methods share it.
 
 Time of a trajectory is ``origin + count * period + phase``: whole periods are counted, so the phase
 stays exact.

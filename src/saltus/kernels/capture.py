@@ -1,12 +1,12 @@
-"""Template: has a trajectory entered a neighbourhood of an attractor in which the return map was
-verified to contract?
+"""Template: the test whether a trajectory has entered a neighbourhood of an attractor in which the
+return map was verified to contract.
 """
 
 
 @entry
 def capture(points, centres, weights, owners, extents, label, when):
-    """Look at every point of every trajectory, in order, until one lies in an ellipsoid |W (p - c)|
-    <= 1.
+    """Test every point of every trajectory, in order, until one lies in an ellipsoid |W (p - c)| <=
+    1.
 
     points f8[k, n, D]; centres f8[m, D], ascending in their first coordinate; weights f8[m, D, D];
     owners i8[m], the attractor of each; extents f8[m]: half the extent of each ellipsoid along the

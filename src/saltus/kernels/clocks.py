@@ -1,5 +1,5 @@
-"""Template: the clocks of a system - switches, remainders and tables that time alone decides.
-codegen puts it behind the generated head.
+"""Template: the clocks of a system, which are switches, remainders and tables that depend on time
+only. codegen puts it after the generated head.
 
 A clock divides time into pieces, numbered k in the order of time; `begin_of` is when piece k of
 clock j begins, by a formula, so that no rounding adds up from piece to piece. The present piece of
@@ -37,7 +37,7 @@ from saltus.kernels.clocks_layout import (
 )
 from saltus.kernels.trigonometry import turned
 
-#: Times within this many ulp are one break (as coincident contacts are one).
+#: Times within this many ulp are one break (coincident contacts have the same limit).
 SAME_BREAK = 10.0 * 2.220446049250313e-16
 
 
@@ -55,7 +55,7 @@ def knots(data, j):
 
 @inner
 def repeats(data, j):
-    """Whether the table of clock j is periodic."""
+    """True if the table of clock j is periodic."""
     return data[int(data[CLOCK_TABLE[j]]) + 1] > 0.5
 
 
@@ -85,7 +85,7 @@ def place_at_base(j, n):
 
 @inner
 def is_cyclic(j, data):
-    """Whether the pieces of clock j repeat."""
+    """True if the pieces of clock j repeat."""
     return CLOCK_KIND[j] != LEVEL and (CLOCK_KIND[j] != TABLE or repeats(data, j))
 
 
@@ -152,7 +152,7 @@ def begin_of(j, k, n, base, data):
 
 @kernel
 def first_guess(j, tau, n, base, data):
-    """A piece near the one that holds tau."""
+    """A piece near the one that contains tau."""
     if begin_of(j, 1, n, base, data) == math.inf:
         return 0
     if is_cyclic(j, data):
@@ -181,7 +181,7 @@ def first_guess(j, tau, n, base, data):
 
 @kernel
 def hold_piece(j, k, n, base, data, h):
-    """Write what piece k of clock j is to h."""
+    """Write the data of piece k of clock j to h."""
     at, kind, rate = HELD * j, CLOCK_KIND[j], n[NUMBERS * j]
     h[at + PIECE] = k
     if kind == LEVEL:
@@ -268,7 +268,7 @@ def place_clocks(p, origin, period, count, n, data):
 @kernel
 def set_clocks(tau, base, n, data, known, h):
     """Bring every clock to its piece at tau (from a guess, unless the pieces in h are known);
-    returns when the next break comes.
+    return the next break.
     """
     until = tau + SAME_BREAK * (abs(tau) + abs(base))
     following = math.inf

@@ -9,20 +9,20 @@ Symbols
 t, t_new ends of a step; t_stop the next end or break of time; h = t_new - t. Times in s.
 """
 
-# Columns of `options` that are the method's own: length of a step [s]; how closely bisection
-# brackets a contact, as a share of a step.
+# Columns of `options` of this method: length of a step [s]; bracket of a contact after bisection,
+# as a share of a step.
 STEP, CLOSENESS = range(2)
-#: A step ends at t_stop if it falls short of it by a millionth of its length at most.
+#: A step ends at t_stop if it would fall short of it by a millionth of its length at most.
 REACHES = 1.000001
-#: Flights of fewer of bisection's last brackets are those of its errors.
+#: Flights of fewer last brackets of bisection than this are errors of bisection.
 BRACKETS = 64.0
-#: Share of a step that tells to which side a motion leaves a boundary on which it stands still.
+#: Share of a step that shows the side to which a motion leaves a boundary on which it stands still.
 START_OF_STEP = 0.001
 
 
 @inner
 def law_mode(i, batch):
-    """The mode that the right-hand side is in."""
+    """The mode of the right-hand side."""
     return batch.mode[i] if batch.options[i, LOCATE] != 0.0 else FROM_STATE
 
 
@@ -34,14 +34,14 @@ def at_once(i, t, batch):
 
 @inner
 def least_state(i, batch):
-    """The size that every state has at least: nothing is known of it."""
+    """The least size of every state: unknown, so zero."""
     return 0.0
 
 
 @kernel
 def settle_sides(i, t, batch, work):
     """Sides of the gaps that are zero at NODE, by the sign of their rates or, where these are zero
-    too, by where the start of a step goes; K1 in that mode.
+    too, by the start of a step; K1 in that mode.
     """
     gap_rates_at(t, NODE, K1, Q, RATE, work)
     begin = t + START_OF_STEP * batch.options[i, STEP]
@@ -57,12 +57,12 @@ def settle_sides(i, t, batch, work):
 
 @inner
 def begin_leg(i, t, t_end, batch, work):
-    """A leg begins with a step like any other."""
+    """Begin a leg: nothing is special about its first step."""
 
 
 @inner
 def step(i, t, t_stop, t_leg, t_end, batch, work):
-    """One step: (t_new, h, whether its end is finite, rejections)."""
+    """One step: (t_new, h, True if its end is finite, rejections)."""
     length = batch.options[i, STEP]
     t_new = t + length
     if REACHES * length >= t_stop - t:

@@ -15,19 +15,19 @@ all, the one behind them in the order of the guards, and the way that each has g
 from saltus.kernels.parts import part
 from saltus.kernels.status import AMBIGUOUS_IMPACT, IMPACT_LAW, INVALID_RESTITUTION, OK
 
-#: Part of the closing velocity of an impact by which the constraint of another contact changes, if
-#: it changes at all.
+#: Least relative effect of an impact: the change of another contact's constraint over the closing
+#: velocity.
 FELT = 1.0e-9
-#: Part of the first closing velocity at which impacts of one instant, each caused by the one
-#: before, have come to an end for a comparison of orders; the most of them.
+#: Part of the first closing velocity at which successive impacts of one instant count as ended in a
+#: comparison of orders; the most impacts of it.
 ENDED, MOST_IMPACTS = 1.0e-12, 50_000
-#: By how much rounding may carry a coefficient of restitution out of [0, 1].
+#: Rounding that may carry a coefficient of restitution out of [0, 1].
 RESTITUTION_ROUNDING = 1.0e-12
 
 
 @inner
 def is_possible(g, told):
-    """Whether the law of guard g has told no impact with an impossible restitution."""
+    """True unless the law of guard g has reported an impact with an impossible restitution."""
     e, strikes = told[0], LAW[g] == IMPACT_LAW and told[1] > 0.0
     return not strikes or -RESTITUTION_ROUNDING <= e <= 1.0 + RESTITUTION_ROUNDING
 
@@ -43,8 +43,8 @@ def closes_at(t, rows, p, held, mode, g, told):
 
 @kernel
 def closing_of(t, rows, p, held, mode, stops, told):
-    """How many of the stops close, and the largest velocity at which one does; what rounding leaves
-    of a velocity doesn't count beside it.
+    """Number of stops that close, and the largest closing velocity; velocities that are rounding
+    beside it don't count.
     """
     closing, fastest = 0, 0.0
     for g in range(NGUARDS):
@@ -58,8 +58,8 @@ def closing_of(t, rows, p, held, mode, stops, told):
 
 @kernel
 def take_impacts(t, rows, p, held, mode, stops, backwards, least, told):
-    """The state behind all impacts of this instant, in the order of the guards or against it, until
-    none closes faster than `least`. Returns OK, or what ends the motion; impacts that come to no
+    """The state after all impacts of this instant, in the order of the guards or against it, until
+    none closes faster than `least`. Returns OK, or the status that ends the motion; impacts without
     end have no order.
     """
     for _ in range(MOST_IMPACTS):
@@ -80,8 +80,8 @@ def take_impacts(t, rows, p, held, mode, stops, backwards, least, told):
 
 @kernel
 def order_of_impacts(t, rows, p, held, mode, stops, told):
-    """Whether the impacts of this instant lead to one state, taken in the order of the guards and
-    against it: OK, or what ends the motion. The tangent isn't asked.
+    """Test that the impacts of this instant lead to one state, in the order of the guards and
+    against it: OK, or the status that ends the motion. The tangent isn't compared.
     """
     closing, fastest = closing_of(t, rows, p, held, mode, stops, told)
     if closing < 2:

@@ -1,5 +1,5 @@
-"""The first crossing of a gap inside a step, with certainty: every root isolated by Bernstein
-coefficients, tangencies told apart.
+"""The first crossing of a gap inside a step, with certainty: every root is isolated by Bernstein
+coefficients, and tangencies are told apart.
 
 The fast path of the flow settles nine steps in ten with a quadratic bound, in all lanes at once.
 What it can't settle comes here, one lane at a time. The gap is a polynomial ``q(x) = sum(q[k] *
@@ -25,10 +25,9 @@ AT, MARGIN = range(2)
 TOUCH_AT, TOUCH_GUARD = range(2)
 #: Rounding error of a sum of terms, in units of their sizes.
 ROUNDING = 4.0 * 2.220446049250313e-16
-#: Places of a touch that differ by less are one: a minimum within rounding is flat over some 1e-8
-#: of the step.
+#: Touches closer than this are one: a minimum within rounding is flat over about 1e-8 of the step.
 SAME_TOUCH = 1.0e-6
-#: Touches that one step can hold on record.
+#: Most touches recorded in one step.
 MOST_TOUCHES = 16
 #: Halvings after which an interval counts as a touch: 2**-48 of a step is below its rounding error.
 DEEPEST = 48
@@ -54,7 +53,7 @@ def slope(q, degree, x):
 
 @kernel
 def is_exact_zero(q, degree, x):
-    """Whether q(x) = 0 and no operation of Horner's rule rounded: the only zero that a sum of
+    """True if q(x) = 0 and no operation of Horner's rule rounded: the only zero that a sum of
     doubles can prove (Dekker 1971).
     """
     value, exact = q[degree], True
@@ -97,7 +96,7 @@ def to_bernstein(q, degree, b):
 
 @kernel
 def halve(b, bounds, row, degree):
-    """Split the interval of a row of Bernstein coefficients (de Casteljau): its right half stays,
+    """Split the interval of a row of Bernstein coefficients (de Casteljau): its right half is kept,
     its left half goes to the next row.
     """
     b[row + 1, 0] = b[row, 0]
@@ -147,7 +146,7 @@ def leading_sign(q, degree):
 
 @kernel
 def is_rounding(q, degree, noise):
-    """Whether all terms together are noise: on [0, 1] the gap can't be told from zero."""
+    """True if all terms together are noise: on [0, 1] the gap can't be told from zero."""
     total = 0.0
     for k in range(degree + 1):
         total += abs(q[k])
@@ -174,7 +173,7 @@ def side_of_leaving(q, degree, shifted, noise):
 
 @kernel
 def turning_place(q, degree, low, high, rates):
-    """The one place in (low, high) where q' goes from - to +; leaves the coefficients of q' in
+    """The place in (low, high) where q' changes from - to +; leaves the coefficients of q' in
     `rates`.
     """
     for k in range(degree):
@@ -202,8 +201,8 @@ def sign_beyond(b, degree, noise):
 
 @kernel
 def _note_touch(place, guard, touches, count):
-    """Add a touch to the list, unless it is the one noted last seen from the neighbouring interval;
-    returns the new count.
+    """Add a touch to the list, unless the neighbouring interval has just added it; return the new
+    count.
     """
     again = (
         count > 0
@@ -304,8 +303,8 @@ def first_crossing(q, degree, shifted, noise, guard, b, bounds, rates, out, touc
 
 
 def work_arrays(degree):
-    """The work of :func:`first_crossing` for polynomials up to ``degree``: b, bounds, rates (plain
-    Python; kernels bring their own).
+    """Work arrays of :func:`first_crossing` for polynomials up to ``degree``: b, bounds, rates (in
+    plain Python; kernels bring their own).
     """
     n = degree + 1
     return np.empty((DEEPEST + 2, n)), np.empty((DEEPEST + 2, 2)), np.empty(n)

@@ -1,5 +1,5 @@
-"""Template: how a step of fixed length that has crossed a boundary lands on it, by one of three
-rules. All of them start again from the start of the step, in the mode that it had.
+"""Template: landing of a step of fixed length on a boundary that it has crossed, by one of three
+rules. All start again from the start of the step, in its mode.
 
 HENON     the gap g takes the place of time: dy/dg = (dy/dt)/(dg/dt) and dt/dg = 1/(dg/dt) over
           [g at the start, 0] in one step of the method. M. Henon, Physica D 5 (1982) 412-414
@@ -24,15 +24,16 @@ from saltus.kernels.status import REJECTED, RUNNING, SLIDING, TURNED
 
 # Rules, the column LOCATE of `options`; 0 locates nothing.
 HENON, INVERSE, BISECT = range(1, 4)
-#: Part of its rate at the end of a step that a gap must have at its start where the state jumps:
-#: below, a step in the gap errs by half a per cent or more, and impacts that accumulate gain speed.
+#: Least rate of a gap at the start of a step, as a part of that at its end, where the state jumps.
+#: Below it a step in the gap errs by half a per cent or more, and impacts that accumulate gain
+#: speed.
 SLOWEST_START = 0.5
 
 
 @kernel
 def find_contact(i, t, t_new, t_leg, h, batch, work):
     """The first contact of a step, whose state NEXT becomes: (its time, end and length of the step
-    that it ends, whether there is one, RUNNING or why it can't be reached).
+    that it ends, True if there is one, RUNNING or the status if it can't be reached).
     """
     gaps_at(t_new, NEXT, Q_STAGE, AT_NEXT, work)
     crossed = sides(AT_NEXT, work) ^ batch.mode[i]
@@ -59,7 +60,7 @@ def find_contact(i, t, t_new, t_leg, h, batch, work):
 
 @kernel
 def reach(i, g, t, h, batch, work):
-    """Step from NODE to the boundary g; returns how long that takes, NaN if it isn't reached."""
+    """Step from NODE to the boundary g; return the time it takes, NaN if it isn't reached."""
     direction, rule = (-1.0 if batch.mode[i] >> g & 1 else 1.0), batch.options[i, LOCATE]
     if rule == BISECT:
         return bisect(i, g, t, h, direction, batch, work)
@@ -73,8 +74,8 @@ def reach(i, g, t, h, batch, work):
 
 @kernel
 def closing(first, crossed, t_hit, mode, work):
-    """Let LEFT and RIGHT differ in sign for the gap that is reached, and for those that are on
-    their new sides at NEXT already.
+    """Give LEFT and RIGHT different signs for the gap that is reached, and for those already on
+    their new sides at NEXT.
     """
     drive_at(t_hit, Q, work)
     gaps_at(t_hit, NEXT, Q, TRY, work)
@@ -87,7 +88,7 @@ def closing(first, crossed, t_hit, mode, work):
 
 @kernel
 def comes_back(g, t_hit, mode, work):
-    """Whether the law beyond boundary g pushes back onto it. Needs q at t_hit in Q."""
+    """True if the law beyond boundary g pushes back onto it. Needs q at t_hit in Q."""
     rate_at(t_hit, NEXT, Q, mode ^ (1 << g), POINT, work)
     gap_rates_at(t_hit, NEXT, POINT, Q, TRY, work)
     return work[TRY + g] * (-1.0 if mode >> g & 1 else 1.0) < 0.0
@@ -95,7 +96,7 @@ def comes_back(g, t_hit, mode, work):
 
 @kernel
 def henon(g, t, direction, mode, work):
-    """The step in g, to NEXT. The times of its stages stand where those of the step did."""
+    """Take the step in g, to NEXT. The times of its stages replace those of the step's."""
     total = -work[AT_NODE + g]
     for stage in range(STAGES - 1):
         elapsed = 0.0
@@ -128,7 +129,9 @@ def henon(g, t, direction, mode, work):
 
 @inner
 def stand_in(h, work):
-    """Stages between the first and the last that give the interpolant the ends of a step in g."""
+    """Replace the stages between the first and the last so that the interpolant has the ends of a
+    step in g.
+    """
     weight = WEIGHT[(STAGES - 1) * STAGES]
     for j in range(NSTATES):
         slope = (work[NEXT + j] - work[NODE + j]) / h if h != 0.0 else work[K1 + j]
@@ -138,7 +141,7 @@ def stand_in(h, work):
 
 @kernel
 def invert(g, t, h, direction, mode, work):
-    """The step to the zero of the inverse cubic, twice."""
+    """Step to the zero of the inverse cubic, twice."""
     hit, value, rate = h, work[AT_NEXT + g], work[RIGHT + g]
     for _ in range(2):
         if not rate * direction > 0.0:
@@ -156,7 +159,9 @@ def invert(g, t, h, direction, mode, work):
 
 @inner
 def inverse_cubic(h, start, end, start_rate, end_rate):
-    """Where g = 0 on the cubic t(g) from (start, 0) to (end, h), with the slopes 1/rate there."""
+    """The time where g = 0 on the cubic t(g) from (start, 0) to (end, h), with the slopes 1/rate
+    there.
+    """
     width = end - start
     if width == 0.0:
         return h
@@ -168,7 +173,7 @@ def inverse_cubic(h, start, end, start_rate, end_rate):
 
 @kernel
 def bisect(i, g, t, h, direction, batch, work):
-    """The step to just beyond the boundary, by halving."""
+    """Step to just beyond the boundary, by halving."""
     before, beyond = 0.0, h
     while beyond - before > batch.options[i, CLOSENESS] * h:
         middle = 0.5 * (before + beyond)

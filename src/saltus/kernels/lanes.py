@@ -66,7 +66,7 @@ def nearest_integer(a):
 
 
 def any_lane(mask):
-    """Whether the mask holds in any lane."""
+    """True if the mask holds in any lane."""
     return bool(np.any(mask))
 
 

@@ -1,5 +1,5 @@
-"""Marks of the functions that are compiled: ``kernel``, ``inner`` for those that are to be inlined,
-``entry`` for the one that is called.
+"""Marks of compiled functions: ``kernel``, ``inner`` for inlined ones, ``entry`` for the one that
+is called.
 
 In plain Python they change nothing; codegen/lowering reads them.
 """
@@ -12,7 +12,7 @@ Function = TypeVar("Function")
 
 
 def kernel(function: Function) -> Function:
-    """A function that is compiled."""
+    """Mark a function that is compiled."""
     return function
 
 

@@ -1,4 +1,4 @@
-"""Template: what MATLAB's solvers have in common.
+"""Template: common parts of MATLAB's solvers.
 
 Sides are those of the state wherever the right-hand side is evaluated. Contacts are located on the
 dense output: a step that ends beyond a boundary is cut there, and the method starts afresh from the
@@ -13,19 +13,19 @@ the trajectory; h = t_new - t. Times in s.
 
 from saltus.kernels.status import RUNNING
 
-# Columns of `options` that these methods have.
+# Columns of `options` of these methods.
 RTOL, ATOL = range(2)
 
 
 @inner
 def law_mode(i, batch):
-    """The mode that the right-hand side is in."""
+    """The mode of the right-hand side."""
     return FROM_STATE
 
 
 @inner
 def settle_sides(i, t, batch, work):
-    """Sides that the gaps at NODE alone don't tell: none here."""
+    """Sides that the gaps at NODE don't show: none here."""
 
 
 @inner
@@ -36,7 +36,7 @@ def at_once(i, t, batch):
 
 @inner
 def least_state(i, batch):
-    """The size that every state has at least for the control of errors."""
+    """The least size of every state for the control of errors."""
     return batch.options[i, ATOL] / batch.options[i, RTOL]
 
 
@@ -48,7 +48,7 @@ def longest_step(t_leg, t_end):
 
 @inner
 def length_asked(i, t, t_stop, t_leg, t_end, batch):
-    """What a step begins with: (its length, the shortest that it may become, whether it ends at
+    """The first try of a step: (its length, the shortest that it may become, True if it ends at
     t_stop).
     """
     shortest = 16.0 * ulp(t)
@@ -60,7 +60,7 @@ def length_asked(i, t, t_stop, t_leg, t_end, batch):
 @inner
 def find_contact(i, t, t_new, t_leg, h, batch, work):
     """The first contact of a step: (its time, or the step's end; end and length of the step that it
-    lies in; whether there is one; RUNNING). A state that rebounds does so just before the boundary.
+    lies in; True if there is one; RUNNING). A state that rebounds does so just before the boundary.
     """
     gaps_at(t_new, NEXT, Q_STAGE, AT_NEXT, work)
     if any_sign_change(work, AT_NODE, AT_NEXT):
@@ -73,8 +73,8 @@ def find_contact(i, t, t_new, t_leg, h, batch, work):
 
 @kernel
 def rebounds(i, t_hit, t, h, batch, work):
-    """Whether the state leaves a boundary that it has reached to the side from which it came: at a
-    stop, or where a jump turns it about.
+    """True if the state leaves a boundary that it has reached to the side from which it came: at a
+    stop, or where a jump reverses it.
     """
     for g in range(NGUARDS):
         if strikes(work, g):

@@ -1,5 +1,5 @@
 """Template: ode15s, numerical differentiation formulas of orders 1 to 5 with backward differences,
-in steps that keep their length for a while, with the Jacobian of the equation.
+in steps of constant length for a while, with the Jacobian of the equation.
 
 Shampine & Reichelt, The MATLAB ODE Suite, SIAM J. Sci. Comput. 18 (1997) 1-22: formulas of order k
 are BDF with kappa_k of the difference of order k + 1 added, solved by simplified Newton iterations.
@@ -29,7 +29,7 @@ STEP_ORDER, STEP_LENGTH, INVERSE, CHANGE, PRODUCT = 8, 9, 10, 11, 47
 
 @inner
 def row(j):
-    """Where a row of the method starts; rows 1 to 7 are the differences."""
+    """Index of a row of the method; rows 1 to 7 are the differences."""
     return K1 + NSTATES * j
 
 
@@ -71,7 +71,7 @@ def factorise(length, k, work):
 
 @kernel
 def solve(work):
-    """DELTA becomes the solution of the system with DELTA at its right."""
+    """Solve the system with DELTA as its right-hand side, into DELTA."""
     lu, x = M + NSTATES * NSTATES, row(DELTA)
     for p in range(NSTATES):
         best = int(work[row(PIVOT) + p])
@@ -87,7 +87,9 @@ def solve(work):
 
 @inner
 def norm_of(at, other, sign_of_other, work):
-    """Max norm on the scale of the step of a row, with another added or not; NaN if any is NaN."""
+    """Max norm of a row on the scale of the step, with another row added or not; NaN if any entry
+    is NaN.
+    """
     norm = 0.0
     for j in range(NSTATES):
         ratio = abs((work[at + j] + sign_of_other * work[other + j]) / work[row(SCALE) + j])
@@ -99,7 +101,7 @@ def norm_of(at, other, sign_of_other, work):
 # -- length and order ------------------------------------------------------------------------------
 @kernel
 def begin_leg(i, t, t_end, batch, work):
-    """Order 1, and a first length from the second derivative, from NODE and K1."""
+    """Begin a leg: order 1, and a first length from the second derivative, from NODE and K1."""
     rtol, theta = batch.options[i, RTOL], batch.options[i, ATOL] / batch.options[i, RTOL]
     for j in range(NUMBERS_OF_METHOD):
         work[S + j] = 0.0
@@ -132,7 +134,7 @@ def begin_leg(i, t, t_end, batch, work):
 
 @kernel
 def change_length(share, k, work):
-    """The differences for a length `share` times the one before."""
+    """Rescale the differences to a length `share` times the one before."""
     for j in range(1, k + 1):
         total = 1.0
         for i in range(1, k + 1):
@@ -188,7 +190,7 @@ def choose(i, length, k, err, rtol, batch, work):
 # -- one step --------------------------------------------------------------------------------------
 @kernel
 def predict(k, theta, work):
-    """The state that the differences go on to, to START and NEXT, its scale, and psi; d = 0."""
+    """Extrapolate the differences to START and NEXT, with scale and psi; d = 0."""
     for j in range(NSTATES):
         total, known = 0.0, 0.0
         for n in range(1, k + 1):
@@ -202,7 +204,9 @@ def predict(k, theta, work):
 
 @kernel
 def converges(t_new, rtol, work):
-    """Simplified Newton iterations for d, and the state with it in NEXT; whether they end soon."""
+    """Simplified Newton iterations for d, and the state with it in NEXT; True if they converge
+    soon.
+    """
     least = 100.0 * EPSILON * norm_of(NEXT, REST, 0.0, work)
     before = 0.0
     for iteration in range(1, MOST_ITERATIONS + 1):
@@ -255,7 +259,7 @@ def shorter(length, err, k, first, rtol, work):
 
 @kernel
 def step(i, t, t_stop, t_leg, t_end, batch, work):
-    """One accepted step: (t_new, h, whether it is fine, rejections). It isn't if no step is short
+    """One accepted step: (t_new, h, True if it succeeded, rejections). It fails if no step is short
     enough, for the iteration or for the error.
     """
     rtol, theta = batch.options[i, RTOL], batch.options[i, ATOL] / batch.options[i, RTOL]

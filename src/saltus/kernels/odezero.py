@@ -15,7 +15,7 @@ LEFT, RIGHT, TRY in `work` (steps_layout.py): the gaps at these three. Only the 
 gaps matter, so halved values do no harm.
 """
 
-# Ends of the bracket that moved last.
+# The end of the bracket that moved last.
 NEITHER, MOVED_LEFT, MOVED_RIGHT = range(3)
 #: Width of the last bracket [ulp of the time].
 RESOLUTION = 128.0
@@ -23,7 +23,7 @@ RESOLUTION = 128.0
 
 @kernel
 def odezero(t, t_new, t_leg, h, work):
-    """The first contact of a step: (a time just before it, its time, whether it ends the leg),
+    """The first contact of a step: (a time just before it, its time, True if it ends the leg),
     times in s.
 
     Needs the gaps at t and t_new at AT_NODE and AT_NEXT. Afterwards LEFT and RIGHT bracket the
@@ -35,7 +35,7 @@ def odezero(t, t_new, t_leg, h, work):
     t_left, t_right = narrow(t, t, t_new, h, work)
     if LAWS:
         while t_left == t_leg and t_right < t_new and not any_strikes(work):
-            # MATLAB looks no further: the state would fall through a stop
+            # MATLAB stops here: the state would fall through a stop
             for g in range(NGUARDS):
                 work[LEFT + g] = work[RIGHT + g]
             if not any_sign_change(work, LEFT, AT_NEXT):
@@ -47,7 +47,7 @@ def odezero(t, t_new, t_leg, h, work):
 
 @inner
 def narrow(t, t_left, t_new, h, work):
-    """The bracket of the first contact between t_left, whose gaps stand in LEFT, and the end of the
+    """The bracket of the first contact between t_left, whose gaps are in LEFT, and the end of the
     step.
     """
     tol = min(RESOLUTION * max(ulp(t), ulp(t_new)), abs(t_new - t))
@@ -75,7 +75,7 @@ def narrow(t, t_left, t_new, h, work):
 
 @inner
 def any_strikes(work):
-    """Whether the state jumps at one of the gaps that close."""
+    """True if the state jumps at one of the gaps that close."""
     found = False
     for g in range(NGUARDS):
         found |= strikes(work, g)
@@ -103,8 +103,8 @@ def propose(t, t_left, t_right, t_try, tol, work):
 
 @inner
 def proposal(t_left, t_right, t_try, width, left, right, tried):
-    """Where one gap wants to be tried, as a fraction of the bracket; a gap that is zero at an end
-    is extrapolated from the end given up.
+    """The next try for one gap, as a fraction of the bracket; a gap that is zero at an end is
+    extrapolated from the end given up.
     """
     if left == 0.0:
         if not (t_try > t_right and tried != right):
@@ -121,14 +121,14 @@ def proposal(t_left, t_right, t_try, width, left, right, tried):
 
 @inner
 def give_up(work, row):
-    """The place tried becomes an end of the bracket; the end it replaces is remembered as tried."""
+    """Make the place tried an end of the bracket; the end it replaces is remembered as tried."""
     for g in range(NGUARDS):
         work[row + g], work[TRY + g] = work[TRY + g], work[row + g]
 
 
 @inner
 def halve(work, row):
-    """The Illinois rule, where it doesn't lose the sign."""
+    """Apply the Illinois rule, unless it loses the sign."""
     for g in range(NGUARDS):
         if abs(0.5 * work[row + g]) >= SMALLEST:
             work[row + g] *= 0.5
@@ -136,7 +136,7 @@ def halve(work, row):
 
 @inner
 def try_place(place, t, h, work):
-    """Gaps at a place inside the step, to TRY."""
+    """Write the gaps at a time inside the step to TRY."""
     dense(place, t, h, work)
     if GAPS_IN_TIME:
         drive_at(place, Q, work)

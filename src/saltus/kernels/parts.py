@@ -1,4 +1,4 @@
-"""Parts of a work array: stretches whose place the compiler knows, so that it keeps their values in
+"""Parts of a work array whose offset the compiler knows, so that it keeps their values in
 registers.
 
 A slice checks its ends against the length of the array at run time; after that no compiler can tell

@@ -12,7 +12,7 @@ from saltus.kernels.lanes import spacing
 from saltus.kernels.parts import part
 from saltus.kernels.status import IMPACT_LAW, JUMP_LAW
 
-#: As a mode: the right-hand side picks its sides from the state that it is given.
+#: As a mode: the right-hand side takes its sides from the given state.
 FROM_STATE = -1
 SMALLEST = 2.2250738585072014e-308
 
@@ -33,7 +33,7 @@ def rate_at(time, state, q, mode, out, work):
 
 @inner
 def gaps_at(time, state, q, out, work):
-    """All gaps, to `out`. A state that lies on a stop hasn't passed it."""
+    """All gaps, to `out`. A state at a stop hasn't passed it."""
     c, h = part(work, C, NCONST), part(work, H, HELD * NCLOCKS)
     gaps(time, part(work, state, NSTATES), c, part(work, q, NDRIVE), h, part(work, out, NGUARDS))
     if LAWS:
@@ -62,7 +62,7 @@ def sides(at, work):
 
 @inner
 def allowed(bits):
-    """Mode bits with those of stops on the side that these allow, whatever rounding says."""
+    """Mode bits with those of stops set to the allowed side, whatever rounding says."""
     if LAWS:
         for g in range(NGUARDS):
             if LAW[g] == IMPACT_LAW:
@@ -72,19 +72,19 @@ def allowed(bits):
 
 @inner
 def leaps(g):
-    """Whether the state jumps at the boundary of a guard."""
+    """True if the state jumps at the boundary of a guard."""
     return LAW[g] == IMPACT_LAW or LAW[g] == JUMP_LAW
 
 
 @inner
 def waits(g, mode):
-    """Whether it does when the gap closes from the side that it has in a mode."""
+    """True if it jumps when the gap closes from the side that it has in a mode."""
     return leaps(g) and (mode >> g & 1 == 1) == (LAW_SIDE[g] > 0.0)
 
 
 @inner
 def strikes(work, g):
-    """Whether the gap closes, from LEFT to RIGHT, and the state jumps."""
+    """True if the gap closes, from LEFT to RIGHT, and the state jumps."""
     return leaps(g) and changes_sign(work, LEFT, RIGHT, g) and work[LEFT + g] * LAW_SIDE[g] > 0.0
 
 
@@ -103,13 +103,13 @@ def sign(x):
 
 @inner
 def changes_sign(work, one, other, g):
-    """Whether gap g has another sign at `other` than at `one`; zero is a sign of its own."""
+    """True if gap g has another sign at `other` than at `one`; zero is a sign of its own."""
     return sign(work[one + g]) != sign(work[other + g])
 
 
 @inner
 def any_sign_change(work, one, other):
-    """Whether any gap has another sign at `other` than at `one`."""
+    """True if any gap has another sign at `other` than at `one`."""
     changes = False
     for g in range(NGUARDS):
         changes |= changes_sign(work, one, other, g)

@@ -1,5 +1,5 @@
 """Template: one step of an explicit Runge-Kutta method, its error estimate and its dense output,
-from the tables that the head supplies (codegen/tableaux.py).
+from the tables of the head (codegen/tableaux.py).
 
 The last stage is the rate at the end of the step, the first one of the next step. Sums are taken
 from left to right and a stage is y + h*(sum), as MATLAB does it since it keeps each stage in a
@@ -18,7 +18,7 @@ AbsTol/RelTol.
 
 @inner
 def toward(stage, h, out, work):
-    """The state that a stage is evaluated at, to `out`."""
+    """The state at which a stage is evaluated, to `out`."""
     for i in range(NSTATES):
         slope = WEIGHT[stage * STAGES] * work[K1 + i]
         for j in range(1, stage):
@@ -30,8 +30,8 @@ def toward(stage, h, out, work):
 
 @inner
 def stages(t, length, t_new, mode, work):
-    """The stages of a step of the length asked for, and its end at t_new, to NEXT; returns h =
-    t_new - t, which rounding sets apart from length.
+    """The stages of a step of the given length, and its end at t_new, to NEXT; returns h = t_new -
+    t, which differs from length by rounding.
     """
     time = t
     for stage in range(1, STAGES - 1):

@@ -1,5 +1,5 @@
 """Status codes of a trajectory and kinds of contact: numbers in kernels, words in results, a
-sentence each for people.
+sentence each for users.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ CONTACT_KIND = {
 }  # fmt: skip
 
 # Laws of contact of a guard: none, a two-valued force that may hold the contact, an impact, a jump
-# of the state; or the guard says whether another one's contact is held.
+# of the state; a hold guard says that another one's contact is held.
 NO_LAW, SURFACE_LAW, IMPACT_LAW, JUMP_LAW, HOLD_LAW = range(5)
 #: Number of each kind of law.
 LAW_KINDS = {"surface": SURFACE_LAW, "impact": IMPACT_LAW, "jump": JUMP_LAW, "hold": HOLD_LAW}
@@ -137,5 +137,5 @@ MINIMA = ("smallest_contact_speed", "smallest_gap_margin")
 REC_PHASE, REC_VELOCITY, REC_TIME_ERROR = range(3)
 RECORD_INTEGERS, RECORD_FLOATS = 8, 3
 
-# What a call of a kernel returns.
+# Return values of a kernel call.
 FINISHED, PAUSED = 0, 1

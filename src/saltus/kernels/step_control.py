@@ -19,8 +19,8 @@ POWER, TINY, LEAST_SHRINK = range(3)
 
 @inner
 def step(i, t, t_stop, t_leg, t_end, batch, work):
-    """One accepted step: (t_new, h, whether it is fine, rejections). It isn't if not err <= rtol:
-    NaN, or no step is short enough.
+    """One accepted step: (t_new, h, True if it succeeded, rejections). It fails unless err <= rtol:
+    for NaN, or if no step is short enough.
     """
     rtol, theta = batch.options[i, RTOL], batch.options[i, ATOL] / batch.options[i, RTOL]
     length, shortest, last = length_asked(i, t, t_stop, t_leg, t_end, batch)

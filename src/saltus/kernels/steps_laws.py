@@ -1,5 +1,5 @@
 """Template: contacts at which the state jumps - impacts, jumps - of the methods that run one
-trajectory after the other. trajectory.py calls it where a step has landed on a contact.
+trajectory after the other. trajectory.py calls it after a step has landed on a contact.
 
 A contact that is held isn't followed, so impacts that accumulate end the trajectory: when flights
 have become too short, or too low, to be told from nothing. docs/decisions/0041.
@@ -20,18 +20,18 @@ from saltus.kernels.status import (
     SURFACE_LAW,
 )
 
-#: Flights in a row that are too short to be told, after which impacts count as accumulating.
+#: Successive flights too short to be resolved, after which impacts count as accumulating.
 MOST_AT_ONCE = 20
 ROUNDING = 2.220446049250313e-16
-#: Height of a flight, in units of the rounding of its gap, below which rounding decides how it
-#: goes; four times that, since speed times duration is four times the height.
+#: Four times the height of a flight below which rounding decides it, in units of the rounding of
+#: its gap. Speed times duration is four times the height.
 FLAT = 64.0
 
 
 @kernel
 def before_strikes(i, t_hit, t_leg, h, batch, work):
-    """What must be known of a contact before the state jumps: by how much it is late if it isn't
-    located, and whether flights have become too short.
+    """Prepare a jump of the state: the lateness of a contact that isn't located, and the count of
+    flights that are too short.
     """
     if batch.options[i, LOCATE] == 0.0:
         for g in range(NGUARDS):
@@ -59,7 +59,7 @@ def count_at_once(i, t_hit, t_leg, batch, work):
 
 @kernel
 def gap_roundings(i, t_hit, out, batch, work):
-    """How far the rounding of the state in NEXT moves each gap, to `out`."""
+    """Change of each gap by the rounding of the state in NEXT, to `out`."""
     for j in range(NSTATES):
         work[BEHIND + j] = ROUNDING * max(abs(work[NEXT + j]), least_state(i, batch))
     gap_changes(t_hit, out, work)
@@ -67,8 +67,8 @@ def gap_roundings(i, t_hit, out, batch, work):
 
 @kernel
 def strike_all(i, t_hit, batch, work):
-    """The jumps of the state in NEXT: of the gaps that close at t_hit, and of those beyond whose
-    boundaries another one has carried it. Needs q at t_hit in Q.
+    """Apply the jumps of the state in NEXT: those of the gaps that close at t_hit, and those of
+    boundaries over which another jump has carried it. Needs q at t_hit in Q.
     """
     have_an_order(i, t_hit, standing(i, t_hit, batch, work), NEXT, batch, work)
     struck = 0
@@ -86,8 +86,8 @@ def strike_all(i, t_hit, batch, work):
 
 @kernel
 def standing(i, t_hit, batch, work):
-    """Bits of the stops at which the state in NEXT is: it lies beyond them, or neither rounding nor
-    the time within which contacts can't be told apart tells it from them.
+    """Bits of the stops at which the state in NEXT is: beyond them, or indistinguishable from them
+    by rounding or by the resolution of contact times.
     """
     gap_roundings(i, t_hit, BEFORE, batch, work)
     gaps_at(t_hit, NEXT, Q, AT_NEXT, work)
@@ -102,8 +102,8 @@ def standing(i, t_hit, batch, work):
 
 @kernel
 def have_an_order(i, time, stops, state, batch, work):
-    """End the trajectory where impacts of one instant have no order, or an impossible one. Needs q
-    in Q.
+    """End the trajectory if impacts of one instant have no order, or an impossible one. Needs q in
+    Q.
     """
     if stops & (stops - 1) == 0:
         return
@@ -118,15 +118,15 @@ def have_an_order(i, time, stops, state, batch, work):
 
 @inner
 def carried_past(i, g, time, batch, work):
-    """Whether the jump before has carried the state over a boundary where it jumps again."""
+    """True if the jump before has carried the state over a boundary at which it jumps again."""
     beyond = work[AT_NEXT + g] * LAW_SIDE[g] < -told_from_zero(g, time, work)
     return waits(g, batch.mode[i]) and beyond and not changes_sign(work, LEFT, RIGHT, g)
 
 
 @kernel
 def strike(i, g, t_hit, told, batch, work):
-    """The state in NEXT jumps by the law of guard g, if it closes: an impact, `told` to the table
-    or not. The gaps behind stand in AT_NEXT.
+    """Apply the law of guard g to the state in NEXT, if it closes: an impact, recorded if `told`.
+    The gaps after it are in AT_NEXT.
     """
     before = batch.mode[i]
     after = leap(i, g, t_hit, NEXT, batch, work)
@@ -155,7 +155,7 @@ def strike(i, g, t_hit, told, batch, work):
 
 @inner
 def reset_at(i, g, time, state, before, after, batch, work):
-    """The law of guard g, to a state; restitution and closing velocity to TOLD."""
+    """Apply the law of guard g to a state; restitution and closing velocity go to TOLD."""
     p, h = batch.param[i * batch.stride], part(work, H, HELD * NCLOCKS)
     reset(time, part(work, state, NSTATES), p, h, before, after, g, part(work, TOLD, 2))
 
@@ -184,8 +184,8 @@ def leap(i, g, time, state, batch, work):
 
 @inner
 def stays(g, time, work):
-    """Whether the state in POINT, after the jump of guard g, is on the side of its boundary that it
-    came from. On the boundary itself the rate of the gap decides.
+    """True if the state in POINT, after the jump of guard g, is on the side from which it came. On
+    the boundary itself the rate of the gap decides.
     """
     decides = work[RATE_BEHIND + g] if lies_on(g, time, work) else work[AT_NEXT + g]
     return decides * LAW_SIDE[g] > 0.0
@@ -193,14 +193,14 @@ def stays(g, time, work):
 
 @inner
 def lies_on(g, time, work):
-    """Whether a jump leaves the state on its own boundary."""
+    """True if a jump leaves the state on its own boundary."""
     return abs(work[AT_NEXT + g]) <= 2.0 * abs(work[BEFORE + g]) + told_from_zero(g, time, work)
 
 
 @inner
 def told_from_zero(g, time, work):
-    """How large a gap is after a jump at least if it isn't zero: what its rounding and that of the
-    time make, and landing a little beside the boundary.
+    """Least size of a gap after a jump that isn't zero: beyond its rounding, that of the time, and
+    the distance of the landing from the boundary.
     """
     change, late = work[AT_NEXT + g] - work[BEFORE + g], 128.0 * ulp(time) + 2.0 * work[LATE]
     return late * abs(work[RATE_BEHIND + g]) + 8.0 * ROUNDING * abs(change)
@@ -220,7 +220,9 @@ def face(i, at, batch, work):
 
 @kernel
 def strike_at_start(i, t, t_end, batch, work):
-    """Impacts of a state that starts on a stop: initial conditions, which no table tells."""
+    """Apply the impacts of a state that starts on a stop: initial conditions, which no table
+    records.
+    """
     struck, stops = False, 0
     for g in range(NGUARDS):
         work[LEFT + g], work[RIGHT + g] = 0.0, 0.0
@@ -241,8 +243,8 @@ def strike_at_start(i, t, t_end, batch, work):
 
 @kernel
 def is_held(i, t_hit, batch, work):
-    """Whether both sides push onto a surface that the state in NEXT has just reached: it would have
-    to stay there, and a method without that mode would go to and fro. Needs q at t_hit in Q.
+    """True if both sides push onto a surface that the state in NEXT has just reached. It would have
+    to stay there, and a method without that mode would oscillate. Needs q at t_hit in Q.
     """
     held = False
     for g in range(NGUARDS):
@@ -259,8 +261,8 @@ def is_held(i, t_hit, batch, work):
 
 @kernel
 def lies_there(i, g, t_hit, batch, work):
-    """Whether the state in NEXT lies on boundary g. A boundary that another one moves as its side
-    changes is crossed without having been reached.
+    """True if the state in NEXT lies on boundary g. A boundary that moves as another one changes
+    sides is crossed without having been reached.
     """
     gap_roundings(i, t_hit, TRY, batch, work)
     gaps_at(t_hit, NEXT, Q, AT_NEXT, work)
@@ -272,7 +274,7 @@ def lies_there(i, g, t_hit, batch, work):
 
 @kernel
 def goes_past(i, t, batch, work):
-    """Whether a step whose contacts are not located ends where the state jumps: beyond a stop and
+    """True if a step without located contacts ends where the state jumps: beyond a stop and
     closing, or where the condition of a jump has become true. LEFT and RIGHT differ in sign there.
     """
     gaps_at(t, NEXT, Q_STAGE, AT_NEXT, work)

@@ -1,4 +1,4 @@
-"""Template: what the work array of the methods holds that run one trajectory after the other.
+"""Template: layout of the work array of the methods that run one trajectory after the other.
 codegen puts a generated head before it; it needs the sizes of that head only.
 """
 
@@ -23,8 +23,8 @@ AT_NODE, AT_NEXT, LEFT, RIGHT, TRY, RATE, RATE_AT_REST, BEFORE, RATE_BEHIND = (
 # q at the time of a stage, last at the end of the step, and at any other; c.
 Q_STAGE, Q = (VECTORS * NSTATES + GAPS * NGUARDS + NDRIVE * row for row in range(DRIVES))
 C = VECTORS * NSTATES + GAPS * NGUARDS + DRIVES * NDRIVE
-# What the clocks hold, and their numbers; the NUMBERS_OF_METHOD; MATRICES of states by states; what
-# a law of contact says of its impact; the time [s] by which it was landed on beside its boundary.
+# Data of the clocks, and their numbers; the NUMBERS_OF_METHOD; MATRICES of states by states; the
+# impact data of a law of contact; the time [s] between its boundary and the landing.
 H = C + NCONST
 N = H + HELD * NCLOCKS
 S = N + (NUMBERS + 1) * NCLOCKS
@@ -34,16 +34,16 @@ LATE = TOLD + 2
 WORK = LATE + 1
 
 
-# Columns of `carry`, what a paused trajectory needs besides its state: time, start of the leg, next
-# step length, contacts met in one instant, the error estimates of all steps so far, added up for
-# each state; of a method that looks back (MULTISTEP is 1, not 0) its rows, numbers and matrices.
+# Columns of `carry`, the data of a paused trajectory besides its state: time, start of the leg,
+# next step length, contacts at one instant, the error estimates of all steps so far, summed for
+# each state; of a multistep method (MULTISTEP is 1, not 0) its rows, numbers and matrices.
 TIME, LEG, LENGTH, AT_ONCE, ERRORS = range(5)
 PAST = ERRORS + NSTATES
 CARRY = PAST + MULTISTEP * (ROWS * NSTATES + NUMBERS_OF_METHOD + MATRICES * NSTATES * NSTATES)
-#: Records that one step may write at most: an impact may carry the state over every other boundary.
+#: Most records of one step: an impact may carry the state over every other boundary.
 STEP_RECORDS = NGUARDS * (NGUARDS if LAWS else 1)
 
 
 def workspace():
-    """The memory that one call of `propagate` works in; one for each thread."""
+    """The work array of one call of `propagate`; one for each thread."""
     return (np.zeros(WORK),)

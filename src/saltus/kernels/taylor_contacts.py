@@ -1,5 +1,5 @@
-"""Template, 5 of 8 of the Taylor flow: contacts of one lane - settling what the quadratic bound
-could not, landing, recording. The first crossing of a step is found before, by `locate` in
+"""Template, 5 of 8 of the Taylor flow: contacts of one lane - the slow path after the quadratic
+bound, landing, recording. The first crossing of a step is found before, by `locate` in
 taylor_crossings.
 """
 
@@ -83,8 +83,8 @@ def gap_rate(lanes, lane, g, d):
 
 @kernel
 def first_place(lanes, lane, g, h, slow, count):
-    """Time into the step at which gap g crosses first, beyond h if it doesn't; and the touches now
-    on the list.
+    """Time into the step at which gap g crosses first, beyond h if it doesn't; and the number of
+    touches on the list.
     """
     if LAWS and lanes.side[WATCHED + g, lane] < 0.5:
         return 2.0 * h, count
@@ -96,9 +96,9 @@ def first_place(lanes, lane, g, h, slow, count):
     sign = leading_sign(slow.q, ORDER)
     if fresh and is_rounding(slow.q, ORDER, noise):
         sign = 0
-    elif lanes.fresh[g, lane] == RIDDEN:  # nothing leaves it by rounding
+    elif lanes.fresh[g, lane] == RIDDEN:  # rounding doesn't leave it
         sign = side_of_leaving(slow.q, ORDER, True, noise)
-    elif not fresh and sign < 0 and slow.q[0] > -noise:  # it may have turned about at the node
+    elif not fresh and sign < 0 and slow.q[0] > -noise:  # it may have reversed at the node
         sign = 1 if side_of_leaving(slow.q, ORDER, False, noise) > 0 else -1
     if sign == 0:
         lanes.memo[lane, RESTS] |= 1 << g  # it is ridden
@@ -130,7 +130,7 @@ def first_place(lanes, lane, g, h, slow, count):
 
 @inner
 def allowed_beside(lanes, lane, g):
-    """How far rounding may carry a lane off a boundary that it keeps to."""
+    """Distance by which rounding may carry a lane off a boundary that it keeps to."""
     return KEPT * (lanes.work[SCALE_ROW + g, lane] + lanes.prior[PRIOR_ROWS * g + OLD, lane])
 
 
@@ -156,7 +156,7 @@ def decide(lanes, lane, batch, slow):
     lanes.found[DELTA, lane] = first
     lanes.memo[lane, HITS] = hits
     note_touches(lanes, lane, batch, slow, first, count)
-    # a gap may have turned behind the crossing, where it won't come to
+    # a gap may have turned after the crossing, which it won't reach
     if first < h and lanes.run[LEAST, lane] < least:
         lanes.run[LEAST, lane] = least
         for g in range(NGUARDS if first > 0.0 else 0):
@@ -165,7 +165,7 @@ def decide(lanes, lane, batch, slow):
 
 @kernel
 def is_broken(lanes, lane, h, slow):
-    """Whether a state at the end of the step, or a term of a gap, isn't a number."""
+    """True if a state at the end of the step, or a term of a gap, isn't a number."""
     state_at(lanes, lane, h, slow.state)
     total = 0.0
     for i in range(NSTATES):
@@ -204,8 +204,8 @@ def note_touches(lanes, lane, batch, slow, first, count):
 
 @kernel
 def touches_exactly(lanes, lane, g, d, slow):
-    """Whether a gap is zero at d with not one operation rounded: else a zero is luck, and the touch
-    unresolved.
+    """True if a gap is zero at d and no operation rounded: otherwise a zero is chance, and the
+    touch unresolved.
     """
     if SNAP_STATE[g] >= 0:
         x, place = lanes.work[GUARD_ROW[g], lane], lanes.c[SNAP_CONST[g], lane]
@@ -221,8 +221,8 @@ def touches_exactly(lanes, lane, g, d, slow):
 
 @kernel
 def touch_error(lanes, lane, g, d, slow):
-    """Error of the time of a touch: how far around it the gap stays within its rounding error, up
-    to the ends of the step.
+    """Error of the time of a touch: the time around it in which the gap stays within its rounding
+    error, up to the ends of the step.
     """
     h = lanes.run[STEP, lane]
     noise = 2.0 * scaled_gap(lanes, lane, g, h, slow)
@@ -243,7 +243,7 @@ def touch_error(lanes, lane, g, d, slow):
 @kernel
 def note_touch(lanes, lane, batch, slow, g, d, start):
     """Count and record one tangency at time d into the step that began at phase `start`: exact, or
-    within the gap's rounding error. Friction that fades out with its contact's force is none.
+    within the gap's rounding error. Friction that vanishes with its contact's force is none.
     """
     support = SUPPORT[PARTNER[g]] if LAW[g] == HOLD_LAW else -1
     if support >= 0 and (lanes.memo[lane, HITS] >> support) & 1:
@@ -268,8 +268,8 @@ def note_touch(lanes, lane, batch, slow, g, d, start):
 # -- gaps at a node, clocks ------------------------------------------------------------------------
 @kernel
 def follow_clocks(lanes, lane, batch, slow, known):
-    """Bring the clocks of a lane to their pieces at its phase, from those that it holds if they are
-    known; sets its next break.
+    """Bring the clocks of a lane to their pieces at its phase, starting from its present pieces if
+    they are known; set its next break.
     """
     if NCLOCKS > 0:
         who, count, base = lanes.memo[lane, WHO], lanes.memo[lane, COUNT], lanes.clock[BASE, lane]
@@ -298,7 +298,9 @@ def follow_clocks(lanes, lane, batch, slow, known):
 
 @inner
 def show_clocks(lanes, lane, slow):
-    """What the clocks of a lane hold to slow.held, for code that reads the time as one number."""
+    """Write the data of a lane's clocks to slow.held, for code that reads the time as one
+    number.
+    """
     if NCLOCKS > 0:
         for row in range(HELD * NCLOCKS):
             slow.held[row] = lanes.clock[CLOCK_ROW + row, lane]
@@ -308,7 +310,7 @@ def show_clocks(lanes, lane, slow):
 
 @inner
 def stands_at(lanes, lane, g, slow):
-    """Whether a lane is known to stand on a boundary whose gap is in slow.gaps: what that is then
+    """True if a lane is known to be on a boundary whose gap is in slow.gaps: the gap's sign then
     says nothing of the side.
     """
     near = TOLD * ROUNDING * lanes.prior[PRIOR_ROWS * g + NEW, lane]
@@ -317,8 +319,8 @@ def stands_at(lanes, lane, g, slow):
 
 @kernel
 def gaps_here(lanes, lane, batch, slow):
-    """All gaps at the node where a lane stands, to slow.gaps; of contacts that can be held also
-    what `gaps` writes behind them, in the mode of the lane where it stands on a boundary.
+    """All gaps at the node of a lane, to slow.gaps; for contacts that can be held also the entries
+    that `gaps` writes after them, in the mode of the lane if it is on a boundary.
     """
     for i in range(NSTATES):
         slow.state[i] = lanes.y[i, lane]
@@ -337,7 +339,7 @@ def gaps_here(lanes, lane, batch, slow):
 
 @kernel
 def look_at_gaps(lanes, lane, batch, slow):
-    """What `gaps` says of the state in slow.state, with the sides in slow.gaps."""
+    """Write the result of `gaps` for slow.state, with the sides in slow.gaps."""
     show_clocks(lanes, lane, slow)
     parameters = batch.param[lanes.memo[lane, WHO] * batch.stride]
     gaps(
@@ -353,7 +355,7 @@ def look_at_gaps(lanes, lane, batch, slow):
 
 @inner
 def is_past(lanes, lane, g, slow):
-    """Whether a gap in slow.gaps is on the wrong side of its boundary, by more than the rounding of
+    """True if a gap in slow.gaps is on the wrong side of its boundary, by more than the rounding of
     the terms of the step before.
     """
     if LAWS and lanes.side[WATCHED + g, lane] < 0.5:
@@ -401,7 +403,7 @@ def mode_of(lanes, lane):
 
 @kernel
 def state_at(lanes, lane, d, out):
-    """States of a lane at time d into the step that its jets belong to."""
+    """States of a lane at time d into the step of its jets."""
     for i in range(NSTATES):
         value = lanes.work[i * (ORDER + 1) + ORDER, lane]
         for k in range(ORDER - 1, -1, -1):
@@ -411,7 +413,7 @@ def state_at(lanes, lane, d, out):
 
 @inner
 def recorded(lanes, lane, batch):
-    """Whether the contacts of this period are kept."""
+    """True if the contacts of this period are kept."""
     return (
         batch.rec_i.shape[0] > 0
         and lanes.memo[lane, COUNT] >= batch.rec_first[lanes.memo[lane, WHO]]
@@ -464,8 +466,9 @@ def snap(lanes, lane, g):
 
 @inner
 def land(lanes, lane, batch, g, rate, slow):
-    """One contact: snap the state to the boundary, change the side, make the guard fresh, count and
-    record. A boundary on which the state stood is left because it came to another.
+    """Land one contact: snap the state to the boundary, change the side, make the guard fresh,
+    count and record. A boundary on which the state stood is left because the state came to another
+    one.
     """
     before, crossed = mode_of(lanes, lane), g
     stood = lanes.found[DELTA, lane] == 0.0 and lanes.fresh[g, lane] > 0.5
@@ -477,7 +480,7 @@ def land(lanes, lane, batch, g, rate, slow):
 
 @inner
 def is_shallow(lanes, lane, g, rate):
-    """Whether a crossing at this rate goes no deeper than the rounding error of the gap: depth =
+    """True if a crossing at this rate goes no deeper than the rounding error of the gap: depth =
     rate^2 / (2 curvature).
     """
     j, h = BOUNDS * GUARD_SERIES[g], lanes.run[STEP, lane]
@@ -490,7 +493,7 @@ def is_shallow(lanes, lane, g, rate):
 
 @inner
 def jump_over(lanes, lane, batch, g, rate, slow):
-    """One contact that the boundary made: it jumped over the state, when that crossed another
+    """Land one contact of a moving boundary: it jumped over the state, when that crossed another
     boundary or at a break (-1).
     """
     cause = int(lanes.run[CAUSE, lane])
@@ -499,8 +502,8 @@ def jump_over(lanes, lane, batch, g, rate, slow):
 
 @inner
 def change_side(lanes, lane, batch, g, rate, before, crossed, slow):
-    """The state is on the other side of a guard, for it crossed that boundary or another: change
-    its bit, count and record.
+    """Change the side of a guard, after the state crossed its boundary or another one; count and
+    record.
     """
     who = lanes.memo[lane, WHO]
     velocity = rate * lanes.side[g, lane]
@@ -548,8 +551,8 @@ def change_side(lanes, lane, batch, g, rate, before, crossed, slow):
 
 @kernel
 def saltate(lanes, lane, batch, g, before, slow):
-    """The jump of the tangent that the states carry, at a crossing of the boundary of guard g out
-    of mode `before`.
+    """Apply the jump of the tangent that the states carry, at a crossing of the boundary of guard g
+    out of mode `before`.
     """
     for i in range(NSTATES):
         slow.state[i] = lanes.y[i, lane]
@@ -570,7 +573,7 @@ def saltate(lanes, lane, batch, g, before, slow):
 
 @inner
 def note_arrival(lanes, lane):
-    """Whether time has passed since the last landing (or the start); counts the landings at one
+    """True if time has passed since the last landing (or the start); counts the landings at one
     instant.
     """
     now = lanes.clock[TAU, lane] + lanes.clock[BASE, lane]
@@ -585,7 +588,7 @@ def note_arrival(lanes, lane):
 
 @inner
 def land_all(lanes, lane, batch, hits, slow):
-    """Every contact at the end of this step, together. Returns the status.
+    """Land every contact at the end of this step, together. Returns the status.
 
     A gap may hold sides of other guards, or clocks, and jump when they change: the state is then
     past that boundary without having met it.
@@ -596,7 +599,7 @@ def land_all(lanes, lane, batch, hits, slow):
         hits = strike_together(lanes, lane, batch, hits, slow)
     for g in range(NGUARDS):
         if (hits >> g) & 1:
-            # Newton's slope is right to some 1e-9
+            # Newton's slope is accurate to about 1e-9
             exactly = lanes.memo[lane, DECIDED] == 1 or batch.rec_i.shape[0] > 0
             rate = gap_rate(lanes, lane, g, d) if exactly else lanes.found[RATE, lane]
             past = -lanes.side[g, lane] * lanes.work[GAP_ROW + g, lane]

@@ -1,4 +1,4 @@
-"""Template, 3 of 8 of the Taylor flow: where gaps close within a step, in all lanes at once.
+"""Template, 3 of 8 of the Taylor flow: crossings of gaps within a step, in all lanes at once.
 
 `locate` bounds the series, classifies each gap and chooses the first crossing. What is proven to
 cross is refined by Newton's method. What stays open is tried on a shorter step (`settle_sooner`),
@@ -25,8 +25,8 @@ from saltus.kernels.lanes import (
 
 @inner
 def bound_series(lanes, h):
-    """For every series that a gap reads: its first three terms at h, its change over h, its slope
-    there, a bound of what follows its cubic.
+    """Bound every series that a gap reads: its first three terms at h, its change over h, its slope
+    there, a bound of the terms after its cubic.
 
     Fills `bounds`: for x in [0, 1], gap(x h) = gap(0) + t1 x + t2 x^2 + t3 x^3 + rest(x), |rest| <=
     x^4 W/12, |rest'| <= W/3, |rest''| <= W with W = sum of k(k-1)|t_k| for k >= 4 (k(k-1) >= 3k >=
@@ -88,9 +88,9 @@ def without_known_root(on_boundary, a0, a1, a2, a3):
 
 @inner
 def locate(lanes, h):
-    """Find the lanes whose gaps may close within h. Fills NEAREST and TURNED, and WHICH and what
-    `found` holds of that gap for those with a first crossing that is proven; returns those
-    undecided.
+    """Find the lanes whose gaps may close within h. Fills NEAREST and TURNED; for lanes with a
+    proven first crossing also WHICH and the entries of `found` for that gap. Returns the undecided
+    lanes.
     """
     bound_series(lanes, h)
     store(lanes.found, NEAREST, splat(math.inf, LANES))
@@ -107,8 +107,8 @@ def locate(lanes, h):
 
 @inner
 def one_way(p1, p2, p3, rest):
-    """Where a gap p0 + p1 x + p2 x^2 + p3 x^3 + rest falls, rises, is concave, is convex on all of
-    [0, 1]; see `bound_series`.
+    """Masks of lanes in which a gap p0 + p1 x + p2 x^2 + p3 x^3 + rest falls, rises, is concave, is
+    convex on all of [0, 1]; see `bound_series`.
     """
     bend = 2.0 * p2
     falls = p1 + larger(bend + larger(3.0 * p3, 0.0), 0.0) + (1.0 / 3.0) * rest < 0.0
@@ -120,8 +120,8 @@ def one_way(p1, p2, p3, rest):
 
 @inner
 def classify(lanes, g, h):
-    """Tell where a gap is clear over the step, and where it crosses: `choose` then. Returns where
-    neither is proven.
+    """Classify a gap in all lanes: clear over the step, or crossing (`choose` then). Returns the
+    lanes in which neither is proven.
 
     A gap P (P/x where the root at 0 is known) is p0 + p1 x + p2 x^2 + p3 x^3 + rest on [0, 1]. If
     it is monotone or concave its end decides; if it is convex it crosses once where it ends below
@@ -146,13 +146,13 @@ def classify(lanes, g, h):
     store(lanes.prior, PRIOR_ROWS * g + OLD, inherited)
     noise = ROUNDING * (size + inherited)
     turns = (p1 < 0.0) & (p1 + 2.0 * p2 > 0.0)
-    flat_at = -p1 / (2.0 * p2)  # where the quadratic part turns
+    flat_at = -p1 / (2.0 * p2)  # the vertex of the quadratic part
     vertex = p0 + 0.5 * p1 * flat_at
     least = select(turns, vertex, smaller(p0, p0 + p1 + p2)) + smaller(p3, 0.0) - (1.0 / 6.0) * rest
     falls, rises, concave, convex = one_way(p1, p2, p3, rest)
     dips = convex & turns & (6.0 * (vertex + larger(p3, 0.0) + noise) + rest < 0.0)
     inside, asked = p0 > 0.0, load(lanes.run, ACTIVE, LANES) > 0.5
-    if LAWS:  # what is ridden, or has more known zeros than one, is left to the slow path
+    if LAWS:  # ridden boundaries, and those with more known zeros than one, go to the slow path
         asked = asked & (load(lanes.side, WATCHED + g, LANES) > 0.5)
         inside = inside & (load(lanes.fresh, g, LANES) < RIDDEN)
     clear = inside & (((falls | rises | concave) & (end > noise)) | (least > noise))
@@ -205,8 +205,8 @@ def classify(lanes, g, h):
 
 @kernel
 def with_more_terms(lanes, g, h, p0, p1, p2, p3, place, end, noise):
-    """Where a gap is clear over the step, crosses once, crosses twice, by its terms to the seventh;
-    and a bound of it from below.
+    """Masks of lanes in which a gap is clear over the step, crosses once, crosses twice, by its
+    terms to the seventh; and a lower bound of it.
 
     A polynomial lies between its coefficients in Bernstein's form. Those of the second derivative,
     summed up, are those of the rate, and of the gap. A convex gap lies above its tangents: above
@@ -257,7 +257,7 @@ def with_more_terms(lanes, g, h, p0, p1, p2, p3, place, end, noise):
     x = larger(smaller(x - rate_to_seventh(x, p1, p2, p3, p4, p5, p6, p7) / bend, 1.0), 0.0)
     rate = rate_to_seventh(x, p1, p2, p3, p4, p5, p6, p7)
     value = fma(fma(fma(fma(fma(fma(fma(p7, x, p6), x, p5), x, p4), x, p3), x, p2), x, p1), x, p0)
-    doubt = fma(1.0 / 56.0, rest, 4.0 * noise)  # of sums as long as these
+    doubt = fma(1.0 / 56.0, rest, 4.0 * noise)  # for sums of this length
     least = select(convex, larger(value - larger(rate * x, rate * (x - 1.0)), least), least) - doubt
     clear = ((falls | rises | concave) & (end > noise)) | (least > 0.0)
     once = (end < -noise) & (falls | concave | convex)
@@ -292,8 +292,8 @@ def rate_to_seventh(x, p1, p2, p3, p4, p5, p6, p7):
 
 @kernel
 def note_turn(lanes, g, near, rises_again, d, h):
-    """Where gaps turn near d, and may come nearer to the boundary than ever before: how near, and
-    when, to NEAREST and TURNED.
+    """Write the nearest approach and the time of gaps that turn near d, if nearer than before, to
+    NEAREST and TURNED.
 
     One that rises at the end of the step turns for certain; of others Newton's method tells.
     """
@@ -319,7 +319,7 @@ def note_turn(lanes, g, near, rises_again, d, h):
 
 @inner
 def crosses_sooner(on_boundary, p0, p1, p2, p3, rest, noise):
-    """Share of the step, just behind the crossing that the quadratic part predicts, within which a
+    """Share of the step, just beyond the crossing that the quadratic part predicts, within which a
     gap is proven to cross once; or 0.
     """
     share = smaller(BEHIND * first_root(p0, p1, p2), 1.0)
@@ -333,7 +333,7 @@ def crosses_sooner(on_boundary, p0, p1, p2, p3, rest, noise):
 
 @inner
 def first_root(p0, p1, p2):
-    """Where p0 + p1 x + p2 x^2, positive at 0, is zero first; infinite if it isn't."""
+    """First zero of p0 + p1 x + p2 x^2, which is positive at 0; infinite if there is none."""
     discriminant = p1 * p1 - 4.0 * p0 * p2
     x = 2.0 * p0 / (root(larger(discriminant, 0.0)) - p1)
     return select((discriminant >= 0.0) & (x > 0.0), x, math.inf)
@@ -341,8 +341,8 @@ def first_root(p0, p1, p2):
 
 @inner
 def predicted(p0, p1, p2, p3):
-    """About where a gap is zero first: where its quadratic part is, then one step of Newton's
-    method on its cubic part.
+    """Approximate first zero of a gap: that of its quadratic part, then one step of Newton's method
+    on its cubic part.
     """
     x = 2.0 * p0 / (root(larger(p1 * p1 - 4.0 * p0 * p2, 0.0)) - p1)
     return x - fma(fma(fma(p3, x, p2), x, p1), x, p0) / fma(fma(3.0 * p3, x, 2.0 * p2), x, p1)
@@ -350,8 +350,8 @@ def predicted(p0, p1, p2, p3):
 
 @inner
 def choose(lanes, g, crosses, until, p0, p1, p2, p3, noise):
-    """Make guard g the one that a lane crosses, where it is the first or is predicted to be;
-    returns the lanes that stay undecided.
+    """Let a lane cross guard g, if it is the first or is predicted to be; returns the lanes that
+    stay undecided.
 
     Gaps of one state, on the same side of it, differ by a constant: the nearer closes first. Of
     others `refine_crossings` proves which is the first, if each of its rivals crosses once.
@@ -402,13 +402,13 @@ def choose(lanes, g, crosses, until, p0, p1, p2, p3, noise):
 
 @inner
 def keep(rows, row, wanted, value):
-    """Write a value to a row in the lanes wanted."""
+    """Write a value to a row in the wanted lanes."""
     store(rows, row, select(wanted, value, load(rows, row, LANES)))
 
 
 @inner
 def gather_series(lanes):
-    """Write to `poly` the series whose gap each lane crosses; the first term isn't needed."""
+    """Write the series of the gap that each lane crosses to `poly`; the first term isn't needed."""
     series = load(lanes.found, SERIES, LANES)
     for j in range(NSERIES):
         wanted = magnitude(series - SERIES_ROW[j]) < 0.5
@@ -427,8 +427,8 @@ def gather_series(lanes):
 
 @inner
 def newton(terms, base, found, h, wanted):
-    """The root of P, or of P(d)/d where the root at 0 is known, in (0, h) in the lanes wanted; its
-    derivative there; and where it is found.
+    """The root of P, or of P(d)/d if the root at 0 is known, in (0, h) in the wanted lanes; its
+    derivative there; and the lanes in which it is found.
 
     P = P(0) + s (X(d) - X(0)) with the series X at `base`: guards of one series share its terms.
     Started from the root of the quadratic part; the first two steps use only the leading terms. A
@@ -504,8 +504,8 @@ def newton_step(terms, base, x, s, depth, fresh, degree):
 
 @inner
 def refine_crossings(lanes, h, undecided):
-    """Newton's method in the lanes whose first crossing is proven or predicted; what isn't found,
-    or isn't the first, joins the undecided.
+    """Apply Newton's method in the lanes whose first crossing is proven or predicted. Lanes without
+    a root, or with an earlier one, join the undecided.
 
     A rival crosses once. Where it is still above zero a thousandth of the step behind the crossing,
     it crosses later, and is no one event with it.
@@ -548,8 +548,8 @@ def gap_at(lanes, g, d):
 
 @kernel
 def settle_sooner(lanes, undecided):
-    """Try one shorter step in lanes whose gaps are undecided; what that doesn't settle keeps its
-    length. Refines, and returns what is open.
+    """Try one shorter step in lanes with undecided gaps; lanes that it doesn't settle keep their
+    length. Refines, and returns the open lanes.
 
     A step that meets several contacts ends at the first; what its series say of the rest is thrown
     away. docs/decisions/0023.
@@ -575,8 +575,7 @@ def locate_again(lanes, h):
 
 @inner
 def share_to_first_crossing(lanes, h):
-    """Share of the step that ends just behind the first crossing which the leading terms predict,
-    and in front of the second.
+    """Share of the step that ends just after the predicted first crossing, and before the second.
 
     1 where a shorter step would prove nothing, or could tell less: a gap that turns about at zero
     before that (a graze is judged on the longest step), two crossings that may be one event, a gap

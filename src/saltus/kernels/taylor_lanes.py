@@ -66,7 +66,7 @@ def set_due(lanes, lane, batch):
 
 @inner
 def set_period(lanes, lane, batch, slow):
-    """Everything of a lane that depends on its period count: time base, phases of harmonics,
+    """Set all numbers of a lane that depend on its period count: time base, phases of harmonics,
     clocks, end of the stretch, next sample.
     """
     who, count = lanes.memo[lane, WHO], lanes.memo[lane, COUNT]
@@ -89,8 +89,8 @@ def set_period(lanes, lane, batch, slow):
 
 @kernel
 def final_contacts(lanes, lane, batch, slow):
-    """A gap that is exactly zero, or past zero by rounding, at the very end is an event there,
-    reported once; or a graze if it turns.
+    """Report a gap that is exactly zero, or past zero by rounding, at the very end: once as an
+    event there, or as a graze if it turns.
     """
     gaps_here(lanes, lane, batch, slow)
     d, met, past = lanes.found[DELTA, lane], 0, 0
@@ -146,7 +146,7 @@ def end_stretch(lanes, lane, batch, slow):
 
 @inner
 def overflowed(lanes, lane):
-    """Whether the step left the range of numbers; the lane then keeps the state and the time at the
+    """True if the step left the range of numbers; the lane then keeps the state and the time at the
     start of the step.
     """
     bad = lanes.memo[lane, BROKEN] == 1
@@ -162,7 +162,7 @@ def overflowed(lanes, lane):
 
 @inner
 def is_slow(lanes, lane, batch):
-    """Whether the trajectory has gained less than it must since its pace was looked at last."""
+    """True if the trajectory has gained less than it must since the last check of its pace."""
     if lanes.run[TAKEN, lane] <= lanes.run[LIMIT, lane]:
         return False
     behind = periods_behind(lanes, lane, batch)
@@ -183,7 +183,7 @@ def periods_behind(lanes, lane, batch):
 
 @inner
 def ride(lanes, lane):
-    """Keep the boundaries known to which a lane has kept in this step: it rides them."""
+    """Mark the boundaries to which a lane has kept in this step as known: it rides them."""
     if lanes.memo[lane, DECIDED] == 0:
         lanes.memo[lane, RESTS] = 0
     for g in range(NGUARDS):
@@ -203,7 +203,7 @@ def crossing_guards(lanes, lane):
 
 @inner
 def attend(lanes, lane, batch, slow):
-    """Everything that happened to one lane in this step. Returns its status."""
+    """Attend to all events of one lane in this step. Returns its status."""
     start = lanes.run[START, lane]
     if overflowed(lanes, lane):
         return RUNNING if LAWS and gives_way(lanes, lane, batch, slow) else NONFINITE
@@ -233,8 +233,8 @@ def attend(lanes, lane, batch, slow):
 # -- filling and emptying lanes --------------------------------------------------------------------
 @kernel
 def start_sides(lanes, lane, batch, slow):
-    """Sides of all guards from the state; on a boundary the guard is fresh and its side is settled
-    by the first step. No contact is held yet; a stop is on the side that it allows.
+    """Sides of all guards from the state; on a boundary the guard is fresh and the first step
+    settles its side. No contact is held yet; a stop is on its allowed side.
     """
     for g in range(NGUARDS):
         lanes.side[g, lane], lanes.fresh[g, lane] = -1.0, 0.0
@@ -368,9 +368,7 @@ def empty(lanes, lane, batch, status):
 
 @kernel
 def refill(lanes, lane, cursor, batch, slow):
-    """Give an idle lane the next trajectory that wants to run; returns where to look for the one
-    after it.
-    """
+    """Give an idle lane the next trajectory that wants to run; returns the next place to search."""
     while cursor < batch.status.shape[0]:
         if batch.status[cursor] == RUNNING:
             if (
@@ -397,7 +395,7 @@ def propagate(
     lane_probe_y, lane_probe_clock, lane_probe_rate, lane_memo, slow_q, slow_b, slow_bounds,
     slow_rates, slow_out, slow_gaps, slow_state, slow_touches, slow_held, slow_numbers,
 ):  # fmt: skip
-    """Move every trajectory whose status is RUNNING to its end, `budget` steps of the lanes at
+    """Move every trajectory whose status is RUNNING to its end, in `budget` steps of the lanes at
     most. See flow/engine.py for the arrays.
     """
     batch = Batch(

@@ -37,8 +37,8 @@ def watch(lanes, lane):
 
 @inner
 def base_of_law(lanes, lane, batch):
-    """Start of the period as laws read the time: of a motion whose forcing repeats to the bit, that
-    of its first period, which is right to rounding after any number of them.
+    """Start of the period as laws read the time. If the forcing repeats to the bit it is that of
+    the first period, which is accurate to rounding after any number of periods.
     """
     if NCLOCKS == 0 and lanes.memo[lane, DRIFTS] == 0:
         return batch.origin[lanes.memo[lane, WHO]]
@@ -47,14 +47,14 @@ def base_of_law(lanes, lane, batch):
 
 @inner
 def time_of_law(lanes, lane, batch):
-    """The time as laws read it."""
+    """The time as laws read it, see `base_of_law`."""
     return lanes.clock[TAU, lane] + base_of_law(lanes, lane, batch)
 
 
 # -- contacts by their laws ------------------------------------------------------------------------
 @kernel
 def meet(lanes, lane, batch, g, rate, slow):
-    """One contact by the law of its guard; returns whether that law has dealt with it."""
+    """Apply the law of a guard to a contact; return True if it applies."""
     if LAW[g] == HOLD_LAW:
         release(lanes, lane, batch, g, slow)
         return True
@@ -68,8 +68,8 @@ def meet(lanes, lane, batch, g, rate, slow):
 
 @kernel
 def note(lanes, lane, batch, g, kind, direction, velocity, before, later, slow):
-    """Count and record what a law did to the state in slow.state, `later` than now by some seconds;
-    at the start of a run it is an initial condition, and no event.
+    """Count and record the effect of a law on the state in slow.state, `later` seconds after now.
+    At the start of a run it is an initial condition, and no event.
     """
     if lanes.run[STARTING, lane] > 0.5:
         who = lanes.memo[lane, WHO]
@@ -101,7 +101,7 @@ def note(lanes, lane, batch, g, kind, direction, velocity, before, later, slow):
 
 @inner
 def carried_over(lanes, lane, g):
-    """Whether another jump has put the state beyond a boundary, so that it isn't on it."""
+    """True if another jump has put the state beyond a boundary, so that it isn't on it."""
     near = TOLD * ROUNDING * lanes.prior[PRIOR_ROWS * g + NEW, lane]
     at_once = lanes.found[DELTA, lane] == 0.0 and lanes.fresh[g, lane] < 0.5
     return at_once and abs(lanes.work[GAP_ROW + g, lane]) > near
@@ -109,8 +109,8 @@ def carried_over(lanes, lane, g):
 
 @kernel
 def strike(lanes, lane, batch, g, rate, slow):
-    """The state jumps at a boundary that it may not pass. Rebounds too small to be followed end at
-    rest.
+    """Apply a jump of the state at a boundary that it may not pass. Rebounds too small to be
+    followed end at rest.
     """
     who, mode = lanes.memo[lane, WHO], mode_of(lanes, lane)
     if LAW[g] == IMPACT_LAW or not carried_over(lanes, lane, g):
@@ -159,7 +159,7 @@ def strike(lanes, lane, batch, g, rate, slow):
 
 @kernel
 def mode_behind(lanes, lane, batch, struck, slow):
-    """The mode where a jump has put the state: it may have carried it over other boundaries."""
+    """The mode after a jump, which may have carried the state over other boundaries."""
     mode, others = mode_of(lanes, lane), False
     for g in range(NGUARDS):
         others = others or (g != struck and (LAW[g] == NO_LAW or LAW[g] == SURFACE_LAW))
@@ -187,8 +187,8 @@ def turn_over(lanes, lane, batch, mode, slow):
 
 @kernel
 def face(lanes, lane, batch, g, slow):
-    """Where the state stands on surfaces and on a stop, let the surfaces face the way in which it
-    would leave the stop: their force then presses onto it. The gaps stand in slow.gaps after it.
+    """Orient the surfaces on which the state is, if it is also at a stop, by the way in which it
+    would leave the stop: their force then presses onto it. The gaps are in slow.gaps afterwards.
     """
     gaps_here(lanes, lane, batch, slow)
     for m in range(NGUARDS):
@@ -204,8 +204,9 @@ def face(lanes, lane, batch, g, slow):
 
 @kernel
 def loosen(lanes, lane, batch, struck, closing, slow):
-    """Let go of the contacts that are held and that feel the blow of another: their surfaces slide
-    then, their stops are struck or left. A stop that had nothing to leave it closes or opens now.
+    """Release the held contacts that feel the impact of another: their surfaces slide then, their
+    stops are struck or left. A free stop whose gap and rate were known to be zero closes or opens
+    now.
     """
     mode, others = mode_of(lanes, lane), False
     for g in range(NGUARDS):
@@ -235,8 +236,8 @@ def loosen(lanes, lane, batch, struck, closing, slow):
 
 @inner
 def too_short(lanes, lane, g, restitution):
-    """Duration of a chatter [s] below which it is completed: what is left of it changes the
-    acceleration by less than 1e-8, so the time at which it ends is right to rounding.
+    """Duration of a chatter [s] below which it is completed: the remainder changes the acceleration
+    by less than 1e-8, so the time of its end is accurate to rounding.
 
     The acceleration's own time scale is read from the series of the flight that has just ended.
     """
@@ -254,7 +255,7 @@ def too_short(lanes, lane, g, restitution):
 
 @inner
 def after_jump(lanes, lane, batch, g, slow):
-    """The side of a guard behind whose boundary the state has jumped."""
+    """Set the side of a guard beyond whose boundary the state has jumped."""
     gaps_here(lanes, lane, batch, slow)
     lanes.fresh[g, lane] = 0.0
     near = TOLD * ROUNDING * lanes.prior[PRIOR_ROWS * g + NEW, lane]
@@ -269,8 +270,8 @@ def after_jump(lanes, lane, batch, g, slow):
 # -- contacts that are held ------------------------------------------------------------------------
 @kernel
 def caught(lanes, lane, batch, g, slow):
-    """Whether both sides push onto the surface that a lane has reached, so that it is held there:
-    the force needed is within its limit.
+    """True if both sides push onto the surface that a lane has reached, so that it is held there:
+    the needed force is within its limit.
     """
     gap = lanes.work[GAP_ROW + g, lane]
     if lanes.found[DELTA, lane] == 0.0 and lanes.fresh[g, lane] < 0.5 and gap != 0.0:
@@ -288,7 +289,7 @@ def caught(lanes, lane, batch, g, slow):
 
 @inner
 def holds_any(lanes, lane):
-    """Whether a contact of a lane is held."""
+    """True if a contact of a lane is held."""
     held = False
     for g in range(NGUARDS):
         held = held or (LAW[g] == HOLD_LAW and lanes.side[g, lane] > 0.0)
@@ -297,9 +298,8 @@ def holds_any(lanes, lane):
 
 @kernel
 def gives_way(lanes, lane, batch, slow):
-    """Let go of the surfaces that are held where nothing holds them any more, because the state
-    came to another boundary: the equations reduced by them are no numbers. Returns whether there is
-    one.
+    """Release the held surfaces that lose their hold because the state came to another boundary:
+    the equations reduced by them are no numbers. True if there is one.
     """
     if lanes.memo[lane, BROKEN] == 0 or not holds_any(lanes, lane):
         return False
@@ -318,7 +318,7 @@ def gives_way(lanes, lane, batch, slow):
 
 @kernel
 def strays(lanes, lane, batch, slow):
-    """Whether a contact that is held isn't on its boundary: its equations are wrong then."""
+    """True if a held contact isn't on its boundary: its equations are wrong then."""
     if not holds_any(lanes, lane):
         return False
     gaps_here(lanes, lane, batch, slow)
@@ -332,8 +332,8 @@ def strays(lanes, lane, batch, slow):
 
 @kernel
 def hold(lanes, lane, batch, g, later, slow):
-    """A contact begins to be held: state and tangent go onto its constraint, `later` [s] at most
-    than now.
+    """Begin to hold a contact: state and tangent go onto its constraint, at most `later` [s] after
+    now.
     """
     who, before, h = lanes.memo[lane, WHO], mode_of(lanes, lane), PARTNER[g]
     lanes.side[h, lane], lanes.fresh[h, lane] = 1.0, 0.0
@@ -361,7 +361,7 @@ def hold(lanes, lane, batch, g, later, slow):
 # -- friction of contacts --------------------------------------------------------------------------
 @kernel
 def rub(lanes, lane, batch, h, slow):
-    """The way in which a contact slides as it begins to be held; where it doesn't slide, the first
+    """Direction in which a contact slides as it begins to be held; if it doesn't slide, the first
     step finds out whether it sticks.
     """
     for m in range(NGUARDS):
@@ -375,8 +375,9 @@ def rub(lanes, lane, batch, h, slow):
 
 @kernel
 def ask_for_paradox(lanes, lane, g, slow):
-    """Name the paradox of Painleve of a contact that begins to rest or leaves at once: sliding,
-    friction leaves nothing of what its force does. One that may stick will. Needs slow.gaps.
+    """Report the paradox of Painleve of a contact that begins to rest or leaves at once: while it
+    slides, friction cancels the effect of its force. A contact that may stick will. Needs
+    slow.gaps.
     """
     paradox = slow.gaps[2 * NGUARDS + g] <= 0.0
     for m in range(NGUARDS):
@@ -389,7 +390,7 @@ def ask_for_paradox(lanes, lane, g, slow):
 
 @inner
 def pushes_on(lanes, lane, batch, now, slow):
-    """Whether a force of friction, or a coefficient of one that acts, is negative in slow.state."""
+    """True if a force of friction, or a coefficient of one that acts, is negative in slow.state."""
     show_clocks(lanes, lane, slow)
     p = batch.param[lanes.memo[lane, WHO] * batch.stride]
     levels(now, slow.state, p, slow.held, mode_of(lanes, lane), slow.out)
@@ -398,7 +399,7 @@ def pushes_on(lanes, lane, batch, now, slow):
 
 @kernel
 def pushes_on_at(lanes, lane, batch, d, slow):
-    """The same of the state a time d into the step."""
+    """The same test for the state a time d into the step."""
     state_at(lanes, lane, d, slow.state)
     now = lanes.run[START, lane] + d + base_of_law(lanes, lane, batch)
     return pushes_on(lanes, lane, batch, now, slow)
@@ -406,8 +407,8 @@ def pushes_on_at(lanes, lane, batch, d, slow):
 
 @kernel
 def watch_friction(lanes, batch, slow):
-    """End the steps in which a friction becomes negative where it does, for good. Returns the bits
-    of their lanes.
+    """End steps at the times at which a friction becomes negative, and the trajectories with them.
+    Returns the bits of their lanes.
     """
     found = 0
     for lane in range(LANES):
@@ -423,7 +424,9 @@ def watch_friction(lanes, batch, slow):
 
 @kernel
 def turn_back(lanes, lane, batch, before, beyond, slow):
-    """Bring a lane back to where friction becomes negative, between two times into its step."""
+    """Return a lane to the time at which friction becomes negative, between two times into its
+    step.
+    """
     for _ in range(HALVINGS):
         middle = 0.5 * (before + beyond)
         if pushes_on_at(lanes, lane, batch, middle, slow):
@@ -439,7 +442,7 @@ def turn_back(lanes, lane, batch, before, beyond, slow):
 
 @kernel
 def let_go(lanes, lane, batch, h, slow):
-    """A contact is held no longer, so its friction holds nothing either."""
+    """Release the friction of a contact that is held no longer."""
     before = mode_of(lanes, lane)
     for m in range(NGUARDS):
         if SUPPORT[m] == h and lanes.side[PARTNER[m], lane] > 0.0:
@@ -449,8 +452,8 @@ def let_go(lanes, lane, batch, h, slow):
 
 @kernel
 def release(lanes, lane, batch, h, slow):
-    """A contact is held no longer. Where its force fades out, more than the gap is known to be
-    zero; where it jumps, or falls from static to kinetic friction, its rate at most.
+    """Release a held contact. If its force vanishes continuously, more than the gap is known to be
+    zero; if it jumps, or falls from static to kinetic friction, its rate at most.
     """
     before, g = mode_of(lanes, lane), PARTNER[h]
     gaps_here(lanes, lane, batch, slow)

@@ -1,4 +1,4 @@
-"""Template, 1 of 8 of the Taylor flow: what its work arrays hold. codegen puts a generated head
+"""Template, 1 of 8 of the Taylor flow: layout of its work arrays. codegen puts a generated head
 before the templates.
 
 One step of all lanes reads: jets -> step length (taylor_step.py) -> locate contacts
@@ -99,34 +99,33 @@ CARRY = CARRIED + (2 if LAWS else 1) * NGUARDS
 #: Records that one step may write at most: contacts and touches of all lanes, in the step and at
 #: the end of the run.
 STEP_RECORDS = 2 * LANES * ((2 if LAWS else 1) * NGUARDS + MOST_TOUCHES)
-#: Row of `side` from which on the lanes stand in which a guard is watched (0/1).
+#: First of the rows of `side` that hold the lanes in which each guard is watched (0/1).
 WATCHED = NGUARDS + NSINGULAR
-#: Part of a friction force by which the force needed exceeds it where slip begins, below which that
-#: is rounding.
+#: Excess of the needed force over a friction force where slip begins, as a part of it, below
+#: which it is rounding.
 SLOW_START = 1.0e-9
-#: Part of the first closing velocity at which impacts of one instant, each caused by the one
-#: before, have come to an end for good; landings at one instant before the rest of them is taken at
-#: once.
+#: Part of the first closing velocity at which successive impacts of one instant have ended for
+#: good; landings at one instant after which the rest is taken at once.
 CLOSED, MOST_STRIKES = 1.0e-16, 50
-#: Rows of `slow.state` behind the state, where there are laws (see impacts.py).
+#: Rows of `slow.state` after the state, if there are laws (see impacts.py).
 TRIED, AT_FIRST, BY_GUARDS, WAY = (NSTATES * row for row in range(1, 5))
-#: Places in each step at which a force of friction is looked at; halvings that find where it
-#: becomes negative.
+#: Times in each step at which a force of friction is tested; halvings that find where it becomes
+#: negative.
 LOOKS, HALVINGS = 4, 60
-#: Part that friction leaves of what the force of a contact does, at which a contact is given up
-#: rather than released.
+#: Share of a contact's effect left by friction, at which a contact is given up rather than
+#: released.
 PARADOX = 1.0e-9
-#: Part of the time scale of the acceleration that may be left of a chatter when it is completed.
+#: Remainder of a chatter when it is completed, as a part of the time scale of the acceleration.
 CHATTER = 1.0e-8
 #: Times within this many ulp are one event (EVENTS.md, rule 6).
 COINCIDENT = 10.0 * 2.220446049250313e-16
 #: Part of the size of a gap's terms by which rounding may carry the state off a boundary that it
 #: keeps to, in all steps together.
 KEPT = 2.0**-30
-#: What `fresh` says of a boundary that is ridden, where contacts have laws: one zero is known, and
-#: what leaves it leaves it at once.
+#: Value of `fresh` for a ridden boundary, if contacts have laws: one zero is known, and a motion
+#: that leaves it does so at once.
 RIDDEN = 1.25
-#: Side of a guard on whose boundary the state is known to stand, as `gaps` is told of it.
+#: Side of a guard on whose boundary the state is known to be, as `gaps` gets it.
 KNOWN = 2.0
 #: Rounds of flips at one instant before the contact is given up as sliding (EVENTS.md, rule 6).
 MOST_BOUNCES = 100
@@ -135,48 +134,46 @@ HUGE = 1.0e300
 HORNER = min(8, ORDER - 4 - ORDER % 2)
 #: A probed step is at most this share of a period, or of an unforced span (MATLAB's default too).
 LONGEST_SHARE = 0.1
-#: Defect that a sound step may have, in units of the tolerance and of the rounding of the
-#: right-hand side's terms: the derivative of the last terms is some N times their size.
+#: Largest defect of a sound step, in units of the tolerance and of the rounding of the right-hand
+#: side's terms: the derivative of the last terms is about N times their size.
 DEFECT = 1024.0
-#: Halvings of a step that its probes can ask for.
+#: Most halvings of a step by its probes.
 MOST_HALVINGS = 40
 
 # -- steps that prove nothing are shortened (settle_sooner), shares of the longest step --
-#: Such a step goes so much further than the first crossing that is predicted: about the error of
-#: the prediction.
+#: Length of such a step over the predicted first crossing: the margin is about the error of the
+#: prediction.
 BEHIND = 1.1
-#: A crossing later than this isn't aimed at: a step hardly shorter proves hardly more.
+#: Latest crossing aimed at, as a share of the step: a step hardly shorter proves hardly more.
 WORTH_AIMING = 0.9
-#: The share that is tried then. A number of two bits, so that motions with round numbers stay
-#: exact.
+#: The share tried otherwise. A number of two bits keeps motions with round numbers exact.
 SHORTENED = 0.75
-#: Crossings predicted so near to each other may be one event.
+#: Predicted crossings nearer to each other than this may be one event.
 TOGETHER = 2.0**-10
-#: Steps of Newton's method that find where a gap turns, from where its quadratic part does.
+#: Newton steps that find the turning point of a gap, from that of its quadratic part.
 NEWTON_STEPS = 4
-#: Length of the last of them, as a share of the step, at which it has found one.
+#: Length of the last of these steps, as a share of the step, at which it has converged.
 TURN_FOUND = 2.0**-20
-#: A step isn't made shorter than this share of the stretch.
+#: Least step, as a share of the stretch.
 LEAST_SHARE = 2.0**-40
 
 # -- laws without a series on a boundary (taylor_singular.py) --
-#: Effect on a state, relative to it, below which the terms without a series are left out of a
-#: step's series.
+#: Relative effect on a state below which terms without a series are left out of a step.
 NEGLIGIBLE = 2.0**-50
-#: Share of the way to the boundary that other steps may go.
+#: Longest other step, as a share of the way to the boundary.
 REACH = 0.9
-#: All steps behind such a boundary are shorter by this factor, as if the tolerance were 2**-13 of
-#: itself: near the edge of its disc a series converges so slowly that its last terms are a small
-#: part of what follows them (with 2**-8 a Hertz contact takes 1e-15 of the energy away, each time).
+#: Factor on all steps beyond such a boundary, as for a tolerance of 2**-13 of itself: near the edge
+#: of its disc a series converges so slowly that its last terms are a small part of those after them
+#: (with 2**-8 a Hertz contact loses 1e-15 of the energy each time).
 FINER = 2.0 ** (-13.0 / ORDER)
-#: A gap that is so many rounding errors wide can be told from zero.
+#: A gap wider than this many rounding errors can be told from zero.
 TOLD = 64.0
 #: Way to the boundary [s] below which coefficients of the last order could overflow.
 SHORTEST = 2.0 ** (-950.0 / ORDER)
-#: Exponent of time that the search for a negligible step begins with: force d**1.5, and one for its
-#: integral.
+#: Exponent of time with which the search for a negligible step begins: force d**1.5, and one more
+#: for its integral.
 USUAL_POWER = 2.5
-#: Steps that this search tries.
+#: Steps tried in this search.
 MOST_TRIALS = 12
 
 Lanes = namedtuple(
@@ -188,8 +185,8 @@ Slow = namedtuple("Slow", "q b bounds rates out gaps state touches held numbers"
 
 # -- memory ----------------------------------------------------------------------------------------
 def rows_of_lanes(count):
-    """Zeros float64[count, LANES] that begin at a cache line: a row that lies in two
-    costs twice.
+    """Zeros float64[count, LANES] that begin at a cache line: a row in two cache lines costs
+    twice.
     """
     room = np.zeros(count * LANES + 8)
     first = -room.ctypes.data // 8 % 8
@@ -197,7 +194,7 @@ def rows_of_lanes(count):
 
 
 def workspace():
-    """The memory that one call of `propagate` works in; one set for each thread."""
+    """The work arrays of one call of `propagate`; one set for each thread."""
     guards = max(NGUARDS, 1)
     rows = dict(
         y=NSTATES, side=2 * guards + NSINGULAR, fresh=guards, clock=CLOCK_ROWS, c=NCONST, work=ROWS,

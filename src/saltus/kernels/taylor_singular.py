@@ -37,8 +37,8 @@ from saltus.kernels.lanes import (
 
 @inner
 def coefficients(lanes):
-    """Taylor coefficients of all lanes; again while lanes turn out to be so near a boundary that
-    its terms are set aside.
+    """Taylor coefficients of all lanes, computed again while lanes are found so near a boundary
+    that its terms are set aside.
     """
     if NSINGULAR == 0:
         jets(lanes.y, lanes.side, lanes.c, lanes.clock, lanes.work)
@@ -54,8 +54,8 @@ def coefficients(lanes):
 
 @inner
 def way(lanes, g):
-    """Time in which the quadratic part of a gap changes by the gap itself: how far the boundary is
-    away.
+    """Time in which the quadratic part of a gap changes by the gap itself: the distance of the
+    boundary in time.
     """
     gap = larger(load(lanes.side, g, LANES) * load(lanes.work, GAP_ROW + g, LANES), 0.0)
     rate, bend = (
@@ -67,7 +67,7 @@ def way(lanes, g):
 
 @inner
 def acts(lanes, j):
-    """Where the terms of a boundary change a rate, or aren't numbers."""
+    """Lanes in which the terms of a boundary change a rate, or aren't numbers."""
     different = splat(0.0, LANES) > 1.0
     for i in range(NMOVED):
         rate, calm = (
@@ -80,14 +80,14 @@ def acts(lanes, j):
 
 @inner
 def told(lanes, g):
-    """The gap that can be told from zero."""
+    """Least gap that can be told from zero."""
     return TOLD * ROUNDING * load(lanes.work, SCALE_ROW + g, LANES)
 
 
 @inner
 def set_aside(lanes):
-    """Set aside the terms that, from here to their boundary, change no state by more than rounding;
-    returns whether there are any.
+    """Set aside the terms that change no state by more than rounding from here to their boundary;
+    True if there are any.
     """
     found = splat(0.0, LANES) > 1.0
     for j in range(NSINGULAR):
@@ -113,7 +113,7 @@ def set_aside(lanes):
 
 @inner
 def away_from_boundaries(lanes, h, room):
-    """h, shortened: to a share of the way to a boundary whose terms act; where they are set aside,
+    """Shorten h to a share of the way to a boundary whose terms act, or, if they are set aside,
     until leaving them out is negligible.
 
     At most the room, which is no reason to shorten: a share of what is left would never reach the
@@ -132,7 +132,7 @@ def away_from_boundaries(lanes, h, room):
 
 @inner
 def rounding_of_gaps(lanes, i):
-    """Rounding error of rate i by that of the gaps: beside its boundary a gap has few digits."""
+    """Rounding error of rate i by that of the gaps: near its boundary a gap has few digits."""
     total = splat(0.0, LANES)
     if i < NMOVED:
         for j in range(NSINGULAR):
@@ -148,7 +148,7 @@ def rounding_of_gaps(lanes, i):
 
 @inner
 def negligible_step(lanes, h, j, wanted):
-    """About the longest step up to h over which the terms of boundary j may be left out.
+    """Approximate longest step up to h over which the terms of boundary j may be left out.
 
     Not shorter than the gap needs to be told from zero, nor than SHORTEST. By the secant rule on
     the logarithms, in a bracket.
@@ -184,8 +184,8 @@ def negligible_step(lanes, h, j, wanted):
 
 @inner
 def left_out(lanes, h, j):
-    """Change of the states by the terms of boundary j over h, in units of what is negligible;
-    judged where its gap is widest.
+    """Change of the states by the terms of boundary j over h, in units of the negligible change;
+    estimated where its gap is widest.
     """
     g = SINGULAR_GUARD[j]
     s = load(lanes.side, g, LANES) * GUARD_SIGN[g]
@@ -215,7 +215,7 @@ def left_out(lanes, h, j):
 
 @kernel
 def look_with(lanes, d, j):
-    """:func:`look_ahead` with the terms of boundary j back in place."""
+    """Apply :func:`look_ahead` with the terms of boundary j restored."""
     kept = load(lanes.side, NGUARDS + j, LANES)
     store(lanes.side, NGUARDS + j, splat(-1.0, LANES))
     look_ahead(lanes, d)
@@ -260,7 +260,7 @@ def add_what_was_left_out(lanes, d):
 
 @inner
 def integral(lanes, i, d, starts, ends):
-    """Integral over d of what was left out of rate i: as a power of the time since, or until, the
+    """Integral over d of the part left out of rate i: as a power of the time since, or until, the
     boundary; else by Simpson's rule.
     """
     first, middle = (

@@ -1,5 +1,5 @@
-"""Template, 4 of 8 of the Taylor flow: one step of all lanes, as arithmetic on lanes: how long it
-is, how it is taken.
+"""Template, 4 of 8 of the Taylor flow: one step of all lanes, as arithmetic on lanes: its length
+and its execution.
 """
 
 from saltus.kernels.isolation import ROUNDING
@@ -85,7 +85,7 @@ def longest(work, base, value, j, log2_tolerance):
 
 @inner
 def probed(lanes, h, log2_tolerance):
-    """h, halved in each lane until the right-hand side at its middle and end agrees with the
+    """Halve h in each lane until the right-hand side at its middle and end agrees with the
     derivative of the series there.
 
     The last coefficients say nothing of a term that sleeps at the start of the step - a saturated
@@ -105,8 +105,8 @@ def probed(lanes, h, log2_tolerance):
 
 @inner
 def disagrees(lanes, h, share, log2_tolerance):
-    """Where the defect of the series at a share of h, times h, is larger than truncation and
-    rounding explain.
+    """Lanes in which the defect of the series at a share of h, times h, exceeds truncation and
+    rounding.
     """
     work, d = lanes.work, h * share
     look_ahead(lanes, d)
@@ -127,8 +127,8 @@ def disagrees(lanes, h, share, log2_tolerance):
 
 @inner
 def look_ahead(lanes, d):
-    """The right-hand side at the states of the series at d; beside it the derivative of the series,
-    and the size of the terms.
+    """The right-hand side at the states of the series at d, the derivative of the series, and the
+    size of the terms.
     """
     work = lanes.work
     for i in range(NSTATES):
@@ -148,9 +148,7 @@ def look_ahead(lanes, d):
 
 @inner
 def size_of_terms(lanes, g, share):
-    """Size of the terms of a gap over a share of the step: what its rounding error is
-    measured by.
-    """
+    """Size of the terms of a gap over a share of the step, the unit of its rounding error."""
     j = BOUNDS * GUARD_SERIES[g]
     t1, t2 = (
         magnitude(load(lanes.bounds, j + LINEAR, LANES)),
@@ -182,8 +180,8 @@ def state_after(work, base, d):
 
 @inner
 def advance(lanes, room, records):
-    """Evaluate the states at the end of the step, move the clock, land where that is simple;
-    returns the lanes that need attention.
+    """Evaluate the states at the end of the step, move the clock, land simple contacts; return the
+    lanes that need attention.
     """
     work, clock, run = lanes.work, lanes.clock, lanes.run
     d = load(lanes.found, DELTA, LANES)
@@ -233,8 +231,8 @@ def advance(lanes, room, records):
 
 @inner
 def land_simply(lanes, simple, tau):
-    """Land the lanes in which Newton's method found one contact, nothing else happens, and nobody
-    records it: `land_all`, on lanes.
+    """Land the lanes in which Newton's method found one contact, nothing else happens, and no
+    record is kept: `land_all`, on lanes.
     """
     run, found, prior = lanes.run, lanes.found, lanes.prior
     which, rate, h = (
@@ -283,7 +281,7 @@ def land_simply(lanes, simple, tau):
 
 @inner
 def step_all(lanes, batch, slow):
-    """One step of every lane; returns the bit set of lanes that need attention."""
+    """Take one step of every lane; return the bit set of lanes that need attention."""
     coefficients(lanes)
     room = load(lanes.run, END, LANES) - load(lanes.clock, TAU, LANES)
     if NCLOCKS > 0:

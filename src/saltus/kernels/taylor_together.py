@@ -1,5 +1,5 @@
 """Template, 7 of 8 of the Taylor flow: several impacts at one instant, and starts on boundaries
-that say nothing of the way. impacts.py compares their orders.
+that don't decide the motion. impacts.py compares their orders.
 """
 
 from saltus.kernels.status import IMPACT_LAW, INVALID_RESTITUTION, OK, SURFACE_LAW
@@ -7,7 +7,7 @@ from saltus.kernels.status import IMPACT_LAW, INVALID_RESTITUTION, OK, SURFACE_L
 
 @inner
 def stands_on(lanes, lane, g, hits):
-    """Whether the state of a lane is at a stop: it comes there now, hasn't left it, or is held."""
+    """True if the state of a lane is at a stop: it comes there now, hasn't left it, or is held."""
     if LAW[g] != IMPACT_LAW:
         return False
     held = lanes.side[PARTNER[g], lane] > 0.0
@@ -33,7 +33,7 @@ def begin_impacts(lanes, lane, slow):
 
 @inner
 def orders(lanes, lane, batch, stops, slow):
-    """Whether impacts on these stops have one outcome: OK, or what ends the motion."""
+    """Test that impacts on these stops have one outcome: OK, or the status that ends the motion."""
     begin_impacts(lanes, lane, slow)
     p, now = batch.param[lanes.memo[lane, WHO] * batch.stride], time_of_law(lanes, lane, batch)
     mode = mode_of(lanes, lane)
@@ -42,8 +42,8 @@ def orders(lanes, lane, batch, stops, slow):
 
 @kernel
 def end_impacts(lanes, lane, batch, hits, slow):
-    """Take all that is left of impacts which cause each other without end at one instant. Stops
-    that don't close any more are held where they are pressed. Returns whether one closed.
+    """Complete impacts that cause each other without end at one instant. Stops that don't close any
+    more are held where they are pressed. True if one closed.
     """
     begin_impacts(lanes, lane, slow)
     rows, held, told, stops = slow.state, slow.held, slow.out, standing(lanes, lane, hits)
@@ -69,7 +69,7 @@ def end_impacts(lanes, lane, batch, hits, slow):
 
 @inner
 def rest_or_leave(lanes, lane, batch, g, slow):
-    """A stop that neither closes nor opens is held if it is pressed; else its gap and its rate are
+    """Hold a stop that neither closes nor opens, if it is pressed; else its gap and its rate are
     known to be zero.
     """
     face(lanes, lane, batch, g, slow)
@@ -82,7 +82,9 @@ def rest_or_leave(lanes, lane, batch, g, slow):
 
 @kernel
 def strike_together(lanes, lane, batch, hits, slow):
-    """The impacts at the end of a step, one after the other. Returns the guards that are left."""
+    """Apply the impacts at the end of a step, one after the other. Returns the guards that are
+    left.
+    """
     stops = standing(lanes, lane, hits)
     strikes = stops & hits != 0
     if strikes and stops & (stops - 1) != 0:
@@ -99,7 +101,7 @@ def strike_together(lanes, lane, batch, hits, slow):
             if others:
                 gaps_here(lanes, lane, batch, slow)
             if others and slow.gaps[3 * NGUARDS + g] < 0.0:
-                snap(lanes, lane, g)  # another impact has turned it away
+                snap(lanes, lane, g)  # another impact has reversed it
             elif not endless:
                 strike(lanes, lane, batch, g, gap_rate(lanes, lane, g, d), slow)
                 others = True
@@ -108,7 +110,7 @@ def strike_together(lanes, lane, batch, hits, slow):
 
 @kernel
 def begins_uniquely(lanes, lane, batch, slow):
-    """Whether a lane starts on no surface from which both sides lead away."""
+    """True if a lane starts on no surface from which both sides lead away."""
     gaps_here(lanes, lane, batch, slow)
     unique = True
     for g in range(NGUARDS):

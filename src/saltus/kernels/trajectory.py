@@ -1,5 +1,5 @@
-"""Template: one trajectory after the other, by any method that goes from node to node. codegen puts
-a generated head, rates.py and the templates of a method before this text.
+"""Template: one trajectory after the other, by any one-step method. codegen puts a generated head,
+rates.py and the templates of a method before this text.
 
 One step reads: step -> find the contact -> write samples -> land or go on. A method supplies
 
@@ -57,8 +57,8 @@ LOCATE, MAX_STEPS, MAX_EVENTS = range(2, 5)
 # -- sides -----------------------------------------------------------------------------------------
 @inner
 def check_sides(i, batch, work):
-    """After a step without contact: the sides are those of the gaps. A gap that has changed sides
-    unseen is counted.
+    """After a step without contact, take the sides of the gaps. A gap that has changed sides unseen
+    is counted.
     """
     now = allowed(sides(AT_NEXT, work))
     if now != batch.mode[i]:
@@ -96,7 +96,7 @@ def write_sample(i, time, state, batch, work):
 
 @kernel
 def write_samples(i, t, h, t_node, batch, work):
-    """Write the samples that the step has passed on its way from t to t_node, whose state stands in
+    """Write the samples that the step has passed on its way from t to t_node, whose state is in
     NEXT.
     """
     time = due(i, batch)
@@ -146,7 +146,7 @@ def land(i, t, t_hit, t_new, t_leg, h, batch, work):
 
 @kernel
 def gap_errors(i, t_hit, batch, work):
-    """How far the errors of all steps so far have moved each gap at most, to TRY; how errors grow
+    """Largest change of each gap by the errors of all steps so far, to TRY; the growth of errors
     from step to step is left out.
     """
     for j in range(NSTATES):
@@ -156,7 +156,7 @@ def gap_errors(i, t_hit, batch, work):
 
 @kernel
 def gap_changes(time, out, work):
-    """How far changes of the states in NEXT, in BEHIND, move each gap at most, to `out`."""
+    """Largest change of each gap by the changes in BEHIND of the states in NEXT, to `out`."""
     gap_rates_at(time, NEXT, REST, Q, RATE_AT_REST, work)
     for g in range(NGUARDS):
         work[out + g] = 0.0
@@ -170,7 +170,7 @@ def gap_changes(time, out, work):
 
 @inner
 def record_contacts(i, t_hit, batch, work):
-    """Count and record every gap that closes at t_hit and lets the state be; sets the mode."""
+    """Count and record every gap that closes at t_hit without a jump of the state; set the mode."""
     before, after = batch.mode[i], batch.mode[i]
     for g in range(NGUARDS):
         if crosses(work, g):
@@ -189,14 +189,14 @@ def record_contacts(i, t_hit, batch, work):
 
 @inner
 def crosses(work, g):
-    """Whether the gap closes at a contact that lets the state be."""
+    """True if the gap closes at a contact without a jump of the state."""
     return changes_sign(work, LEFT, RIGHT, g) and not (LAWS and strikes(work, g))
 
 
 @inner
 def saltate(i, t_hit, before, after, batch, work):
-    """The jumps of the tangent that the states carry, guard by guard where several
-    cross together.
+    """Apply the jumps of the tangent that the states carry, guard by guard where several cross
+    together.
     """
     mode = before
     for g in range(NGUARDS):
@@ -224,7 +224,7 @@ def note(i, g, t_hit, kind, direction, velocity, before, after, batch, work):
 
 @kernel
 def record(i, g, t_hit, kind, direction, velocity, before, after, batch, work):
-    """Write one contact, if there is a table and it lies in a period that is kept."""
+    """Write one contact, if there is a table and the contact is in a recorded period."""
     period, elapsed = batch.period[i], t_hit - batch.origin[i]
     count = math.floor(elapsed / period)
     if batch.rec_i.shape[0] == 0 or count < batch.rec_first[i]:
@@ -255,7 +255,7 @@ def end_time(i, batch):
 
 @inner
 def go_on(rate, work):
-    """The end of a step becomes the start of the next: NEXT, a rate and AT_NEXT to NODE, K1 and
+    """Make the end of a step the start of the next: NEXT, a rate and AT_NEXT become NODE, K1 and
     AT_NODE.
     """
     for i in range(NSTATES):
@@ -267,8 +267,8 @@ def go_on(rate, work):
 
 @kernel
 def take_up(i, t_end, batch, work):
-    """Load a trajectory, from its start (mode < 0) or from where it was paused: (t, start of the
-    leg, next break).
+    """Load a trajectory, from its start (mode < 0) or from its pause: (t, start of the leg, next
+    break).
     """
     prepare(batch.param[i * batch.stride], part(work, C, NCONST))
     begins = batch.mode[i] < 0
@@ -295,7 +295,7 @@ def take_up(i, t_end, batch, work):
 
 @kernel
 def exchange_past(i, store, batch, work):
-    """What a method that looks back knows, to `carry` or from it."""
+    """Exchange the memory of a multistep method with `carry`."""
     for j in range(MULTISTEP * ROWS * NSTATES):
         if store:
             batch.carry[i, PAST + j] = work[K1 + j]
@@ -311,8 +311,8 @@ def exchange_past(i, store, batch, work):
 
 @kernel
 def follow_clocks(i, t, known, batch, work):
-    """Bring the clocks to their pieces at a time, from those that they hold if these are known;
-    returns the next break.
+    """Bring the clocks to their pieces at a time, from their present pieces if these are known;
+    return the next break.
     """
     if NCLOCKS == 0:
         return math.inf
@@ -323,8 +323,8 @@ def follow_clocks(i, t, known, batch, work):
 
 @kernel
 def start_leg(i, t, t_end, look, batch, work):
-    """Start afresh where the equations change, or begin: rates, gaps and, if they are to be looked
-    at, sides at NODE.
+    """Start afresh where the equations change, or begin: rates, gaps and, if wanted, sides at
+    NODE.
     """
     drive_at(t, Q, work)
     gaps_at(t, NODE, Q, AT_NODE, work)
@@ -357,7 +357,7 @@ def put_back(i, t, t_leg, status, batch, work):
 
 @kernel
 def pushes_on(i, t, batch, work):
-    """Whether a force of friction is negative at NODE."""
+    """True if a force of friction is negative at NODE."""
     mode = batch.mode[i]
     if batch.options[i, LOCATE] == 0.0:
         drive_at(t, Q, work)
@@ -386,7 +386,7 @@ def status_at(i, t, t_end, batch, work):
 
 @inner
 def has_room(batch):
-    """Whether the contacts of one more step fit in the table."""
+    """True if the contacts of one more step fit in the table."""
     return batch.rec_i.shape[0] == 0 or batch.rec_used[0] + STEP_RECORDS <= batch.rec_i.shape[0]
 
 
@@ -446,8 +446,8 @@ def propagate(
     end_phase, counters, minima, sample_count, sample_fraction, cursor, samples, sample_mode,
     rec_first, rec_i, rec_f, rec_used, options, data, budget, work,
 ):  # fmt: skip
-    """Move every trajectory whose status is RUNNING to its end, `budget` tries of a step at most.
-    See kernels/batch.py for the arrays.
+    """Move every trajectory whose status is RUNNING to its end, in `budget` tries of a step at
+    most. See kernels/batch.py for the arrays.
     """
     batch = Batch(
         period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count,

@@ -23,8 +23,8 @@ from saltus.kernels.marks import inner, kernel
 HALF_PI_1, HALF_PI_2, HALF_PI_3 = 1.5707963267948966, 6.123233995736766e-17, -1.4973849048591833e-33
 #: 2 pi as the sum of two doubles.
 TWO_PI_1, TWO_PI_2 = 6.283185307179586, 2.4492935982947064e-16
-#: Beyond this |angle| the number of quarter turns times HALF_PI_3 matters: the C library takes
-#: over.
+#: |angle| above which the number of quarter turns times HALF_PI_3 matters; the C library is used
+#: then.
 LARGEST_ANGLE = 1.0e7
 
 _S = (

@@ -1,5 +1,5 @@
-"""The language of equations: expressions, the functions that an equation may call, and what can be
-told of an expression without a system.
+"""The language of equations: expressions, the functions that an equation may call, and properties
+of an expression that need no system.
 
 >>> from saltus.language import sin
 >>> from saltus.language.derivatives import differentiate
@@ -8,7 +8,7 @@ told of an expression without a system.
 cos(w*x)*w
 """
 
-# Imported for the answers that they hand in: see expression.answers.
+# Imported because they register their answers: see expression.answers.
 from saltus.language import foreign, text  # noqa: F401
 from saltus.language.clocks import mod
 from saltus.language.compositions import (

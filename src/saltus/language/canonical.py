@@ -1,4 +1,4 @@
-"""A normal form of expressions, only to find out whether two of them are the same boundary.
+"""A normal form of expressions, used only to find out whether two of them are the same boundary.
 
 An expression is expanded to a sum of monomials over atoms (states, parameters, functions of normal
 forms), with rational coefficients. Nothing that is computed with a normal form reaches a
@@ -13,7 +13,7 @@ from typing import Any
 from saltus.language.expression import Expr, walk
 from saltus.language.roots import with_root
 
-#: A monomial: atoms, by number, with their exponents.
+#: A monomial: numbers of atoms with their exponents.
 Monomial = frozenset[tuple[int, int]]
 #: A sum of monomials with non-zero coefficients.
 Polynomial = dict[Monomial, Fraction]
@@ -21,7 +21,7 @@ Polynomial = dict[Monomial, Fraction]
 ONE: Monomial = frozenset()
 _MOST_TERMS = 200  # beyond this an expanded product stays one atom
 _MOST_POWER = 12
-# two ratios of coefficients that differ by less are equal: 0.1*x > g/10 is x > g
+# ratios of coefficients that differ by less are equal: 0.1*x > g/10 is x > g
 _SAME = Fraction(1, 10**14)
 
 
@@ -40,8 +40,8 @@ class Canonical:
         return self._memo[root]
 
     def kinds(self, polynomial: Polynomial) -> frozenset[str]:
-        """What the value depends on: ``state``, ``time``, ``param``, ``select``. A condition counts
-        as ``select`` only.
+        """Kinds of leaves that the value depends on: ``state``, ``time``, ``param``, ``select``. A
+        condition counts as ``select`` only.
         """
         return frozenset().union(
             *(self._kinds[atom] for monomial in polynomial for atom, _ in monomial)
@@ -163,18 +163,18 @@ def proportion(a: Polynomial, b: Polynomial) -> int:
 
 
 def is_multiple(a: Polynomial, b: Polynomial) -> bool:
-    """Whether ``a = m b`` with a monomial m: a gap times, or over, quantities that it
-    doesn't hold.
+    """True if ``a = m b`` with a monomial m: a gap times, or over, quantities that it doesn't
+    hold.
     """
     if len(a) != len(b) or not a:
         return False
-    own = {atom for monomial in b for atom, _ in monomial}
+    atoms = {atom for monomial in b for atom, _ in monomial}
     first = next(iter(b))
     inverse = frozenset((atom, -exponent) for atom, exponent in first)
     for candidate in a:
         factor = _merged(candidate, inverse)
         multiple = {_merged(monomial, factor): coefficient for monomial, coefficient in b.items()}
-        if all(exponent > 0 or atom not in own for atom, exponent in factor) and proportion(
+        if all(exponent > 0 or atom not in atoms for atom, exponent in factor) and proportion(
             a, multiple
         ):
             return True

@@ -1,5 +1,5 @@
-"""What the clock alone decides: comparisons of time and parameters, and remainders of time. Their
-instants are solved, never searched for.
+"""Conditions and remainders that depend on time and parameters only. Their instants are solved for,
+never searched.
 
 A comparison of time only is a *switch*: it flips at *breaks*, which follow from the parameters by a
 formula. No motion has to reach a boundary, so it is no guard, and nothing is recorded as a contact.
@@ -14,6 +14,7 @@ import weakref
 from dataclasses import dataclass
 from typing import Any
 
+from saltus.arguments import written
 from saltus.errors import TraceError, shown
 from saltus.language import expression as ex
 from saltus.language.derivatives import differentiate
@@ -22,7 +23,7 @@ from saltus.language.functions import of_numbers
 
 _SYMBOL = ex.parameter("\0wave")
 _RELATIONS: weakref.WeakValueDictionary[Expr, Relation] = weakref.WeakValueDictionary()
-#: Most comparisons that one with pieces inside splits into.
+#: Most cases that a comparison with pieces splits into.
 _MOST_CASES = 64
 
 
@@ -67,7 +68,7 @@ def affine(node: Expr) -> tuple[Expr, Expr] | None:
 
 
 def _at_zero(node: Expr, leaf: Expr) -> Expr | None:
-    """The value where a leaf is zero, if there is one."""
+    """The value where a leaf is zero, None if there is none."""
     try:
         return ex.substituted(node, {leaf: ex.constant(0.0)})
     except TraceError:  # a pole
@@ -75,7 +76,9 @@ def _at_zero(node: Expr, leaf: Expr) -> Expr | None:
 
 
 def switch_of(gap: Expr) -> Level | Wave | Pulse | None:
-    """When ``gap > 0`` flips, by a formula; None if there is none. The gap holds no conditions."""
+    """The switch that decides ``gap > 0``, with its breaks by a formula; None if there is none. The
+    gap holds no conditions.
+    """
     if line := affine(gap):
         return Level(*line)
     inner = {
@@ -100,8 +103,8 @@ def switch_of(gap: Expr) -> Level | Wave | Pulse | None:
 
 
 def cycles_of(node: Expr) -> tuple[Expr, bool]:
-    """(rate, whether it counts cycles) of a switch (its gap), a remainder or a table; a level and a
-    table that ends don't repeat.
+    """The rate of a switch (its gap), a remainder or a table, and True if it counts cycles: a level
+    and a table that ends don't repeat.
     """
     if node.op in ("mod", "table"):
         line = affine(node.args[0])
@@ -121,7 +124,7 @@ def cycles_of(node: Expr) -> tuple[Expr, bool]:
 
 
 def switch(gap: Expr) -> Condition | bool:
-    """The condition ``gap > 0`` of a gap that depends on time and parameters only; pieces inside
+    """The condition ``gap > 0`` of a gap that depends on time and parameters only. Pieces inside
     the gap become cases of the condition.
 
     Raises
@@ -132,9 +135,9 @@ def switch(gap: Expr) -> Condition | bool:
     return _cases(gap, gap, [_MOST_CASES])
 
 
-def _cases(gap: Expr, whole: Expr, left: list[int]) -> Condition | bool:
-    """Or of (this piece and its comparison); ``left`` counts the comparisons that may
-    still come.
+def _cases(gap: Expr, original: Expr, left: list[int]) -> Condition | bool:
+    """Join (this piece and its comparison) by or; ``left`` counts the comparisons that may still
+    come.
     """
     piece = next((node for node in ex.walk(gap) if node.op == "select"), None)
     if piece is None:
@@ -143,10 +146,10 @@ def _cases(gap: Expr, whole: Expr, left: list[int]) -> Condition | bool:
             return holds
         left[0] -= 1
         if left[0] < 0 or switch_of(gap) is None:
-            raise TraceError(_unsolvable(whole))
+            raise TraceError(_unsolvable(original))
         return _RELATIONS.setdefault(gap, Relation(gap))
     if_so, if_not = (
-        _cases(ex.substituted(gap, {piece: value}), whole, left) for value in piece.args
+        _cases(ex.substituted(gap, {piece: value}), original, left) for value in piece.args
     )
     return _either(_both(piece.payload, if_so), _both(Not(piece.payload), if_not))
 
@@ -174,13 +177,14 @@ def _unsolvable(gap: Expr) -> str:
 
 
 def of_time_only(gap: Expr) -> bool:
-    """Whether a gap depends on time, and on no state (pieces in it that time decides
-    are time too).
+    """True if a gap depends on time, and on no state. Pieces in it that time decides are time
+    too.
     """
     return ex.depends_on(gap, ("time",)) and not ex.depends_on(gap, ("state",))
 
 
 @ex.answers("__mod__")
+@written("mod(t, T)")
 def mod(a: Operand, cycle: Operand) -> Any:
     """The remainder of ``a`` by ``cycle``, in [0, cycle): time within the present cycle, for drives
     that repeat.
@@ -214,16 +218,20 @@ def mod(a: Operand, cycle: Operand) -> Any:
     value, length = ex.as_expr(a), ex.as_expr(cycle)
     if ex.varies(length):
         raise TraceError(
-            f"the cycle of sl.mod must be a number or a parameter, not {shown(length)}."
+            lambda say: (
+                f"the cycle of {say.sl}mod must be a number or a parameter, not {shown(length)}."
+            )
         )
     if length.op == "const" and length.payload == 0:
-        raise TraceError("the cycle of sl.mod is zero.")
+        raise TraceError(lambda say: f"the cycle of {say.sl}mod is zero.")
     with ex.observed(None):
         line = affine(value)
     if line is None or not ex.depends_on(value, ("time",)):
         raise TraceError(
-            f"sl.mod of {value!r}: a remainder is for rate*t + offset with numbers and parameters. "
-            f"Of a state it has no end of boundaries; "
-            f"write a law that repeats in x with sl.sin and sl.cos."
+            lambda say: (
+                f"{say.sl}mod of {value!r}: a remainder is for rate*t + offset with numbers and "
+                "parameters. Of a state it has no end of boundaries; write a law that repeats in "
+                f"x with {say.sl}sin and {say.sl}cos."
+            )
         )
     return Expr("mod", (value, length))

@@ -1,5 +1,5 @@
-"""Functions made of others: each is a composition of elementary functions and pieces, chosen so
-that no digit is lost near special points.
+"""Functions composed of elementary functions and pieces, written so that no digits are lost near
+special points.
 
 Derivatives and Taylor series follow from the parts. A function with a kink or a jump has its
 boundaries there, as `sl.piecewise` would.
@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from saltus.arguments import written
 from saltus.language.expression import Condition, Expr, Operand
 from saltus.language.functions import atan, exp, max, min, of_numbers, pi, piecewise, sqrt, tanh
 
@@ -18,6 +19,7 @@ def _traced(*values: object) -> bool:
     return any(isinstance(value, Expr) for value in values)
 
 
+@written("where(condition, value, otherwise)")
 def where(condition: Condition | bool, value: Operand, otherwise: Operand) -> Any:
     """``value`` where the condition holds, ``otherwise`` elsewhere: short for
     ``sl.piecewise((value, condition), otherwise=otherwise)``.
@@ -51,6 +53,7 @@ def heaviside(a: Operand, at_zero: float = 0.5) -> Any:
     )
 
 
+@written("clip(x, low, high)")
 def clip(a: Operand, low: Operand, high: Operand) -> Any:
     """``a`` held between ``low`` and ``high``: ``sl.min(sl.max(a, low), high)``, with a boundary at
     each end.
@@ -89,7 +92,7 @@ def acos(a: Operand) -> Any:
 
 
 def hypot(a: Operand, b: Operand) -> Any:
-    """``sqrt(a**2 + b**2)``. A cone: it has no derivative where both are zero."""
+    """``sqrt(a**2 + b**2)``, a cone: it has no derivative where both are zero."""
     return sqrt(a * a + b * b) if _traced(a, b) else of_numbers("hypot", math.hypot, a, b)
 
 
@@ -109,7 +112,7 @@ def atan2(y: Operand, x: Operand) -> Any:
 
 
 def _at_distance(y: Any, x: Any) -> Any:
-    """atan2 for a number x."""
+    """The angle for a number x."""
     if x > 0:
         return atan(y / x)
     above = piecewise((pi, y > 0), otherwise=-pi)

@@ -24,6 +24,7 @@ from saltus.language.expression import (
     sub,
     walk,
 )
+from saltus.language.operations import FUNCTIONS
 
 _ZERO = constant(0.0)
 
@@ -66,7 +67,7 @@ def differentiate(expression: Expr, with_respect_to: Expr) -> Expr:
 
 
 def _rule(node: Expr, inner: list[Expr]) -> Expr:
-    """The derivative of one operation from the derivatives of its operands."""
+    """The derivative of one operation, from the derivatives of its operands."""
     match node.op, node.args, inner:
         case "add", _, (da, db):
             return add(da, db)
@@ -89,31 +90,9 @@ def _rule(node: Expr, inner: list[Expr]) -> Expr:
             return da
         case "table", (u,), (du,):
             return mul(Expr("table", (u,), node.payload.derivative()), du)
-        case op, (u,), (du,):
-            return mul(_outer(op, node, u), du)
+        case op, (u,), (du,) if slope := FUNCTIONS[op].slope:
+            return mul(slope(u, node, elementary), du)
     raise TypeError(node.op)
-
-
-def _outer(op: str, value: Expr, u: Expr) -> Expr:
-    """The derivative of an elementary function, from its value and its operand."""
-    match op:
-        case "sqrt":
-            return div(0.5, value)
-        case "exp":
-            return value
-        case "log":
-            return div(1.0, u)
-        case "sin":
-            return elementary("cos", u)
-        case "cos":
-            return neg(elementary("sin", u))
-        case "tan":
-            return add(1.0, mul(value, value))
-        case "atan":
-            return div(1.0, add(1.0, mul(u, u)))
-        case "tanh":
-            return sub(1.0, mul(value, value))
-    raise TypeError(op)
 
 
 def gradient(expression: Expr, states: Sequence[str]) -> tuple[Expr, ...]:

@@ -13,15 +13,20 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 from saltus.errors import UnitError
-from saltus.language.expression import ELEMENTARY, Expr, walk
+from saltus.language.expression import Expr, walk
+from saltus.language.operations import ELEMENTARY
 from saltus.language.text import PI_MULTIPLES
+from saltus.sentences import Dialect
 from saltus.units import dimension, unit_text
 
 #: Exponents of m, kg, s, A and K.
 Dimension = dict[str, Fraction]
 
 _PLAIN: Dimension = {}
-_WAY_OUT = "sl.system(..., check_units=False) leaves units unchecked."
+
+
+def _way_out(say: Dialect) -> str:
+    return f"{say.system(check_units=False)} leaves units unchecked."
 
 
 class _Number(dict[str, Fraction]):
@@ -63,7 +68,7 @@ class DimensionCheck:
             self._known[node] = self._of(node)
 
     def leave_open(self, node: Expr) -> None:
-        """Ask nothing about a node: its unit isn't known."""
+        """Check nothing about a node: its unit isn't known."""
         self._known[node] = None
 
     def check_rates(self, rates: Sequence[Expr]) -> None:
@@ -80,7 +85,8 @@ class DimensionCheck:
                 raise UnitError(
                     f"d{name}/dt is a rate in {unit_text(wanted)}, but {_brief(term)} is "
                     f"{_in(found)}: "
-                    f"{_missing(found, wanted)}. {_WAY_OUT}"
+                    f"{_missing(found, wanted)}. ",
+                    _way_out,
                 )
 
     def check_plain(self, node: Expr, what: str) -> None:
@@ -106,7 +112,8 @@ class DimensionCheck:
         if isinstance(wanted, _Number) or isinstance(found, _Number):
             return
         raise UnitError(
-            f"{what} is to be {_in(wanted)}, but {_brief(node)} is {_in(found)}. {_WAY_OUT}"
+            f"{what} is to be {_in(wanted)}, but {_brief(node)} is {_in(found)}. ",
+            _way_out,
         )
 
     def unit(self, node: Expr) -> str:
@@ -119,7 +126,7 @@ class DimensionCheck:
         )
 
     def declared(self, node: Expr) -> str:
-        """As :meth:`unit`, and ``"1"`` of what is known to be a plain number."""
+        """The unit as from :meth:`unit`, but ``"1"`` for a node known to be a plain number."""
         return "1" if self._dimension(node) == _PLAIN else self.unit(node)
 
     # -- one node ----------------------------------------------------------------------------------
@@ -158,7 +165,7 @@ class DimensionCheck:
         return None
 
     def _alike(self, node: Expr, a: Dimension | None, b: Dimension | None) -> Dimension | None:
-        """Of a sum, a difference (that of a comparison too), or of two pieces."""
+        """The dimension of a sum, a difference (also that of a comparison), or two pieces."""
         if a is None or b is None:
             return None
         if isinstance(a, _Number) and isinstance(b, _Number):
@@ -173,13 +180,14 @@ class DimensionCheck:
         missing = _missing(b, a, " in the second") if second else _missing(a, b, " in the first")
         raise UnitError(
             f"{_brief(left)} [{unit_text(a)}] and {_brief(right)} [{unit_text(b)}] {what}, which "
-            f"needs one unit: {missing}. {_WAY_OUT}"
+            f"needs one unit: {missing}. ",
+            _way_out,
         )
 
     def _power(
         self, node: Expr, base: Dimension | None, exponent: Dimension | None
     ) -> Dimension | None:
-        """Of a power, whose exponent must be a plain number."""
+        """The dimension of a power, whose exponent must be a plain number."""
         self._plain(node, exponent, "as the exponent of")
         if base is None or isinstance(base, _Number) or not base:
             return base
@@ -190,7 +198,7 @@ class DimensionCheck:
         return {symbol: exponent * times for symbol, exponent in base.items()}
 
     def _plain(self, node: Expr, argument: Dimension | None, where: str = "in") -> Dimension | None:
-        """Of a function of a plain number or an angle."""
+        """The dimension of a function of a plain number or an angle."""
         inner = node.args[-1]
         if argument and any(
             abs(number) != 1 and abs(number) not in PI_MULTIPLES for number in _factors(inner)
@@ -200,13 +208,14 @@ class DimensionCheck:
             raise UnitError(
                 f"{_brief(inner)} is in {unit_text(argument)}, but stands {where} {_brief(node)}, "
                 f"which takes a plain number or an "
-                f"angle. {_WAY_OUT}"
+                "angle. ",
+                _way_out,
             )
         return None if argument is None else _PLAIN
 
 
 def _joined(a: Dimension | None, b: Dimension | None, sign: int) -> Dimension | None:
-    """Of a product or a quotient."""
+    """The dimension of a product or a quotient."""
     if a is None or b is None:
         return None
     numbers = [each for each in (a, b) if isinstance(each, _Number)]
@@ -223,8 +232,8 @@ def _product(a: Dimension, b: Dimension, power: int) -> Dimension:
 
 
 def _is_plain(number: float) -> bool:
-    """Whether a number is one of those that formulas are made of: a small multiple of 1, 1/2, 1/3
-    or 1/6, or one of pi.
+    """True if a number is one that formulas are made of: a small multiple of 1, 1/2, 1/3 or 1/6, or
+    one of pi.
     """
     size = abs(number)
     return size in PI_MULTIPLES or (size < 10 and abs(6 * size - round(6 * size)) < 1e-12)
@@ -276,7 +285,7 @@ def _in(exponents: Dimension) -> str:
 
 
 def _missing(found: Dimension, wanted: Dimension, where: str = "") -> str:
-    """What lies between two dimensions."""
+    """The factor by which two dimensions differ, in words."""
     factor = _product(found, wanted, -1)
     if factor == {"kg": Fraction(1)}:
         return f"a division by a mass is missing{where}"

@@ -1,5 +1,5 @@
-"""Numbers from expressions, by NumPy: for tests, checks and pictures. Trajectories are computed by
-generated code, not here.
+"""Evaluate expressions by NumPy, for tests, checks and pictures. Trajectories are computed by
+generated code.
 """
 
 from __future__ import annotations
@@ -11,13 +11,12 @@ from typing import Any
 import numpy as np
 
 from saltus.language.expression import And, Bit, Condition, Expr, Not, Or, Relation, walk
+from saltus.language.operations import ARITHMETIC, FUNCTIONS
 
 _OPERATIONS: dict[str, Any] = {
-    "add": np.add, "sub": np.subtract, "mul": np.multiply, "div": np.divide, "neg": np.negative,
-    "pow": np.power, "mod": np.mod,
-    "sqrt": np.sqrt, "exp": np.exp, "log": np.log, "sin": np.sin, "cos": np.cos, "tan": np.tan,
-    "atan": np.arctan, "tanh": np.tanh,
-}  # fmt: skip
+    name: getattr(np, one.numpy) for name, one in (ARITHMETIC | FUNCTIONS).items() if one.operands
+}
+_OPERATIONS["mod"] = np.mod
 
 
 def evaluate(
@@ -33,7 +32,7 @@ def evaluate(
     Parameters
     ----------
     expressions : iterable of Expr
-        What to evaluate; parts that they share are computed once.
+        The expressions; parts that they share are computed once.
     t : float or array
         Time [s].
     states, values : mapping of str to float or array
@@ -86,8 +85,9 @@ def evaluate(
 def _program(
     expressions: tuple[Expr, ...],
 ) -> tuple[list[tuple[str, Any, tuple[int, ...]]], dict[Expr, int], list[int]]:
-    """The operations that make some expressions, each with its payload (a function, if it has
-    operands) and the places of its operands; where each node's value stands; and those wanted.
+    """The operations that compute some expressions, each with its payload (a function, if it has
+    operands) and the indices of its operands; the index of each node's value; and the wanted
+    indices.
     """
     places: dict[Expr, int] = {}
     steps: list[tuple[str, Any, tuple[int, ...]]] = []

@@ -1,4 +1,4 @@
-"""Expressions: what a traced equation is made of.
+"""Expressions, the nodes of a traced equation.
 
 An :class:`Expr` is one node of a directed acyclic graph. Nodes are interned: the same operation on
 the same operands is the same object, so common subexpressions are shared from the start, and the
@@ -22,15 +22,12 @@ from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar, Union, runtime_checkable
 
 from saltus.errors import TraceError, shown
-
-#: Elementary functions that a traced equation may call, in addition to arithmetic.
-ELEMENTARY = ("sqrt", "exp", "log", "sin", "cos", "tan", "atan", "tanh")
+from saltus.language.operations import ELEMENTARY, FUNCTIONS
+from saltus.sentences import Dialect
 
 #: The functions that an equation may call, as a sentence.
 OWN_FUNCTIONS = (
-    "Use saltus's own: sl.sqrt, sl.exp, sl.log, sl.sin, sl.cos, sl.tan, sl.asin, sl.acos, sl.atan, "
-    "sl.atan2, sl.sinh, sl.cosh, sl.tanh, "
-    "sl.hypot, sl.abs, sl.sign, sl.heaviside, sl.min, sl.max, sl.clip, sl.where, sl.piecewise; "
+    f"Use saltus's own: {', '.join(f'sl.{name}' for name in FUNCTIONS)}; "
     "sl.mod(t, T) for a time that repeats, sl.square, sl.sawtooth, sl.pulse; sl.table(x, points, "
     "values) for measured points, in place of np.interp or a spline."
 )
@@ -40,10 +37,12 @@ _INTERNED: weakref.WeakValueDictionary[tuple[Any, ...], Expr] = weakref.WeakValu
 _JOINED: weakref.WeakValueDictionary[tuple[Any, ...], Condition] = weakref.WeakValueDictionary()
 _LOCK = threading.RLock()  # two nodes for one state would make a derivative silently zero
 _OBSERVER: ContextVar[Callable[[Expr], None] | None] = ContextVar("observer", default=None)
-#: Most comparisons in one condition, as they would be written out (a chain in which each condition
-#: uses the one before twice doubles at each), and within one another (Python reads 200 brackets).
-MOST_JOINED, DEEPEST = 1000, 150
-#: A number with one bit for each operation, in the order in which they were met.
+#: Most comparisons in one condition as it would be written out: a chain in which each condition
+#: uses the one before twice doubles at each.
+MOST_JOINED = 1000
+#: Most nested brackets of a condition; Python reads 200.
+DEEPEST = 150
+#: Bit of each operation, in the order in which they were met.
 _OPS: dict[str, int] = {}
 Number = int | float
 Operand = Union["Expr", int, float]
@@ -60,7 +59,8 @@ class Expr:
     ----------
     op : str
         ``const``, ``param``, ``state``, ``time``, ``add``, ``sub``, ``mul``, ``div``, ``neg``,
-        ``pow``, ``select``, ``mod``, ``table`` or one of :data:`ELEMENTARY`.
+        ``pow``, ``select``, ``mod``, ``table`` or one of
+        :data:`~saltus.language.operations.ELEMENTARY`.
     args : tuple of Expr
         Operands in the order written. ``pow`` holds base and exponent, ``select`` the value where
         its condition holds and the other.
@@ -81,7 +81,7 @@ class Expr:
     bits: int
 
     def __new__(cls, op: str, args: tuple[Expr, ...] = (), payload: Any = None) -> Expr:
-        """The one node of this operation on these operands."""
+        """Return the one node of this operation on these operands."""
         tag = payload.hex() if isinstance(payload, float) else payload
         key = (op, tag, tuple(map(id, args)))
         with _LOCK:
@@ -143,7 +143,7 @@ class Expr:
         return absolute(self)
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **keywords: Any) -> Any:
-        """A NumPy function of traced values is saltus's own."""
+        """Apply saltus's function of the same name to traced values."""
         return _ANSWERS["__array_ufunc__"](ufunc, method, inputs, keywords)
 
     # -- what has no meaning here ------------------------------------------------------------------
@@ -166,7 +166,7 @@ class Expr:
     __rfloordiv__ = __floordiv__
 
     def __call__(self, *_arguments: object) -> Expr:
-        """Refused: the value of a state at another time."""
+        """Refuse: a state can't be taken at another time."""
         raise TraceError(
             f"an equation called {self!r} as a function. There are no delays, x(t - tau): a rate "
             f"depends on the states at the time t only. "
@@ -207,6 +207,11 @@ class Expr:
 
     __or__ = __rand__ = __ror__ = __and__
 
+    def __xor__(self, _other: object) -> Expr:
+        raise TraceError("a power is written x**2; ^ is something else in Python.")
+
+    __rxor__ = __xor__
+
     def __bool__(self) -> bool:
         raise TraceError(
             "an equation asked whether a traced value is true. It is a symbol here, not a number: "
@@ -241,16 +246,16 @@ class Expr:
         return self
 
 
-#: What answers for an expression where Python asks, by the method: see :func:`answers`.
+#: Functions that answer for an expression, by the method that Python asks: see :func:`answers`.
 _ANSWERS: dict[str, Callable[..., Any]] = {}
 Answer = TypeVar("Answer", bound=Callable[..., Any])
 
 
 def answers(method: str) -> Callable[[Answer], Answer]:
-    """Let a function answer for every expression: ``__repr__``, ``__mod__``, ``__array_ufunc__``.
+    """Register a function that answers for every expression: ``__repr__``, ``__mod__``,
+    ``__array_ufunc__``.
 
-    Such a function is built of expressions, so it stands in a file above this one, and is handed
-    in.
+    Such a function is built of expressions, so it stands in a file above this one.
     """
 
     def handed_in(function: Answer) -> Answer:
@@ -260,17 +265,18 @@ def answers(method: str) -> Callable[[Answer], Answer]:
     return handed_in
 
 
-#: Where a comparison stands for 0 or 1, as it does in MATLAB.
-_NO_NUMBER = (
-    "a comparison was used as a number. Write sl.piecewise((1, x > gap), otherwise=0), or the "
-    "whole term in place of the 1: sl.piecewise((k*(x - gap), x > gap), otherwise=0)."
-)
+def _no_number(say: Dialect) -> str:
+    return say.either(
+        "a comparison was used as a number. Write sl.piecewise((1, x > gap), otherwise=0), or the "
+        "whole term in place of the 1: sl.piecewise((k*(x - gap), x > gap), otherwise=0).",
+        "a comparison is no number. Write 1 if x > gap else 0.",
+    )
 
 
 @contextmanager
 def observed(observer: Callable[[Expr], None] | None) -> Iterator[None]:
-    """Every node that is asked for inside is shown to the observer, which may raise: the error then
-    has the line of the user's function.
+    """Show every node that is asked for inside to the observer, which may raise: the error then has
+    the line of the user's function.
     """
     token = _OBSERVER.set(observer)
     try:
@@ -280,8 +286,8 @@ def observed(observer: Callable[[Expr], None] | None) -> Iterator[None]:
 
 
 def with_own_unit(make: Callable[[], Any]) -> Any:
-    """What ``make`` returns, made unobserved and of a unit that the observer can't know: numbers in
-    it carry units of their own.
+    """Return ``make()``, made unobserved. Its unit is left open: numbers in it carry units of their
+    own.
     """
     observer = _OBSERVER.get()
     with observed(None):
@@ -296,13 +302,13 @@ class _LeavesOpen(Protocol):
     """An observer that can leave the unit of a node open."""
 
     def leave_open(self, node: Expr) -> None:
-        """Take the node as it is."""
+        """Accept the node as it is."""
 
 
 # -- conditions ------------------------------------------------------------------------------------
 class _MadeOnce(type):
-    """Equal conditions are one object, as equal nodes are: a comparison of two takes no longer for
-    long ones.
+    """Makes equal conditions one object, as equal nodes are, so that comparing long ones is
+    quick.
     """
 
     def __call__(cls, *parts: Condition | int) -> Any:
@@ -365,18 +371,19 @@ class Condition:
         )
 
     def __neg__(self, *_others: object) -> Expr:
-        """Refused, as every operation that would need a number."""
-        raise TraceError(_NO_NUMBER)
+        """Refuse, as every operation that would need a number."""
+        raise TraceError(_no_number)
 
     __pos__ = __abs__ = __float__ = __int__ = __neg__
     __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __neg__
-    __truediv__ = __rtruediv__ = __pow__ = __rpow__ = __neg__
+    __truediv__ = __rtruediv__ = __pow__ = __rpow__ = __mod__ = __rmod__ = __neg__
+    __lt__ = __le__ = __gt__ = __ge__ = __neg__
 
 
 @dataclass(frozen=True, eq=False)
 class Relation(Condition):
-    """``gap > 0``. While tracing, any comparison; in a system's conditions, one of time and
-    parameters only: no guard, but a switch whose times are known. What a state decides is a
+    """``gap > 0``. While tracing, any comparison. In a system's conditions, one of time and
+    parameters only: no guard, but a switch at known instants; a comparison of states is a
     :class:`Bit` there.
     """
 
@@ -389,7 +396,7 @@ class Relation(Condition):
 @dataclass(frozen=True, eq=False)
 class Friction(Relation):
     """A comparison that decides the direction of friction forces. These are ``levels`` in motion;
-    at rest they may be ``limit`` times as large, where that is given.
+    at rest they may be ``limit`` times as large, if that is given.
     """
 
     limit: Expr | None
@@ -398,7 +405,7 @@ class Friction(Relation):
 
 @dataclass(frozen=True, eq=False)
 class Bit(Condition, metaclass=_MadeOnce):
-    """Side of guard number ``guard`` in a system's list: true where that guard is positive."""
+    """Side of guard number ``guard`` in a system's list: true where its gap is positive."""
 
     guard: int
 
@@ -408,7 +415,7 @@ class Bit(Condition, metaclass=_MadeOnce):
 
 @dataclass(frozen=True, eq=False)
 class _Joint(Condition, metaclass=_MadeOnce):
-    """Two conditions, joined."""
+    """Two joined conditions."""
 
     left: Condition
     right: Condition
@@ -482,7 +489,7 @@ def as_expr(value: Operand) -> Expr:
     if isinstance(value, Expr):
         return value
     if isinstance(value, Condition):
-        raise TraceError(_NO_NUMBER)
+        raise TraceError(_no_number)
     if isinstance(value, str | bytes):
         raise TraceError(
             f"an equation holds the text {shown(value)}. Text with units is for parameter values; "
@@ -599,7 +606,7 @@ def power(base: Operand, exponent: Operand) -> Expr:
 
 
 def elementary(name: str, a: Operand) -> Expr:
-    """One of the functions in :data:`ELEMENTARY` of ``a``."""
+    """One of the functions in :data:`~saltus.language.operations.ELEMENTARY` of ``a``."""
     a = as_expr(a)
     if a.op == "const":
         try:
@@ -627,20 +634,20 @@ def absolute(a: Operand) -> Expr:
 
 # -- walking ---------------------------------------------------------------------------------------
 def relations_in(condition: Condition) -> Iterator[Relation]:
-    """Every relation in a condition, left to right; one that stands in it twice may come once."""
+    """Every relation in a condition, left to right; a repeated one may come once."""
     seen: set[Condition] = set()
     stack = [condition]
     while stack:
-        one = stack.pop()
-        if not one.ops or one in seen:  # of bits alone
+        top = stack.pop()
+        if not top.ops or top in seen:  # bits only
             continue
-        seen.add(one)
-        if isinstance(one, Relation):
-            yield one
-        elif isinstance(one, And | Or):
-            stack += (one.right, one.left)
-        elif isinstance(one, Not):
-            stack.append(one.inner)
+        seen.add(top)
+        if isinstance(top, Relation):
+            yield top
+        elif isinstance(top, And | Or):
+            stack += (top.right, top.left)
+        elif isinstance(top, Not):
+            stack.append(top.inner)
 
 
 def operands(node: Expr) -> tuple[Expr, ...]:
@@ -673,8 +680,8 @@ def walk(
 
 
 def rebuild(node: Expr, args: tuple[Expr, ...], payload: Any) -> Expr:
-    """The same operation on other operands, constants folded; the node itself if
-    nothing differs.
+    """The same operation on other operands, constants folded; the node itself if nothing
+    differs.
     """
     if payload is node.payload and all(
         new is old for new, old in zip(args, node.args, strict=True)
@@ -690,7 +697,7 @@ def rebuild(node: Expr, args: tuple[Expr, ...], payload: Any) -> Expr:
 
 
 def substituted(root: Expr, new: Mapping[Expr, Expr]) -> Expr:
-    """The expression with other nodes in the places of some; conditions stay as they are."""
+    """The expression with some nodes replaced; conditions are kept."""
     memo: dict[Expr, Expr] = {}
     for node in walk(root):
         memo[node] = (
@@ -702,12 +709,12 @@ def substituted(root: Expr, new: Mapping[Expr, Expr]) -> Expr:
 
 
 def depends_on(node: Expr, ops: tuple[str, ...]) -> bool:
-    """Whether a leaf of one of the kinds ``ops`` stands below ``node``."""
+    """True if a leaf of one of the kinds ``ops`` is at or below ``node``."""
     return any(node.ops & _number_of(op) for op in ops)
 
 
 def varies(node: Expr) -> bool:
-    """Whether the value changes along a trajectory (depends on time, state or mode)."""
+    """True if the value changes along a trajectory (depends on time, state or mode)."""
     return depends_on(node, ("time", "state", "select"))
 
 

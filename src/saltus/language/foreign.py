@@ -1,5 +1,5 @@
-"""Functions of other packages in an equation: what saltus calls them, and what to write for those
-that it hasn't.
+"""Functions of other packages in an equation: their equivalents in saltus, and advice on those
+without one.
 """
 
 from __future__ import annotations
@@ -13,24 +13,19 @@ from saltus.language import compositions as made
 from saltus.language import functions as own
 from saltus.language.clocks import mod
 from saltus.language.expression import OWN_FUNCTIONS, answers, as_expr
+from saltus.language.operations import ARITHMETIC, FUNCTIONS
 
-#: NumPy's ufuncs that an equation may call, by their names: the traced function that each stands
-#: for.
+#: NumPy's ufuncs that an equation may call, by name, and the traced function for each.
 UFUNCS: dict[str, Callable[..., Any]] = {
-    "add": operator.add, "subtract": operator.sub, "multiply": operator.mul,
-    "divide": operator.truediv, "power": operator.pow,
-    "float_power": operator.pow, "negative": operator.neg, "positive": operator.pos,
-    "absolute": abs, "fabs": abs,
+    **{one.numpy: one.python for one in ARITHMETIC.values() if one.python},
+    **{one.numpy: getattr(own, name, None) or getattr(made, name)
+        for name, one in FUNCTIONS.items() if one.numpy},
+    "float_power": operator.pow, "positive": operator.pos, "fabs": own.abs,
     "square": lambda a: a * a, "reciprocal": lambda a: 1.0 / a,
     "greater": operator.gt, "greater_equal": operator.ge, "less": operator.lt,
     "less_equal": operator.le,
-    "equal": operator.eq, "not_equal": operator.ne, "maximum": own.max, "minimum": own.min,
-    "fmax": own.max, "fmin": own.min,
-    "sqrt": own.sqrt, "exp": own.exp, "log": own.log, "sin": own.sin, "cos": own.cos,
-    "tan": own.tan, "tanh": own.tanh,
-    "arctan": own.atan, "arcsin": made.asin, "arccos": made.acos, "arctan2": made.atan2,
-    "sinh": made.sinh, "cosh": made.cosh,
-    "hypot": made.hypot, "remainder": mod, "sign": made.sign, "heaviside": made.heaviside,
+    "equal": operator.eq, "not_equal": operator.ne, "fmax": own.max, "fmin": own.min,
+    "remainder": mod,
     "deg2rad": lambda a: a * (own.pi / 180),
     "radians": lambda a: a * (own.pi / 180), "rad2deg": lambda a: a * (180 / own.pi),
     "degrees": lambda a: a * (180 / own.pi),
@@ -38,10 +33,10 @@ UFUNCS: dict[str, Callable[..., Any]] = {
 
 #: Names of other packages, and their equivalents here.
 ADVICE: dict[str, str] = {
-    "arctan2": "Write sl.atan2(y, x).", "arctan": "Write sl.atan.", "arcsin": "Write sl.asin.",
-    "arccos": "Write sl.acos.",
-    "absolute": "Write sl.abs or abs.", "fabs": "Write sl.abs or abs.", "maximum": "Write sl.max.",
-    "minimum": "Write sl.min.",
+    **{one.numpy: f"Write sl.{name}." for name, one in FUNCTIONS.items() if one.numpy not in
+        ("", name)},
+    "arctan2": "Write sl.atan2(y, x).", "absolute": "Write sl.abs or abs.",
+    "fabs": "Write sl.abs or abs.",
     "pow": "Write x**2.", "power": "Write x**2.",
     "signum": "Write sl.sign.",
     "step": "Write sl.heaviside(t - t0).",
@@ -63,7 +58,7 @@ ADVICE: dict[str, str] = {
 
 @answers("__array_ufunc__")
 def traced_ufunc(ufunc: Any, method: str, inputs: tuple[Any, ...], keywords: dict[str, Any]) -> Any:
-    """What a NumPy ufunc gives for traced values.
+    """The result of a NumPy ufunc for traced values.
 
     Raises
     ------

@@ -1,5 +1,5 @@
-"""The functions that an equation may call. Each takes traced values or plain numbers; plain numbers
-give a plain number.
+"""The functions that an equation may call, of traced values or plain numbers. Plain numbers give a
+plain number.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from saltus.arguments import written
 from saltus.errors import TraceError, shown
 from saltus.language.expression import (
     Condition,
@@ -21,6 +22,7 @@ from saltus.language.expression import (
     select,
 )
 from saltus.language.expression import sub as _difference
+from saltus.language.operations import FUNCTIONS
 
 pi = math.pi
 
@@ -40,29 +42,32 @@ def of_numbers(name: str, function: Callable[..., Any], *numbers: Any) -> Any:
     except (TypeError, ValueError, ArithmeticError):
         given = ", ".join(map(shown, numbers))
         raise TraceError(
-            f"sl.{name}({given}) has no finite real value. Keep to the numbers where it has one."
+            lambda say: (
+                f"{say.sl}{name}({given}) has no finite real value. Keep to the numbers where it "
+                "has one."
+            )
         ) from None
 
 
-def _elementary(name: str, what: str) -> Callable[[Operand], Any]:
+def _elementary(name: str) -> Callable[[Operand], Any]:
     on_numbers = getattr(math, name)
 
     def function(a: Operand) -> Any:
         return elementary(name, a) if isinstance(a, Expr) else of_numbers(name, on_numbers, a)
 
     function.__name__ = function.__qualname__ = name
-    function.__doc__ = f"{what} of a traced value or a number."
+    function.__doc__ = f"{FUNCTIONS[name].what} of a traced value or a number."
     return function
 
 
-sqrt = _elementary("sqrt", "Square root")
-exp = _elementary("exp", "Exponential")
-log = _elementary("log", "Natural logarithm")
-sin = _elementary("sin", "Sine [of rad]")
-cos = _elementary("cos", "Cosine [of rad]")
-tan = _elementary("tan", "Tangent [of rad]")
-atan = _elementary("atan", "Inverse tangent [rad]")
-tanh = _elementary("tanh", "Hyperbolic tangent")
+sqrt = _elementary("sqrt")
+exp = _elementary("exp")
+log = _elementary("log")
+sin = _elementary("sin")
+cos = _elementary("cos")
+tan = _elementary("tan")
+atan = _elementary("atan")
+tanh = _elementary("tanh")
 
 
 def abs(a: Operand) -> Any:
@@ -97,6 +102,7 @@ def _extreme(
     return result
 
 
+@written("piecewise((value, condition), ..., otherwise=value)")
 def piecewise(*pieces: tuple[Operand, Condition | bool], otherwise: Operand | None = None) -> Any:
     """A value that differs from region to region: each comparison in a condition is a boundary
     where a contact can begin or end.
@@ -127,8 +133,10 @@ def piecewise(*pieces: tuple[Operand, Condition | bool], otherwise: Operand | No
     """
     if otherwise is None:
         raise TraceError(
-            "sl.piecewise needs otherwise=, the value where no condition holds: sl.piecewise((k*(x "
-            "- gap), x > gap), otherwise=0)."
+            lambda say: (
+                f"{say.sl}piecewise needs otherwise=, the value where no condition holds: "
+                f"{say.sl}piecewise((k*(x - gap), x > gap), otherwise=0)."
+            )
         )
     result: Any = otherwise
     for piece in reversed(pieces):
@@ -144,19 +152,25 @@ def _pair(piece: Any) -> tuple[Operand, Condition | bool]:
     """A piece, checked."""
     if not (isinstance(piece, tuple | list) and len(piece) == 2):
         raise TraceError(
-            f"a piece of sl.piecewise is a pair (value, condition), not {shown(piece)}."
+            lambda say: (
+                f"a piece of {say.sl}piecewise is a pair (value, condition), not {shown(piece)}."
+            )
         )
     value, condition = piece
     if isinstance(value, Condition):
         raise TraceError(
-            "a piece of sl.piecewise begins with its value: write (value, condition), "
-            "such as (k*(x - gap), x > gap)."
+            lambda say: (
+                f"a piece of {say.sl}piecewise begins with its value: write (value, condition), "
+                "such as (k*(x - gap), x > gap)."
+            )
         )
     if isinstance(condition, Condition):
         return value, condition
     if isinstance(condition, bool) or str(getattr(condition, "dtype", "")) == "bool":
         return value, bool(condition)
     raise TraceError(
-        f"the condition of a piece of sl.piecewise must be a comparison such as x > "
-        f"gap, not {shown(condition)}."
+        lambda say: (
+            f"the condition of a piece of {say.sl}piecewise must be a comparison such as x > gap, "
+            f"not {shown(condition)}."
+        )
     )

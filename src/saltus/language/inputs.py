@@ -1,5 +1,5 @@
-"""Drives with breaks: square waves, saw-teeth, pulses, recorded series. The instants at which they
-break follow from their parameters by a formula: steps end there, and nothing is searched for.
+"""Drives with breaks: square waves, saw-teeth, pulses, recorded series. The instants of their
+breaks follow from their parameters by a formula, so steps end there and nothing is searched for.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from saltus.arguments import written
 from saltus.errors import TraceError, among, nearest, shown
 from saltus.language.clocks import mod
 from saltus.language.compositions import where
@@ -87,6 +88,7 @@ def sawtooth(phase: Operand, width: Operand = 1.0) -> Any:
     return where(mod(phase, _TURN) < _TURN * width, rise, fall)
 
 
+@written("pulse(t, duration, start=..., every=..., shape=...)")
 def pulse(
     t: Operand,
     duration: Operand,
@@ -102,14 +104,14 @@ def pulse(
     t : Expr or float
         The time [s].
     duration : Expr or float
-        How long it lasts [s]: a number or a parameter.
+        Its duration [s]: a number or a parameter.
     start : Expr or float
         When it begins [s].
     every : Expr or float, optional
         Time from one pulse of a train to the next [s], at least ``duration``; pulses begin at
         ``start`` and at all whole multiples of ``every`` before and after. Default: one pulse.
     shape : {"rectangle", "half_sine", "triangle"}
-        How it rises and falls.
+        Shape of the pulse.
 
     Returns
     -------
@@ -129,11 +131,13 @@ def pulse(
     (1.0, 0.0)
     """
     if not among(shape, SHAPES):
-        raise TraceError(f"sl.pulse: shape={shown(shape)}. {nearest(shape, SHAPES)}")
+        raise TraceError(
+            lambda say: f"{say.sl}pulse: shape={shown(shape)}. {nearest(shape, SHAPES)}"
+        )
     for given in (t, duration, start):
         as_expr(given)  # refuses anything but a number or a traced value
     if not isinstance(duration, Expr) and duration <= 0:
-        raise TraceError(f"sl.pulse: duration = {duration:g} must be positive.")
+        raise TraceError(lambda say: f"{say.sl}pulse: duration = {duration:g} must be positive.")
     within = t - start if every is None else mod(t - start, every)
     if shape == "rectangle":
         height: Any = 1.0
@@ -169,7 +173,7 @@ class Record:
         return float(self.table.points[-1] - self.table.points[0])
 
     def __call__(self, t: Any) -> Any:
-        """Its value [SI] at a time: ``t``, ``rate*t + offset``, a number, or an array of numbers.
+        """The value [SI] at a time: ``t``, ``rate*t + offset``, a number, or an array of numbers.
 
         Raises
         ------
@@ -203,7 +207,7 @@ def recorded(
     times : sequence of float
         Instants, ascending [``time_unit``].
     values : sequence of float
-        What was recorded [``unit``].
+        Recorded values [``unit``].
     unit : str
         Unit of the values, such as ``"mm"``; they are converted to SI, and the units of the
         equation are checked with it. Default: numbers in SI of a unit that isn't checked.
@@ -241,7 +245,7 @@ def recorded(
 
 
 def _times(numbers: Any, factor: float) -> Any:
-    """Numbers times a factor; anything else as it is, for :func:`curve` to refuse."""
+    """Numbers times a factor; anything else unchanged, for :func:`curve` to refuse."""
     try:
         return np.asarray(numbers, dtype=np.float64) * factor
     except (TypeError, ValueError, OverflowError):
@@ -251,5 +255,8 @@ def _times(numbers: Any, factor: float) -> Any:
 def _check_share(number: Any, function: str, argument: str) -> None:
     if not isinstance(number, Expr) and not (isinstance(number, int | float) and 0 <= number <= 1):
         raise TraceError(
-            f"sl.{function}: {argument} is a part of a turn, from 0 to 1, not {shown(number)}."
+            lambda say: (
+                f"{say.sl}{function}: {argument} is a part of a turn, from 0 to 1, not "
+                f"{shown(number)}."
+            )
         )

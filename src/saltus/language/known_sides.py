@@ -1,4 +1,4 @@
-"""Expressions with one bit known."""
+"""Substitute a known bit into expressions."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from saltus.language.expression import And, Bit, Condition, Expr, Not, Or, Relat
 
 
 def assuming(root: Expr, bit: int, value: bool) -> Expr:
-    """The expression with one bit known. What it rules out isn't looked at: it may
-    divide by zero. A quotient by what the bit makes zero is zero: it is the force of a contact that
-    can't be held then, and is let go.
+    """Substitute one bit. Branches it rules out are dropped unevaluated: they may divide by zero. A
+    quotient by something that the bit makes zero is zero: it is the force of a contact that can't
+    be held then, and is released.
     """
     memo: dict[Expr, Expr] = {}
     stack = [root]

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 
-from saltus.language.expression import ELEMENTARY, Condition, Expr
-from saltus.language.text import ATOM, PI_MULTIPLES, PRODUCT, Writer
+from saltus.language.expression import Condition, Expr
+from saltus.language.operations import ATOM, ELEMENTARY, FUNCTIONS, PRODUCT
+from saltus.language.text import PI_MULTIPLES, Writer
 
 _GREEK = frozenset([
     "alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "iota", "kappa", "lambda",
@@ -25,7 +26,7 @@ class LatexWriter(Writer):
         return r" \;\text{and}\; " if both else r" \;\text{or}\; "
 
     def name(self, name: str) -> str:
-        """A name as a symbol."""
+        """The symbol of a name."""
         return latex_name(name)
 
     def number(self, value: float) -> tuple[str, int]:
@@ -47,7 +48,7 @@ class LatexWriter(Writer):
         )
 
     def infix(self, op: str, left: Expr, right: Expr) -> tuple[str, int]:
-        """Quotients as fractions, products without a sign."""
+        """An infix operation: quotients as fractions, products without a sign."""
         if op == "div":
             return rf"\frac{{{self.text(left)}}}{{{self.text(right)}}}", ATOM
         if op == "mul":
@@ -58,7 +59,7 @@ class LatexWriter(Writer):
         return super().infix(op, left, right)
 
     def power(self, base: Expr, exponent: Expr) -> str:
-        """A superscript."""
+        """A power as a superscript."""
         text = self.part(base, ATOM)
         braced = text if base.op in ("state", "param", "time") else f"{{{text}}}"
         return f"{braced}^{{{self.text(exponent)}}}"
@@ -70,25 +71,25 @@ class LatexWriter(Writer):
             return rf"\sqrt{{{inner}}}"
         if function not in ELEMENTARY:
             return latex_name(function) + self.parentheses(inner)
-        return rf"\{'arctan' if function == 'atan' else function}{self.parentheses(inner)}"
+        return rf"\{FUNCTIONS[function].latex or function}{self.parentheses(inner)}"
 
     def piece(self, value: Expr, condition: Condition) -> str:
         """One line of cases."""
         return rf"{self.text(value)} & \text{{if }} {self.condition(condition)} \\"
 
     def piecewise(self, pieces: list[str], otherwise: Expr) -> str:
-        """Cases."""
+        """A piecewise expression as cases."""
         return (
             rf"\begin{{cases}} {' '.join(pieces)} {self.text(otherwise)} & \text{{otherwise}} "
             rf"\end{{cases}}"
         )
 
     def parentheses(self, text: str) -> str:
-        """Parentheses that grow."""
+        """Add parentheses that grow."""
         return rf"\left({text}\right)"
 
     def line(self, name: str, text: str) -> str:
-        """An aligned line."""
+        """One aligned line."""
         return f"{name} &= {text}"
 
 

@@ -1,4 +1,4 @@
-"""What a system, its states and its parameters may be called."""
+"""Allowed names of systems, states and parameters."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from saltus.fence import has_control
 
 #: Longest name of a system [characters].
 LONGEST = 200
-#: Prefixes of a state's name in a result, and the place that each stands for.
+#: Prefixes of a state's name in a result, and the words for each.
 _PLACES = {"end_": "the end", "contact_": "a contact"}
 #: Names with another meaning in equations or in the generated code.
 RESERVED = frozenset(
@@ -20,8 +20,8 @@ RESERVED = frozenset(
 
 
 def why_no_name(name: Any) -> str | None:
-    """Why this can't be the name of a state or parameter, as the end of a sentence;
-    None if it can.
+    """The reason why this can't be the name of a state or parameter, as the end of a sentence; None
+    if it can.
     """
     if not isinstance(name, str) or not name.isidentifier():
         return "use letters, digits and _"
@@ -33,7 +33,8 @@ def why_no_name(name: Any) -> str | None:
 
 
 def why_not_together(states: Sequence[str]) -> str | None:
-    """Why these can't be the states of one system, as the end of a sentence; None if they can.
+    """The reason why these can't be the states of one system, as the end of a sentence; None if
+    they can.
 
     Results call a state x at the end of a trajectory ``end_x``, and at a contact ``contact_x``.
     """
@@ -48,7 +49,9 @@ def why_not_together(states: Sequence[str]) -> str | None:
 
 
 def why_no_title(title: Any) -> str | None:
-    """Why this can't be the name of a system, as the end of a sentence; None if it can."""
+    """The reason why this can't be the name of a system, as the end of a sentence; None if it
+    can.
+    """
     if not isinstance(title, str) or not title.strip():
         return "it must be text"
     if _controls(title):
@@ -57,15 +60,17 @@ def why_no_title(title: Any) -> str | None:
 
 
 def why_no_text(text: Any) -> str | None:
-    """Why this can't be a description or a source, as the end of a sentence; None if it can."""
+    """The reason why this can't be a description or a source, as the end of a sentence; None if it
+    can.
+    """
     if not isinstance(text, str):
         return "it must be text"
     return "it holds control characters" if _controls(text) - {"\n", "\t"} else None
 
 
 def _controls(text: str) -> set[str]:
-    """Letters that a terminal or a parser may obey: control characters, line ends, halves of
-    surrogate pairs, turns of the direction.
+    """Characters that a terminal or a parser may obey: control characters, line ends, halves of
+    surrogate pairs, marks of text direction.
     """
     return {
         letter

@@ -13,13 +13,13 @@ from collections.abc import Callable, Iterable
 from saltus.language import expression as ex
 from saltus.language.expression import Expr
 
-#: Added to the square of a length of zero, which divides; nothing is added to any other.
+#: Added to the square of a length of zero, by which is divided; nothing is added to any other.
 _LEAST = 2.0**-200
 
 
 def without_root(gap: Expr) -> Expr:
-    """A gap that compares a root with numbers and parameters, or with another root, as one without
-    roots: positive, zero and negative where the gap is.
+    """Replace a gap that compares a root with numbers and parameters, or with another root, by one
+    of the same sign without roots.
 
     With numbers and parameters d it is ``(u - d*|d|)/(2*|d|)``, which differs from ``sqrt(u) - d``
     in the second order of the distance only: margins and speeds of contact stay what they were.
@@ -51,7 +51,9 @@ def without_root(gap: Expr) -> Expr:
 
 
 def with_root(gap: Expr) -> Expr:
-    """The gap of which :func:`without_root` made this one, ``sqrt(u) - d``; any other as it is."""
+    """The original ``sqrt(u) - d`` of a gap made by :func:`without_root`; any other gap
+    unchanged.
+    """
     if (inner := _within_factor(gap, with_root)) is not None:
         return inner
     match gap.op, gap.args:
@@ -80,7 +82,9 @@ def root_name(root: Expr) -> str:
 
 
 def _within_factor(gap: Expr, change: Callable[[Expr], Expr]) -> Expr | None:
-    """A sign or factor that doesn't vary, and what it multiplies changed; None if there is none."""
+    """A constant sign or factor, and the changed operand that it multiplies; None if there is
+    none.
+    """
     match gap.op, gap.args:
         case "neg", (inner,):
             return ex.neg(change(inner))
@@ -103,12 +107,14 @@ def _squared(c: Expr, u: Expr) -> Expr:
 
 
 def _is_square(node: Expr) -> bool:
-    """Whether a node is ``c*|c|``."""
+    """True if a node is ``c*|c|``."""
     return node.op == "mul" and node.args[1] is ex.absolute(node.args[0])
 
 
 def _split(gap: Expr, sign: float = 1.0) -> tuple[list[tuple[Expr, Expr]], Expr]:
-    """The terms ``c*sqrt(u)`` of a sum, or of minus it, as pairs (c, u), and minus all others."""
+    """The terms ``c*sqrt(u)`` of a sum, or of its negative, as pairs (c, u), and minus all
+    others.
+    """
     roots: list[tuple[Expr, Expr]] = []
     level: Expr = ex.constant(0.0)
     stack = [(gap, sign)]
@@ -127,7 +133,7 @@ def _split(gap: Expr, sign: float = 1.0) -> tuple[list[tuple[Expr, Expr]], Expr]
 
 
 def _root(node: Expr) -> tuple[Expr, Expr] | None:
-    """c and u of ``c*sqrt(u)``, u varying and c not; None of anything else."""
+    """c and u of ``c*sqrt(u)`` with varying u and constant c; None for anything else."""
     match node.op, node.args:
         case "sqrt", (u,) if ex.varies(u):
             return ex.constant(1.0), u
@@ -143,8 +149,9 @@ def _root(node: Expr) -> tuple[Expr, Expr] | None:
 
 
 def zero_where_idle(field: Iterable[Expr]) -> tuple[Expr, ...]:
-    """The same field with products of a piece that is zero somewhere as pieces of products, if they
-    divide by a root: ``sl.max(r - gap, 0)*x/r`` is zero within the gap, at r = 0 too.
+    """The same field with each product that divides by a root, and has a factor that is a piece
+    with a zero side, as a piece of products. ``sl.max(r - gap, 0)*x/r`` is zero within the gap, at
+    r = 0 too.
     """
     memo: dict[Expr, Expr] = {}
     rooted, divided = set[Expr](), set[Expr]()  # nodes that hold roots, and quotients by such
@@ -160,7 +167,7 @@ def zero_where_idle(field: Iterable[Expr]) -> tuple[Expr, ...]:
 
 
 def _spread(product: Expr) -> Expr:
-    """A product as a piece of products, if a factor of it is a piece that is zero somewhere."""
+    """A product as a piece of products, if one of its factors is a piece with a zero side."""
     piece = _idle_factor(product)
     if piece is None:
         return product
@@ -169,7 +176,7 @@ def _spread(product: Expr) -> Expr:
 
 
 def _idle_factor(product: Expr) -> Expr | None:
-    """A piece that is zero somewhere among the factors of a product."""
+    """A factor of a product that is a piece with a zero side."""
     stack = [product]
     while stack:
         node = stack.pop()

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.arguments import has_mask
+from saltus.arguments import has_mask, written
 from saltus.errors import TraceError, among, nearest, shown
 from saltus.language import expression as ex
 from saltus.language.clocks import affine
@@ -35,7 +35,7 @@ class Table:
     Attributes
     ----------
     name : str
-        How equations show it.
+        Name in printed equations.
     points : float64[n]
         Knots, ascending.
     pieces : float64[m, 5]
@@ -83,8 +83,10 @@ class Table:
             x = np.asarray(x, dtype=np.float64)
         except (TypeError, ValueError):
             raise TraceError(
-                f"sl.table: it is looked up at {shown(x)}, which is no number. Write "
-                f"sl.table(x, points, values)."
+                lambda say: (
+                    f"{say.sl}table: it is looked up at {shown(x)}, which is no number. Write "
+                    f"{say.sl}table(x, points, values)."
+                )
             ) from None
         first, last = self.points[0], self.points[-1]
         if self.periodic:
@@ -140,6 +142,7 @@ class Table:
         return cls(points, pieces, periodic, name, check_declared(unit, name) if unit else "")
 
 
+@written('table(t, points, values, kind="linear", outside="hold")')
 def table(
     x: Operand,
     points: Sequence[float],
@@ -159,7 +162,7 @@ def table(
         any number of points. Or anything that depends on states: a law of 32 points at most, with a
         boundary at each knot.
     points : sequence of float
-        Where the curve is known, ascending [unit of x].
+        Arguments of the given values, ascending [unit of x].
     values : sequence of float
         Its values there [SI]. An amplitude stays a parameter: ``amplitude*sl.table(...)``.
     kind : str
@@ -171,7 +174,7 @@ def table(
         polynomials at the ends go on. ``"periodic"``: the curve repeats after ``points[-1] -
         points[0]``; first and last value must be equal. In time only.
     name : str
-        What printed equations call it.
+        Its name in printed equations.
 
     Returns
     -------
@@ -193,8 +196,8 @@ def table(
 
 
 def look_up(x: Operand, data: Table) -> Any:
-    """The value of a table at ``x``, as :func:`table` gives it. Raises TraceError if it can't be
-    looked up there.
+    """The value of a table at ``x``, as :func:`table` gives it. Raises TraceError if ``x`` can't be
+    an argument.
     """
     if not isinstance(x, Expr):
         return float(data(x))
@@ -204,57 +207,69 @@ def look_up(x: Operand, data: Table) -> Any:
         line = affine(x)
     if line is None or not ex.depends_on(x, ("time",)):
         raise TraceError(
-            f"sl.table in {x!r}: write a state, or rate*t + offset with numbers and "
-            f"parameters for the rest."
+            lambda say: (
+                f"{say.sl}table in {x!r}: write a state, or rate*t + offset with numbers and "
+                "parameters for the rest."
+            )
         )
     return Expr("table", (x,), data)
 
 
-def curve(points: Any, values: Any, kind: str, outside: str, name: str, unit: str = "") -> Table:
-    """The table of :func:`table`, checked. Raises TraceError as it does."""
+def curve(
+    points: Any,
+    values: Any,
+    kind: str,
+    outside: str,
+    name: str,
+    unit: str = "",
+    title: str = "sl.table",
+) -> Table:
+    """The table of :func:`table`, checked; ``title`` begins the messages. Raises TraceError as it
+    does.
+    """
     for what, word, known in (("kind", kind, KINDS), ("outside", outside, OUTSIDE)):
         if not among(word, known):
-            raise TraceError(f"sl.table: {what}={shown(word)}. {nearest(word, known)}")
+            raise TraceError(f"{title}: {what}={shown(word)}. {nearest(word, known)}")
     if not (isinstance(name, str) and name.isidentifier()):
-        raise TraceError(f"sl.table: name={shown(name)} is no name. Use letters, digits and _.")
+        raise TraceError(f"{title}: name={shown(name)} is no name. Use letters, digits and _.")
     if has_mask([points, values]):
         raise TraceError(
-            "sl.table: points or values are masked, and masks aren't supported. Leave "
+            f"{title}: points or values are masked, and masks aren't supported. Leave "
             "them out of both."
         )
     try:
         x, y = (np.array(data, dtype=np.float64) for data in (points, values))
     except (TypeError, ValueError, OverflowError):
         raise TraceError(
-            "sl.table: points and values must be numbers [SI], as lists or arrays."
+            f"{title}: points and values must be numbers [SI], as lists or arrays."
         ) from None
     if x.ndim != 1 or x.shape != y.shape or len(x) < 2:
         raise TraceError(
-            f"sl.table: points and values must be lists of one length, at least 2; "
+            f"{title}: points and values must be lists of one length, at least 2; "
             f"theirs are {x.shape} and {y.shape}."
         )
     for what, numbers in (("points", x), ("values", y)):
         if not np.isfinite(numbers).all():
             raise TraceError(
-                f"sl.table: {what}[{int(np.flatnonzero(~np.isfinite(numbers))[0])}] "
+                f"{title}: {what}[{int(np.flatnonzero(~np.isfinite(numbers))[0])}] "
                 f"is not a finite number."
             )
     if not (np.diff(x) > 0).all():
         i = int(np.flatnonzero(np.diff(x) <= 0)[0]) + 1
         raise TraceError(
-            f"sl.table: points must ascend, but points[{i}] = {x[i]:g} follows "
+            f"{title}: points must ascend, but points[{i}] = {x[i]:g} follows "
             f"{x[i - 1]:g}. {_ascending(x, y, i)}"
         )
     if outside == "periodic" and y[0] != y[-1]:
         raise TraceError(
-            f"sl.table: outside='periodic' needs the same first and last value, not "
+            f"{title}: outside='periodic' needs the same first and last value, not "
             f"{y[0]:g} and {y[-1]:g}."
         )
     return Table(x, _pieces(x, y, kind, outside), outside == "periodic", name, unit)
 
 
 def _ascending(x: np.ndarray, y: np.ndarray, i: int) -> str:
-    """What to do about point number i, which doesn't lie after the one before it."""
+    """Advice about point number i, which isn't greater than the one before it."""
     if (np.diff(x) < 0).any():
         return "Sort them."
     if y[i] == y[i - 1]:
@@ -297,17 +312,21 @@ def _of_state(x: Expr, data: Table) -> Any:
     """A table in a state, as pieces with a boundary at every knot where the polynomial changes."""
     if data.periodic:
         raise TraceError(
-            "sl.table: outside='periodic' is for tables in time. Of a state it would "
-            "have no end of boundaries."
+            lambda say: (
+                f"{say.sl}table: outside='periodic' is for tables in time. Of a state it would "
+                "have no end of boundaries."
+            )
         )
     differs = [
         i for i in range(len(data.points)) if not np.array_equal(data.pieces[i], data.pieces[i + 1])
     ]
     if len(differs) > MOST_KNOTS:
         raise TraceError(
-            f"sl.table in a state has {len(differs)} knots, each a boundary of the motion: "
-            f"{MOST_KNOTS} at most. Take fewer points with "
-            f"kind='spline' or 'pchip', or fit a formula. A table in time may have any number."
+            lambda say: (
+                f"{say.sl}table in a state has {len(differs)} knots, each a boundary of the "
+                f"motion: {MOST_KNOTS} at most. Take fewer points with kind='spline' or 'pchip', "
+                "or fit a formula. A table in time may have any number."
+            )
         )
     last = data.pieces[-1]
 

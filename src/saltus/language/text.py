@@ -25,26 +25,19 @@ from saltus.language.expression import (
     operands,
     walk,
 )
+from saltus.language.operations import ARITHMETIC, ATOM, NEGATIVE, POWER, PRODUCT
 from saltus.language.roots import with_root
 
-#: How strongly a text holds together: where its strength is less than asked for, it is bracketed.
-ATOM, POWER, NEGATIVE, PRODUCT, SUM = 5, 4, 3, 2, 1
-_INFIX = {
-    "add": (" + ", SUM),
-    "sub": (" - ", SUM),
-    "mul": ("*", PRODUCT),
-    "div": ("/", PRODUCT),
-}
 #: Constants that people write with pi.
 PI_MULTIPLES = {math.pi: "pi", 2 * math.pi: "2*pi", 4 * math.pi: "4*pi", math.pi / 2: "pi/2"}
 
 
 class Boundary(Protocol):
-    """What a writer asks of a guard."""
+    """Interface of a guard to a writer."""
 
     @property
     def name(self) -> str:
-        """What it is called."""
+        """The name of the guard."""
 
     @property
     def gap(self) -> Expr:
@@ -52,15 +45,15 @@ class Boundary(Protocol):
 
     @property
     def state(self) -> str | None:
-        """The state it is a level of."""
+        """The state of which the boundary is a level."""
 
     @property
     def boundary(self) -> Expr | None:
-        """That level."""
+        """The level of that state."""
 
     @property
     def law(self) -> object:
-        """Its law of contact, if any."""
+        """The law of contact."""
 
 
 class Writer:
@@ -144,7 +137,7 @@ class Writer:
     greater, less = " > ", " < "
 
     def joint(self, both: bool) -> str:
-        """What joins two conditions."""
+        """The text that joins two conditions."""
         return " & " if both else " | "
 
     def name(self, name: str) -> str:
@@ -165,7 +158,7 @@ class Writer:
 
     def infix(self, op: str, left: Expr, right: Expr) -> tuple[str, int]:
         """A sum, difference, product or quotient and its binding strength."""
-        sign, strength = _INFIX[op]
+        sign, strength = ARITHMETIC[op].sign, ARITHMETIC[op].strength
         return self.part(left, strength) + sign + self.part(
             right, strength + 1, after_sign=True
         ), strength
@@ -218,7 +211,7 @@ class Writer:
                 return self.power(*node.args), POWER
             case "select":
                 return self._select(node), ATOM
-            case op if op in _INFIX:
+            case op if op in ARITHMETIC:
                 return self.infix(op, *node.args)
         return self.call(node.payload.name if node.op == "table" else node.op, *node.args), ATOM
 
@@ -234,7 +227,7 @@ class Writer:
         return self.piecewise(pieces, otherwise)
 
     def _named(self, node: Expr, text: str, strength: int) -> tuple[str, int]:
-        """The text as it is used from here on: itself, a name, or dots."""
+        """The text as it is used from now on: itself, a name, or dots."""
         if self.limit is not None and len(text) > self.limit:
             self._pieces.pop(node, None)
             return "...", ATOM
@@ -253,7 +246,7 @@ class Writer:
         return self.name(name), ATOM
 
     def _guard_sides(self, guard: Boundary) -> tuple[str, str]:
-        if getattr(guard.law, "kind", None) == "hold":  # its gap is no boundary that anyone wrote
+        if getattr(guard.law, "kind", None) == "hold":  # its gap is no boundary that the user wrote
             return guard.name, f"not {guard.name}"
         if guard.state is not None and guard.boundary is not None:
             state, boundary = self.name(guard.state), self.text(guard.boundary)

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from saltus.errors import ParameterError, among, nearest, shown
+from saltus.errors import ParameterError, among, nearest, shown, unknown
 from saltus.models.aeroelastic import aeroelastic
 from saltus.models.ball_in_box import ball_in_box
 from saltus.models.bang_bang import bang_bang
@@ -103,7 +103,7 @@ def find(name: str) -> Callable[..., System]:
         If there is none; the message offers the nearest name.
     """
     if not among(name, MODELS):
-        raise ParameterError(f"no model is called {shown(name)}. {nearest(name, MODELS)}")
+        raise unknown("no model is called", name, MODELS)
     return MODELS[name]
 
 
@@ -136,7 +136,7 @@ def energy(name: str) -> dict[str, Callable[..., Any]]:
 
 
 def has_energy(name: str) -> bool:
-    """Whether a model brings its energies along. Raises ParameterError for an unknown model."""
+    """True if a model has its energies. Raises ParameterError for an unknown model."""
     return hasattr(sys.modules[find(name).__module__], "ENERGY")
 
 

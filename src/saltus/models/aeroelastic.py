@@ -95,7 +95,7 @@ def _stored(
     plunge, pitch, plunge_rate, pitch_rate, *, mass, inertia, imbalance, half_chord,
     plunge_stiffness, pitch_stiffness, pitch_gap,
 ):  # fmt: skip
-    """Of the section and its two springs, per unit span."""
+    """Energy of the section and its two springs, per unit span."""
     kinetic = (
         mass * plunge_rate**2 / 2
         + mass * imbalance * half_chord * plunge_rate * pitch_rate
@@ -108,7 +108,7 @@ def _stored(
 def _supplied(
     pitch, plunge_rate, pitch_rate, *, airspeed, half_chord, elastic_axis, air_density, lift_slope
 ):
-    """By the flow, per unit span; negative while it damps."""
+    """Power supplied by the flow, per unit span; negative while it damps."""
     incidence = (
         pitch + plunge_rate / airspeed + (0.5 - elastic_axis) * half_chord * pitch_rate / airspeed
     )
@@ -117,7 +117,7 @@ def _supplied(
 
 
 def _dissipated(plunge_rate, pitch_rate, *, plunge_damping, pitch_damping):
-    """In the dampers of the mount, per unit span."""
+    """Power dissipated in the dampers of the mount, per unit span."""
     return plunge_damping * plunge_rate**2 + pitch_damping * pitch_rate**2
 
 

@@ -79,7 +79,7 @@ def _stored(
     ground_contact_stiffness, ground_gap,
     coupling_contact_stiffness, coupling_gap,
 ):  # fmt: skip
-    """Of the masses, the springs and the contacts."""
+    """Energy of the masses, the springs and the contacts."""
     stretch = x2 - x1
     springs = ground_stiffness * x1**2 + coupling_stiffness * stretch**2
     ground = ground_contact_stiffness * freeplay(x1, stiffness=1.0, gap=ground_gap) ** 2
@@ -88,12 +88,12 @@ def _stored(
 
 
 def _supplied(t, v1, *, force, frequency):
-    """By the force on the first mass."""
+    """Power of the force on the first mass."""
     return force * cos(2 * pi * frequency * t) * v1
 
 
 def _dissipated(v1, v2, *, ground_damping, coupling_damping):
-    """In the two dampers."""
+    """Power dissipated in the two dampers."""
     return ground_damping * v1**2 + coupling_damping * (v2 - v1) ** 2
 
 

@@ -76,8 +76,8 @@ def delangre(
     """
     wn, w = 2 * pi * natural_frequency, 2 * pi * frequency
     beyond = piecewise((x + lower_gap, x < -lower_gap), (x - upper_gap, x > upper_gap), otherwise=0)
-    # The order of eq. (3), which is the one whose rounding in ode45 gives the digits of the paper's
-    # Table 2 (docs/decisions/0007).
+    # The order of eq. (3): its rounding in ode45 gives the digits of the paper's Table 2
+    # (docs/decisions/0007).
     restoring = (
         -2 * damping_ratio * wn * v
         - wn**2 * x
@@ -89,20 +89,20 @@ def delangre(
 
 # -- energy ----------------------------------------------------------------------------------------
 def _stored(x, v, *, mass, natural_frequency, cubic, contact_stiffness, lower_gap, upper_gap):
-    """Of the block, the beams and the contact springs."""
+    """Energy of the block, the beams and the contact springs."""
     beyond = piecewise((x + lower_gap, x < -lower_gap), (x - upper_gap, x > upper_gap), otherwise=0)
     beams = mass * (2 * pi * natural_frequency) ** 2 * x**2 / 2 + cubic * x**4 / 4
     return mass * v**2 / 2 + beams + contact_stiffness * beyond**2 / 2
 
 
 def _supplied(t, v, *, force, frequency):
-    """By the magnet."""
+    """Power of the magnet."""
     w = 2 * pi * frequency
     return force * (1 - 18 / w**2) * cos(w * t) * v
 
 
 def _dissipated(v, *, mass, damping_ratio, natural_frequency):
-    """In the modal damping."""
+    """Power dissipated by the modal damping."""
     return 2 * damping_ratio * (2 * pi * natural_frequency) * mass * v**2
 
 

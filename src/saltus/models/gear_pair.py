@@ -66,7 +66,7 @@ def gear_pair(
 
 # -- energy ----------------------------------------------------------------------------------------
 def _stored(t, x, v, *, mesh_mass, mesh_stiffness, stiffness_variation, gap, mesh_frequency):
-    """Of the gears and the teeth as stiff as they are at this time."""
+    """Energy of the gears and of the teeth, with their stiffness at this time."""
     stiffness = mesh_stiffness * (1 + stiffness_variation * cos(2 * pi * mesh_frequency * t))
     return mesh_mass * v**2 / 2 + stiffness * freeplay(x, stiffness=1.0, gap=gap) ** 2 / 2
 
@@ -83,7 +83,7 @@ def _supplied(
     alternating_force,
     mesh_frequency,
 ):
-    """By the two forces, and by whatever stiffens the teeth while they are bent."""
+    """Power of the two forces, and of the change of stiffness while the teeth are bent."""
     w = 2 * pi * mesh_frequency
     stiffening = -mesh_stiffness * stiffness_variation * w * sin(w * t)
     return (mean_force + alternating_force * cos(w * t)) * v + stiffening * freeplay(
@@ -92,7 +92,7 @@ def _supplied(
 
 
 def _dissipated(v, *, mesh_mass, damping_ratio, mesh_stiffness):
-    """In the damping of the mesh."""
+    """Power dissipated by the damping of the mesh."""
     return 2 * damping_ratio * sqrt(mesh_stiffness * mesh_mass) * v**2
 
 

@@ -77,20 +77,22 @@ def jeffcott_rotor(
 
 # -- energy ----------------------------------------------------------------------------------------
 def _stored(x, y, u, v, *, mass, stiffness, gap, stator_stiffness, gravity):
-    """Of the disk, the shaft, the stator, and in the field of gravity."""
+    """Energy of the disk, the shaft and the stator, and in the field of gravity."""
     r = hypot(x, y)
     stator = piecewise((stator_stiffness * (r - gap) ** 2 / 2, r > gap), otherwise=0)
     return mass * (u**2 + v**2) / 2 + stiffness * (x**2 + y**2) / 2 + stator + mass * gravity * y
 
 
 def _supplied(t, u, v, *, mass, eccentricity, speed):
-    """By what keeps the unbalance turning."""
+    """Power that keeps the unbalance rotating."""
     w = 2 * pi * speed
     return mass * eccentricity * w**2 * (cos(w * t) * u + sin(w * t) * v)
 
 
 def _dissipated(x, y, u, v, *, damping, gap, stator_stiffness, friction):
-    """In the damping, and by the friction at the centre: negative where it drives the whirl."""
+    """Power dissipated by the damping, and by the friction at the centre: negative where that
+    drives the whirl.
+    """
     fx, fy = clearance(x, y, stiffness=stator_stiffness, gap=gap, friction=friction)
     nx, ny = clearance(x, y, stiffness=stator_stiffness, gap=gap)
     return damping * (u**2 + v**2) + (fx - nx) * u + (fy - ny) * v

@@ -1,5 +1,5 @@
-"""How a published model is written: its equation, with units, a source and, where the publication
-has them, named cases.
+"""The decorator of published models: an equation with units, a source and, if the publication has
+them, named cases.
 """
 
 from __future__ import annotations
@@ -10,11 +10,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from saltus.errors import ParameterError, among, nearest, shown
+from saltus.errors import ParameterError, among, shown, unknown
 from saltus.system import System, system
 
-#: What the docstring of every model says about its arguments; ``{example}`` is one of its own
-#: parameters.
+#: Docstring section on the arguments of every model; ``{example}`` is one of its own parameters.
 _CALL = """Parameters
 ----------
 {case}**values
@@ -90,9 +89,7 @@ def model(
                 )
             chosen = positional[0] if positional else case
             if cases and not among(chosen, cases):
-                raise ParameterError(
-                    f"{name} has no case {shown(chosen)}. {nearest(chosen, cases)}"
-                )
+                raise unknown(f"{name} has no case", chosen, cases)
             return traced().with_values(**{**(cases[chosen] if cases else {}), **values})
 
         named = (
@@ -129,8 +126,8 @@ def _no_name(name: str, given: Any, parameters: list[str], cases: bool) -> str:
 
 
 def _documented(text: str, first: tuple[str, Any]) -> str:
-    """A model's docstring: what all models say about their arguments stands before the Notes, after
-    what it says itself about its case.
+    """A model's docstring: the section on the arguments is inserted before the Notes, after the
+    model's text about its cases.
     """
     before, notes, rest = text.partition("Notes\n-----\n")
     head, parameters, own = before.partition("Parameters\n----------\n")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -13,12 +14,11 @@ from matplotlib.patches import Patch
 from matplotlib.transforms import ScaledTranslation
 
 from saltus.errors import ParameterError
-from saltus.plot import maps
-from saltus.plot.basins import paint
+from saltus.plot import cells
 from saltus.plot.palette import hues
 from saltus.plot.picture import picture
 from saltus.plot.style import OKABE_ITO, style
-from saltus.results.dataset.schema import AGREEMENT, kind_text
+from saltus.results.dataset.schema import kind_text
 
 #: Colour and name of each value of the agreement; differences are the news.
 _LOOKS = {
@@ -30,12 +30,14 @@ _WHERE = {(True, True): "in both", (True, False): "left only", (False, True): "r
 #: More attractors than this are not named in a legend of their own: the maps of plot.basins do
 #: that.
 _NAMED = 8
+#: Characters of a title that fit above a map.
+_TITLE = 34
 
 
 _NEEDS = ("agreement", "basin_a", "basin_b", "match_a", "match_b", "match_type", "match_period")
 
 
-@picture(AGREEMENT, needs=_NEEDS)
+@picture(needs=_NEEDS)
 def agreement(ds: xr.Dataset, ax: Any = None) -> Any:
     """Two maps of basins side by side, and where they differ; with one Axes only where they differ.
 
@@ -59,57 +61,54 @@ def agreement(ds: xr.Dataset, ax: Any = None) -> Any:
     ParameterError
         If ``ds`` is not from ``sl.compare``, or ``ax`` holds neither one nor three Axes.
     """
-    pair = maps.plane(ds, "agreement")
+    sides = cells.plane(ds, "agreement")
     if ax is None:
         with style():
             _, panels = plt.subplots(1, 3, figsize=(9.0, 3.3), sharex=True, sharey=True)
-            return _three(panels, ds, pair)
+            return _three(panels, ds, sides)
     panels = np.ravel(np.asarray(ax, dtype=object))
     if panels.size not in (1, 3) or not all(isinstance(one, Axes) for one in panels):
         raise ParameterError(
             f"ax={type(ax).__name__}. Give one Axes, or three, such as plt.subplots(1, 3) makes."
         )
     if panels.size == 1:
-        _difference(panels[0], ds, pair)
+        _difference(panels[0], ds, sides)
         return panels[0]
-    return _three(panels, ds, pair)
+    return _three(panels, ds, sides)
 
 
-def _three(panels: np.ndarray, ds: xr.Dataset, pair: tuple[str, str]) -> np.ndarray:
+def _three(panels: np.ndarray, ds: xr.Dataset, sides: cells.Sides) -> np.ndarray:
     """Both maps and their difference."""
-    scales = maps.scale_of(ds, pair[0]), maps.scale_of(ds, pair[1])
     ids, codes = _occurring(ds)
     colors = dict(zip(ids, hues(max(ids, default=-1) + 1)[ids], strict=True))
-    methods = {which: maps.method_text(ds, f"_{which}") for which in "ab"}
+    methods = {which: cells.method_text(ds, f"_{which}") for which in "ab"}
     other = "exact" if any(methods.values()) else ""
     for panel, which in zip(panels, "ab", strict=False):
-        maps.draw_cells(panel, ds, pair, scales, paint(ds[f"basin_{which}"].values, colors))
-        panel.set_title(
-            str(ds.attrs.get(f"name_{which}", methods[which] or other or f"map {which}"))
-        )
-    _difference(panels[2], ds, pair)
+        cells.draw_cells(panel, sides, cells.paint(ds[f"basin_{which}"].values, colors))
+        name = str(ds.attrs.get(f"name_{which}", methods[which] or other or f"map {which}"))
+        panel.set_title(textwrap.fill(name, _TITLE))
+    _difference(panels[2], ds, sides)
     for panel in panels[1:]:
         panel.set_ylabel("")
     handles = (
         [Patch(fc=colors[key], label=_name(ds, key)) for key in ids] if len(ids) <= _NAMED else []
     )
     handles += [
-        Patch(fc=maps.UNSETTLED[code].color, label=maps.UNSETTLED[code].label) for code in codes
+        Patch(fc=cells.UNSETTLED[code].color, label=cells.UNSETTLED[code].label) for code in codes
     ]
     if handles:
         _below(panels[0], handles, columns=2)
     return panels
 
 
-def _difference(ax: Axes, ds: xr.Dataset, pair: tuple[str, str]) -> None:
+def _difference(ax: Axes, ds: xr.Dataset, sides: cells.Sides) -> None:
     """Where the maps differ, with the share that agrees as title."""
-    scales = maps.scale_of(ds, pair[0]), maps.scale_of(ds, pair[1])
     values = ds["agreement"].values
-    table = maps.as_bytes(np.array([to_rgb(_LOOKS[key][0]) for key in (-1, 0, 1)]))
-    maps.draw_cells(ax, ds, pair, scales, table[np.nan_to_num(values, nan=-1).astype(np.int64) + 1])
+    colors = {key: np.array(to_rgb(color)) for key, (color, _) in _LOOKS.items()}
+    cells.draw_cells(ax, sides, cells.paint(np.nan_to_num(values, nan=-1), colors))
     settled = int((values >= 0).sum())
     ax.set_title(
-        f"{maps.share_text((values == 1).sum() / settled)} agree"
+        f"{cells.share_text((values == 1).sum() / settled)} agree"
         if settled
         else "nothing settles in both"
     )
@@ -132,12 +131,12 @@ def _below(ax: Axes, handles: list[Any], columns: int) -> None:
 
 
 def _occurring(ds: xr.Dataset) -> tuple[list[int], list[int]]:
-    """Ids of the attractors and codes of the rest that occur in one of the maps."""
+    """Ids of the attractors and codes of the rest that occur in one of the cells."""
     both = np.concatenate(
         [np.unique(np.nan_to_num(ds[name].values, nan=-4)) for name in ("basin_a", "basin_b")]
     )
     found = np.unique(both).astype(np.int64).tolist()
-    return [key for key in found if key >= 0], [code for code in maps.UNSETTLED if code in found]
+    return [key for key in found if key >= 0], [code for code in cells.UNSETTLED if code in found]
 
 
 def _name(ds: xr.Dataset, key: int) -> str:

@@ -18,15 +18,12 @@ from matplotlib.patches import Rectangle
 from matplotlib.text import Text
 
 from saltus.plot import axes as draw
-from saltus.plot import maps
+from saltus.plot import cells
 from saltus.plot.palette import shades
 from saltus.plot.picture import check, picture
-from saltus.plot.style import QUIET, Scale
-from saltus.results.dataset.schema import BASINS
+from saltus.plot.style import QUIET
 from saltus.units import from_si
 
-#: Shades of a hue; the middle one is the hue itself.
-_LEVELS = 65
 #: Share of the settled starts that may be lighter or darker than the ends of the scale. Without it,
 #: a few late ones would make all others equally light.
 _BEYOND = 0.02
@@ -36,7 +33,7 @@ _DIGIT = 0.64
 _LONG_LEGEND = 14
 
 
-@picture()
+@picture(checks=False)
 def basins(
     ds: xr.Dataset,
     ax: Any = None,
@@ -78,25 +75,19 @@ def basins(
     ParameterError
         If ``ds`` is not from ``sl.basins``, or an argument doesn't fit it.
     """
-    check(ds, [BASINS], ["basin", "attractor", *(["periods_to_settle"] if shade else [])])
-    pair = maps.plane(ds, "basin")
-    colors = maps.colors_of(ds, order)
+    check(ds, ["basin", "attractor", *(["periods_to_settle"] if shade else [])])
+    sides = cells.plane(ds, "basin")
+    colors = cells.colors_of(ds, order)
     settling = _settling(ds) if shade else None
-    scales = maps.scale_of(ds, pair[0]), maps.scale_of(ds, pair[1])
     with draw.panels(ax, 1, (6.3, 3.9)) as (panel,):
-        maps.draw_cells(
-            panel,
-            ds,
-            pair,
-            scales,
-            paint(ds["basin"].values, colors, settling.level(ds) if settling else None),
-        )
+        level = settling.level(ds) if settling else None
+        cells.draw_cells(panel, sides, cells.paint(ds["basin"].values, colors, level))
         if points:
-            _points(panel, ds, pair, scales, colors)
+            _points(panel, ds, sides, colors)
         if legend:
-            _legend(panel, ds, pair, colors, settling, points)
+            _legend(panel, ds, sides, colors, settling, points)
         panel.set_title(
-            ", ".join(filter(None, (_section(ds, pair), maps.method_text(ds)))),
+            ", ".join(filter(None, (_section(ds, sides), cells.method_text(ds)))),
             loc="left",
             fontsize=8,
             color=QUIET,
@@ -104,13 +95,13 @@ def basins(
     return panel
 
 
-def _section(ds: xr.Dataset, pair: tuple[str, str]) -> str:
+def _section(ds: xr.Dataset, sides: cells.Sides) -> str:
     """Where the other states start, in words; empty where there are none."""
     try:
         fixed = {
             name: float(value)
             for name, value in json.loads(ds.attrs.get("at", "{}")).items()
-            if name not in pair
+            if name not in [side.name for side in sides]
         }
     except (ValueError, TypeError, AttributeError):  # of another program
         return ""
@@ -146,7 +137,8 @@ class Settling:
 
     def level(self, ds: xr.Dataset) -> np.ndarray:
         """The shade of each cell, 0 to 64."""
-        return np.round((_LEVELS - 1) * self.share(ds["periods_to_settle"].values)).astype(np.int64)
+        share = self.share(ds["periods_to_settle"].values)
+        return np.round((cells.LEVELS - 1) * share).astype(np.int64)
 
     def ticks(self) -> list[int]:
         """Both ends and the middle of the scale, as many of these as differ."""
@@ -164,40 +156,14 @@ def _settling(ds: xr.Dataset) -> Settling | None:
     return Settling(float(first), float(last)) if last > first else None
 
 
-def paint(
-    basin: np.ndarray, colors: Mapping[int, np.ndarray], level: np.ndarray | None = None
-) -> np.ndarray:
-    """The colour of each cell, uint8, shape (A, B, 3).
-
-    Parameters
-    ----------
-    basin : array, shape (A, B)
-        Attractor ids, and negative codes. NaN, or an id that has no colour, is drawn as not
-        computed.
-    colors : mapping of int to array of shape (3,)
-        The hue of each attractor, sRGB in 0 to 1.
-    level : array of int, shape (A, B), optional
-        Shade of each cell, 0 to 64.
-    """
-    table = np.stack([to_rgb(maps.UNSETTLED[code].color) for code in (-4, -3, -2, -1)])[
-        :, None, :
-    ].repeat(_LEVELS, axis=1)
-    if colors:
-        table = np.concatenate([table, shades(np.stack(list(colors.values())), _LEVELS)])
-    row = {code: code + 4 for code in maps.UNSETTLED} | {key: 4 + i for i, key in enumerate(colors)}
-    codes, where = np.unique(np.nan_to_num(np.asarray(basin), nan=-4), return_inverse=True)
-    rows = np.array([row.get(int(code), 0) for code in codes])[where.reshape(np.shape(basin))]
-    painted: np.ndarray = maps.as_bytes(table)[rows, _LEVELS // 2 if level is None else level]
-    return painted
-
-
 # -- attractors ------------------------------------------------------------------------------------
-def _stroboscopic(ds: xr.Dataset, pair: tuple[str, str], key: int) -> np.ndarray:
+def _stroboscopic(ds: xr.Dataset, sides: cells.Sides, key: int) -> np.ndarray:
     """The points of one attractor in the plane of the map [SI], shape (point, 2)."""
     one = ds.sel(attractor=key)
-    if any(f"attractor_{name}" not in one for name in pair):
+    names = [f"attractor_{side.name}" for side in sides]
+    if any(name not in one for name in names):
         return np.empty((0, 2))
-    both = np.stack([np.ravel(one[f"attractor_{name}"].values) for name in pair], axis=-1)
+    both = np.stack([np.ravel(one[name].values) for name in names], axis=-1)
     finite: np.ndarray = both[np.isfinite(both).all(axis=-1)]
     return finite
 
@@ -205,20 +171,19 @@ def _stroboscopic(ds: xr.Dataset, pair: tuple[str, str], key: int) -> np.ndarray
 def _points(
     ax: Axes,
     ds: xr.Dataset,
-    pair: tuple[str, str],
-    scales: tuple[Scale, Scale],
+    sides: cells.Sides,
     colors: Mapping[int, np.ndarray],
 ) -> None:
     """Every attractor at whole periods; those of many points first, so that a single one is never
     buried.
     """
-    clouds = {key: _stroboscopic(ds, pair, key) for key in colors}
+    clouds = {key: _stroboscopic(ds, sides, key) for key in colors}
     for key in sorted(colors, key=lambda key: -len(clouds[key])):
         cloud = clouds[key]
         if not len(cloud):
             continue
         size = _size(len(cloud), sum(map(len, clouds.values())))
-        at = cloud[:, 0] * scales[0].factor, cloud[:, 1] * scales[1].factor
+        at = cloud.T * [[side.scale.factor] for side in sides]
         edge = 1.0 if size > 4 else 0.3
         draw.draw_points(
             ax, *at, marker="o", ms=size + edge + 0.9, mfc="#222222", mec="none", zorder=4
@@ -342,7 +307,7 @@ def _apart(
 def _legend(
     ax: Axes,
     ds: xr.Dataset,
-    pair: tuple[str, str],
+    sides: cells.Sides,
     colors: Mapping[int, np.ndarray],
     settling: Settling | None,
     points: bool,
@@ -360,10 +325,10 @@ def _legend(
                 strict=True,
             )
         )
-    named = [key for key in colors if shares.get(key) or _inside(ds, pair, key)]
-    texts = _texts(ds, pair, named, shares)
+    named = [key for key in colors if shares.get(key) or _inside(ds, sides, key)]
+    texts = _texts(ds, sides, named, shares)
     handles: list[Any] = [
-        _Ramp(shades(colors[key][None], _LEVELS if settling else 1)[0][::2]) for key in named
+        _Ramp(shades(colors[key][None], cells.LEVELS if settling else 1)[0][::2]) for key in named
     ]
     if settling and named:
         ticks = settling.ticks()
@@ -375,11 +340,11 @@ def _legend(
             )
         )
         texts.append(f"shade: {'periods' if every is None else 's'} to settle")
-    for code, unsettled in maps.UNSETTLED.items():
+    for code, unsettled in cells.UNSETTLED.items():
         if code in shares:
             handles.append(_Ramp(np.array([to_rgb(unsettled.color)])))
-            texts.append(f"{unsettled.label}, {maps.share_text(shares[code])}")
-    if points and colors and any(len(_stroboscopic(ds, pair, key)) for key in colors):
+            texts.append(f"{unsettled.label}, {cells.share_text(shares[code])}")
+    if points and colors and any(len(_stroboscopic(ds, sides, key)) for key in colors):
         handles.append(
             Line2D([], [], ls="none", marker="o", ms=5, mfc="#BBBBBB", mec="#222222", mew=0.7)
         )
@@ -402,34 +367,27 @@ def _legend(
 
 
 def _texts(
-    ds: xr.Dataset, pair: tuple[str, str], ids: Sequence[int], shares: Mapping[int, float]
+    ds: xr.Dataset, sides: cells.Sides, ids: Sequence[int], shares: Mapping[int, float]
 ) -> list[str]:
     """Each attractor in words, with its share of the cells; equal ones with their peaks."""
-    names = [maps.describe(ds.sel(attractor=key)) for key in ids]
+    names = [cells.describe(ds.sel(attractor=key)) for key in ids]
     texts = []
     for key, name in zip(ids, names, strict=True):
         one = ds.sel(attractor=key)
         if names.count(name) > 1 and "attractor_peak" in one:
-            name = f"{name}, {maps.peak_text(one)}"
-        share = maps.share_text(shares[key]) if shares.get(key) else "no start"
+            name = f"{name}, {cells.peak_text(one)}"
+        share = cells.share_text(shares[key]) if shares.get(key) else "no start"
         outside = (
             ", outside the map"
-            if len(_stroboscopic(ds, pair, key)) and not _inside(ds, pair, key)
+            if len(_stroboscopic(ds, sides, key)) and not _inside(ds, sides, key)
             else ""
         )
         texts.append(f"{name}, {share}{outside}")
     return texts
 
 
-def _inside(ds: xr.Dataset, pair: tuple[str, str], key: int) -> bool:
+def _inside(ds: xr.Dataset, sides: cells.Sides, key: int) -> bool:
     """Whether a point of the attractor lies in the map, where it can be drawn."""
-    cloud = _stroboscopic(ds, pair, key)
-    limits = [maps.edges(ds[name].values) for name in pair]
-    return bool(
-        np.logical_and.reduce(
-            [
-                (cloud[:, i] >= edge.min()) & (cloud[:, i] <= edge.max())
-                for i, edge in enumerate(limits)
-            ]
-        ).any()
-    )
+    cloud = _stroboscopic(ds, sides, key) * [side.scale.factor for side in sides]
+    low, high = zip(*((side.edges.min(), side.edges.max()) for side in sides), strict=True)
+    return bool(((cloud >= low) & (cloud <= high)).all(axis=1).any())

@@ -10,15 +10,15 @@ import xarray as xr
 from matplotlib import patheffects
 from matplotlib.axes import Axes
 
-from saltus.errors import ParameterError, shown
+from saltus.errors import shown
 from saltus.plot import axes as draw
+from saltus.plot import cells
 from saltus.plot import response_points as points
-from saltus.plot.picture import caller, check, picture
+from saltus.plot.picture import PictureError, caller, check, picture
 from saltus.plot.response_points import MARKS
 from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
 from saltus.plot.type_map import type_map
-from saltus.results.dataset import schema
-from saltus.results.dataset.schema import parameters_of, period_text, point_name
+from saltus.results.dataset.schema import RESPONSES, parameters_of, period_text, point_name
 
 #: Name and marker of the points of codimension two.
 _POINTS = {
@@ -34,7 +34,7 @@ _POINTS = {
 }  # fmt: skip
 
 
-@picture()
+@picture(checks=False)
 def bifurcation_curves(
     curves: Any, *, over: xr.Dataset | None = None, legend: bool = True, ax: Any = None
 ) -> Axes:
@@ -66,10 +66,10 @@ def bifurcation_curves(
     first = named[0][1]
     pair = first.attrs["parameter_x"], first.attrs["parameter_y"]
     if over is not None:
-        check(over, (schema.RESPONSES,), ("type", "period", "response_of"))
+        check(over, ("type", "period", "response_of"), kinds=[RESPONSES], argument="over")
         below = parameters_of(over)
         if len(below) != 2 or set(below) != set(pair):
-            raise ParameterError(
+            raise PictureError(
                 f"{caller()}: the curves are over {' and '.join(pair)}, the map in over= is over "
                 f"{' and '.join(below)}."
             )
@@ -98,13 +98,13 @@ def _named(curves: Any) -> list[tuple[str, xr.Dataset]]:
         given = curves if isinstance(curves, Sequence) else [curves]
         named = [("", ds) for ds in given]
     if not named:
-        raise ParameterError(f"{caller()} has no curves to draw: {shown(curves)}.")
+        raise PictureError(f"{caller()} has no curves to draw: {shown(curves)}.")
     for _, ds in named:
-        check(ds, (schema.CURVE,))
+        check(ds)
     pairs = {frozenset((ds.attrs["parameter_x"], ds.attrs["parameter_y"])) for _, ds in named}
     if len(pairs) > 1:
         texts = sorted(" and ".join(sorted(pair)) for pair in pairs)
-        raise ParameterError(
+        raise PictureError(
             f"{caller()}: the curves are over different parameters: {'; '.join(texts)}. Draw them "
             "apart."
         )
@@ -121,8 +121,7 @@ def _scale(name: str, named: list[tuple[str, xr.Dataset]], over: xr.Dataset | No
     """Unit in which a parameter is shown."""
     unit = named[0][1][point_name(name)].attrs.get("units", "")
     if over is not None:
-        values = over[name].values
-        return points.parameter_scale(values, unit, points.is_log(values))
+        return cells.parameter(over, name).scale
     return display_scale(unit, max(abs(end) for end in _limits(name, named, Scale(1.0, unit))))
 
 

@@ -4,32 +4,43 @@ from __future__ import annotations
 
 import xarray as xr
 
+from saltus.results.dataset import schema
 from saltus.results.dataset.schema import kind_of, parameters_of
 
-#: The functions of saltus.plot that draw each kind of result, the usual one first.
-PICTURES: dict[str, tuple[str, ...]] = {
-    "trajectory": ("history", "phase"),
-    "stroboscope": ("phase",),
-    "basins": ("basins",),
-    "agreement": ("agreement",),
-    "responses": ("frequency_response", "bifurcation_diagram", "type_map"),
-    "section": ("section",),
-    "spectrum": ("spectrum",),
-    "impacts": ("impacts",),
-    "energy": ("energy",),
-    "methods": ("methods",),
-    "exponents": ("exponents",),
-    "branches": ("branches",),
-    "orbits": ("periodic_orbits",),
-    "bifurcation_curve": ("bifurcation_curves",),
-    "backbone": ("backbone",),
+#: The kinds of result that each picture draws; of the pictures of one kind the usual one is first.
+TAKES: dict[str, tuple[str, ...]] = {
+    "history": (schema.TRAJECTORY,),
+    "phase": (schema.TRAJECTORY, schema.STROBOSCOPE),
+    "basins": (schema.BASINS,),
+    "gallery": (schema.BASINS, schema.ATTRACTORS),
+    "agreement": (schema.AGREEMENT,),
+    "frequency_response": (schema.RESPONSES,),
+    "bifurcation_diagram": (schema.RESPONSES,),
+    "type_map": (schema.RESPONSES,),
+    "section": (schema.SECTION,),
+    "spectrum": (schema.SPECTRUM,),
+    "impacts": (schema.IMPACTS,),
+    "energy": (schema.ENERGY,),
+    "methods": (schema.METHODS,),
+    "exponents": (schema.EXPONENTS,),
+    "branches": (schema.BRANCHES,),
+    "periodic_orbits": (schema.ORBITS,),
+    "bifurcation_curves": (schema.CURVE,),
+    "backbone": (schema.BACKBONE,),
 }
+#: Pictures that take more than one result.
+_OF_SEVERAL = ("gallery",)
+
+
+def pictures_of(kind: str) -> tuple[str, ...]:
+    """Names of the pictures of a result of this kind alone, the usual one first."""
+    return tuple(name for name, kinds in TAKES.items() if kind in kinds and name not in _OF_SEVERAL)
 
 
 def default_kind(ds: xr.Dataset) -> str:
     """The picture that fits a result; ``""`` if there is none."""
-    if kind_of(ds) == "responses":
+    if kind_of(ds) == schema.RESPONSES:
         if len(parameters_of(ds)) == 2:
             return "type_map"
         return "bifurcation_diagram" if "sample" in ds.dims else "frequency_response"
-    return next(iter(PICTURES.get(kind_of(ds), ())), "")
+    return next(iter(pictures_of(kind_of(ds))), "")

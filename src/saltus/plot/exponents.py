@@ -13,14 +13,14 @@ from saltus.plot import axes as draw
 from saltus.plot import selection
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
-from saltus.results.dataset.schema import EXPONENTS, kind_text
+from saltus.results.dataset.schema import kind_text
 
 #: Share of the time at the beginning whose running means aren't shown: they start anywhere, with
 #: intervals beyond any frame.
 _EARLY = 0.1
 
 
-@picture(EXPONENTS)
+@picture()
 def exponents(
     ds: xr.Dataset,
     trajectory: int | Sequence[int] | None = None,

@@ -16,10 +16,10 @@ from matplotlib.transforms import ScaledTranslation
 
 from saltus.errors import ParameterError
 from saltus.plot import axes as draw
-from saltus.plot import maps, selection
+from saltus.plot import cells, selection
 from saltus.plot.history import history
 from saltus.plot.phase import phase
-from saltus.plot.picture import caller, check, picture
+from saltus.plot.picture import PictureError, caller, check, picture
 from saltus.plot.style import display_scale, style
 from saltus.results.dataset import schema
 
@@ -34,9 +34,7 @@ _ELSEWHERE = "#D2D2D2"
 _NARROWEST = 0.25
 
 
-@picture(
-    schema.BASINS, schema.ATTRACTORS, needs=("attractor", "attractor_period", "attractor_contacts")
-)
+@picture(needs=("attractor", "attractor_period", "attractor_contacts"))
 def gallery(
     ds: xr.Dataset,
     runs: xr.Dataset,
@@ -70,8 +68,8 @@ def gallery(
         If ``ds`` or ``runs`` is something else, they don't fit one another, or there is nothing to
         show.
     """
-    check(runs, [schema.TRAJECTORY])
-    colors = maps.colors_of(ds, order)
+    check(runs, kinds=[schema.TRAJECTORY], argument="runs")
+    colors = cells.colors_of(ds, order)
     ids = _chosen(runs, list(colors), attractors)
     pair = _pair(runs)
     columns = (
@@ -110,7 +108,7 @@ def _chosen(runs: xr.Dataset, ids: list[int], attractors: Any) -> list[int]:
         )
     if not 0 < len(chosen) <= _MOST:
         some = " Choose, such as attractors=[0, 1]." if ids else " Nothing settled in this Dataset."
-        raise ParameterError(f"{caller()} shows 1 to {_MOST} attractors, not {len(chosen)}.{some}")
+        raise PictureError(f"{caller()} shows 1 to {_MOST} attractors, not {len(chosen)}.{some}")
     held = runs["trajectory"].values.tolist() if "trajectory" in runs.dims else [0]
     lacking = [one for one in chosen if one not in held]
     if lacking:
@@ -241,11 +239,11 @@ def title_of(ds: xr.Dataset, key: int) -> str:
     the starts``.
     """
     one = ds.sel(attractor=key)
-    parts = [maps.describe(one), _stability(one)]
+    parts = [cells.describe(one), _stability(one)]
     if "attractor_peak" in one:
-        parts.append(maps.peak_text(one))
+        parts.append(cells.peak_text(one))
     if "attractor_fraction" in one and math.isfinite(float(one["attractor_fraction"])):
-        parts.append(f"{maps.share_text(float(one['attractor_fraction']))} of the starts")
+        parts.append(f"{cells.share_text(float(one['attractor_fraction']))} of the starts")
     return ", ".join(part for part in parts if part)
 
 

@@ -16,7 +16,6 @@ from saltus.plot import regions, selection
 from saltus.plot.picture import picture
 from saltus.plot.style import OKABE_ITO, QUIET, Scale, display_scale
 from saltus.results.dataset.schema import (
-    TRAJECTORY,
     contact_name,
     equations_of,
     forcing_period,
@@ -34,7 +33,7 @@ _MARKERS: dict[str, dict[str, Any]] = {
 _MOST_MARKED = 120
 
 
-@picture(TRAJECTORY)
+@picture()
 def history(
     run: xr.Dataset,
     trajectory: int | Sequence[int] | None = None,

@@ -14,7 +14,6 @@ from saltus.plot import axes as draw
 from saltus.plot import selection
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
-from saltus.results.dataset.schema import ENERGY, IMPACTS
 
 #: Speeds of a guard that are equal to this share of the largest are one speed; the most speeds of a
 #: motion that repeats, and how often each must be seen.
@@ -23,7 +22,7 @@ _SAME, _MOST_SPEEDS, _REPEATED = 1e-7, 6, 3
 _LINE = 60
 
 
-@picture(IMPACTS)
+@picture()
 def impacts(
     ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, legend: bool = True
 ) -> Axes:
@@ -111,7 +110,7 @@ def _in_words(ds: xr.Dataset, labels: np.ndarray | None, counts: xr.DataArray, s
     return "\n".join(["The speeds at contact repeat.", *lines])
 
 
-@picture(ENERGY)
+@picture()
 def energy(
     ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, legend: bool = True
 ) -> Axes:

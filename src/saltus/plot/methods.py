@@ -11,13 +11,11 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogFormatter
 
-from saltus.errors import ParameterError
 from saltus.intervals import wilson
 from saltus.plot import axes as draw
-from saltus.plot.picture import caller, picture
+from saltus.plot.picture import PictureError, caller, picture
 from saltus.plot.response_points import is_log, parameter_scale
 from saltus.plot.style import CYCLE
-from saltus.results.dataset.schema import METHODS
 
 #: Pieces of the axis over which medians and shares are taken: the eye can't follow 2000 values, and
 #: a share needs some dozen.
@@ -27,7 +25,7 @@ PIECES = 30
 FEW, STEPS = 100, 8
 
 
-@picture(METHODS)
+@picture()
 def methods(ds: xr.Dataset, *, ax: Any = None) -> list[Axes]:
     """What a method does to steady responses, against one parameter: three panels, the first method
     of ``ds`` being the reference.
@@ -55,7 +53,7 @@ def methods(ds: xr.Dataset, *, ax: Any = None) -> list[Axes]:
         If ``ds`` is something else.
     """
     if "step_error" not in ds or ds["step_error"].ndim != 2:
-        raise ParameterError(
+        raise PictureError(
             f"{caller()} draws responses over one parameter. For basins draw plot.agreement, for "
             f"two parameters select one."
         )

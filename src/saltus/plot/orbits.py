@@ -11,17 +11,17 @@ from matplotlib.axes import Axes
 
 from saltus.errors import ParameterError, nearest, shown
 from saltus.plot import axes as draw
-from saltus.plot import maps
+from saltus.plot import cells
 from saltus.plot.basins import basins
-from saltus.plot.picture import picture
+from saltus.plot.picture import check, picture
 from saltus.plot.style import CYCLE, display_scale
-from saltus.results.dataset.schema import BASINS, ORBITS, check, kind_text, orbit_name, states_of
+from saltus.results.dataset.schema import BASINS, kind_text, orbit_name, states_of
 
 #: Orbits that are named in the legend.
 _NAMED = 14
 
 
-@picture(ORBITS)
+@picture()
 def periodic_orbits(
     ds: xr.Dataset,
     x: str | None = None,
@@ -75,7 +75,7 @@ def periodic_orbits(
             panel.set_ylabel(scales[1].label(pair[1]))
         else:
             basins(over, ax=panel, legend=False, points=False)
-            scales = tuple(maps.scale_of(over, name) for name in pair)
+            scales = tuple(side.scale for side in cells.plane(over, "basin"))
         for i in range(ds.sizes["orbit"]):
             _orbit(panel, ds.isel(orbit=i), pair, scales, i, over is not None)
         if legend and ds.sizes["orbit"]:
@@ -92,8 +92,9 @@ def _pair(ds: xr.Dataset, x: str | None, y: str | None, over: xr.Dataset | None)
                 f"these orbits have no state {shown(name)}. {nearest(name, known)}"
             )
     if over is not None:
-        check(over, caller="plot.periodic_orbits(over=)", kinds=(BASINS,))
-        pair = maps.plane(over, "basin")
+        check(over, kinds=[BASINS], argument="over")
+        first, second = (side.name for side in cells.plane(over, "basin"))
+        pair = first, second
         if any(name not in known for name in pair) or (x or pair[0], y or pair[1]) != pair:
             raise ParameterError(
                 f"over is a map of {pair[0]} and {pair[1]}. Leave x and y out, and give orbits of "

@@ -14,7 +14,7 @@ from saltus.plot import axes as draw
 from saltus.plot import regions, selection
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
-from saltus.results.dataset.schema import STROBOSCOPE, TRAJECTORY, kind_of, states_of
+from saltus.results.dataset.schema import STROBOSCOPE, kind_of, states_of
 
 #: Without `periods` the last part of a forced run is shown: transients of lightly damped systems
 #: have mostly gone by then (of the rig with 3 % damping after 40 periods, at 15 Hz), and
@@ -22,7 +22,7 @@ from saltus.results.dataset.schema import STROBOSCOPE, TRAJECTORY, kind_of, stat
 SETTLED_SHARE = 0.3
 
 
-@picture(TRAJECTORY, STROBOSCOPE)
+@picture()
 def phase(
     run: xr.Dataset,
     trajectory: int | Sequence[int] | None = None,

@@ -18,27 +18,23 @@ from matplotlib.text import Text
 
 from saltus.arguments import checked
 from saltus.errors import ParameterError
+from saltus.plot.choice import TAKES, pictures_of
 from saltus.results.dataset import schema
 from saltus.results.dataset.reader import reader
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
-#: What draws each kind of result.
-_PICTURES = {
-    schema.BASINS: "plot.basins",
-    schema.AGREEMENT: "plot.agreement",
-    schema.TRAJECTORY: "plot.history or plot.phase",
-    schema.STROBOSCOPE: "plot.phase",
-    schema.RESPONSES: "plot.frequency_response, plot.bifurcation_diagram or plot.type_map",
-    schema.BRANCHES: "plot.branches",
-    schema.CURVE: "plot.bifurcation_curves",
-    schema.BACKBONE: "plot.backbone",
-}
-_NAME: ContextVar[str] = ContextVar("name", default="the picture")
+_NAME: ContextVar[str] = ContextVar("name", default="")
 
 
-def picture(*kinds: str, needs: Sequence[str] = ()) -> Callable[[Callable[P, R]], Callable[P, R]]:
+class PictureError(ParameterError):
+    """A picture can't be drawn; the message begins with its name."""
+
+
+def picture(
+    *, needs: Sequence[str] = (), checks: bool = True
+) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Make a function that draws Axes or a Figure a public picture.
 
     Names of maps, outputs and boundaries may hold dollar signs. What is a formula between two of
@@ -46,37 +42,38 @@ def picture(*kinds: str, needs: Sequence[str] = ()) -> Callable[[Callable[P, R]]
 
     Parameters
     ----------
-    *kinds : str
-        Kinds of Dataset (:data:`saltus.results.schema.MAKERS`) that the first argument may be.
-        Without any, the function checks itself.
     needs : sequence of str
-        Variables that it must hold, besides those of its kind.
+        Variables that the first argument must hold, besides those of its kind.
+    checks : bool
+        Whether the first argument must be a Dataset that the picture draws
+        (:data:`saltus.plot.choice.TAKES`); otherwise the function calls :func:`check` itself.
     """
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
         def check_and_draw(*args: P.args, **kwargs: P.kwargs) -> R:
-            if kinds:
-                check(args[0] if args else next(iter(kwargs.values())), kinds, needs)
+            if checks:
+                check(args[0] if args else next(iter(kwargs.values())), needs)
             return function(*args, **kwargs)
 
-        draw = checked(reader(functools.wraps(function)(check_and_draw)))
+        draw = reader(functools.wraps(function)(check_and_draw))
 
         @functools.wraps(function)
         def drawn(*args: P.args, **kwargs: P.kwargs) -> R:
-            token = _NAME.set(f"plot.{function.__name__}")
+            token = _NAME.set(function.__name__)
             try:
                 result = draw(*args, **kwargs)
-            except ParameterError as error:
-                if not str(error).startswith("plot."):
-                    error.args = (f"{_NAME.get()}: {error}",)
+            except PictureError:
                 raise
+            except ParameterError as error:
+                named = PictureError(f"{caller()}: {error}")
+                raise named.with_traceback(error.__traceback__) from error.__cause__
             finally:
                 _NAME.reset(token)
             for one in np.ravel(np.asarray(result, dtype=object)):
                 keep_drawable(one)
             return result
 
-        return drawn
+        return checked(drawn)
 
     return decorate
 
@@ -85,27 +82,45 @@ def caller() -> str:
     """The name of the picture that is being drawn, such as ``plot.history``: the subject of its
     messages.
     """
-    return _NAME.get()
+    return f"plot.{_NAME.get()}"
 
 
-def check(ds: Any, kinds: Sequence[str], needs: Sequence[str] = ()) -> None:
-    """Raise a ParameterError unless ``ds`` is a Dataset of one of these kinds and holds these
+def check(
+    ds: Any, needs: Sequence[str] = (), *, kinds: Sequence[str] = (), argument: str = ""
+) -> None:
+    """Raise a PictureError unless ``ds`` is a Dataset of one of these kinds and holds these
     variables.
+
+    Parameters
+    ----------
+    ds : Any
+        What was given.
+    needs : sequence of str
+        Variables.
+    kinds : sequence of str, optional
+        By default those that the picture draws.
+    argument : str, optional
+        Argument that it was given as, if it isn't the first one.
     """
-    kind = schema.kind_of(ds)
+    of = f"{caller()}({argument}=)" if argument else caller()
+    wanted, kind = tuple(kinds) or TAKES[_NAME.get()], schema.kind_of(ds)
     try:
-        schema.check(ds, caller=caller(), kinds=kinds)
+        schema.check(ds, caller=of, kinds=wanted)
     except ParameterError as error:
-        better = (
-            f" Draw it with {_PICTURES[kind]}." if kind not in kinds and kind in _PICTURES else ""
-        )
-        raise ParameterError(f"{error}{better}") from None
+        others = [f"plot.{name}" for name in pictures_of(kind)] if kind not in wanted else []
+        better = f" Draw it with {_either(others)}." if others else ""
+        raise PictureError(f"{error}{better}") from None
     missing = [one for one in needs if one not in ds.variables]
     if missing:
-        raise ParameterError(
-            f"{caller()} misses {', '.join(missing)} in this Dataset. Give it the whole Dataset, "
-            f"not some variables of it."
+        raise PictureError(
+            f"{of} misses {', '.join(missing)} in this Dataset. Give it the whole Dataset, not "
+            f"some variables of it."
         )
+
+
+def _either(names: Sequence[str]) -> str:
+    """``a``; ``a or b``; ``a, b or c``."""
+    return " or ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
 def keep_drawable(artist: Artist) -> None:

@@ -15,10 +15,10 @@ from matplotlib.lines import Line2D
 
 from saltus.errors import ParameterError
 from saltus.plot import motion_colors
-from saltus.plot.picture import caller, check
+from saltus.plot.picture import PictureError, caller, check
 from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
 from saltus.results.dataset.kinds import WITHOUT_WORDS
-from saltus.results.dataset.schema import RESPONSES, event_name, parameters_of, response_name
+from saltus.results.dataset.schema import event_name, parameters_of, point_name, response_name
 
 #: What a picture of responses takes: a Dataset, or several by their names.
 Source = xr.Dataset | Mapping[str, xr.Dataset]
@@ -55,7 +55,7 @@ class Shown:
     Attributes
     ----------
     ds : Dataset
-        With these responses only.
+        With these responses only; or branches alone.
     axis : str
         The parameter that they are drawn over.
     place : array of int, shape (response,)
@@ -77,9 +77,22 @@ class Shown:
         """Value of the parameter at each response [SI]."""
         return np.asarray(self.ds[response_name(self.axis)].values, dtype=float)
 
+    @property
+    def grid(self) -> np.ndarray:
+        """Values of the parameter [SI]; of branches alone the ends of its range."""
+        if self.axis in self.ds:
+            return np.asarray(self.ds[self.axis].values, dtype=float)
+        return np.array([self.ds.attrs[f"parameter_{end}"] for end in ("low", "high")])
+
+    @property
+    def unit(self) -> str:
+        """Unit of the parameter."""
+        known = self.ds[self.axis if self.axis in self.ds else point_name(self.axis)]
+        return str(known.attrs.get("units", ""))
+
 
 # -- which responses -------------------------------------------------------------------------------
-def shown(source: Any, needs: Sequence[str]) -> list[Shown]:
+def shown(source: Any) -> list[Shown]:
     """The Datasets to draw, each with the responses that are left in it.
 
     Raises
@@ -96,11 +109,11 @@ def shown(source: Any, needs: Sequence[str]) -> list[Shown]:
             "{'exact': a, 'ode45': b}."
         )
     if len(named) > len(MARKERS):
-        raise ParameterError(
+        raise PictureError(
             f"{caller()} tells {len(MARKERS)} Datasets apart, not {len(named)}. "
             f"Draw them in several pictures."
         )
-    found = [_of(ds, str(name), i, needs) for i, (name, ds) in enumerate(named.items())]
+    found = [_of(ds, str(name), i) for i, (name, ds) in enumerate(named.items())]
     if len({one.axis for one in found}) > 1:
         raise ParameterError(
             f"these are over {', '.join(sorted({one.axis for one in found}))}. "
@@ -109,8 +122,8 @@ def shown(source: Any, needs: Sequence[str]) -> list[Shown]:
     return found
 
 
-def _of(ds: Any, name: str, rank: int, needs: Sequence[str]) -> Shown:
-    check(ds, [RESPONSES], [*NEEDS, *needs])
+def _of(ds: Any, name: str, rank: int) -> Shown:
+    check(ds, NEEDS)
     axes = parameters_of(ds)
     if len(axes) != 1:
         over = (
@@ -121,7 +134,7 @@ def _of(ds: Any, name: str, rank: int, needs: Sequence[str]) -> Shown:
             if axes
             else "no parameter"
         )
-        raise ParameterError(
+        raise PictureError(
             f"{caller()} draws responses over one parameter; this Dataset has {over}."
         )
     left = select(ds)
@@ -183,9 +196,9 @@ def parameter_scale(values: np.ndarray, unit: str, log: bool) -> Scale:
 def parameter_axis(ax: Axes, datasets: Sequence[Shown]) -> Scale:
     """Name, limits and scale of the horizontal axis; returns its display unit."""
     name = datasets[0].axis
-    grids = [np.asarray(one.ds[name].values, dtype=float) for one in datasets]
+    grids = [one.grid for one in datasets]
     values, log = np.concatenate(grids), all(is_log(grid) for grid in grids)
-    scale = parameter_scale(values, datasets[0].ds[name].attrs.get("units", ""), log)
+    scale = parameter_scale(values, datasets[0].unit, log)
     if log:
         ax.set_xscale("log")
     if np.ptp(values) > 0:
@@ -196,14 +209,6 @@ def parameter_axis(ax: Axes, datasets: Sequence[Shown]) -> Scale:
         ax.set_xlim(low, high)
     ax.set_xlabel(scale.label(name.replace("_", " ")))
     return scale
-
-
-def state_scale(arrays: Sequence[xr.DataArray]) -> Scale:
-    """Display unit of a variable, over all Datasets."""
-    largest = max(
-        (float(np.nanmax(np.abs(one.values), initial=0.0)) for one in arrays), default=0.0
-    )
-    return display_scale(arrays[0].attrs.get("units", ""), largest)
 
 
 # -- colours and legend ----------------------------------------------------------------------------

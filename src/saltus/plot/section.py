@@ -14,7 +14,7 @@ from saltus.plot import axes as draw
 from saltus.plot import regions, selection
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
-from saltus.results.dataset.schema import SECTION, states_of
+from saltus.results.dataset.schema import states_of
 
 #: What can stand on an axis besides the states: variable and name.
 _OTHERS = {
@@ -25,7 +25,7 @@ _OTHERS = {
 _DIRECTIONS = {1: (OKABE_ITO["blue"], "upwards"), -1: (OKABE_ITO["vermillion"], "downwards")}
 
 
-@picture(SECTION)
+@picture()
 def section(
     ds: xr.Dataset,
     x: str | None = None,

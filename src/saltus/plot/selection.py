@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.errors import ParameterError, among, nearest, shown
-from saltus.plot.picture import caller
+from saltus.plot.picture import PictureError, caller
 from saltus.results.dataset.schema import (
     before_name,
     contact_name,
@@ -63,7 +63,7 @@ def chosen(run: xr.Dataset, trajectory: Any) -> list[int]:
             f"there is no trajectory {shown(strange[0])}; this run has {_span(known)}."
         )
     if not 0 < len(labels) <= MOST:
-        raise ParameterError(
+        raise PictureError(
             f"{caller()} shows 1 to {MOST} trajectories, not {len(labels)}. "
             f"Choose, such as trajectory=[{known[0]}]."
         )

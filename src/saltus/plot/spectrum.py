@@ -14,7 +14,7 @@ from saltus.plot import axes as draw
 from saltus.plot import selection
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
-from saltus.results.dataset.schema import SPECTRUM, states_of
+from saltus.results.dataset.schema import states_of
 
 #: The picture reaches down to this share of the largest amplitude, and up to the last frequency
 #: that has so much; the rest is what sampling folds back.
@@ -23,7 +23,7 @@ _SHOWN = 1e-5
 _ORDERS = 5.0
 
 
-@picture(SPECTRUM)
+@picture()
 def spectrum(
     ds: xr.Dataset,
     state: str | None = None,

@@ -12,12 +12,10 @@ from matplotlib.patches import Patch
 
 from saltus.errors import ParameterError, shown
 from saltus.plot import axes as draw
-from saltus.plot import maps, motion_colors
-from saltus.plot import response_points as points
-from saltus.plot.picture import caller, picture
-from saltus.plot.style import Scale
+from saltus.plot import cells, motion_colors
+from saltus.plot.picture import PictureError, caller, picture
 from saltus.results.dataset.kinds import Kind
-from saltus.results.dataset.schema import RESPONSES, parameters_of, start_name, states_of
+from saltus.results.dataset.schema import parameters_of, start_name, states_of
 from saltus.units import from_si
 
 #: Where a start settles to nothing: white and pale greys, as chaos is dark.
@@ -28,11 +26,11 @@ _PALE = {
     Kind.NOT_COMPUTED: "#F3F3F3",
 }
 _UNSETTLED: dict[int, tuple[str, str]] = {
-    code: (maps.UNSETTLED[code].label, color) for code, color in _PALE.items()
+    code: (cells.UNSETTLED[code].label, color) for code, color in _PALE.items()
 }
 
 
-@picture(RESPONSES, needs=("type", "period", "response_of"))
+@picture(needs=("type", "period", "response_of"))
 def type_map(ds: xr.Dataset, *, start: int = 0, legend: bool = True, ax: Any = None) -> Axes:
     """Kind of motion over two parameters: a hue for each period, grey for motion that never
     repeats, chaos dark.
@@ -62,18 +60,20 @@ def type_map(ds: xr.Dataset, *, start: int = 0, legend: bool = True, ax: Any = N
     """
     pair = parameters_of(ds)
     if len(pair) != 2:
-        raise ParameterError(
+        raise PictureError(
             f"{caller()} draws two parameters, this Dataset has {', '.join(pair) or 'none'}. See "
             f"plot.bifurcation_diagram."
         )
-    one = _of_start(ds, start)
+    one = _of_start(ds, start).transpose(*pair, ...)
     code = np.where(
         one["response_of"].values < 0,
         one["response_of"].values,
         motion_colors.codes(one["type"].values, one["period"].values),
     )
+    sides = cells.parameter(ds, pair[0]), cells.parameter(ds, pair[1])
     with draw.panels(ax, 1, (5.8, 3.9)) as (panel,):
-        _cells(panel, ds, (pair[0], pair[1]), code)
+        colors = {key: _color(key) for key in _order(code)}
+        cells.draw_cells(panel, sides, cells.paint(code, colors))
         panel.set_title(_title(ds, start))
         if legend:
             handles = [_handle(key, code, one["period"].values) for key in _order(code)]
@@ -98,41 +98,6 @@ def _of_start(ds: xr.Dataset, start: int) -> xr.Dataset:
     return ds.sel(start=start)
 
 
-def _cells(ax: Axes, ds: xr.Dataset, pair: tuple[str, str], code: np.ndarray) -> None:
-    """Colour every cell; log axes get cells of even width there."""
-    logs = [points.is_log(ds[name].values) for name in pair]
-    scales = [
-        points.parameter_scale(ds[name].values, ds[name].attrs.get("units", ""), log)
-        for name, log in zip(pair, logs, strict=True)
-    ]
-    colors = np.zeros((*code.shape, 3), dtype=np.uint8)
-    for key in _order(code):
-        colors[code == key] = maps.as_bytes(_color(key))
-    if any(logs):
-        x, y = (
-            _edges(ds[name].values * scale.factor, log)
-            for name, scale, log in zip(pair, scales, logs, strict=True)
-        )
-        ax.pcolormesh(x, y, np.ascontiguousarray(colors.swapaxes(0, 1)), zorder=0, rasterized=True)
-        for set_scale, log in zip((ax.set_xscale, ax.set_yscale), logs, strict=True):
-            set_scale("log" if log else "linear")
-        ax.set_xlim(x[0], x[-1])
-        ax.set_ylim(y[0], y[-1])
-        _name(ax, pair, scales)
-    else:
-        maps.draw_cells(ax, ds.transpose(*pair, ...), pair, (scales[0], scales[1]), colors)
-        _name(ax, pair, scales)
-
-
-def _edges(values: np.ndarray, log: bool) -> np.ndarray:
-    return np.exp(maps.edges(np.log(values))) if log else maps.edges(values)
-
-
-def _name(ax: Axes, pair: tuple[str, str], scales: list[Scale]) -> None:
-    ax.set_xlabel(scales[0].label(pair[0].replace("_", " ")))
-    ax.set_ylabel(scales[1].label(pair[1].replace("_", " ")))
-
-
 def _order(code: np.ndarray) -> list[int]:
     """Kinds in the order of the legend: by period, then what never repeats, then what never
     settles.
@@ -151,7 +116,7 @@ def _handle(key: int, code: np.ndarray, period: np.ndarray) -> Patch:
         fc=_color(key),
         ec="#999999",
         lw=0.4,
-        label=f"{name}, {maps.share_text(float((code == key).mean()))}",
+        label=f"{name}, {cells.share_text(float((code == key).mean()))}",
     )
 
 

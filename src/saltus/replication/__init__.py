@@ -1,4 +1,4 @@
-"""Replications: a published paper's figures drawn again, and each of its claims held against the
+"""Replications: the figures of a published paper drawn again, and its claims tested against the
 data, by one command.
 
 A paper is a folder of study files, *jobs* (each gives one Dataset, kept as a study keeps its

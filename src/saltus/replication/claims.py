@@ -1,5 +1,5 @@
 """Claims as rows: a statement of a paper, the quantities that decide it, the rules with their
-limits, and the sentences that tell it.
+limits, and the sentences about the outcome.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
-from saltus.plot.maps import share_text
+from saltus.plot.cells import share_text
 from saltus.replication.verdict import Check, Finding, passed
 from saltus.results.dataset.schema import period_text
 
@@ -18,12 +18,13 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Data = Mapping[str, "xr.Dataset"]
-#: What a claim's reading of the data returns: numbers, texts, truths, and lists of such tables.
+#: Quantities that a claim reads from the data: numbers, texts, truth values, and lists of such
+#: tables.
 Quantities = Mapping[str, Any]
 
 #: Quantities that every claim has.
 ALWAYS, NEVER = "always", "never"
-#: Formats of quantities in sentences, beside Python's own: ``{part:share}``.
+#: Formats of quantities in sentences, besides Python's own: ``{part:share}``.
 FORMATS: dict[str, Callable[[Any], str]] = {
     "share": lambda value: share_text(float(value)),
     "period": lambda value: period_text(int(value)),
@@ -52,14 +53,12 @@ class _Words(string.Formatter):
 
 
 def filled(template: str, quantities: Quantities) -> str:
-    """A sentence with the quantities in it."""
+    """The sentence with the quantities inserted."""
     return _Words().vformat(template, (), quantities)
 
 
 def _each(row: Mapping[str, Any], quantities: Quantities) -> Iterator[Quantities]:
-    """The quantities that a row is for: all, or once for each table of the list that it names by
-    ``each``.
-    """
+    """The quantities of a row: all of them, or once for each table of the list in ``each``."""
     yield from (
         ({**quantities, **one} for one in quantities[row["each"]])
         if "each" in row
@@ -69,7 +68,7 @@ def _each(row: Mapping[str, Any], quantities: Quantities) -> Iterator[Quantities
 
 @dataclass(frozen=True)
 class Row:
-    """How a claim is judged: the part of it that is a row of a table.
+    """The judging part of a claim's row in a table.
 
     Attributes
     ----------
@@ -96,7 +95,7 @@ class Row:
     lines: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     def judge(self, data: Data) -> Finding:
-        """Read the data, apply the rules, and tell what was found."""
+        """Read the data, apply the rules, and word the finding."""
         found = {ALWAYS: True, NEVER: False, **self.read(data)}
         for name, line in self.lines.items():
             found[name] = line.get("between", "; ").join(

@@ -1,4 +1,4 @@
-"""Jobs: one Dataset each, kept as a study keeps its results."""
+"""Jobs: one Dataset each, stored as a study stores its results."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from saltus.study.run.running import Running
     from saltus.system import System
 
-#: Attribute of a result: how long it took [s].
+#: Attribute of a result: the time it took [s].
 SECONDS = "seconds"
 
 
 @dataclass(frozen=True)
 class Job:
-    """Something to compute.
+    """One computation.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class Job:
     system : System
         With the values of this job.
     method : Method
-        How to integrate.
+        The method of integration.
     arguments : mapping
         Plain values.
     needs : tuple of str
@@ -55,7 +55,7 @@ class Job:
     needs: tuple[str, ...] = ()
 
     def identity(self, inputs: Mapping[str, xr.Dataset]) -> dict[str, str]:
-        """What must be equal for a kept result to be this job's."""
+        """The settings that must be equal for a stored result to be this job's."""
         given = {
             "arguments": dict(self.arguments),
             "inputs": {name: content_hash(inputs[name]) for name in self.needs},
@@ -66,8 +66,8 @@ class Job:
         }
 
     def result(self, inputs: Mapping[str, xr.Dataset], at: Running) -> tuple[xr.Dataset, bool]:
-        """The Dataset, and whether it was computed now: else it was in the folder, whole, from the
-        same settings and code.
+        """The Dataset, and True if it was computed now. Otherwise it was in the folder, complete,
+        with the same settings and code.
         """
         new: list[bool] = []
 
@@ -86,7 +86,7 @@ class Job:
 
 @cache
 def _own_code(module: str) -> str:
-    """Hash of the statements of a module that isn't saltus's; the code of saltus counts in every
+    """Hash of the statements of a module outside saltus; the code of saltus counts in every
     identity.
     """
     return (

@@ -1,4 +1,4 @@
-"""What came out of a replication: results, findings, pictures, tables, what could not be made."""
+"""The outcome of a replication: results, findings, pictures, tables, failures."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from saltus.replication.verdict import Finding
 if TYPE_CHECKING:
     import xarray as xr
 
-    from saltus.study.table import TextTable
+    from saltus.results.table import TextTable
 
 
 @dataclass
 class Replication:
-    """What came out.
+    """The outcome of a replication.
 
     Attributes
     ----------
@@ -28,7 +28,7 @@ class Replication:
     figures : tuple of str
         The figures that were asked for.
     folder : Path
-        Where everything is.
+        Folder of all files.
     threads : int
         Threads of each computation.
     data : dict of str to Dataset
@@ -63,15 +63,15 @@ class Replication:
 
     @property
     def report(self) -> Path:
-        """The report: ``report.html``, of some figures only ``report-fig8.html``, which leaves that
-        of all figures alone.
+        """The file of the report: ``report.html``, or ``report-fig8.html`` for some figures only,
+        so that the report of all figures is kept.
         """
         return self.folder / f"report{self._some}.html"
 
     @property
     def claims_file(self) -> Path:
-        """The claims with their answers and verdicts: ``claims.csv``, of some figures only
-        ``claims-fig8.csv``.
+        """The file of the claims with their answers and verdicts: ``claims.csv``, or
+        ``claims-fig8.csv`` for some figures only.
         """
         return self.folder / f"claims{self._some}.csv"
 
@@ -85,5 +85,5 @@ class Replication:
 
     @property
     def seconds_in_all(self) -> float:
-        """What all computations took, the earlier ones too [s]."""
+        """Time of all computations, the earlier ones included [s]."""
         return float(sum(ds.attrs.get(SECONDS, 0.0) for ds in self.data.values()))

@@ -28,16 +28,16 @@ from saltus.results.provenance import versions
 if TYPE_CHECKING:
     from saltus.replication.outcome import Replication
     from saltus.replication.papers import Claim, Picture
-    from saltus.study.table import TextTable
+    from saltus.results.table import TextTable
 
-#: Class in the style sheet, and sign, of each verdict: colour never stands alone.
+#: Style class and sign of each verdict: colour never stands alone.
 _LOOKS = {
     HOLDS: ("holds", "✓"),
     IN_PART: ("part", "◐"),
     FAILS: ("fails", "✗"),
     UNDECIDED: ("open", "?"),
 }
-#: Order of the claims at a glance: what is news first.
+#: Order of the claims at a glance: news first.
 _NEWS = (FAILS, IN_PART, UNDECIDED, HOLDS)
 _SIGNS = {True: "✓", False: "✗", None: "?"}
 #: Pictures narrower than this [pixels] aren't stretched over the page.
@@ -45,7 +45,7 @@ _NARROW = 900
 
 
 def write_page(result: Replication) -> Path:
-    """Write the report of a replication; returns the file."""
+    """Write the report of a replication; return the file."""
     with replacing(result.report) as (part,):
         part.write_text(page(result), encoding="utf-8")
     return result.report
@@ -102,7 +102,7 @@ def _version() -> str:
 
 
 def _sentence(text: str) -> str:
-    """With a full stop, if nothing else ends it."""
+    """The text with a full stop, unless it ends with a mark already."""
     return text if text.endswith(("?", "!", ".")) else f"{text}."
 
 
@@ -112,7 +112,7 @@ def _text(value: str) -> str:
 
 # -- top -------------------------------------------------------------------------------------------
 def _tally(result: Replication) -> str:
-    """How many claims have each verdict: numbers and a bar."""
+    """Number of claims with each verdict, as numbers and a bar."""
     counts = Counter(finding.verdict for _, finding in result.findings)
     tiles = "".join(
         f'<li class="{_LOOKS[one][0]}"><b>{counts[one]}</b>{_LOOKS[one][1]} {one}</li>'
@@ -137,7 +137,7 @@ def _chip(verdict: str) -> str:
 
 
 def _glance(result: Replication) -> str:
-    """A row for each claim, those that fail first; each leads to its answers."""
+    """A row for each claim, failed ones first; each links to its answers."""
     findings = sorted(result.findings, key=lambda one: _NEWS.index(one[1].verdict))
     rows = "".join(
         f"<tr><td>{_text(claim.figure)}</td><td><a "
@@ -198,7 +198,7 @@ def _table(table: TextTable) -> str:
 
 
 def _missing(result: Replication, figure: str) -> list[str]:
-    """What isn't there of a figure's pictures and tables, and why."""
+    """Missing pictures and tables of a figure, and the reasons."""
     paper = result.paper
     parts = [
         (f"picture {one.name}", _sentence(one.title))
@@ -217,7 +217,7 @@ def _missing(result: Replication, figure: str) -> list[str]:
 
 
 def _claim(result: Replication, claim: Claim, finding: Finding) -> str:
-    """A claim, its answers, its verdict and how this was come by."""
+    """A claim, its answers, its verdict and the checks behind it."""
     why = f'<p class="why">{_text(finding.why)}</p>' if finding.why else ""
     checks = "".join(
         f"<li><b>{_SIGNS[check.passed]}</b>{_text(check.text)}</li>" for check in finding.checks
@@ -238,17 +238,17 @@ def _claim(result: Replication, claim: Claim, finding: Finding) -> str:
 
 # -- end -------------------------------------------------------------------------------------------
 def _made(result: Replication) -> str:
-    """What was computed, on what, for how long."""
+    """The computations, the machine and the time."""
     packages = ", ".join(f"{name} {value}" for name, value in versions().items())
-    new, kept = len(result.computed), len(result.data) - len(result.computed)
+    new, earlier = len(result.computed), len(result.data) - len(result.computed)
     size = (
         "Grids and sweeps are coarser than in the full run, and shorter."
         if result.quick
         else "Grids and sweeps are those of the study files."
     )
     return (
-        f"<p>{counted(new, 'computation')} in this run, {kept} from an earlier one with the same "
-        f"settings and code. "
+        f"<p>{counted(new, 'computation')} in this run, {earlier} from an earlier one with the "
+        f"same settings and code. "
         f"This run took {result.seconds:.0f} s, with {counted(result.threads, 'thread')} on "
         f"{counted(usable_processors(), 'usable core')} ({_text(platform.machine())}, "
         f"{_text(platform.system())}). All computations, "

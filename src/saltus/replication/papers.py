@@ -1,5 +1,5 @@
-"""The papers that can be reproduced: rows beside their study files, and the few functions that
-can't be rows.
+"""The papers that can be reproduced: rows beside their study files, and functions for anything a
+row can't say.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from saltus.study.code import PACKAGE
 if TYPE_CHECKING:
     from saltus.replication.job import Job
     from saltus.replication.verdict import Finding
-    from saltus.study.table import TextTable
+    from saltus.results.table import TextTable
 
-#: Name of each paper: what it is. Its folder is replications/NAME.
+#: Title of each paper, by name. Its folder is replications/NAME.
 _PAPERS = {
     "saunders2021": "Contact force strength and numerical inaccuracies in piecewise-smooth "
     "systems: ode45 with and without event location",
@@ -44,7 +44,7 @@ class Picture:
     name : str
         Its own name, also that of its file.
     title, caption : str
-        What it shows; how to read it.
+        Title, and how to read the picture.
     needs : tuple of str
         Names of the jobs that it is drawn from.
     draw : callable
@@ -83,7 +83,7 @@ class Numbers:
 
 @dataclass(frozen=True)
 class Claim:
-    """A statement of the paper, and how it is judged.
+    """A statement of the paper, and the way it is judged.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ class Claim:
     says : str
         The claim.
     where : str
-        Where the paper says so.
+        Place of the claim in the paper.
     rule : str
         The rule in words.
     needs : tuple of str
@@ -114,7 +114,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class Paper:
-    """A paper and how it is reproduced.
+    """A paper and its replication.
 
     Attributes
     ----------
@@ -177,8 +177,8 @@ def find(name: str) -> Paper:
 def _part(
     paper: str, row: Mapping[str, Any], sets: Mapping[str, Sequence[str]], function: str
 ) -> dict[str, Any]:
-    """What a row says, with names of jobs in place of their patterns, and the function in place of
-    its name.
+    """The entries of a row, with the names of jobs in place of patterns, and the function in place
+    of its name.
     """
     said = {key: value for key, value in row.items() if key not in ("data", "with")}
     return {
@@ -200,7 +200,7 @@ def _claim(
 
 
 def _whole(rows: Sequence[Mapping[str, Any]]) -> Iterator[Mapping[str, Any]]:
-    """The rows of claims; what a row doesn't say is as in the row that it is ``like``."""
+    """The rows of claims, completed from the row that they are ``like``."""
     known = {row["id"]: row for row in rows}
     for row in rows:
         whole = {**known[row["like"]], **row} if "like" in row else row
@@ -208,7 +208,7 @@ def _whole(rows: Sequence[Mapping[str, Any]]) -> Iterator[Mapping[str, Any]]:
 
 
 def _expanded(patterns: Sequence[str], sets: Mapping[str, Sequence[str]]) -> Iterator[str]:
-    """Names of jobs: ``{ends}`` in a pattern stands for each text of this set in turn."""
+    """Names of jobs: ``{ends}`` in a pattern is replaced by each text of this set in turn."""
     for pattern in patterns:
         fields = [name for _, name, _, _ in Formatter().parse(pattern) if name]
         for values in product(*(sets[name] for name in fields)):
@@ -216,15 +216,15 @@ def _expanded(patterns: Sequence[str], sets: Mapping[str, Sequence[str]]) -> Ite
 
 
 def _function(paper: str, place: str, arguments: Mapping[str, Any]) -> Callable[[Data], Any]:
-    """The function ``module.name`` of a paper, with the arguments that its row gives."""
+    """The function ``module.name`` of a paper, with the arguments of its row."""
     module, _, name = place.partition(".")
     return partial(getattr(code(paper, module), name), **arguments)
 
 
 # -- files that come with saltus -------------------------------------------------------------------
 def folder_of(name: str) -> Path:
-    """The folder of a paper: in an installed package beside its modules, in the repository beside
-    ``src``.
+    """The folder of a paper: beside its modules in an installed package, beside ``src`` in the
+    repository.
 
     Raises
     ------
@@ -233,26 +233,26 @@ def folder_of(name: str) -> Path:
     """
     if name not in _PAPERS:
         raise ParameterError(f"no paper {name!r} can be reproduced. {nearest(name, _PAPERS)}")
-    beside = PACKAGE.parents[1] if PACKAGE.parent.name == "src" else PACKAGE
-    place = next(
+    root = PACKAGE.parents[1] if PACKAGE.parent.name == "src" else PACKAGE
+    folder = next(
         (
             one
-            for one in (PACKAGE / "replications" / name, beside / "replications" / name)
+            for one in (PACKAGE / "replications" / name, root / "replications" / name)
             if one.is_dir()
         ),
         None,
     )
-    if place is None:
+    if folder is None:
         raise ParameterError(
             f"the study files of {name} are missing: no folder "
             f"{PACKAGE / 'replications' / name}. Install saltus again."
         )
-    return place
+    return folder
 
 
 def code(name: str, module: str) -> ModuleType:
-    """A module of a paper's folder, which comes with saltus. Nothing is ever imported from a folder
-    that a user names.
+    """A module of a paper's folder, which is part of saltus. Nothing is ever imported from a user's
+    folder.
     """
     package = f"saltus_{name}"
     if package not in sys.modules:

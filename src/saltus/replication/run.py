@@ -1,4 +1,4 @@
-"""Reproduce a paper: compute or fetch every job, draw the pictures, judge the claims, write the
+"""Reproduce a paper: compute or read every job, draw the pictures, judge the claims, write the
 report.
 """
 
@@ -21,6 +21,7 @@ from saltus.replication.papers import Claim, Numbers, Paper, Picture, folder_of
 from saltus.replication.tables import claims_table
 from saltus.replication.verdict import undecided
 from saltus.results.files.atomic import ResultFileError, replacing, usable_folder
+from saltus.results.files.sheets import write_table
 from saltus.results.store.lock import WHOLE, locked
 from saltus.study.run.running import Report, Resources, Running
 
@@ -29,11 +30,14 @@ if TYPE_CHECKING:
 
 _Made = TypeVar("_Made")
 
-#: Dots per inch of the pictures: sharp on a phone, and the report stays small enough to mail.
+#: Dots per inch of the pictures: sharp on a phone, in a report small enough to mail.
 DPI = 130
-#: Folders beside the report: of the Datasets, of the pictures, of the lock that keeps a second run
-#: out.
-DATA, PICTURES, LOCKS = "data", "pictures", "locks"
+#: Folder of the Datasets, beside the report.
+DATA = "data"
+#: Folder of the pictures.
+PICTURES = "pictures"
+#: Folder of the lock against a second run.
+LOCKS = "locks"
 
 
 def reproduce(
@@ -45,8 +49,8 @@ def reproduce(
     report: Callable[[Report], None] = lambda _: None,
     say: Callable[[str], None] = lambda _: None,
 ) -> Replication:
-    """Reproduce a paper, or some figures of it. What is in the folder already, from the same
-    settings and code, isn't computed again.
+    """Reproduce a paper, or some of its figures. Results in the folder with the same settings and
+    code aren't computed again.
 
     A job, picture, table or judge that fails costs only what needs it: the rest is finished, and
     the report says what is missing and why.
@@ -92,7 +96,7 @@ def reproduce(
 
 
 def _chosen(paper: Paper, figures: Sequence[str]) -> tuple[str, ...]:
-    """Numbers of the figures that were asked for, in the paper's order."""
+    """Numbers of the wanted figures, in the paper's order."""
     wanted = {re.sub(r"(?i)^fig(ure)?[. ]*", "", figure.strip()): figure for figure in figures}
     for number, text in wanted.items():
         if number not in paper.figures:
@@ -129,12 +133,12 @@ def _make(
                 )
         say(_finish(result, figure))
     result.seconds = time.perf_counter() - begin
-    claims_table(result).write_csv(result.claims_file)
+    write_table(claims_table(result), result.claims_file)
     write_page(result)
 
 
 def wanted_by(paper: Paper, figure: str) -> set[str]:
-    """Names of the jobs that a figure's pictures, tables and claims ask for."""
+    """Names of the jobs that a figure's pictures, tables and claims need."""
     parts: list[Any] = [*paper.pictures, *paper.claims, *paper.tables]
     return {name for one in parts if one.figure == figure for name in one.needs}
 
@@ -155,7 +159,7 @@ def _counted(report: Callable[[Report], None], number: str, one: Report) -> None
 
 
 def _compute(result: Replication, job: Job, at: Running) -> None:
-    """Take in the Dataset of a job, or the reason why there is none."""
+    """Add the Dataset of a job, or the reason for its failure."""
     lost = next((name for name in job.needs if name not in result.data), None)
     if lost is not None:
         result.failures[job.name] = result.failures[lost]
@@ -176,8 +180,8 @@ def _compute(result: Replication, job: Job, at: Running) -> None:
 
 
 def _cause(error: Exception) -> str:
-    """What went wrong, in a sentence without its full stop; of an error that nobody foresaw also
-    where.
+    """The cause of an error as a sentence without full stop; for an unexpected error with its
+    place.
     """
     text = str(error).rstrip(". ")
     if isinstance(error, SaltusError):
@@ -191,8 +195,8 @@ def _cause(error: Exception) -> str:
 
 # -- what stands in the report ---------------------------------------------------------------------
 def _finish(result: Replication, figure: str) -> str:
-    """Draw a figure's pictures, make its tables and judge its claims, as far as its data are there;
-    returns a sentence that says so.
+    """Draw a figure's pictures, make its tables and judge its claims, as far as their data exist;
+    return a sentence about it.
     """
     paper, folder, before = result.paper, result.folder / PICTURES, len(result.failures)
     for picture in (one for one in paper.pictures if one.figure == figure):
@@ -202,7 +206,7 @@ def _finish(result: Replication, figure: str) -> str:
     for numbers in (one for one in paper.tables if one.figure == figure):
         table = _attempt(result, f"table {numbers.name}", numbers, numbers.make)
         if table is not None:
-            table.write_csv(folder / f"{numbers.name}.csv")
+            write_table(table, folder / f"{numbers.name}.csv")
             result.tables.append((numbers, table))
     claims = [one for one in paper.claims if one.figure == figure]
     for claim in claims:
@@ -218,8 +222,8 @@ def _attempt(
     part: Picture | Numbers | Claim,
     make: Callable[[dict[str, Any]], _Made],
 ) -> _Made | None:
-    """What a part of the report gives; None, with the reason in ``failures``, if it fails or a job
-    that it needs did.
+    """The value of a part of the report; None, with the reason in ``failures``, if it fails or a
+    job that it needs failed.
     """
     lost = next((name for name in part.needs if name not in result.data), None)
     if lost is not None:
@@ -238,7 +242,7 @@ def _attempt(
 
 
 def _draw(picture: Picture, file: Path, data: dict[str, Any]) -> Path:
-    """Draw a picture into a file. Figures that are open, a notebook's for instance, stay open."""
+    """Draw a picture into a file. Open figures, e.g. a notebook's, stay open."""
     import matplotlib.pyplot as plt
 
     from saltus import plot

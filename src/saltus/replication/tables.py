@@ -1,11 +1,11 @@
-"""The claims of a paper as tables: to print, and for people who go on with them."""
+"""The claims of a paper as tables, to print and to process further."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from saltus.replication.verdict import VERDICTS
-from saltus.study.table import TextTable
+from saltus.results.table import TextTable
 
 if TYPE_CHECKING:
     from saltus.replication.outcome import Replication
@@ -22,8 +22,8 @@ def verdict_table(result: Replication) -> TextTable:
 
 
 def claims_table(result: Replication) -> TextTable:
-    """A row for each claim, with both answers: what the paper's own settings give here, and what
-    exact arithmetic gives.
+    """A row for each claim, with both answers: that of the paper's own settings, and that of exact
+    arithmetic.
     """
     columns = (
         "figure",

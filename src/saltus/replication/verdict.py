@@ -1,5 +1,5 @@
-"""Verdicts: the rules that hold a number of a claim against its limit, and what follows when checks
-pass or fail.
+"""Verdicts: rules that compare a number of a claim with its limit, and the verdict of several
+checks.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from typing import Any
 HOLDS, IN_PART, FAILS, UNDECIDED = "holds", "holds in part", "does not hold", "not decidable"
 #: All verdicts, best first.
 VERDICTS = (HOLDS, IN_PART, FAILS, UNDECIDED)
-#: How the checks of any claim make its verdict; the report prints it.
+#: The rule from checks to a verdict, which the report prints.
 RULE_OF_ALL = (
     "A claim holds if all of its checks pass, doesn't hold if none does, and holds in part if some "
     "do, or if some pass and others can't be "
     "decided. It is not decidable if no check can be decided."
 )
 
-#: Rules of a check: from a quantity and the limit to whether it is so.
+#: Rules of a check: functions of a quantity and the limit.
 RULES: dict[str, Callable[[Any, Any], bool]] = {
     "below": lambda value, limit: value < limit,
     "at_most": lambda value, limit: value <= limit,
@@ -43,7 +43,7 @@ class Check:
     Attributes
     ----------
     text : str
-        What must be so, in words, with the numbers that decide it.
+        The statement in words, with the numbers that decide it.
     passed : bool or None
         Whether it is so; None if the data can't tell.
     """
@@ -54,18 +54,18 @@ class Check:
 
 @dataclass(frozen=True)
 class Finding:
-    """What was found on a claim.
+    """The finding on a claim.
 
     Attributes
     ----------
     own : str
-        What the paper's own settings give here.
+        Answer of the paper's own settings here.
     exact : str
-        What exact arithmetic gives.
+        Answer of exact arithmetic.
     checks : tuple of Check
         They make the verdict.
     sure : str
-        How sure that is: starts, intervals, error estimates.
+        Certainty of that: starts, intervals, error estimates.
     why : str
         Where we differ from the paper: which setting might explain it. Where nothing is decided:
         why not.
@@ -79,7 +79,7 @@ class Finding:
 
     @property
     def verdict(self) -> str:
-        """The verdict that the checks make."""
+        """The verdict of the checks."""
         return verdict_of(self.checks)
 
 
@@ -93,7 +93,7 @@ def passed(row: Mapping[str, Any], quantities: Mapping[str, Any]) -> bool | None
         that is the limit. Without a rule the quantity itself says whether it is so. ``given``: name
         of a quantity that must be true for the data to decide.
     quantities : mapping
-        What was read from the data, by name.
+        Readings of the data, by name.
 
     Returns
     -------
@@ -115,7 +115,7 @@ def _unknown(value: Any) -> bool:
 
 
 def verdict_of(checks: Sequence[Check]) -> str:
-    """The verdict that some checks make; see :data:`RULE_OF_ALL`."""
+    """The verdict of some checks; see :data:`RULE_OF_ALL`."""
     passed = [check.passed for check in checks]
     decided = [one for one in passed if one is not None]
     if not decided:

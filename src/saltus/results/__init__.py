@@ -1,5 +1,6 @@
 """Results: the schema of every Dataset, where it comes from, and files."""
 
+from saltus.results import kinds as kinds
 from saltus.results.dataset.attractors import AttractorTable
 from saltus.results.dataset.build import Guards, Subject, build
 from saltus.results.dataset.result import Result

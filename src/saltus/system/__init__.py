@@ -26,8 +26,8 @@ __all__ = [
 
 
 class _CallableModule(ModuleType):
-    """Lets ``saltus.system`` be the decorator, although importing this folder binds that name to
-    the module.
+    """Let ``saltus.system`` be the decorator, although importing this folder binds that name to the
+    module.
     """
 
     __call__ = staticmethod(system)

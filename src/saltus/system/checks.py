@@ -1,4 +1,4 @@
-"""Checks on a system: what a parameter's value may be, and how many boundaries there may be."""
+"""Checks of a system: allowed values of parameters, and the number of boundaries."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def check_values(system: EquationsOfMotion, values: Mapping[str, Any]) -> None:
     """
     why = overlapping(system.field, system.guards, system.states, values)
     if why is not None:
-        raise ParameterError(f"{system.name}: {why}")
+        raise ParameterError(f"{system.name}: ", why)
     for guard in system.guards:
         law = guard.law or Law("jump")
         for part, low, high, told in (
@@ -105,18 +105,20 @@ def resolve(name: str, value: Any, unit: str, forced_at: str | None) -> Any:
 
 
 def resolve_one(name: str, value: Any, unit: str, forced_at: str | None) -> float:
-    """As :func:`resolve`, for the single value that a system holds."""
+    """Resolve the single value that a system holds, as :func:`resolve` does."""
     result = resolve(name, value, unit, forced_at)
     if not isinstance(result, float):
         raise ParameterError(
-            f"{name} got {result.size} values, but a system holds one. Give many "
-            f"by values= of the analysis."
+            lambda say: (
+                f"{name} got {result.size} values, but a system holds one. Give many by "
+                f"{say.key('values')} of the analysis."
+            )
         )
     return result
 
 
 def point(system: EquationsOfMotion, t: Any, y: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Times and states [SI] as arrays of numbers that fit together; the states come first.
+    """Times and states [SI] as arrays of numbers with matching shapes; the states come first.
 
     Raises
     ------

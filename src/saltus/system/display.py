@@ -17,7 +17,7 @@ from saltus.language.text import Writer
 from saltus.system.equations_of_motion import EquationsOfMotion
 from saltus.units import from_si
 
-#: How the description of a structure begins.
+#: First words of the description of a structure.
 STRUCTURE = "Structure of"
 
 
@@ -38,7 +38,7 @@ def equation_lines(system: EquationsOfMotion) -> list[str]:
 
 
 def _jumps(system: EquationsOfMotion, writer: Writer) -> Iterator[tuple[str, str, Expr]]:
-    """Where the state jumps: the place, a state and its new value."""
+    """Jumps of the state: the side where each happens, a state and its new value."""
     for number, guard in enumerate(system.guards):
         if guard.law is None:
             continue
@@ -72,13 +72,13 @@ def system_text(system: EquationsOfMotion) -> str:
 
 
 def _about(system: EquationsOfMotion) -> list[str]:
-    """What is said of a structure, whose equations alone don't tell its frequencies."""
+    """The lines about a structure, whose equations alone don't show its frequencies."""
     words = system.description if system.description.startswith(STRUCTURE) else ""
     return textwrap.wrap(f"{'about':<12}{words}", 100, subsequent_indent=" " * 12) if words else []
 
 
 def _boundaries(system: EquationsOfMotion) -> int:
-    """How many boundaries there are: hold guards aren't any."""
+    """Number of boundaries, hold guards not counted."""
     return sum(not is_hold(guard) for guard in system.guards)
 
 
@@ -92,28 +92,28 @@ def _forcing(system: EquationsOfMotion) -> str:
 
 
 def _guard_rows(system: EquationsOfMotion) -> list[tuple[str, str]]:
-    """Name and place of each guard."""
+    """Name and equation of each guard."""
     writer = _writer(Writer, system, free_field(system.field, system.guards))
     rows = []
     for number, guard in enumerate(system.guards):
         if is_hold(guard):
             continue
-        place = at_equality(writer.side(number))
+        where = at_equality(writer.side(number))
         if guard.boundary is not None and guard.state is not None:
             (value,) = evaluate([guard.boundary], values=system.values)
-            place += (
+            where += (
                 f"  ({from_si(float(value) + 0.0, system.units[guard.state])})"
                 if guard.boundary.op != "const"
                 else ""
             )
-        rows.append((guard.name, _by_law(guard.law, place, system, writer)))
+        rows.append((guard.name, _by_law(guard.law, where, system, writer)))
     return rows
 
 
-def _by_law(law: Law | None, place: str, system: EquationsOfMotion, writer: Writer) -> str:
-    """What happens at a boundary, and where it is."""
+def _by_law(law: Law | None, where: str, system: EquationsOfMotion, writer: Writer) -> str:
+    """The effect of a boundary in words, and its equation."""
     if law is None:
-        return place
+        return where
     if law.kind == "surface":
         limit = writer.text(law.limit) if law.limit is not None else "1"
         stronger = "" if limit == "1" else f", held by up to {limit} times the force of sliding"
@@ -121,17 +121,17 @@ def _by_law(law: Law | None, place: str, system: EquationsOfMotion, writer: Writ
             contact = system.guards[law.support].law
             assert contact is not None
             return (
-                f"sticks or slides at {place} while {system.guards[contact.partner].name!r} rests"
+                f"sticks or slides at {where} while {system.guards[contact.partner].name!r} rests"
             )
-        return f"sticks or slides at {place}{stronger}"
+        return f"sticks or slides at {where}{stronger}"
     if law.restitution is None:
-        return f"jump at {place}"
+        return f"jump at {where}"
     rough = "" if law.friction is None else f" and friction {_number(law.friction, system, writer)}"
-    return f"impact with restitution {_number(law.restitution, system, writer)}{rough} at {place}"
+    return f"impact with restitution {_number(law.restitution, system, writer)}{rough} at {where}"
 
 
 def _number(part: Expr, system: EquationsOfMotion, writer: Writer) -> str:
-    """A plain number of a law: its value, or how it depends on the state."""
+    """A plain number of a law: its value, or its dependence on the state."""
     if varies(part):
         return writer.text(part)
     (value,) = evaluate([part], values=system.values)
@@ -153,7 +153,7 @@ def _parameter_rows(system: EquationsOfMotion) -> list[tuple[str, str]]:
 
 
 def _value(system: EquationsOfMotion, parameter: str) -> str:
-    """The value of a parameter as people write it."""
+    """The value of a parameter in a readable unit."""
     return from_si(system.values[parameter], system.units[parameter])
 
 

@@ -1,6 +1,4 @@
-"""What people type who come from other programs, and what to write here: a sentence for each name
-that saltus hasn't.
-"""
+"""Names that users of other programs type, and a sentence of advice for each."""
 
 from __future__ import annotations
 
@@ -37,7 +35,7 @@ _MERGE = (
     "xarray.concat([a.x, b.x], dim) joins what they have in common."
 )
 _EQUATION = "Write the equation as a function, with @sl.system(states=...) above it."
-#: What to write for a name, in small letters and without _.
+#: Advice by name, in small letters and without _.
 _ADVICE: dict[str, str] = {
     **dict.fromkeys(
         ("continuation", "continue", "arclength", "pseudoarclength", "contclass", "auto", "matcont",
@@ -136,21 +134,15 @@ _ADVICE: dict[str, str] = {
 }  # fmt: skip
 
 
+#: Likeness from which on a name among many is a slip of the pen: 0.5 is "montecarlo", "poincare".
+_NEAR = 0.7
+
+
 def _plain(name: str) -> str:
     return name.lower().replace("_", "")
 
 
 def instead(name: str, known: list[str]) -> str:
-    """A sentence for a name that saltus hasn't, which has the names ``known``."""
+    """A sentence of advice for a name that saltus lacks; ``known`` are the names it has."""
     advice = _ADVICE.get(_plain(name)) or ADVICE.get(name)
-    return advice or near(name, known, "dir(saltus) and docs/api.md list all.")
-
-
-def near(name: str, known: list[str], otherwise: str) -> str:
-    """The nearest of many names, or what to do if none is near."""
-    found = nearest(name, known, _NEAR)
-    return found if found.startswith("Did you mean") else otherwise
-
-
-#: Likeness from which on a name among many is a slip of the pen: 0.5 is "montecarlo", "poincare".
-_NEAR = 0.7
+    return advice or nearest(name, known, _NEAR, "dir(saltus) and docs/api.md list all.")

@@ -1,4 +1,4 @@
-"""Equations of motion as data: what a System holds, for the files that it is built of."""
+"""Equations of motion as data: the fields of a System, for the files that it is built on."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from saltus.contact.guards import Guard
-from saltus.errors import ParameterError, shown
+from saltus.errors import must_be
 from saltus.language.expression import Expr
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class EquationsOfMotion:
-    """Equations of motion with contacts, and values for their parameters. The attributes are those
+    """Equations of motion with contacts, and values of their parameters. The attributes are those
     of a System, and are described there.
     """
 
@@ -41,15 +41,11 @@ class EquationsOfMotion:
         if self.forced_at is None:
             return None
         if values is not None and not isinstance(values, Mapping):
-            raise ParameterError(
-                f"values must be a mapping, such as {{{self.forced_at!r}: 15.0}}, "
-                f"not {shown(values)}."
-            )
+            raise must_be("values", f"a mapping, such as {{{self.forced_at!r}: 15.0}}", values)
         frequency = (values or {}).get(self.forced_at, self.values[self.forced_at])
         try:
             return (2 * math.pi if self.units[self.forced_at] == "rad/s" else 1.0) / frequency
         except (TypeError, ArithmeticError):
-            raise ParameterError(
-                f"{self.forced_at} must be a positive number or an array of them, "
-                f"not {shown(frequency)}."
+            raise must_be(
+                f"{self.forced_at}", "a positive number or an array of them", frequency
             ) from None

@@ -1,4 +1,4 @@
-"""Mappings of a System that are never changed, and say what to write instead."""
+"""Read-only mappings of a System, whose errors say how to get other values."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from saltus.errors import ParameterError, among
 
 
 class Fixed(dict[str, Any]):
-    """A mapping that is never changed. Copies of it are plain."""
+    """A read-only mapping. Copies of it are plain."""
 
     def _why(self, name: Any) -> ParameterError:
         raise NotImplementedError
@@ -24,23 +24,23 @@ class Fixed(dict[str, Any]):
         raise self._why(None)
 
     def update(self, *_: Any, **changes: Any) -> None:
-        """Refused."""
+        """Refuse."""
         raise self._why(next(iter(changes), None))
 
     def pop(self, name: Any, *_: Any) -> Any:
-        """Refused."""
+        """Refuse."""
         raise self._why(name)
 
     def setdefault(self, name: Any, *_: Any) -> Any:
-        """Refused."""
+        """Refuse."""
         raise self._why(name)
 
     def popitem(self) -> Any:
-        """Refused."""
+        """Refuse."""
         raise self._why(None)
 
     def clear(self) -> None:
-        """Refused."""
+        """Refuse."""
         raise self._why(None)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -65,7 +65,7 @@ class Units(Fixed):
 
 
 def no_change(name: Any, values: Mapping[str, Any]) -> ParameterError:
-    """What is said to somebody who sets a value of a System."""
+    """The error for someone who sets a value of a System."""
     change = f"{name}=..." if among(name, values) else "..."
     return ParameterError(
         f"a System is never changed. Write system = system.with_values({change}), a copy with "

@@ -10,16 +10,16 @@ from __future__ import annotations
 import ast
 import inspect
 import operator
-import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial, reduce
 from typing import Any
 
+from saltus import language
 from saltus.contact.forces import flores, freeplay, hertz, hunt_crossley, lankarani_nikravesh
 from saltus.contact.memory import play, slider
 from saltus.errors import SaltusError, TraceError, nearest, shown
-from saltus.language import compositions, functions
+from saltus.language import functions, operations
 from saltus.language.clocks import mod
 from saltus.language.expression import Condition
 from saltus.language.inputs import pulse, sawtooth, square
@@ -30,36 +30,9 @@ from saltus.language.tables import Table, look_up
 LONGEST = 1000
 #: Deepest nesting of a formula: each level takes a few of Python's thousand nested calls.
 DEPTH = 200
-_SIMPLE = (
-    "abs",
-    "atan",
-    "cos",
-    "exp",
-    "log",
-    "max",
-    "min",
-    "piecewise",
-    "sin",
-    "sqrt",
-    "tan",
-    "tanh",
-)
-_COMPOSED = (
-    "acos",
-    "asin",
-    "atan2",
-    "clip",
-    "cosh",
-    "heaviside",
-    "hypot",
-    "sign",
-    "sinh",
-    "where",
-)
 #: Functions of formulas.
 FUNCTIONS: dict[str, Callable[..., Any]] = {
-    **{name: getattr(functions, name) for name in _SIMPLE},
-    **{name: getattr(compositions, name) for name in _COMPOSED},
+    **{name: getattr(language, name) for name in operations.FUNCTIONS},
     "freeplay": freeplay, "hertz": hertz, "hunt_crossley": hunt_crossley,
     "lankarani_nikravesh": lankarani_nikravesh, "flores": flores, "mod": mod, "play": play,
     "slider": slider,
@@ -90,8 +63,7 @@ _INSTEAD: dict[type[ast.AST], str] = {
 
 
 class Formula:
-    """A function of time, states and parameters that was written as text. It is called with them by
-    name.
+    """A function of time, states and parameters written as text. It is called with them by name.
 
     Attributes
     ----------
@@ -116,26 +88,22 @@ class Formula:
         )
 
     def __call__(self, **values: Any) -> Any:
-        """The value, of symbols or of numbers. Raises TraceError if it has none."""
-        own = {
+        """The value for symbols or numbers. Raises TraceError if there is none."""
+        terms = {
             term: self.book.terms[term](
                 **{name: values[name] for name in self.book.terms[term].names}
             )
             for term in self._terms
         }
         try:
-            return self._value(self._tree, {**_CONSTANTS, **values, **own})
-        except SaltusError:
-            raise
+            return self._value(self._tree, {**_CONSTANTS, **values, **terms})
+        except SaltusError as error:
+            raise type(error)(f"{self.place}: ", error) from error
         except (ArithmeticError, TypeError, ValueError) as error:
-            if isinstance(error, TypeError) and re.search(r"'(Relation|And|Or|Not)'", str(error)):
-                raise TraceError(
-                    f"{self.place}: a comparison is no number. Write 1 if x > gap else 0."
-                ) from None
             raise TraceError(f"{self.place} has no value: {error}.") from error
 
     def data(self) -> list[Any]:
-        """All that it depends on, as JSON-able data: its text, those of its terms, and the
+        """All that the formula depends on, as JSON-able data: its text, those of its terms, and the
         fingerprints of the tables.
         """
         tables = {
@@ -191,8 +159,7 @@ class Formula:
         found = self._value(node, scope)
         if not isinstance(found, Condition | bool):
             raise TraceError(
-                f"{self.place}: {_written(node)} is no condition. Write a comparison, "
-                f"such as x > gap."
+                f"{_written(node)} is no condition. Write a comparison, such as x > gap."
             )
         return found
 
@@ -202,9 +169,7 @@ class Formula:
             **{table: partial(look_up, data=data) for table, data in self.book.tables.items()},
         }
         if name not in known:
-            raise TraceError(
-                f"{self.place}: there is no function {shown(name)}. {nearest(name, known)}"
-            )
+            raise TraceError(f"there is no function {shown(name)}. {nearest(name, known)}")
         return known[name]
 
 
@@ -248,7 +213,7 @@ class Formulas:
 
 
 class Equations:
-    """An equation of motion from formulas: what :func:`saltus.system` makes a System of.
+    """An equation of motion from formulas, from which :func:`saltus.system` makes a System.
 
     Parameters
     ----------
@@ -321,7 +286,7 @@ def _parsed(text: str) -> ast.expr:
         )
     try:
         with warnings.catch_warnings():
-            # of numbers that touch words: the tree gives the better message
+            # about numbers that touch words: the tree gives the better message
             warnings.simplefilter("ignore")
             tree = ast.parse(f"({text.strip()}\n)", mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
@@ -350,9 +315,7 @@ def _depth(tree: ast.AST) -> int:
 
 
 def _names(tree: ast.AST) -> Iterator[str]:
-    """Names of values in a formula, in its order; those of functions that it calls aren't among
-    them.
-    """
+    """Names of values in a formula, in its order; names of called functions are left out."""
     called = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
     found = [
         node
@@ -367,7 +330,7 @@ def _written(node: ast.AST) -> str:
 
 
 def _check(tree: ast.AST, text: str) -> None:
-    """Raise a TraceError for the first part of a formula that has no meaning in one."""
+    """Raise a TraceError for the first part of a formula that isn't allowed."""
     for node in ast.walk(tree):
         match node:
             case ast.Constant(value=number):

@@ -15,7 +15,7 @@ from saltus.system.system import System
 
 
 def with_guard_names(system: System, names: Mapping[str, Quantity]) -> System:
-    """The system with other names for some of its guards.
+    """The system with some of its guards renamed.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ def gap_units(system: System) -> list[str]:
     return list(_gap_units(system.origin))
 
 
-@lru_cache(maxsize=256)  # the same for all values, and as long to find as a short run
+@lru_cache(maxsize=256)  # the same for all values, and as slow to find as a short run
 def _gap_units(system: System) -> tuple[str, ...]:
     gaps = [with_root(guard.gap) for guard in system.guards]
     found = units_of(system.states, system.units, free_field(system.field, system.guards), gaps)

@@ -1,4 +1,5 @@
-"""Legs: the equations of one mode, without boundaries, from any time on and for any time.
+"""Segments of trajectories in one mode: its equations without boundaries, from any time on and for
+any time span.
 
 A leg begins at the time START and lasts SPAN, both of which are states that don't change; its own
 time runs from 0 to 1. A tangent flow over that time holds the derivatives with respect to both, and
@@ -15,7 +16,7 @@ from saltus.language.expression import Expr
 from saltus.language.known_sides import assuming
 from saltus.system.system import System
 
-#: Names of the states that a leg adds, in their order.
+#: States that a segment adds, in their order.
 START, SPAN = "start of the leg", "span of the leg"
 
 
@@ -54,14 +55,14 @@ def leg(system: System, mode: int) -> System:
 
 
 def has_legs(system: System) -> bool:
-    """Whether the system has legs: its equations are smooth in time within every mode, up to its
-    boundaries.
+    """True if the system has segments: its equations are smooth in time within every mode, up to
+    its boundaries.
     """
     return not system.is_steep and all(_smooth_in_time(entry) for entry in system.field)
 
 
 def _smooth_in_time(entry: Expr) -> bool:
-    """Whether nothing switches, and no remainder or table is taken, by the time."""
+    """True if no condition, remainder or table depends on the time."""
     return not any(
         node.op in ("mod", "table") and ex.depends_on(node, ("time",)) for node in ex.walk(entry)
     ) and not any(
@@ -73,7 +74,7 @@ def _smooth_in_time(entry: Expr) -> bool:
 
 
 def frozen(system: System, expressions: tuple[Expr, ...], mode: int) -> tuple[Expr, ...]:
-    """Expressions in one mode, bit i the side of guard i."""
+    """Expressions in one mode; bit i is the side of guard i."""
     for number in range(len(system.guards)):
         side = bool(mode >> number & 1)
         expressions = tuple(assuming(entry, number, side) for entry in expressions)

@@ -89,7 +89,7 @@ def _free(name: str, system: System) -> str:
 
 
 class _Rewriting:
-    """Expressions with states in place of parameters, and with the time in periods."""
+    """Rewrites expressions with states in place of parameters, and with the time in periods."""
 
     def __init__(self, system: System, names: tuple[str, ...], timed: bool) -> None:
         self._system, self._timed = system, timed
@@ -104,7 +104,7 @@ class _Rewriting:
                 self._leaves[self._frequency] = ex.div(turns, self._period)
 
     def rate(self, entry: Expr) -> Expr:
-        """A rate, per period where the time is counted so."""
+        """A rate; per period if the time is counted in periods."""
         new = self.expression(entry)
         return ex.mul(new, self._period) if self._timed else new
 
@@ -181,11 +181,12 @@ class _Rewriting:
         return condition
 
     def _check_clock(self, node: Expr) -> None:
-        """The instants of a clock must not depend on what is followed."""
+        """Raise a ParameterError if the instants of a clock depend on a followed parameter."""
         if ex.depends_on(node, ("state",)):
             raise ParameterError(
                 f"{self._system.name} switches at times that depend on a parameter that is "
-                "followed. Write them in phases of the forcing, such as sl.mod(frequency*t, 1)."
+                "followed. Write them in phases of the forcing, such as ",
+                lambda say: f"{say.sl}mod(frequency*t, 1).",
             )
 
 

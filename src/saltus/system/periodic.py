@@ -1,5 +1,5 @@
-"""Whether a forced system repeats after the period of its forcing: by formula where time enters as
-a phase or a clock, else by samples.
+"""Check that a forced system repeats after the period of its forcing: by formula where time enters
+as a phase or a clock, else by samples.
 """
 
 from __future__ import annotations
@@ -26,19 +26,21 @@ from saltus.language.expression import (
     relations_in,
     walk,
 )
+from saltus.sentences import Text
 from saltus.system.equations_of_motion import EquationsOfMotion
 from saltus.system.modes import sides
 
-#: Rounding allowed in the number of cycles in a period: relative, and absolute for a phase
-#: [cycles].
-CLOCK_MISS, PHASE_MISS = 1e-9, 1e-9
-#: Difference after a period that exceeds rounding, relative to the values at one state.
+#: Rounding allowed in the number of a clock's cycles in a period [relative].
+CLOCK_MISS = 1e-9
+#: Rounding allowed in the number of a phase's cycles in a period [cycles].
+PHASE_MISS = 1e-9
+#: Smallest difference after a period that exceeds rounding, relative to the values at one state.
 DIFFERENCE = 1e-7
 
 
 @dataclass(frozen=True)
 class Timing:
-    """How time enters an expression. None of it depends on the values of the parameters.
+    """The ways in which time enters an expression, independent of the values of parameters.
 
     Attributes
     ----------
@@ -59,7 +61,7 @@ class Timing:
 
 @functools.lru_cache(maxsize=1024)
 def timing_of(entry: Expr) -> Timing:
-    """How time enters an expression; worked out once for each."""
+    """Find the ways in which time enters an expression; cached."""
     timed: set[Expr] = set()
     for node in walk(entry):
         if node.op == "time" or not timed.isdisjoint(operands(node)):
@@ -88,8 +90,8 @@ def timing_of(entry: Expr) -> Timing:
 
 
 def rate_of(angle: Expr) -> Expr | None:
-    """The rate of ``rate*t + (anything without time)``, of parameters only; None for any other
-    angle.
+    """The rate of ``rate*t + (anything without time)``, if it depends on parameters only; None for
+    any other angle.
     """
     if depends_on(angle, ("select", "mod", "table")):
         return None
@@ -119,7 +121,9 @@ def check_periodic(system: EquationsOfMotion) -> None:
 
 
 def _entries(system: EquationsOfMotion) -> list[Expr]:
-    """The field where no contact is held, then the gaps of the guards and what laws set."""
+    """The field where no contact is held, then the gaps of the guards and the expressions of the
+    laws.
+    """
     return list(_written(system.field, system.guards))
 
 
@@ -131,8 +135,8 @@ def _written(field: tuple[Expr, ...], guards: tuple[Guard, ...]) -> tuple[Expr, 
 
 
 def _clocks_repeat(timing: Timing, system: EquationsOfMotion, period: float) -> bool:
-    """Whether every clock has a whole number of cycles in a period: by formula, since samples miss
-    pulses.
+    """True if every clock has a whole number of cycles in a period. Tested by formula, since
+    samples miss pulses.
     """
     cycles = [
         abs(rate * period)
@@ -146,7 +150,7 @@ def _clocks_repeat(timing: Timing, system: EquationsOfMotion, period: float) -> 
 
 
 def _phases_repeat(timing: Timing, system: EquationsOfMotion, period: float) -> bool:
-    """Whether every phase has a whole number of cycles in a period."""
+    """True if every phase has a whole number of cycles in a period."""
     cycles = [rate * period for rate in evaluate(timing.phases, values=system.values)]
     return all(abs(number - np.round(number)) <= PHASE_MISS for number in cycles)
 
@@ -171,16 +175,16 @@ def _check_samples(system: EquationsOfMotion, period: float, unsure: list[int]) 
         evaluate(expressions, t=when, states=states, values=system.values, bits=bits)
         for when in (t, t + period)
     )
-    for place, (a, b) in enumerate(zip(now, later, strict=True)):
+    for index, (a, b) in enumerate(zip(now, later, strict=True)):
         a, b = np.broadcast_to(a, (6, 8)), np.broadcast_to(b, (6, 8))
         with np.errstate(invalid="ignore"):
             scale = np.maximum(np.abs(a), np.abs(b)).max(axis=1, keepdims=True)
             differs = np.abs(a - b) > DIFFERENCE * scale
         if differs.any():
-            raise TraceError(_not_periodic(system, unsure[place % len(unsure)], period))
+            raise TraceError(_not_periodic(system, unsure[index % len(unsure)], period))
 
 
-def _not_periodic(system: EquationsOfMotion, entry: int, period: float) -> str:
+def _not_periodic(system: EquationsOfMotion, entry: int, period: float) -> Text:
     """The message about the entry of the field or the guard that doesn't repeat."""
     count = len(system.states)
     what = (
@@ -194,10 +198,10 @@ def _not_periodic(system: EquationsOfMotion, entry: int, period: float) -> str:
     unit = system.units[name]
     hertz, radians = f"cos(2*pi*{name}*t)", f"cos({name}*t)"
     drive, another, other = (radians, hertz, "Hz") if unit == "rad/s" else (hertz, radians, "rad/s")
-    return (
+    return lambda say: (
         f"{system.name}: {what} doesn't repeat after the forcing period T = {period:.6g} s set by "
-        f"forced_at={name!r} [{unit}]. "
-        f"Write the drive as {drive}, or as {another} with units={{{name!r}: {other!r}}}; let "
-        f"every other forcing "
-        f"frequency be a multiple of it; or leave forced_at= out for a system without a period."
+        f"{say.key(forced_at=name)} [{unit}]. "
+        f"Write the drive as {drive}, or as {another} with {say.key(units={name: other})}; let "
+        "every other forcing frequency be a multiple of it; or leave "
+        f"{say.key('forced_at')} out for a system without a period."
     )

@@ -40,7 +40,7 @@ from saltus.system.explained import explained, place
 from saltus.system.system import System
 from saltus.units import check_declared, to_si
 
-#: How the name of a state that is remembered ends: as no user can write it.
+#: Suffix of a remembered state's name, which no user can write.
 _REMEMBERED = " before a jump"
 #: A function of (t, states, parameters), each argument by its name.
 Quantity = Callable[..., Any]
@@ -60,7 +60,7 @@ def quantity(
         in any order; ``**rest`` takes all other parameters. So the signature of the equation itself
         will do. Default values aren't used. It returns one number.
     what : str
-        What the function is, for messages: ``"the surface"``.
+        Words for the function in messages: ``"the surface"``.
 
     Returns
     -------
@@ -78,18 +78,18 @@ def quantity(
     try:
         expression = as_expr(returned)
     except Exception as error:
-        raise TraceError(explained(error, function, title)) from error
+        raise TraceError(*explained(error, function, title)) from error
     try:
         (root,), guards = join_guards([expression], system.guards)
         (root,) = lifted([root], guards)
         root = with_held_signs(root, guards, system.states)
     except TraceError as error:
-        raise TraceError(f"{title} ({place(function)}): {error}") from error
+        raise TraceError(f"{title} ({place(function)}): ", error) from error
     return root, guards
 
 
 def called(system: System, function: Quantity, what: str) -> Any:
-    """What a function of time, states and parameters of a system returns for symbols. Raises as
+    """The result of a user's function of time, states and parameters for symbols. Raises as
     :func:`quantity` does.
     """
     if not callable(function) or isinstance(function, System):
@@ -105,19 +105,19 @@ def called(system: System, function: Quantity, what: str) -> Any:
         if returned is None:
             raise TraceError("it returns nothing. End it with: return ...")
     except Exception as error:
-        raise TraceError(explained(error, function, title)) from error
+        raise TraceError(*explained(error, function, title)) from error
     return returned
 
 
 def _own_states(system: System) -> tuple[str, ...]:
-    """The states that a user knows: those of a tangent system aren't named in functions."""
+    """The states that a user knows: those of a tangent aren't named in functions."""
     return (system.tangent_of or system).states
 
 
 def _arguments(
     system: System, function: Quantity, title: str
 ) -> tuple[list[Expr], dict[str, Expr]]:
-    """Symbols for the arguments of a function, by their names."""
+    """Symbols for the arguments of a function, by name."""
     states = _own_states(system)
     known = {
         "t": TIME,
@@ -133,7 +133,7 @@ def _arguments(
         ) from None
     plain = [a.name for a in arguments if a.kind in (a.POSITIONAL_ONLY, a.POSITIONAL_OR_KEYWORD)]
     if tuple(plain[1:]) == states:
-        known[plain[0]] = TIME  # written as an equation, whatever the time is called there
+        known[plain[0]] = TIME  # written as an equation: its first argument is the time
     positional: list[Expr] = []
     named: dict[str, Expr] = {}
     for argument in arguments:
@@ -155,13 +155,13 @@ def _arguments(
 
 # -- surfaces --------------------------------------------------------------------------------------
 def with_surface(system: System, surface: Quantity | str, name: str = "surface") -> System:
-    """The system with one more guard, on whose side nothing depends: the flow locates its crossings
+    """The system with one more guard, on which no equation depends: the flow locates its crossings
     as it locates contacts.
 
     Parameters
     ----------
     system : System
-        What moves.
+        The equations and values.
     surface : callable or str
         The motion is on the surface where this function of (t, states, parameters) is zero (see
         :func:`quantity`); or the name of a state, for the surface on which that state is zero.
@@ -196,7 +196,7 @@ def with_level(system: System, name: str, level: float | str) -> System:
     Parameters
     ----------
     system : System
-        What moves.
+        The equations and values.
     name : str
         A state.
     level : float or str
@@ -228,7 +228,7 @@ def turning_surface(system: System, name: str) -> System:
     Parameters
     ----------
     system : System
-        What moves.
+        The equations and values.
     name : str
         A state.
 
@@ -251,12 +251,10 @@ def turning_surface(system: System, name: str) -> System:
 
 
 def acting_guards(system: System) -> tuple[int, ...]:
-    """Numbers of the guards on whose side the equations depend: all but the surfaces that were
-    added.
-    """
+    """Numbers of the guards on which the equations depend: all but added surfaces."""
     waiting = bits_in(system.field) | {n for n, guard in enumerate(system.guards) if guard.law}
     acting: set[int] = set()
-    while waiting:  # hold guards ask about one another in circles
+    while waiting:  # hold guards refer to one another in circles
         acting |= waiting
         waiting = bits_in(expressions_of([system.guards[number] for number in waiting])) - acting
     return tuple(sorted(acting))
@@ -279,7 +277,7 @@ def with_integrals(
     Parameters
     ----------
     system : System
-        What moves.
+        The equations and values.
     integrands : mapping of str to callable
         Integrands by the name of the new state: functions of (t, states, parameters), see
         :func:`quantity`. They can't use the other integrals.
@@ -322,7 +320,7 @@ def with_states(
     Parameters
     ----------
     system : System
-        What moves.
+        The equations and values.
     rates : mapping of str to Expr
         Rate of each new state by its name, which isn't taken.
     units : mapping of str to str, optional
@@ -353,17 +351,17 @@ def jumping_states(system: System) -> tuple[str, ...]:
 
 
 def is_remembered(name: str) -> bool:
-    """Whether a state is one that :func:`remembering` has added: it says what was, and what happens
-    doesn't depend on it.
+    """True if a state is one that :func:`remembering` has added: it holds a past value, and the
+    motion doesn't depend on it.
     """
     return name.endswith(_REMEMBERED)
 
 
 @functools.lru_cache(maxsize=64)
 def remembering(system: System) -> System:
-    """The system with more states, the last: its :func:`jumping_states` as they were before the
-    last impact or jump; the same one each time, and copies of it for copies with other values.
-    Where nothing jumps it is the system itself.
+    """The system extended by its :func:`jumping_states` as they were before the last impact or
+    jump. Without jumps it is the system itself. The result is cached; copies with other values give
+    copies.
     """
     names, size = jumping_states(system), len(system.states)
     if not names:
@@ -388,13 +386,13 @@ def remembering(system: System) -> System:
 
 
 def with_losses(system: System, stored: Expr, name: str, unit: str) -> System:
-    """The system with one more state, the last: the sum of what its impacts and jumps have taken of
-    a stored quantity.
+    """The system with one more state, the last: the sum of the losses of a stored quantity at
+    impacts and jumps.
 
     Parameters
     ----------
     system : System
-        What moves.
+        The equations and values.
     stored : Expr
         The quantity, as :func:`quantity` returns it; its pieces are those from which the state
         jumps.
@@ -424,14 +422,14 @@ def with_losses(system: System, stored: Expr, name: str, unit: str) -> System:
 
 
 def with_impulses(system: System, names: Mapping[int, str]) -> System:
-    """The system with more states, the last: each the impulse of a stop so far, of its impacts and
-    of the force at rest. Where impacts accumulate, the force that would hold the contact stands for
-    those that aren't followed: their impulse is the same.
+    """The system with more states, the last: the impulse of each stop so far, from its impacts and
+    from the force at rest. Where impacts accumulate, the force that would hold the contact replaces
+    the impacts that aren't followed: their impulse is the same.
 
     Parameters
     ----------
     system : System
-        What moves.
+        The equations and values.
     names : mapping of int to str
         Names of the new states by the number of the guard, all of which have the law of an impact.
 
@@ -475,7 +473,7 @@ def _with(entries: tuple[Expr, ...], place: int, entry: Expr) -> tuple[Expr, ...
 
 
 def _free(name: str, system: System) -> str:
-    """A name that the system doesn't use yet: the name, or with a number behind it."""
+    """The name, with a number behind it if the system uses it already."""
     number, free = 1, name
     while free in system.units:
         number += 1

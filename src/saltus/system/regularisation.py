@@ -1,5 +1,5 @@
-"""Smooth stand-ins for contacts: a system whose boundaries are blended over a width in place of
-being located.
+"""Regularised contacts: a system whose boundaries are blended over a width in place of being
+located.
 
 Each side of a guard has a weight, the step H(gap/width) or one minus it, and a piece counts with
 the weight of its condition. Every analysis then works on the system as on any other, by any method.
@@ -17,7 +17,7 @@ from saltus.contact.blend import STEPS, Step, blended
 from saltus.contact.guards import is_hold
 from saltus.contact.reduction import free_field
 from saltus.contact.singular import set_aside
-from saltus.errors import ParameterError, TraceError, among, nearest, shown
+from saltus.errors import ParameterError, TraceError, among, nearest, shown, unknown
 from saltus.language import expression as ex
 from saltus.language.names import why_no_name
 from saltus.system import checks
@@ -25,8 +25,10 @@ from saltus.system.guard_units import gap_units
 from saltus.system.system import System
 from saltus.units import coherent_unit
 
-#: Where a law of a user is tried, and how near to 0 and 1 it must be there: arctan is off by 0.003.
-_FAR, _NEAR = 100.0, 0.02
+#: Argument, and its negative, at which a user's law is tried.
+_FAR = 100.0
+#: Largest distance from 0 and 1 there: arctan is off by 0.003.
+_NEAR = 0.02
 
 
 def regularise(
@@ -35,7 +37,7 @@ def regularise(
     *,
     width: float | str | Mapping[str, float | str],
 ) -> System:
-    """A smooth stand-in of a system: at each boundary the pieces are blended over a width.
+    """Regularise a system: at each boundary the pieces are blended over a width.
 
     A piece that holds where ``gap > 0`` is multiplied by a smoothed step ``H(gap/width)``, the
     other one by ``1 - H``; a weight of joined conditions is the product of theirs. A spring behind
@@ -119,7 +121,7 @@ def regularise(
     try:
         field, guards = blended(system.field, system.guards, system.states, step, parameters)
     except TraceError as error:
-        raise TraceError(f"{system.name}, regularised: {error}") from error
+        raise TraceError(f"{system.name}, regularised: ", error) from error
     slips = " Friction slips only: its static limit is left out." if static else ""
     description = (
         f"Regularised: {called} over {', '.join(values)} in place of the boundaries "
@@ -137,7 +139,7 @@ def regularise(
 
 
 def _without_laws(system: System) -> System:
-    """The system of which friction only slips: nothing is held. Raises a ParameterError if the
+    """The system with friction that only slips: nothing is held. Raises a ParameterError if the
     state jumps at a contact.
     """
     for guard in system.guards:
@@ -180,9 +182,7 @@ def _names(system: System, width: Any) -> dict[int, Any]:
     known = [guard.name for guard in system.guards]
     for name in width:
         if not among(name, known):
-            raise ParameterError(
-                f"{system.name} has no boundary {shown(name)}. {nearest(name, known)}"
-            )
+            raise unknown(f"{system.name} has no boundary", name, known)
     if not width:
         raise ParameterError("width={} names no boundary: there is nothing to regularise.")
     return {known.index(name): value for name, value in width.items()}
@@ -193,9 +193,9 @@ def _parameters(
 ) -> tuple[dict[int, str], dict[str, float], dict[str, str]]:
     """Name of the width of each guard; values and units of these parameters."""
     in_units = gap_units(system)
-    one = len(set(map(id, widths.values()))) == 1 and len(widths) == len(system.guards)
+    shared = len(set(map(id, widths.values()))) == 1 and len(widths) == len(system.guards)
     known = sorted({in_units[number] for number in widths} - {""})
-    if one and len(known) > 1:
+    if shared and len(known) > 1:
         guards = [guard.name for guard in system.guards]
         raise ParameterError(
             f"the boundaries of {system.name} are in {' and '.join(known)}: one width can't be "
@@ -205,11 +205,11 @@ def _parameters(
     values: dict[str, float] = {}
     units: dict[str, str] = {}
     for number, value in widths.items():
-        if one and names:
+        if shared and names:
             names[number] = next(iter(values))
             continue
-        name = _free_name(system, values, None if one else system.guards[number].name)
-        unit = (known or [""])[0] if one else in_units[number]
+        name = _free_name(system, values, None if shared else system.guards[number].name)
+        unit = (known or [""])[0] if shared else in_units[number]
         if not unit and isinstance(value, str):
             unit = coherent_unit(value, name)
         names[number], units[name] = name, unit
@@ -233,7 +233,7 @@ def _free_name(system: System, others: Mapping[str, float], guard: str | None) -
 
 
 def _check_both_sides(system: System, smoothed: Mapping[int, str]) -> None:
-    """Raise a TraceError if a piece ends to exist on a boundary that is to be blended."""
+    """Raise a TraceError if a piece isn't defined beyond a boundary that is to be blended."""
     for number in set_aside(system.field, system.guards).guards:
         if number in smoothed:
             name = system.guards[number].name

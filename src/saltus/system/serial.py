@@ -11,7 +11,6 @@ from saltus.contact.guards import Guard, Law, bits_in, expressions_of, is_hold
 from saltus.errors import SaltusError, among, shown
 from saltus.language.clocks import affine, switch
 from saltus.language.expression import (
-    ELEMENTARY,
     And,
     Bit,
     Condition,
@@ -24,34 +23,24 @@ from saltus.language.expression import (
     walk,
 )
 from saltus.language.names import why_no_name, why_no_text, why_no_title, why_not_together
+from saltus.language.operations import ARITHMETIC, FUNCTIONS
 from saltus.language.tables import Table
 from saltus.system.equations_of_motion import EquationsOfMotion
 from saltus.units import check_declared
 
-#: Changes whenever the meaning of the data does. Systems without a law of contact, and with one.
-FORMAT, WITH_LAWS = "saltus-system/1", "saltus-system/2"
+#: Version of the data's meaning, for systems without a law of contact.
+FORMAT = "saltus-system/1"
+#: Version for systems with a law of contact.
+WITH_LAWS = "saltus-system/2"
 #: Bound of the numbers of guards in conditions, well above those that any system has.
 MOST_BITS = 1000
-#: Entries of a law's data, by what they hold: expressions, one of them or none, anything else.
+#: Entries of a law's data by content: tuples of expressions, single expressions or None, others.
 _TUPLES = ("reset", "settled", "normal", "direction")
 _SINGLE = ("constraint", "drive", "pivot", "limit", "restitution", "friction", "remaining", "mass")
 _PLAIN = ("kind", "side", "partner", "zeros")
 
-_OPERANDS = {
-    "const": 0,
-    "param": 0,
-    "state": 0,
-    "time": 0,
-    "add": 2,
-    "sub": 2,
-    "mul": 2,
-    "div": 2,
-    "neg": 1,
-    "pow": 2,
-    "select": 2,
-}
-_OPERANDS |= {"mod": 2, "table": 1}
-_OPERANDS |= dict.fromkeys(ELEMENTARY, 1)
+_OPERANDS = {"const": 0, "param": 0, "state": 0, "time": 0, "select": 2, "mod": 2, "table": 1}
+_OPERANDS |= {name: one.operands for name, one in (ARITHMETIC | FUNCTIONS).items() if one.operands}
 
 
 def to_dict(system: EquationsOfMotion) -> dict[str, Any]:
@@ -119,8 +108,8 @@ def _law_data(law: Law, index: Mapping[Expr, int]) -> dict[str, Any]:
 
 
 def fingerprint(system: EquationsOfMotion) -> str:
-    """SHA-256 of the equations: field, guards, names of states and parameters, and what sets the
-    period. Not of values, name or source.
+    """SHA-256 of the equations: field, guards, names of states and parameters, and the source of
+    the period. Values, name and source don't count.
     """
     data = {"format": _format(system), **_equations(system)}
     data["forced_at_unit"] = system.units[system.forced_at] if system.forced_at else None

@@ -14,14 +14,16 @@ from saltus.language.expression import depends_on
 from saltus.system.modes import sides
 from saltus.system.system import System
 
-#: States at which both sides are compared, and powers of ten between which their sizes lie.
-SAMPLES, SIZES = 256, (-6.0, 2.0)
+#: States at which both sides are compared.
+SAMPLES = 256
+#: Powers of ten between which their magnitudes lie.
+SIZES = (-6.0, 2.0)
 #: Share of a value by which it may differ from its mirror image: rounding.
 ROUNDING = 1e-7
 
 
 def is_symmetric(system: System, varied: Mapping[str, tuple[float, float]]) -> bool:
-    """Whether the mirror image of each motion is one, whatever value some parameters have.
+    """True if the mirror image of each motion is a motion too, at all values of some parameters.
 
     Both sides are compared at random states and times. Contacts that stick or slide, and jumps
     other than impacts, count as not symmetric.
@@ -44,13 +46,13 @@ def is_symmetric(system: System, varied: Mapping[str, tuple[float, float]]) -> b
     if period is None:
         return False
     size = 10 ** random.uniform(*SIZES, SAMPLES)
-    here = _Place(system, random.uniform(0, 1, SAMPLES) * period, values,
+    sample = _Place(system, random.uniform(0, 1, SAMPLES) * period, values,
                   size * random.normal(size=(len(system.states), SAMPLES)))  # fmt: skip
-    there = _Place(system, here.time + period / 2, values, -here.states)
-    if not all(map(_opposite, here.of(system.field), there.of(system.field))):
+    mirrored = _Place(system, sample.time + period / 2, values, -sample.states)
+    if not all(map(_opposite, sample.of(system.field), mirrored.of(system.field))):
         return False
     impacts = [i for i, guard in enumerate(system.guards) if guard.law and guard.law.reset]
-    return all(any(_mirror(system, i, j, here, there) for j in impacts) for i in impacts)
+    return all(any(_mirror(system, i, j, sample, mirrored) for j in impacts) for i in impacts)
 
 
 class _Place:
@@ -72,7 +74,7 @@ class _Place:
 
 
 def _period(system: System, values: Mapping[str, np.ndarray]) -> np.ndarray | None:
-    """Forcing periods, any where the time doesn't matter; None where it does without forcing."""
+    """Forcing periods; ones without forcing if the time doesn't matter, None if it does."""
     if system.forced_at is not None:
         frequency = values.get(system.forced_at, np.full(SAMPLES, system.values[system.forced_at]))
         return np.asarray(system.period({system.forced_at: 1.0}) / frequency)
@@ -84,15 +86,15 @@ def _opposite(one: np.ndarray, other: np.ndarray) -> bool:
     return bool((np.abs(one + other) <= ROUNDING * np.abs(one)).all())
 
 
-def _mirror(system: System, i: int, j: int, here: _Place, there: _Place) -> bool:
-    """Whether an impact is the mirror image of another one."""
-    one, other = system.guards[i], system.guards[j]
-    assert one.law is not None
+def _mirror(system: System, i: int, j: int, sample: _Place, mirrored: _Place) -> bool:
+    """True if an impact is the mirror image of another one."""
+    guard, other = system.guards[i], system.guards[j]
+    assert guard.law is not None
     assert other.law is not None
-    (gap,), (image,) = here.of([one.gap]), there.of([other.gap])
+    (gap,), (image,) = sample.of([guard.gap]), mirrored.of([other.gap])
     sign = -1 if _opposite(gap, image) else 1
     return (
         _opposite(gap, -sign * image)
-        and other.law.side == sign * one.law.side
-        and all(map(_opposite, here.of(one.law.reset), there.of(other.law.reset)))
+        and other.law.side == sign * guard.law.side
+        and all(map(_opposite, sample.of(guard.law.reset), mirrored.of(other.law.reset)))
     )

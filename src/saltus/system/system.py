@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from saltus.contact.singular import is_steep
-from saltus.errors import ParameterError, among, nearest, shown
+from saltus.errors import ParameterError, among, nearest, shown, unknown
 from saltus.language.derivatives import gradient
 from saltus.language.expression import Expr
 from saltus.system import checks, serial
@@ -102,8 +102,8 @@ class System(EquationsOfMotion):
 
     @property
     def origin(self) -> System:
-        """The system that this one copies with other values, or itself; it holds all that depends
-        on the equations alone.
+        """The system that this one copies with other values, or itself; it holds everything that
+        depends on the equations alone.
         """
         origin: System = vars(self).get("_origin", self)
         return origin
@@ -132,9 +132,7 @@ class System(EquationsOfMotion):
     def _known(self, name: str) -> str:
         """The name of a parameter, checked."""
         if not among(name, self.values):
-            raise ParameterError(
-                f"{self.name} has no parameter {shown(name)}. {nearest(name, self.values)}"
-            )
+            raise unknown(f"{self.name} has no parameter", name, self.values)
         return name
 
     # -- equations ---------------------------------------------------------------------------------
@@ -147,8 +145,8 @@ class System(EquationsOfMotion):
 
     @functools.cached_property
     def is_steep(self) -> bool:
-        """Whether an entry of the Jacobian is infinite where a contact begins, as that of
-        ``depth**0.25`` is: derivatives of the flow are differences then.
+        """True if an entry of the Jacobian is infinite where a contact begins, as that of
+        ``depth**0.25``: derivatives of the flow are differences then.
         """
         if self.origin is not self:
             return self.origin.is_steep
@@ -210,9 +208,7 @@ class System(EquationsOfMotion):
     def state_unit(self, name: str) -> str:
         """Unit of a state; ``""`` if not declared. Raises ParameterError for an unknown state."""
         if not among(name, self.states):
-            raise ParameterError(
-                f"{self.name} has no state {shown(name)}. {nearest(name, self.states)}"
-            )
+            raise unknown(f"{self.name} has no state", name, self.states)
         return self.units[name]
 
     def parameter_text(self, name: str) -> str:
@@ -265,7 +261,7 @@ class System(EquationsOfMotion):
         raise AttributeError(f"a System has no attribute {shown(name)}: {self._instead(name)}")
 
     def _instead(self, name: Any) -> str:
-        """What to write for a parameter or a state by its name."""
+        """Advice about a parameter or a state by its name."""
         if among(name, self.values):
             return (
                 f"{self.name}.values[{name!r}] is the value of a parameter, "
@@ -283,7 +279,7 @@ class System(EquationsOfMotion):
         )
 
 
-#: What people ask of a System, and what does it.
+#: Names that people try on a System, and the functions that do it.
 _DONE_ELSEWHERE = {
     **dict.fromkeys(("simulate", "solve", "run", "integrate", "compute"), "sl.simulate({}, ...)"),
     **dict.fromkeys(("copy", "set", "update", "replace"), "{}.with_values(name=...)"),

@@ -35,8 +35,7 @@ def derivative_name(row: str, column: str) -> str:
 
 @functools.lru_cache(maxsize=256)
 def tangent_system(system: System) -> System:
-    """The system with D states extended to D + D*D: the states, then the rows of Y one after the
-    other; the same one each time.
+    """The system with D states extended to D + D*D: the states, then the rows of Y in turn; cached.
 
     Parameter values, guards and forcing are those of the system. Y starts as the identity; its
     units are those of its row over those of its column. Those of copies with other values are

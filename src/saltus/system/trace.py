@@ -1,5 +1,5 @@
 """Tracing: the user's function is called with symbols, and its operations are recorded. It is
-called twice: what differs isn't an equation.
+called twice, because an equation gives the same both times.
 
 Whatever goes wrong inside the function becomes a TraceError that names its file and line and says
 what to write instead.
@@ -32,6 +32,7 @@ from saltus.errors import (
 from saltus.language.dimensions import DimensionCheck
 from saltus.language.expression import TIME, Expr, as_expr, observed, parameter, state, walk
 from saltus.language.names import why_no_name, why_no_text, why_no_title, why_not_together
+from saltus.sentences import Given
 from saltus.system import checks
 from saltus.system.explained import explained, place
 from saltus.system.formula import Equations, Formula
@@ -44,7 +45,7 @@ R = TypeVar("R")
 
 
 def _known_words(function: Callable[P, R]) -> Callable[P, R]:
-    """Answer arguments that :func:`system` doesn't have by those that it has."""
+    """Answer unknown arguments of :func:`system` by the known ones."""
     known = inspect.signature(function).parameters
     elsewhere = dict.fromkeys(("forcing", "forced", "drive", "frequency", "period"), "forced_at")
     values = ("params", "parameters", "pars", "args", "values", "constants", "p")
@@ -112,7 +113,7 @@ def system(
     name : str, optional
         Name of the system; default: that of the function.
     source : str, optional
-        Where the equations were published.
+        Publication of the equations.
     check_units : bool, optional
         Whether to check known units: terms of a sum or comparison have one unit, and each rate has
         that of its state per second. False for equations whose numbers have units of their own.
@@ -303,12 +304,17 @@ def _units(
     for name in declared:
         if name not in states and name not in defaults:
             raise ParameterError(
-                f"{title}: units= names {shown(name)}, which is neither a state nor a parameter. "
-                f"{nearest(name, (*states, *defaults))}"
+                f"{title}: ",
+                lambda say: say.key("units"),
+                f" names {shown(name)}, which is neither a state nor a parameter. "
+                f"{nearest(name, (*states, *defaults))}",
             )
     if forced_at is not None and forced_at not in defaults:
         raise ParameterError(
-            f"{title}: forced_at={shown(forced_at)} is no parameter. {nearest(forced_at, defaults)}"
+            lambda say: (
+                f"{title}: {say.key(forced_at=Given(forced_at))} is no parameter. "
+                f"{nearest(forced_at, defaults)}"
+            )
         )
     units = {}
     for name in (*states, *defaults):
@@ -323,7 +329,7 @@ def _units(
 
 
 def _is_angular(default: Any, name: str) -> bool:
-    """Whether a forcing frequency is written in radians, as ``"94.2 rad/s"``; turns and rpm are
+    """True if a forcing frequency is written in radians, as ``"94.2 rad/s"``; turns and rpm are
     counted in Hz.
     """
     return isinstance(default, str) and "rad" in default and coherent_unit(default, name) == "rad/s"
@@ -338,7 +344,7 @@ def _traced(
     dimensions: DimensionCheck | None,
     units: Mapping[str, str],
 ) -> tuple[Any, Any, dict[str, str]]:
-    """Field and guards; the states that elements with a memory bring, with their units."""
+    """Field and guards; states added by elements with a memory, with their units."""
     try:
         with observed(dimensions), declarations() as made, elements() as remembered:
             derivatives, laws = _called(function, states, parameters)
@@ -354,18 +360,18 @@ def _traced(
         derivatives += rates_of(remembered, states, derivatives).values()
     except Exception as error:
         kind = UnitError if isinstance(error, UnitError) else TraceError
-        raise kind(explained(error, function, title)) from error
+        raise kind(*explained(error, function, title)) from error
     own = {one.name: _unit_of(one.x, states, units, dimensions) for one in remembered}
     try:
         return *find_contacts(derivatives, laws, (*states, *own)), own
     except TraceError as error:
-        raise TraceError(f"{title} ({place(function)}): {error}") from error
+        raise TraceError(f"{title} ({place(function)}): ", error) from error
 
 
 def _unit_of(
     x: Expr, states: Sequence[str], units: Mapping[str, str], dimensions: DimensionCheck | None
 ) -> str:
-    """Unit of what drives an element; of a system without units that of all its states."""
+    """Unit of the input of an element; of a system without units that of all its states."""
     if x.op == "state" and x.payload in units:
         return units[x.payload]
     plain = "1" if all(units[name] == "1" for name in states) else ""
@@ -387,7 +393,7 @@ def _check_elements(made: Sequence[Element], known: Sequence[str]) -> None:
 def _called(
     function: Callable[..., Any], states: tuple[str, ...], parameters: tuple[str, ...]
 ) -> tuple[list[Expr], list[Declared]]:
-    """What the function returns when it is called with symbols."""
+    """The result of the function called with symbols."""
     returned = function(TIME, *map(state, states), **{name: parameter(name) for name in parameters})
     return _as_derivatives(returned, states)
 
@@ -396,14 +402,14 @@ def _check_same(
     first: tuple[list[Expr], list[Declared]], second: tuple[list[Expr], list[Declared]]
 ) -> None:
     """Raise a TraceError unless two calls gave the same equation."""
-    one, two = (
+    first_nodes, second_nodes = (
         [
             (node.op, None if node.op == "select" else node.payload)
             for node in walk(*rates, *(root for law in laws for root in law.roots()))
         ]
         for rates, laws in (first, second)
     )
-    for a, b in zip_longest(one, two):
+    for a, b in zip_longest(first_nodes, second_nodes):
         if a == b:
             continue
         plain = a is not None and b is not None and a[0] == b[0] == "const"
@@ -435,7 +441,7 @@ def _warn_of_unused(
 
 
 def _as_derivatives(returned: Any, states: tuple[str, ...]) -> tuple[list[Expr], list[Declared]]:
-    """What the function returned: one expression per state, and the laws behind them."""
+    """The function's result as one expression per state, and the laws behind them."""
     if returned is None:
         raise TraceError(
             "it returns nothing. End it with: return " + ", ".join(f"d{name}/dt" for name in states)

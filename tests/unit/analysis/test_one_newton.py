@@ -1,4 +1,4 @@
-"""Newton's method stands once for each of its uses: who writes another one is told here."""
+"""Newton's method stands once: who writes another one is told here."""
 
 import ast
 from pathlib import Path
@@ -12,18 +12,17 @@ SOLVERS = {"solve", "lstsq", "pinv", "inv"}
 #: Files that solve linear systems, and why.
 WHY = {
     "solve/newton.py": "Newton's method",
-    "solve/damped.py": "Newton's method from far away, with known zeros taken out",
-    "branches/arclength.py": "Newton's method with a border: the corrector of continuation",
+    "solve/linear.py": "linear systems, some of which have no solution",
     "closed/capture.py": "norms in which a neighbourhood shrinks",
     "closed/field_zeros.py": "points around an equilibrium in such a norm",
-    "branches/special_equilibria.py": "the Lyapunov coefficient of a Hopf point",
+    "branches/criticality.py": "the Lyapunov coefficient of a Hopf point",
     "branches/codimension_two.py": "the quadratic part at a fold",
     "branches/forced_vibration.py": "the answer of a rigid body to a static force",
 }
 
 
 def solves(text: str) -> bool:
-    """Whether a linear system is solved in a text."""
+    """True where a linear system is solved in a text."""
     return any(
         isinstance(node, ast.Attribute)
         and node.attr in SOLVERS

@@ -10,9 +10,9 @@ import pytest
 import saltus as sl
 from saltus.errors import SaltusWarning
 from saltus.flow import room
+from saltus.study.read import parse
 from saltus.study.run.running import Resources
 from saltus.study.run.study import run_study
-from saltus.study.tables.read import parse
 
 rig = sl.models.delangre("b", force="4 N", frequency="15 Hz")
 START = {"x": np.linspace(-4e-3, 4e-3, 12), "v": np.linspace(-0.5, 0.5, 12)}

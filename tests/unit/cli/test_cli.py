@@ -118,7 +118,7 @@ def test_ctrl_c_ends_with_a_message(monkeypatch, tmp_path):
     def stopped(path):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("saltus.study.tables.read.read", stopped)
+    monkeypatch.setattr("saltus.study.read.read", stopped)
     result = saltus("run", str(tmp_path / "a.toml"))
     assert result.exit_code == 130
     assert "stopped" in result.output
@@ -148,7 +148,7 @@ def test_a_file_that_cannot_be_written(monkeypatch, tmp_path):
     def refused(path):
         raise PermissionError(13, "Permission denied", "/out/demo.csv")
 
-    monkeypatch.setattr("saltus.study.tables.read.read", refused)
+    monkeypatch.setattr("saltus.study.read.read", refused)
     result = saltus("run", str(tmp_path / "a.toml"))
     assert result.exit_code == 2
     assert result.output.startswith("saltus: /out/demo.csv: Permission denied.")

@@ -104,7 +104,10 @@ def test_run_prints_a_table_and_writes_files_that_open(finished):
     assert "share of starts" in result.stdout
     for row in ("0  T ", "1  2T ", "2  2T ", "3  5T "):
         assert any(line.startswith(row) for line in result.stdout.splitlines()), row
-    assert "256 starts; a basin of less than 1.2 % may have been missed." in result.stdout
+    assert (
+        "256 starts: other attractors with a basin below 1.2 % of where they lie may be missed."
+        in result.stdout
+    )
     for name in ("basins.nc", "basins.csv", "basins.png", "basins-attractors.png"):
         assert f"wrote {folder / name}" in result.stdout.replace("\n", "")
     ds = load(folder / "basins.nc")

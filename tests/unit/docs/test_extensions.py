@@ -27,7 +27,7 @@ def test_every_row_of_the_glossary_becomes_a_term(root):
 def test_every_key_of_a_study_stands_in_the_tables():
     from study_tables import markdown, tables
 
-    from saltus.study.tables.spec import Study, Table
+    from saltus.study.spec import Study, Table
 
     described = {model for _, model in tables()}
     text = markdown()
@@ -57,11 +57,11 @@ def test_every_key_of_a_study_stands_in_the_tables():
 def test_every_variable_of_every_result_stands_in_the_dictionary():
     from result_tables import markdown
 
-    from saltus.results.dataset.schema import TABLES
+    from saltus.results.dataset.schema import KINDS
 
     text = markdown()
-    for table in TABLES.values():
-        for name, variable in table.items():
+    for kind in KINDS.values():
+        for name, variable in kind.variables.items():
             assert f"| `{name}` | {', '.join(variable.dims).replace('<', '&lt;')} |" in text
             assert variable.long_name.replace("|", "\N{DIVIDES}").replace("<", "&lt;") in text
     lengths = {line.count("|") for line in text.splitlines() if line.startswith("|")}

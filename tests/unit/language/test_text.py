@@ -8,10 +8,11 @@ from hypothesis import strategies as st
 
 from saltus.language import expression as ex
 from saltus.language import functions
+from saltus.language.operations import ELEMENTARY
 from saltus.language.text import Writer, to_text
 
 X, V, P = ex.state("x"), ex.state("v"), ex.parameter("p")
-SCOPE = {name: getattr(functions, name) for name in (*ex.ELEMENTARY, "pi", "piecewise")}
+SCOPE = {name: getattr(functions, name) for name in (*ELEMENTARY, "pi", "piecewise")}
 SCOPE |= {"x": X, "v": V, "p": P, "q": ex.parameter("q"), "t": ex.TIME}
 
 

@@ -3,6 +3,7 @@
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 from saltus.errors import ParameterError
 from saltus.plot import agreement, palette
@@ -96,3 +97,17 @@ def test_errors_teach():
     for ax in ("here", plt.subplots(1, 2)[1]):
         with pytest.raises(ParameterError, match="Give one Axes, or three"):
             agreement(ds, ax)
+
+
+def test_long_names_of_maps_stay_above_their_maps():
+    ds = agreement_map(np.zeros((3, 3), dtype=int), np.zeros((3, 3), dtype=int)).assign_attrs(
+        name_b="ode45, rtol 0.001, atol 1e-05, contacts not located"
+    )
+    panels = agreement(ds)
+    panels[0].figure.canvas.draw()
+    title = next(
+        text
+        for text in panels[1].findobj(Text)
+        if " ".join(text.get_text().split()) == ds.attrs["name_b"]
+    )
+    assert title.get_window_extent().x1 < panels[2].get_window_extent().x0

@@ -11,8 +11,9 @@ import xarray as xr
 from matplotlib.colors import to_rgb
 
 from saltus.errors import ParameterError
-from saltus.plot import basins, maps, palette
+from saltus.plot import basins, palette
 from saltus.plot.basins import _apart as apart_ticks
+from saltus.plot.cells import UNSETTLED
 
 from .maps_data import attractors, basins_map
 
@@ -81,7 +82,7 @@ def test_shades_darken_steadily_and_stay_apart_from_near_black():
     ramp = palette.oklab(palette.shades(palette.hues(20), 65))
     assert np.all(np.diff(ramp[..., 0], axis=1) < 0)
     assert np.allclose(palette.shades(palette.hues(20), 65)[:, 32], palette.hues(20), atol=1e-6)
-    black = palette.oklab(np.array([to_rgb(maps.UNSETTLED[code].color) for code in (-1, -2, -3)]))
+    black = palette.oklab(np.array([to_rgb(UNSETTLED[code].color) for code in (-1, -2, -3)]))
     assert np.linalg.norm(ramp[:, -1, None] - black, axis=-1).min() > 0.02
     assert apart(black) > 0.05
 
@@ -90,9 +91,7 @@ def test_shades_darken_steadily_and_stay_apart_from_near_black():
 def test_every_cell_has_the_hue_of_its_attractor():
     basin = np.array([[0, 1, 2], [2, 1, -1]])
     cells = pixels(basins(basins_map(basin), shade=False))
-    wanted = np.round(255 * np.vstack([palette.hues(3), to_rgb(maps.UNSETTLED[-1].color)])).astype(
-        int
-    )
+    wanted = np.round(255 * np.vstack([palette.hues(3), to_rgb(UNSETTLED[-1].color)])).astype(int)
     assert np.array_equal(cells, wanted[basin])
 
 
@@ -158,9 +157,7 @@ def test_codes_and_holes():
     ax = basins(ds, shade=False)
     cells = pixels(ax)
     for code, at in {-1: (0, 0), -2: (0, 1), -3: (0, 2), -4: (1, 0)}.items():
-        assert np.array_equal(
-            cells[at], np.round(255 * np.array(to_rgb(maps.UNSETTLED[code].color)))
-        )
+        assert np.array_equal(cells[at], np.round(255 * np.array(to_rgb(UNSETTLED[code].color))))
     assert np.array_equal(cells[1, 0], cells[1, 1])
     assert texts(ax)[1:5] == [
         "escaped, 16.7 %",

@@ -99,7 +99,7 @@ def test_without_stroboscopic_points_two_columns_remain(known, batch):
     ("which", "message"),
     [
         ("map", "plot.gallery takes what sl.basins, sl.attractors or sl.basin_fractions"),
-        ("runs", "plot.gallery takes what sl.simulate returns"),
+        ("runs", r"plot\.gallery\(runs=\) takes what sl\.simulate returns"),
         ("points", "takes what sl.simulate returns"),
         (
             "few",

@@ -3,16 +3,22 @@ no picture fails to be saved.
 """
 
 import io
+import pathlib
+import re
 
 import matplotlib.pyplot as plt
 import pytest
 from matplotlib.text import Text
 
 from saltus import plot
+from saltus.errors import ParameterError
+from saltus.plot.choice import TAKES, default_kind, pictures_of
+from saltus.plot.picture import PictureError, picture
+from saltus.results.dataset import schema
 from saltus.study.run.write import save_picture
 
 from .conftest import rig_run
-from .responses_data import resonance
+from .responses_data import kinds_map, resonance
 
 
 def texts(axes):
@@ -48,3 +54,71 @@ def test_a_title_of_a_study_is_drawn_as_it_is_written(tmp_path):
     axes.set_title("from $^$ on")
     save_picture(figure, tmp_path / "map.png")
     assert axes.get_title() == r"from \$^\$ on"
+
+
+# -- registers -------------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("word", "homes"),
+    [
+        (r"\.(imshow|pcolormesh)\(", {"cells.py"}),
+        (r"\bparameter_axis\(", {"curves.py", "response_points.py"}),
+        (r"\boutput_units\b", {"curves.py"}),
+        (r"schema\.[A-Z]+,\)", {"choice.py"}),
+    ],
+)
+def test_what_is_one_stays_one(word, homes):
+    """One plane of cells, one frame over a parameter, one way to a quantity, one table of kinds."""
+    folder = pathlib.Path(plot.__file__).parent
+    found = {file.name for file in folder.glob("*.py") if re.search(word, file.read_text("utf-8"))}
+    assert found == homes
+
+
+def test_the_usual_picture_comes_first():
+    assert pictures_of(schema.TRAJECTORY) == ("history", "phase")
+    assert pictures_of(schema.BASINS) == ("basins",)  # a gallery needs runs too
+    assert pictures_of(schema.SETTLED) == ()
+    assert (default_kind(resonance(20)), default_kind(kinds_map())) == (
+        "frequency_response",
+        "type_map",
+    )
+
+
+@pytest.mark.parametrize("name", [name for name in TAKES if name != "phase"])
+def test_another_kind_of_result_is_sent_to_its_picture(name):
+    other = rig_run(periods=2) if name != "history" else resonance(20)
+    where = "Draw it with plot." + (
+        "history or plot.phase"
+        if name != "history"
+        else "frequency_response, plot.bifurcation_diagram or plot.type_map"
+    )
+    arguments = (other, other) if name == "gallery" else (other,)
+    with pytest.raises(ParameterError, match=rf"^plot\.{name} takes .*{where}\.$"):
+        getattr(plot, name)(*arguments)
+
+
+@picture(checks=False)
+def inner(fault):
+    """A picture."""
+    raise fault("no such thing.")
+
+
+@picture(checks=False)
+def outer(fault):
+    """A picture with another in it."""
+    return inner(fault)
+
+
+def test_a_picture_names_itself_once():
+    """Whether the function, a check of its arguments, or a picture inside it finds the fault."""
+    map_ = kinds_map()
+    for call, says in (
+        (lambda: plot.type_map(map_, start=7), "plot.type_map: there is no start 7"),
+        (lambda: plot.type_map(map_, begin=7), "plot.type_map has no argument"),
+        (lambda: plot.type_map(resonance(20)), "plot.type_map draws two parameters"),
+        (lambda: plot.bifurcation_curves([], over=map_), "plot.bifurcation_curves has no curves"),
+        (lambda: outer(ParameterError), "plot.inner: no such thing."),
+        (lambda: outer(PictureError), "no such thing."),
+    ):
+        with pytest.raises(ParameterError) as caught:
+            call()
+        assert str(caught.value).startswith(says)

@@ -126,6 +126,39 @@ def test_phases_have_ticks_wherever_they_lie(peak, low, high):
     assert (low, high) != (-180, 180) or {-180, -90, 0, 90, 180} <= set(seen)
 
 
+def test_narrow_phases_have_round_ticks(peak):
+    phases = np.deg2rad(np.linspace(-178, -174, peak.sizes["response"]))
+    with_phase = peak.drop_dims("output", errors="ignore").assign_coords(output=["x"])
+    with_phase = with_phase.assign(
+        output_phase=(("response", "output"), phases[:, None]), output_units=("output", ["m"])
+    )
+    ax = frequency_response(with_phase, quantity="phase")
+    assert ax.get_ylabel() == "phase of x [deg]"
+    assert np.allclose(ax.get_yticks() % 0.5, 0)
+
+
+def test_a_transmissibility_is_drawn_of_responses_on_branches():
+    rig = sl.models.delangre("b", force="4 N", frequency="15 Hz")
+    found = sl.frequency_response(rig, ("14 Hz", "15 Hz", 3), progress=False)
+    assert "point_branch" in found
+    ax = frequency_response(sl.transmissibility(found, "x", "v"), quantity="transmissibility")
+    assert all_points(ax).size == found.sizes["response"]
+    assert any(str(one.get_gid()).startswith("branches") for one in ax.lines)
+
+
+def test_measured_phases_are_angles(peak):
+    phases = np.zeros((peak.sizes["response"], 1))
+    with_phase = peak.drop_dims("output", errors="ignore").assign_coords(output=["x"])
+    with_phase = with_phase.assign(
+        output_phase=(("response", "output"), phases), output_units=("output", ["m"])
+    )
+    measured = xr.Dataset(
+        {"frequency": ("i", [16.0], {"units": "Hz"}), "amplitude": ("i", [30.0], {"units": "deg"})}
+    )
+    ax = frequency_response(with_phase, quantity="phase", measured=measured)
+    assert layer(ax, "measured")[1] == pytest.approx(30.0)
+
+
 def test_peaks_instead(peak):
     ax = frequency_response(peak, quantity="peak")
     assert np.allclose(all_points(ax).imag.max(), 1e3 * peak["response_peak"].values.max())

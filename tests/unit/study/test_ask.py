@@ -9,10 +9,10 @@ import pytest
 import saltus as sl
 from saltus.errors import StudyError
 from saltus.results import load
-from saltus.study.answers.ask import ask
+from saltus.study.ask import ask
+from saltus.study.read import parse
 from saltus.study.run.running import Resources
 from saltus.study.run.study import run_study
-from saltus.study.tables.read import parse
 from small_study import small_study
 
 STUDY = """

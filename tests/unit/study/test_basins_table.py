@@ -11,7 +11,8 @@ import pytest
 
 import made_results
 from saltus.results import AttractorTable
-from saltus.study.answers.basins_rows import attractor_table
+from saltus.results.files.sheets import write_table
+from saltus.results.kinds.basins import rows
 
 SCATTER = 4.3e-6 / 3
 TABLE = AttractorTable(
@@ -37,13 +38,14 @@ def made(table=TABLE, basin=((0, 0), (0, 1)), **attrs):
         "unresolved_cells": 0,
         "method": "ODE45",
     }
-    return attractor_table("made up", made_results.basins(
+    (table,) = rows("made up", made_results.basins(
         states=("x", "v"), units={"x": "m", "v": "m/s"},
         axes={"x": np.array([0.0, 1.0]), "v": np.array([0.0, 1.0])}, basin=basin,
         periods_to_settle=0 * basin, status=0 * basin + 2, status_meanings={2: "ok"},
         grazes_unresolved=0 * basin, attractors=table,
         gap_unit="m", attrs={**trust, "unsettled_cells": int((basin < 0).sum()), **attrs},
     ))  # fmt: skip
+    return table
 
 
 def test_a_noisy_attractor_has_a_name_a_scatter_with_its_unit_and_a_note(tmp_path):
@@ -52,7 +54,7 @@ def test_a_noisy_attractor_has_a_name_a_scatter_with_its_unit_and_a_note(tmp_pat
     assert [row[1] for row in table.rows] == ["3T", "noisy 24T"]
     assert [row[column] for row in table.rows] == ["-", "1.4 µm"]
     assert any(note.startswith("Noisy: errors of the method") for note in table.notes)
-    frame = pd.read_csv(table.write_csv(tmp_path / "table.csv"), comment="#")
+    frame = pd.read_csv(write_table(table, tmp_path / "table.csv"), comment="#")
     assert frame["scatter x [m]"].iloc[1] == SCATTER
     assert math.isnan(frame["scatter x [m]"].iloc[0])
 

@@ -9,9 +9,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from saltus.errors import SaltusError
+from saltus.study.read import parse
 from saltus.study.run.running import Resources
 from saltus.study.run.study import run_study
-from saltus.study.tables.read import parse
 
 STUDY = """
 [study]

@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 
 from saltus.errors import StudyError
+from saltus.results.files.sheets import write_table
 from saltus.study.answers.compare import contact_table, exact_times, printed_rows
 
 
@@ -143,7 +144,7 @@ def test_a_mark_of_windows_before_the_text_is_no_part_of_it(folder):
 
 
 def test_csv_keeps_what_was_printed(folder):
-    lines = table(folder).write_csv(folder / "table.csv").read_text().splitlines()
+    lines = write_table(table(folder), folder / "table.csv").read_text().splitlines()
     assert lines[0] == "# title"
     assert lines[4].startswith("marker,contact,ODE45 [s],printed [s],difference [s]")
     assert lines[5].startswith("A,2,0.2500000000000009,")

@@ -9,13 +9,13 @@ import pytest
 import saltus as sl
 from saltus.errors import SaltusError, StudyError
 from saltus.results import load
-from saltus.study.answers.ask import questions_of
-from saltus.study.answers.motion_rows import spectrum_table
+from saltus.results.kinds.spectrum import rows
+from saltus.study.ask import questions_of
+from saltus.study.read import parse
 from saltus.study.run.running import Resources
 from saltus.study.run.status import status_tables
 from saltus.study.run.study import run_study
 from saltus.study.setting.inputs import Inputs
-from saltus.study.tables.read import parse
 from saltus.units import from_si
 
 HEAD = """
@@ -216,7 +216,7 @@ def test_lines_of_rounding_are_not_printed():
     steady = 1 / (40 - w**2 + 0.5j * w)
     motion = sl.simulate(linear, (steady.real, (1j * w * steady).real), periods=4, progress=False)
     lines = sl.spectrum(motion)
-    found = spectrum_table("lines", lines)
+    (found,) = rows("lines", lines)
     assert [row[:3] for row in found.rows] == [("1.3", "1", from_si(abs(steady), "m"))]
     assert f"{lines.sizes['frequency'] - 1} of them no larger than rounding" in found.notes[-1]
     assert len(found.data) == lines.sizes["frequency"] + 1

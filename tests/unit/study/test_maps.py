@@ -10,11 +10,11 @@ import pytest
 from edited_copy import edited_copy
 from saltus.errors import SaltusError, StudyError
 from saltus.study import code
-from saltus.study.answers.ask import questions_of
 from saltus.study.answers.basins import BasinMap
+from saltus.study.ask import questions_of
+from saltus.study.read import parse
 from saltus.study.run.running import Report, Resources, shard_of
 from saltus.study.setting.inputs import Inputs
-from saltus.study.tables.read import parse
 from small_study import maps_of, small_study
 
 BASE = small_study(6, 4)

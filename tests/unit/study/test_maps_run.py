@@ -14,12 +14,12 @@ from saltus.errors import StudyError
 from saltus.results import load
 from saltus.results.store.store import Store, StoreError
 from saltus.study import identity
+from saltus.study.read import parse
 from saltus.study.run import copies, maps
 from saltus.study.run.copies import copy_of
 from saltus.study.run.running import Resources
 from saltus.study.run.status import status_table, status_tables, stores
 from saltus.study.run.study import run_study
-from saltus.study.tables.read import parse
 from small_maps import small_maps
 from small_study import maps_of, small_study
 

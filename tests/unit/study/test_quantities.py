@@ -9,9 +9,9 @@ import math
 import pytest
 
 from saltus import models
-from saltus.errors import StudyError, UnitError
+from saltus.errors import StudyError
+from saltus.study.read import parse
 from saltus.study.setting import quantities
-from saltus.study.tables.read import parse
 
 RIG = models.delangre("b")
 
@@ -45,7 +45,7 @@ def test_bare_number_for_a_dimension_is_refused():
 
 
 def test_wrong_unit_is_refused():
-    with pytest.raises(UnitError, match=r"\[system\] force"):
+    with pytest.raises(StudyError, match=r"\[system\] force"):
         quantities.parameters(RIG, {"force": "4 mm"})
 
 

@@ -7,9 +7,9 @@ import json
 import pytest
 
 from saltus.errors import StudyError
+from saltus.study.read import parse, read
+from saltus.study.spec import Study
 from saltus.study.tables.methods import METHODS
-from saltus.study.tables.read import parse, read
-from saltus.study.tables.spec import Study
 
 HEAD = '[study]\nname = "a study"\n'
 WHOLE = HEAD + '[simulate]\nstart = { x = "0 mm" }\nperiods = 3\n'

@@ -15,11 +15,11 @@ from saltus.cli.demo import demo, draw
 from saltus.cli.own_system import own_system
 from saltus.errors import StudyError
 from saltus.results import load
+from saltus.study.read import parse, read
 from saltus.study.run.copies import inputs_of
 from saltus.study.run.running import Resources
 from saltus.study.run.study import run_study
 from saltus.study.setting.inputs import Inputs
-from saltus.study.tables.read import parse, read
 
 ROOT = Path(__file__).parents[3]
 REFERENCE = ROOT / "tests" / "reference"

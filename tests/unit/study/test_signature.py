@@ -11,11 +11,11 @@ import pytest
 
 import saltus as sl
 from saltus.errors import StudyError
-from saltus.study.answers.ask import ask
-from saltus.study.tables import questions
+from saltus.study.ask import ask
+from saltus.study.read import parse
+from saltus.study.spec import QUESTIONS
 from saltus.study.tables.kinds import KINDS
 from saltus.study.tables.methods import METHODS
-from saltus.study.tables.read import parse
 from saltus.study.tables.signature import documented, table
 
 HEAD = '[study]\nname = "a"\n'
@@ -25,13 +25,13 @@ OF_THE_STUDY = {"system", "threads", "progress"}
 @pytest.mark.parametrize(
     ("made", "function", "besides"),
     [
-        (questions.Simulate, sl.simulate, set()),
-        (questions.Poincare, sl.poincare, {"name"}),
-        (questions.Impacts, sl.impact_statistics, {"name"}),
-        (questions.Energy, sl.energy_balance, {"name"}),
-        (questions.Lyapunov, sl.lyapunov, {"name"}),
-        (questions.FrequencyResponse, sl.frequency_response, {"name", "measured"}),
-        (questions.BifurcationDiagram, sl.bifurcation_diagram, {"name"}),
+        (QUESTIONS["simulate"], sl.simulate, set()),
+        (QUESTIONS["poincare"], sl.poincare, {"name"}),
+        (QUESTIONS["impacts"], sl.impact_statistics, {"name"}),
+        (QUESTIONS["energy"], sl.energy_balance, {"name"}),
+        (QUESTIONS["lyapunov"], sl.lyapunov, {"name"}),
+        (QUESTIONS["frequency_response"], sl.frequency_response, {"name", "measured"}),
+        (QUESTIONS["bifurcation_diagram"], sl.bifurcation_diagram, {"name"}),
     ],
 )
 def test_keys_are_the_parameters_with_their_defaults(made, function, besides):
@@ -53,7 +53,7 @@ def test_options_are_those_of_the_methods():
 
 
 def test_choices_are_those_that_the_docstring_names():
-    assert get_args(questions.Lyapunov.model_fields["unit"].annotation) == (
+    assert get_args(QUESTIONS["lyapunov"].model_fields["unit"].annotation) == (
         "1/s",
         "1/period",
         "bit/s",

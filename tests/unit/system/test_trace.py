@@ -363,8 +363,8 @@ class TestPeriodicity:
         with pytest.raises(
             TraceError,
             match=r"as cos\(frequency\*t\), or as "
-            r"cos\(2\*pi\*frequency\*t\) with units={'frequency': "
-            r"'Hz'}",
+            r"cos\(2\*pi\*frequency\*t\) with units={\"frequency\": "
+            r"\"Hz\"}",
         ):
             self.forced(lambda t, x, a, f, g: a * cos(2 * pi * f * t), units={"frequency": "rad/s"})
 
@@ -375,7 +375,7 @@ class TestPeriodicity:
         with pytest.raises(
             TraceError,
             match=r"as cos\(2\*pi\*speed\*t\), or as cos\(speed\*t\) "
-            r"with units={'speed': 'rad/s'}",
+            r"with units={\"speed\": \"rad/s\"}",
         ):
             make(rotor, forced_at="speed")
         assert make(rotor, forced_at="speed", units={"speed": "rad/s"}).period() == pytest.approx(

@@ -45,7 +45,7 @@ ALIKE = 0.6
 
 
 @dataclass(frozen=True)
-class SampledAttractor:
+class SampledMotion:
     """An attractor that is known by points on it: one that never repeats, a limit cycle, or a noisy
     orbit.
 
@@ -122,7 +122,7 @@ def _codes(cells: np.ndarray) -> np.ndarray:
 
 def survey(
     map_: Map, start: np.ndarray, points: np.ndarray, scale: np.ndarray
-) -> list[SampledAttractor]:
+) -> list[SampledMotion]:
     """The aperiodic attractors of trajectories that have not settled for long.
 
     Parameters
@@ -144,7 +144,7 @@ def survey(
     if not usable:
         return []
     groups: list[list[int]] = []
-    runs = [SampledAttractor("", 0.0, 0.0, points[i], scale) for i in usable]
+    runs = [SampledMotion("", 0.0, 0.0, points[i], scale) for i in usable]
     for i, iterates in enumerate(runs):
         home = next((group for group in groups if alike(runs[group[0]], iterates)), None)
         if home is None:
@@ -153,7 +153,7 @@ def survey(
             home.append(i)
     _, kinds = kinds_of(map_, start[usable], np.broadcast_to(scale, start[usable].shape), groups)
     return [
-        SampledAttractor(*kind, points[usable[group[0]]], scale)
+        SampledMotion(*kind, points[usable[group[0]]], scale)
         for group, kind in zip(groups, kinds, strict=True)
         if kind is not None and kind[0] != Kind.NOT_REPEATING.word
     ]
@@ -274,7 +274,7 @@ def _undecided(blocks: np.ndarray) -> tuple[str, float, float] | None:
     return None if dies_out else (Kind.NOT_REPEATING.word, float(exponent), float(error))
 
 
-def alike(one: SampledAttractor, other: SampledAttractor) -> bool:
+def alike(one: SampledMotion, other: SampledMotion) -> bool:
     """Whether two attractors visit the same boxes."""
     return (
         min(float(other.share(one.points[None])[0]), float(one.share(other.points[None])[0]))
@@ -282,9 +282,9 @@ def alike(one: SampledAttractor, other: SampledAttractor) -> bool:
     )
 
 
-def merge(found: list[SampledAttractor]) -> list[SampledAttractor]:
+def merge(found: list[SampledMotion]) -> list[SampledMotion]:
     """Those of a list that are different: of two that visit the same boxes the first is kept."""
-    kept: list[SampledAttractor] = []
+    kept: list[SampledMotion] = []
     for one in found:
         if not any(alike(one, other) for other in kept):
             kept.append(one)

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from saltus.analysis.attractors.aperiodic import SampledAttractor, merge
+from saltus.analysis.attractors.aperiodic import SampledMotion, merge
 from saltus.analysis.attractors.noisy import Noisy, Stray
 from saltus.analysis.closed.capture import Neighbourhoods, neighbourhoods
-from saltus.analysis.closed.orbits import Orbit
+from saltus.analysis.closed.motions import ClosedMotion
 from saltus.flow.maps import Map
 
 #: Share of a trajectory's points that must lie in an attractor's boxes, or beside its orbit, to
@@ -25,31 +25,36 @@ class AttractorSet:
     ----------
     near : Neighbourhoods
         Where the periodic ones capture.
-    orbits : list of Orbit
+    orbits : list of ClosedMotion
         The periodic ones, stable.
-    sampled : list of SampledAttractor
+    sampled : list of SampledMotion
         Those that never repeat: their ids follow.
-    unstable : list of Orbit
+    unstable : list of ClosedMotion
         Periodic orbits met on the way that don't attract.
     astray : list of Stray
         Of an inexact map: motions that never settled. Of the last search only; no store keeps them.
     """
 
     near: Neighbourhoods
-    orbits: list[Orbit] = field(default_factory=list)
-    sampled: list[SampledAttractor] = field(default_factory=list)
-    unstable: list[Orbit] = field(default_factory=list)
+    orbits: list[ClosedMotion] = field(default_factory=list)
+    sampled: list[SampledMotion] = field(default_factory=list)
+    unstable: list[ClosedMotion] = field(default_factory=list)
     astray: list[Stray] = field(default_factory=list)
+
+    @property
+    def every(self) -> list[ClosedMotion | SampledMotion]:
+        """All of them, in the order of their ids."""
+        return [*self.orbits, *self.sampled]
 
     def __len__(self) -> int:
         return len(self.orbits) + len(self.sampled)
 
-    def add(self, map_: Map, orbit: Orbit, scale: np.ndarray) -> None:
+    def add(self, map_: Map, orbit: ClosedMotion, scale: np.ndarray) -> None:
         """One more periodic attractor, and where it captures."""
         self.near = self.near.joined(neighbourhoods(map_, orbit, len(self.orbits), scale))
         self.orbits.append(orbit)
 
-    def add_sampled(self, one: SampledAttractor) -> None:
+    def add_sampled(self, one: SampledMotion) -> None:
         """One more that is known by where it goes, unless it is there. Orbits that turn out to be
         scatter about it are no longer others.
         """
@@ -58,11 +63,10 @@ class AttractorSet:
         self.near = self.near.of(np.array(kept, np.int64))
         self.orbits = [self.orbits[i] for i in kept]
 
-    def index(self, one: Orbit | SampledAttractor) -> int:
+    def index(self, one: ClosedMotion | SampledMotion) -> int:
         """The id of an attractor that was found."""
-        every: list[Orbit | SampledAttractor] = [*self.orbits, *self.sampled]
-        for i, other in enumerate(every):
-            if other is one or (isinstance(one, Orbit) and is_about(other, one)):
+        for i, other in enumerate(self.every):
+            if other is one or (isinstance(one, ClosedMotion) and is_about(other, one)):
                 return i
         raise AssertionError("an attractor that wasn't found")
 
@@ -81,12 +85,12 @@ class AttractorSet:
         )
 
 
-def is_about(one: Orbit | SampledAttractor, orbit: Orbit) -> bool:
+def is_about(one: ClosedMotion | SampledMotion, orbit: ClosedMotion) -> bool:
     """Whether an orbit is scatter about a noisy one."""
     return isinstance(one, Noisy) and bool(one.share(orbit.points[None])[0] >= INSIDE)
 
 
-def _rounded(orbit: Orbit, scale: np.ndarray) -> tuple[float, ...]:
+def _rounded(orbit: ClosedMotion, scale: np.ndarray) -> tuple[float, ...]:
     """Size and place of an orbit, coarse enough that rounding can't change their order."""
     sizes = np.sqrt(np.mean((orbit.points / scale) ** 2, axis=0))
     return tuple(np.round(np.concatenate([sizes, orbit.points[0] / scale]), 7).tolist())

@@ -42,11 +42,21 @@ def attractors(
     """The attractors that given starts lead to: period, contacts, size, multipliers, margin to the
     next graze.
 
-    A trajectory is followed until it has settled, not for a fixed number of periods. Periodic
-    responses are polished by Newton's method on the stroboscopic map and verified by their Floquet
-    multipliers; what never repeats is typed by its largest Lyapunov exponent. Where errors of the
-    method keep a motion from closing (ode45 at a loose tolerance), exact integration says which
-    orbit it scatters about.
+    1. All trajectories are followed in rounds of some periods until they have settled, not for a
+       fixed number of periods, since transients differ by orders of magnitude.
+    2. Where the states at whole periods nearly recur, Newton's method closes the orbit: recurrence
+       alone can't tell an orbit from a slow transient. Orbits attract by their Floquet multipliers;
+       those that don't are only remembered.
+    3. About each attracting orbit a neighbourhood is taken in which the return map was seen to
+       contract. A trajectory that enters one has arrived, and leaves the work.
+    4. Without forcing, trajectories that circle a limit cycle are recognised too, whatever their
+       phase.
+    5. Trajectories that haven't settled within ``periods`` are followed much longer. A set that
+       never repeats is accepted as an attractor only if none of them leaves it, since chaotic
+       saddles hold trajectories for thousands of periods too; its largest Lyapunov exponent gives
+       its type.
+    6. Where errors of the method keep a motion from closing (ode45 at a loose tolerance), exact
+       integration says which orbit it scatters about.
 
     Parameters
     ----------

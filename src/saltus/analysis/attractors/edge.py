@@ -13,12 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from saltus.analysis.attractors.aperiodic import SampledAttractor
+from saltus.analysis.attractors.aperiodic import SampledMotion
 from saltus.analysis.attractors.attractor_set import AttractorSet
 from saltus.analysis.attractors.find_attractors import find_attractors
 from saltus.analysis.attractors.recurrence import recurrence
-from saltus.analysis.closed.all_orbits import OrbitSet, close
-from saltus.analysis.closed.orbits import Orbit
+from saltus.analysis.closed.all_orbits import Orbits
+from saltus.analysis.closed.motions import ClosedMotion
+from saltus.analysis.closed.shooting import close
 from saltus.flow.maps import Map
 
 #: Points that are tried between the two at once.
@@ -45,7 +46,7 @@ class Edge:
         The attractors that were met.
     sides : tuple of two int
         Ids of those that the two starts lead to; -1 where none was established.
-    orbit : Orbit or None
+    orbit : ClosedMotion or None
         The orbit on the boundary; None if no motion there repeated.
     beside : tuple of two int
         Ids of the attractors on the two sides of the orbit.
@@ -55,7 +56,7 @@ class Edge:
 
     found: AttractorSet
     sides: tuple[int, int]
-    orbit: Orbit | None = None
+    orbit: ClosedMotion | None = None
     beside: tuple[int, int] = (-1, -1)
     iterates: int = 0
 
@@ -66,18 +67,18 @@ class _Sides:
     def __init__(self, map_: Map, ends: np.ndarray, scale: np.ndarray, most: int) -> None:
         self._map, self._scale, self._most = map_, scale, most
         self.found: AttractorSet | None = None
-        self.first: Orbit | SampledAttractor | None = None
+        self.first: ClosedMotion | SampledMotion | None = None
         self.first, self.second = self.of(ends)
 
-    def of(self, states: np.ndarray) -> list[Orbit | SampledAttractor | None]:
+    def of(self, states: np.ndarray) -> list[ClosedMotion | SampledMotion | None]:
         """The attractors of states float64[k, D]; None where none was established."""
         self.found, label, _ = find_attractors(
             self._map, states, self._scale, self._most, self.found
         )
-        every = [*self.found.orbits, *self.found.sampled]
+        every = self.found.every
         return [every[i] if i >= 0 else None for i in label.tolist()]
 
-    def number(self, one: Orbit | SampledAttractor | None) -> int:
+    def number(self, one: ClosedMotion | SampledMotion | None) -> int:
         """The id of an attractor as they are now."""
         return -1 if one is None or self.found is None else self.found.index(one)
 
@@ -151,7 +152,7 @@ def _shadowed(
     return np.array(points), ends
 
 
-def _closed(map_: Map, points: np.ndarray, scale: np.ndarray) -> Orbit | None:
+def _closed(map_: Map, points: np.ndarray, scale: np.ndarray) -> ClosedMotion | None:
     """The orbit that iterates float64[m, D] on the boundary end on; None if there is none yet."""
     if len(points) < FIRST:
         return None
@@ -160,11 +161,11 @@ def _closed(map_: Map, points: np.ndarray, scale: np.ndarray) -> Orbit | None:
     if not apart[0] < NEAR:
         return None
     guess = points[-n:]
-    found = OrbitSet(scale)
-    found.take(map_, close(map_, guess[None], scale))
+    found = Orbits(map_, scale)
+    found.take(close(found.guess(guess[None]))[1])
     near = [
         one
-        for one in found.orbits
+        for one in found.motions
         if np.abs((one.points - guess[-1]) / scale).max(axis=1).min() < BESIDE
         and abs(one.multipliers[0]) > 1.0
     ]
@@ -172,8 +173,8 @@ def _closed(map_: Map, points: np.ndarray, scale: np.ndarray) -> Orbit | None:
 
 
 def _beside(
-    map_: Map, orbit: Orbit, scale: np.ndarray, sides: _Sides
-) -> list[Orbit | SampledAttractor | None]:
+    map_: Map, orbit: ClosedMotion, scale: np.ndarray, sides: _Sides
+) -> list[ClosedMotion | SampledMotion | None]:
     """The attractors on the two sides of an orbit, along its most unstable direction."""
     n = orbit.period
     _, matrix = map_.tangent(orbit.points[:1], n)

@@ -40,10 +40,19 @@ def edge_orbit(
 ) -> xr.Dataset:
     """The unstable periodic orbit on the boundary of a basin, from a start in it and one outside.
 
-    Between two starts that lead to different attractors lies the boundary of the basin of the first
-    one. It is found by bisection, and the motion on it followed by two trajectories that are
-    brought together again whenever they part (edge tracking). What that motion settles to, the edge
-    state, is closed by Newton's method: mostly a saddle, whose stable manifold is the boundary.
+    1. Both starts are followed to their attractors, which must differ: then the boundary of the
+       basin of the first one lies between them.
+    2. The line between them is divided until its ends are very close together and still lead to
+       different attractors: they are on the two sides of the boundary.
+    3. Both ends are followed until they part. Until then they have shadowed a motion on the
+       boundary. They are brought together again where they stand (step 2), since every motion near
+       the boundary leaves it: edge tracking.
+    4. On the boundary the motion settles to an attractor of its own, the edge state. Where it
+       nearly recurs, Newton's method closes the orbit: mostly a saddle, whose stable manifold is
+       the boundary.
+    5. The orbit is accepted if it is unstable and lies near the motion on the boundary.
+    6. Starts on both sides of it, along its most unstable direction, are followed to the attractors
+       that meet there (``beside``).
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ import numpy as np
 from saltus.analysis.attractors.aperiodic import (
     REPEATS,
     SURVEY_ITERATES,
-    SampledAttractor,
+    SampledMotion,
     merge,
     mismatch,
     survey,
@@ -22,13 +22,14 @@ from saltus.analysis.attractors.noisy import Noisy, Stray, blurred, keep_to, str
 from saltus.analysis.attractors.recurrence import recurrence
 from saltus.analysis.closed.capture import Neighbourhoods
 from saltus.analysis.closed.field_zeros import autonomous
-from saltus.analysis.closed.orbits import Orbit, find_orbits, same
+from saltus.analysis.closed.motions import ClosedMotion, same
+from saltus.analysis.closed.orbits import find_orbits
 from saltus.analysis.solve.tolerances import NEAR, ROUND, SAME
 from saltus.flow.maps import Map, Stroboscope, Travel
 from saltus.results.dataset.kinds import Kind
 
 #: The attractor of each trajectory, None as long as it isn't known.
-Owners = list[Orbit | SampledAttractor | None]
+Owners = list[ClosedMotion | SampledMotion | None]
 #: Candidates for orbits in one round; what isn't tried has its turn in the next.
 MAX_CANDIDATES = 12
 #: Trajectories that never recur whose motion is surveyed.
@@ -189,7 +190,7 @@ def _add_orbits(
     return added
 
 
-def _behind(map_: Map, orbit: Orbit, scale: np.ndarray, most: int) -> Noisy | None:
+def _behind(map_: Map, orbit: ClosedMotion, scale: np.ndarray, most: int) -> Noisy | None:
     """The exact orbit of another period about which an inexact map's orbit is scatter: its loops
     are made, or lost, by errors.
     """
@@ -205,14 +206,16 @@ def _blurs(map_: Map) -> bool:
     )
 
 
-def _exactly(map_: Map, state: np.ndarray, scale: np.ndarray, most: int) -> list[Orbit | None]:
+def _exactly(
+    map_: Map, state: np.ndarray, scale: np.ndarray, most: int
+) -> list[ClosedMotion | None]:
     """The orbits to which the exact map settles from float64[k, D]."""
     assert map_.exact_map is not None
     exact, label, _ = find_attractors(map_.exact_map, state, scale, most)
     return [exact.orbits[i] if 0 <= i < len(exact.orbits) else None for i in label]
 
 
-def _lies_on(place: np.ndarray, orbit: Orbit, scale: np.ndarray, tolerance: float) -> bool:
+def _lies_on(place: np.ndarray, orbit: ClosedMotion, scale: np.ndarray, tolerance: float) -> bool:
     return bool(np.abs((orbit.points - place) / scale).max(axis=1).min() < tolerance)
 
 

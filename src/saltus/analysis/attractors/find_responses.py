@@ -23,7 +23,7 @@ from saltus.analysis.attractors.growth import BUDGET
 from saltus.analysis.attractors.recurrence import recurrence, recurring_orbits
 from saltus.analysis.closed import unforced
 from saltus.analysis.closed.field_zeros import autonomous
-from saltus.analysis.closed.orbits import OrbitBatch
+from saltus.analysis.closed.motions import ClosedMotions
 from saltus.analysis.solve.tolerances import BESIDE, NEAR, RESTS, ROUND, SETTLED
 from saltus.flow.maps import Stroboscope
 from saltus.flow.request import Schedule
@@ -52,7 +52,7 @@ class SettledMotions:
     ----------
     kind : int64[k]
         What it settles to, or why to nothing: :class:`saltus.results.dataset.kinds.Kind`.
-    orbits : OrbitBatch
+    orbits : ClosedMotions
         The orbits of the periodic ones, verified; elsewhere nothing.
     exponent, exponent_error : float64[k]
         Largest Lyapunov exponent and its standard error [per iterate].
@@ -69,7 +69,7 @@ class SettledMotions:
     """
 
     kind: np.ndarray
-    orbits: OrbitBatch
+    orbits: ClosedMotions
     exponent: np.ndarray
     exponent_error: np.ndarray
     settled: np.ndarray
@@ -83,7 +83,7 @@ class SettledMotions:
         """Nothing computed yet."""
         nothing = np.full(count, np.nan)
         return cls(
-            np.full(count, Kind.NOT_COMPUTED, np.int64), OrbitBatch.none(count, size),
+            np.full(count, Kind.NOT_COMPUTED, np.int64), ClosedMotions.none(count, size),
             nothing.copy(), nothing.copy(),
             np.full(count, -1, np.int64), np.ones((count, size)), {},
             np.full((count, size), np.nan), np.zeros(count),
@@ -227,17 +227,17 @@ def _settled_unforced(
     """
     state, window = points[:, -1], ROUND * float(map_.period[0])
     result.scale[who] = np.maximum(result.scale[who], np.ptp(points, axis=1))
-    found = unforced.attracted(map_, state, result.scale[who], window, near)
-    done = found.orbits.period > 0
+    found, scale = unforced.attracted(map_, state, result.scale[who], window, near)
+    done = found.period > 0
     chosen = who[done]
-    result.orbits.put(chosen, found.orbits.rows(done))
-    result.scale[chosen] = found.scale[done]
-    rests = found.orbits.time[done] == 0
+    result.orbits.put(chosen, found.rows(done))
+    result.scale[chosen] = scale[done]
+    rests = found.time[done] == 0
     result.kind[chosen], result.exponent_error[chosen] = (
         np.where(rests, Kind.EQUILIBRIUM, Kind.LIMIT_CYCLE),
         0.0,
     )
-    leading = found.orbits.multipliers[done, 0].real * map_.period[done]
+    leading = found.multipliers[done, 0].real * map_.period[done]
     # along a limit cycle nothing grows or dies
     result.exponent[chosen] = np.where(rests, leading, 0.0)
     return done

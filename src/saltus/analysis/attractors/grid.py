@@ -16,10 +16,11 @@ from saltus.analysis.inputs.axes import along, count_along
 from saltus.analysis.inputs.random_starts import random_count, random_starts
 from saltus.analysis.inputs.starts import at_values, check_system, ensemble, single, trajectories
 from saltus.analysis.solve.tolerances import LONGEST
-from saltus.errors import ParameterError, nearest, shown
+from saltus.errors import ParameterError, unknown
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.flow.room import check_room
+from saltus.sentences import Word
 from saltus.system import System
 from saltus.units import from_si
 
@@ -133,7 +134,10 @@ def grid_of(
         sweeps = sweeps or ("up",) * len(starts)
     if sweeps and len(points) > 1:
         raise ParameterError(
-            "a sweep follows one parameter; this grid has two. Leave follow= and sweeps out."
+            lambda say: (
+                "a sweep follows one parameter; this grid has two. Leave "
+                f"{say.key('follow')} and sweeps out."
+            )
         )
     grid = Grid(system, points, starts, sweeps, drawn)
     corners = {name: np.array([column.min(), column.max()]) for name, column in points.items()}
@@ -161,13 +165,15 @@ def axis(system: System, name: str, given: Any) -> np.ndarray:
     array of values.
     """
     if name not in system.values:
-        raise ParameterError(
-            f"{system.name} has no parameter {shown(name)}. {nearest(name, system.values)}"
-        )
-    example = f"{name}=({_text(system, name, 0.5)}, {_text(system, name, 2.0)}, 200)"
+        raise unknown(f"{system.name} has no parameter", name, system.values)
+    example = {name: (_text(system, name, 0.5), _text(system, name, 2.0), 200)}
     values = along(name, given, lambda value: single(system, name, value), "values", example)
     if not len(values) or not np.isfinite(values).all() or not (np.diff(values) > 0).all():
-        raise ParameterError(f"the values of {name} must ascend and be finite, such as {example}.")
+        raise ParameterError(
+            lambda say: (
+                f"the values of {name} must ascend and be finite, such as {say.key(**example)}."
+            )
+        )
     return values
 
 
@@ -177,9 +183,9 @@ def _text(system: System, name: str, factor: float) -> str:
     """
     value = factor * (system.values[name] or 1.0)
     return (
-        repr(from_si(value, system.units[name]))
+        from_si(value, system.units[name])
         if system.units[name] not in ("", "1")
-        else f"{value:g}"
+        else Word(f"{value:g}")
     )
 
 
@@ -192,7 +198,9 @@ def _starts(
     if isinstance(start, str):
         return random_starts(system, start, box, seed, tuple(SWEEPS)), (), True
     if box is not None:
-        raise ParameterError('box= is for random starts: start="random 20".')
+        raise ParameterError(
+            lambda say: f"{say.key('box')} is for random starts: {say.key(start='random 20')}."
+        )
     return (
         ensemble(system, np.zeros(len(system.states)) if start is None else start, None).start,
         (),

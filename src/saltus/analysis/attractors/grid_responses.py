@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from saltus.analysis.attractors.aperiodic import SampledAttractor, alike
+from saltus.analysis.attractors.aperiodic import SampledMotion, alike
 from saltus.analysis.attractors.find_responses import SettledMotions, find_responses
 from saltus.analysis.attractors.grid import Grid
 from saltus.analysis.closed.cycles import ASIDE
@@ -197,7 +197,7 @@ def _same(result: SettledMotions, a: int, b: int, tolerance: float) -> bool:
             < tolerance
         )
     first, second = (
-        SampledAttractor("", 0.0, 0.0, result.iterates[row], result.scale[a]) for row in (a, b)
+        SampledMotion("", 0.0, 0.0, result.iterates[row], result.scale[a]) for row in (a, b)
     )
     return alike(first, second)
 
@@ -232,7 +232,7 @@ def numbers_of(
 def table_of(found: GridResponses, numbers: Measures, grid: Grid, method: Method) -> AttractorTable:
     """What is known of each response."""
     map_ = grid.map(method).rows(found.place)
-    kind, s = found.kind, found.motions
+    kind, s, free = found.kind, found.motions, grid.every is not None
     period = np.where(kind == Kind.PERIODIC, found.period, 0)
     multipliers, eigenvalues = multipliers_and_eigenvalues(
         s.orbits.multipliers[found.row], kind == Kind.EQUILIBRIUM
@@ -241,13 +241,8 @@ def table_of(found: GridResponses, numbers: Measures, grid: Grid, method: Method
     low, high = wilson(hits, len(grid.starts))
     shares = (hits / len(grid.starts), low, high) if grid.drawn else None
     return AttractorTable(
+        **{**numbers.columns(period), "itinerary": [""] * len(found)},
         kind=[Kind(code).word for code in kind],
-        period=period,
-        contacts=numbers.contacts * np.maximum(period, 1),
-        itinerary=[""] * len(found),
-        peak=numbers.peak[:, 0],
-        rms=numbers.rms[:, 0],
-        margin=numbers.margin,
         multipliers=multipliers,
         exponent=s.exponent[found.row] / map_.period,
         exponent_error=s.exponent_error[found.row] / map_.period,
@@ -256,14 +251,8 @@ def table_of(found: GridResponses, numbers: Measures, grid: Grid, method: Method
             for i, known in enumerate(np.where(found.period > 0, found.period, APERIODIC_PERIODS))
         ],
         fractions=shares,
-        **(
-            {}
-            if grid.every is None
-            else {
-                "cycle": np.where(kind == Kind.LIMIT_CYCLE, found.time, np.nan),
-                "eigenvalues": eigenvalues,
-            }
-        ),
+        cycle=np.where(kind == Kind.LIMIT_CYCLE, found.time, np.nan) if free else None,
+        eigenvalues=eigenvalues if free else None,
     )
 
 

@@ -6,9 +6,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.analysis.attractors.aperiodic import SURVEY_ITERATES, SampledAttractor
+from saltus.analysis.attractors.aperiodic import SURVEY_ITERATES, SampledMotion
 from saltus.analysis.closed.cycles import attracting_cycles
-from saltus.analysis.closed.orbits import OrbitBatch
+from saltus.analysis.closed.motions import ClosedMotions
 from saltus.analysis.solve.tolerances import NEAR, ROUND
 from saltus.flow.maps import Stroboscope
 from saltus.flow.request import Schedule
@@ -20,7 +20,7 @@ PLACES = np.array([0.0, 0.36, 0.71, 0.87])
 
 def limit_cycles(
     map_: Stroboscope, state: np.ndarray, window: float, scale: np.ndarray
-) -> list[SampledAttractor]:
+) -> list[SampledMotion]:
     """Attracting limit cycles on which some trajectories float64[k, D] lie, each by places in equal
     steps of its time.
 
@@ -42,10 +42,10 @@ def limit_cycles(
         return []
     once = map_.rows(rows).with_period(cycles.time[rows])
     points = once.run(cycles.points[rows, 0], 1, Schedule.even(1, SURVEY_ITERATES)).samples
-    return [SampledAttractor(Kind.LIMIT_CYCLE.word, 0.0, 0.0, one, scale) for one in points]
+    return [SampledMotion(Kind.LIMIT_CYCLE.word, 0.0, 0.0, one, scale) for one in points]
 
 
-def cycle_of(map_: Stroboscope, one: SampledAttractor) -> OrbitBatch:
+def cycle_of(map_: Stroboscope, one: SampledMotion) -> ClosedMotions:
     """A limit cycle that is known by its places.
 
     Newton's method begins at several of them: at a jump of the state there is no derivative.

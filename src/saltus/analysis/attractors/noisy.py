@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from saltus.analysis.attractors.aperiodic import SURVEY_ITERATES, SampledAttractor
-from saltus.analysis.closed.orbits import Orbit
+from saltus.analysis.attractors.aperiodic import SURVEY_ITERATES, SampledMotion
+from saltus.analysis.closed.motions import ClosedMotion
 from saltus.flow.maps import Map, Stroboscope
 from saltus.flow.request import Schedule
 from saltus.results.dataset.kinds import Kind
@@ -36,13 +36,13 @@ BETWEEN = 32
 
 
 @dataclass(frozen=True)
-class Noisy(SampledAttractor):
+class Noisy(SampledMotion):
     """An orbit about which errors of a map keep its motion scattered; ``points`` and ``exponent``
     are the orbit's.
 
     Attributes
     ----------
-    orbit : Orbit
+    orbit : ClosedMotion
         Of the exact map; it attracts.
     size : float64[D]
         Range of each state in the exact motion.
@@ -53,7 +53,7 @@ class Noisy(SampledAttractor):
         Largest such distance, in units of the range.
     """
 
-    orbit: Orbit
+    orbit: ClosedMotion
     size: np.ndarray
     scatter: np.ndarray
     stray: float
@@ -105,7 +105,7 @@ def apart(runs: np.ndarray, points: np.ndarray, size: np.ndarray) -> np.ndarray:
     return best
 
 
-def blurred(map_: Map, orbit: Orbit, scale: np.ndarray) -> Noisy | None:
+def blurred(map_: Map, orbit: ClosedMotion, scale: np.ndarray) -> Noisy | None:
     """What errors of a map make of an orbit of the exact one: scatter about it; None if the motion
     leaves it.
 
@@ -117,7 +117,7 @@ def blurred(map_: Map, orbit: Orbit, scale: np.ndarray) -> Noisy | None:
     ----------
     map_ : Map
         An inexact map.
-    orbit : Orbit
+    orbit : ClosedMotion
         Of ``map_.exact_map``; it attracts.
     scale : float64[D]
         Range of each state in all motions.
@@ -146,7 +146,7 @@ def blurred(map_: Map, orbit: Orbit, scale: np.ndarray) -> Noisy | None:
     )
 
 
-def motion_size(map_: Map, orbit: Orbit, scale: np.ndarray) -> np.ndarray:
+def motion_size(map_: Map, orbit: ClosedMotion, scale: np.ndarray) -> np.ndarray:
     """Range of each state in the exact motion on an orbit, float64[D]; where a state rests, that of
     all motions.
     """
@@ -159,7 +159,9 @@ def motion_size(map_: Map, orbit: Orbit, scale: np.ndarray) -> np.ndarray:
     return np.where(wide > 0, wide, scale)
 
 
-def stray_of(map_: Map, orbit: Orbit | None, iterates: np.ndarray, scale: np.ndarray) -> Stray:
+def stray_of(
+    map_: Map, orbit: ClosedMotion | None, iterates: np.ndarray, scale: np.ndarray
+) -> Stray:
     """How far a trajectory float64[m, D] of an inexact map strays from an exact orbit; unknown if
     there is none.
     """
@@ -182,7 +184,7 @@ def stray_attrs(strays: Sequence[Stray]) -> dict[str, str | float]:
     return {"unconverged_exactly": words, "unconverged_stray": max(far, default=np.nan)}
 
 
-def keep_to(attractors: Sequence[SampledAttractor], runs: np.ndarray, inside: float) -> np.ndarray:
+def keep_to(attractors: Sequence[SampledMotion], runs: np.ndarray, inside: float) -> np.ndarray:
     """Which of some attractors, known by where they go, trajectories float64[k, m, D] keep to with
     such a share, int64[k]; -1 for none.
     """

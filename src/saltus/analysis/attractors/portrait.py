@@ -4,15 +4,18 @@ columns of the attractor table.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from saltus.analysis.attractors.aperiodic import SampledAttractor
+from saltus.analysis.attractors.aperiodic import SampledMotion
 from saltus.analysis.attractors.attractor_set import AttractorSet
 from saltus.analysis.attractors.limit_cycles import cycle_of
 from saltus.analysis.attractors.noisy import Noisy
 from saltus.analysis.closed.cycles import ASIDE
 from saltus.analysis.closed.field_zeros import autonomous, find_equilibria
 from saltus.analysis.closed.measures import Measures, measure, unknown
+from saltus.analysis.closed.motions import ClosedMotion
 from saltus.analysis.closed.unforced import rest
 from saltus.flow.maps import Map, Stroboscope
 from saltus.results import AttractorTable
@@ -36,93 +39,72 @@ def portraits(map_: Map, found: AttractorSet) -> AttractorTable:
     """
     if isinstance(map_, Stroboscope) and autonomous(map_.system):
         return _unforced(map_, found)
-    size, per_second = len(map_.states), 1.0 / float(map_.period[0])
-    orbits = [
-        *found.orbits,
-        *(one.orbit if isinstance(one, Noisy) else None for one in found.sampled),
-    ]
-    period = np.array([0 if orbit is None else orbit.period for orbit in orbits], np.int64)
-    start = np.array(
-        [*(orbit.points[0] for orbit in found.orbits), *map(_first, found.sampled)]
-    ).reshape(-1, size)
-    points = [
-        *(orbit.points for orbit in found.orbits),
-        *(one.points[:APERIODIC_PERIODS] for one in found.sampled),
-    ]
-    nothing = np.full(size, np.nan + 0j)
-    numbers = _numbers(map_, start, period, points)
-    scatter = np.array(
+    size, every = len(map_.states), found.every
+    orbits = [one.orbit if isinstance(one, Noisy) else one for one in every]
+    period = np.array(
+        [one.period if isinstance(one, ClosedMotion) else 0 for one in orbits], np.int64
+    )
+    multipliers = np.array(
         [
-            one.scatter[0] if isinstance(one, Noisy) else np.nan
-            for one in (*found.orbits, *found.sampled)
+            one.multipliers if isinstance(one, ClosedMotion) else np.full(size, np.nan + 0j)
+            for one in orbits
         ]
     )
+    points = [one.points[:APERIODIC_PERIODS] for one in every]
+    start = _starts(every, size)
+    numbers = _numbers(map_, start, period, points)
+    scatter = np.array([one.scatter[0] if isinstance(one, Noisy) else np.nan for one in every])
     noisy = np.flatnonzero(np.isfinite(scatter))
     if len(noisy) and map_.exact_map is not None:
-        numbers.put(
-            noisy, _numbers(map_.exact_map, start[noisy], period[noisy], [points[i] for i in noisy])
-        )
+        exact = _numbers(map_.exact_map, start[noisy], period[noisy], [points[i] for i in noisy])
+        numbers.put(noisy, exact)
+    exponent, error = 1.0 / float(map_.period[0]) * _exponents(every)
     return AttractorTable(
-        kind=[*(Kind.PERIODIC.word for _ in found.orbits), *(one.kind for one in found.sampled)],
-        period=period,
-        contacts=numbers.contacts * np.maximum(period, 1),
-        itinerary=numbers.itinerary,
-        peak=numbers.peak[:, 0],
-        rms=numbers.rms[:, 0],
-        margin=numbers.margin,
-        multipliers=np.array(
-            [nothing if orbit is None else orbit.multipliers for orbit in orbits]
-        ).reshape(-1, size),
-        exponent=per_second
-        * np.array(
-            [*(orbit.exponent for orbit in found.orbits), *(one.exponent for one in found.sampled)]
-        ),
-        exponent_error=per_second
-        * np.array([*(0.0 for _ in found.orbits), *(one.exponent_error for one in found.sampled)]),
+        **numbers.columns(period),
+        kind=[one.kind for one in every],
+        multipliers=multipliers.reshape(-1, size),
+        exponent=exponent,
+        exponent_error=error,
         points=points,
         scatter=scatter if len(noisy) else None,
     )
 
 
-def _first(one: SampledAttractor) -> np.ndarray:
-    """A point on an attractor that is known by where it goes: of one that never repeats its last,
-    when it has settled the most.
+def _starts(every: Sequence[ClosedMotion | SampledMotion], size: int) -> np.ndarray:
+    """A point on each motion, float64[m, D]: of one that never repeats the last, when it has
+    settled the most.
     """
-    return np.asarray(one.points[0] if isinstance(one, Noisy) else one.points[-1])
+    repeats = [isinstance(one, (ClosedMotion, Noisy)) for one in every]
+    points = [one.points[0 if known else -1] for one, known in zip(every, repeats, strict=True)]
+    return np.array(points).reshape(-1, size)
+
+
+def _exponents(every: Sequence[ClosedMotion | SampledMotion]) -> np.ndarray:
+    """The largest Lyapunov exponent of each motion and its error [per iterate], float64[2, m]."""
+    return np.array([(one.exponent, one.exponent_error) for one in every]).reshape(-1, 2).T
 
 
 def _unforced(map_: Stroboscope, found: AttractorSet) -> AttractorTable:
     """The table of a system without forcing: equilibria, limit cycles, and what never repeats."""
-    size, rests = len(map_.states), len(found.orbits)
+    size, rests, every = len(map_.states), len(found.orbits), found.every
     kind = np.array(
         [*(Kind.EQUILIBRIUM.word for _ in found.orbits), *(one.kind for one in found.sampled)],
         dtype=np.str_,
     )
-    start = np.array(
-        [*(orbit.points[0] for orbit in found.orbits), *(one.points[-1] for one in found.sampled)]
-    ).reshape(-1, size)
+    start = _starts(every, size)
     points = [
-        *(orbit.points[:1] for orbit in found.orbits),
+        *(one.points[:1] for one in found.orbits),
         *(one.points[:APERIODIC_PERIODS] for one in found.sampled),
     ]
     cycle, multipliers, eigenvalues = (
         np.full(len(kind), np.nan),
         *np.full((2, len(kind), size), np.nan + 0j),
     )
-    exponent, error = (
-        np.array(
-            [(0.0, 0.0)] * rests + [(one.exponent, one.exponent_error) for one in found.sampled]
-        )
-        .reshape(-1, 2)
-        .T
-    )
-    exponent, error = exponent / map_.period, error / map_.period
+    exponent, error = _exponents(every) / map_.period
     still = find_equilibria(map_.rows(np.arange(rests)), start[:rests], np.ones((rests, size)))
     for i in range(rests):
-        points[i] = start[i : i + 1] = (
-            still.place[i : i + 1] if np.isfinite(still.place[i]).all() else start[i : i + 1]
-        )
-        eigenvalues[i], exponent[i] = still.eigenvalues[i], still.eigenvalues[i, 0].real
+        points[i] = start[i : i + 1] = still.points[i, :1] if still.period[i] else start[i : i + 1]
+        eigenvalues[i], exponent[i] = still.multipliers[i], still.multipliers[i, 0].real
     for i in np.flatnonzero(kind == Kind.LIMIT_CYCLE.word).tolist():
         one = cycle_of(map_, found.sampled[i - rests])
         cycle[i], multipliers[i], points[i], start[i] = (
@@ -134,21 +116,12 @@ def _unforced(map_: Stroboscope, found: AttractorSet) -> AttractorTable:
     own = map_.rows(np.arange(len(kind))).with_period(
         np.where(np.isfinite(cycle), cycle, map_.period)
     )
-    numbers = measure(
-        own,
-        start,
-        np.isin(kind, (Kind.EQUILIBRIUM.word, Kind.LIMIT_CYCLE.word)).astype(np.int64),
-        APERIODIC_PERIODS,
-    )
+    closed = np.isin(kind, (Kind.EQUILIBRIUM.word, Kind.LIMIT_CYCLE.word)).astype(np.int64)
+    numbers = measure(own, start, closed, APERIODIC_PERIODS)
     rest(map_.rows(np.arange(rests)), start[:rests], np.arange(rests), numbers)
     return AttractorTable(
+        **numbers.columns(np.zeros(len(kind), np.int64)),
         kind=kind.tolist(),
-        period=np.zeros(len(kind), np.int64),
-        contacts=numbers.contacts,
-        itinerary=numbers.itinerary,
-        peak=numbers.peak[:, 0],
-        rms=numbers.rms[:, 0],
-        margin=numbers.margin,
         multipliers=multipliers,
         exponent=exponent,
         exponent_error=error,

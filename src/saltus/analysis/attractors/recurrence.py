@@ -7,7 +7,8 @@ from __future__ import annotations
 import numpy as np
 
 from saltus.analysis.attractors.growth import NEWTON, tangent_cost
-from saltus.analysis.closed.orbits import OrbitBatch, find_orbits
+from saltus.analysis.closed.motions import ClosedMotions
+from saltus.analysis.closed.orbits import find_orbits
 from saltus.flow.maps import Map
 
 
@@ -35,7 +36,7 @@ def recurrence(points: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.nd
 
 def recurring_orbits(
     map_: Map, points: np.ndarray, scale: np.ndarray, near: float, purse: np.ndarray | None = None
-) -> tuple[OrbitBatch, np.ndarray, np.ndarray]:
+) -> tuple[ClosedMotions, np.ndarray, np.ndarray]:
     """The orbits of trajectories that nearly recur.
 
     Parameters
@@ -55,13 +56,13 @@ def recurring_orbits(
 
     Returns
     -------
-    orbits : OrbitBatch
+    orbits : ClosedMotions
         What was found from the last points, k of them.
     apart, noise : float64[k]
         How nearly each recurs, and the noise of the map, in units of the scale.
     """
     period, apart = recurrence(points, scale)
-    noise, result = map_.noise_of(scale), OrbitBatch.none(len(points), points.shape[2])
+    noise, result = map_.noise_of(scale), ClosedMotions.none(len(points), points.shape[2])
     price = NEWTON * period * tangent_cost(points.shape[2])
     purse = np.full(len(points), np.inf) if purse is None else purse
     ready = np.flatnonzero((apart < np.maximum(near, noise)) & (price <= purse))

@@ -1,3 +1,3 @@
-"""Which attractor each start leads to, how large the basins are and how far the map
-can be trusted.
+"""Basins of attraction: the attractor of each start, the sizes of the basins, and measures of trust
+in the map.
 """

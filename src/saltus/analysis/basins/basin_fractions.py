@@ -1,4 +1,4 @@
-"""`basin_fractions`: how likely each response is."""
+"""`basin_fractions`: the probability of each response."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from saltus.intervals import smallest_seen
 from saltus.results.dataset.kinds import Kind
 from saltus.system import System
 
-#: Starts that tell the range.
+#: Starts that measure the range of the states.
 SPREAD_STARTS = 4096
 
 
@@ -50,8 +50,8 @@ def basin_fractions(
     progress: bool | Callable[[float], None] | None = None,
     **box: Any,
 ) -> xr.Dataset:
-    """How likely each response is: random starts from a box of any number of states, with
-    confidence intervals.
+    """Share of random starts that lead to each response, with confidence intervals. The starts are
+    uniform in a box of any number of states.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""`basins`: which attractor each start leads to."""
+"""`basins`: the attractor that each start of a grid leads to."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from saltus.flow.threads import on_threads
 from saltus.interrupt import Interrupted
 from saltus.system import System
 
-#: Share of the progress that the search for attractors takes.
+#: Share of the progress bar for the search for attractors.
 SCOUTING = 0.05
 
 
@@ -35,10 +35,21 @@ def basins(
 ) -> xr.Dataset:
     """The attractor that each start of a grid leads to, every attractor typed and verified.
 
-    Attractors are first found from a fixed sample of 1024 starts; a trajectory ends when it enters
-    a neighbourhood of one of them in which the return map was seen to contract with an unchanged
-    sequence of contacts. What isn't captured is followed further, and new attractors are looked for
-    there.
+    1. A fixed quasi-random sample of 1024 starts is followed until it settles, and its attractors
+       are established as by :func:`saltus.attractors`: a small sample meets all large basins.
+    2. About each attracting orbit a neighbourhood is taken in which the return map was seen to
+       contract with an unchanged sequence of contacts: a trajectory inside needn't be followed any
+       further.
+    3. Every start of the grid is followed until it enters such a neighbourhood, so none runs longer
+       than it must. Limit cycles and attractors that never repeat have none: a trajectory is on one
+       of these if its iterates keep to it.
+    4. New attractors are looked for from a sample of the trajectories that nothing captured within
+       ``periods``, since small basins may be missing from the first sample. Then all of these go on
+       for as long again.
+    5. A random sample of the settled cells is computed again by a more exact method; ``flip_rate``
+       is the share that leads elsewhere, an estimate of wrong labels.
+    6. Shares, entropies and the uncertainty exponent are computed from the labels; they say how far
+       the map can be trusted.
 
     Parameters
     ----------

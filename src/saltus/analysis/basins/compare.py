@@ -1,4 +1,4 @@
-"""Where two maps of basins agree: attractors matched one to one, then cell by cell."""
+"""Compare two maps of basins: match their attractors one to one, then compare cell by cell."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from scipy.optimize import linear_sum_assignment
 
-from saltus.analysis.closed.orbits import orbit_distance
+from saltus.analysis.closed.motions import orbit_distance
 from saltus.analysis.inputs.verb import verb
 from saltus.errors import ParameterError
 from saltus.intervals import wilson
@@ -27,17 +27,17 @@ from saltus.results.dataset.schema import (
     states_of,
 )
 
-#: Largest distance of two orbits that count as one, in units of the axis ranges: far above what
-#: methods differ by on one attractor, below what tells neighbours on the rig apart.
+#: Largest distance of two orbits that count as one, in units of the axis ranges. Methods differ far
+#: less on one attractor, and neighbouring orbits of the rig differ more.
 TOLERANCE = 0.01
 #: Orbits of equal peak and rms count as one up to this multiple of that distance: errors of a
 #: weakly damped response add up in its phase.
 SHIFTED = 10.0
 #: Largest difference of two grids that is rounding, in units of the axis range.
 _ROUNDING = 1e-9
-#: Attributes of both maps that the result keeps, with _a and _b.
+#: Attributes of both maps that the result keeps, with suffixes _a and _b.
 _KEPT = ("system", "parameters", "method", "method_options", "result_hash", "saltus_version")
-#: Stands for "can't be the same" in the assignment: more than all possible pairs together.
+#: Cost of an impossible pair in the assignment: more than all possible pairs together.
 _NEVER = 1e9
 
 
@@ -58,7 +58,7 @@ def compare(map_a: xr.Dataset, map_b: xr.Dataset, *, tolerance: float = TOLERANC
     Parameters
     ----------
     map_a, map_b : Dataset
-        What ``basins`` returned.
+        The result of ``basins``.
     tolerance : float
         Largest distance of two orbits that count as one, in units of the axis ranges. A state that
         is no axis is measured by the largest magnitude of the points.
@@ -141,7 +141,7 @@ def compare(map_a: xr.Dataset, map_b: xr.Dataset, *, tolerance: float = TOLERANC
 
 # -- the grids -------------------------------------------------------------------------------------
 def _same_grid(a: xr.Dataset, b: xr.Dataset) -> None:
-    """Raise a ParameterError that says in what two grids differ."""
+    """Raise a ParameterError that names the difference of two grids."""
     differ = _difference(a, b)
     if differ:
         raise ParameterError(
@@ -151,7 +151,7 @@ def _same_grid(a: xr.Dataset, b: xr.Dataset) -> None:
 
 
 def _difference(a: xr.Dataset, b: xr.Dataset) -> str:
-    """The first thing in which two grids differ, as text; empty if they are one."""
+    """The first difference of two grids, as text; empty if they are equal."""
     if states_of(a) != states_of(b):
         return f"the states are {', '.join(states_of(a))} and {', '.join(states_of(b))}"
     if axes_of(a) != axes_of(b):
@@ -230,8 +230,8 @@ def _level_distances(a: xr.Dataset, b: xr.Dataset) -> np.ndarray:
 
 
 def _scales(a: xr.Dataset, b: xr.Dataset) -> np.ndarray:
-    """What a distance of each state is measured by: the range of its axis, else the largest
-    magnitude of the points; never 0.
+    """Unit of distance for each state: the range of its axis, else the largest magnitude of the
+    points; never 0.
     """
     scales = []
     for name in states_of(a):
@@ -246,9 +246,7 @@ def _scales(a: xr.Dataset, b: xr.Dataset) -> np.ndarray:
 
 
 def _shared_cells(a: xr.Dataset, b: xr.Dataset) -> np.ndarray:
-    """Share of the cells that every attractor of a and every one of b have in common, of those that
-    either has.
-    """
+    """Cells shared by each attractor of a and each of b, over the cells that either has."""
     size = (a.sizes["attractor"], b.sizes["attractor"])
     first, second = a["basin"].values.ravel(), b["basin"].values.ravel()
     both = np.zeros(size)
@@ -265,8 +263,8 @@ def _cells(labels: np.ndarray, m: int) -> np.ndarray:
 
 # -- one numbering ---------------------------------------------------------------------------------
 def _pairs(partner: np.ndarray, m_b: int) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers of each pair in a and in b, -1 for none: first the attractors of a, then those that
-    only b has.
+    """Numbers of each pair in a and in b, -1 for none: first the attractors of a, then those in b
+    only.
     """
     alone = np.setdiff1d(np.arange(m_b), partner)
     return np.concatenate([np.arange(len(partner)), np.full(len(alone), -1)]), np.concatenate(
@@ -275,7 +273,7 @@ def _pairs(partner: np.ndarray, m_b: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _renumbered(labels: np.ndarray, ids: np.ndarray) -> np.ndarray:
-    """The labels in the numbers of the pairs; codes stay."""
+    """The labels in the numbers of the pairs; negative codes are kept."""
     number = np.empty(ids.max(initial=-1) + 1, dtype=np.int64)
     number[ids[ids >= 0]] = np.flatnonzero(ids >= 0)
     result = labels.copy()
@@ -286,13 +284,13 @@ def _renumbered(labels: np.ndarray, ids: np.ndarray) -> np.ndarray:
 def _column(
     a: xr.Dataset, b: xr.Dataset, ids_a: np.ndarray, ids_b: np.ndarray, name: str
 ) -> list[Any]:
-    """A variable of the attractors for each pair, from whichever map has it."""
+    """A variable of the attractors for each pair, from a map that has it."""
     first, second = a[name].values, b[name].values
     return [first[i] if i >= 0 else second[j] for i, j in zip(ids_a, ids_b, strict=True)]
 
 
 def _shares(ds: xr.Dataset, ids: Sequence[int] | np.ndarray) -> np.ndarray:
-    """Share of the starts for each pair, NaN where the map doesn't have it."""
+    """Share of the starts for each pair, NaN if the map lacks it."""
     share = np.append(
         ds["attractor_fraction"].values
         if "attractor_fraction" in ds
@@ -317,7 +315,7 @@ def _numbers(agreement: np.ndarray) -> dict[str, float | int]:
 
 
 def _provenance(a: xr.Dataset, b: xr.Dataset) -> dict[str, Any]:
-    """Where both maps come from, and what they have in common under its plain name."""
+    """Provenance of both maps; entries that they share have plain names."""
     result = {
         f"{name}_{which}": ds.attrs[name]
         for which, ds in (("a", a), ("b", b))
@@ -329,7 +327,7 @@ def _provenance(a: xr.Dataset, b: xr.Dataset) -> dict[str, Any]:
         for name in ("system", "parameters", "units")
         if name in a.attrs and a.attrs[name] == b.attrs.get(name)
     }
-    # those that both maps share; what differs stands under parameters_a and parameters_b
+    # shared parameters; those that differ are in parameters_a and parameters_b
     if "parameters" not in common:
         first, second = (json.loads(ds.attrs.get("parameters", "{}")) for ds in (a, b))
         common["parameters"] = json.dumps(

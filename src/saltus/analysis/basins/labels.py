@@ -1,5 +1,5 @@
-"""Where many starts lead, once the attractors are known: a pure function of its arguments, so that
-any part can be computed anywhere.
+"""Label starts by the attractors they lead to, once these are known. Pure functions, so that any
+part can be computed anywhere.
 """
 
 from __future__ import annotations
@@ -16,22 +16,23 @@ from saltus.flow.threads import on_threads
 from saltus.kernels import status as st
 from saltus.results.dataset.kinds import Kind
 
-#: Not captured by any attractor known so far, beside the codes of :class:`Kind`: for the post-pass.
+#: Code of a start that no known attractor has captured, besides those of :class:`Kind`; the
+#: post-pass treats it.
 OPEN = min(Kind) - 1
 #: Iterates between two tests for capture.
 BLOCK = 8
 #: Starts that one thread follows at a time.
 PIECE = 4096
-#: Age at which a trajectory may be taken for one on a chaotic attractor, and age between two tests
-#: after that.
+#: Age from which a trajectory may count as being on a chaotic attractor, and age between two such
+#: tests.
 APERIODIC_WINDOW = 64
-#: Trajectories that nothing captured from which new attractors are looked for.
+#: Most uncaptured trajectories from which new attractors are searched.
 SAMPLE = 256
 
 
 @dataclass(frozen=True)
 class Settling:
-    """What came of k starts.
+    """The outcomes of k starts.
 
     Attributes
     ----------
@@ -40,11 +41,11 @@ class Settling:
     periods : int64[k]
         Iterates until captured; -1 if it wasn't.
     status : int64[k]
-        How it ended: codes of kernels/status.py.
+        Its end: codes of kernels/status.py.
     unresolved : int64[k]
         Grazes on the way that were shallower than the local error.
     end : float64[k, D]
-        Where it stood last.
+        Its last state.
     """
 
     label: np.ndarray
@@ -55,7 +56,7 @@ class Settling:
 
     @classmethod
     def empty(cls, count: int, size: int) -> Settling:
-        """Nothing computed yet."""
+        """Outcomes of which nothing is computed yet."""
         label, periods = np.full(count, Kind.NOT_COMPUTED, np.int64), np.full(count, -1, np.int64)
         return cls(
             label,
@@ -66,14 +67,14 @@ class Settling:
         )
 
     def put(self, where: np.ndarray | slice, other: Settling) -> None:
-        """Write another's results to some places."""
+        """Write the outcomes of other starts to these indices."""
         for name in ("label", "periods", "status", "unresolved", "end"):
             getattr(self, name)[where] = getattr(other, name)
 
 
 def settle(map_: Map, start: np.ndarray, found: AttractorSet, most: int) -> Settling:
-    """Follow trajectories until an attractor captures them, float64[k, D], for ``most`` iterates at
-    the longest.
+    """Follow trajectories from float64[k, D] until an attractor captures them, for ``most``
+    iterates at most.
     """
     result = Settling.empty(len(start), start.shape[1])
     travel, who = map_.launch(start, most), np.arange(len(start))
@@ -140,8 +141,8 @@ def complete(
     most: int,
     threads: int | None = None,
 ) -> AttractorSet:
-    """Search new attractors where nothing captured, label what they capture, and give all
-    attractors their final ids.
+    """Search for new attractors from uncaptured trajectories, label those they capture, and give
+    all attractors their final ids.
 
     Changes ``result``. The trajectories go on from where they stood. Returns the attractors in
     their final order.

@@ -1,5 +1,5 @@
-"""The plan of a basin map: which starts, in which chunks, and what each chunk computes. Everything
-that a store or a cluster needs to know.
+"""The plan of a basin map: its starts, its chunks, and the work of each chunk. A store or a cluster
+needs nothing else.
 
 Three stages, each a pure function of the plan and of the stages before: *scout* finds the
 attractors from a fixed sample of the starts, *chunk* labels one run of cells with them, *finish*
@@ -41,11 +41,11 @@ from saltus.results.provenance import to_json
 from saltus.system import System
 from saltus.units import to_si
 
-#: Starts from which attractors are looked for first; a basin of half a per cent is met with 99.4 %.
+#: Starts of the first search for attractors; a basin of half a per cent is hit with 99.4 %.
 SCOUTS = 1024
-#: Cells of one task: seconds of work at most, and enough of them to keep lanes full to the end.
+#: Cells of one task: seconds of work at most, and enough cells to keep lanes full to the end.
 CHUNK = 4096
-#: Cells recomputed with a more exact method.
+#: Cells recomputed by a more exact method.
 CHECKED = 1000
 
 
@@ -58,7 +58,7 @@ class BasinPlan:
     system : System
         Equations and values.
     method : Method
-        How to integrate.
+        The method of integration.
     axes : mapping of str to float64[n]
         The two states that the map is drawn over, and their values [SI].
     fixed : mapping of str to float
@@ -98,13 +98,13 @@ class BasinPlan:
         return -(-self.cells // CHUNK)
 
     def map(self, threads: int | None = None) -> Stroboscope:
-        """The map whose attractors are asked for."""
+        """The map whose attractors are computed."""
         return Stroboscope(self.system, self.method, every=self.every, threads=threads)
 
     @property
     def scale(self) -> np.ndarray:
-        """Range of each state: of an axis its length, of others the largest of those with the same
-        unit, else of any.
+        """Range of each state: of an axis its length, of other states the largest of those with the
+        same unit, else of any.
         """
         lengths = {name: float(np.ptp(values)) for name, values in self.axes.items()}
         units = self.system.units
@@ -149,21 +149,19 @@ class BasinPlan:
         )[0]
 
     def sample(self, count: int) -> np.ndarray:
-        """Some of the cells, drawn at random, always the same ones: int64[count at most],
-        ascending.
-        """
+        """Indices of cells drawn at random, the same each time: int64[count at most], ascending."""
         return np.sort(
             np.random.default_rng(0).choice(self.cells, min(count, self.cells), replace=False)
         )
 
     def chunk(self, index: int, found: AttractorSet, map_: Stroboscope | None = None) -> Settling:
-        """Where the starts of one chunk lead. One thread."""
+        """Label the starts of one chunk, on one thread."""
         return settle(map_ or self.map(1), self.starts(self.cells_of(index)), found, self.periods)
 
     def finish(
         self, result: Settling, found: AttractorSet, threads: int | None = None
     ) -> xr.Dataset:
-        """The Dataset; what is still open is settled first, and a sample is checked. Changes
+        """The finished Dataset: open cells are settled first, and a sample is checked. Changes
         ``result``.
         """
         found = complete(self.map(threads), result, found, self.scale, self.periods, threads)
@@ -172,9 +170,7 @@ class BasinPlan:
     def dataset(
         self, result: Settling, found: AttractorSet, threads: int | None = None
     ) -> xr.Dataset:
-        """The Dataset of what is known; what is still open counts as unconverged. Changes
-        ``result``.
-        """
+        """The Dataset of all known labels; open cells count as unconverged. Changes ``result``."""
         map_ = self.map(threads)
         result.label[result.label == OPEN] = Kind.UNCONVERGED
         labels = result.label.reshape(self.shape)
@@ -235,8 +231,8 @@ class BasinPlan:
 
 
 def memory(cells: int, states: int) -> float:
-    """Memory that a map takes, or as many random starts [bytes]: what is kept of each cell, and the
-    measures of the map.
+    """Memory of a map, or of as many random starts [bytes]: the data of each cell, and the measures
+    of the map.
     """
     return 2.5e8 + cells * (120.0 + 24.0 * states)
 
@@ -249,7 +245,7 @@ def basin_plan(
     periods: int,
     every: float | str | None,
 ) -> BasinPlan:
-    """A plan from what users write, checked.
+    """A checked plan from a user's arguments.
 
     Raises
     ------
@@ -272,7 +268,7 @@ def basin_plan(
     check_room(
         memory(first * second, len(system.states)),
         f"{first} x {second} cells",
-        "Take a coarser grid, or sl.basin_fractions.",
+        lambda say: f"Take a coarser grid, or {say.verb('basin_fractions')}.",
     )
     values = {name: _axis(system, name, given) for name, given in axes.items()}
     plan = BasinPlan(system, method, values, fixed, periods)
@@ -282,10 +278,8 @@ def basin_plan(
 
 def _axis(system: System, name: str, given: Any) -> np.ndarray:
     """Starts along one state from (low, high, count) or a list or array of starts."""
-    example = f'{name}=("-5 mm", "5 mm", 400)'
-    values = along(
-        name, given, lambda value: to_si(value, system.units[name], name), "starts", example, 2
-    )
+    example, unit = {name: ("-5 mm", "5 mm", 400)}, system.units[name]
+    values = along(name, given, lambda value: to_si(value, unit, name), "starts", example, 2)
     if len(values) < 2 or not (np.diff(values) > 0).all():
         raise ParameterError(f"the starts along {name} must ascend, at least two of them.")
     return values

@@ -1,5 +1,5 @@
-"""Attractors and labels as plain data: what a store keeps, and reads back to the last bit. No code
-is run on reading.
+"""Attractors and labels as plain data, which a store keeps to the last bit. Reading runs no
+code.
 """
 
 from __future__ import annotations
@@ -9,15 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from saltus.analysis.attractors.aperiodic import SampledAttractor
+from saltus.analysis.attractors.aperiodic import SampledMotion
 from saltus.analysis.attractors.attractor_set import AttractorSet
 from saltus.analysis.attractors.noisy import Noisy
 from saltus.analysis.basins.labels import Settling
 from saltus.analysis.closed.capture import Neighbourhoods
-from saltus.analysis.closed.orbits import Orbit
+from saltus.analysis.closed.motions import ClosedMotion
 from saltus.errors import SaltusError
 
-#: What is kept of each cell, beside where it ended.
+#: Data of each cell, besides its final state.
 CELL: dict[str, Any] = {
     "label": np.int16,
     "periods": np.int32,
@@ -61,7 +61,7 @@ def found_from(data: Mapping[str, Any], size: int) -> AttractorSet:
 
 
 def _holds_together(found: AttractorSet, size: int) -> bool:
-    """Whether sizes fit one another, and numbers what they count."""
+    """True if the sizes agree, and all numbers are in the range of the items they refer to."""
     near, orbits = (
         found.near,
         [
@@ -98,7 +98,7 @@ def _found(data: Mapping[str, Any], size: int) -> AttractorSet:
     )
 
 
-def _orbit_data(orbit: Orbit) -> dict[str, Any]:
+def _orbit_data(orbit: ClosedMotion) -> dict[str, Any]:
     values = orbit.multipliers
     return {
         "points": orbit.points.tolist(), "mismatch": orbit.mismatch,
@@ -106,27 +106,27 @@ def _orbit_data(orbit: Orbit) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _orbit_from(data: Mapping[str, Any], size: int) -> Orbit:
+def _orbit_from(data: Mapping[str, Any], size: int) -> ClosedMotion:
     values = np.array([complex(real, imaginary) for real, imaginary in data["multipliers"]])
-    return Orbit(_array(data["points"], size), values, float(data["mismatch"]))
+    return ClosedMotion(_array(data["points"], size), values, float(data["mismatch"]))
 
 
-def _sampled_data(one: SampledAttractor) -> dict[str, Any]:
+def _sampled_data(attractor: SampledMotion) -> dict[str, Any]:
     data = {
-        "kind": one.kind, "exponent": one.exponent, "error": one.exponent_error,
-        "points": one.points.tolist(), "scale": one.scale.tolist(),
+        "kind": attractor.kind, "exponent": attractor.exponent, "error": attractor.exponent_error,
+        "points": attractor.points.tolist(), "scale": attractor.scale.tolist(),
     }  # fmt: skip
-    if not isinstance(one, Noisy):
+    if not isinstance(attractor, Noisy):
         return data
     return data | {
-        "orbit": _orbit_data(one.orbit),
-        "size": one.size.tolist(),
-        "scatter": one.scatter.tolist(),
-        "stray": one.stray,
+        "orbit": _orbit_data(attractor.orbit),
+        "size": attractor.size.tolist(),
+        "scatter": attractor.scatter.tolist(),
+        "stray": attractor.stray,
     }
 
 
-def _sampled_from(data: Mapping[str, Any], size: int) -> SampledAttractor:
+def _sampled_from(data: Mapping[str, Any], size: int) -> SampledMotion:
     plain = (
         str(data["kind"]),
         float(data["exponent"]),
@@ -135,7 +135,7 @@ def _sampled_from(data: Mapping[str, Any], size: int) -> SampledAttractor:
         np.array(data["scale"], float),
     )
     if "orbit" not in data:
-        return SampledAttractor(*plain)
+        return SampledMotion(*plain)
     widths = np.array(data["size"], float), np.array(data["scatter"], float)
     return Noisy(*plain, _orbit_from(data["orbit"], size), *widths, float(data["stray"]))
 
@@ -145,7 +145,7 @@ def _array(rows: Any, *tail: int) -> np.ndarray:
 
 
 def cell_types(states: tuple[str, ...]) -> dict[str, Any]:
-    """Name and type of what is kept of each cell."""
+    """Name and type of the data of each cell."""
     return {**CELL, **{f"end_{name}": np.float64 for name in states}}
 
 
@@ -161,7 +161,7 @@ def settling_arrays(part: Settling, states: tuple[str, ...]) -> dict[str, np.nda
 
 
 def settling_from(arrays: Mapping[str, np.ndarray], states: tuple[str, ...]) -> Settling:
-    """Cells from :func:`settling_arrays`' result."""
+    """Outcomes of cells from :func:`settling_arrays`' result."""
     columns = {name: arrays[name].astype(np.int64) for name in CELL}
     return Settling(columns["label"], columns["periods"], columns["status"], columns["unresolved"],
                     np.stack([arrays[f"end_{name}"] for name in states], axis=1))  # fmt: skip

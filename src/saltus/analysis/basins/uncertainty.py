@@ -1,5 +1,5 @@
-"""How far a map of basins can be trusted: shares with intervals, what the grid can miss, and how
-intricate the boundaries are.
+"""Trust in a map of basins: shares with intervals, the smallest basin seen, and measures of the
+boundaries.
 
 All functions take the labels of the cells of a regular grid, int[nA, nB]. Negative labels are codes
 (escaped, unconverged, ...), not attractors: they have no share, but in the measures of boundaries
@@ -20,10 +20,10 @@ from saltus.results.dataset.schema import BASINS, check
 
 #: Cells along the side of a box; Daza et al. use 5 in all of their figures.
 BOX = 5
-#: The largest distance looked at is this part of the shorter side of the grid: beyond it the sides
-#: are felt.
+#: Largest distance, as a part of the shorter side of the grid: beyond it the sides have an
+#: influence.
 LARGEST_DISTANCE = 16
-#: Distances that a slope needs at least, so that it has an error.
+#: Least number of distances for a slope, so that it has an error.
 FEWEST_DISTANCES = 3
 #: Codes of cells without a motion.
 NO_MOTION = (Kind.FAILED, Kind.NOT_COMPUTED)
@@ -118,8 +118,8 @@ def _mean(of: np.ndarray) -> float:
 
 
 def uncertain_share(labels: np.ndarray, distance: int) -> float:
-    """Share of the cells of which a neighbour ``distance`` cells away, along either axis and to
-    either side, has another label; cells in NO_MOTION are none.
+    """Share of cells with a neighbour of another label at this distance, along either axis and to
+    either side. Cells in NO_MOTION are left out.
 
     Beyond its edges the grid is continued by its mirror image. That keeps every cell and changes no
     dimension: a share of the cells that have all four neighbours would grow with the distance for a
@@ -186,12 +186,12 @@ def uncertainty_exponent(labels: np.ndarray) -> tuple[float, float, float]:
 
 # -- a map -----------------------------------------------------------------------------------------
 def measure(ds: xr.Dataset) -> dict[str, float | int]:
-    """The trust numbers of a map of basins, to be kept in its attributes.
+    """The measures of trust of a map of basins, for its attributes.
 
     Parameters
     ----------
     ds : Dataset
-        What ``basins`` returned.
+        The result of ``basins``.
 
     Returns
     -------

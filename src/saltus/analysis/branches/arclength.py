@@ -15,13 +15,13 @@ from typing import Protocol
 
 import numpy as np
 
+from saltus.analysis.solve.newton import Zeros, newton
 from saltus.flow.polynomials import between
 
+#: The corrector is done where its residual is smaller than this, in units of the scale.
+CLOSED = 1e-14
 #: Iterations of the corrector: more mean that the step was too long.
 MOST_ITERATIONS = 7
-#: A residual so small, in units of the scale, is rounding; one so small that stalls is accepted.
-#: One that quadratic convergence foresees to be smaller than this isn't waited for.
-CLOSED, STALLED, FORESEEN = 1e-14, 1e-9, 1e-17
 #: Cosine of the angle between tangents at the ends of a step, and between it and each of them: less
 #: halves the step. A step to another curve that runs alongside is at an angle to both.
 TURN = 0.97
@@ -104,18 +104,15 @@ class Curve:
     length: list[float] = field(default_factory=list)
     end: str = ""
 
-
-@dataclass(frozen=True)
-class Corrected:
-    """Points of curves: float64[k, m + 1], the derivative there, which were found, in how many
-    evaluations, and how the second step of the iteration compares with the first, all float64[k].
-    """
-
-    z: np.ndarray
-    derivative: np.ndarray
-    found: np.ndarray
-    evaluations: np.ndarray
-    contraction: np.ndarray
+    def behind(self, back: Curve) -> Curve:
+        """The curve through the start of both that comes along another one and goes on as this."""
+        return Curve(
+            back.z[:0:-1] + self.z,
+            [-tangent for tangent in back.tangent[:0:-1]] + self.tangent,
+            back.derivative[:0:-1] + self.derivative,
+            [-length for length in back.length[:0:-1]] + self.length,
+            self.end,
+        )
 
 
 def correct(
@@ -125,7 +122,7 @@ def correct(
     rows: np.ndarray,
     astray: np.ndarray | float = np.inf,
     foresee: bool = False,
-) -> Corrected:
+) -> Zeros:
     """Newton's method from guesses float64[k, m + 1] in the planes across float64[k, m + 1].
 
     Parameters
@@ -142,55 +139,11 @@ def correct(
         Leave out the evaluation that would only confirm a last step: the derivative is that before
         it then.
     """
-    k, size = guess.shape
-    scale, limit = equations.scale[rows], np.broadcast_to(astray, k)
-    z, derivative = guess.copy(), np.full((k, size - 1, size), np.nan)
-    found, count = np.zeros(k, bool), np.zeros(k, np.int64)
-    before, left = np.full(k, np.inf), np.arange(k)
-    steps, lately = np.zeros((2, k)), np.zeros(k)
-    for iteration in range(MOST_ITERATIONS):
-        if not len(left):
-            break
-        residual, matrix = equations.evaluate(z[left], rows[left])
-        count[left] += 1
-        error = np.abs(residual).max(axis=1)
-        good = np.isfinite(error + matrix.sum(axis=(1, 2)))
-        done = good & ((error < CLOSED) | ((error < STALLED) & (error > 0.5 * before[left])))
-        derivative[left[done]], found[left[done]] = matrix[done], True
-        before[left] = error
-        going = np.flatnonzero(good & ~done)
-        left = left[going]
-        whole, right = np.empty((len(left), size, size)), np.zeros((len(left), size))
-        whole[:, :-1], whole[:, -1], right[:, :-1] = matrix[going], normal[left], residual[going]
-        step = -solved(whole, right)
-        length, earlier = np.linalg.norm(step, axis=1), lately[left]
-        lately[left] = length
-        if iteration < len(steps):
-            steps[iteration, left] = length
-        z[left] += step * scale[left]
-        near = np.linalg.norm((z[left] - guess[left]) / scale[left], axis=1) <= limit[left]
-        if foresee and iteration:
-            sure = near & (before[left] * (length / earlier) ** 2 < FORESEEN)
-            derivative[left[sure]], found[left[sure]] = matrix[going[sure]], True
-            count[left[sure]] += 1
-            near &= ~sure
-        left = left[near]  # no step is NaN, then
-    contraction = steps[1] / np.maximum(steps[0], STALLED)
-    return Corrected(z, derivative, found, count, contraction)
-
-
-def solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Solutions of linear systems, NaN where there is none."""
-    try:
-        return np.asarray(np.linalg.solve(matrix, right[:, :, None])[:, :, 0])
-    except np.linalg.LinAlgError:
-        result = np.full(right.shape, np.nan, matrix.dtype)
-        for i, (one, vector) in enumerate(zip(matrix, right, strict=True)):
-            try:
-                result[i] = np.linalg.solve(one, vector)
-            except np.linalg.LinAlgError:
-                continue
-        return result
+    return newton(
+        lambda z, some: equations.evaluate(z, rows[some]), guess, equations.scale[rows],
+        planes=normal, enough=CLOSED, foresee=foresee, longest_step=np.inf, farthest=astray,
+        max_steps=MOST_ITERATIONS,
+    )  # fmt: skip
 
 
 def tangents(derivative: np.ndarray, along: np.ndarray) -> np.ndarray:
@@ -281,7 +234,7 @@ class _Fronts:
         self.firsts = np.zeros(0, np.int64) if group is None else np.unique(group, True)[1]
         self.length = np.broadcast_to(first, len(curves)).astype(float)
 
-    def begin(self, here: Corrected, tangent: np.ndarray) -> None:
+    def begin(self, here: Zeros, tangent: np.ndarray) -> None:
         """The first points."""
         self.z, self.tangent = here.z.copy(), tangent
         self.side = _orientation(here.derivative, tangent)

@@ -23,7 +23,7 @@ from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.inputs.starts import at_values, check_system
 from saltus.analysis.inputs.verb import verb
-from saltus.errors import ParameterError, UnitError, among, nearest, shown
+from saltus.errors import ParameterError, UnitError, among, must_be, shown, unknown
 from saltus.flow.counts import whole
 from saltus.flow.methods import Method, exact_method
 from saltus.flow.progress import reporting
@@ -65,11 +65,18 @@ def backbone(
     """The backbone of the resonances over their amplitude: free vibrations without damping
     (nonlinear normal modes), or forced ones in phase quadrature, damping included.
 
-    The family of periodic orbits is followed by pseudo-arclength from small vibrations about rest.
-    Free vibrations: parameters that are zero are taken out of the equations; what then still forces
-    or damps is refused. In quadrature the forcing frequency and the amplitude of the force are such
-    that the mean of displacement times force over a period is zero: the displacement's first
-    harmonic lags a harmonic force by a quarter of the period.
+    1. Free vibrations: parameters that are zero are taken out of the equations; what then still
+       forces or damps is refused. Orbits come in families then, and one of the equations that close
+       them follows from the others. A fictitious damping is one more unknown, which makes them
+       independent; it vanishes on the family.
+    2. In quadrature the forcing frequency and the amplitude of the force are unknowns, such that
+       the mean of displacement times force over a period is zero: the displacement's first harmonic
+       lags a harmonic force by a quarter of the period.
+    3. The chosen mode of small vibrations about the equilibrium gives the first orbit, below the
+       smallest amplitude, as there the equations are linear unless a contact is near.
+    4. Newton's method closes it, and the family is followed by pseudo-arclength continuation until
+       it exceeds the largest amplitude; frequency and amplitude may both turn back on the way.
+    5. The first and the last point are moved along the family to exactly the amplitudes asked for.
 
     Parameters
     ----------
@@ -132,13 +139,13 @@ def backbone(
     method, system = exact_method(method, "sl.backbone"), at_values(system, values)
     state = system.states[0] if state is None else state
     if not among(state, system.states):
-        raise ParameterError(
-            f"{system.name} has no state {shown(state)}. {nearest(state, system.states)}"
-        )
+        raise unknown(f"{system.name} has no state", state, system.states)
     low, high = _range(system, state, amplitude)
     points, mode = whole(points, "points", 2), whole(mode, "mode", 1)
     if phase not in ("free", "quadrature"):
-        raise ParameterError(f'phase= is "free" or "quadrature", not {shown(phase)}.')
+        raise ParameterError(
+            lambda say: f'{say.key("phase")} is "free" or "quadrature", not {shown(phase)}.'
+        )
     measured = system.states.index(state)
     about = Force.of(system, force, state) if phase == "quadrature" else None
     with reporting(progress) as show:
@@ -175,8 +182,11 @@ def _free_start(
     z = np.array([[*begin, orbits.first_return(begin, LONGEST * period)[0], 0.0]])
     if not np.isfinite(z).all():
         raise ParameterError(
-            f"small vibrations of {system.name} in mode {mode} don't return to where they "
-            "began: choose a smaller amplitude to begin with, or another mode=."
+            lambda say: (
+                f"small vibrations of {system.name} in mode {mode} don't return to where they "
+                "began: choose a smaller amplitude to begin with, or another "
+                f"{say.key('mode')}."
+            )
         )
     return free, orbits, z
 
@@ -207,7 +217,10 @@ def _relative(system: System, shape: np.ndarray, measured: int, mode: int) -> np
     sizes = np.abs(shape)
     if not sizes[measured] > NODE * sizes.max():
         raise ParameterError(
-            f"{system.states[measured]} is at rest in mode {mode}. Choose another state=."
+            lambda say: (
+                f"{system.states[measured]} is at rest in mode {mode}. Choose another "
+                f"{say.key('state')}."
+            )
         )
     sizes = np.where(sizes > NODE * sizes.max(), sizes, sizes.max()) / sizes[measured]
     return np.asarray(sizes)
@@ -221,11 +234,9 @@ def _range(system: System, state: str, given: Any) -> tuple[float, float]:
     except UnitError:
         raise
     except (TypeError, ValueError):
-        raise ParameterError(
-            f'amplitude= must be (low, high), such as ("0.1 mm", "5 mm"), not {shown(given)}.'
-        ) from None
+        raise must_be("amplitude", '(low, high), such as ("0.1 mm", "5 mm")', given) from None
     if not 0 < low < high < np.inf:
-        raise ParameterError(f"amplitude= must ascend from above zero, not {shown(given)}.")
+        raise ParameterError(f"amplitude must ascend from above zero, not {shown(given)}.")
     return low, high
 
 
@@ -276,8 +287,10 @@ def _family(
     sizes = peak(found)
     if not sizes[0] < limits[0] <= sizes.max():
         raise ParameterError(
-            f"the amplitude of free vibrations of {orbits.system.name} goes from {sizes[0]:.4g} to "
-            f"{sizes.max():.4g}: amplitude= must begin between."
+            lambda say: (
+                f"the amplitude of free vibrations of {orbits.system.name} goes from "
+                f"{sizes[0]:.4g} to {sizes.max():.4g}: {say.key('amplitude')} must begin between."
+            )
         )
     first = int(np.argmax(sizes >= limits[0]))
     step = (found[first] - found[first - 1]) / orbits.scale[0] @ tangent[first - 1]
@@ -347,8 +360,11 @@ def _conserved(system: System, damping: np.ndarray, period: np.ndarray) -> np.nd
     """The fictitious damping of orbits, which must be rounding."""
     if np.abs(damping * period).max() > CONSERVED:
         raise ParameterError(
-            f"{system.name} doesn't conserve energy: its vibrations need a damping of "
-            f"{damping[np.argmax(np.abs(damping))]:.3g} /s to close. Set what damps to zero by "
-            'values=, and the restitution of impacts to 1: values={"damping": 0, "restitution": 1}.'
+            lambda say: (
+                f"{system.name} doesn't conserve energy: its vibrations need a damping of "
+                f"{damping[np.argmax(np.abs(damping))]:.3g} /s to close. Set what damps to zero by "
+                f"{say.key('values')}, and the restitution of impacts to 1: "
+                f"{say.key(values={'damping': 0, 'restitution': 1})}."
+            )
         )
     return damping

@@ -29,6 +29,7 @@ from saltus.results import build
 from saltus.results.dataset import schema
 from saltus.results.dataset.attractors import padded
 from saltus.results.dataset.schema import event_name, point_name
+from saltus.sentences import Word
 from saltus.system import System
 from saltus.system.leg import has_legs
 
@@ -46,12 +47,21 @@ def bifurcation_curve(
 ) -> xr.Dataset:
     """A bifurcation of periodic orbits followed over two parameters, in both directions.
 
-    Folds, period doublings, Neimark-Sacker bifurcations and grazes are followed by pseudo-arclength
-    on equations that define them, so each point is one to rounding. Points of codimension two are
-    located on the way: cusps, resonances, degenerate doublings, and the extrema of a curve of
-    folds, at which closed branches (isolas) are born or join another branch; on a curve of grazes
-    where the orbit folds or doubles, where a second boundary is touched, and where the square root
-    that an impact brings vanishes.
+    1. The event gives the orbit, the parameters and the critical multiplier, or the boundary that
+       is grazed, to begin with.
+    2. The equations of the orbit are extended by those of the bifurcation, so that each point is
+       one to rounding: for folds, period doublings and Neimark-Sacker bifurcations one that
+       vanishes where the tangent map has that multiplier; for grazes, that gap and rate are zero at
+       an instant of the orbit.
+    3. Their solutions are followed by pseudo-arclength continuation over both parameters at once,
+       since curves turn back in either of them. They end where they leave the range, close, or run
+       out of ``points``, or where a curve of this kind ends.
+    4. Test functions along the curve change sign at points of codimension two, which are located:
+       cusps, resonances, degenerate doublings, and the extrema of a curve of folds, at which closed
+       branches (isolas) are born or join another branch.
+    5. On a curve of grazes these are the points where the orbit folds or doubles, where a second
+       boundary is touched, and where the square root that an impact brings vanishes. The contact
+       that grazes is left out of the equations, which keeps them smooth.
 
     Parameters
     ----------
@@ -120,7 +130,8 @@ def bifurcation_curve(
         if not low <= start.system.values[name] <= high:
             raise ParameterError(
                 f"the event lies at {name} = {start.system.values[name]:.6g}, outside the range "
-                f"({low:g}, {high:g}) in vary=."
+                f"({low:g}, {high:g}) in ",
+                lambda say: f"{say.key('vary')}.",
             )
     with reporting(progress) as show:
         orbits, z = _orbits(start, names, limits, method, threads)
@@ -155,8 +166,11 @@ def _ranges(system: System, vary: Any) -> tuple[tuple[str, str], list[tuple[floa
     if not isinstance(vary, Mapping) or len(vary) != 2:
         one, two = [*system.values, "name", "other"][:2]
         raise ParameterError(
-            f"sl.bifurcation_curve varies two parameters: vary={{{one!r}: (low, high), {two!r}: "
-            f"(low, high)}}, not {shown(vary)}."
+            lambda say: (
+                f"{say.either('sl.bifurcation_curve varies', 'varies')} two parameters: "
+                f"{say.key(vary=dict.fromkeys((one, two), (Word('low'), Word('high'))))}, not "
+                f"{shown(vary)}."
+            )
         )
     one, two = vary
     return (one, two), [range_of(system, name, ends) for name, ends in vary.items()]
@@ -183,9 +197,9 @@ def _start(system: System, event: Any) -> _Start:
         )
     kind = str(event["event_kind"].item())
     if kind not in (*MULTIPLIER, "graze"):
+        advice = nearest(kind, (*MULTIPLIER, "graze"))
         raise ParameterError(
-            f"a {kind.replace('_', ' ')} can't be followed in two parameters. "
-            f"{nearest(kind, (*MULTIPLIER, 'graze'))}"
+            f"a {kind.replace('_', ' ')} can't be followed in two parameters. {advice}"
         )
     guards = [guard.name for guard in system.guards]
     guard = guards.index(str(event["event_guard"].item())) if kind == "graze" else -1
@@ -288,7 +302,7 @@ def _table(
         "codim2": np.arange(len(special)),
         "codim2_kind": [point.kind for point in special],
         "codim2_point": np.array([point.after for point in special], np.int64),
-        "codim2_extremum": ["" if p.parameter < 0 else names[p.parameter] for p in special],
+        "codim2_extremum": ["" if p.extremum < 0 else names[p.extremum] for p in special],
         "codim2_<parameter>": {name: values[count:, i] for i, name in enumerate(names)},
         "codim2_multiplier_real": own[count:].real,
         "codim2_multiplier_imag": own[count:].imag,

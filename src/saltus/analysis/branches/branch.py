@@ -10,9 +10,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from saltus.analysis.branches.arclength import Curve, correct, follow, passes, tangents
+from saltus.analysis.branches.events import Event
 from saltus.analysis.branches.sequence_changes import contact_points
 from saltus.analysis.branches.shooting import PeriodicOrbits
-from saltus.analysis.branches.special_points import COMPLEX, SpecialPoint, locate, outside, tests
+from saltus.analysis.branches.special_points import COMPLEX, locate, outside, tests
 
 #: A fold so near to a branch point is none, in units of the scale: it is located less well there.
 VERTEX = 1e-4
@@ -59,7 +60,7 @@ class Branch:
         where its orbits lose stability, and no more was asked for.
     limits : (float, float)
         The parameter at which they do, at either end; NaN otherwise.
-    events : list of SpecialPoint
+    events : list of Event
         In the order of the branch.
     unexplained : list of int
         Points after which the number of multipliers outside the unit circle changes by more or less
@@ -76,7 +77,7 @@ class Branch:
     length: np.ndarray
     multipliers: np.ndarray
     ends: tuple[str, str]
-    events: list[SpecialPoint] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
     unexplained: list[int] = field(default_factory=list)
     parent: tuple[int, int] | None = None
     limits: tuple[float, float] = (np.nan, np.nan)
@@ -147,7 +148,7 @@ class Branch:
             ),
         )  # fmt: skip
 
-    def _loss(self, after: int, which: int) -> SpecialPoint | None:
+    def _loss(self, after: int, which: int) -> Event | None:
         """The event behind a point at which stability is lost, the first (0) or the last (-1)."""
         mine = [event for event in self.events if event.after == after]
         mine = [event for event in mine if event.kind in _LOSES_STABILITY] or mine
@@ -161,7 +162,7 @@ class Branch:
             if not left or not self.unexplained or not len(refine(self, self.unexplained)):
                 break
 
-    def _contacts(self) -> list[SpecialPoint]:
+    def _contacts(self) -> list[Event]:
         """Where the contact sequence changes."""
         return contact_points(self.orbits, self.row, self.z, self.tangent)
 
@@ -202,7 +203,7 @@ def _dips(branch: Branch) -> tuple[list[int], np.ndarray]:
     return places, np.array([found[after] for after in places])
 
 
-def _located(branch: Branch) -> list[SpecialPoint]:
+def _located(branch: Branch) -> list[Event]:
     values = _tests(branch)
     kinds, after = np.nonzero(values[:, 1:] * values[:, :-1] < 0)
     ends, rows = np.stack([after, after + 1], axis=1), np.full(len(after), branch.row)
@@ -226,12 +227,12 @@ def _vertical(branch: Branch) -> np.ndarray:
     return vertical
 
 
-def _in_order(branch: Branch, events: Sequence[SpecialPoint]) -> list[SpecialPoint]:
+def _in_order(branch: Branch, events: Sequence[Event]) -> list[Event]:
     """Events in the order in which the branch comes by."""
     return sorted(events, key=lambda event: (event.after, _ahead(branch, event)))
 
 
-def _is_vertex(event: SpecialPoint, events: Sequence[SpecialPoint], branch: Branch) -> bool:
+def _is_vertex(event: Event, events: Sequence[Event], branch: Branch) -> bool:
     """Whether a fold is where a branch point's crossing branch turns back."""
     return event.kind == "fold" and any(
         other.kind == "branch_point" and np.abs((other.z - event.z) / branch.scale).max() < VERTEX
@@ -239,7 +240,7 @@ def _is_vertex(event: SpecialPoint, events: Sequence[SpecialPoint], branch: Bran
     )
 
 
-def _is_real(point: SpecialPoint) -> bool:
+def _is_real(point: Event) -> bool:
     """Whether a test vanishes at a point: it may also change its sign by a leap, between branches
     that run alongside or at two real multipliers whose product is one.
     """
@@ -254,7 +255,7 @@ def _is_real(point: SpecialPoint) -> bool:
     return True
 
 
-def _ahead(branch: Branch, point: SpecialPoint) -> float:
+def _ahead(branch: Branch, point: Event) -> float:
     step = (point.z - branch.z[point.after]) / branch.scale
     return float(step @ branch.tangent[point.after])
 
@@ -367,7 +368,7 @@ def _arrived(point: np.ndarray, unit: np.ndarray, curve: Curve) -> str:
     return "arrived" if len(curve.z) > 1 and passes(curve, point, unit) else ""
 
 
-def _moved(branch: Branch, event: SpecialPoint, placed: np.ndarray) -> int:
+def _moved(branch: Branch, event: Event, placed: np.ndarray) -> int:
     """The point that comes before an event, once new points have been put in."""
     place = event.after
     for new in placed:

@@ -35,6 +35,7 @@ from saltus.flow.counts import whole
 from saltus.flow.methods import Method, exact_method
 from saltus.flow.progress import reporting, stage
 from saltus.interrupt import Interrupted
+from saltus.sentences import Dialect, Word
 from saltus.system import System
 
 
@@ -61,17 +62,25 @@ def branches(
     """Branches of periodic orbits over a parameter, stable and unstable, with folds, period
     doublings, branch points, tori and grazes.
 
-    Each branch is followed by pseudo-arclength continuation on the exact flow, in both directions
-    and through its folds, until it leaves the range or closes: an isola. Contacts come and go by
-    themselves; no contact sequence is given. Derivatives, also with respect to the parameter, are
-    those of the tangent flow. Bifurcations are located to rounding; where the number of multipliers
-    outside the unit circle changes otherwise, the step is refined, and what stays unexplained is
-    counted in ``branch_unexplained``. Orbits with impacts are followed from contact to contact,
-    through the grazes at which an impact appears or vanishes.
+    1. Seeds are the orbits of ``start``, or the orbits that starts settle to at ``at`` values of
+       the parameter: continuation needs an orbit to begin with.
+    2. Newton's method closes each seed. Seeds on a branch that was followed already, or on its
+       mirror image, are dropped, so each branch is listed once.
+    3. The branch is followed by pseudo-arclength continuation on the exact flow in both directions,
+       until it leaves the range or closes (an isola). Steps in arclength pass folds like any other
+       point. Contacts come and go by themselves; no contact sequence is given. Derivatives, also
+       with respect to the parameter, are those of the tangent flow.
+    4. Orbits with impacts are followed from contact to contact, through the grazes at which an
+       impact appears or vanishes, because the map over a period isn't smooth there.
+    5. Events are located to rounding where a test function changes its sign. Where the number of
+       multipliers outside the unit circle changes otherwise, the step is refined; what stays
+       unexplained is counted in ``branch_unexplained``.
+    6. The branches that leave at the events in ``switch`` are seeds of their own, begun beside the
+       event.
 
-    Of a system without forcing branches of equilibria are followed too, with their eigenvalues,
-    one branch in each mode, from mode to mode through boundary equilibria, and the limit cycles
-    that are born at their Hopf points. Equilibria that a contact holds aren't followed.
+    Of a system without forcing branches of equilibria are followed too, with their eigenvalues, one
+    branch in each mode, from mode to mode through boundary equilibria, and the limit cycles that
+    are born at their Hopf points. Equilibria that a contact holds aren't followed.
 
     Parameters
     ----------
@@ -188,9 +197,12 @@ def branches(
             rests = _inside(rests, limits)
             if not begins and not rests:
                 raise ParameterError(
-                    f"no periodic orbit of {system.name} is known between {limits[0]:g} and "
-                    f'{limits[1]:g}: give other starts, more of them (start="random 20" with '
-                    "box=), or longer runs (periods=)."
+                    lambda say: (
+                        f"no periodic orbit of {system.name} is known between "
+                        f"{limits[0]:g} and {limits[1]:g}: give other starts, more of them "
+                        f"({say.key(start='random 20')} with {say.key('box')}), or longer runs "
+                        f"({say.key('periods')})."
+                    )
                 )
             plan = plan_of(system, name, limits, method, threads, points, longest, chosen)
             born = trace_rests(plan, system, name, rests, done) if rests else []
@@ -202,18 +214,24 @@ def branches(
         return table_of(system, name, limits, done, wanted, method)
 
 
+def _two_parameters(say: Dialect) -> str:
+    ranges = "system, {one: (low, high, number), two: (low, high, number)}"
+    return (
+        f" Two parameters: {say.verb('bifurcation_curve')} follows a bifurcation over both, and "
+        f"{say.verb('bifurcation_diagram', ranges)} maps the kinds of motion."
+    )
+
+
 def _range(system: System, vary: Any) -> tuple[str, tuple[float, float]]:
     """The parameter and its range [SI]."""
     example = next(iter(system.values), "name")
     if not isinstance(vary, Mapping) or len(vary) != 1:
-        two = (
-            " Two parameters: sl.bifurcation_curve follows a bifurcation over both, and "
-            "sl.bifurcation_diagram(system, {one: (low, high, number), two: (low, high, number)}) "
-            "maps the kinds of motion."
-        )
         raise ParameterError(
-            f"sl.branches follows one parameter: {{{example!r}: (low, high)}}, not {shown(vary)}."
-            f"{two if isinstance(vary, Mapping) and len(vary) > 1 else ''}"
+            lambda say: (
+                f"{say.either('sl.branches follows', 'follows')} one parameter: "
+                f"{say.key(vary={example: (Word('low'), Word('high'))})}, not {shown(vary)}."
+            ),
+            _two_parameters if isinstance(vary, Mapping) and len(vary) > 1 else "",
         )
     ((name, ends),) = vary.items()
     return name, range_of(system, name, ends)

@@ -10,11 +10,12 @@ cubic coefficient of its normal form vanishes. Kuznetsov, Elements of Applied Bi
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from saltus.analysis.branches.arclength import correct, tangents
+from saltus.analysis.branches.events import Event
 from saltus.analysis.branches.grazing_orbits import GrazingOrbits
 from saltus.analysis.branches.singular_orbits import SingularOrbits
 from saltus.analysis.branches.special_points import zeros
@@ -27,7 +28,8 @@ WIDE = 5e-3
 ROUNDING = 1e-7
 #: The multiplier at a cusp is 1 to so much; it is a simple one.
 SIMPLE = 1e-8
-#: Kinds on the curves of each bifurcation, in the order of the tests.
+#: Kinds on the curves of each bifurcation, in the order of the tests; an extremum of folds is
+#: ``isola_birth`` or ``branches_join``.
 KINDS = {
     "fold": ("extremum", "extremum", "cusp", "resonance_1_1", "fold_flip"),
     "period_doubling": (
@@ -39,31 +41,6 @@ KINDS = {
     ),
     "graze": ("extremum", "extremum", "fold_graze", "flip_graze", "resonant_graze"),
 }  # fmt: skip
-
-
-@dataclass(frozen=True)
-class CodimensionTwo:
-    """A point on a curve.
-
-    Attributes
-    ----------
-    kind : str
-        See KINDS; an extremum of folds is ``isola_birth`` or ``branches_join``.
-    after : int
-        The point of the curve that it comes after.
-    z : float64[z]
-        Its unknowns.
-    multipliers : complex128[D]
-        There.
-    parameter : int
-        Which of the two parameters has its extremum; -1 for other kinds.
-    """
-
-    kind: str
-    after: int
-    z: np.ndarray
-    multipliers: np.ndarray
-    parameter: int = -1
 
 
 def tests(
@@ -168,7 +145,7 @@ def find(
     z: np.ndarray,
     tangent: np.ndarray,
     derivative: np.ndarray,
-) -> list[CodimensionTwo]:
+) -> list[Event]:
     """All points of codimension two on a curve float64[p, z], in its order."""
     rows = np.full(len(z), row)
     own = orbits.multipliers(z, derivative, rows)
@@ -176,7 +153,7 @@ def find(
     which, after = np.nonzero(_crosses(values))
     if not len(which):
         return []
-    found: dict[int, CodimensionTwo] = {}
+    found: dict[int, Event] = {}
     names, local = KINDS[orbits.kind], orbits.at(row, z[after])
 
     def at(flat: np.ndarray, event: np.ndarray) -> np.ndarray:
@@ -196,8 +173,8 @@ def find(
         for place, i in enumerate(good):
             kind = int(which[event[i]])
             extreme = kind if kind < 2 else -1
-            found[int(event[i])] = CodimensionTwo(
-                names[kind], int(begin[i]), point.z[i], own[place], extreme
+            found[int(event[i])] = Event(
+                names[kind], int(begin[i]), point.z[i], own[place], extremum=extreme
             )
         return result
 
@@ -208,7 +185,7 @@ def find(
     return [_named(orbits, row, found[i]) for i in order]
 
 
-def _resolved(point: CodimensionTwo) -> bool:
+def _resolved(point: Event) -> bool:
     """Whether a cusp is more than rounding: next to a graze of a rigid stop the map bends without
     bound, and its derivatives are noise.
     """
@@ -227,14 +204,12 @@ def _crosses(values: np.ndarray) -> np.ndarray:
     return crosses
 
 
-def _ahead(
-    z: np.ndarray, tangent: np.ndarray, orbits: Equations, row: int, point: CodimensionTwo
-) -> float:
+def _ahead(z: np.ndarray, tangent: np.ndarray, orbits: Equations, row: int, point: Event) -> float:
     step = (point.z - z[point.after]) / orbits.scale[row]
     return float(step @ tangent[point.after])
 
 
-def _named(orbits: Equations, row: int, point: CodimensionTwo) -> CodimensionTwo:
+def _named(orbits: Equations, row: int, point: Event) -> Event:
     """An extremum of folds by what happens to the branches over the other parameter.
 
     There they cross at a point, F restricted to both null directions is a quadratic form, and the
@@ -244,7 +219,7 @@ def _named(orbits: Equations, row: int, point: CodimensionTwo) -> CodimensionTwo
         return point
     size, width = orbits.size, orbits.orbits.width
     one = np.array([row])
-    other = orbits.parameters[1 - point.parameter]
+    other = orbits.parameters[1 - point.extremum]
     columns = [*range(size), other]
     z = point.z[None, :width]
     _, derivative = orbits.orbits.evaluate(z, one)

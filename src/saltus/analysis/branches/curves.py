@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from saltus.analysis.branches.arclength import Curve, follow, tangents
-from saltus.analysis.branches.codimension_two import CodimensionTwo, Equations, find
+from saltus.analysis.branches.codimension_two import Equations, find
+from saltus.analysis.branches.events import Event
 from saltus.analysis.branches.grazing_orbits import GrazingOrbits
 from saltus.analysis.branches.singular_orbits import COSINES, SingularOrbits
 
@@ -31,7 +32,7 @@ class BifurcationCurve:
         Why it ends at its first and at its last point: see :class:`Curve`; ``resonance_1_1`` and
         ``resonance_1_2`` where the multipliers of a torus meet; of a graze also
         ``double_graze``, ``graze_corner`` and ``degenerate_graze``, and ``contacts_change``.
-    special : list of CodimensionTwo
+    special : list of Event
         In its order.
     """
 
@@ -40,7 +41,7 @@ class BifurcationCurve:
     length: np.ndarray
     multipliers: np.ndarray
     ends: tuple[str, str]
-    special: list[CodimensionTwo] = field(default_factory=list)
+    special: list[Event] = field(default_factory=list)
 
 
 def trace_curve(
@@ -119,19 +120,14 @@ def _joined(equations: Equations, curves: list[Curve]) -> BifurcationCurve:
     if closed:
         whole, ends = curves[closed[0]], ("closed", "closed")
     else:
-        whole = Curve(
-            back.z[:0:-1] + ahead.z,
-            [-tangent for tangent in back.tangent[:0:-1]] + ahead.tangent,
-            back.derivative[:0:-1] + ahead.derivative,
-            [-length for length in back.length[:0:-1]] + ahead.length,
-        )
+        whole = ahead.behind(back)
         ends = (_end(equations, back), _end(equations, ahead))
     z, tangent, derivative = (np.array(part) for part in (whole.z, whole.tangent, whole.derivative))
     length = np.array(whole.length) - whole.length[0]
     own = equations.multipliers(z, derivative, np.zeros(len(z), np.int64))
     special = find(equations, 0, z, tangent, derivative)
     doubles = [
-        CodimensionTwo("double_graze", place, z[place], own[place])
+        Event("double_graze", place, z[place], own[place])
         for place, end in zip((0, len(z) - 1), ends, strict=True)
         if end == "double_graze"
     ]

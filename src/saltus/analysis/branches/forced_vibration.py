@@ -23,7 +23,7 @@ from saltus.analysis.branches.free_vibration import (
 )
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.closed.field_zeros import jacobian_of
-from saltus.errors import ParameterError, among, nearest, shown
+from saltus.errors import ParameterError, among, unknown
 from saltus.flow.methods import Method
 from saltus.language import expression as ex
 from saltus.language.derivatives import differentiate
@@ -73,12 +73,17 @@ class Force:
         """
         if system.forced_at is None:
             raise ParameterError(
-                f"{system.name} isn't forced, so nothing has a phase. Leave phase= out."
+                lambda say: (
+                    f"{system.name} isn't forced, so nothing has a phase. Leave "
+                    f"{say.key('phase')} out."
+                )
             )
         if not among(name, system.values):
-            raise ParameterError(
-                f"{system.name} has no parameter {shown(name)}. {nearest(name, system.values)} "
-                "force= names the amplitude of its forcing."
+            raise unknown(
+                f"{system.name} has no parameter",
+                name,
+                system.values,
+                lambda say: f" {say.key('force')} names the amplitude of its forcing.",
             )
         amplitude = ex.parameter(name)
         rates = {
@@ -92,8 +97,10 @@ class Force:
             for rate in rates.values()
         ):  # fmt: skip
             raise ParameterError(
-                f"{name} isn't the amplitude of a force on {system.name}: it must multiply a "
-                "function of time alone. Name another parameter by force=."
+                lambda say: (
+                    f"{name} isn't the amplitude of a force on {system.name}: it must multiply "
+                    f"a function of time alone. Name another parameter by {say.key('force')}."
+                )
             )
         velocity = {
             i: system.states.index(str(entry.payload))
@@ -105,7 +112,10 @@ class Force:
         place = place if place in velocity else back.get(place, place)
         if place not in velocity:
             raise ParameterError(
-                f"{state} is no displacement, and no velocity of one: choose another state=."
+                lambda say: (
+                    f"{state} is no displacement, and no velocity of one: choose another "
+                    f"{say.key('state')}."
+                )
             )
         row = velocity[place] if velocity[place] in rates else min(rates)
         return cls(name, rates, place, velocity[place], row)
@@ -190,8 +200,10 @@ def small_vibration(
     natural = np.sort(np.abs(roots[roots.imag > 0]))
     if not 1 <= mode <= len(natural):
         raise ParameterError(
-            f"{system.name} has {len(natural)} modes of small vibrations, not {mode}: choose "
-            "another mode=."
+            lambda say: (
+                f"{system.name} has {len(natural)} modes of small vibrations, not {mode}: "
+                f"choose another {say.key('mode')}."
+            )
         )
     turns = 2 * np.pi / system.period({system.forced_at: 1.0})  # rad over forcing frequency
 

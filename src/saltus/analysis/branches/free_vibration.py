@@ -24,6 +24,7 @@ from saltus.flow.methods import Method
 from saltus.flow.request import Schedule
 from saltus.language import expression as ex
 from saltus.language.expression import Expr
+from saltus.sentences import Word
 from saltus.system import System
 
 #: Samples among which a first return is looked for.
@@ -49,8 +50,10 @@ def free_system(system: System) -> tuple[System, str]:
     speeds = {entry.payload for entry in system.field if entry.op == "state"}
     if not speeds:
         raise ParameterError(
-            f"{system.name} has no state that is the velocity of another: sl.backbone needs "
-            "displacements x and velocities v with dx/dt = v."
+            lambda say: (
+                f"{system.name} has no state that is the velocity of another: "
+                f"{say.verb('backbone')} needs displacements x and velocities v with dx/dt = v."
+            )
         )
     name = "fictitious_damping"
     drag = ex.parameter(name)
@@ -64,9 +67,11 @@ def free_system(system: System) -> tuple[System, str]:
     )  # fmt: skip
     if not autonomous(made):
         raise ParameterError(
-            f"{system.name} is forced: its equations depend on time. Set the parameters of its "
-            f"forcing, and of what damps, to zero by values={{name: 0}} - it has "
-            f'{", ".join(system.values)} - or take phase="quadrature".'
+            lambda say: (
+                f"{system.name} is forced: its equations depend on time. Set the parameters of "
+                f"its forcing, and of what damps, to zero by {say.key(values={Word('name'): 0})} - "
+                f"it has {', '.join(system.values)} - or take {say.key(phase='quadrature')}."
+            )
         )
     return made, name
 
@@ -146,15 +151,13 @@ def place_of_rest(system: System) -> np.ndarray:
     def equations(x: np.ndarray, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return field_of(system, x, values) / size, jacobian_of(system, x, values) / size[..., None]
 
-    state, found = newton(
-        equations, zero, units, enough=0.0, longest_step=np.inf, least_squares=True
-    )
-    if not found[0]:
+    rest = newton(equations, zero, units, enough=0.0, longest_step=np.inf, least_squares=True)
+    if not rest.found[0]:
         raise ParameterError(
             f"no equilibrium of {system.name} was found from zero: a backbone begins with small "
             "vibrations about one."
         )
-    return np.asarray(state[0])
+    return np.asarray(rest.z[0])
 
 
 def linear_mode(system: System, rest: np.ndarray, mode: int) -> tuple[float, np.ndarray, int]:
@@ -167,8 +170,11 @@ def linear_mode(system: System, rest: np.ndarray, mode: int) -> tuple[float, np.
     order = np.flatnonzero(fit)[np.argsort(roots.imag[fit])]
     if not 1 <= mode <= len(order):
         raise ParameterError(
-            f"{system.name} has {len(order)} undamped modes of small vibrations, and mode={mode} "
-            "was asked for. Set what damps to zero by values=."
+            lambda say: (
+                f"{system.name} has {len(order)} undamped modes of small vibrations, and "
+                f"{say.key(mode=mode)} was asked for. Set what damps to zero by "
+                f"{say.key('values')}."
+            )
         )
     root, shape = roots[order[mode - 1]], shapes[:, order[mode - 1]]
     places = [i for i, entry in enumerate(system.field) if entry.op == "state"]

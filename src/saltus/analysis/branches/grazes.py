@@ -128,12 +128,11 @@ def graze(legs: Legs, z: np.ndarray, guard: int, phase: float) -> ContactEvent |
     begins = legs.nodes(z[None])[0][0, place]
     phase = nearest_turn(legs, z, place, gap, (phase - begins) % legs.n) + begins
     row, scale = np.zeros(1, np.int64), np.append(legs.scale[0], 1.0)
-    state, slope, derivative = np.empty(legs.size), np.empty(len(z)), np.empty(0)
+    state, slope = np.empty(legs.size), np.empty(len(z))
 
     def equations(u: np.ndarray, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        nonlocal derivative
         (residual, by_z), states, value, slopes = touching(legs, place, gap, u, row)
-        state[:], slope[:], derivative = states[0], slopes[0, 0, :-1], by_z[0]
+        state[:], slope[:] = states[0], slopes[0, 0, :-1]
         whole = np.zeros((1, len(scale), len(scale)))
         whole[:, :-2, :-1], whole[:, -2:] = by_z, slopes * scale
         unit = np.abs(whole[:, -2:]).max(axis=2)
@@ -141,10 +140,11 @@ def graze(legs: Legs, z: np.ndarray, guard: int, phase: float) -> ContactEvent |
         return np.concatenate([residual, value / unit], axis=1), whole
 
     legs.accepted(z[None], row)
-    u, found = newton(equations, np.append(z, phase)[None], scale[None])
-    if not found[0]:
+    found = newton(equations, np.append(z, phase)[None], scale[None])
+    if not found.found[0]:
         return None
-    z, phase = u[0, :-1], float(u[0, -1]) % legs.n  # the last step was rounding
+    z, phase = found.z[0, :-1], float(found.z[0, -1]) % legs.n  # the last step was rounding
+    derivative = found.derivative[0, :-2, :-1]
     return ContactEvent("graze", (guard,), phase, legs, z, place, state, slope, derivative)
 
 
@@ -206,10 +206,9 @@ def corner(legs: Legs, z: np.ndarray, place: int) -> ContactEvent | None:
         The leg that vanishes.
     """
     row, after = np.zeros(1, np.int64), (place + 1) % legs.count
-    width, derivative = legs.size + 1, np.empty(0)
+    width = legs.size + 1
 
     def equations(u: np.ndarray, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        nonlocal derivative
         residual, derivative = legs.evaluate(u, row)
         last = np.zeros((1, 1, u.shape[1]))
         last[0, 0, after * width] += 1.0
@@ -217,13 +216,14 @@ def corner(legs: Legs, z: np.ndarray, place: int) -> ContactEvent | None:
         span = legs.spans(legs.nodes(u)[0])[:, [place]]
         return np.append(residual, span, axis=1), np.append(derivative, last, axis=1)
 
-    u, found = newton(equations, z[None], legs.scale)
-    if not found[0]:
+    found = newton(equations, z[None], legs.scale)
+    if not found.found[0]:
         return None
+    u = found.z
     guards = (legs.contacts[place].guard, legs.contacts[after].guard)
     phase = float(legs.nodes(u)[0][0, place]) % legs.n
     slope = np.zeros(len(z))
     slope[after * width], slope[place * width] = 1.0, -1.0
     state = legs.nodes(u)[1][0, place]
-    own = derivative[0]
+    own = found.derivative[0, :-1]
     return ContactEvent("corner", guards, phase, legs, u[0], place, state, slope, own)

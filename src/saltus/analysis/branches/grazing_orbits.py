@@ -209,9 +209,9 @@ class GrazingOrbits:
                 np.append(whole, slopes / unit[..., None], axis=1),
             )
 
-        u, found = newton(equations, np.append(z, first[place] + since)[None], scale[None])
-        near = np.abs((u[0, :-1] - z) / self.scale[0]).max() < NEAR
-        return u[0, :-1] if found[0] and near else None
+        found = newton(equations, np.append(z, first[place] + since)[None], scale[None])
+        near = np.abs((found.z[0, :-1] - z) / self.scale[0]).max() < NEAR
+        return found.z[0, :-1] if found.found[0] and near else None
 
     # -- normal form -------------------------------------------------------------------------------
     def is_smooth(self, event: ContactEvent) -> bool:

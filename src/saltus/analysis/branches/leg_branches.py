@@ -17,11 +17,11 @@ import numpy as np
 from saltus.analysis.branches.arclength import tangents
 from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.contact_sequences import sequences
+from saltus.analysis.branches.events import Event
 from saltus.analysis.branches.grazing_orbits import sqrt_coefficient
 from saltus.analysis.branches.leg_pieces import Piece, follow_legs
 from saltus.analysis.branches.legs import Legs
 from saltus.analysis.branches.shooting import PeriodicOrbits
-from saltus.analysis.branches.special_points import SpecialPoint
 from saltus.analysis.branches.tracing import Plan, Start, both_ways
 
 
@@ -31,7 +31,7 @@ class PieceBranch(Branch):
 
     orbits: Legs  # type: ignore[assignment]
 
-    def _contacts(self) -> list[SpecialPoint]:
+    def _contacts(self) -> list[Event]:
         """None: all of its orbits have the same contacts."""
         return []
 
@@ -81,21 +81,21 @@ class LegBranch(Branch):
         self.events = events
         self._complete()
 
-    def _own(self, branch: PieceBranch, event: SpecialPoint, first: int) -> SpecialPoint:
+    def _own(self, branch: PieceBranch, event: Event, first: int) -> Event:
         return replace(
             event, after=first + event.after, z=_by_points(branch.orbits, event.z[None])[0]
         )
 
-    def _between(self, after: int, piece: Piece, outcome: str) -> SpecialPoint:
+    def _between(self, after: int, piece: Piece, outcome: str) -> Event:
         """The event behind a piece."""
         assert piece.end is not None
         event = piece.end.event
-        none, legs = np.zeros(0), event.legs
+        legs = event.legs
         orbit = _by_points(legs, event.z[None])[0]
         phase = (event.phase - float(legs.begin(event.z[None])[0])) % legs.n
-        return SpecialPoint(
-            event.kind, max(after, 0), orbit, none, event.multipliers, none,
-            event.guards, phase, outcome, sqrt_coefficient(event),
+        return Event(
+            event.kind, max(after, 0), orbit, event.multipliers, guards=event.guards,
+            phase=phase, outcome=outcome, sqrt_coefficient=sqrt_coefficient(event),
         )  # fmt: skip
 
     def _complete(self) -> None:

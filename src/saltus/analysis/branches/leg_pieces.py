@@ -16,6 +16,7 @@ from saltus.analysis.branches.leg_ends import End, end_of
 from saltus.analysis.branches.legs import Legs
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.special_points import unstable
+from saltus.analysis.branches.tracing import halved
 
 #: Contact sequences of one branch in one direction.
 MOST_PIECES = 40
@@ -122,7 +123,7 @@ class _Way:
                 return "virtual"
             if again and self._returns(legs, curve):
                 return "closed"
-            return _halved(legs, curve)
+            return halved(legs, curve)
 
         left = self.points - sum(len(piece.curve.z) for piece in self.pieces)
         step = AFTER if again else self.first
@@ -158,15 +159,6 @@ class _Way:
             if 0 <= ahead <= length and aside <= SIDEWAYS * length:
                 return True
         return False
-
-
-def _halved(legs: Legs, curve: Curve) -> str:
-    """``period_doubling`` if an orbit of 2m periods has just passed one of m periods."""
-    if legs.n % 2 or len(curve.z) < 2:
-        return ""
-    half, points = legs.n // 2, legs.orbits.points(legs.orbit(np.array(curve.z[-2:])))
-    apart = (points[:, :half] - points[:, half:]).reshape(2, -1)
-    return "period_doubling" if apart[0] @ apart[1] < 0.0 else ""
 
 
 def follow_legs(

@@ -425,6 +425,10 @@ class Legs:
         points = self._ends(start, np.array(self._modes)[last])[0]
         return np.concatenate([points.reshape(len(z), self.n * self.size), rest], axis=1)
 
+    def points(self, z: np.ndarray) -> np.ndarray:
+        """The points at whole periods of orbits float64[r, z], float64[r, n, D]."""
+        return self.orbits.points(self.orbit(z))
+
     def admissible(self, z: np.ndarray) -> np.ndarray:
         """Whether the free flow makes the orbits float64[r, z]: they meet these contacts and no
         others, bool[r].

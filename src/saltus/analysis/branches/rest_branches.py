@@ -9,7 +9,7 @@ Kowalczyk, Piecewise-smooth Dynamical Systems (2008), chapter 5.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -17,30 +17,19 @@ import numpy as np
 
 from saltus.analysis.branches.arclength import Curve, tangents
 from saltus.analysis.branches.branch import Branch, refine
+from saltus.analysis.branches.criticality import criticality
+from saltus.analysis.branches.events import Event
 from saltus.analysis.branches.rests import Rests
-from saltus.analysis.branches.special_equilibria import (
-    SpecialEquilibrium,
-    boundary_equilibrium,
-    fold_point,
-    hopf_point,
-)
-from saltus.analysis.branches.special_points import SpecialPoint
 from saltus.analysis.branches.switching import Seed, crossing
 from saltus.analysis.branches.tracing import Plan, both_ways, trace
+from saltus.analysis.solve.newton import newton
 from saltus.system import System
 
-#: Newton's method on a defining system finds the point that was bracketed, within this distance in
-#: units of the scale.
-SAME = 1e-5
 #: Farthest that a branch ends from what ends it, in units of the scale.
 ENDING = 0.02
 #: Rates that vanish on one side of a boundary and are smaller than this on the other, in units of
 #: their derivatives, vanish there too.
 CONTINUOUS = 1e-9
-#: A Lyapunov coefficient smaller than this, in units of the frequency, has no sign.
-NEUTRAL = 1e-9
-#: Most states of a system whose third derivatives are written down.
-MOST_STATES = 8
 #: How often the interval around a change of stability is halved.
 CLOSER = 6
 #: Two events nearer than this, in units of the scale, are one.
@@ -53,26 +42,26 @@ class RestBranch(Branch):
 
     Attributes
     ----------
-    borders : tuple of SpecialPoint or None
+    borders : tuple of Event or None
         The boundary equilibria at its first and at its last point.
     beyond : tuple of float64[z] or None
         The direction in which the branch in the mode behind each begins, in units of the scale.
     """
 
     orbits: Rests  # type: ignore[assignment]
-    borders: list[SpecialPoint | None] = field(default_factory=lambda: [None, None])
+    borders: list[Event | None] = field(default_factory=lambda: [None, None])
     beyond: list[np.ndarray | None] = field(default_factory=lambda: [None, None])
 
     def find_events(self) -> None:
         """Locate what happens along the branch; see :class:`Branch`."""
         self._end()
         super().find_events()
-        self.events = [_finished(self, event) for event in self.events]
+        self.events = [_named(self, event) for event in self.events]
         for _ in range(CLOSER):  # so that a picture shows where stability changes
             at = {event.after for event in self.events if event.kind in ("fold", "hopf")}
             refine(self, sorted(at))
 
-    def _contacts(self) -> list[SpecialPoint]:
+    def _contacts(self) -> list[Event]:
         """The boundary equilibria at the ends."""
         places = (0, max(len(self.z) - 2, 0))
         return [
@@ -139,7 +128,7 @@ def trace_rests(
     mine = replace(plan, make=make, follow=follow, leave=_leave, crossed=True)
     trace(mine, seeds, branches)
     rests = [(i, one) for i, one in enumerate(branches) if isinstance(one, RestBranch)]
-    known: list[SpecialPoint] = []
+    known: list[Event] = []
     for _, branch in rests:
         branch.events = [event for event in branch.events if not _told(branch, event, known)]
         known += [event for event in branch.events if event.kind == "boundary_equilibrium"]
@@ -157,47 +146,22 @@ def _left(orbits: Rests, curve: Curve) -> str:
     return "boundary_equilibrium" if (ends[0] != ends[1]).any() else ""
 
 
-def _told(branch: RestBranch, event: SpecialPoint, known: Sequence[SpecialPoint]) -> bool:
+def _told(branch: RestBranch, event: Event, known: Sequence[Event]) -> bool:
     """Whether a boundary equilibrium is the end of a branch that came from its other side."""
     return event.kind == "boundary_equilibrium" and any(
         np.abs((event.z - other.z) / branch.scale).max() < ONE for other in known
     )
 
 
-# -- Hopf points and folds -------------------------------------------------------------------------
-def _finished(branch: RestBranch, event: SpecialPoint) -> SpecialPoint:
-    """An event by the name that it has of equilibria, solved for by its defining system."""
-    if event.kind not in ("fold", "neimark_sacker"):
+# -- Hopf points -----------------------------------------------------------------------------------
+def _named(branch: RestBranch, event: Event) -> Event:
+    """An event by the name that it has of equilibria."""
+    if event.kind != "neimark_sacker":
         return event
-    orbits, outcome = branch.orbits, ""
-    size = orbits.size
-    if event.kind == "neimark_sacker":
-        event = replace(event, kind="hopf")
-    if size > MOST_STATES:
-        return event
-    solve = hopf_point if event.kind == "hopf" else fold_point
-    found = _solved(branch, event.z, solve)
-    if found is None:
-        return event
-    if event.kind == "hopf" and abs(found.coefficient) > NEUTRAL * found.frequency:
-        outcome = "supercritical" if found.coefficient < 0 else "subcritical"
-    return replace(event, z=np.append(found.state, found.value), outcome=outcome)
+    return replace(event, kind="hopf", outcome=criticality(branch.orbits, branch.row, event.z))
 
 
-def _solved(
-    branch: RestBranch, z: np.ndarray, solve: Callable[..., SpecialEquilibrium | None]
-) -> SpecialEquilibrium | None:
-    """The special equilibrium at the unknowns float64[z]; None where another one is found."""
-    orbits, size = branch.orbits, branch.orbits.size
-    system = orbits.system.with_values(**{orbits.names[0]: float(z[-1])})
-    found = solve(system, orbits.names[0], z[:size], branch.scale[:size])
-    if found is None:
-        return None
-    apart = np.abs((np.append(found.state, found.value) - z) / branch.scale).max()
-    return found if apart < SAME else None
-
-
-def _born(branch: RestBranch, event: SpecialPoint, parent: tuple[int, int]) -> Seed:
+def _born(branch: RestBranch, event: Event, parent: tuple[int, int]) -> Seed:
     """The limit cycle that is born at a Hopf point."""
     orbits, size, unit = branch.orbits, branch.orbits.size, branch.scale
     matrix = orbits.jacobian(event.z[None], orbits.modes[[branch.row]])[0, :, :size]
@@ -219,22 +183,17 @@ def _meet_boundary(branch: RestBranch, side: int, place: int) -> None:
     with np.errstate(all="ignore"):
         far = -gaps / (slopes @ out)
     guard = int(np.argmin(np.where(far > 0, far, np.inf)))
-    system = orbits.system.with_values(**{orbits.names[0]: float(z[-1])})
-    size, unit = orbits.size, branch.scale
-    found = boundary_equilibrium(system, orbits.names[0], guard, z[:size], unit[:size])
-    if found is None:
-        return
-    end, one = np.append(found.state, found.value), np.array([row])
-    apart = float(np.linalg.norm((end - z) / unit))
-    if apart > ENDING:
+    end, one = _on_boundary(orbits, row, z, guard), np.array([row])
+    apart = np.inf if end is None else float(np.linalg.norm((end - z) / branch.scale))
+    if end is None or apart > ENDING:
         return
     derivative = orbits.evaluate(end[None], one)[1]
     tangent = tangents(derivative, out[None])[0]
     outcome, branch.beyond[side] = _behind(branch, end, guard, tangent)
     own = orbits.multipliers(end[None], derivative, one)
     tangent = tangent if side else -tangent
-    branch.borders[side] = SpecialPoint(
-        "boundary_equilibrium", 0, end, tangent, own[0], derivative[0], (guard,), np.nan, outcome
+    branch.borders[side] = Event(
+        "boundary_equilibrium", 0, end, own[0], tangent, derivative[0], (guard,), outcome=outcome
     )
     at = len(branch.z) if side else 0
     length = branch.length[place] + (apart if side else -apart)
@@ -242,6 +201,22 @@ def _meet_boundary(branch: RestBranch, side: int, place: int) -> None:
     for name, value in {**new, "multipliers": own[0]}.items():
         setattr(branch, name, np.insert(getattr(branch, name), at, value, axis=0))
     branch.length = branch.length - branch.length[0]
+
+
+def _on_boundary(orbits: Rests, row: int, z: np.ndarray, guard: int) -> np.ndarray | None:
+    """The equilibrium near another float64[z] at which the gap of a guard vanishes, float64[z]."""
+
+    def equations(z: np.ndarray, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        residual, derivative = orbits.evaluate(z, np.array([row]))
+        gap, slope = (one[[guard]] for one in orbits.gaps(z[0], row))
+        unit = np.abs(slope).max()
+        return (
+            np.append(residual, gap[None] / unit, axis=1),
+            np.append(derivative, slope[None] / unit, axis=1),
+        )
+
+    found = newton(equations, z[None], orbits.scale[[row]])
+    return found.z[0] if found.found[0] else None
 
 
 def _behind(

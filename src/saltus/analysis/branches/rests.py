@@ -16,6 +16,7 @@ import numpy as np
 
 from saltus.analysis.solve.newton import leading_first
 from saltus.contact.guards import is_hold
+from saltus.language.derivatives import gradient
 from saltus.language.evaluate import evaluate
 from saltus.language.expression import Expr
 from saltus.system import System
@@ -118,6 +119,20 @@ class Rests:
         free = [one.gap for one in self._whole.guards if not is_hold(one)]
         gaps = self._at(free, z[None], self.sides(z[None]))[0] if free else np.zeros(0)
         return float(np.abs(gaps).min(initial=np.inf))
+
+    def derivatives(self, z: np.ndarray, row: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """First, second and third derivatives of the rates at float64[z] with respect to the
+        states, in units of the scale: float64[D, D], [D, D, D] and [D, D, D, D].
+        """
+        unit = self.scale[row, : self.size]
+        entries: list[Expr] = list(self._field)
+        weight, found = 1.0 / unit, []
+        for _ in range(3):
+            entries = [one for entry in entries for one in gradient(entry, self.system.states)]
+            weight = weight[..., None] * unit
+            numbers = self._at(entries, z[None], self.modes[[row]])
+            found.append(numbers.reshape(weight.shape) * weight)
+        return found[0], found[1], found[2]
 
     # -- equations ---------------------------------------------------------------------------------
     def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

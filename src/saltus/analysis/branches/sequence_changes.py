@@ -16,11 +16,11 @@ from saltus.analysis.branches.contact_sequences import (
     shift,
     without,
 )
+from saltus.analysis.branches.events import Event
 from saltus.analysis.branches.grazes import ContactEvent, corner, graze
 from saltus.analysis.branches.grazing_orbits import sqrt_coefficient
 from saltus.analysis.branches.legs import Legs
 from saltus.analysis.branches.shooting import PeriodicOrbits
-from saltus.analysis.branches.special_points import SpecialPoint
 from saltus.system.leg import has_legs
 
 #: How often an interval is halved in which the change isn't one graze, one corner, or several
@@ -45,7 +45,7 @@ class _Point:
 
 def contact_points(
     orbits: PeriodicOrbits, row: int, z: np.ndarray, tangent: np.ndarray
-) -> list[SpecialPoint]:
+) -> list[Event]:
     """All changes of the contact sequence between the points of a branch and the next ones; none
     where contacts are held, or equations switch by the time.
 
@@ -72,8 +72,8 @@ def contact_points(
     places = np.array([event.orbit for _, event in found])
     derivative = orbits.evaluate(places, np.full(len(found), row))[1]
     return [
-        SpecialPoint(
-            event.kind, after, place, tangent[after], event.multipliers, matrix,
+        Event(
+            event.kind, after, place, event.multipliers, tangent[after], matrix,
             event.guards, event.phase, sqrt_coefficient=sqrt_coefficient(event),
         )
         for (after, event), place, matrix in zip(found, places, derivative, strict=True)

@@ -17,6 +17,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from saltus.analysis.closed.field_zeros import field_of
+from saltus.analysis.closed.shooting import less_next
 from saltus.analysis.solve.floquet import across, multipliers
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
@@ -81,11 +82,6 @@ class PeriodicOrbits:
             guard.law is not None and guard.law.kind == "impact" for guard in system.guards
         )
         self._next = (np.arange(n) + 1) % n  # the point that follows each
-        self._less_next = -np.eye(n * self.size)[self._columns_of(self._next)]
-
-    def _columns_of(self, shots: np.ndarray) -> np.ndarray:
-        """Which unknowns some of the points are, int64[s, D]."""
-        return shots[:, None] * self.size + np.arange(self.size)
 
     @property
     def width(self) -> int:
@@ -147,9 +143,7 @@ class PeriodicOrbits:
         ends = ends[:, :size].reshape(r, n, size)
         matrices = matrices[:, :size].reshape(r, n, size, -1)
         derivative = np.empty((r, n, size, z.shape[1]))
-        derivative[..., : n * size] = self._less_next
-        for i in range(n):
-            derivative[:, i, :, i * size : (i + 1) * size] += matrices[:, i, :, :size]
+        derivative[..., : n * size] = less_next(matrices[..., :size]).reshape(r, n, size, n * size)
         derivative[..., n * size + order] = matrices[..., size:] * slopes[:, None, None]
         unit = self.scale[rows]
         each = unit[:, : n * size].reshape(r, n, size)

@@ -13,8 +13,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.analysis.branches.arclength import solved
 from saltus.analysis.branches.shooting import PeriodicOrbits
+from saltus.analysis.solve.linear import solved
 
 #: Multiplier of each kind that is followed; a torus has its own.
 MULTIPLIER = {"fold": 1.0, "period_doubling": -1.0, "neimark_sacker": None}

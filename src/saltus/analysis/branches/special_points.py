@@ -11,12 +11,12 @@ Kuznetsov, Elements of Applied Bifurcation Theory (2004), chapter 10.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import elementwise
 
 from saltus.analysis.branches.arclength import correct, tangents
+from saltus.analysis.branches.events import Event
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.solve.newton import newton
 from saltus.flow.polynomials import between
@@ -33,46 +33,6 @@ ON_CIRCLE = 1e-9
 CONVERGED, ASIDE = 1e-11, 1e-5
 #: Farthest that a branch point lies from where it was seen, in units of the scale.
 FARTHEST = 0.3
-
-
-@dataclass(frozen=True)
-class SpecialPoint:
-    """A bifurcation on a curve.
-
-    Attributes
-    ----------
-    kind : str
-        One of KINDS; ``graze``: a contact appears or vanishes; ``corner``: two contacts come at
-        once.
-    after : int
-        The point of the curve that it comes after.
-    z, tangent : float64[m + 1]
-        The orbit and the parameter, and the direction of the curve, in units of the scale.
-    multipliers : complex128[D]
-        There.
-    derivative : float64[m, m + 1]
-        Of the equations there, in units of the scale.
-    guards : tuple of int
-        The guard that is grazed; the two that are met at once.
-    phase : float
-        When, in forcing periods since the orbit's first point.
-    outcome : str
-        How a branch of orbits with impacts goes on behind a graze: ``persistence`` or
-        ``nonsmooth_fold``.
-    sqrt_coefficient : float
-        Of a graze: see grazing_orbits.py.
-    """
-
-    kind: str
-    after: int
-    z: np.ndarray
-    tangent: np.ndarray
-    multipliers: np.ndarray
-    derivative: np.ndarray
-    guards: tuple[int, ...] = ()
-    phase: float = np.nan
-    outcome: str = ""
-    sqrt_coefficient: float = np.nan
 
 
 def tests(
@@ -114,7 +74,7 @@ def locate(
     z: np.ndarray,
     tangent: np.ndarray,
     kind: np.ndarray,
-) -> list[SpecialPoint | None]:
+) -> list[Event | None]:
     """The zeros of tests between points and the next ones.
 
     Parameters
@@ -138,7 +98,7 @@ def locate(
     # slopes by the share of the step along the first tangent
     along = length[:, None] * tangent
     end = (length / np.einsum("ei,ei->e", beyond, tangent))[:, None] * beyond
-    known: dict[int, SpecialPoint] = {}
+    known: dict[int, Event] = {}
 
     def at(flat: np.ndarray, which: np.ndarray) -> np.ndarray:
         mine = rows[which]
@@ -155,8 +115,8 @@ def locate(
             tested = tests(direction[good], derivative[good], own, column)
             values[good] = tested[kind[which[good]], np.arange(len(good))]
             for place, i in enumerate(good):
-                known[int(which[i])] = SpecialPoint(
-                    KINDS[kind[which[i]]], -1, point.z[i], direction[i], own[place], derivative[i]
+                known[int(which[i])] = Event(
+                    KINDS[kind[which[i]]], -1, point.z[i], own[place], direction[i], derivative[i]
                 )
         return values
 
@@ -193,7 +153,7 @@ def zeros(at: Callable[[np.ndarray, np.ndarray], np.ndarray], length: np.ndarray
 
 def _branch_point(
     orbits: PeriodicOrbits, row: int, start: np.ndarray, along: np.ndarray
-) -> SpecialPoint | None:
+) -> Event | None:
     """The point near another at which two branches cross; None if none is found.
 
     There the derivative J has a left null vector u, and Newton's method on F alone fails; on
@@ -221,12 +181,12 @@ def _branch_point(
         return residual[None], whole[None]
 
     null = np.linalg.svd(derivative[0])[0][:, -1]
-    x, found = newton(
+    zeros = newton(
         equations, np.concatenate([start, [0.0], null])[None],
-        np.concatenate([unit, np.ones(size)])[None], CONVERGED, longest_step=np.inf,
+        np.concatenate([unit, np.ones(size)])[None], enough=CONVERGED, longest_step=np.inf,
     )  # fmt: skip
-    z = x[0, :size]
-    if not found[0]:
+    z = zeros.z[0, :size]
+    if not zeros.found[0]:
         return None
     if np.linalg.norm((z - start) / unit) > FARTHEST:
         return None
@@ -235,7 +195,7 @@ def _branch_point(
     direction = spans.T @ (spans @ along)
     direction /= np.linalg.norm(direction)
     own = orbits.multipliers(z[None], derivative, one)[0]
-    return SpecialPoint("branch_point", -1, z, direction, own, derivative[0])
+    return Event("branch_point", -1, z, own, direction, derivative[0])
 
 
 def outside(multipliers: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from saltus.analysis.branches.branch import Branch
-from saltus.analysis.branches.special_points import SpecialPoint
+from saltus.analysis.branches.events import Event
 
 #: A branch that ends so near to where another is to leave is that one, in units of the scale.
 BORN = 0.015
@@ -81,7 +81,7 @@ def children(branch: Branch, number: int, switch: frozenset[str], longest: int) 
             yield Seed(middle, z[branch.orbits.n * size :], branch.scale[:size])
 
 
-def _doubled(branch: Branch, event: SpecialPoint) -> np.ndarray:
+def _doubled(branch: Branch, event: Event) -> np.ndarray:
     """The direction of the branch of twice the period."""
     (segments,) = branch.orbits.segments(event.derivative[None], np.array([branch.row]))
     product = np.eye(branch.orbits.size)
@@ -96,7 +96,7 @@ def _doubled(branch: Branch, event: SpecialPoint) -> np.ndarray:
     return np.asarray(whole / np.linalg.norm(whole))
 
 
-def crossing(event: SpecialPoint) -> np.ndarray:
+def crossing(event: Event) -> np.ndarray:
     """The direction of the branch that crosses at a branch point."""
     null = np.linalg.svd(event.derivative)[2][-2:]
     rest = null - np.outer(null @ event.tangent, event.tangent)

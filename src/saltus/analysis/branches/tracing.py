@@ -13,9 +13,11 @@ import numpy as np
 
 from saltus.analysis.branches.arclength import ENDING, FIRST, Curve, correct, follow, tangents
 from saltus.analysis.branches.branch import Branch
+from saltus.analysis.branches.events import Event
+from saltus.analysis.branches.legs import Legs
 from saltus.analysis.branches.same_branch import SAME, branch_of
 from saltus.analysis.branches.shooting import PeriodicOrbits
-from saltus.analysis.branches.special_points import SpecialPoint, unstable
+from saltus.analysis.branches.special_points import unstable
 from saltus.analysis.branches.switching import Seed, children, ends_there
 
 #: How far a new branch begins from the point where it leaves another, in units of the scale: the
@@ -178,7 +180,7 @@ def _holds(branch: Branch, other: Branch) -> bool:
     return n == branch.orbits.n and all(branch_of(z, n, [branch]) == 0 for z in ends)
 
 
-def _same_event(event: SpecialPoint, branch: Branch) -> int | None:
+def _same_event(event: Event, branch: Branch) -> int | None:
     """The number of an event among those of another branch."""
     apart = [
         np.abs((other.z - event.z) / branch.scale).max() if other.kind == event.kind else np.inf
@@ -233,25 +235,26 @@ class Start:
         return None
 
 
-def _halved(orbits: PeriodicOrbits, curve: Curve) -> str:
-    """``period_doubling`` if an orbit of 2m periods has just passed one of m periods; ``hopf`` if a
-    limit cycle has shrunk to nothing.
-    """
-    if len(curve.z) < 2:
+def halved(orbits: PeriodicOrbits | Legs, curve: Curve) -> str:
+    """``period_doubling`` if an orbit of 2m periods has just passed one of m periods."""
+    if orbits.n % 2 or len(curve.z) < 2:
         return ""
-    ahead, behind = curve.z[-1], curve.z[-2]
-    if orbits.n % 2 == 0:
-        half = orbits.n // 2
-        apart = [(p[:half] - p[half:]).ravel() for p in map(orbits.points, (ahead, behind))]
-        if apart[0] @ apart[1] < 0.0:
-            return "period_doubling"
-    return "hopf" if orbits.free and orbits.turned(ahead, behind) else ""
+    half, points = orbits.n // 2, orbits.points(np.array(curve.z[-2:]))
+    apart = (points[:, :half] - points[:, half:]).reshape(2, -1)
+    return "period_doubling" if apart[0] @ apart[1] < 0.0 else ""
+
+
+def _shrunk(orbits: PeriodicOrbits, curve: Curve) -> str:
+    """The same; ``hopf`` if a limit cycle has shrunk to nothing."""
+    why = halved(orbits, curve)
+    turns = not why and orbits.free and len(curve.z) > 1 and orbits.turned(*curve.z[:-3:-1])
+    return "hopf" if turns else why
 
 
 def both_ways(
     plan: Plan,
     starts: Sequence[Start],
-    ends: Callable[[Any, Curve], str] = _halved,
+    ends: Callable[[Any, Curve], str] = _shrunk,
     kind: type[Branch] = Branch,
 ) -> list[Branch | None]:
     """The branches of orbits over one period, side by side: see :class:`Plan`."""
@@ -295,13 +298,7 @@ def _joined(orbits: PeriodicOrbits, curves: list[Curve], kind: type[Branch]) -> 
     if len(curves) == 1:
         return _of(orbits, curves[0], ("branch", curves[0].end), kind)
     up, down = curves
-    whole = Curve(
-        down.z[:0:-1] + up.z,
-        [-tangent for tangent in down.tangent[:0:-1]] + up.tangent,
-        down.derivative[:0:-1] + up.derivative,
-        [-length for length in down.length[:0:-1]] + up.length,
-    )
-    return _of(orbits, whole, (down.end, up.end), kind)
+    return _of(orbits, up.behind(down), (down.end, up.end), kind)
 
 
 def _of(orbits: PeriodicOrbits, curve: Curve, ends: tuple[str, str], kind: type[Branch]) -> Branch:

@@ -10,32 +10,30 @@ Parker & Chua, Practical Numerical Algorithms for Chaotic Systems (1989), chapte
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from saltus.analysis.closed.all_orbits import BESIDE, HELD, Search, chained, used_up
 from saltus.analysis.closed.cycles import (
     LOCATED,
     NO_CYCLE,
     close_returns,
     first_point,
-    least_period,
+    least_part,
     units,
+    with_trivial,
 )
 from saltus.analysis.closed.field_zeros import field_of
-from saltus.analysis.solve.damped import Known, damped_newton
-from saltus.analysis.solve.floquet import nontrivial
-from saltus.analysis.solve.newton import Equations
+from saltus.analysis.closed.motions import ClosedMotion
+from saltus.analysis.closed.search import AGES, BESIDE, Family, Search, used_up
+from saltus.analysis.closed.shooting import Shooting, close
+from saltus.analysis.solve.deflation import Known
 from saltus.analysis.solve.tolerances import AMPLIFIED, CONVERGED, LONGEST, SAME
 from saltus.flow.maps import Stroboscope
 from saltus.flow.polynomials import between
 from saltus.flow.request import Schedule
 
-#: Turns that starts are followed before a return is looked for, in turn: none, so that cycles are
-#: found which nothing comes near; some, so that a chaotic set is reached.
-AGES = (0, 4, 8, 12)
 #: Windows of time in each of which the nearest return is a guess.
 WINDOWS = 3
 #: Starts whose motions are held at a time.
@@ -46,44 +44,31 @@ FEWEST, MOST = 4, 16
 FINER, FAR = 8, 1e-2
 #: Farthest that points go from the guess, in units of its range.
 FARTHEST = 3.0
-#: Samples of a cycle by which others are told to be it.
+#: Sample points of a cycle by which duplicates of it are recognised.
 SAMPLES = 1024
 #: One in so many of these is looked at first.
 COARSE = 8
 #: Sizes of guesses beside a known cycle, in units of its own.
 SIZES = np.array([0.3, 0.5, 0.7, 0.8, 0.9, 0.97, 1.03, 1.1, 1.25, 1.5, 2.0, 3.0])
-#: Starts of a search with the known cycles deflated, searches at most, and steps of one.
-DEFLATED_STARTS, DEFLATED_SEARCHES, DEFLATED_STEPS = 64, 4, 40
 
 
 @dataclass(frozen=True)
-class Cycle:
-    """A limit cycle.
+class Cycle(ClosedMotion):
+    """A limit cycle, and where it goes.
 
     Attributes
     ----------
-    time : float
-        Its period [s].
     points : float64[LONGEST, D]
         States in equal steps of its time, from where the first state that moves is least.
-    multipliers : complex128[D - 1]
-        Floquet multipliers without the trivial 1, the largest first.
-    mismatch : float
-        Largest distance of a point that was shot from the image of the one before, in units of the
-        range.
     scale : float64[D]
         Range of each state, its size where it rests.
     samples, rates : float64[SAMPLES + 1, D]
         States from the first point on to the last, which is it again, and their rates.
     """
 
-    time: float
-    points: np.ndarray
-    multipliers: np.ndarray
-    mismatch: float
-    scale: np.ndarray
-    samples: np.ndarray
-    rates: np.ndarray
+    scale: np.ndarray = field(kw_only=True)
+    samples: np.ndarray = field(kw_only=True)
+    rates: np.ndarray = field(kw_only=True)
 
     def nearest(self, states: np.ndarray) -> np.ndarray:
         """Where on it states float64[m, D] are nearest, float64[m] in samples: from the nearest of
@@ -116,97 +101,118 @@ class Cycle:
         )
 
 
-@dataclass
-class CycleSet:
-    """Limit cycles, each once.
+class Cycles(Family[Cycle]):
+    """Limit cycles of a flow with one row of values, each once.
 
-    Attributes
+    Parameters
     ----------
-    cycles : list of Cycle
-        They.
-    found : list of int
-        Starts that led to each.
-    search : Search
-        What the search came to; its period is 0.
+    map_ : Stroboscope
+        Of a system without forcing.
+    longest : float
+        Longest period looked for [s].
     """
 
-    search: Search
-    cycles: list[Cycle] = field(default_factory=list)
-    found: list[int] = field(default_factory=list)
+    rounds = 4
 
-    def take(self, map_: Stroboscope, guess: Guess) -> np.ndarray:
-        """Add the cycles that aren't known yet; the number of each, int64[k], -1 of one that
-        doesn't close.
-        """
-        number = np.full(len(guess), -1)
-        for i, cycle in enumerate(self.cycles):
-            rows = np.flatnonzero(number < 0)
-            number[rows[_is(map_, cycle, guess.rows(rows))]] = i
-        for row in range(len(guess)):
-            if number[row] != -1:
-                continue
-            one = _cycle(map_, guess.rows(np.array([row])))
-            if one is None:
-                number[row] = -2
-                continue
-            rows = np.flatnonzero(number == -1)
-            number[rows[_is(map_, one, guess.rows(rows))]] = len(self.cycles)
-            number[row] = len(self.cycles)
-            self.cycles.append(one)
-            self.found.append(0)
-        found: np.ndarray = np.maximum(number, -1)
-        return found
+    def __init__(self, map_: Stroboscope, longest: float) -> None:
+        super().__init__()
+        self.map, self.longest = map_, longest
 
-    def within(self, limits: tuple[float, float]) -> CycleSet:
-        """Those with periods in a range [s], in an order that doesn't depend on discovery: by
-        period, then by place.
-        """
-        low, high = limits[0] * (1.0 - SAME), limits[1] * (1.0 + SAME)
-        order = sorted(
-            (i for i, one in enumerate(self.cycles) if low <= one.time <= high),
-            key=lambda i: (
-                float(f"{self.cycles[i].time:.7e}"),
-                *np.round(self.cycles[i].points[0] / self.cycles[i].scale, 6).tolist(),
-            ),
-        )
-        return CycleSet(
-            self.search, [self.cycles[i] for i in order], [self.found[i] for i in order]
+    def guess(self, points: np.ndarray, time: np.ndarray, scale: np.ndarray) -> Shooting:
+        """Guesses of cycles float64[k, n, D], with their periods [s] and ranges."""
+        row = np.zeros(len(points), np.int64)
+        return Shooting(
+            self.map, row, points, scale, time=time, longest=self.longest, farthest=FARTHEST
         )
 
+    def motion(self, closed: Shooting) -> Cycle | None:
+        """See :class:`Family`; None too if it rests."""
+        assert closed.time is not None
+        row, n = self.map.rows(closed.row), closed.points.shape[1]
+        travelled = np.abs(closed.rates(closed.points)[0]) * closed.time
+        if not (travelled > NO_CYCLE * closed.scale).any():
+            return None
+        time = least_part(row, closed.points[:, 0], closed.time, closed.scale)
+        if time[0] < 0.75 * closed.time[0]:
+            points = _parts(self.map, closed.points[:, 0], time, n)
+            _, closed = close(replace(closed, points=points, time=time, longest=2.0 * time[0]))
+            if not len(closed):
+                return None
+        assert closed.time is not None
+        ends, matrices = closed.parts().tangent(closed.points[0], 1)
+        whole = row.with_period(closed.time)
+        first = first_point(row, closed.points[:, 0], closed.time)
+        samples = whole.run(first, 1, Schedule.even(1, SAMPLES, beyond=1)).samples[0]
+        scale = units(samples.max(axis=0), samples.min(axis=0))
+        mismatch = float(np.abs((ends - np.roll(closed.points[0], -1, axis=0)) / scale).max())
+        if not (
+            mismatch < AMPLIFIED and np.isfinite(matrices).all() and np.isfinite(samples).all()
+        ):
+            return None
+        multipliers = with_trivial(matrices, closed.rates(closed.points)[0])
+        growth = float(np.abs(multipliers[1:]).max(initial=0.0))
+        if not _repeats(whole, closed.points[0], scale, growth):
+            return None
+        points = samples[:: SAMPLES // LONGEST][:LONGEST]
+        return Cycle(
+            points, multipliers, mismatch, float(closed.time[0]), scale=scale, samples=samples,
+            rates=closed.rates(samples[None])[0],
+        )  # fmt: skip
 
-@dataclass
-class Guess:
-    """What Newton's method begins with, or has found: k of them.
+    def same(self, motion: Cycle, closed: Shooting) -> np.ndarray:
+        """See :class:`Family`: once or several times round."""
+        assert closed.time is not None
+        turns = np.maximum(np.round(closed.time / motion.time), 1.0)
+        same = np.abs(closed.time / motion.time - turns) < SAME * turns
+        rows = np.flatnonzero(same)
+        if len(rows):
+            points = closed.points[rows]
+            apart = _apart(self.map, motion, points.reshape(-1, points.shape[2]))
+            # one point may lie at a jump
+            same[rows] = np.sort(apart.reshape(points.shape[:2]), axis=1)[:, -2:][:, 0] < SAME
+        return same
 
-    Attributes
-    ----------
-    points : float64[k, n, D]
-        States in equal steps of the period.
-    time : float64[k]
-        The period [s].
-    scale : float64[k, D]
-        Range of each state.
-    row : int64[k]
-        Which start it comes from.
-    """
+    def known(self, n: int) -> Known:
+        """What gives each known cycle as it is nearest to unknowns: the phase by their points, as
+        often round as their period has it.
+        """
+        cycles = tuple(self.motions)
 
-    points: np.ndarray
-    time: np.ndarray
-    scale: np.ndarray
-    row: np.ndarray
+        def zeros(z: np.ndarray) -> np.ndarray:
+            points = z[:, :-1].reshape(len(z), n, (z.shape[1] - 1) // n)
+            result = np.empty((len(z), len(cycles), z.shape[1]))
+            for i, cycle in enumerate(cycles):
+                turns = np.maximum(np.round(z[:, -1] / cycle.time), 1.0)
+                place = cycle.nearest(points[:, 0])[:, None] + np.arange(n) * (
+                    turns[:, None] * SAMPLES / n
+                )
+                result[:, i, :-1] = cycle.at(place).reshape(len(z), z.shape[1] - 1)
+                result[:, i, -1] = turns * cycle.time
+            return result
 
-    def __len__(self) -> int:
-        return len(self.time)
+        return zeros
 
-    def rows(self, which: np.ndarray) -> Guess:
-        """Those of some rows, int64[m] or bool[k]."""
-        return Guess(self.points[which], self.time[which], self.scale[which], self.row[which])
+    def beside(self, n: int, random: np.random.Generator) -> list[Shooting]:
+        """See :class:`Family`: larger and smaller ones of a cycle's shape, and what lies beside its
+        points once and twice round.
+        """
+        far = np.concatenate([np.full(len(SIZES), BESIDE[0]), BESIDE, BESIDE])
+        size = np.concatenate([SIZES, np.ones(2 * len(BESIDE))])
+        turns = np.where(np.arange(len(far)) < len(SIZES) + len(BESIDE), 1, 2)
+        steps = np.arange(n) * turns[:, None] * SAMPLES / n
+        guesses = []
+        for cycle in self.motions:
+            middle = cycle.samples[:-1].mean(axis=0)
+            points = cycle.at(random.uniform(0, SAMPLES, (len(far), 1)) + steps)
+            points = middle + size[:, None, None] * (points - middle)
+            points += far[:, None, None] * random.standard_normal(points.shape) * cycle.scale
+            scale = np.broadcast_to(cycle.scale, (len(far), len(cycle.scale)))
+            guesses.append(self.guess(points, turns * cycle.time, scale))
+        return guesses
 
-    @classmethod
-    def joined(cls, parts: list[Guess]) -> Guess:
-        """Those of several."""
-        columns = zip(*([p.points, p.time, p.scale, p.row] for p in parts), strict=True)
-        return cls(*(np.concatenate(column) for column in columns))
+    def place(self, motion: Cycle) -> tuple[float, ...]:
+        """See :class:`Family`: by period, then by place."""
+        return (float(f"{motion.time:.7e}"), *np.round(motion.points[0] / motion.scale, 6))
 
 
 def all_cycles(
@@ -215,7 +221,7 @@ def all_cycles(
     limits: tuple[float, float],
     time: float,
     progress: Callable[[float], None] | None = None,
-) -> CycleSet:
+) -> Cycles:
     """The limit cycles that starts lead to, with periods in a range.
 
     Parameters
@@ -232,85 +238,24 @@ def all_cycles(
     progress : callable, optional
         Called with the share done.
     """
-    search = Search(0, len(start))
-    result = CycleSet(search)
+    search, result = Search(0, len(start)), Cycles(map_, limits[1])
     turn = float(map_.period[0])
     n = int(np.clip(np.ceil(limits[1] / turn), FEWEST, MOST))
-    guesses, led = list[Guess](), list[np.ndarray]()
-    for first in range(0, len(start), TOGETHER):
-        part = slice(first, first + TOGETHER)
-        state, followed = _aged(map_, start[part], np.resize(AGES, len(start))[part])
-        search.given_up += int((~followed).sum())
-        for guess in _guesses(map_, state, limits, time, n):
-            guesses.append(guess)
-            closed = close(map_, guess, limits[1])
-            number = result.take(map_, closed)
-            led.append(np.stack([first + closed.row, number])[:, number >= 0])
-        if progress:
-            progress(0.7 * min(1.0, (first + TOGETHER) / len(start)))
-    pairs = np.unique(np.concatenate(led, axis=1), axis=1)
-    result.found = np.bincount(pairs[1], minlength=len(result.cycles)).tolist()
-    search.converged, search.found_once = len(np.unique(pairs[0])), result.found.count(1)
-    _deflate(map_, Guess.joined(guesses), limits[1], result)
-    return result.within(limits)
 
+    def guesses() -> Iterator[tuple[Shooting, np.ndarray]]:
+        for first in range(0, len(start), TOGETHER):
+            part = slice(first, first + TOGETHER)
+            state, followed = _aged(map_, start[part], np.resize(AGES, len(start))[part])
+            search.given_up += int((~followed).sum())
+            for guess, row in _guesses(result, state, limits, time, n):
+                yield guess, first + row
+            if progress:
+                progress(0.7 * min(1.0, (first + TOGETHER) / len(start)))
 
-def close(
-    map_: Stroboscope,
-    guess: Guess,
-    longest: float,
-    known: Known | None = None,
-    max_steps: int | None = None,
-) -> Guess:
-    """The cycles that Newton's method finds, with periods up to the longest [s]; ``known`` ones are
-    deflated.
-    """
-    _, n, size = guess.points.shape
-    options = {} if max_steps is None else {"max_steps": max_steps}
-    step, parts = max(1, HELD // (n * size + 1) ** 2), [guess.rows(np.zeros(0, np.int64))]
-    for first in range(0, len(guess), step):
-        part = guess.rows(np.arange(first, min(first + step, len(guess))))
-        z = np.concatenate([part.points.reshape(len(part), -1), part.time[:, None]], axis=1)
-        unit = np.concatenate([np.tile(part.scale, n), part.time[:, None]], axis=1)
-        z, found = damped_newton(_equations(map_, part, longest), z, unit, known, **options)
-        found &= (z[:, -1] > 0) & (z[:, -1] <= longest * (1.0 + SAME))
-        points = z[found, :-1].reshape(-1, n, size)
-        parts.append(Guess(points, z[found, -1], part.scale[found], part.row[found]))
-    return Guess.joined(parts)
-
-
-def _equations(map_: Stroboscope, guess: Guess, longest: float) -> Equations:
-    """The equations of the cycles near guesses, in units of these; the last one keeps each step
-    across the flow at the first point. They end at twice the longest period,
-    and far from the guess, where a motion may run away.
-    """
-    _, n, size = guess.points.shape
-
-    def equations(z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        k, points, scale = len(z), z[:, :-1].reshape(-1, n, size), guess.scale[rows]
-        away = np.abs(points - guess.points[rows]) / scale[:, None]
-        ahead = (z[:, -1] > 0) & (z[:, -1] < 2.0 * longest) & (away.max(axis=(1, 2)) < FARTHEST)
-        points = np.where(ahead[:, None, None], points, guess.points[rows])
-        part = np.where(ahead, z[:, -1], guess.time[rows]) / n
-        mine = map_.rows(np.zeros(k * n, np.int64)).with_period(np.repeat(part, n))
-        gaps, matrix, ends = chained(mine, points, scale)
-        residual = np.append(gaps, np.zeros((k, 1)), axis=1)
-        residual[~ahead] = np.nan
-        unit = guess.time[rows, None, None] / scale[:, None]
-        derivative = np.zeros((k, n * size + 1, n * size + 1))
-        derivative[:, :-1, :-1] = matrix
-        derivative[:, :-1, -1] = (_rates(map_, ends) * unit / n).reshape(k, -1)
-        derivative[:, -1, :size] = (_rates(map_, points[:, :1]) * unit)[:, 0]
-        return residual, derivative
-
-    return equations
-
-
-def _rates(map_: Stroboscope, states: np.ndarray) -> np.ndarray:
-    """Rates at states float64[..., D]."""
-    flat = states.reshape(-1, states.shape[-1])
-    values = {name: np.full(len(flat), column[0]) for name, column in map_.values.items()}
-    return field_of(map_.system, flat, values).reshape(states.shape)
+    result.deflate(search, result.hunt(search, guesses()))
+    low, high = limits[0] * (1.0 - SAME), limits[1] * (1.0 + SAME)
+    result.order(i for i, one in enumerate(result.motions) if low <= one.time <= high)
+    return result
 
 
 # -- first guesses ---------------------------------------------------------------------------------
@@ -327,24 +272,22 @@ def _aged(map_: Stroboscope, start: np.ndarray, age: np.ndarray) -> tuple[np.nda
 
 
 def _guesses(
-    map_: Stroboscope, state: np.ndarray, limits: tuple[float, float], time: float, n: int
-) -> list[Guess]:
-    """The nearest returns of motions from float64[k, D] in each window of time; without any in the
-    first one after a given time.
+    cycles: Cycles, state: np.ndarray, limits: tuple[float, float], time: float, n: int
+) -> Iterator[tuple[Shooting, np.ndarray]]:
+    """The nearest returns of motions from float64[k, D] in each window of time, and the motions
+    that they are of, int64[m]; of those without any a given time in the first window.
     """
     rows = np.flatnonzero(np.isfinite(state).all(axis=1))
     state = state[rows]
     edges = np.linspace(*limits, WINDOWS + 1)
-    each = close_returns(map_.rows(np.zeros(len(state), np.int64)), state, edges)
+    each = close_returns(cycles.map.rows(np.zeros(len(state), np.int64)), state, edges)
     none = np.all([np.isnan(one.time) for one in each], axis=0)
     each[0].time[none] = time
-    guesses = []
     for one in each:
         here = np.isfinite(one.time)
         length = one.time[here]
-        points = _parts(map_, state[here], length, n)
-        guesses.append(Guess(points, length, one.scale[here], rows[here]))
-    return guesses
+        points = _parts(cycles.map, state[here], length, n)
+        yield cycles.guess(points, length, one.scale[here]), rows[here]
 
 
 def _parts(map_: Stroboscope, state: np.ndarray, time: np.ndarray, n: int) -> np.ndarray:
@@ -353,76 +296,7 @@ def _parts(map_: Stroboscope, state: np.ndarray, time: np.ndarray, n: int) -> np
     return np.asarray(rows.run(state, 1, Schedule.even(1, n)).samples)
 
 
-# -- other cycles than those that are known --------------------------------------------------------
-def _deflate(map_: Stroboscope, guesses: Guess, longest: float, result: CycleSet) -> None:
-    """Search on with the known cycles deflated, from some guesses and from beside the known ones,
-    until nothing more is found.
-    """
-    search, n = result.search, guesses.points.shape[1]
-    some = guesses.rows(np.arange(0, len(guesses), max(1, len(guesses) // DEFLATED_STARTS)))
-    random = np.random.default_rng(0)
-    for _ in range(DEFLATED_SEARCHES):
-        before = len(result.cycles)
-        starts = Guess.joined([some, *(_beside(one, n, random) for one in result.cycles)])
-        cycles = tuple(result.cycles)
-        known = _nearest(cycles, n)
-        result.take(map_, close(map_, starts, longest, known, DEFLATED_STEPS))
-        search.deflated += len(result.cycles) - before
-        if len(result.cycles) == before:
-            search.exhausted = True
-            return
-
-
-def _beside(cycle: Cycle, n: int, random: np.random.Generator) -> Guess:
-    """Guesses beside a cycle: larger and smaller ones of its shape, and what lies beside its points
-    once and twice round.
-    """
-    far = np.concatenate([np.full(len(SIZES), BESIDE[0]), BESIDE, BESIDE])
-    size = np.concatenate([SIZES, np.ones(2 * len(BESIDE))])
-    turns = np.where(np.arange(len(far)) < len(SIZES) + len(BESIDE), 1, 2)
-    steps = np.arange(n) * turns[:, None] * SAMPLES / n
-    middle = cycle.samples[:-1].mean(axis=0)
-    points = cycle.at(random.uniform(0, SAMPLES, (len(far), 1)) + steps)
-    points = middle + size[:, None, None] * (points - middle)
-    points = points + far[:, None, None] * random.standard_normal(points.shape) * cycle.scale
-    scale = np.broadcast_to(cycle.scale, (len(far), len(cycle.scale)))
-    return Guess(points, turns * cycle.time, scale, np.full(len(far), -1))
-
-
-def _nearest(cycles: tuple[Cycle, ...], n: int) -> Known:
-    """What gives each known cycle as it is nearest to guesses: the phase by their points, as often
-    round as their period has it.
-    """
-
-    def zeros(z: np.ndarray) -> np.ndarray:
-        points = z[:, :-1].reshape(len(z), n, (z.shape[1] - 1) // n)
-        result = np.empty((len(z), len(cycles), z.shape[1]))
-        for i, cycle in enumerate(cycles):
-            turns = np.maximum(np.round(z[:, -1] / cycle.time), 1.0)
-            place = cycle.nearest(points[:, 0])[:, None] + np.arange(n) * (
-                turns[:, None] * SAMPLES / n
-            )
-            result[:, i, :-1] = cycle.at(place).reshape(len(z), z.shape[1] - 1)
-            result[:, i, -1] = turns * cycle.time
-        return result
-
-    return zeros
-
-
 # -- one cycle -------------------------------------------------------------------------------------
-def _is(map_: Stroboscope, cycle: Cycle, found: Guess) -> np.ndarray:
-    """Which of those that were found are a cycle, once or several times round, bool[k]."""
-    turns = np.maximum(np.round(found.time / cycle.time), 1.0)
-    same = np.abs(found.time / cycle.time - turns) < SAME * turns
-    rows = np.flatnonzero(same)
-    if len(rows):
-        points = found.points[rows]
-        apart = _apart(map_, cycle, points.reshape(-1, points.shape[2]))
-        # one point may lie at a jump
-        same[rows] = np.sort(apart.reshape(points.shape[:2]), axis=1)[:, -2:][:, 0] < SAME
-    return same
-
-
 def _apart(map_: Stroboscope, cycle: Cycle, states: np.ndarray) -> np.ndarray:
     """How far states float64[m, D] lie from a cycle, in units of its range, float64[m]."""
     rows, step = map_.rows(np.zeros(len(states), np.int64)), cycle.time / SAMPLES
@@ -430,41 +304,11 @@ def _apart(map_: Stroboscope, cycle: Cycle, states: np.ndarray) -> np.ndarray:
     for _ in range(LOCATED):
         sample = np.floor(place - 0.5).astype(int)
         there = rows.with_period((place - sample) * step).run(cycle.samples[sample % SAMPLES], 1)
-        offset, rate = (states - there.state) / cycle.scale, _rates(map_, there.state) / cycle.scale
+        offset = (states - there.state) / cycle.scale
+        rate = field_of(map_.system, there.state, rows.values) / cycle.scale
         along = np.einsum("mj,mj->m", offset, rate) / np.einsum("mj,mj->m", rate, rate)
         place = place + np.clip(np.nan_to_num(along / step), -1.0, 1.0)
     return np.asarray(np.abs(offset).max(axis=1))
-
-
-def _cycle(map_: Stroboscope, found: Guess) -> Cycle | None:
-    """The cycle that Newton's method found; None if it doesn't close, or rests."""
-    row, n = map_.rows(np.zeros(1, np.int64)), found.points.shape[1]
-    travelled = np.abs(_rates(map_, found.points[0])) * found.time
-    if not (travelled > NO_CYCLE * found.scale).any():
-        return None
-    time = least_period(row, found.points[:, 0], found.time, found.scale)
-    if time[0] < 0.75 * found.time[0]:
-        points = _parts(map_, found.points[:, 0], time, n)
-        found = close(map_, Guess(points, time, found.scale, found.row), 2.0 * time[0])
-        if not len(found):
-            return None
-    parts = map_.rows(np.zeros(n, np.int64)).with_period(np.repeat(found.time / n, n))
-    ends, matrices = parts.tangent(found.points[0], 1)
-    whole = row.with_period(found.time)
-    first = first_point(row, found.points[:, 0], found.time)
-    samples = whole.run(first, 1, Schedule.even(1, SAMPLES, beyond=1)).samples[0]
-    scale = units(samples.max(axis=0), samples.min(axis=0))
-    mismatch = float(np.abs((ends - np.roll(found.points[0], -1, axis=0)) / scale).max())
-    if not (mismatch < AMPLIFIED and np.isfinite(matrices).all() and np.isfinite(samples).all()):
-        return None
-    multipliers = nontrivial(matrices, _rates(map_, found.points[0]))
-    if not _repeats(whole, found.points[0], scale, float(np.abs(multipliers).max())):
-        return None
-    return Cycle(
-        float(found.time[0]), samples[:: SAMPLES // LONGEST][:LONGEST],
-        multipliers, mismatch, scale, samples,
-        _rates(map_, samples),
-    )  # fmt: skip
 
 
 def _repeats(whole: Stroboscope, points: np.ndarray, scale: np.ndarray, growth: float) -> bool:

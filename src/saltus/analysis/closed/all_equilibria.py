@@ -34,7 +34,7 @@ NEUTRAL = 1e-12
 
 
 @dataclass(frozen=True)
-class Rest:
+class Equilibrium:
     """An equilibrium, or a continuum of them.
 
     Attributes
@@ -76,7 +76,7 @@ class Rest:
     margin: float
 
 
-def all_equilibria(system: System, starts: np.ndarray, scale: np.ndarray) -> list[Rest]:
+def all_equilibria(system: System, starts: np.ndarray, scale: np.ndarray) -> list[Equilibrium]:
     """The equilibria of a system without forcing.
 
     Parameters
@@ -88,11 +88,11 @@ def all_equilibria(system: System, starts: np.ndarray, scale: np.ndarray) -> lis
     scale : float64[D]
         Size of each state.
     """
-    found: list[Rest] = []
+    found: list[Equilibrium] = []
     continua: list[Piece] = []
     for mode in _modes(system.guards):
         piece = Piece(system, mode, scale)
-        rests: list[Rest] = []
+        rests: list[Equilibrium] = []
         for state in piece.zeros(starts):
             rest = _rest(piece, state)
             if rest is not None and rest.dimension and rest.place != "boundary":
@@ -123,8 +123,10 @@ def _modes(guards: Sequence[Guard]) -> list[tuple[bool, ...]]:
         options.append((*free, (False, True)) if law is not None and law.partner >= 0 else free)
     if np.prod([float(len(one)) for one in options]) > MOST_MODES:
         raise ParameterError(
-            f"{len(options)} boundaries make more than {MOST_MODES} modes, too many to look for "
-            f"equilibria in each. Ask sl.attractors for those that attract."
+            lambda say: (
+                f"{len(options)} boundaries make more than {MOST_MODES} modes, too many to "
+                f"look for equilibria in each. Ask {say.verb('attractors')} for those that attract."
+            )
         )
     owners = [number for number, guard in enumerate(guards) if not is_hold(guard)]
     modes = []
@@ -139,7 +141,7 @@ def _modes(guards: Sequence[Guard]) -> list[tuple[bool, ...]]:
     return modes
 
 
-def _rest(piece: Piece, state: np.ndarray) -> Rest | None:
+def _rest(piece: Piece, state: np.ndarray) -> Equilibrium | None:
     """The equilibrium at a zero of the field; None where the mode doesn't hold."""
     state = piece.cleaned(state)
     touched, margin = [], np.inf
@@ -166,7 +168,7 @@ def _rest(piece: Piece, state: np.ndarray) -> Rest | None:
         kind, stable = "undecided", False
     place = "boundary" if touched or releases else "pseudo" if piece.held else "region"
     ends = piece.ends(state) if dimension else np.stack([state, state])
-    return Rest(
+    return Equilibrium(
         state + 0.0, piece.mode, place, kind, stable and attracts, (*piece.held, *touched),
         dimension, np.append(own, np.full(len(state) - len(own), np.nan + 0j)), ends, margin,
     )  # fmt: skip
@@ -234,7 +236,7 @@ def _named(own: np.ndarray, dimension: int) -> tuple[str, bool]:
     return "focus" if turns.any() else "node", stable
 
 
-def _same(a: Rest, b: Rest, scale: np.ndarray) -> bool:
+def _same(a: Equilibrium, b: Equilibrium, scale: np.ndarray) -> bool:
     """Whether two finds are one equilibrium: on a boundary it is one of both sides."""
     return near(a.state, b.state, scale) and (
         a.mode == b.mode or ("boundary" in (a.place, b.place) and a.dimension == b.dimension)

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_discrete_lyapunov
 
-from saltus.analysis.closed.orbits import Orbit
+from saltus.analysis.closed.motions import ClosedMotion
 from saltus.analysis.solve.tolerances import JITTER
 from saltus.codegen.module import capture_module
 from saltus.flow.maps import Map
@@ -113,14 +113,14 @@ class Neighbourhoods:
         )
 
 
-def neighbourhoods(map_: Map, orbit: Orbit, owner: int, scale: np.ndarray) -> Neighbourhoods:
+def neighbourhoods(map_: Map, orbit: ClosedMotion, owner: int, scale: np.ndarray) -> Neighbourhoods:
     """Verified neighbourhoods of the points of a stable periodic orbit.
 
     Parameters
     ----------
     map_ : Map
         The map.
-    orbit : Orbit
+    orbit : ClosedMotion
         An attractor.
     owner : int
         Its number.
@@ -133,7 +133,7 @@ def neighbourhoods(map_: Map, orbit: Orbit, owner: int, scale: np.ndarray) -> Ne
     )
 
 
-def _verified(map_: Map, orbit: Orbit, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _verified(map_: Map, orbit: ClosedMotion, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Centres and weights about points of one orbit: of each the largest radius tried at which the
     returns were seen to contract.
 
@@ -189,7 +189,7 @@ def _verified(map_: Map, orbit: Orbit, scale: np.ndarray) -> tuple[np.ndarray, n
     return points, norms / best[:, None, None]
 
 
-def _returns(orbit: Orbit) -> int:
+def _returns(orbit: ClosedMotion) -> int:
     """Returns after which the linear part alone contracts to half of what is asked for, if these
     aren't too many.
     """
@@ -201,7 +201,7 @@ def _returns(orbit: Orbit) -> int:
     )
 
 
-def _asked(orbit: Orbit) -> float:
+def _asked(orbit: ClosedMotion) -> float:
     """What may be left of a distance after those returns: half way to what the norm promises, where
     that is more than CONTRACTION.
     """

@@ -17,9 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from saltus.analysis.closed.field_zeros import field_of, jacobian_of
-from saltus.analysis.closed.orbits import OrbitBatch
-from saltus.analysis.solve.floquet import across
-from saltus.analysis.solve.newton import leading_first, newton
+from saltus.analysis.closed.motions import ClosedMotions
+from saltus.analysis.closed.shooting import Shooting
+from saltus.analysis.solve.floquet import nontrivial
+from saltus.analysis.solve.newton import newton
 from saltus.analysis.solve.tolerances import AMPLIFIED, BESIDE, CONVERGED, LONGEST, RESTS, ROUNDING
 from saltus.flow.maps import Stroboscope
 from saltus.flow.polynomials import between
@@ -228,7 +229,7 @@ def _locate(map_: Stroboscope, start: np.ndarray, which: np.ndarray, result: Ret
 # -- Newton's method -------------------------------------------------------------------------------
 def find_cycles(
     map_: Stroboscope, start: np.ndarray, time: np.ndarray, scale: np.ndarray
-) -> tuple[OrbitBatch, np.ndarray]:
+) -> tuple[ClosedMotions, np.ndarray]:
     """The limit cycles near states float64[k, D] that nearly recur after times float64[k] [s].
 
     Parameters
@@ -242,19 +243,19 @@ def find_cycles(
 
     Returns
     -------
-    cycles : OrbitBatch
+    cycles : ClosedMotions
         Each by points in equal steps of its time, from where the first state that moves is least.
     moved : float64[k]
         How far from the first guess Newton's method arrived, in units of the scale; NaN where it
         found none.
     """
-    result, moved = OrbitBatch.none(*start.shape), np.full(len(start), np.nan)
+    result, moved = ClosedMotions.none(*start.shape), np.full(len(start), np.nan)
     x, time, found = _newton(map_, start, time, scale)
     rows = np.flatnonzero(found)
     if not len(rows):
         return result, moved
     mine = map_.rows(rows)
-    time = least_period(mine, x[rows], time[rows], scale[rows])
+    time = least_part(mine, x[rows], time[rows], scale[rows])
     first = first_point(mine, x[rows], time)
     points = mine.with_period(time).run(first, 1, Schedule.even(1, LONGEST)).samples
     moves = (np.ptp(points, axis=1) / scale[rows]).max(axis=1) > NO_CYCLE
@@ -263,7 +264,9 @@ def find_cycles(
     rows, period = rows[good], np.full(np.count_nonzero(good), LONGEST)
     result.put(
         rows,
-        OrbitBatch(period, points[good], multipliers[good], time[good], np.full(len(rows), np.nan)),
+        ClosedMotions(
+            period, points[good], multipliers[good], time[good], np.full(len(rows), np.nan)
+        ),
     )
     moved[rows] = np.abs((x[rows] - start[rows]) / scale[rows]).max(axis=1)
     return result, moved
@@ -271,7 +274,7 @@ def find_cycles(
 
 def attracting_cycles(
     map_: Stroboscope, state: np.ndarray, window: float, near: float
-) -> tuple[OrbitBatch, np.ndarray, np.ndarray]:
+) -> tuple[ClosedMotions, np.ndarray, np.ndarray]:
     """The limit cycles of trajectories that nearly return.
 
     Parameters
@@ -288,7 +291,7 @@ def attracting_cycles(
 
     Returns
     -------
-    cycles : OrbitBatch
+    cycles : ClosedMotions
         What Newton's method found.
     beside : bool[k]
         Which attract, and lie beside their trajectory.
@@ -312,40 +315,14 @@ def _newton(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """States float64[k, D] and periods float64[k] [s] that solve phi_T(x) = x, and where the
     iteration converged, bool[k].
-
-    The last unknown is the time in units of the first guess. The last equation keeps each step
-    across the flow.
     """
-    size = start.shape[1]
-
-    def equations(z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        mine, x, unit, times = map_.rows(rows), z[:, :size], scale[rows], time[rows, None]
-        end, matrix = mine.with_period(z[:, size] * time[rows]).tangent(x, 1)
-        residual, derivative = (
-            np.zeros((len(rows), size + 1)),
-            np.zeros((len(rows), size + 1, size + 1)),
-        )
-        residual[:, :size] = (end - x) / unit
-        derivative[:, :size, :size] = matrix * unit[:, None, :] / unit[:, :, None] - np.eye(size)
-        derivative[:, :size, size] = field_of(mine.system, end, mine.values) / unit * times
-        derivative[:, size, :size] = field_of(mine.system, x, mine.values) / unit * times
-        return residual, derivative
-
-    guess, units = (
-        np.concatenate([part, np.ones((len(start), 1))], axis=1) for part in (start, scale)
-    )
-    guess[~np.isfinite(time)] = np.nan
-    z, found = newton(
-        equations,
-        guess,
-        units,
-        CONVERGED if map_.exact else map_.noise_of(scale),
-        farthest=FARTHEST,
-    )
-    return z[:, :size], z[:, size] * time, found
+    guess = Shooting(map_, np.arange(len(start)), start[:, None], scale, time=time)
+    enough = CONVERGED if map_.exact else map_.noise_of(scale)
+    zeros = newton(guess, guess.unknowns, guess.units, enough=enough, farthest=FARTHEST)
+    return zeros.z[:, :-1], zeros.z[:, -1], zeros.found
 
 
-def least_period(
+def least_part(
     map_: Stroboscope, x: np.ndarray, period: np.ndarray, scale: np.ndarray
 ) -> np.ndarray:
     """The smallest part of each period after which the motion is back already."""
@@ -390,7 +367,13 @@ def _multipliers(map_: Stroboscope, x: np.ndarray) -> np.ndarray:
     size = x.shape[1]
     result = np.full((len(x), size), np.nan + 0j)
     for i, (matrix, rate) in enumerate(zip(matrices, rates, strict=True)):
-        if not (np.isfinite(matrix).all() and np.isfinite(rate).all() and rate.any()):
-            continue
-        result[i] = np.append(1.0, leading_first(across(matrix, rate)[None])[0])
+        if np.isfinite(matrix).all() and np.isfinite(rate).all() and rate.any():
+            result[i] = with_trivial(matrix[None], rate[None])
     return result
+
+
+def with_trivial(segments: np.ndarray, flows: np.ndarray) -> np.ndarray:
+    """1, and the multipliers of a limit cycle across the flow, the largest first, complex128[D];
+    see :func:`saltus.analysis.solve.floquet.nontrivial`.
+    """
+    return np.append(1.0, nontrivial(segments, flows))[: segments.shape[1]]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.closed.all_equilibria import Rest, all_equilibria
+from saltus.analysis.closed.all_equilibria import Equilibrium, all_equilibria
 from saltus.analysis.closed.field_zeros import autonomous
 from saltus.analysis.dataset_parts import gap_unit
 from saltus.analysis.inputs.box import box_ranges, draw
@@ -40,10 +40,21 @@ def equilibria(
     """All equilibria of a system without forcing: in each region, on boundaries, and held by
     contacts; stable ones and unstable ones.
 
-    In every mode - a side of each boundary, and which contacts are held - Newton's method looks for
-    zeros of the field from many starts, those that are known deflated; in a mode whose equations
-    are linear one start finds what there is. A zero counts if the mode holds there. Nothing is
-    integrated.
+    1. Every mode is taken in turn: a side of each boundary, and the contacts that are held. In a
+       mode the equations are smooth.
+    2. In each mode Newton's method looks for zeros of the field from all starts; linear equations
+       need only one. Of a held contact the constraint vanishes too, so steps are least-squares
+       steps.
+    3. It is started again with the known zeros deflated, also from beside them, until nothing new
+       is found: many starts lead to one zero, and hide the others.
+    4. A zero counts if its mode holds there: the gaps have their sides, and held contacts stay
+       held. Other zeros are virtual.
+    5. The eigenvalues of the linear part along the boundaries that hold it give kind and stability.
+       On a boundary itself linear parts decide nothing: ``undecided``.
+    6. Where contacts leave a state free (a block that is stuck), the equilibria form a continuum;
+       the ends of an interval are where a contact is released.
+
+    Nothing is integrated.
 
     Parameters
     ----------
@@ -96,11 +107,16 @@ def equilibria(
     check_system(system)
     if not autonomous(system):
         raise ParameterError(
-            f"{system.name} depends on time, so it has no equilibria. Ask sl.attractors for its "
-            f"periodic responses; or write it without the forcing."
+            lambda say: (
+                f"{system.name} depends on time, so it has no equilibria. Ask "
+                f"{say.verb('attractors')} for its periodic responses; or write it without the "
+                "forcing."
+            )
         )
     if start is not None and (box or at is not None):
-        raise ParameterError("give start= or ranges of a box, and only one of them.")
+        raise ParameterError(
+            lambda say: f"give {say.key('start')} or ranges of a box, and only one of them."
+        )
     begin, scale = _starts(system, start, whole(starts, "starts", 1, MOST_STARTS), at, box)
     found = all_equilibria(system, begin, scale)
     attrs = attributes(
@@ -135,7 +151,7 @@ def _starts(
     return begin, np.where(wide > 0, wide, 1.0)
 
 
-def _columns(system: System, found: list[Rest]) -> dict[str, Any]:
+def _columns(system: System, found: list[Equilibrium]) -> dict[str, Any]:
     """The variables of the result."""
     size, names = len(system.states), [guard.name for guard in system.guards]
     own = np.array([one.eigenvalues for one in found], complex).reshape(-1, size)

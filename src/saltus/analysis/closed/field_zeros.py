@@ -9,14 +9,13 @@ points, not a proof. Khalil, Nonlinear Systems (2002), chapter 4.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 from scipy.linalg import solve_continuous_lyapunov
 
 from saltus.analysis.closed.capture import RADII, SAFETY, sphere
-from saltus.analysis.closed.orbits import OrbitBatch
+from saltus.analysis.closed.motions import ClosedMotions
 from saltus.analysis.solve.newton import newton
 from saltus.flow.maps import Stroboscope
 from saltus.language.evaluate import evaluate
@@ -44,49 +43,6 @@ def autonomous(system: System) -> bool:
     return system.forced_at is None and not any(
         depends_on(entry, ("time",)) for entry in everything
     )
-
-
-@dataclass
-class Equilibria:
-    """What Newton's method found from k states; NaN where it found nothing.
-
-    Attributes
-    ----------
-    place : float64[k, D]
-        Where the field vanishes.
-    eigenvalues : complex128[k, D]
-        Of the Jacobian there [1/s], the largest real part first.
-    reach : float64[k, D, D]
-        W with |W (x - place)| <= 1 where it is known to capture; NaN where it isn't stable.
-    """
-
-    place: np.ndarray
-    eigenvalues: np.ndarray
-    reach: np.ndarray
-
-    @property
-    def stable(self) -> np.ndarray:
-        """Which attract, bool[k]."""
-        stable: np.ndarray = np.isfinite(self.reach).all(axis=(1, 2))
-        return stable
-
-    @property
-    def orbits(self) -> OrbitBatch:
-        """They as orbits of one point and of time 0."""
-        found = np.isfinite(self.place).all(axis=1)
-        result = OrbitBatch.none(*self.place.shape)
-        result.period[found], result.time[found] = 1, 0.0
-        result.points[:, 0], result.multipliers[:] = self.place, self.eigenvalues
-        return result
-
-    def holds(self, states: np.ndarray) -> np.ndarray:
-        """Which of states float64[k, D] lie where their equilibrium captures, bool[k]."""
-        with np.errstate(invalid="ignore"):
-            inside: np.ndarray = (
-                np.linalg.norm(np.einsum("kij,kj->ki", self.reach, states - self.place), axis=1)
-                <= 1.0
-            )
-            return inside
 
 
 def field_of(system: System, states: np.ndarray, values: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -152,15 +108,11 @@ def _evaluated(
     )
 
 
-def find_equilibria(
-    map_: Stroboscope, start: np.ndarray, scale: np.ndarray, captures: bool = True
-) -> Equilibria:
-    """The equilibria near states float64[k, D] at the parameter values of each row; float64[k, D]
-    is the range of each state.
-
-    ``captures``: whether to ask where they capture.
+def find_equilibria(map_: Stroboscope, start: np.ndarray, scale: np.ndarray) -> ClosedMotions:
+    """The equilibria near states float64[k, D] at the parameter values of each row, each a motion
+    of one point and of time 0; float64[k, D] is the range of each state.
     """
-    system, values = map_.system, map_.values
+    system, values, result = map_.system, map_.values, ClosedMotions.none(*start.shape)
     scale = np.maximum(scale, DECAYED)
 
     def equations(x: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -168,22 +120,37 @@ def find_equilibria(
         derivative = jacobian_of(system, x, mine) * unit[:, None, :] / unit[:, :, None]
         return field_of(system, x, mine) / unit, derivative
 
-    x, found = newton(equations, start, scale, longest_step=FARTHEST_STEP)
-    place = np.where(found[:, None], x, np.nan)
-    eigenvalues = np.full(x.shape, np.nan + 0j)
-    reach = np.full((*x.shape, x.shape[1]), np.nan)
-    rows = np.flatnonzero(found)
-    for i, matrix in zip(
-        rows, jacobian_of(system, x[rows], {n: v[rows] for n, v in values.items()}), strict=True
-    ):
+    zeros = newton(equations, start, scale, longest_step=FARTHEST_STEP)
+    found = zeros.found
+    result.period[found], result.time[found], result.points[found, 0] = 1, 0.0, zeros.z[found]
+    for i, matrix in _jacobians(map_, result):
+        own = np.linalg.eigvals(matrix)
+        result.multipliers[i] = own[np.lexsort((-own.imag, -own.real))]
+    return result
+
+
+def _jacobians(map_: Stroboscope, rests: ClosedMotions) -> Iterator[tuple[int, np.ndarray]]:
+    """The Jacobian at each equilibrium where it is known, and its row."""
+    rows = np.flatnonzero(rests.period)
+    matrices = jacobian_of(map_.system, rests.points[rows, 0], map_.rows(rows).values)
+    for row, matrix in zip(rows.tolist(), matrices, strict=True):
         if np.isfinite(matrix).all():
-            own = np.linalg.eigvals(matrix)
-            eigenvalues[i] = own[np.lexsort((-own.imag, -own.real))]
-            if captures and eigenvalues[i, 0].real < -MARGINAL * np.linalg.norm(matrix, 2):
-                reach[i] = _reach(
-                    system, {n: v[[i]] for n, v in values.items()}, x[i], matrix, scale[i]
-                )
-    return Equilibria(place, eigenvalues, reach)
+            yield row, matrix
+
+
+def captured(
+    map_: Stroboscope, rests: ClosedMotions, state: np.ndarray, scale: np.ndarray
+) -> np.ndarray:
+    """Which states float64[k, D] lie where their equilibrium is known to capture, bool[k];
+    float64[k, D] is the range of each state.
+    """
+    result, scale = np.zeros(len(state), bool), np.maximum(scale, DECAYED)
+    for i, matrix in _jacobians(map_, rests):
+        if rests.multipliers[i, 0].real < -MARGINAL * np.linalg.norm(matrix, 2):
+            values, place = map_.rows(np.array([i])).values, rests.points[i, 0]
+            reach = _reach(map_.system, values, place, matrix, scale[i])
+            result[i] = np.linalg.norm(reach @ (state[i] - place)) <= 1.0
+    return result
 
 
 def _reach(

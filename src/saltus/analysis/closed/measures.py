@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
@@ -94,6 +95,16 @@ class Measures:
             "peak_to_peak": self.maximum - self.minimum,
             "mean": self.mean, "rms": self.rms, "rms_about_mean": self.deviation,
             "amplitude": np.abs(self.harmonic), "phase": np.angle(self.harmonic),
+        }  # fmt: skip
+
+    def columns(self, period: np.ndarray) -> dict[str, Any]:
+        """What an :class:`saltus.results.AttractorTable` says of the first state and of contacts:
+        of those in a whole period int64[m], in one forcing period where it is 0.
+        """
+        return {
+            "period": period, "contacts": self.contacts * np.maximum(period, 1),
+            "itinerary": self.itinerary, "peak": self.peak[:, 0], "rms": self.rms[:, 0],
+            "margin": self.margin,
         }  # fmt: skip
 
     def rows(self, which: slice) -> Measures:

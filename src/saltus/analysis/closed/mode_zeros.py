@@ -3,7 +3,7 @@ method from many starts, with deflation.
 
 Of a held contact the constraint vanishes too, so there are more equations than unknowns, and where
 the field leaves a state free (a block that is stuck) a continuum of zeros: steps are least-squares
-steps. Deflation: Farrell, Birkisson & Funke, SIAM J. Sci. Comput. 37 (2015) A2026-A2045.
+steps.
 """
 
 from __future__ import annotations
@@ -110,16 +110,13 @@ class Piece:
         """
 
         def equations(x: np.ndarray, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            residual, derivative = self._equilibrated(entries, slopes, x)
-            for one in known:
-                residual, derivative = _deflated(residual, derivative, (x - one) / self.scale)
-            return residual, derivative
+            return self._equilibrated(entries, slopes, x)
 
-        x, arrived = newton(
+        zeros = newton(
             equations, start, np.broadcast_to(self.scale, start.shape), longest_step=LONGEST_STEP,
-            least_squares=True,
+            least_squares=True, known=np.array(known) if len(known) else None,
         )  # fmt: skip
-        x = x[arrived]
+        x = zeros.z[zeros.found]
         residual, derivative = self._equilibrated(entries, slopes, x)
         with np.errstate(invalid="ignore", over="ignore"):
             reach = 1.0 + np.abs(x / self.scale)
@@ -218,17 +215,6 @@ class Piece:
             for number, guard in enumerate(self.system.guards)
             if not is_hold(guard) and number not in self.held
         ]
-
-
-def _deflated(
-    residual: np.ndarray, derivative: np.ndarray, away: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Equations times 1 + 1/|away|^2: a zero at distance 0 is none any more."""
-    near = np.einsum("ki,ki->k", away, away)
-    with np.errstate(all="ignore"):
-        factor, slope = 1.0 + 1.0 / near, -2.0 * away / near[:, None] ** 2
-        derivative = factor[:, None, None] * derivative + residual[:, :, None] * slope[:, None, :]
-        return factor[:, None] * residual, derivative
 
 
 def near(a: np.ndarray, b: np.ndarray, scale: np.ndarray) -> bool:

@@ -2,84 +2,49 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from saltus.analysis.closed.all_cycles import Cycle
 from saltus.analysis.closed.cycles import ASIDE
 from saltus.analysis.closed.measures import measure
-from saltus.analysis.closed.orbits import Orbit
+from saltus.analysis.closed.motions import ClosedMotion
 from saltus.analysis.solve.tolerances import MARGINAL
 from saltus.flow.maps import Stroboscope
 from saltus.results import AttractorTable
-from saltus.results.dataset.kinds import Kind
 from saltus.results.dataset.orbits import OrbitTable
 
 
-def table_of(map_: Stroboscope, orbits: list[Orbit], found: list[int]) -> OrbitTable:
-    """The table of orbits of a forced flow with one row of values, and how many starts led to
-    each.
+def table_of(
+    map_: Stroboscope, motions: Sequence[ClosedMotion], found: Sequence[int]
+) -> OrbitTable:
+    """The table of the orbits of a forced flow, or of the limit cycles of another one, with one row
+    of values, and how many starts led to each.
     """
-    size, count = len(map_.states), len(orbits)
-    period = np.array([orbit.period for orbit in orbits], np.int64)
-    multipliers = np.array([orbit.multipliers for orbit in orbits]).reshape(-1, size)
-    start = np.array([orbit.points[0] for orbit in orbits]).reshape(-1, size)
-    numbers = measure(map_.rows(np.zeros(count, np.int64)), start, period)
+    size, count, forced = len(map_.states), len(motions), map_.system.forced_at is not None
+    rows, aside = map_.rows(np.zeros(count, np.int64)), 0 if forced else ASIDE
+    time = np.array([one.time for one in motions])
+    period = np.array([one.period if forced else 1 for one in motions], np.int64)
+    start = np.array([one.points[aside] for one in motions]).reshape(-1, size)
+    multipliers = [one.transverse for one in motions]
+    numbers = measure(rows if forced else rows.with_period(time), start, period)
+    per_second = 1.0 / float(map_.period[0]) if forced else 1.0
     whole = AttractorTable(
-        kind=[Kind.PERIODIC.word] * count,
-        period=period,
-        contacts=numbers.contacts * period,
-        itinerary=numbers.itinerary,
-        peak=numbers.peak[:, 0],
-        rms=numbers.rms[:, 0],
-        margin=numbers.margin,
-        multipliers=multipliers,
-        exponent=1.0 / float(map_.period[0]) * np.array([orbit.exponent for orbit in orbits]),
+        **numbers.columns(period if forced else 0 * period),
+        kind=[one.kind for one in motions],
+        multipliers=np.array(multipliers, complex).reshape(count, size - (not forced and size > 1)),
+        exponent=per_second * np.array([one.exponent for one in motions]),
         exponent_error=np.zeros(count),
-        points=[orbit.points for orbit in orbits],
+        points=[one.points for one in motions],
+        cycle=None if forced else time,
+        eigenvalues=None if forced else np.full((count, size), np.nan + 0j),
     )
     return OrbitTable(
         whole,
         [stability_of(one) for one in multipliers],
         np.array([outside(one) for one in multipliers], np.int64),
         np.array(found, np.int64),
-        np.array([orbit.mismatch for orbit in orbits]),
-    )
-
-
-def table_of_cycles(map_: Stroboscope, cycles: list[Cycle], found: list[int]) -> OrbitTable:
-    """The table of limit cycles of a flow with one row of values, and how many starts led to
-    each.
-    """
-    size, count = len(map_.states), len(cycles)
-    time = np.array([one.time for one in cycles])
-    leading = np.array([abs(one.multipliers[0]) for one in cycles])
-    multipliers = np.array([one.multipliers for one in cycles]).reshape(count, -1 if count else 0)
-    start = np.array([one.points[ASIDE] for one in cycles]).reshape(-1, size)
-    rows = map_.rows(np.zeros(count, np.int64)).with_period(time)
-    numbers = measure(rows, start, np.ones(count, np.int64))
-    with np.errstate(divide="ignore"):
-        exponent = np.maximum(np.log(leading) / time, 0.0)
-    whole = AttractorTable(
-        kind=[Kind.LIMIT_CYCLE.word] * count,
-        period=np.zeros(count, np.int64),
-        contacts=numbers.contacts,
-        itinerary=numbers.itinerary,
-        peak=numbers.peak[:, 0],
-        rms=numbers.rms[:, 0],
-        margin=numbers.margin,
-        multipliers=multipliers,
-        exponent=exponent,
-        exponent_error=np.zeros(count),
-        points=[one.points for one in cycles],
-        cycle=time,
-        eigenvalues=np.full((count, size), np.nan + 0j),
-    )
-    return OrbitTable(
-        whole,
-        [stability_of(one) for one in multipliers],
-        np.array([outside(one) for one in multipliers], np.int64),
-        np.array(found, np.int64),
-        np.array([one.mismatch for one in cycles]),
+        np.array([one.mismatch for one in motions]),
     )
 
 

@@ -11,9 +11,10 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.closed.all_cycles import all_cycles
-from saltus.analysis.closed.all_orbits import AGES, Search, all_orbits
+from saltus.analysis.closed.all_orbits import all_orbits
 from saltus.analysis.closed.field_zeros import autonomous
-from saltus.analysis.closed.orbit_table import table_of, table_of_cycles
+from saltus.analysis.closed.orbit_table import table_of
+from saltus.analysis.closed.search import AGES, Search
 from saltus.analysis.closed.spread import spread
 from saltus.analysis.closed.turns import looks_every
 from saltus.analysis.dataset_parts import provenance, subject
@@ -56,17 +57,22 @@ def periodic_orbits(
     """The periodic orbits of a system, stable and unstable: of a forced one those with periods up
     to a number of forcing periods, of one without forcing its limit cycles.
 
-    Newton's method is started from many states, for each period at once in all of them, with the
-    points of an orbit at whole forcing periods as unknowns (multiple shooting), steps that are
-    shortened until they help, and derivatives of the exact tangent flow. Then it is started again
-    with the orbits that are known deflated: their zeros are divided out, so that only others can be
-    found; also from beside known orbits, where a fold leaves the second of a pair. No search of
-    this kind finds every orbit for sure. What is said of those that it missed: ``search_unseen``.
-
-    Without forcing, the period is one more unknown. Close returns of the motions from the starts,
-    at once and after some turns, are first guesses of a state and a period: a motion on a chaotic
-    set passes near its unstable cycles. A cycle is one whatever its phase, for deflation too.
-    Cycles that lie side by side in families, as where energy is conserved, aren't found.
+    1. Starts are followed for none or some periods before Newton's method begins, in rotation: none
+       finds repelling orbits, some periods reach a chaotic set and the orbits in it.
+    2. For each period Newton's method is started from their next iterates, with the points of an
+       orbit at whole forcing periods as unknowns (multiple shooting: errors grow over one forcing
+       period only). Steps are shortened until they help; derivatives are those of the exact tangent
+       flow.
+    3. Orbits are reduced to their least period, and each is listed once.
+    4. Newton's method is started again with the known orbits deflated: their zeros are divided out,
+       so that only others can be found. Starts beside known orbits find the second of a pair that a
+       fold has made.
+    5. No search of this kind finds every orbit for sure. From the orbits that only one start led
+       to, ``search_unseen`` estimates the share of those that were missed.
+    6. Without forcing, the period is one more unknown. Close returns of the motions give first
+       guesses of a state and a period, as a motion on a chaotic set passes near its unstable
+       cycles. A cycle is the same whatever its phase, for deflation too. Cycles that lie side by
+       side in families, as where energy is conserved, aren't found.
 
     Parameters
     ----------
@@ -156,20 +162,22 @@ def periodic_orbits(
         looks = Stroboscope(system, method, every=turn, threads=threads)
         with reporting(progress) as show:
             cycles = all_cycles(looks, states, limits, guess or turn, show)
-            table = table_of_cycles(looks, cycles.cycles, cycles.found)
+            table = table_of(looks, cycles.motions, cycles.found)
         attrs |= {"shortest_period": limits[0], "longest_period": limits[1]}
-        return orbits_dataset(system, attrs, table, searches([cycles.search]))
+        return orbits_dataset(system, attrs, table, searches(cycles.searches))
     if period is not None:
         raise ParameterError(
-            f"{system.name} is forced: its orbits last whole forcing periods. Give periods=, the "
-            f"longest of them, in place of period=."
+            lambda say: (
+                f"{system.name} is forced: its orbits last whole forcing periods. Give "
+                f"{say.key('periods')}, the longest of them, in place of {say.key('period')}."
+            )
         )
     map_ = Stroboscope(system, _with_budget(method, 1), threads=threads)
     before = map_.by(_with_budget(method, AGES[-1] + periods))
     scale = spread(before, states)
     with reporting(progress) as show:
         found = all_orbits(map_, states, periods, scale, show, before)
-        table = table_of(map_, found.orbits, found.found)
+        table = table_of(map_, found.motions, found.found)
     return orbits_dataset(system, attrs | {"periods": periods}, table, searches(found.searches))
 
 
@@ -177,8 +185,10 @@ def _turn(system: System, states: np.ndarray) -> float:
     """About a turn of the motions of a system without forcing [s]."""
     if not autonomous(system):
         raise ParameterError(
-            f"{system.name} depends on time, without a forcing period: none of its motions need "
-            f"repeat. Name the parameter that forces it: forced_at=."
+            lambda say: (
+                f"{system.name} depends on time, without a forcing period: none of its "
+                f"motions need repeat. Name the parameter that forces it: {say.key('forced_at')}."
+            )
         )
     every = looks_every(system, None, states)
     assert every is not None
@@ -193,8 +203,10 @@ def _range(period: Any, default: tuple[float, float]) -> tuple[tuple[float, floa
     ends = [to_si(one, "s", "period") for one in (period if pair else (period,))]
     if not (np.isfinite(ends).all() and ends[-1] > 0 and (not pair or 0 <= ends[0] < ends[1])):
         raise ParameterError(
-            f"period must be a positive time or an ascending range of them, such as "
-            f'period=("1 s", "5 s"), not {shown(period)}.'
+            lambda say: (
+                "period must be a positive time or an ascending range of them, such as "
+                f"{say.key(period=('1 s', '5 s'))}, not {shown(period)}."
+            )
         )
     if pair:
         return (ends[0], ends[1]), None
@@ -206,8 +218,10 @@ def exact_method(method: Method | None) -> Method:
     method = check_method(method)
     if not method.exact:
         raise ParameterError(
-            f"errors of {method.name} keep unstable orbits from closing. Leave method= out: Taylor "
-            f"integrates to rounding."
+            lambda say: (
+                f"errors of {method.name} keep unstable orbits from closing. Leave "
+                f"{say.key('method')} out: Taylor integrates to rounding."
+            )
         )
     return method
 
@@ -231,7 +245,9 @@ def _with_budget(method: Method, iterates: float) -> Method:
 def _given(system: System, start: Any, box: Any) -> np.ndarray:
     """The starts that were given, float64[k, D]."""
     if box is not None:
-        raise ParameterError('box= is for random starts: start="random 1000".')
+        raise ParameterError(
+            lambda say: f"{say.key('box')} is for random starts: {say.key(start='random 1000')}."
+        )
     return ensemble(system, start, None).start
 
 

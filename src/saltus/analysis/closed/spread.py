@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.analysis.closed.all_orbits import used_up
+from saltus.analysis.closed.search import used_up
 from saltus.flow.maps import Stroboscope
 from saltus.flow.request import Schedule
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from saltus.analysis.closed.cycles import directions
 from saltus.analysis.closed.field_zeros import autonomous, jacobian_of
-from saltus.errors import ParameterError, shown
-from saltus.flow.maps import FORCED, Stroboscope
+from saltus.errors import ParameterError, must_be
+from saltus.flow.maps import Stroboscope, forced
 from saltus.flow.taylor import Taylor
 from saltus.system import System
 from saltus.units import to_si
@@ -53,19 +53,22 @@ def looks_every(
     """
     if system.forced_at is not None:
         if every is not None:
-            raise ParameterError(f"{system.name} {FORCED}")
+            raise ParameterError(f"{system.name} ", forced)
         return None
     if every is None:
         if not autonomous(system):
             raise ParameterError(
-                f"{system.name} depends on time, but no parameter is named as the frequency of its "
-                f"forcing: name it by forced_at= in @sl.system. If the forcing repeats otherwise, "
-                f'give every=, its period, such as every="0.1 s".'
+                lambda say: (
+                    f"{system.name} depends on time, but no parameter is named as the frequency "
+                    f"of its forcing: name it by {say.key('forced_at')} in {say.system()}. If the "
+                    f"forcing repeats otherwise, give {say.key('every')}, its period, such as "
+                    f"{say.key(every='0.1 s')}."
+                )
             )
         return _turn(system, start, parameters)
     seconds = to_si(every, "s", "every")
     if not 0 < seconds < math.inf:
-        raise ParameterError(f"every must be a positive time, not {shown(every)}.")
+        raise must_be("every", "a positive time", every)
     return seconds
 
 

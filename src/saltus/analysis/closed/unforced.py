@@ -4,14 +4,12 @@ way for many trajectories at once.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from saltus.analysis.closed.cycles import attracting_cycles, find_cycles, returns
-from saltus.analysis.closed.field_zeros import find_equilibria
+from saltus.analysis.closed.field_zeros import captured, find_equilibria
 from saltus.analysis.closed.measures import Measures
-from saltus.analysis.closed.orbits import OrbitBatch
+from saltus.analysis.closed.motions import ClosedMotions
 from saltus.contact.guards import is_hold
 from saltus.flow.maps import Stroboscope
 from saltus.language.evaluate import evaluate
@@ -23,25 +21,9 @@ EIGHTHS, GROWN = 8, 3.0
 TORUS = 1e-2
 
 
-@dataclass
-class Attracted:
-    """What k trajectories have come to.
-
-    Attributes
-    ----------
-    orbits : OrbitBatch
-        Their equilibria (time 0) and limit cycles (time > 0); period 0 where there is none yet.
-    scale : float64[k, D]
-        Range of each state on the limit cycle; of an equilibrium that which was given.
-    """
-
-    orbits: OrbitBatch
-    scale: np.ndarray
-
-
 def attracted(
     map_: Stroboscope, state: np.ndarray, scale: np.ndarray, window: float, near: float
-) -> Attracted:
+) -> tuple[ClosedMotions, np.ndarray]:
     """Which trajectories have come to an equilibrium that captures where they are, or to an
     attracting limit cycle.
 
@@ -57,19 +39,25 @@ def attracted(
         Time over which a return is looked for first [s].
     near : float
         Distance of a return, in units of the scale, that is worth a try by Newton's method.
+
+    Returns
+    -------
+    motions : ClosedMotions
+        Their equilibria and limit cycles; period 0 where there is none yet.
+    scale : float64[k, D]
+        Range of each state on the limit cycle; of an equilibrium that which was given.
     """
-    result = Attracted(OrbitBatch.none(len(state), state.shape[1]), scale.copy())
-    rest = find_equilibria(map_, state, scale)
-    here = np.flatnonzero(rest.stable & rest.holds(state))
-    result.orbits.put(here, rest.orbits.rows(here))
-    result.scale[here] = np.maximum(scale[here], np.abs(rest.place[here]))
-    rows = np.flatnonzero(result.orbits.period == 0)
-    if not len(rows):
-        return result
-    cycles, beside, own = attracting_cycles(map_.rows(rows), state[rows], window, near)
-    result.orbits.put(rows[beside], cycles.rows(beside))
-    result.scale[rows[beside]] = own[beside]
-    return result
+    result, size = ClosedMotions.none(*state.shape), scale.copy()
+    rests = find_equilibria(map_, state, scale)
+    here = np.flatnonzero(captured(map_, rests, state, scale))
+    result.put(here, rests.rows(here))
+    size[here] = np.maximum(scale[here], np.abs(rests.points[here, 0]))
+    rows = np.flatnonzero(result.period == 0)
+    if len(rows):
+        cycles, beside, own = attracting_cycles(map_.rows(rows), state[rows], window, near)
+        result.put(rows[beside], cycles.rows(beside))
+        size[rows[beside]] = own[beside]
+    return result, size
 
 
 def nearly_recurs(map_: Stroboscope, state: np.ndarray, window: float) -> np.ndarray:
@@ -124,12 +112,12 @@ def multipliers_and_eigenvalues(
 
 def close_again(
     map_: Stroboscope, start: np.ndarray, time: np.ndarray, scale: np.ndarray
-) -> OrbitBatch:
+) -> ClosedMotions:
     """Equilibria (time 0) and limit cycles (their period) from those at other parameter values."""
-    result = OrbitBatch.none(len(start), start.shape[1])
+    result = ClosedMotions.none(len(start), start.shape[1])
     rests, turns = np.flatnonzero(time == 0), np.flatnonzero(time > 0)
     if len(rests):
-        result.put(rests, find_equilibria(map_.rows(rests), start[rests], scale[rests]).orbits)
+        result.put(rests, find_equilibria(map_.rows(rests), start[rests], scale[rests]))
     if len(turns):
         result.put(turns, find_cycles(map_.rows(turns), start[turns], time[turns], scale[turns])[0])
     return result

@@ -1,1 +1,1 @@
-"""What every verb takes in: starts, boxes, values along an axis, outputs, arguments."""
+"""Inputs that the verbs share: starts, boxes, values along an axis, outputs, arguments."""

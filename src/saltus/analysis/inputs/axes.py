@@ -1,25 +1,30 @@
-"""Values along an axis, from what users write: a tuple is a range, a list or array holds the
-values. One rule for all verbs.
+"""Values along an axis from a user's argument: a tuple is a range, a list or array holds the
+values. All verbs share this rule.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
-from saltus.errors import ParameterError, among, nearest, shown
+from saltus.errors import ParameterError, among, shown, unknown
 from saltus.flow.counts import MOST, whole
 
-#: Values along a range, by what users write for the scale.
+#: Spacings of a range, by name.
 SCALES = ("linear", "log")
-#: Values along one axis beyond which a range is refused before it fills memory.
+#: Most values along one axis; a longer range is refused before it fills memory.
 MOST_VALUES = 100_000_000
 
 
 def along(
-    name: str, given: Any, number: Callable[[Any], float], what: str, example: str, least: int = 1
+    name: str,
+    given: Any,
+    number: Callable[[Any], float],
+    what: str,
+    example: Mapping[str, Any],
+    least: int = 1,
 ) -> np.ndarray:
     """Values along an axis [SI], in the order in which they are written.
 
@@ -33,9 +38,9 @@ def along(
     number : callable
         One value [SI] from a number or a text with a unit.
     what : str
-        What the values are, for messages: ``"values"``, ``"starts"``.
-    example : str
-        A range as one would write it.
+        Words for the values in messages: ``"values"``, ``"starts"``.
+    example : mapping
+        An argument, and a range as one would write it.
     least : int
         Least number of values of a range.
 
@@ -49,14 +54,16 @@ def along(
         return _listed(name, given, number, what, example)
     if len(given) not in (3, 4):
         raise ParameterError(
-            f"{name} = {shown(given)} must be a range (first, last, number of {what}), such as "
-            f"{example}. A tuple is a range; "
-            f"a list holds the {what} themselves: {shown(list(given))}."
+            lambda say: (
+                f"{name} = {shown(given)} must be a range (first, last, number of {what}), "
+                f"such as {say.key(**example)}. A tuple is a range; a list holds the {what} "
+                f"themselves: {shown(list(given))}."
+            )
         )
     first, last, count, *rest = given
     scale = rest[0] if rest else "linear"
     if not among(scale, SCALES):
-        raise ParameterError(f"the scale of {name} is {shown(scale)}. {nearest(scale, SCALES)}")
+        raise unknown(f"the scale of {name} is", scale, SCALES)
     count = whole(count, f"the number of {what} along {name}", least)
     if count > MOST_VALUES:
         raise ParameterError(
@@ -71,8 +78,8 @@ def along(
 
 
 def count_along(given: Any) -> int:
-    """How many values :func:`along` makes of what users write, before it makes them: what they take
-    is counted first. 1 of a single value, and of what it refuses.
+    """Number of values that :func:`along` makes of an argument, counted before they are made. 1 for
+    a single value, and for arguments that it refuses.
     """
     if isinstance(given, tuple):
         count = given[2] if len(given) in (3, 4) else 1
@@ -82,8 +89,8 @@ def count_along(given: Any) -> int:
 
 
 def axes_of(given: Any) -> int:
-    """Number of axes of lists or an array; -1 for lists of unequal length, and for what can't be
-    made an array.
+    """Number of axes of lists or an array; -1 for lists of unequal length, and for anything that
+    can't become an array.
     """
     try:
         return np.ndim(given)
@@ -92,7 +99,7 @@ def axes_of(given: Any) -> int:
 
 
 def _listed(
-    name: str, given: Any, number: Callable[[Any], float], what: str, example: str
+    name: str, given: Any, number: Callable[[Any], float], what: str, example: Mapping[str, Any]
 ) -> np.ndarray:
     """The values of a list or array, each a number or a text with a unit."""
     if (
@@ -101,8 +108,10 @@ def _listed(
         or axes_of(given) != 1
     ):
         raise ParameterError(
-            f"{name} = {shown(given)} must be a range (first, last, number of {what}), such as "
-            f"{example}, or a list or array of {what}."
+            lambda say: (
+                f"{name} = {shown(given)} must be a range (first, last, number of {what}), "
+                f"such as {say.key(**example)}, or a list or array of {what}."
+            )
         )
     values = np.asarray(given)
     if values.dtype.kind in "fiu":
@@ -113,7 +122,7 @@ def _listed(
                 f"{name} is {values[where[0]]} at index {where[0]}. Give finite {what}."
             )
         for value in (values.min(), values.max()) if len(values) else ():
-            number(float(value))  # what the name allows is checked there
+            number(float(value))  # checks the limits that the name implies
         return values
     items = list(given)
     if (

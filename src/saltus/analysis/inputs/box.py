@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.errors import ParameterError, shown
+from saltus.errors import ParameterError, must_be, shown
 from saltus.system import System
 from saltus.units import to_si
 
@@ -20,9 +20,8 @@ def box_ranges(system: System, box: Mapping[str, Any]) -> dict[str, tuple[float,
             low, high = given
         except (TypeError, ValueError):
             unit = system.units[name]
-            raise ParameterError(
-                f'{name} must be (low, high), such as {name}=("-1 {unit}", "1 {unit}"), not '
-                f"{shown(given)}."
+            raise must_be(
+                name, f'(low, high), such as {name}=("-1 {unit}", "1 {unit}")', given
             ) from None
         low, high = (to_si(value, system.units[name], name) for value in (low, high))
         if not low < high:
@@ -37,7 +36,7 @@ def box_ranges(system: System, box: Mapping[str, Any]) -> dict[str, tuple[float,
 
 
 def draw(ranges: Mapping[str, tuple[float, float]], unit: np.ndarray) -> dict[str, np.ndarray]:
-    """Starts of the states that have a range, from numbers in [0, 1), one column for each."""
+    """Starts of the states that have a range, from numbers in [0, 1), one column for each state."""
     return {
         name: low + (high - low) * column
         for (name, (low, high)), column in zip(ranges.items(), unit.T, strict=True)

@@ -1,6 +1,7 @@
 """Quasi-random points: the sequence of Halton.
 
-scipy.stats has it too, but takes longer to import (0.7 s) than many a map to scout.
+scipy.stats has it too, but its import (0.7 s) takes longer than the search for attractors of many a
+map.
 """
 
 from __future__ import annotations

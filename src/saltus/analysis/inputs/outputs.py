@@ -1,5 +1,5 @@
-"""Outputs: what engineers read off a motion besides its states - a force, an acceleration, the
-motion of a base.
+"""Outputs: functions of a motion besides its states, such as a force, an acceleration or the motion
+of a base.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Outputs:
     formulas : tuple of Expr
         Of the functions; conditions hold bits.
     guards : tuple of Guard
-        What these bits number: those of the system, then those that only the functions need.
+        The guards of these bits: those of the system, then those that only the functions need.
     """
 
     names: tuple[str, ...]
@@ -43,12 +43,12 @@ class Outputs:
 
 
 def outputs_of(system: System, given: Mapping[str, Any] | None = None) -> Outputs:
-    """The outputs of a system: its states, then what the user asks for.
+    """The outputs of a system: its states, then the user's functions.
 
     Parameters
     ----------
     system : System
-        What moves.
+        The equations and values.
     given : mapping of str to callable, or to (callable, unit)
         Functions of (t, states, parameters), arguments found by name; see
         :func:`saltus.system.quantity.quantity`.
@@ -79,7 +79,7 @@ def outputs_of(system: System, given: Mapping[str, Any] | None = None) -> Output
 
 
 def _unit(system: System, formula: Expr, name: str, declared: str) -> str:
-    """The unit of an output: that which was declared, or what its formula comes to."""
+    """The unit of an output: the declared one, or that of its formula."""
     (found,) = units_of(system.states, system.units, system.field, [formula])
     if declared and found and dimension(found) != dimension(declared):
         raise UnitError(

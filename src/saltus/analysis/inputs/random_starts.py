@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from saltus.errors import ParameterError, UnitError, nearest, shown
+from saltus.errors import ParameterError, UnitError, must_be, nearest, shown, unknown
 from saltus.flow.counts import whole
 from saltus.flow.room import check_room
+from saltus.sentences import Given
 from saltus.system import System
 from saltus.units import to_si
 
@@ -43,15 +44,17 @@ def random_starts(
     count = random_count(start)
     if not count:
         raise ParameterError(
-            f"start={shown(start)} isn't known. "
-            f"{nearest(start, (*others, 'random 20'))} Or give states."
+            lambda say: (
+                f"{say.key(start=Given(start))} isn't known. "
+                f"{nearest(start, (*others, 'random 20'))} Or give states."
+            )
         )
     if not isinstance(box, Mapping) or not box:
-        example = ", ".join(
-            f'"{name}": ("-1 {system.units[name]}", "1 {system.units[name]}")'
-            for name in system.states[:2]
+        units = {name: system.units[name] for name in system.states[:2]}
+        example = {name: (f"-1 {unit}", f"1 {unit}") for name, unit in units.items()}
+        raise ParameterError(
+            lambda say: f"random starts need a box to be drawn from: {say.key(box=example)}."
         )
-        raise ParameterError(f"random starts need a box to be drawn from: box={{{example}}}.")
     check_room(16.0 * count * len(system.states), f"{count} random starts", "Draw fewer.")
     unit = np.random.default_rng(whole(seed, "seed", 0)).random((count, len(system.states)))
     starts = np.zeros((count, len(system.states)))
@@ -63,7 +66,7 @@ def random_starts(
 
 
 def random_count(start: str) -> int:
-    """How many starts ``"random 20"`` asks for; 0 of any other word."""
+    """Number of starts that ``"random 20"`` asks for; 0 for any other word."""
     word, _, number = start.partition(" ")
     return int(number) if word == "random" and _COUNT.fullmatch(number.strip()) else 0
 
@@ -71,17 +74,13 @@ def random_count(start: str) -> int:
 def _range(system: System, name: str, ends: Any) -> tuple[float, float]:
     """The range of a state [SI]."""
     if name not in system.states:
-        raise ParameterError(
-            f"{system.name} has no state {shown(name)}. {nearest(name, system.states)}"
-        )
+        raise unknown(f"{system.name} has no state", name, system.states)
     try:
         low, high = (to_si(end, system.units[name], name) for end in ends)
     except UnitError:
         raise
     except (TypeError, ValueError):
-        raise ParameterError(
-            f"the range of {name} must be (low, high), not {shown(ends)}."
-        ) from None
+        raise must_be(f"the range of {name}", "(low, high)", ends) from None
     if not (np.isfinite([low, high]).all() and low < high):
         raise ParameterError(f"the range of {name} must ascend and be finite, not {shown(ends)}.")
     return low, high

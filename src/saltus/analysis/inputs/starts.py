@@ -1,4 +1,4 @@
-"""What users write for starts, values and spans, turned into the arrays of a request."""
+"""Convert a user's starts, values and spans to the arrays of a request."""
 
 from __future__ import annotations
 
@@ -10,20 +10,23 @@ from typing import Any
 import numpy as np
 
 from saltus.analysis.inputs.axes import along, axes_of, count_along
-from saltus.errors import ParameterError, SaltusError, among, nearest, shown
+from saltus.errors import ParameterError, SaltusError, among, must_be, shown, unknown
 from saltus.flow.counts import whole
 from saltus.flow.request import Request, Schedule
 from saltus.flow.room import check_room
 from saltus.language import expression as ex
+from saltus.sentences import Word
 from saltus.system import System, check_values
 from saltus.units import to_si
 
-#: Trajectories that a single call may hold before their starts alone fill memory.
+#: Most trajectories of a single call: the starts of more would fill the memory.
 MOST_TRAJECTORIES = 100_000_000
-#: Memory of a trajectory of D states that keeps nothing but its end [bytes]: rows of the engine.
-TRAJECTORY, TRAJECTORY_OF_A_STATE = 200.0, 24.0
+#: Memory of a trajectory that keeps only its end [bytes].
+TRAJECTORY = 200.0
+#: Memory of each of its states [bytes].
+TRAJECTORY_OF_A_STATE = 24.0
 
-#: Different combinations of values whose periodicity is checked; each takes half a millisecond.
+#: Most combinations of values whose periodicity is checked; each takes half a millisecond.
 MOST_PERIOD_CHECKS = 2000
 
 
@@ -74,7 +77,11 @@ def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> En
     """
     check_system(system)
     if values is not None and not isinstance(values, Mapping):
-        raise ParameterError('values must be a mapping, such as values={"frequency": [5.0, 10.0]}.')
+        raise ParameterError(
+            lambda say: (
+                f"values must be a mapping, such as {say.key(values={'frequency': [5.0, 10.0]})}."
+            )
+        )
     _check_labels({**(start if isinstance(start, Mapping) else {}), **(values or {})})
     _check_count(system, trajectories(start, values))
     columns = _columns(system, start)
@@ -115,7 +122,7 @@ def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> En
 
 
 def trajectories(start: Any, values: Any) -> int:
-    """How many trajectories starts and values ask for, before any array of them is made."""
+    """Number of trajectories in given starts and values, counted before any array is made."""
     given = [*(start.values() if isinstance(start, Mapping) else ())]
     given += values.values() if isinstance(values, Mapping) else ()
     rows = 1 if isinstance(start, Mapping) or axes_of(start) != 2 else max(len(start), 1)
@@ -137,8 +144,8 @@ def _check_count(system: System, count: int) -> None:
 
 
 def _check_labels(given: Mapping[str, Any]) -> None:
-    """Columns of pandas or xarray are taken row by row, so their labels must be the same, in the
-    same order. Raises ParameterError.
+    """Raise a ParameterError for columns of pandas or xarray with different labels, or labels in
+    different order: columns are used row by row.
     """
     labelled = {
         name: labels for name, value in given.items() if (labels := _labels(value)) is not None
@@ -153,14 +160,14 @@ def _check_labels(given: Mapping[str, Any]) -> None:
 
 
 def _labels(value: Any) -> Any:
-    """The index of a Series, or of a DataArray with one dim; None where there is none."""
+    """The index of a Series, or of a DataArray with one dim; None for anything else."""
     if hasattr(value, "iloc"):
         return value.index
     return next(iter(value.indexes.values()), None) if hasattr(value, "indexes") else None
 
 
 def check_system(system: Any) -> None:
-    """Raises ParameterError for what isn't a System."""
+    """Raise a ParameterError for anything that isn't a System."""
     if isinstance(system, System):
         return
     name = getattr(system, "__name__", "")
@@ -181,8 +188,8 @@ def check_system(system: Any) -> None:
 def fill(
     system: System, columns: Mapping[str, np.ndarray], fixed: Mapping[str, float]
 ) -> np.ndarray:
-    """States float64[k, D] from float64[k] for some of them; the others are fixed, at zero if
-    nothing is said.
+    """States float64[k, D] from float64[k] for some of them; the others are fixed, by default at
+    zero.
     """
     count = len(next(iter(columns.values())))
     return np.stack(
@@ -192,7 +199,7 @@ def fill(
 
 
 def fixed_states(system: System, at: Any, moving: Iterable[str]) -> dict[str, float]:
-    """Starts [SI] of the states that don't move over a map or a box; default zero.
+    """Starts [SI] of the states that aren't varied in a map or a box; default zero.
 
     Raises
     ------
@@ -201,17 +208,18 @@ def fixed_states(system: System, at: Any, moving: Iterable[str]) -> dict[str, fl
         those isn't a state.
     """
     if at is not None and not isinstance(at, Mapping):
-        raise ParameterError(f"at must be a mapping of states to starts, not {shown(at)}.")
+        raise must_be("at", "a mapping of states to starts", at)
     given, moving = at or {}, list(moving)
     for name in (*moving, *given):
         if name not in system.states:
-            raise ParameterError(
-                f"{system.name} has no state {shown(name)}. {nearest(name, system.states)}"
-            )
+            raise unknown(f"{system.name} has no state", name, system.states)
     twice = [name for name in moving if name in given]
     if twice:
         raise ParameterError(
-            f"{twice[0]} has a range and stands in at= too. Leave it out of one of them."
+            lambda say: (
+                f"{twice[0]} has a range and stands in {say.key('at')} too. Leave it out "
+                "of one of them."
+            )
         )
     return {
         name: to_si(given.get(name, 0.0), system.units[name], name)
@@ -223,10 +231,10 @@ def fixed_states(system: System, at: Any, moving: Iterable[str]) -> dict[str, fl
 def _check_period_of_each(
     system: System, shared: Mapping[str, float], varied: Mapping[str, np.ndarray], count: int
 ) -> None:
-    """The time dependence must repeat with the forcing period for every trajectory, not only for
-    the system's own values.
+    """Check that the time dependence repeats with the forcing period for every trajectory, not only
+    for the system's own values.
 
-    Only parameters that the explicit time dependence can see are asked; each different combination
+    Only parameters in the explicit time dependence matter; each different combination is checked
     once.
     """
     if system.forced_at is None:
@@ -245,25 +253,27 @@ def _check_period_of_each(
         try:
             system.with_values(**{**shared, **dict(zip(columns, key, strict=True))})
         except SaltusError as error:
-            raise ParameterError(f"trajectory {i}: {error}") from None
+            raise ParameterError(f"trajectory {i}: ", error) from None
 
 
 def _values(system: System, name: str, value: Any) -> Any:
     """One value of a parameter [SI], or many: a list or array, or a range (first, last, number)."""
     if not isinstance(value, tuple):
         return system.resolve(name, value)
-    example = f'values={{"{name}": ("{system.parameter_text(name)}", ..., 20)}}'
+    example = {"values": {name: (system.parameter_text(name), ..., 20)}}
     return along(name, value, lambda one: single(system, name, one), "values", example)
 
 
 def at_values(system: System, values: Mapping[str, Any] | None) -> System:
-    """A system at other values of its parameters, one each. Raises ParameterError or UnitError
-    where one isn't a value.
+    """The system with other values of its parameters, one each. Raises ParameterError or UnitError
+    for an invalid value.
     """
     if values is None:
         return system
     if not isinstance(values, Mapping):
-        raise ParameterError('values must be a mapping, such as values={"force": "4 N"}.')
+        raise ParameterError(
+            lambda say: f"values must be a mapping, such as {say.key(values={'force': '4 N'})}."
+        )
     for name, value in values.items():
         if np.ndim(system.resolve(name, value)):
             raise ParameterError(
@@ -275,8 +285,8 @@ def at_values(system: System, values: Mapping[str, Any] | None) -> System:
 
 
 def single(system: System, name: str, value: Any) -> float:
-    """The value of a parameter [SI] at an end of a range, or in a list of them. Raises
-    ParameterError for many in place of one.
+    """The value of a parameter [SI] at an end of a range, or in a list. Raises ParameterError for
+    many in place of one.
     """
     number = system.resolve(name, value)
     if np.ndim(number):
@@ -292,9 +302,7 @@ def range_of(system: System, name: Any, ends: Any) -> tuple[float, float]:
     doesn't ascend.
     """
     if not among(name, system.values):
-        raise ParameterError(
-            f"{system.name} has no parameter {shown(name)}. {nearest(name, system.values)}"
-        )
+        raise unknown(f"{system.name} has no parameter", name, system.values)
     if not isinstance(ends, list | tuple | np.ndarray) or len(ends) != 2:
         raise ParameterError(
             f"the range of {name} must be (low, high), not {shown(ends)}: the steps between are "
@@ -309,18 +317,17 @@ def range_of(system: System, name: Any, ends: Any) -> tuple[float, float]:
 def _columns(system: System, start: Any) -> dict[str, np.ndarray]:
     """Each state's start [SI], a scalar or an array."""
     if isinstance(start, Mapping):
-        unknown = [name for name in start if name not in system.states]
-        if unknown:
-            raise ParameterError(
-                f"{system.name} has no state {shown(unknown[0])}. "
-                f"{nearest(unknown[0], system.states)}"
-            )
+        strange = [name for name in start if name not in system.states]
+        if strange:
+            raise unknown(f"{system.name} has no state", strange[0], system.states)
         start = {**dict.fromkeys(_made(system), 0.0), **start}
         missing = [name for name in system.states if name not in start]
         if missing:
             raise ParameterError(
-                f"the start gives no {missing[0]!r}. Write "
-                f"start={{{', '.join(f'{s!r}: 0.0' for s in system.states)}}}."
+                lambda say: (
+                    f"the start gives no {missing[0]!r}. Write "
+                    f"{say.key(start=dict.fromkeys(system.states, 0.0))}."
+                )
             )
         return {name: _numbers(system, name, start[name]) for name in system.states}
     rows = start if isinstance(start, np.ndarray) else _as_array(start)
@@ -343,12 +350,12 @@ def _columns(system: System, start: Any) -> dict[str, np.ndarray]:
 
 
 def _made(system: System) -> tuple[str, ...]:
-    """The states that elements with a memory have brought."""
+    """The states that elements with a memory have added."""
     return system.states[len(system.states) - system.made :]
 
 
 def _as_array(start: Any) -> np.ndarray:
-    """Rows as an array; mixed text and numbers stay as they are."""
+    """Rows as an array; mixed text and numbers are kept."""
     try:
         rows = np.asarray(start)
         return rows if rows.dtype.kind in "fiu" else np.asarray(start, dtype=object)
@@ -358,7 +365,7 @@ def _as_array(start: Any) -> np.ndarray:
 
 def _numbers(system: System, name: str, value: Any) -> np.ndarray:
     if isinstance(value, tuple):
-        example = f'start={{"{name}": (0.0, 1.0, 20), ...}}'
+        example = {"start": Word(f'{{"{name}": (0.0, 1.0, 20), ...}}')}
         return along(
             name, value, lambda one: to_si(one, system.units[name], name), "starts", example
         )
@@ -383,7 +390,7 @@ def _numbers(system: System, name: str, value: Any) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Span:
-    """How long to run: a period for each trajectory, whole periods and the time after them, all
+    """The length of a run: a period for each trajectory, whole periods and the time after them, all
     since t_start.
 
     For an unforced system the whole span is one period. ``t_end`` is the time that was asked for
@@ -399,8 +406,8 @@ class Span:
     def request(
         self, start: np.ndarray, parameters: np.ndarray, schedule: Schedule, record_from: int | None
     ) -> Request:
-        """A run of this length, with samples at a schedule; contacts from period ``record_from`` on
-        are kept, or none.
+        """A request of this length, with samples at a schedule; contacts are kept from period
+        ``record_from`` on, or none.
         """
         return Request(
             start=start, parameters=parameters, period=self.period, end_count=self.count,
@@ -421,16 +428,25 @@ def span(system: System, group: Ensemble, periods: Any, t_end: Any, t_start: Any
     n = group.size
     if periods is None and t_end is None and system.forced_at is None:
         raise ParameterError(
-            f'{system.name} has no forcing period: give t_end=, such as t_end="10 s".'
+            lambda say: (
+                f"{system.name} has no forcing period: give {say.key('t_end')}, such as "
+                f"{say.key(t_end='10 s')}."
+            )
         )
     if (periods is None) == (t_end is None):
         raise ParameterError(
-            "give periods= (whole forcing periods) or t_end= (seconds), and only one of them."
+            lambda say: (
+                f"give {say.key('periods')} (whole forcing periods) or {say.key('t_end')} "
+                "(seconds), and only one of them."
+            )
         )
     if periods is not None:
         if system.forced_at is None:
             raise ParameterError(
-                f"{system.name} has no forcing period. Give t_end= in place of periods=."
+                lambda say: (
+                    f"{system.name} has no forcing period. Give {say.key('t_end')} in "
+                    f"place of {say.key('periods')}."
+                )
             )
         periods = whole(periods, "periods")
         return Span(begin, _periods(system, group), np.full(n, int(periods), np.int64), np.zeros(n))
@@ -448,7 +464,7 @@ def span(system: System, group: Ensemble, periods: Any, t_end: Any, t_start: Any
 def _time(value: Any, name: str) -> float:
     seconds = to_si(value, "s", name)
     if not math.isfinite(seconds):
-        raise ParameterError(f"{name} must be a finite time, not {shown(value)}.")
+        raise must_be(name, "a finite time", value)
     return seconds
 
 

@@ -1,4 +1,4 @@
-"""What every public verb does beside its work: say in a sentence how it is called, and end well on
+"""The wrapper of every public verb: it answers wrong arguments in words, and ends well on
 Ctrl-C.
 """
 
@@ -24,7 +24,7 @@ from saltus.system import System
 P = ParamSpec("P")
 R = TypeVar("R")
 
-#: What people write who come from elsewhere, and what it is called here.
+#: Names of arguments in other programs, and ours.
 _ELSEWHERE: Mapping[str, str] = {
     **dict.fromkeys(
         ("tend", "tfinal", "t_final", "tf", "t_max", "tmax", "duration", "t_span", "tspan"),
@@ -52,7 +52,7 @@ _RECORDS = (
     "Contacts are comparisons in the equation, and a run records them all: run.contact_time. "
     "sl.poincare(system, start, surface) records other crossings."
 )
-#: What people write who come from elsewhere, and why there is no such argument.
+#: Names of arguments in other programs that have no counterpart, and the reason.
 _MISSING: Mapping[str, str] = {
     **dict.fromkeys(("events", "event", "callback"), _RECORDS),
     **dict.fromkeys(
@@ -83,14 +83,14 @@ _MISSING: Mapping[str, str] = {
     ),
     "values": "Give other values by system.with_values(name=...), and call it once for each.",
 }
-#: What people write for the forcing frequency.
+#: Names in other programs for the forcing frequency.
 _FREQUENCY = ("freq", "frequency", "omega", "w", "f", "forcing_frequency")
-#: What verbs take for states that the user names, as one would write it.
+#: Arguments with the names of a system's states, as a user would write them.
 _RANGES = {
     "axes": 'x=("-5 mm", "5 mm", 400), v=("-1 m/s", "1 m/s", 400)',
     "box": 'x=("-5 mm", "5 mm"), v=("-1 m/s", "1 m/s")',
 }
-#: Arguments for the length of a run; verbs of whole periods have no t_end.
+#: Arguments for the length of a run; verbs that count whole periods have no t_end.
 _LENGTHS = ("t_end", "periods", "every")
 _INSIDE: ContextVar[bool] = ContextVar("inside", default=False)
 
@@ -98,9 +98,9 @@ _INSIDE: ContextVar[bool] = ContextVar("inside", default=False)
 def verb(function: Callable[P, R]) -> Callable[P, R]:
     """Make a function a public verb.
 
-    Arguments that it doesn't have are answered by those that it has, and those of another kind by
-    what they must be; ``progress=False`` silences what is said about compiling; Ctrl-C that comes
-    before anything is finished is an :class:`Interrupted` too.
+    It answers unknown arguments by the known ones, and arguments of a wrong kind by the right kind.
+    ``progress=False`` also silences messages about compiling. Ctrl-C before anything is finished is
+    an :class:`Interrupted` too.
     """
     signature, kinds = inspect.signature(function), Kinds(function)
 
@@ -119,7 +119,7 @@ def verb(function: Callable[P, R]) -> Callable[P, R]:
         except KeyboardInterrupt as stop:
             if isinstance(stop, Interrupted) and not isinstance(stop, RunInterrupted):
                 raise
-            raise Interrupted from None  # what a run inside has finished is no answer
+            raise Interrupted from None  # a run inside has finished, but that is no answer
         finally:
             _INSIDE.reset(token)
 
@@ -127,8 +127,8 @@ def verb(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def check_call(function: Callable[..., Any], *args: Any, **kwargs: Any) -> None:
-    """Raise ParameterError for arguments that a verb doesn't take; for a verb that hands on
-    arguments to another.
+    """Raise a ParameterError for arguments that a verb doesn't take; for a verb that passes its
+    arguments to another one.
     """
     function = inspect.unwrap(function)
     _check(function.__name__, inspect.signature(function), Kinds(function), args, kwargs)
@@ -141,7 +141,7 @@ def _check(
     args: tuple[Any, ...],
     kwargs: Mapping[str, Any],
 ) -> None:
-    """Raise ParameterError unless there are such arguments, of these kinds."""
+    """Raise a ParameterError unless these arguments exist and have the right kinds."""
     given = _by_name(name, signature, args, kwargs)
     kinds.check(f"sl.{name}", given)
     if given.get("threads") is not None:
@@ -151,7 +151,7 @@ def _check(
 def _by_name(
     name: str, signature: inspect.Signature, args: tuple[Any, ...], kwargs: Mapping[str, Any]
 ) -> Mapping[str, Any]:
-    """The arguments by name. Raises ParameterError unless there are such."""
+    """The arguments by name. Raises a ParameterError for unknown ones."""
     known = signature.parameters
     open_ = any(parameter.kind == parameter.VAR_KEYWORD for parameter in known.values())
     for word in [word for word in kwargs if word not in known]:
@@ -186,7 +186,7 @@ def _misspelt(
     args: tuple[Any, ...],
     kwargs: Mapping[str, Any],
 ) -> bool:
-    """Whether a word that could be a state is nearly an argument, and neither a state nor a
+    """True if a word that could be a state is nearly an argument, and neither a state nor a
     parameter.
     """
     system = kwargs.get("system", args[0] if args else None)
@@ -206,7 +206,7 @@ def _instead(
     args: tuple[Any, ...],
     kwargs: Mapping[str, Any],
 ) -> str:
-    """What to write in place of an argument that isn't there."""
+    """Advice about an argument that doesn't exist."""
     system = kwargs.get("system", args[0] if args else None)
     if isinstance(system, System) and word in system.values and "vary" in known:
         return f"It is a parameter of {system.name}: vary={{{word!r}: (low, high, count)}}."
@@ -218,7 +218,7 @@ def _instead(
             f"It is a state of {system.name}: give it by "
             f"start={{{', '.join(f'{state!r}: ...' for state in system.states)}}}."
         )
-    if word.rstrip("s") in known:  # one letter too many
+    if word.rstrip("s") in known:  # a plural of an argument
         return nearest(word, known)
     there = _ELSEWHERE.get(word.lower(), f"{word}=" if word in _LENGTHS else "")
     if there.partition("=")[0] in known:
@@ -260,7 +260,7 @@ def _length(known: Mapping[str, inspect.Parameter]) -> str:
 
 
 def _call(known: Mapping[str, inspect.Parameter]) -> str:
-    """How it is called, with the arguments that it can't do without."""
+    """A call of the verb with its required arguments."""
     needed = [
         p.name
         for p in known.values()

@@ -1,1 +1,1 @@
-"""How fast small deviations grow along motions of a flow."""
+"""Lyapunov exponents: growth rates of small deviations along motions of a flow."""

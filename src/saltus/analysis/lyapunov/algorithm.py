@@ -1,4 +1,4 @@
-"""What every way of measuring the exponents of trajectories of a flow is asked, and answers."""
+"""Interface of every algorithm for the exponents of trajectories of a flow."""
 
 from __future__ import annotations
 
@@ -45,5 +45,5 @@ class Algorithm:
         raise NotImplementedError
 
     def settings(self) -> dict[str, Any]:
-        """What was asked for, as attributes."""
+        """The settings, as attributes of the result."""
         raise NotImplementedError

@@ -1,5 +1,5 @@
-"""How fast a flow makes volumes grow: the divergence of its field, integrated along the motion, and
-what contacts add.
+"""Growth of volumes by a flow: the divergence of its field, integrated along the motion, and the
+contributions of contacts.
 
 By Liouville's rule the logarithm of the determinant of the tangent is the integral of the trace of
 the Jacobian. At a contact where the force jumps the determinant is multiplied by that of the
@@ -27,7 +27,7 @@ from saltus.language.expression import Expr, add, depends_on, walk
 from saltus.system import System
 from saltus.system.quantity import remembering, with_states
 
-#: Name of a state that is added where an integral is needed, which no user can write.
+#: Name of the state added for an integral, which no user can write.
 _INTEGRAL = "integral of the divergence"
 
 
@@ -48,8 +48,8 @@ class Divergence:
         self._extended = remembering(with_states(system, {_INTEGRAL: self._trace}))
 
     def of_blocks(self, map_: Stroboscope, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Over one block from float64[k, D], each with its row of the map: logarithm of the growth
-        of volumes, float64[k], and how many directions are lost where contacts are held, int64[k].
+        """Growth of volumes over one block from float64[k, D], each with its row of the map: the
+        logarithm, float64[k], and the number of directions lost where contacts are held, int64[k].
         """
         constant = not self._moves and not self._by_mode
         if constant and not self._system.guards:
@@ -71,8 +71,8 @@ class Divergence:
         return np.where(good, total, np.nan), lost
 
     def _lost(self, outcome: Outcome, size: int) -> np.ndarray:
-        """The most constraints that are held at once, int64[k]: two of a contact at rest, its place
-        and its velocity, one of a surface.
+        """The most constraints that are held at once, int64[k]: two for a contact at rest (place
+        and velocity), one for a surface.
         """
         contacts, most = outcome.contacts, np.zeros(size, np.int64)
         held = np.zeros(len(contacts), np.int64)
@@ -101,7 +101,7 @@ class Divergence:
             total, row, (times - begun) * self._in_mode(map_, row, outcome.contacts.mode_before)
         )
         last = np.zeros(len(map_))
-        last[row] = times  # sorted by time: the last one stays
+        last[row] = times  # sorted by time: the last one is kept
         integral: np.ndarray = total + (map_.period - last) * self._in_mode(
             map_, np.arange(len(map_)), outcome.mode
         )
@@ -117,20 +117,20 @@ class Divergence:
         return [(mode >> i) & 1 == 1 for i in range(len(self._system.guards))]
 
     def _jumps(self, map_: Stroboscope, outcome: Outcome) -> np.ndarray:
-        """Logarithm of the determinant of the saltation matrix at each contact; where one begins to
-        be held -inf.
+        """Logarithm of the determinant of the saltation matrix at each contact; -inf where a
+        contact begins to be held.
         """
         system, contacts = self._system, outcome.contacts
         carried, behind = _carried(contacts)
-        here = self._here(map_, contacts)
+        arguments = self._here(map_, contacts)
         before, after = self._bits(contacts.mode_before), self._bits(contacts.mode_after)
-        fields = [evaluate(system.field, bits=bits, **here) for bits in (before, after)]
+        fields = [evaluate(system.field, bits=bits, **arguments) for bits in (before, after)]
         logarithm = np.where(contacts.kind == st.HOLD, -np.inf, 0.0)
         for g, guard in enumerate(system.guards):
             *normal, drift = evaluate(
                 [*gradient(guard.gap, system.states), time_derivative(guard.gap)],
                 bits=before,
-                **here,
+                **arguments,
             )
             rates = [
                 sum((n * f for n, f in zip(normal, field, strict=True)), start=drift)
@@ -176,7 +176,7 @@ class Divergence:
     def _here(
         self, map_: Stroboscope, contacts: ContactTable, before: bool = False
     ) -> dict[str, Any]:
-        """Where contacts are, for :func:`evaluate`, with the states after or before them."""
+        """Arguments of :func:`evaluate` at contacts, with the states after or before them."""
         columns = before_jumps(self._system, contacts) if before else contacts.state
         return {
             "t": contacts.time,
@@ -186,8 +186,8 @@ class Divergence:
 
 
 def _carried(contacts: ContactTable) -> tuple[np.ndarray, np.ndarray]:
-    """Which contacts are boundaries over which an impact has carried the state, bool[n], and the
-    mode behind each contact and those that it has carried over, int64[n].
+    """True for contacts that are boundaries over which an impact has carried the state, bool[n],
+    and the mode after each contact with its carried ones, int64[n].
     """
     same = (np.diff(contacts.trajectory, prepend=-1) == 0) & (
         np.diff(contacts.time, prepend=np.nan) == 0

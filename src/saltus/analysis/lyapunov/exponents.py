@@ -1,5 +1,5 @@
-"""Exponents of many trajectories of a flow: group after group, so that memory stays bounded, into
-the columns of a result.
+"""Exponents of many trajectories of a flow, computed in groups to bound the memory, as columns of a
+result.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 
 from saltus.analysis.closed.field_zeros import autonomous, find_equilibria
 from saltus.analysis.closed.measures import measure
-from saltus.analysis.closed.orbits import Orbit
+from saltus.analysis.closed.motions import ClosedMotion
 from saltus.analysis.lyapunov.algorithm import Algorithm
 from saltus.analysis.lyapunov.qr import AT_REST, GOOD, SEGMENT
 from saltus.analysis.lyapunov.segments import TangentFlow
@@ -22,16 +22,15 @@ from saltus.flow.maps import Stroboscope
 from saltus.kernels import status as st
 from saltus.results.dataset.kinds import Kind
 
-#: Numbers that the tangents of one segment of a group may hold: 32 MB, and some copies of it.
+#: Most numbers in the tangents of one segment of a group: 32 MB, with some copies.
 GROUP = 4_000_000
-#: Growth rates of a group: 80 MB, and some copies of it.
+#: Most growth rates of a group: 80 MB, with some copies.
 RATES = 10_000_000
 #: Share of the range of a gap below which an orbit that misses or overshoots its boundary is near a
-#: graze. Exponents belong to infinitesimal deviations. A gap is known, and a deviation seen, to a
-#: thousandth of the motion at best: of an orbit so close to a boundary nobody could tell on which
-#: side of the graze it is, and beyond it the exponents are others. A motion that never repeats
-#: comes as close as one likes to every boundary that it meets, so of such a one only the grazes
-#: themselves count.
+#: graze. Exponents belong to infinitesimal deviations, but a gap is known, and a deviation seen, to
+#: a thousandth of the motion at best. So near a boundary nobody can tell the side of the graze, and
+#: on the other side the exponents differ. A motion that never repeats comes arbitrarily close to
+#: every boundary that it meets, so only its grazes count.
 NEAR_GRAZE = 1e-3
 #: The two conventions of a forced system.
 FORCED = (
@@ -41,7 +40,7 @@ FORCED = (
 
 
 class Exponents(Algorithm):
-    """By the variational equations."""
+    """Lyapunov exponents by the variational equations."""
 
     algorithm = "variational equations with saltation, QR method"
 
@@ -85,7 +84,7 @@ class Exponents(Algorithm):
             self._keep(rows, flow, found)
 
     def _keep(self, rows: np.ndarray, flow: TangentFlow, found: Spectrum) -> None:
-        """Write a group to its places."""
+        """Write the results of a group to their rows."""
         segment = found.growth.segment
         self._mean[rows], self._error[rows], self._half[rows] = (
             found.exponents,
@@ -113,8 +112,8 @@ class Exponents(Algorithm):
                 self._of_orbit(rows[i], flow.rows(np.array([i])), orbit)
         self._near[rows] |= (self._grazes[rows] > 0) | (self._unresolved[rows] > 0)
 
-    def _of_orbit(self, row: int, flow: TangentFlow, orbit: Orbit) -> None:
-        """Grazes and margin of the orbit alone, in place of those on the way to it."""
+    def _of_orbit(self, row: int, flow: TangentFlow, orbit: ClosedMotion) -> None:
+        """Replace grazes and margin by those of the orbit alone, without the way to it."""
         segment = flow.advance(orbit.points[:1], orbit.period)
         self._grazes[row], self._unresolved[row] = segment.grazes[0], segment.unresolved[0]
         numbers = measure(flow.map, orbit.points[:1], np.array([orbit.period]))
@@ -123,16 +122,16 @@ class Exponents(Algorithm):
 
     def columns(self, factor: np.ndarray) -> dict[str, Any]:
         """The columns of the result; exponents times a factor for each trajectory, float64[k]."""
-        one, two = factor[:, None], factor[:, None, None]
-        mean, half = self._mean * one, self._half * one
-        running, running_half = self._running * two, self._running_half * two
+        scale, running_scale = factor[:, None], factor[:, None, None]
+        mean, half = self._mean * scale, self._half * scale
+        running, running_half = self._running * running_scale, self._running_half * running_scale
         lost = ~np.isin(self._status, GOOD)
         mean[lost], half[lost] = np.nan, np.nan
         return {
             "kind": self._kind.astype(str),
             "response_period": self._period,
             "lyapunov_exponent": mean,
-            "lyapunov_error": np.where(np.isnan(mean), np.nan, self._error * one),
+            "lyapunov_error": np.where(np.isnan(mean), np.nan, self._error * scale),
             "lyapunov_low": mean - half,
             "lyapunov_high": mean + half,
             "flow_lyapunov_exponent": _with_phase(mean) if self._every is None else mean,
@@ -152,7 +151,7 @@ class Exponents(Algorithm):
         }
 
     def settings(self) -> dict[str, Any]:
-        """What was asked for, as attributes."""
+        """The settings, as attributes of the result."""
         return {
             "algorithm": self.algorithm,
             "convention": FORCED if self._every is None else "both are the exponents of the flow",
@@ -163,33 +162,34 @@ class Exponents(Algorithm):
 
 
 def _rest(found: Spectrum, flow: TangentFlow, start: np.ndarray, every: float) -> None:
-    """Where a motion has come to an equilibrium, its exponents: the real parts of the eigenvalues
-    of the Jacobian, exact but for rounding.
+    """Replace the exponents of motions that have come to an equilibrium by the real parts of the
+    eigenvalues of the Jacobian, exact but for rounding.
 
-    Means of growth lag behind: those of a pair of complex eigenvalues swing about its real part.
+    Means of growth converge slowly: those of a pair of complex eigenvalues oscillate about its real
+    part.
     """
     iterates = found.growth.segment.points
-    state, whole = (
+    state, extent = (
         iterates[:, -1],
         np.ptp(np.concatenate([start[:, None], iterates], axis=1), axis=1),
     )
-    # in place of the range of a state that began at rest and has come to rest
-    widest = whole.max(axis=1, keepdims=True)
+    # replaces the range of a state that was at rest all the time
+    widest = extent.max(axis=1, keepdims=True)
     scale = np.where(
-        whole > AT_REST * widest, whole, np.where((widest > 0) & np.isfinite(widest), widest, 1.0)
+        extent > AT_REST * widest, extent, np.where((widest > 0) & np.isfinite(widest), widest, 1.0)
     )
-    still = find_equilibria(flow.map, state, scale, captures=False)
+    still = find_equilibria(flow.map, state, scale)
     with np.errstate(invalid="ignore"):
-        attracts = (still.eigenvalues.real < 0).all(axis=1)
-        near = (np.abs(state - still.place) <= SAME * scale).all(axis=1)
+        attracts = (still.multipliers.real < 0).all(axis=1)
+        near = (np.abs(state - still.points[:, 0]) <= SAME * scale).all(axis=1)
     arrived = np.flatnonzero(attracts & near & np.isin(found.growth.segment.status, GOOD))
     rounding = 64 * np.finfo(float).eps
     for i in arrived:
-        own = still.eigenvalues[i]
-        found.exponents[i] = own.real * every
-        found.errors[i] = found.half_width[i] = rounding * np.abs(own).max() * every
+        eigenvalues = still.multipliers[i]
+        found.exponents[i] = eigenvalues.real * every
+        found.errors[i] = found.half_width[i] = rounding * np.abs(eigenvalues).max() * every
         found.batches[i], found.kinds[i] = 0, Kind.EQUILIBRIUM.word
-        found.volume[i] = flow.rows(np.array([i])).divergences(still.place[[i]][:, None])[0][0, 0]
+        found.volume[i] = flow.rows(np.array([i])).divergences(still.points[[i], :1])[0][0, 0]
 
 
 def _with_phase(exponents: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""`lyapunov`: how fast small deviations grow or die along a motion."""
+"""`lyapunov`: growth rates of small deviations along a motion."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from saltus.analysis.lyapunov.algorithm import Algorithm
 from saltus.analysis.lyapunov.exponents import Exponents
 from saltus.analysis.lyapunov.wolf_on_flow import NeighbourExponents
 from saltus.analysis.outcome_messages import warn
-from saltus.errors import ParameterError, among, nearest, shown
+from saltus.errors import ParameterError, among, shown, unknown
 from saltus.flow.counts import whole
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method, check_method
@@ -25,19 +25,18 @@ from saltus.flow.progress import reporting
 from saltus.interrupt import Interrupted
 from saltus.results import build
 from saltus.results.dataset import schema
+from saltus.sentences import Word
 from saltus.system import System
 
 METHODS = ("variational", "wolf")
-#: Units in which exponents are given: what one block is worth, and whether the logarithm is
-#: natural.
+#: Units of exponents: True for a growth per block, and the logarithm that counts as one.
 UNITS = {
     "1/s": (False, 1.0),
     "1/period": (True, 1.0),
     "bit/s": (False, math.log(2)),
     "bit/period": (True, math.log(2)),
 }
-#: Blocks from which something can be said at least: the error of the mean needs 8 independent
-#: batches, of some blocks each.
+#: Least number of blocks: the error of the mean needs 8 independent batches, of some blocks each.
 LEAST_PERIODS = 64
 
 
@@ -58,10 +57,22 @@ def lyapunov(
 ) -> xr.Dataset:
     """Lyapunov exponents of the motions that given starts lead to, with their errors.
 
-    A motion that settles to a periodic orbit has exactly the exponents of the orbit, the logarithms
-    of the magnitudes of its Floquet multipliers over its period. Any other has the mean growth of
-    small deviations, by the variational equations, their jumps at contacts (saltation) and the QR
-    method, over ``periods`` blocks after ``transient``. A block is a forcing period.
+    1. Each trajectory runs through ``transient`` blocks; a block is a forcing period. At their end
+       a frame of small deviations is carried along, so that its axes have found their directions.
+    2. Over ``periods`` blocks the derivative of each block is computed by the variational
+       equations, with their jumps at contacts (saltation).
+    3. The frame is carried through these derivatives and made orthogonal after each (QR method), as
+       otherwise all axes would turn to the fastest one. The mean logarithm of their growth gives
+       the exponents.
+    4. A motion that settles to a periodic orbit has exactly the exponents of the orbit, which
+       replace the means: the logarithms of the magnitudes of its Floquet multipliers over its
+       period. At an equilibrium they are the real parts of the eigenvalues.
+    5. The errors of the means come from batches that grow until they are independent, since growth
+       in successive blocks is correlated.
+    6. The sum of the exponents is held against the mean divergence, which is found without the
+       tangent.
+
+    These are the steps of ``method="variational"``.
 
     Two conventions are in use. A forced system of D states has D exponents as a stroboscopic map:
     ``lyapunov_exponent``. As a flow, the phase of the forcing is one more state, whose exponent is
@@ -80,8 +91,8 @@ def lyapunov(
         states and the phase of the forcing, 32 in a block; an evolution is one block. It is the
         largest exponent of the flow, so never below zero: neighbours on an orbit stay neighbours.
     flow : Method
-        How to integrate. Default :class:`saltus.Taylor`. With ``sl.ODE45(events="ignore")`` jumps
-        of the tangent are left out, as contacts aren't known.
+        The method of integration. Default :class:`saltus.Taylor`. With
+        ``sl.ODE45(events="ignore")`` jumps of the tangent are left out, as contacts aren't known.
     periods : int
         Blocks that growth is measured over, at least 64. The error falls with the square root of
         it.
@@ -171,24 +182,28 @@ def lyapunov(
 def _check_words(method: Any, unit: Any, system: System) -> None:
     if isinstance(method, Method):
         raise ParameterError(
-            f'method says how exponents are measured: "variational" or "wolf". How to integrate is '
-            f"flow=sl.{method.name}(...)."
+            lambda say: (
+                'method says how exponents are measured: "variational" or "wolf". How to '
+                f"integrate is {say.key(flow=Word(say.method(method.name)))}."
+            )
         )
     if not among(method, METHODS):
-        raise ParameterError(f"there is no method {shown(method)}. {nearest(method, METHODS)}")
+        raise unknown("there is no method", method, METHODS)
     if not among(unit, UNITS):
-        raise ParameterError(f"exponents aren't given in {shown(unit)}. {nearest(unit, UNITS)}")
+        raise unknown("exponents aren't given in", unit, UNITS)
     if UNITS[unit][0] and system.forced_at is None:
         raise ParameterError(
-            f"{system.name} has no forcing period, so {shown(unit)} has no meaning. Take "
-            f"unit={unit.replace('period', 's')!r}."
+            lambda say: (
+                f"{system.name} has no forcing period, so {shown(unit)} has no meaning. "
+                f"Take {say.key(unit=unit.replace('period', 's'))}."
+            )
         )
 
 
 def _dataset(
     system: System, flow: Method, group: Ensemble, work: Algorithm, unit: str
 ) -> xr.Dataset:
-    """Everything under its name and in its unit."""
+    """The Dataset of the exponents, in the chosen unit."""
     per_period, logarithm = UNITS[unit]
     factor = (1.0 if per_period else 1.0 / work.map.period) / logarithm
     attrs = (

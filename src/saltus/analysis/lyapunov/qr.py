@@ -1,4 +1,4 @@
-"""How small deviations grow along trajectories, block by block and in all directions: the QR
+"""Growth of small deviations along trajectories, block by block and in all directions, by the QR
 method.
 
 The derivatives of all blocks of a segment are computed in one batch, as the states at which they
@@ -18,12 +18,12 @@ import numpy as np
 from saltus.analysis.lyapunov.segments import Segment, TangentFlow
 from saltus.kernels import status as st
 
-#: Blocks of a segment. A trajectory starts afresh after each, so this number is part of the result
-#: and never depends on the batch.
+#: Blocks of a segment. A trajectory restarts after each, so this number is part of the result and
+#: never depends on the batch.
 SEGMENT = 1024
-#: Blocks at most in which the frame finds its way before growth counts, taken from the transient.
+#: Most blocks for the alignment of the frame before growth counts, taken from the transient.
 ALIGNING = 128
-#: Share of the distance from its start below which a motion is taken to be at rest.
+#: A motion whose range is below this share of its distance from the start is at rest.
 AT_REST = 1e-6
 #: Statuses with which a trajectory goes on, in ascending order.
 GOOD = (st.OK, st.GRAZE_UNRESOLVED)
@@ -31,7 +31,7 @@ GOOD = (st.OK, st.GRAZE_UNRESOLVED)
 
 @dataclass(frozen=True)
 class Growth:
-    """What became of k trajectories.
+    """Growth along k trajectories.
 
     Attributes
     ----------

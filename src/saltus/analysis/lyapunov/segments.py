@@ -14,8 +14,10 @@ from saltus.flow.maps import Stroboscope
 from saltus.flow.request import Schedule
 from saltus.kernels import status as st
 
-#: Blocks whose motion is sampled for its size, and samples in each.
-SAMPLED_BLOCKS, SAMPLES_PER_BLOCK = 16, 32
+#: Blocks sampled for the size of the motion.
+SAMPLED_BLOCKS = 16
+#: Samples in each of these blocks.
+SAMPLES_PER_BLOCK = 32
 
 
 @dataclass(frozen=True)
@@ -27,7 +29,7 @@ class Segment:
     points : float64[k, n, D]
         States at the ends of the blocks.
     status : int64[k]
-        How each ended: codes of kernels/status.py.
+        Its end: codes of kernels/status.py.
     grazes, unresolved : int64[k]
         Grazes, and those of them that were shallower than the local error.
     margin : float64[k]
@@ -42,8 +44,8 @@ class Segment:
 
 
 class TangentFlow:
-    """Trajectories of a flow, each with a row of a map, and how deviations grow in each block: one
-    iterate of the map.
+    """Trajectories of a flow, each with a row of a map, and the growth of deviations in each block,
+    which is one iterate of the map.
     """
 
     def __init__(self, map_: Stroboscope):
@@ -51,7 +53,9 @@ class TangentFlow:
         self._divergence = Divergence(map_.system)
 
     def advance(self, start: np.ndarray, count: int, first: int = 0) -> Segment:
-        """``count`` blocks from float64[k, D]; the points kept begin after ``first`` of them."""
+        """Advance ``count`` blocks from float64[k, D]; the points kept begin after ``first`` of
+        them.
+        """
         if not count:
             nothing = np.zeros(len(start), np.int64)
             return Segment(
@@ -64,8 +68,8 @@ class TangentFlow:
         )
 
     def sample(self, start: np.ndarray) -> np.ndarray:
-        """States float64[k, m, D] of the motion from float64[k, D] on, close enough to one another
-        to tell its size.
+        """States float64[k, m, D] of the motion from float64[k, D] on, dense enough to show its
+        size.
         """
         return self.map.run(
             start, SAMPLED_BLOCKS, Schedule.even(SAMPLED_BLOCKS, SAMPLES_PER_BLOCK)
@@ -79,8 +83,8 @@ class TangentFlow:
         )
 
     def divergences(self, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Of the block that begins at each of float64[k, n, D]: logarithm of the factor by which
-        volumes grow, float64[k, n], and directions that are lost in it for good, int64[k, n].
+        """Growth of volumes in the block from each of float64[k, n, D]: logarithm, float64[k, n],
+        and directions lost in it for good, int64[k, n].
         """
         k, n, size = states.shape
         growth, lost = self._divergence.of_blocks(self._blocks(k, n), states.reshape(k * n, size))

@@ -1,5 +1,4 @@
-"""Lyapunov spectra of trajectories of a flow or of any map, with what kind of motion they belong
-to.
+"""Lyapunov spectra of trajectories of a flow or of any map, and the kinds of their motions.
 
 A trajectory that settles to a periodic orbit has the exponents of the orbit, ln |multiplier| per
 period, exact but for rounding. Any other has the means of its growth rates, and the statistics of
@@ -15,20 +14,21 @@ import numpy as np
 
 from saltus.analysis.attractors.aperiodic import SURE
 from saltus.analysis.attractors.recurrence import recurring_orbits
-from saltus.analysis.closed.orbits import Orbit
+from saltus.analysis.closed.motions import ClosedMotion
 from saltus.analysis.lyapunov.qr import GOOD, Growth, carry, grow
 from saltus.analysis.lyapunov.segments import TangentFlow
 from saltus.analysis.solve.tolerances import NEAR, ROUND, SAME
 from saltus.analysis.statistics import BOUNDED, UNCLEAR, Means, batch_means, running_ends
 from saltus.results.dataset.kinds import Kind
 
-#: Logarithm of the ratio of growths in one block beyond which the slower one is lost in the
-#: rounding of the faster: three digits are left.
+#: Logarithm of the ratio of growths in one block above which the slower one is lost in the rounding
+#: of the faster: three digits are left.
 LOST = 29.0
-#: Factor on the rounding of a monodromy matrix beyond which a multiplier is lost, and blocks of the
-#: round trips that find it then.
-AMPLIFIED, TRIPS = 1e6, 256
-#: What a slow approach to an orbit must at least have gained over half of the last segment.
+#: Factor on the rounding of a monodromy matrix above which a multiplier is lost.
+AMPLIFIED = 1e6
+#: Blocks of the round trips that find a lost multiplier.
+TRIPS = 256
+#: A slow approach to an orbit must shrink its distance to this share over half of the last segment.
 GAINED = 0.5
 
 
@@ -44,7 +44,7 @@ class Spectrum:
         Mean growth of volumes, found without the tangent: the sum of the exponents.
     batches : int64[k]
         Independent batches that the error of the largest comes from; 0 for an orbit.
-    orbits : list of Orbit or None
+    orbits : list of ClosedMotion or None
         The periodic orbit to which each settles.
     kinds : list of str
         ``periodic``, ``quasi_periodic``, ``chaotic``, ``equilibrium``, ``limit_cycle`` or
@@ -54,7 +54,7 @@ class Spectrum:
     running : Means
         and these, float64[k, D, m].
     growth : Growth
-        What they come from.
+        The growth that they come from.
     """
 
     exponents: np.ndarray
@@ -62,7 +62,7 @@ class Spectrum:
     half_width: np.ndarray
     volume: np.ndarray
     batches: np.ndarray
-    orbits: list[Orbit | None]
+    orbits: list[ClosedMotion | None]
     kinds: list[str]
     ends: np.ndarray
     running: Means
@@ -79,8 +79,8 @@ def spectrum(
 ) -> Spectrum:
     """Exponents over ``count`` blocks after a transient, of trajectories from float64[k, D].
 
-    Without forcing a motion that repeats has an exponent of zero along itself; that makes a
-    difference to what it is called.
+    Without forcing a motion that repeats has an exponent of zero along itself, which changes its
+    kind.
     """
     growth = grow(flow, start, count, transient, progress)
     rates = _told(
@@ -115,9 +115,8 @@ def spectrum(
 
 
 def _told(rates: np.ndarray, volume: np.ndarray) -> np.ndarray:
-    """Rates float64[k, n, D] without what rounding has made of directions that are lost in that of
-    the fastest one: one alone grows as volumes float64[k, n] do without the others, of several
-    nothing is known (NaN).
+    """Rates float64[k, n, D] without directions lost in the rounding of the fastest one. A single
+    lost direction has the rest of the growth of volumes float64[k, n]; several are NaN.
     """
     with np.errstate(invalid="ignore"):
         lost = ~((rates[:, :, :1] - rates).mean(axis=1) < LOST)
@@ -127,8 +126,8 @@ def _told(rates: np.ndarray, volume: np.ndarray) -> np.ndarray:
 
 
 def _vanish(zeros: int, exponents: np.ndarray, *errors: np.ndarray) -> None:
-    """Let the last exponents of a trajectory float64[D] be those of directions that vanish, without
-    an error: a contact that is held keeps no deviation from it.
+    """Set the last exponents of a trajectory float64[D] to those of vanishing directions, without
+    an error: a held contact keeps no deviation from it.
     """
     last = len(exponents) - zeros
     exponents[last:] = -np.inf
@@ -137,20 +136,20 @@ def _vanish(zeros: int, exponents: np.ndarray, *errors: np.ndarray) -> None:
 
 
 # -- orbits ----------------------------------------------------------------------------------------
-def _orbits(flow: TangentFlow, growth: Growth) -> list[Orbit | None]:
+def _orbits(flow: TangentFlow, growth: Growth) -> list[ClosedMotion | None]:
     """The stable periodic orbit to which each trajectory has come, None for the others."""
     points, scale = growth.segment.points, growth.scale
     orbits, _, noise = recurring_orbits(flow.map, points[:, -ROUND - 1 :], scale, NEAR)
     good = orbits.stable & np.isin(growth.segment.status, GOOD)
-    found: list[Orbit | None] = [None] * len(points)
+    found: list[ClosedMotion | None] = [None] * len(points)
     for row in np.flatnonzero(good).tolist():
         if _arrives(points[row], orbits[row], scale[row], float(noise[row])):
             found[row] = orbits[row]
     return found
 
 
-def _arrives(points: np.ndarray, orbit: Orbit, scale: np.ndarray, noise: float) -> bool:
-    """Whether a trajectory float64[m, D] lies on an orbit at its end, or comes closer to it all the
+def _arrives(points: np.ndarray, orbit: ClosedMotion, scale: np.ndarray, noise: float) -> bool:
+    """True if a trajectory float64[m, D] lies on an orbit at its end, or approaches it all the
     time.
     """
     n, half = orbit.period, len(points) // 2
@@ -162,9 +161,9 @@ def _arrives(points: np.ndarray, orbit: Orbit, scale: np.ndarray, noise: float) 
 
 
 def _of_orbit(
-    flow: TangentFlow, i: int, orbit: Orbit, scale: np.ndarray, volume: float, vanish: bool
+    flow: TangentFlow, i: int, orbit: ClosedMotion, scale: np.ndarray, volume: float, vanish: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Exponents of an orbit per block, and what the map's own errors make of them (Bauer & Fike:
+    """Exponents of an orbit per block, and their error from the map's own errors (Bauer & Fike:
     times the condition of the eigenvectors).
 
     Multipliers that are lost in the rounding of the largest are found as growth round the orbit,
@@ -197,10 +196,10 @@ def _of_orbit(
 
 
 def _round_trips(
-    flow: TangentFlow, i: int, orbit: Orbit, scale: np.ndarray
+    flow: TangentFlow, i: int, orbit: ClosedMotion, scale: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Mean growth per block over the later half of many round trips of an orbit, and how far that
-    of its two halves lies apart.
+    """Mean growth per block over the later half of many round trips of an orbit, and the difference
+    of that half's two halves.
     """
     n, size = orbit.points.shape
     blocks = flow.rows(np.full(n, i)).derivatives(orbit.points[:, None])[:, 0]
@@ -211,7 +210,7 @@ def _round_trips(
         return 0.5 * (early + late), np.abs(late - early) + flow.map.noise
 
 
-def _volume(flow: TangentFlow, i: int, orbit: Orbit) -> tuple[float, int]:
+def _volume(flow: TangentFlow, i: int, orbit: ClosedMotion) -> tuple[float, int]:
     """Mean growth of volumes over an orbit, and directions that vanish on it."""
     growth, lost = flow.rows(np.full(orbit.period, i)).divergences(orbit.points[:, None])
     return float(growth.mean()), int(lost.max())
@@ -219,8 +218,8 @@ def _volume(flow: TangentFlow, i: int, orbit: Orbit) -> tuple[float, int]:
 
 # -- kinds -----------------------------------------------------------------------------------------
 def kind_of(rates: np.ndarray, errors: np.ndarray, forced: bool) -> str:
-    """What a motion that isn't an orbit of the map is called, from rates float64[n, D] and the
-    errors of their means.
+    """The kind of a motion that isn't an orbit of the map, from rates float64[n, D] and the errors
+    of their means.
     """
     mean, first, second = (
         rates.mean(axis=0),
@@ -231,7 +230,7 @@ def kind_of(rates: np.ndarray, errors: np.ndarray, forced: bool) -> str:
     limit = np.maximum(SURE * errors, BOUNDED / len(rates))
     if mean[0] > limit[0] and second[0] > 0.5 * first[0]:  # not one that was chaotic only at first
         return Kind.CHAOTIC.word
-    # zero only if what grew stays bounded, however wide the error is
+    # zero only if the growth stays bounded, however wide the error is
     if abs(second[0]) > min(limit[0], 2 * BOUNDED / len(rates)):
         return "unclear"
     torus = forced or (len(mean) > 2 and abs(second[1]) <= limit[1])

@@ -1,5 +1,5 @@
-"""Largest exponents of trajectories of a flow from neighbours on them: all states, and the phase of
-the forcing.
+"""Largest exponents of trajectories of a flow from neighbours on them, which are compared in all
+states and the phase of the forcing.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from saltus.flow.request import Schedule
 from saltus.flow.room import check_room
 from saltus.kernels import status as st
 
-#: Samples of a block: neighbours on an orbit then lie closer than the widest distance.
+#: Samples of a block: dense enough that neighbours on an orbit lie within the widest distance.
 SAMPLES = 32
-#: Numbers that the samples of a group of trajectories may hold: 128 MB.
+#: Most numbers in the samples of a group of trajectories: 128 MB.
 GROUP = 16_000_000
 
 
 class NeighbourExponents(Algorithm):
-    """By the method of Wolf et al."""
+    """Largest Lyapunov exponents by the method of Wolf et al."""
 
     algorithm = "Wolf et al. (1985), fixed evolution time"
 
@@ -41,7 +41,7 @@ class NeighbourExponents(Algorithm):
         check_room(
             self._periods * SAMPLES * (16.0 * size + 32.0),
             f"{SAMPLES} samples in each of {self._periods} periods",
-            "Give fewer periods=.",
+            lambda say: f"Give fewer {say.key('periods')}.",
         )
         schedule = Schedule.even(self._periods, SAMPLES, first=self._transient)
         step = max(GROUP // (self._periods * SAMPLES * size), 1)
@@ -68,8 +68,8 @@ class NeighbourExponents(Algorithm):
         return measure(points, period / SAMPLES, default_search(points, SAMPLES, SAMPLES))
 
     def columns(self, factor: np.ndarray) -> dict[str, Any]:
-        """The columns of the result; exponents, which come per second, are turned to those times a
-        factor of a block.
+        """The columns of the result; exponents, which are per second, are converted to those of a
+        block times a factor.
         """
         per_second = factor * self.map.period
         k = len(self._found)
@@ -106,7 +106,7 @@ class NeighbourExponents(Algorithm):
         return values
 
     def settings(self) -> dict[str, Any]:
-        """What was asked for, as attributes."""
+        """The settings, as attributes of the result."""
         return {
             "algorithm": self.algorithm,
             "convention": "largest exponent of the flow, its phase included",

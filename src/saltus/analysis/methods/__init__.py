@@ -1,1 +1,1 @@
-"""The same question put to several methods."""
+"""Comparisons of methods on the same problem."""

@@ -1,6 +1,4 @@
-"""`compare_methods`: the same question put to several methods. What changes, where, how large is
-the error, and what does each cost?
-"""
+"""`compare_methods`: one analysis by several methods, with their differences, errors and costs."""
 
 from __future__ import annotations
 
@@ -42,7 +40,7 @@ from saltus.results.dataset.schema import (
 )
 from saltus.system import System
 
-#: The question of Saunders et al. (2021): ode45 as it comes, with and without event location.
+#: The methods of Saunders et al. (2021): ode45 with and without event location.
 USUAL = (ODE45(rtol=1e-4, atol=1e-7), ODE45(rtol=1e-4, atol=1e-7, events="ignore"))
 _ANALYSES: dict[str, Callable[..., xr.Dataset]] = {
     "basins": basins,
@@ -62,8 +60,8 @@ def compare_methods(
     progress: bool | Callable[[float], None] | None = None,
     **arguments: Any,
 ) -> xr.Dataset:
-    """One analysis by several methods beside an exact one: what changes, at which values, with
-    error and cost side by side.
+    """Run one analysis by several methods and an exact one, and compare: changed results, errors
+    and costs.
 
     Parameters
     ----------
@@ -73,9 +71,9 @@ def compare_methods(
         :func:`saltus.frequency_response`, :func:`saltus.bifurcation_diagram` or
         :func:`saltus.basins`.
     methods : sequence of Method
-        What is compared; default ode45 at (1e-4, 1e-7) with and without event location.
+        The methods compared; default ode45 at (1e-4, 1e-7) with and without event location.
     reference : Method
-        What it is compared with; default :class:`saltus.Taylor`, exact but for rounding.
+        The exact method; default :class:`saltus.Taylor`, exact but for rounding.
     computed : mapping of str to Dataset, optional
         Results that exist already, by the ``label`` of their method; they aren't computed again,
         and their cost stays unknown.
@@ -221,7 +219,7 @@ def _timed(
     try:
         ds = _ANALYSES[name](system, method=method, **arguments)
     except Interrupted:
-        raise Interrupted from None  # what one method has finished is no comparison
+        raise Interrupted from None  # the results of single methods are no comparison
     return ds, time.process_time() - begin
 
 

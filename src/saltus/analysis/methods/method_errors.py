@@ -1,4 +1,4 @@
-"""How far one method's responses lie from another's: orbit by orbit, and period by period."""
+"""Distances of one method's responses from another's: orbit by orbit, and period by period."""
 
 from __future__ import annotations
 
@@ -6,17 +6,18 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.attractors.find_responses import motion_range
-from saltus.analysis.closed.orbits import orbit_distance
+from saltus.analysis.closed.motions import orbit_distance
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.kernels import status as st
 from saltus.results.dataset.schema import parameters_of, response_name, states_of
 from saltus.system import System
 
-#: Orbits of two methods are one if their distance is below this multiple of the method's noise, or
-#: below this part of the motion's range.
-SAME_NOISE, SAME_AT_LEAST = 4.0, 1e-3
-#: Points of a response from which one-period errors are measured; more say nothing new.
+#: Orbits of two methods are one below this multiple of the method's noise.
+SAME_NOISE = 4.0
+#: They are one below this part of the motion's range, too.
+SAME_AT_LEAST = 1e-3
+#: Points of a response from which one-period errors are measured; more add nothing.
 POINTS = 64
 
 
@@ -87,7 +88,7 @@ def response_noise(system: System, method: Method, exact: xr.Dataset) -> np.ndar
 def cell_agreement(
     exact: xr.Dataset, other: xr.Dataset, distance: np.ndarray, noise: np.ndarray
 ) -> np.ndarray:
-    """1 where two methods give one response, 0 where they don't, -1 where one of them gives none,
+    """1 where two methods give one response, 0 where they differ, -1 where one of them gives none,
     int8.
     """
     settled = (exact["response_of"].values >= 0) & (other["response_of"].values >= 0)
@@ -101,11 +102,11 @@ def cell_agreement(
 def one_period_errors(
     system: System, reference: Method, method: Method, exact: xr.Dataset, threads: int | None = None
 ) -> dict[str, np.ndarray]:
-    """Error of one forcing period by a method, from states on the exact responses at each value of
-    the parameters.
+    """Error of a method over one forcing period, from states on the exact responses at each value
+    of the parameters.
 
-    Independent of stability and of basins, and so a smooth function of the parameters: what the
-    method itself does wrong.
+    It doesn't depend on stability or basins, so it is a smooth function of the parameters: the
+    method's own error.
 
     Returns
     -------

@@ -1,5 +1,5 @@
-"""`regularisation_widths`: how wide may the smooth stand-in of a contact be? As wide as makes no
-more error than the method that integrates it, and what a step then costs.
+"""`regularisation_widths`: the widths at which a regularised contact is as exact as the method that
+integrates it, and the steps it then takes.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.inputs.starts import ensemble
 from saltus.analysis.inputs.verb import verb
 from saltus.contact import STEPS
-from saltus.errors import ParameterError, among, nearest, shown
+from saltus.errors import ParameterError, must_be, one_of
 from saltus.flow.counts import whole
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import ODE45, Method, Taylor, check_method
@@ -25,7 +25,7 @@ from saltus.results.dataset.schema import WIDTHS
 from saltus.system import System, gap_units, regularise
 from saltus.units import to_si
 
-#: Widths that are tried where none are given, as shares of the largest gap of the motion.
+#: Default widths, as shares of the largest gap of the motion.
 SHARES = np.geomspace(1e-1, 1e-6, 16)
 
 
@@ -41,8 +41,8 @@ def regularisation_widths(
     points: int = 32,
     threads: int | None = None,
 ) -> xr.Dataset:
-    """The width at which a smooth stand-in of a system is as wrong as the method that integrates
-    it, and the steps that it takes there.
+    """The width at which the error of regularisation equals that of the integrating method, and the
+    steps taken there.
 
     A forcing period is computed from points of the settled motion: exactly; by the method, with its
     contacts; and of :func:`saltus.regularise`'s stand-in at each width, exactly and by the method.
@@ -91,8 +91,7 @@ def regularisation_widths(
     >>> 1e-6 < float(table["equal_width"]) < 1e-5  # [m]; the gap is 4e-4 m
     True
     """
-    if not among(law, STEPS):
-        raise ParameterError(f"regularisation_widths: law={shown(law)}. {nearest(law, STEPS)}")
+    one_of(STEPS, "regularisation_widths: ", law=law)
     method = check_method(ODE45(rtol=1e-4, atol=1e-7) if method is None else method)
     zero = dict.fromkeys(system.states, 0.0)
     group = ensemble(system, zero if start is None else start, None)
@@ -107,12 +106,12 @@ def regularisation_widths(
     smooth = regularise(system, law, width=float(tried[-1]))
     (name,) = smooth.values.keys() - system.values.keys()
 
-    def period(of: System, by: Method, width: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def period(moving: System, by: Method, width: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Error and steps of a period for each width."""
-        rows = np.tile(np.array(list(of.values.values())), (len(width) * len(begin), 1))
-        if of is smooth:
-            rows[:, list(of.values).index(name)] = np.repeat(width, len(begin))
-        map_ = Stroboscope(of, by, rows, threads=threads)
+        rows = np.tile(np.array(list(moving.values.values())), (len(width) * len(begin), 1))
+        if moving is smooth:
+            rows[:, list(moving.values).index(name)] = np.repeat(width, len(begin))
+        map_ = Stroboscope(moving, by, rows, threads=threads)
         outcome = map_.run(np.tile(begin, (len(width), 1)), 1)
         apart = (outcome.state - np.tile(end, (len(width), 1))) / scale
         steps = outcome.counters[:, st.STEPS] + outcome.counters[:, st.REJECTED]
@@ -121,16 +120,16 @@ def regularisation_widths(
             steps.reshape(len(width), -1).mean(axis=1),
         )
 
-    (own,), (own_steps,) = period(system, method, np.ones(1))
+    (method_error,), (method_steps,) = period(system, method, np.ones(1))
     by_width, _ = period(smooth, Taylor(), tried)
     both, steps = period(smooth, method, tried)
-    equal = _where_equal(tried, by_width, own)
+    equal = _where_equal(tried, by_width, method_error)
     equal_steps = np.exp(np.interp(np.log(equal), np.log(tried[::-1]), np.log(steps[::-1])))
     if np.isnan(equal):
         equal_steps = np.nan
     values = {
         "width": tried, "regularisation_error": by_width, "error": both, "steps_per_period": steps,
-        "method_error": own, "method_steps_per_period": own_steps, "equal_width": equal,
+        "method_error": method_error, "method_steps_per_period": method_steps, "equal_width": equal,
         "equal_steps_per_period": equal_steps,
     }  # fmt: skip
     about = subject(system, provenance(system, method, system.values) | {"law": law})
@@ -163,13 +162,13 @@ def _widths(system: System, orbit: np.ndarray, given: Any, unit: str) -> np.ndar
     given = given if isinstance(given, list | tuple | np.ndarray) else [given]
     widths = np.array([to_si(one, unit, "widths") for one in given])
     if not len(widths) or not (widths > 0).all():
-        raise ParameterError(f"widths must be positive, at least one, not {shown(given)}.")
+        raise must_be("widths", "positive, at least one", given)
     return np.sort(widths)[::-1]
 
 
 def _where_equal(widths: np.ndarray, errors: np.ndarray, wanted: float) -> float:
-    """The largest width below which the error by the width stays under another, NaN if there is
-    none among them.
+    """The largest width below which the error stays under another one, NaN if there is none among
+    them.
     """
     below = errors <= wanted
     count = len(below) if below.all() else int(np.argmin(below[::-1]))

@@ -1,1 +1,1 @@
-"""Trajectories and what is read off them: histories, sections, spectra, impacts, energy."""
+"""Trajectories and their evaluation: histories, sections, spectra, impacts, energy."""

@@ -1,4 +1,4 @@
-"""`energy_balance`: where the energy of a motion comes from and where it goes."""
+"""`energy_balance`: energy stored, supplied and dissipated in a motion."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from saltus.results.dataset import schema
 from saltus.system import System
 from saltus.system.quantity import Quantity, quantity, with_integrals, with_losses
 
-#: Intervals into which the span of an unforced system is cut.
+#: Default number of intervals of an unforced system's span.
 INTERVALS = 100
-#: Names of the integrals, by what they are of, and of the sum of the losses at impacts, chosen so
-#: that no system has them.
+#: Names of the states that hold the integrals, by content, and of the sum of the losses at impacts;
+#: chosen so that no system has them.
 _NAMES = {
     "supplied": "work_supplied_",
     "dissipated": "energy_dissipated_",
@@ -56,8 +56,8 @@ def energy_balance(
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
 ) -> xr.Dataset:
-    """Energy stored, supplied and dissipated, forcing period by forcing period; what is left over
-    must be zero.
+    """Energy stored, supplied and dissipated, forcing period by forcing period; the residual must
+    be zero.
 
     The powers are integrated along the motion as states of their own, so with the flow's precision:
     with :class:`saltus.Taylor` the residual is rounding. A residual that is larger says that a term
@@ -161,14 +161,18 @@ def _schedule(seen: Stretch, intervals: int | None) -> Schedule:
         return Schedule(index // count, (index % count) / count)
     if intervals is not None:
         raise ParameterError(
-            f"{seen.system.name} is forced: its balance is drawn each forcing "
-            f"period. Leave intervals= out."
+            lambda say: (
+                f"{seen.system.name} is forced: its balance is drawn each forcing period. "
+                f"Leave {say.key('intervals')} out."
+            )
         )
     last = int(np.min(seen.length.count))
     if np.any(seen.length.phase > 0) or np.any(seen.length.count != last):
         raise ParameterError(
-            "an energy balance of a forced system is drawn over whole forcing "
-            "periods. Give periods= in place of t_end=."
+            lambda say: (
+                "an energy balance of a forced system is drawn over whole forcing "
+                f"periods. Give {say.key('periods')} in place of {say.key('t_end')}."
+            )
         )
     _check_room(seen, last - seen.skipped)
     index = np.arange(seen.skipped, last + 1)
@@ -176,7 +180,7 @@ def _schedule(seen: Stretch, intervals: int | None) -> Schedule:
 
 
 def _check_room(seen: Stretch, intervals: int) -> None:
-    """Raise ParameterError if the balance of these intervals doesn't fit into memory."""
+    """Raise a ParameterError if the balance of these intervals doesn't fit into memory."""
     numbers = seen.group.size * (2 * len(seen.system.states) + 8) + 2
     check_room(
         8.0 * numbers * intervals,
@@ -195,7 +199,7 @@ def _dataset(
     names: list[str],
     outcome: Outcome,
 ) -> xr.Dataset:
-    """What each interval holds, under its name."""
+    """The energies of each interval, by name."""
     samples = outcome.samples
     columns = {name: np.array(column)[:, None] for name, column in seen.group.varied.items()}
     shared = dict(zip(seen.system.values, seen.group.parameters[0], strict=True))

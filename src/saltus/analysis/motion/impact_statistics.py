@@ -1,4 +1,4 @@
-"""`impact_statistics`: how often, how hard and how long the contacts are."""
+"""`impact_statistics`: rate, speed and duration of contacts."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from saltus.analysis.motion import touchdowns
 from saltus.analysis.motion.touchdowns import Touchdowns
 from saltus.analysis.motion.window import Stretch, computed, dataset, stretch
 from saltus.analysis.outcome_messages import warn
-from saltus.errors import ParameterError, nearest, shown
+from saltus.errors import ParameterError, must_be, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.methods import Method, check_method
 from saltus.flow.request import Outcome, Schedule
@@ -25,8 +25,8 @@ from saltus.results.dataset import schema
 from saltus.system import System
 from saltus.system.quantity import Quantity, with_impulses, with_integrals
 
-#: Blocks from whose scatter a standard error is taken: contacts that follow each other are not
-#: independent, blocks nearly are.
+#: Blocks whose scatter gives a standard error: consecutive contacts are not independent, blocks
+#: nearly are.
 BLOCKS = 20
 #: Bins of the histogram of speeds.
 BINS = 20
@@ -168,22 +168,20 @@ def _by_guard(system: System, given: Mapping[str, Any], argument: str) -> dict[i
     for name in given:
         if name not in names:
             raise ParameterError(
-                f"{argument}= names {shown(name)}, which is no boundary of "
-                f"{system.name}. {nearest(name, names)}"
+                lambda say: say.key(argument),
+                f" names {shown(name)}, which is no boundary of {system.name}. "
+                f"{nearest(name, names)}",
             )
     return {names.index(name): value for name, value in given.items()}
 
 
 def contact_sides(system: System, given: Mapping[int, Any]) -> np.ndarray:
     """Sign of each gap in contact, int8[guard]: as given, else opposite to that at rest. Gaps of
-    zero are opened a little to ask.
+    zero are opened a little for this test.
     """
     for number, side in given.items():
         if side not in (-1, 1):
-            raise ParameterError(
-                f"contact_side of {system.guards[number].name!r} must be 1 or -1, "
-                f"not {shown(side)}."
-            )
+            raise must_be(f"contact_side of {system.guards[number].name!r}", "1 or -1", side)
     values = {name: value or np.finfo(float).tiny for name, value in system.values.items()}
     rest = dict.fromkeys(system.states, 0.0)
     bits: list[bool] = []
@@ -210,7 +208,7 @@ def _dataset(
     bins: Any,
     outcome: Outcome,
 ) -> xr.Dataset:
-    """Contacts and what they have in common, under their names."""
+    """The contacts and their statistics, by name."""
     size, guards = seen.group.size, len(system.guards)
     ends = np.searchsorted(found.trajectory, np.arange(size + 1))
     cells = [
@@ -347,7 +345,7 @@ def _largest(values: np.ndarray) -> float:
 
 
 def _error_of_row(values: np.ndarray) -> float:
-    """Standard error of the mean of values that follow each other, by the means of blocks."""
+    """Standard error of the mean of consecutive values, by the means of blocks."""
     blocks = min(BLOCKS, len(values) // 2)
     if blocks < 2:
         return np.nan
@@ -356,5 +354,5 @@ def _error_of_row(values: np.ndarray) -> float:
 
 
 def _error(means: np.ndarray) -> float:
-    """Standard error of the mean from the means of blocks; NaN from one."""
+    """Standard error of the mean from the means of blocks; NaN for one block."""
     return float(means.std(ddof=1) / np.sqrt(len(means))) if len(means) > 1 else np.nan

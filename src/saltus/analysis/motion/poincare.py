@@ -1,4 +1,4 @@
-"""`poincare`: where the motion crosses a surface in the space of states and time."""
+"""`poincare`: the states at which a motion crosses a surface."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion.window import Stretch, computed, dataset, stretch
 from saltus.analysis.outcome_messages import warn
 from saltus.contact.guards import equation_of
-from saltus.errors import ParameterError, among, nearest, shown
+from saltus.errors import ParameterError, among, must_be, nearest, shown
 from saltus.flow.methods import Method, check_method
 from saltus.flow.request import Outcome, Schedule
 from saltus.kernels import status as st
@@ -29,8 +29,8 @@ from saltus.system.quantity import (
     with_surface,
 )
 
-#: Touches that are closer than this are one [forcing periods; the span if unforced]: where a gap is
-#: flat its minimum is that uncertain.
+#: Touches closer than this are one [forcing periods; the span if unforced]: where a gap is flat its
+#: minimum is that uncertain.
 SAME_TOUCH = 1e-9
 
 
@@ -121,7 +121,7 @@ def poincare(
         0,
         1,
     ):
-        raise ParameterError(f"direction must be 0, 1 or -1, not {shown(direction)}.")
+        raise must_be("direction", "0, 1 or -1", direction)
     found = crossed(system, surface, values if isinstance(values, Mapping) else {})
     seen = stretch(found.system, start, values, periods, t_end, t_start, transient)
 
@@ -139,8 +139,8 @@ def poincare(
 
 @dataclass(frozen=True)
 class Crossed:
-    """The system with the surface among its guards, which of them it is, and the unit of its
-    function; the surface in words.
+    """The system with the surface among its guards, the number of that guard, the unit of its
+    function, and the surface in words.
     """
 
     system: System
@@ -150,7 +150,7 @@ class Crossed:
 
 
 def crossed(system: System, surface: Any, values: Mapping[str, Any]) -> Crossed:
-    """What the user means by a surface; ``values`` may hold its level. Raises as :func:`poincare`
+    """The system with a user's surface; ``values`` may hold its level. Raises as :func:`poincare`
     does.
     """
     if callable(surface):
@@ -190,7 +190,7 @@ def crossed(system: System, surface: Any, values: Mapping[str, Any]) -> Crossed:
 
 
 def _last(system: System, unit: str, text: str) -> Crossed:
-    """The surface is the last guard; without words of its own its equation says what it is."""
+    """The last guard as the surface; without a text its equation describes it."""
     number = len(system.guards) - 1
     return Crossed(system, number, unit, text or equation_of(number, system.guards))
 
@@ -203,27 +203,27 @@ def _dataset(
     direction: int,
     outcome: Outcome,
 ) -> xr.Dataset:
-    """The crossings that were asked for, under their names."""
+    """The crossings in the wanted direction, by name."""
     table = outcome.contacts
     who, guard, time = table.trajectory, table.guard, table.time
     flips = table.changes_side | (table.kind == st.IMPACT)
     late = time > seen.begin[who]
     ours = late & (guard == crossed.guard)
     wanted = ours & flips & ((direction == 0) | (table.direction == direction))
-    kept, rows = table.rows(wanted), who[wanted]
+    crossings, rows = table.rows(wanted), who[wanted]
 
     def count(of: np.ndarray) -> np.ndarray:
         return np.bincount(who[of], minlength=seen.group.size)
 
     columns = {
-        "<state>": kept.state[:, : len(system.states)],
-        "crossing_time": kept.time,
-        "crossing_time_error": kept.time_error,
-        "crossing_period": kept.period,
-        "crossing_phase": _phases(seen, kept.phase, rows),
-        "crossing_direction": kept.direction,
-        "crossing_rate": kept.velocity,
-        "crossing_kind": kept.kind_name,
+        "<state>": crossings.state[:, : len(system.states)],
+        "crossing_time": crossings.time,
+        "crossing_time_error": crossings.time_error,
+        "crossing_period": crossings.period,
+        "crossing_phase": _phases(seen, crossings.phase, rows),
+        "crossing_direction": crossings.direction,
+        "crossing_rate": crossings.velocity,
+        "crossing_kind": crossings.kind_name,
         "crossing_trajectory": rows,
     }
     contacts = late & flips & np.isin(guard, acting_guards(system))
@@ -241,8 +241,8 @@ def _dataset(
 
 
 def _distinct(seen: Stretch, who: np.ndarray, time: np.ndarray, touches: np.ndarray) -> np.ndarray:
-    """The touches without repeats: one in the instant of another event is seen from the step before
-    it and from the step after it.
+    """The touches without repeats: a touch at the instant of another event is seen from the step
+    before it and from the step after it.
     """
     rows = np.flatnonzero(touches)
     again = np.zeros(len(rows), dtype=bool)

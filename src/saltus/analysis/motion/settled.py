@@ -1,4 +1,4 @@
-"""What a motion has settled to, so far as the kept periods can tell.
+"""The response that a motion has settled to, as far as the kept periods show.
 
 The stroboscope (states at whole forcing periods) is searched for the smallest n after which it
 repeats. That is an observation, not a proof: a slow transient may pass for settled, and a response
@@ -29,24 +29,24 @@ from saltus.results.dataset.schema import (
     states_of,
 )
 
-#: Largest mismatch that counts as a repeat: far above rounding, far below what tells 24T from its
-#: neighbour 12T on the rig (1e-2).
+#: Largest mismatch that counts as a repeat: far above rounding, far below the difference of 24T
+#: from its neighbour 12T on the rig (1e-2).
 TOLERANCE = 1e-6
 #: A transient of an nT response may repeat to the tolerance after 3n periods a little before it
-#: does after n. Where a part of the period repeats to this multiple of the tolerance, nothing is
-#: decided yet.
+#: does after n. If a part of the period repeats to this multiple of the tolerance, the response is
+#: undecided.
 UNDECIDED = 10
-#: Periods looked at, by default: enough for two repeats of a 48T response.
+#: Default number of last periods: enough for two repeats of a 48T response.
 LAST = 96
-#: Where nothing but magnitudes is known, a state counts as at least this share of the largest of
-#: its unit: one that has died away beside others has no size of its own.
+#: Least size of a state, as a share of the largest of its unit, if only magnitudes are known: a
+#: state that has decayed beside others has no size of its own.
 LEAST_SHARE = 1e-6
-#: The size that every state has at least [SI]: of one that died away and is alone of its unit. An
-#: atom measures 1e-10 m.
+#: Least size of any state [SI], for one that has decayed and is alone in its unit. An atom measures
+#: 1e-10 m.
 AT_REST = 1e-14
 #: Rounding of a state, relative to the largest value of its unit.
 ROUNDING = 64 * np.finfo(float).eps
-#: Numbers of one state that are looked at together.
+#: Numbers of one state that are processed together.
 TOGETHER = 2**19
 
 
@@ -60,8 +60,8 @@ def settled(
     Parameters
     ----------
     run : Dataset
-        What ``simulate`` returned for a forced system with samples at whole periods, or what
-        ``stroboscope`` returned.
+        The result of ``simulate`` for a forced system with samples at whole periods, or of
+        ``stroboscope``.
     tolerance : float
         Largest difference of states n periods apart that counts as a repeat, relative to the
         largest range that a state of the same unit has in the samples looked at; where there are
@@ -98,22 +98,22 @@ def settled(
     check(run, caller="settled")
     check_positive("tolerance", tolerance)
     phases = _phases(run)
-    whole = np.flatnonzero(phases == np.round(phases))
-    kept = max(whole.size - 1, 0)
-    last = min(LAST, kept) if last is None else whole_number(last, "last")
-    if not 2 <= last <= kept:
+    whole_periods = np.flatnonzero(phases == np.round(phases))
+    available = max(whole_periods.size - 1, 0)
+    last = min(LAST, available) if last is None else whole_number(last, "last")
+    if not 2 <= last <= available:
         raise ParameterError(
-            f"settled compares 2 whole forcing periods or more: last = {last}, and {kept} were "
-            f"kept. Give keep={max(last, LAST)}."
+            f"settled compares 2 whole forcing periods or more: last = {last}, and {available} "
+            f"were kept. Give keep={max(last, LAST)}."
         )
-    whole = whole[-last - 1 :]
+    whole_periods = whole_periods[-last - 1 :]
     states = states_of(run)
     samples = [np.atleast_2d(run[name].transpose(..., sample_dim(run)).values) for name in states]
     units = [str(run[name].attrs.get("units", "")) for name in states]
     parts = [
         _smallest_repeats(
-            np.stack([of[some][:, whole] for of in samples], axis=1),
-            _scales([of[some] for of in samples], units, whole, tolerance),
+            np.stack([of[some][:, whole_periods] for of in samples], axis=1),
+            _scales([of[some] for of in samples], units, whole_periods, tolerance),
             tolerance,
         )
         for some in _parts(samples[0])
@@ -122,7 +122,7 @@ def settled(
     n = np.where(np.isin(run["status"].values, ("ok", "graze_unresolved")), n, 0)
     values: dict[str, Any] = {"mismatch": mismatch, "response_period": n}
     if kind_of(run) == TRAJECTORY:
-        values |= _measures(run, dict(zip(states, samples, strict=True)), whole, n)
+        values |= _measures(run, dict(zip(states, samples, strict=True)), whole_periods, n)
     return _dataset(run, values, last // 2)
 
 
@@ -141,39 +141,39 @@ def _phases(run: xr.Dataset) -> np.ndarray:
 
 
 def _parts(samples: np.ndarray) -> Iterator[slice]:
-    """Trajectories that are looked at together."""
+    """Groups of trajectories that are processed together."""
     size = max(TOGETHER // max(samples.shape[1], 1), 1)
     return (slice(first, first + size) for first in range(0, len(samples), size))
 
 
 def _scales(
-    samples: Sequence[np.ndarray], units: Sequence[str], whole: np.ndarray, tolerance: float
+    samples: Sequence[np.ndarray], units: Sequence[str], whole_periods: np.ndarray, tolerance: float
 ) -> np.ndarray:
-    """What differences of each state are measured against, float64[trajectory, state].
+    """Scales of the differences of each state, float64[trajectory, state].
 
-    The range of a state that rests, or is on its way there, says nothing: it is measured by the
-    range of others of its unit, by the rounding of values of that unit, or by :data:`AT_REST`.
+    The range of a state at rest, or near it, is no scale: the range of other states of its unit,
+    the rounding of values of that unit, or :data:`AT_REST` stands for it.
     """
-    between = whole[-1] - whole[0] > len(whole) - 1
-    looked_at = [of[:, whole[0] : whole[-1] + 1] for of in samples]
-    own = np.stack(
+    between = whole_periods[-1] - whole_periods[0] > len(whole_periods) - 1
+    looked_at = [of[:, whole_periods[0] : whole_periods[-1] + 1] for of in samples]
+    ranges = np.stack(
         [np.ptp(of, axis=1) if between else np.abs(of).max(axis=1) for of in looked_at], axis=1
     )
     size = np.stack([np.abs(of).max(axis=1) for of in samples], axis=1)
     for unit in set(units):
         alike = np.array([one == unit for one in units])
-        largest = own[:, alike].max(axis=1, keepdims=True) * (1.0 if between else LEAST_SHARE)
+        largest = ranges[:, alike].max(axis=1, keepdims=True) * (1.0 if between else LEAST_SHARE)
         rounding = np.fmax.reduce(size[:, alike], axis=1)[:, None] * (ROUNDING / tolerance)
-        own[:, alike] = np.maximum(np.maximum(own[:, alike], largest), rounding)
-    scales: np.ndarray = np.maximum(own, AT_REST)
+        ranges[:, alike] = np.maximum(np.maximum(ranges[:, alike], largest), rounding)
+    scales: np.ndarray = np.maximum(ranges, AT_REST)
     return scales
 
 
 def _smallest_repeats(
     strobe: np.ndarray, scale: np.ndarray, tolerance: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Smallest n with states n periods apart equal, and how equal, for each trajectory; 0 and the
-    smallest mismatch where none is decided.
+    """Smallest n with states n periods apart equal, and their mismatch, for each trajectory; 0 and
+    the smallest mismatch if undecided.
 
     ``strobe`` has shape (trajectory, state, period), ``scale`` (trajectory, state); n runs up to
     half of the periods.
@@ -199,32 +199,37 @@ def _smallest_repeats(
 
 
 def _measures(
-    run: xr.Dataset, samples: Mapping[str, np.ndarray], whole: np.ndarray, n: np.ndarray
+    run: xr.Dataset, samples: Mapping[str, np.ndarray], whole_periods: np.ndarray, n: np.ndarray
 ) -> dict[str, Any]:
-    """Contacts in a response, peak and rms of each state, over whole responses; where nothing
-    repeats, over all that was looked at.
+    """Contacts in a response, peak and rms of each state, over whole responses; over all kept
+    periods if nothing repeats.
     """
-    last, each = len(whole) - 1, np.arange(len(n))
+    last, each = len(whole_periods) - 1, np.arange(len(n))
     repeats = np.where(n > 0, last // np.maximum(n, 1), 0)
     begin = np.where(n > 0, last - repeats * n, 0)
-    contacts = _contacts(run, whole[begin], whole[-1], len(n))
+    contacts = _contacts(run, whole_periods[begin], whole_periods[-1], len(n))
     values: dict[str, Any] = {
         "contacts_per_response": np.where(n > 0, contacts / np.maximum(repeats, 1), np.nan)
     }
     peaks, rms = {}, {}
     for name, of in samples.items():
-        parts = [_from_each_period(of[some], whole) for some in _parts(of)]
+        parts = [_from_each_period(of[some], whole_periods) for some in _parts(of)]
         largest, squares = (np.concatenate(column) for column in zip(*parts, strict=True))
         peaks[name] = largest[each, begin]
-        rms[name] = np.sqrt(squares[each, begin] / (whole[-1] - whole[begin]))
+        rms[name] = np.sqrt(squares[each, begin] / (whole_periods[-1] - whole_periods[begin]))
     return values | {"<state>_peak": peaks, "<state>_rms": rms}
 
 
-def _from_each_period(samples: np.ndarray, whole: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _from_each_period(
+    samples: np.ndarray, whole_periods: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Largest magnitude and sum of squares from each whole period to the last, two arrays
     float64[trajectory, period].
     """
-    looked_at, begins = samples[:, whole[0] : whole[-1]], whole[:-1] - whole[0]
+    looked_at, begins = (
+        samples[:, whole_periods[0] : whole_periods[-1]],
+        whole_periods[:-1] - whole_periods[0],
+    )
     largest = np.maximum.reduceat(np.abs(looked_at), begins, axis=1)
     squares = np.add.reduceat(looked_at**2, begins, axis=1)
     return (
@@ -239,20 +244,20 @@ def _contacts(run: xr.Dataset, first: np.ndarray, final: int, count: int) -> np.
     """
     time = np.broadcast_to(np.atleast_2d(run["time"].values), (count, run["time"].shape[-1]))
     contact = run["contact_time"].values
-    place, known = np.zeros(contact.size, np.int64), np.ones(contact.size, bool)
-    if "trajectory" in run.coords:  # of those that were chosen, in their order
+    row, known = np.zeros(contact.size, np.int64), np.ones(contact.size, bool)
+    if "trajectory" in run.coords:  # of the chosen trajectories, in their order
         numbers, who = np.atleast_1d(run["trajectory"].values), run["contact_trajectory"].values
         order = np.argsort(numbers)
-        place = order[np.searchsorted(numbers, who, sorter=order) % count]
-        known = numbers[place] == who
+        row = order[np.searchsorted(numbers, who, sorter=order) % count]
+        known = numbers[row] == who
     begin, end = time[np.arange(count), first], time[:, final]
     counts = (
         known
-        & (contact > begin[place])
-        & (contact <= end[place])
+        & (contact > begin[row])
+        & (contact <= end[row])
         & np.isin(run["contact_kind"].values, ("crossing", "impact"))
     )
-    return np.bincount(place[counts], minlength=count)
+    return np.bincount(row[counts], minlength=count)
 
 
 def _dataset(run: xr.Dataset, values: Mapping[str, Any], longest: int) -> xr.Dataset:

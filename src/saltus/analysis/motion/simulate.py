@@ -15,7 +15,7 @@ from saltus.analysis.inputs.starts import Ensemble, Span, check_system, ensemble
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion import time_errors as measure
 from saltus.analysis.outcome_messages import warn
-from saltus.errors import ParameterError, among, shown
+from saltus.errors import ParameterError, among, must_be
 from saltus.flow import engine
 from saltus.flow.counts import whole
 from saltus.flow.methods import Method, check_method
@@ -28,11 +28,12 @@ from saltus.results.dataset import schema
 from saltus.system import System
 from saltus.system.quantity import remembering
 
-#: Samples per forcing period: contacts are exact anyway, this is what a picture needs.
+#: Default samples per forcing period, enough for a picture; contacts are exact without them.
 PER_PERIOD = 200
-#: Samples over the whole span of an unforced system: a curve without corners over a hundred
-#: oscillations; fewer of many trajectories.
-MOST_PER_SPAN, LEAST_PER_SPAN = 10_000, 2000
+#: Samples over the whole span of an unforced system: a smooth curve over a hundred oscillations.
+MOST_PER_SPAN = 10_000
+#: Least number of these, for each of many trajectories.
+LEAST_PER_SPAN = 2000
 
 
 @verb
@@ -125,9 +126,7 @@ def simulate(
     flown = remembering(system)
     plan = _plan(system, group, length, samples, keep, len(flown.states))
     if not among(time_errors, ("measured", "local")):
-        raise ParameterError(
-            f'time_errors must be "measured" or "local", not {shown(time_errors)}.'
-        )
+        raise must_be("time_errors", '"measured" or "local"', time_errors)
 
     def so_far(outcome: Outcome) -> xr.Dataset:
         return _dataset(system, method, group, length, plan, outcome, measure.local(outcome))
@@ -151,7 +150,7 @@ def simulate(
 
 @dataclass(frozen=True)
 class _Plan:
-    """Which samples and contacts are kept."""
+    """The samples and contacts that are kept."""
 
     schedule: Schedule
     first: int
@@ -176,13 +175,15 @@ def _plan(
         samples, "samples", _per_span(group.size) if system.forced_at is None else PER_PERIOD
     )
     last = int(np.max(length.count + length.phase / length.period))
-    kept = _whole(keep, "keep", max(last, 1))
+    periods_kept = _whole(keep, "keep", max(last, 1))
     if keep is not None and system.forced_at is None:
         raise ParameterError(
-            f"{system.name} has no forcing period, so keep= has no meaning. Start "
-            f"later, or take fewer samples=."
+            lambda say: (
+                f"{system.name} has no forcing period, so {say.key('keep')} has no "
+                f"meaning. Start later, or take fewer {say.key('samples')}."
+            )
         )
-    first = max(int(np.min(length.count)) - kept, 0) if keep is not None else 0
+    first = max(int(np.min(length.count)) - periods_kept, 0) if keep is not None else 0
     longest = np.max((length.count + length.phase / length.period) * per)
     count = int(longest + 1e-9) + 1 - first * per
     _check_room(system, group.size, count, states)
@@ -196,7 +197,7 @@ def _plan(
 
 
 def _least_samples(system: System, trajectories: int, periods: Any, samples: Any, keep: Any) -> int:
-    """Samples that each trajectory has at least, known before any array is made."""
+    """Least number of samples of each trajectory, known before any array is made."""
     if system.forced_at is None:
         return _whole(samples, "samples", _per_span(trajectories)) + 1
     if periods is None:
@@ -206,16 +207,19 @@ def _least_samples(system: System, trajectories: int, periods: Any, samples: Any
 
 
 def _check_room(system: System, trajectories: int, samples: int, states: int | None = None) -> None:
-    """Raise ParameterError if samples of so many trajectories don't fit into memory."""
+    """Raise a ParameterError if samples of so many trajectories don't fit into memory."""
     check_room(
         samples * trajectories * (16.0 * (states or len(system.states)) + 16.0),
         f"{trajectories} trajectories with {samples} samples each",
-        "Give keep= (last periods) or fewer samples=, or use sl.stroboscope.",
+        lambda say: (
+            f"Give {say.key('keep')} (last periods) or fewer {say.key('samples')}, or use "
+            f"{say.verb('stroboscope')}."
+        ),
     )
 
 
 def _per_span(trajectories: int) -> int:
-    """Samples of a motion without forcing: enough for a smooth curve, fewer where there are many
+    """Samples of a motion without forcing: enough for a smooth curve, fewer for many
     trajectories.
     """
     return max(MOST_PER_SPAN // max(trajectories // 20, 1), LEAST_PER_SPAN)
@@ -234,7 +238,7 @@ def _dataset(
     outcome: Outcome,
     errors: np.ndarray,
 ) -> xr.Dataset:
-    """Everything under its name."""
+    """The Dataset of a run."""
     reached = slice(outcome.reached())
     count, fraction = plan.schedule.count[reached], plan.schedule.fraction[reached]
     forced = system.forced_at is not None

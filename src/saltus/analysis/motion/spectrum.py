@@ -1,4 +1,4 @@
-"""`spectrum`: the response by frequency."""
+"""`spectrum`: amplitudes of the response by frequency."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ import xarray as xr
 
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion.settled import settled
-from saltus.errors import ParameterError, among, nearest, shown
+from saltus.errors import ParameterError, among, one_of, unknown
 from saltus.flow.counts import whole as whole_number
 from saltus.results import Subject, build, inherited
 from saltus.results.dataset import schema
 from saltus.results.dataset.reader import reader
+from saltus.sentences import Given
 
-#: Windows by name: weights of n samples. Both are periodic (the sample after the last would be the
-#: first).
+#: Windows by name: weights of n samples. They are periodic: the sample after the last would be the
+#: first.
 WINDOWS: dict[str, Callable[[int], np.ndarray]] = {
     "none": lambda n: np.ones(n),
     "hann": lambda n: 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(n) / n),
@@ -60,12 +61,12 @@ def spectrum(
     Parameters
     ----------
     run : Dataset
-        What ``simulate`` returned. Take the transient off with its ``keep=``. Sampling folds what
+        The result of ``simulate``. Take the transient off with its ``keep=``. Sampling folds what
         lies above half of the samples per period back into the spectrum; forces of contact springs
         bend and their lines fall off as the third power of the order, so 200 samples a period leave
         some 1e-6 of the largest line.
     state : str or sequence of str, optional
-        Which states; all of them by default.
+        The states; all of them by default.
     window : {"none", "hann"}, optional
         For all trajectories; by default ``"none"`` where the response repeats, else ``"hann"``.
     last : int, optional
@@ -102,8 +103,8 @@ def spectrum(
     0.333
     """
     schema.check(run, caller="spectrum", kinds=[schema.TRAJECTORY])
-    if window is not None and not among(window, WINDOWS):
-        raise ParameterError(f"spectrum: window={shown(window)}. {nearest(window, WINDOWS)}")
+    if window is not None:
+        one_of(WINDOWS, "spectrum: ", window=window)
     names = _states(run, state)
     stretch = _forced_stretch(run, last) if "period" in run.variables else _free_stretch(run, last)
     chosen = [window or ("none" if n else "hann") for n in stretch.response]
@@ -117,12 +118,12 @@ def spectrum(
         for name in named
         if name in run.coords and name not in ("frequency", "order")
     }
-    own = stretch.frequency.ndim == 2
+    separate = stretch.frequency.ndim == 2
     subject = Subject(
         states=names,
         units={name: run[name].attrs.get("units", "") for name in (*names, *varied)},
         forcing_period=np.atleast_1d(run["forcing_period"].values)
-        if own
+        if separate
         else run.attrs.get("forcing_period_s"),
         varied=varied,
         attrs=inherited(run),
@@ -146,15 +147,15 @@ def spectrum(
         schema.SPECTRUM,
         subject,
         [*places.items(), *spectra, *each.items()],
-        along={"frequency": "order"} if own else {},
+        along={"frequency": "order"} if separate else {},
     )
 
 
 # -- which samples ---------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class _Stretch:
-    """Samples ``first`` to ``first + count``: frequencies [Hz], orders, the time of the first [s];
-    the periods of the responses [T].
+    """Samples ``first`` to ``first + count``: frequencies [Hz], orders, the time of the first
+    sample [s]; the periods of the responses [T].
     """
 
     first: int
@@ -176,9 +177,7 @@ def _states(run: xr.Dataset, state: str | Sequence[str] | None) -> list[str]:
     )
     for name in names:
         if not among(name, known):
-            raise ParameterError(
-                f"spectrum: this run has no state {shown(name)}. {nearest(name, known)}"
-            )
+            raise unknown("spectrum: this run has no state", name, known)
     return names
 
 
@@ -187,36 +186,45 @@ def _forced_stretch(run: xr.Dataset, last: int | None) -> _Stretch:
     trajectories that repeat.
     """
     phases = np.asarray(run["period"].values, dtype=float)
-    whole = np.flatnonzero(phases == np.round(phases))
-    kept = max(whole.size - 1, 0)
+    whole_periods = np.flatnonzero(phases == np.round(phases))
+    available = max(whole_periods.size - 1, 0)
     last = last if last is None else whole_number(last, "last")
-    if last is not None and last > kept:
+    if last is not None and last > available:
         raise ParameterError(
-            f"spectrum: last={shown(last)}, but {kept} whole forcing periods were "
-            f"kept. Simulate with more keep=."
+            lambda say: (
+                f"spectrum: {say.key(last=Given(last))}, but {available} whole forcing periods "
+                f"were kept. Simulate with more {say.key('keep')}."
+            )
         )
-    if not kept:
+    if not available:
         raise ParameterError(
-            "spectrum needs a whole forcing period of samples, its two ends included. Simulate "
-            "longer, or give more keep=."
+            lambda say: (
+                "spectrum needs a whole forcing period of samples, its two ends included. "
+                f"Simulate longer, or give more {say.key('keep')}."
+            )
         )
-    periods = kept if last is None else last
-    _check_even(phases[whole[-periods - 1] :], "forcing periods")
+    periods = available if last is None else last
+    _check_even(phases[whole_periods[-periods - 1] :], "forcing periods")
     response = np.zeros(run.sizes.get("trajectory", 1), dtype=np.int64)
     if periods >= 2:
         response = np.atleast_1d(settled(run, last=periods)["response_period"].values)
     common = math.lcm(*(int(n) for n in response if n))
     if common > periods:
         raise ParameterError(
-            f"spectrum: the trajectories repeat after {sorted({int(n) for n in response if n})} "
-            f"forcing periods, so only {common} periods "
-            f"hold whole responses of all, and {periods} were kept. Give more keep=, or take them "
-            f"one by one: run.isel(trajectory=0)."
+            lambda say: (
+                "spectrum: the trajectories repeat after "
+                f"{sorted({int(n) for n in response if n})} forcing periods, so only {common} "
+                f"periods hold whole responses of all, and {periods} were kept. Give more "
+                f"{say.key('keep')}, or take them one by one: run.isel(trajectory=0)."
+            )
         )
     if last is None and response.all():
-        periods = common  # more of the same would only put empty lines between
+        periods = common  # more periods would only add empty lines between
     periods -= periods % common
-    first, count = int(whole[-periods - 1]), int(whole[-1] - whole[-periods - 1])
+    first, count = (
+        int(whole_periods[-periods - 1]),
+        int(whole_periods[-1] - whole_periods[-periods - 1]),
+    )
     order = np.arange(count // 2 + 1) / periods
     own = "forcing_period" in run.variables and run["forcing_period"].ndim == 1
     period = (
@@ -227,7 +235,9 @@ def _forced_stretch(run: xr.Dataset, last: int | None) -> _Stretch:
 
 
 def _free_stretch(run: xr.Dataset, last: int | None) -> _Stretch:
-    """All samples of a system without forcing; the last one would be the first of a repeat."""
+    """All samples of a system without forcing but the last, which would be the first of a
+    repeat.
+    """
     if last is not None:
         raise ParameterError(
             "spectrum: last= counts forcing periods, and this system isn't "

@@ -89,11 +89,15 @@ def stroboscope(
     count = whole_periods + 1 - first
     many = trajectories(start, values)
     size = count * many * (16.0 * len(system.states) + 16.0)
-    check_room(size, f"{many} trajectories with {count} periods each", "Give keep= (last periods).")
+    check_room(
+        size,
+        f"{many} trajectories with {count} periods each",
+        lambda say: f"Give {say.key('keep')} (last periods).",
+    )
     group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
     length = span(system, group, periods, None, t_start)
-    kept = np.arange(first, whole_periods + 1, dtype=np.int64)
-    schedule = Schedule(kept, np.zeros(len(kept)))
+    periods_kept = np.arange(first, whole_periods + 1, dtype=np.int64)
+    schedule = Schedule(periods_kept, np.zeros(len(periods_kept)))
     request = length.request(group.start, group.parameters, schedule, None)
 
     def dataset(outcome: Outcome) -> xr.Dataset:
@@ -104,7 +108,7 @@ def stroboscope(
         )
         values = {
             "trajectory": np.arange(group.size),
-            "period": kept[reached],
+            "period": periods_kept[reached],
             "<state>": outcome.samples[:, reached, : len(system.states)],
             **dataset_parts.endings(outcome),
             **dataset_parts.minima(outcome),

@@ -1,5 +1,5 @@
-"""`structure_modes`: natural frequencies and shapes of a structure, and what a reduction to the
-lowest of them leaves out.
+"""`structure_modes`: natural frequencies and mode shapes of a structure, and the flexibility that a
+reduction to the lowest modes leaves out.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.inputs.verb import verb
-from saltus.errors import ParameterError, shown
+from saltus.errors import must_be
 from saltus.flow.counts import whole
 from saltus.results import Subject, build, made_by
 from saltus.results.dataset.schema import MODES
@@ -30,7 +30,7 @@ def structure_modes(
     at: Any = None,
     names: Sequence[str] | str | None = None,
 ) -> xr.Dataset:
-    """The lowest modes of a structure, and how much of the static flexibility they carry.
+    """The lowest modes of a structure, and their share of the static flexibility.
 
     Contacts press on few degrees of freedom. What the modes left out would have given way there,
     the residual flexibility, is missing in a reduced system: set beside that of the contact itself,
@@ -78,7 +78,7 @@ def structure_modes(
     places, vectors = _directions(at, degrees if known.shapes.shape[1] == size else [], degrees)
     total, residual = flexibility(stiffness, known, count, vectors)
     kept = known.kept(count)
-    with np.errstate(invalid="ignore"):  # of what a rigid body moves, or nothing does
+    with np.errstate(invalid="ignore"):  # a rigid body moves, or nothing does
         share = np.where(np.isfinite(total), 1 - residual / total, np.nan)
 
     values = {
@@ -90,11 +90,11 @@ def structure_modes(
 
 
 def _directions(at: Any, usual: list[str], degrees: list[str]) -> tuple[list[str], np.ndarray]:
-    """Labels of the places, and the directions float64[m, n] of unit forces there."""
+    """Labels of the degrees of freedom, and the directions float64[m, n] of unit forces there."""
     if isinstance(at, str):
         at = at.replace(",", " ").split()
     elif not isinstance(at, list | tuple | None):
-        raise ParameterError(f"at must be names of degrees of freedom, not {shown(at)}.")
+        raise must_be("at", "names of degrees of freedom", at)
     pairs: list[tuple[Any, Any]] = [
         one if isinstance(one, tuple) and len(one) == 2 else (one, None)
         for one in (usual if at is None else at)

@@ -1,5 +1,5 @@
-"""Errors of contact times: of one step, or measured by running the same trajectories again, more
-exactly and nudged by roundings.
+"""Errors of contact times: of one step, or measured by repeated runs of the same trajectories, more
+exact and perturbed by roundings.
 """
 
 from __future__ import annotations
@@ -19,26 +19,27 @@ from saltus.language import expression as ex
 from saltus.language.evaluate import evaluate
 from saltus.system import System
 
-#: Copies of a trajectory whose errors are rounding. Errors soon lie along the one direction that
-#: grows fastest, so the ratio of a trajectory's error to its distance from a copy stays what chance
-#: made it at the start: one copy can be near for ever, three rarely are.
+#: Copies of a trajectory whose errors are rounding. Errors soon lie along the direction that grows
+#: fastest, so the ratio of a trajectory's error to its distance from a copy stays at its random
+#: first value: one copy can be near for ever, three rarely are.
 COPIES = 3
-#: The estimate is this many times the largest distance so far: where errors are rounding, and where
-#: the companion is exact beside them.
-SAFETY, SAFETY_OF_EXACT_COMPANION = 8.0, 4.0
+#: Factor of the estimate on the largest distance so far, if errors are rounding.
+SAFETY = 8.0
+#: The same factor, if the companion is exact in comparison.
+SAFETY_OF_EXACT_COMPANION = 4.0
 #: Most trajectories that move in one call with their copies.
 FEW = 16
-#: Share of the work that is the run itself, where its copies come after it.
+#: Share of the progress for the run itself, if its copies come after it.
 BY_ITSELF = 0.3
-#: Seed of the signs of the nudges. They are the same for every trajectory, so that no result
+#: Seed of the signs of the perturbations. They are the same for every trajectory, so that no result
 #: depends on its neighbours.
 SEED = 20
-#: What must be the same of two contacts that are compared.
+#: Columns that must agree in two contacts that are compared.
 _EVENT = [st.REC_GUARD, st.REC_DIRECTION]
 
 
 def local(outcome: Outcome) -> np.ndarray:
-    """What one step's own error means for the time of its contact [s]."""
+    """Error of each contact's time from the error of one step [s]."""
     errors: np.ndarray = outcome.contacts.time_error
     return errors
 
@@ -50,7 +51,7 @@ def measured(
     threads: int | None,
     show: Callable[[float], None] | None,
 ) -> tuple[Outcome, np.ndarray]:
-    """Run a request, and the copies that tell its errors.
+    """Run a request, and the copies that measure its errors.
 
     Parameters
     ----------
@@ -60,7 +61,7 @@ def measured(
     Returns
     -------
     Outcome, float64[contact]
-        What came out, and the estimated error of the time of every contact [s]; infinite from where
+        The outcome, and the estimated error of the time of every contact [s]; infinite from where
         on nothing is known.
 
     Raises
@@ -85,18 +86,18 @@ def _in_one_call(
     threads: int | None,
     show: Callable[[float], None] | None,
 ) -> tuple[Outcome, np.ndarray]:
-    """Outcome and largest distances, trajectories and copies moved together: copies fill lanes that
-    would stay empty.
+    """Outcome and largest distances, with trajectories and copies moved together: copies fill lanes
+    that would stay empty.
     """
     n, total = len(request.start), (1 + COPIES) * len(request.start)
     try:
-        whole = engine.run(
+        together = engine.run(
             system, method.suited_to(total), _with_copies(system, request), threads, show
         )
     except RunInterrupted as stop:
         so_far = stop
         raise RunInterrupted(lambda: so_far.partial.of(0, n)) from None
-    outcome, check = whole.of(0, n), whole.of(n, total)
+    outcome, check = together.of(0, n), together.of(n, total)
     return outcome, np.max([_distances(outcome, check, i * n) for i in range(COPIES)], axis=0)
 
 
@@ -107,7 +108,9 @@ def _one_by_one(
     threads: int | None,
     show: Callable[[float], None] | None,
 ) -> tuple[Outcome, np.ndarray]:
-    """The same, one run after the other: the contacts of one copy need room at a time."""
+    """Outcome and largest distances, with one run after the other: only one copy's contacts need
+    memory at a time.
+    """
 
     def part(begin: float, share: float) -> Callable[[float], None] | None:
         return None if show is None else lambda done: show(begin + share * done)
@@ -135,8 +138,8 @@ def _one_by_one(
 
 # -- nudges ----------------------------------------------------------------------------------------
 def _nudged(system: System, request: Request) -> tuple[np.ndarray, np.ndarray]:
-    """Starts float64[copy, n, D] and values float64[copy, n or 1, P] of the copies: wrong by an
-    ulp, differently in each. What moves a boundary, or time, stays.
+    """Starts float64[copy, n, D] and values float64[copy, n or 1, P] of the copies, perturbed by an
+    ulp, differently in each. Values that move a boundary, or change the time, are kept.
     """
     of_states, of_values = _nudges(system.origin)
     resting = _on_a_boundary(system, request)
@@ -157,7 +160,9 @@ def _nudges(system: System) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _fixed(system: System) -> np.ndarray:
-    """Parameters that move a boundary, or time: bool[P], the same for all values."""
+    """True for parameters that move a boundary, or change the time: bool[P], the same for all
+    values.
+    """
     places = {
         leaf.payload for guard in system.guards for leaf in ex.walk(guard.gap) if leaf.op == "param"
     } | {system.forced_at}
@@ -165,12 +170,14 @@ def _fixed(system: System) -> np.ndarray:
 
 
 def _signs(copy: int, count: int) -> np.ndarray:
-    """Up or down, for each state and value of a copy."""
+    """Signs of the perturbations of each state and value of a copy."""
     return np.random.default_rng([SEED, copy]).choice([-1.0, 1.0], count)
 
 
 def _on_a_boundary(system: System, request: Request) -> np.ndarray:
-    """Trajectories that start on a boundary, and would leave it by a nudge: bool[n]."""
+    """True for trajectories that start on a boundary, and would leave it by a perturbation:
+    bool[n].
+    """
     gaps = evaluate(
         [guard.gap for guard in system.guards],
         t=request.origin,
@@ -206,8 +213,8 @@ def _distances(outcome: Outcome, check: Outcome, offset: int) -> np.ndarray:
     """Largest distance so far of the contacts of a trajectory from those of its copy [s],
     ``offset`` rows later in ``check``.
 
-    The k-th contact is compared with the k-th; from the first at which the two runs meet different
-    guards on, it is infinite.
+    The k-th contact is compared with the k-th; from the first different guards on the distance is
+    infinite.
     """
     distance = np.full(len(outcome.contacts), np.inf)
     count = len(outcome.status)
@@ -225,8 +232,8 @@ def _distances(outcome: Outcome, check: Outcome, offset: int) -> np.ndarray:
 
 
 def _in_order(ours: np.ndarray, theirs: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, int]:
-    """Their times in the order of our contacts, and how many are the same; neighbours are swapped
-    (contacts at one instant).
+    """Times of their contacts in the order of ours, and the number of equal ones; neighbours may be
+    swapped (contacts at one instant).
     """
     shared, first = min(len(ours), len(theirs)), 0
     while first < shared:

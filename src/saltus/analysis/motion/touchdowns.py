@@ -17,8 +17,8 @@ from saltus.system import System
 
 @dataclass(frozen=True)
 class Touchdowns:
-    """Contacts that begin in a stretch of motion, one a row, by trajectory and time; and when each
-    guard is in contact.
+    """Contacts that begin in a stretch of motion, one a row, by trajectory and time; and the times
+    in contact of each guard.
 
     Attributes
     ----------
@@ -121,8 +121,8 @@ def find(
 
 
 def _rebounds(seen: Stretch, contacts: ContactTable) -> tuple[np.ndarray, np.ndarray]:
-    """Speed at which an impact's guard is left, and its impulse for each unit of the change of
-    speed, float64[c]; zero for other contacts.
+    """Rebound speed at an impact's guard, and its impulse per unit of the change of speed,
+    float64[c]; zero for other contacts.
     """
     system, speed, mass = seen.system, np.zeros(len(contacts)), np.zeros(len(contacts))
     values = dict(zip(system.values, seen.group.parameters.T, strict=True))
@@ -142,9 +142,10 @@ def _rebounds(seen: Stretch, contacts: ContactTable) -> tuple[np.ndarray, np.nda
 def _summed_up(
     contacts: ContactTable, mass: np.ndarray, speed: np.ndarray, after: np.ndarray
 ) -> np.ndarray:
-    """In the row of the last impact of a chatter that was followed, the impulse of those that were
-    not, ``m v (1 + e)/(1 - e)`` from a rebound v; in the row behind it, where the rest begins,
-    minus the integral of the force at rest for that long, ``2 m v/(1 - e)``: float64[c].
+    """Impulses that are summed up where a chatter isn't followed to its end, float64[c]. In the row
+    of its last impact: that of the missing impacts, ``m v (1 + e)/(1 - e)`` from a rebound v. In
+    the row after it, where the rest begins: minus the integral of the force at rest for that time,
+    ``2 m v/(1 - e)``.
     """
     result = np.zeros(len(contacts))
     last = np.flatnonzero(contacts.chatters[:-1] & (contacts.kind[1:] == st.HOLD))
@@ -156,9 +157,7 @@ def _summed_up(
 
 
 def _pairs(rows: np.ndarray, enters: np.ndarray) -> np.ndarray:
-    """Rows of each entry and of the exit after it (-1: none), and that there are no
-    impacts, int64[k, 4].
-    """
+    """Rows of each entry and of the exit after it (-1: none), with zero impacts, int64[k, 4]."""
     at = np.flatnonzero(enters)
     following = np.append(rows, -1)
     return np.stack([rows[at], following[at + 1], 0 * at, 0 * at - 1], axis=1)
@@ -203,7 +202,7 @@ def _single(row: int) -> tuple[int, int, int, int]:
 
 
 def _released(contacts: ContactTable, row: int, hold: int) -> int:
-    """The row in which the rest behind the last impact of a chatter ends, -1 if it doesn't."""
+    """The row in which the rest after the last impact of a chatter ends, -1 if it doesn't."""
     later = np.flatnonzero(
         (contacts.trajectory[row:] == contacts.trajectory[row])
         & (contacts.guard[row:] == hold)
@@ -213,8 +212,8 @@ def _released(contacts: ContactTable, row: int, hold: int) -> int:
 
 
 def _touching_first(outcome: Outcome, i: int, g: int, side: int, enters: np.ndarray) -> bool:
-    """Whether a guard is in contact when the stretch begins: the first event tells, else the mode,
-    which then never changes.
+    """True if a guard is in contact when the stretch begins: the first event shows it, else the
+    mode, which then never changes.
     """
     if len(enters):
         return not enters[0]

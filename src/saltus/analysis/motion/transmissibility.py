@@ -1,4 +1,4 @@
-"""`transmissibility`: how much of one output of a response arrives in another."""
+"""`transmissibility`: the ratio of two outputs of a response."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.inputs.verb import verb
-from saltus.errors import ParameterError, among, nearest, shown
+from saltus.errors import ParameterError, nearest, one_of, shown
 from saltus.results.dataset.build import finish
 from saltus.results.dataset.reader import reader
 from saltus.results.dataset.schema import RESPONSES, check
 
-#: What two outputs are compared by.
+#: Quantities by which two outputs are compared.
 By = Literal["amplitude", "rms", "rms_about_mean"]
 
 
@@ -25,7 +25,7 @@ def transmissibility(ds: xr.Dataset, output: str, to: str, by: By = "amplitude")
     Parameters
     ----------
     ds : Dataset
-        What ``frequency_response`` or ``bifurcation_diagram`` returned.
+        The result of ``frequency_response`` or ``bifurcation_diagram``.
     output, to : str
         Outputs of it, states or functions: numerator and denominator.
     by : {"amplitude", "rms", "rms_about_mean"}
@@ -63,8 +63,7 @@ def transmissibility(ds: xr.Dataset, output: str, to: str, by: By = "amplitude")
                 f"transmissibility: {shown(name)} is no output. "
                 f"{nearest(name, known)} Ask for functions by outputs=."
             )
-    if not among(by, get_args(By)):
-        raise ParameterError(f"transmissibility: by={shown(by)}. Known: {', '.join(get_args(By))}.")
+    one_of(get_args(By), "transmissibility: ", by=by)
     upper, lower = ds.sel(output=output), ds.sel(output=to)
     units = [one["output_units"].item() for one in (upper, lower)]
     unit = "" if "" in units else "1" if units[0] == units[1] else f"{units[0]}/{_factor(units[1])}"
@@ -84,5 +83,5 @@ def transmissibility(ds: xr.Dataset, output: str, to: str, by: By = "amplitude")
 
 
 def _factor(unit: str) -> str:
-    """A unit as it stands in a denominator."""
+    """A unit in the form for a denominator."""
     return f"({unit})" if any(sign in unit for sign in "*/ ") else unit

@@ -1,5 +1,5 @@
-"""A stretch of motion after a transient: what sections, impact statistics and energy balances are
-taken from.
+"""A stretch of motion after a transient, from which sections, impact statistics and energy balances
+are computed.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from saltus.units import to_si
 
 @dataclass(frozen=True)
 class Stretch:
-    """Which trajectories run, and from when on they are looked at.
+    """The trajectories of a run, and the part of it after the transient.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Stretch:
 
     @property
     def duration(self) -> np.ndarray:
-        """Time that is looked at, float64[n] [s]."""
+        """Length of the stretch, float64[n] [s]."""
         duration: np.ndarray = (
             self.length.t_start
             + self.length.count * self.length.period
@@ -61,7 +61,7 @@ class Stretch:
 
     @property
     def forcing_period(self) -> float | np.ndarray | None:
-        """One for all, or one each [s]; None for an unforced system."""
+        """Forcing period, one for all trajectories or one each [s]; None for an unforced system."""
         if self.system.forced_at is None:
             return None
         return (
@@ -69,7 +69,7 @@ class Stretch:
         )
 
     def request(self, system: System, schedule: Schedule, record: bool) -> Request:
-        """The request for this system, or one with more states: those start at zero."""
+        """The request for this system, or for one with more states, which start at zero."""
         more = len(system.states) - self.group.start.shape[1]
         start = np.pad(self.group.start, ((0, 0), (0, more)))
         return self.length.request(
@@ -80,7 +80,7 @@ class Stretch:
 def stretch(
     system: System, start: Any, values: Any, periods: Any, t_end: Any, t_start: Any, transient: Any
 ) -> Stretch:
-    """What the user asked for.
+    """The stretch of a user's arguments.
 
     Raises
     ------
@@ -124,7 +124,9 @@ def computed(
     threads: int | None,
     progress: bool | Callable[[float], None] | None,
 ) -> xr.Dataset:
-    """The Dataset of a request; on Ctrl-C the one so far, in the ``partial`` of the exception."""
+    """The Dataset of a request; on Ctrl-C the Dataset so far is in the ``partial`` of the
+    exception.
+    """
     with reporting(progress) as show:
         try:
             return dataset(engine.run(system, method, request, threads, show))
@@ -137,8 +139,7 @@ def dataset(
     values: Mapping[str, Any], each: Mapping[str, Any],
     attrs: Mapping[str, Any] | None = None, **options: Any,
 ) -> xr.Dataset:  # fmt: skip
-    """The Dataset of a stretch: of the system itself, not of the guards and states that were added
-    to it.
+    """The Dataset of a stretch: of the system itself, without added guards and states.
 
     ``values`` are tables, ``each`` what belongs to each trajectory; how it ended stands between
     them. ``attrs`` are settings beside the provenance, ``options`` as for

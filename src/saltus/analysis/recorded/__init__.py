@@ -1,1 +1,1 @@
-"""Exponents of recorded series: what a laboratory measured, without an equation."""
+"""Exponents of recorded series: measurements without an equation."""

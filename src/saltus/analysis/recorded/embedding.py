@@ -10,16 +10,19 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-#: Longest delay tried, as a share of the series: shorter series don't show so slow a motion anyway.
+#: Longest delay tried, as a share of the series: a shorter series doesn't show so slow a motion.
 LONGEST = 0.05
 #: Samples for each cell of the histogram of the mutual information.
 PER_CELL = 40
-#: Growth of a distance by one more coordinate, and size of it relative to the series, from which a
-#: neighbour is false: Kennel's values.
-STRETCHED, SPREAD = 15.0, 2.0
-#: Share of false neighbours that is taken for none, and the largest dimension tried.
-NONE_FALSE, MOST = 0.01, 10
-#: Points whose neighbours are looked at.
+#: Growth of a distance by one more coordinate from which a neighbour is false (Kennel's value).
+STRETCHED = 15.0
+#: Distance relative to the series from which a neighbour is false (Kennel's value).
+SPREAD = 2.0
+#: Share of false neighbours that counts as none.
+NONE_FALSE = 0.01
+#: Largest dimension tried.
+MOST = 10
+#: Points whose neighbours are tested.
 ASKED = 4000
 
 
@@ -32,14 +35,14 @@ def embed(series: np.ndarray, dimension: int, delay: int) -> np.ndarray:
 
 
 def mutual_information(series: np.ndarray, lag: int) -> float:
-    """What a sample says about the one ``lag`` later [nat], by a histogram of cells of equal
-    chance.
+    """Information of a sample about the one ``lag`` later [nat], by a histogram with cells of equal
+    probability.
     """
     return _information(*_cells(series), lag)
 
 
 def _cells(series: np.ndarray) -> tuple[np.ndarray, int]:
-    """The cell of each sample, and how many there are."""
+    """The cell of each sample, and the number of cells."""
     cells = max(int(np.sqrt(len(series) / PER_CELL)), 4)
     rank = np.empty(len(series), np.int64)
     rank[np.argsort(series, kind="stable")] = np.arange(len(series))
@@ -70,8 +73,8 @@ def first_minimum(series: np.ndarray) -> int:
 
 
 def false_neighbours(series: np.ndarray, dimension: int, delay: int, exclude: int) -> float:
-    """Share of nearest neighbours in this dimension that one more coordinate shows to be none; NaN
-    if nothing has a neighbour.
+    """Share of nearest neighbours in this dimension that one more coordinate shows to be false; NaN
+    if no point has a neighbour.
     """
     longer = embed(series, dimension + 1, delay)
     points = longer[:, :dimension]
@@ -91,14 +94,14 @@ def false_neighbours(series: np.ndarray, dimension: int, delay: int, exclude: in
 def _nearest_allowed(
     points: np.ndarray, asked: np.ndarray, exclude: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Distance and index of the nearest point more than ``exclude`` samples away from each that is
-    asked for; inf and -1 if there is none.
+    """Distance and index of the nearest point more than ``exclude`` samples away from each tested
+    point; inf and -1 if there is none.
 
-    The few nearest are looked at first, four times as many where all of them are too near in time:
-    for most points a few are enough.
+    The few nearest are tried first, then four times as many while all are too near in time: for
+    most points a few are enough.
     """
     tree, most = cKDTree(points), min(2 * exclude + 2, len(points))
-    distance, place = np.full(len(asked), np.inf), np.full(len(asked), -1)
+    distance, index = np.full(len(asked), np.inf), np.full(len(asked), -1)
     left, count = np.arange(len(asked)), min(8, most)
     while True:
         near, who = (
@@ -106,10 +109,10 @@ def _nearest_allowed(
         )
         allowed = np.abs(who - asked[left, None]) > exclude
         rows, first = np.flatnonzero(allowed.any(axis=1)), allowed.argmax(axis=1)
-        distance[left[rows]], place[left[rows]] = near[rows, first[rows]], who[rows, first[rows]]
+        distance[left[rows]], index[left[rows]] = near[rows, first[rows]], who[rows, first[rows]]
         left = np.delete(left, rows)
         if not len(left) or count == most:
-            return distance, place
+            return distance, index
         count = min(4 * count, most)
 
 
@@ -124,8 +127,8 @@ def least_dimension(series: np.ndarray, delay: int, exclude: int) -> int:
 
 
 def hardly_correlated(series: np.ndarray) -> bool:
-    """Whether neighbouring samples tell little of each other, as those of a map do: autocorrelation
-    below 1/e in magnitude.
+    """True if neighbouring samples are hardly correlated, as those of a map: autocorrelation below
+    1/e in magnitude.
     """
     centred = series - series.mean()
     return bool(abs(np.dot(centred[:-1], centred[1:])) < np.dot(centred, centred) / np.e)

@@ -15,14 +15,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-#: Neighbours that a point has within the default of the largest distance: enough that one of them
-#: lies in the old direction.
+#: Neighbours of a point within the default largest distance: enough that one of them lies in the
+#: old direction.
 CROWD = 20
-#: Points that are asked for it, evenly spread.
+#: Points for which this distance is measured, evenly spread.
 ASKED = 200
-#: Angle that a replacement may turn by at first [rad], and how often the largest distance grows
-#: before the angle is doubled: Wolf's.
-ANGLE, WIDENINGS = 0.3, 5
+#: Largest angle of a first replacement [rad] (Wolf's value).
+ANGLE = 0.3
+#: Widenings of the largest distance before the angle is doubled (Wolf's value).
+WIDENINGS = 5
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,7 @@ class Evolutions:
 
 @dataclass(frozen=True)
 class Search:
-    """Where neighbours are looked for.
+    """Limits of the search for neighbours.
 
     Attributes
     ----------
@@ -71,31 +72,31 @@ def crowd_distance(points: np.ndarray, smallest: float, exclude: int) -> float:
     return float(np.median([_crowd(points, tree, here, smallest, exclude) for here in asked]))
 
 
-def _crowd(points: np.ndarray, tree: cKDTree, here: int, smallest: float, exclude: int) -> float:
-    """Distance of a point to its 20th allowed neighbour: among a few that the tree finds, among
-    more, at last among all.
+def _crowd(points: np.ndarray, tree: cKDTree, index: int, smallest: float, exclude: int) -> float:
+    """Distance of a point to its 20th allowed neighbour; the tree returns more neighbours until
+    there are enough, at last all.
     """
     for count in (4 * CROWD, 16 * CROWD, len(points)):
         if count < len(points) // 8:
-            distances, places = tree.query(points[here], k=count)
+            distances, places = tree.query(points[index], k=count)
         else:
-            distances = np.linalg.norm(points - points[here], axis=1)
+            distances = np.linalg.norm(points - points[index], axis=1)
             places = np.arange(len(points))
-        allowed = distances[(np.abs(places - here) > exclude) & (distances >= smallest)]
+        allowed = distances[(np.abs(places - index) > exclude) & (distances >= smallest)]
         if len(allowed) >= CROWD:
             return float(np.partition(allowed, CROWD - 1)[CROWD - 1])
     return math.inf
 
 
 def follow(points: np.ndarray, search: Search) -> Evolutions:
-    """The evolutions of the trajectory float64[n, m], from its first point on that has a neighbour;
-    empty if none has.
+    """The evolutions of the trajectory float64[n, m], from its first point with a neighbour on;
+    empty if none has one.
     """
     return _Chase(points, search).run()
 
 
 class _Chase:
-    """A fiducial point and its neighbour on their way."""
+    """A fiducial point and its neighbour, moving along the trajectory."""
 
     def __init__(self, points: np.ndarray, search: Search):
         self._points, self._search = points, search
@@ -106,15 +107,15 @@ class _Chase:
         search, points = self._search, self._points
         rows: list[tuple[float, float, float]] = []
         neighbour, angle = None, math.nan
-        for here in range(0, len(points) - search.evolve, search.evolve):
+        for index in range(0, len(points) - search.evolve, search.evolve):
             if neighbour is None:
-                neighbour, angle = self._nearest(here), math.nan
+                neighbour, angle = self._nearest(index), math.nan
             if neighbour is None:
                 continue
-            there = here + search.evolve, neighbour + search.evolve
-            before, after = points[neighbour] - points[here], points[there[1]] - points[there[0]]
+            there = index + search.evolve, neighbour + search.evolve
+            before, after = points[neighbour] - points[index], points[there[1]] - points[there[0]]
             distance, later = float(np.linalg.norm(before)), float(np.linalg.norm(after))
-            # on one another: no growth to be seen, and no direction
+            # on one another: neither growth nor direction is defined
             if later == 0.0 or distance == 0.0:
                 neighbour = None
                 continue
@@ -122,11 +123,11 @@ class _Chase:
             neighbour, angle = self._replacement(there, after / later)
         return Evolutions(*np.array(rows).reshape(-1, 3).T)
 
-    def _nearest(self, here: int) -> int | None:
+    def _nearest(self, index: int) -> int | None:
         """The nearest allowed neighbour of a point."""
         radius = self._search.largest
         for _ in range(WIDENINGS):
-            places, distances, _ = self._around(here, radius)
+            places, distances, _ = self._around(index, radius)
             if len(places):
                 return int(places[distances.argmin()])
             radius += self._search.largest
@@ -135,16 +136,16 @@ class _Chase:
     def _replacement(
         self, there: tuple[int, int], direction: np.ndarray
     ) -> tuple[int | None, float]:
-        """The neighbour that takes over: the one that turns least, close by if it can be; the old
-        one if there is no other.
+        """The neighbour that replaces the old one: the one that turns least, close by if possible;
+        the old one if there is no other.
         """
-        here, old = there
-        if here >= len(self._points) - self._search.evolve:
+        index, old = there
+        if index >= len(self._points) - self._search.evolve:
             return None, math.nan
         limit = ANGLE
         while limit < math.pi:
             for widening in range(1, WIDENINGS + 1):
-                places, distances, offsets = self._around(here, widening * self._search.largest)
+                places, distances, offsets = self._around(index, widening * self._search.largest)
                 if len(places):
                     angles = np.arccos(np.minimum(np.abs(offsets @ direction) / distances, 1.0))
                     best = int(angles.argmin())
@@ -153,11 +154,11 @@ class _Chase:
             limit *= 2.0
         return (old if old < len(self._points) - self._search.evolve else None), math.nan
 
-    def _around(self, here: int, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _around(self, index: int, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Allowed neighbours of a point within a radius, their distances and offsets."""
-        point = self._points[here]
+        point = self._points[index]
         places = np.array(self._tree.query_ball_point(point, radius, return_sorted=True), np.int64)
-        places = places[np.abs(places - here) > self._search.exclude]
+        places = places[np.abs(places - index) > self._search.exclude]
         offsets = self._points[places] - point
         distances = np.linalg.norm(offsets, axis=1)
         far = distances >= self._search.smallest

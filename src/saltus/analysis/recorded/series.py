@@ -1,4 +1,4 @@
-"""Recorded series: what users hand over, checked and turned into numbers."""
+"""Recorded series from users, checked and converted to numbers."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import numpy as np
 
 from saltus.analysis.inputs.axes import axes_of
 from saltus.analysis.statistics import LEAST
-from saltus.errors import ParameterError, shown
+from saltus.errors import ParameterError, must_be, shown
 from saltus.flow.counts import whole
 from saltus.units import to_si
 
-#: Points from which something can be said at least.
+#: Least number of points for an estimate.
 LEAST_POINTS = 200
 #: Largest difference of sampling times from evenness, as a share of the interval.
 EVEN = 1e-3
@@ -55,11 +55,11 @@ def columns_of(series: Any, embed: bool | None) -> np.ndarray:
 
 
 def interval_of(given: Any, count: int) -> float:
-    """Time between samples [s], from itself or from all times."""
+    """Time between samples [s], from the interval itself or from all times."""
     if isinstance(given, str) or axes_of(given) == 0:
         interval = to_si(given, "s", "sampling_interval")
         if not 0 < interval < math.inf:
-            raise ParameterError(f"sampling_interval must be a positive time, not {shown(given)}.")
+            raise must_be("sampling_interval", "a positive time", given)
         return interval
     try:
         times = np.asarray(given, float)
@@ -96,8 +96,8 @@ def samples_of(value: Any, interval: float, name: str, least: int = 1) -> int:
 
 
 def check_length(count: int, evolve: int, exclude: int) -> None:
-    """Raise ParameterError unless the points give enough evolutions, and neighbours beside those
-    that are excluded.
+    """Raise a ParameterError unless the points give enough evolutions, and neighbours besides the
+    excluded ones.
     """
     least = max(LEAST_POINTS, 2 * LEAST * evolve, 2 * exclude + LEAST_POINTS)
     if count < least:

@@ -29,26 +29,26 @@ from saltus.analysis.recorded.series import (
     samples_of,
 )
 from saltus.analysis.statistics import BOUNDED, CONFIDENCE, UNCLEAR, batch_means, running_ends
-from saltus.errors import ParameterError, SaltusWarning, among, nearest, shown
+from saltus.errors import ParameterError, SaltusWarning, among, must_be, unknown
 from saltus.flow.counts import whole
 from saltus.results import Subject, build, made_by
 from saltus.results.dataset import schema
 
-#: Default of the largest distance at most, as a share of the range: beyond it growth isn't that of
-#: small deviations. Wolf's rule.
+#: Largest default of the largest distance, as a share of the range: beyond it growth isn't that of
+#: small deviations (Wolf's rule).
 WIDEST = 0.1
 #: Default of the smallest distance: rounding in a clean series.
 CLEANEST = 1e-6
 #: Delays in an evolution by default: the delay is about a quarter of a turn of the motion.
 DELAYS = 4
-#: Share of false neighbours beyond which an embedding shows no states.
+#: Share of false neighbours above which an embedding doesn't show states.
 UNFOLDED = 0.1
 UNITS = {"1/s": 1.0, "bit/s": math.log(2)}
 
 
 @dataclass(frozen=True)
 class Growing:
-    """What neighbours on one trajectory tell.
+    """The exponent measured from neighbours on one trajectory.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class Growing:
 
 
 _NONE = np.zeros(0)
-#: Where there is no neighbour, or no trajectory.
+#: Result without neighbours, or without a trajectory.
 NOTHING = Growing(
     math.nan, math.nan, math.nan, 0, "unclear", _NONE, _NONE, _NONE, Evolutions(_NONE, _NONE, _NONE)
 )
@@ -173,7 +173,7 @@ def wolf(
     True
     """
     if not among(unit, UNITS):
-        raise ParameterError(f"the exponent isn't given in {shown(unit)}. {nearest(unit, UNITS)}")
+        raise unknown("the exponent isn't given in", unit, UNITS)
     columns = columns_of(series, embed)
     interval = interval_of(sampling_interval, len(columns))
     single = columns.shape[1] == 1 if embed is None else embed
@@ -263,7 +263,7 @@ def _table(found: Growing, block: float, logarithm: float, false: float) -> dict
 
 
 def replaced(found: list[Growing]) -> dict[str, Any]:
-    """Columns on the replacements of some trajectories."""
+    """Columns about the replacements on some trajectories."""
     taken = [np.isfinite(one.evolutions.angle) for one in found]
     return {
         "replacements": [int(mask.sum()) for mask in taken],
@@ -298,9 +298,7 @@ def _search(points: np.ndarray, evolve: int, smallest: Any, largest: Any, exclud
     """The distances, checked."""
     for name, value in (("smallest_distance", smallest), ("largest_distance", largest)):
         if value is not None and not (isinstance(value, int | float) and 0 < value < 1):
-            raise ParameterError(
-                f"{name} must be a share of the range, between 0 and 1, not {shown(value)}."
-            )
+            raise must_be(name, "a share of the range, between 0 and 1", value)
     return default_search(points, evolve, exclude, float(smallest), largest)
 
 
@@ -311,8 +309,8 @@ def default_search(
     smallest: float = CLEANEST,
     largest: float | None = None,
 ) -> Search:
-    """Where neighbours are looked for; the largest distance by how close the points lie if it isn't
-    given.
+    """The search for neighbours; a largest distance that isn't given follows from the density of
+    points.
     """
     far = (
         max(min(crowd_distance(points, smallest, exclude), WIDEST), 2.0 * smallest)
@@ -327,7 +325,7 @@ def default_search(
 
 
 def _warn(found: Growing, search: Search, false: float, dimension: int, by_density: bool) -> None:
-    """Say what makes the exponent doubtful."""
+    """Warn about the causes that make the exponent doubtful."""
     if false > UNFOLDED:
         warnings.warn(
             f"{false:.0%} of the neighbours are false in {dimension} dimensions: the series shows "

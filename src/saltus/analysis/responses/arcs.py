@@ -29,7 +29,8 @@ from saltus.analysis.branches.rest_branches import trace_rests
 from saltus.analysis.branches.same_branch import on_branch
 from saltus.analysis.branches.seeds import rests_at, scaled, seeds_at
 from saltus.analysis.branches.tracing import Plan, trace
-from saltus.analysis.closed.orbits import OrbitBatch, find_orbits, phase_distances
+from saltus.analysis.closed.motions import ClosedMotions, phase_distances
+from saltus.analysis.closed.orbits import find_orbits
 from saltus.analysis.closed.unforced import close_again
 from saltus.analysis.inputs.outputs import Outputs
 from saltus.errors import ParameterError
@@ -38,10 +39,9 @@ from saltus.flow.methods import Method, exact_method
 from saltus.results.dataset.kinds import CLOSED, Kind
 from saltus.system.parametric import parametric
 
-#: Seeds of each number of periods that are taken at a time.
+#: Seeds of each number of periods that are followed at a time.
 TAKEN = 8
-#: Farthest that a response of an inexact method lies from the exact orbit that it stands for, in
-#: units of its range.
+#: Largest distance of a response of an inexact method from its exact orbit, in units of its range.
 INEXACT = 0.05
 
 
@@ -71,11 +71,15 @@ def check_unstable(unstable: bool, grid: Grid, method: Method) -> None:
     """Raise a ParameterError unless branches of these responses have unstable parts to follow."""
     if unstable and len(grid.axes) != 1:
         raise ParameterError(
-            "unstable=True follows branches over one parameter; this grid has two."
+            lambda say: (
+                f"{say.key(unstable=True)} follows branches over one parameter; this grid has two."
+            )
         )
     if unstable and len(next(iter(grid.axes.values()))) < 2:
         raise ParameterError(
-            "unstable=True follows branches over a range: give two values or more."
+            lambda say: (
+                f"{say.key(unstable=True)} follows branches over a range: give two values or more."
+            )
         )
     if unstable:
         exact_method(method, "unstable=True")
@@ -89,8 +93,8 @@ def follow_arcs(
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> None:
-    """Follow the branches of all responses that repeat, into ``arcs``: after a KeyboardInterrupt it
-    holds those that are done.
+    """Follow the branches of all responses that repeat, into ``arcs``. After a KeyboardInterrupt it
+    holds the finished ones.
 
     Parameters
     ----------
@@ -127,10 +131,10 @@ def follow_arcs(
 
 
 def _follow_rests(
-    found: GridResponses, orbits: OrbitBatch, grid: Grid, plan: Plan, arcs: Arcs
+    found: GridResponses, orbits: ClosedMotions, grid: Grid, plan: Plan, arcs: Arcs
 ) -> None:
-    """The branches of equilibria; if unstable orbits are followed, of the limit cycles that are
-    born at their Hopf points too.
+    """Follow the branches of equilibria, and those of limit cycles born at Hopf points if unstable
+    orbits are followed.
     """
     rests = np.flatnonzero((found.kind == Kind.EQUILIBRIUM) & (orbits.period > 0))
     if not len(rests):
@@ -146,14 +150,14 @@ def _follow_rests(
 
 def _follow_orbits(
     found: GridResponses,
-    orbits: OrbitBatch,
+    orbits: ClosedMotions,
     grid: Grid,
     plan: Plan,
     method: Method,
     arcs: Arcs,
     progress: Callable[[float], None] | None,
 ) -> None:
-    """The branches of periodic orbits and limit cycles."""
+    """Follow the branches of periodic orbits and limit cycles."""
     ((name, values),) = grid.axes.items()
     left = np.flatnonzero(
         np.isin(found.kind, CLOSED) & (found.kind != Kind.EQUILIBRIUM) & (orbits.period > 0)
@@ -175,16 +179,18 @@ def _follow_orbits(
         beginnings = scaled(grid.system, name, list(seeds), method)
         try:
             trace(plan, beginnings, arcs.branches, None if plan.stable else progress)
-        finally:  # also of what is known when it is interrupted
+        finally:  # also with the results so far, when interrupted
             _number(found, orbits, grid, plan, np.append(some, left), arcs, known)
         left, known = left[arcs.of[left] < 0], len(arcs.branches)
         if progress is not None:
             progress(1.0 - len(left) / number)
 
 
-def _coarse_first(place: np.ndarray, places: int) -> np.ndarray:
-    """The rank of places int64[k] among all, every other one before those between, and so on."""
-    result, left = np.zeros(len(place), np.int64), place.copy()
+def _coarse_first(index: np.ndarray, places: int) -> np.ndarray:
+    """The rank of indices int64[k] among all: every other one first, then those between, and so
+    on.
+    """
+    result, left = np.zeros(len(index), np.int64), index.copy()
     for _ in range(int(places).bit_length()):
         result, left = 2 * result + left % 2, left // 2
     return result
@@ -192,15 +198,15 @@ def _coarse_first(place: np.ndarray, places: int) -> np.ndarray:
 
 def _number(
     found: GridResponses,
-    orbits: OrbitBatch,
+    orbits: ClosedMotions,
     grid: Grid,
     plan: Plan,
     some: np.ndarray,
     arcs: Arcs,
     known: int,
 ) -> None:
-    """Tell which of some responses int64[k] lie on the branches behind the first ``known``, which
-    come apart into their stable parts if no more was asked for.
+    """Assign responses int64[k] to the branches after the first ``known``. These are split into
+    their stable parts if unstable orbits weren't asked for.
     """
     (values,) = grid.axes.values()
     if plan.stable:
@@ -216,10 +222,10 @@ def _number(
 
 
 def _unknowns(
-    found: GridResponses, orbits: OrbitBatch, values: np.ndarray, some: np.ndarray
+    found: GridResponses, orbits: ClosedMotions, values: np.ndarray, some: np.ndarray
 ) -> Iterator[tuple[np.ndarray, int, np.ndarray]]:
-    """Responses by their number of points: their unknowns float64[r, z], that number, and which
-    they are, int64[r].
+    """Responses by their number of points: their unknowns float64[r, z], that number, and their
+    indices, int64[r].
     """
     times, free = orbits.time[some], np.isfinite(orbits.time[some])
     points = np.where(free, 1, orbits.period[some])
@@ -235,7 +241,7 @@ def _unknowns(
 
 
 def _in_order(arcs: Arcs) -> None:
-    """Number branches in the order of their first responses, those without one last."""
+    """Number branches in the order of their first responses; those without a response come last."""
     first = np.full(len(arcs.branches), len(arcs.of))
     for response in np.flatnonzero(arcs.of >= 0)[::-1]:
         first[arcs.of[response]] = response
@@ -251,8 +257,8 @@ def _in_order(arcs: Arcs) -> None:
 # -- inexact methods -------------------------------------------------------------------------------
 def _exact_orbits(
     found: GridResponses, grid: Grid, method: Method, threads: int | None
-) -> OrbitBatch:
-    """The orbit of each response; of an inexact method the exact one near it, with period 0 where
+) -> ClosedMotions:
+    """The orbit of each response; for an inexact method the exact one near it, with period 0 where
     there is none.
     """
     orbits = found.motions.orbits.rows(found.row)
@@ -282,7 +288,7 @@ def _exact_orbits(
 def arc_values(
     arcs: Arcs, grid: Grid, method: Method, outputs: Outputs
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The variables and attributes of the branches, empty where there are none."""
+    """The variables and attributes of the branches, empty if there are none."""
     if not arcs.branches or not method.exact:
         return {}, {"branches_refused": arcs.refused} if arcs.refused else {}
     ((name, values),) = grid.axes.items()

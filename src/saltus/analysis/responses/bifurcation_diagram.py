@@ -37,9 +37,8 @@ def bifurcation_diagram(
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
 ) -> xr.Dataset:
-    """How the steady responses change with a parameter: their turning points, periods, kinds, and
-    what happens to them on the way, to rounding. For the steps see
-    :func:`saltus.frequency_response`.
+    """Steady responses against a parameter: their turning points, periods, kinds and bifurcations,
+    located to rounding. For the steps see :func:`saltus.frequency_response`.
 
     Parameters
     ----------
@@ -98,8 +97,10 @@ def bifurcation_diagram(
     """
     if not isinstance(vary, Mapping):
         raise ParameterError(
-            'vary must be a mapping, such as vary={"contact_stiffness": ("1e3 '
-            'N/m", "1e9 N/m", 200, "log")}.'
+            lambda say: (
+                "vary must be a mapping, such as "
+                f"{say.key(vary={'contact_stiffness': ('1e3 N/m', '1e9 N/m', 200, 'log')})}."
+            )
         )
     method = check_method(method)
     check_sample(sample, method)

@@ -35,8 +35,7 @@ def frequency_response(
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
 ) -> xr.Dataset:
-    """Steady responses against the forcing frequency: which there are, and which start leads to
-    which.
+    """Steady responses against the forcing frequency, and the starts that lead to each.
 
     1. Every start is followed at every frequency until it has settled on an orbit that is closed by
        Newton's method and attracts by its Floquet multipliers. What never repeats is typed by its
@@ -133,9 +132,11 @@ def frequency_response(
     check_system(system)
     if system.forced_at is None:
         raise ParameterError(
-            f"{system.name} has no forcing, so no frequency to vary. Take sl.bifurcation_diagram "
-            f"over another parameter; "
-            "if a parameter is the frequency of a forcing, declare forced_at= in @sl.system."
+            lambda say: (
+                f"{system.name} has no forcing, so no frequency to vary. Take "
+                f"{say.verb('bifurcation_diagram')} over another parameter; if a parameter is the "
+                f"frequency of a forcing, declare {say.key('forced_at')} in {say.system()}."
+            )
         )
     grid = grid_of(system, {system.forced_at: frequency}, start, box, values, seed, follow)
     return respond(grid, method, periods, threads, progress, outputs=outputs, unstable=unstable)

@@ -1,6 +1,4 @@
-"""From a grid to the Dataset of its responses: what `frequency_response` and `bifurcation_diagram`
-share.
-"""
+"""The Dataset of a grid's responses, shared by `frequency_response` and `bifurcation_diagram`."""
 
 from __future__ import annotations
 

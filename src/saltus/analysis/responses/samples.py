@@ -1,5 +1,5 @@
-"""What a bifurcation diagram shows of each response: where it turns, where it is at whole periods,
-or where it meets a boundary.
+"""Samples of each response in a bifurcation diagram: its turning points, its states at whole
+periods, or its contacts.
 """
 
 from __future__ import annotations
@@ -14,36 +14,43 @@ from saltus.analysis.attractors.grid_responses import (
     spans_of,
 )
 from saltus.analysis.closed.measures import Measures
-from saltus.errors import ParameterError, among, nearest, shown
+from saltus.errors import ParameterError, one_of
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.flow.request import Outcome
 from saltus.kernels import status as st
 from saltus.system import System
 
-#: What may be shown.
+#: Known kinds of samples.
 SAMPLES = ("turning_points", "stroboscope", "contacts")
 #: Responses sampled at a time.
 PIECE = 256
 
 
 def check_sample(sample: str, method: Method) -> str:
-    """The sample, if it is known and the method can tell it. Raises ParameterError."""
-    if not among(sample, SAMPLES):
-        raise ParameterError(f"sample={shown(sample)} isn't known. {nearest(sample, SAMPLES)}")
+    """Return the kind of sample, checked. Raises ParameterError if it is unknown, or the method
+    can't give it.
+    """
+    one_of(SAMPLES, sample=sample)
     if sample == "contacts" and not method.records_contacts:
         raise ParameterError(
-            f'{method.name} with events="ignore" locates no contacts. Take sample="turning_points".'
+            lambda say: (
+                f"{method.name} with {say.key(events='ignore')} locates no contacts. Take "
+                f"{say.key(sample='turning_points')}."
+            )
         )
     return sample
 
 
 def check_unforced_sample(sample: str, system: System) -> None:
-    """Raises ParameterError if a system without forcing can't show it."""
+    """Raise a ParameterError if a system without forcing can't show this sample."""
     if sample == "stroboscope" and system.forced_at is None:
         raise ParameterError(
-            f"{system.name} has no forcing period: it has no stroboscope. Take "
-            f'sample="turning_points" or "contacts".'
+            lambda say: (
+                f"{system.name} has no forcing period: it has no stroboscope. Take "
+                f"{say.key(sample='turning_points')} or "
+                '"contacts".'
+            )
         )
 
 
@@ -55,8 +62,8 @@ def sampled(
     found: GridResponses,
     threads: int | None = None,
 ) -> list[np.ndarray]:
-    """The sampled states of each response, float64[n, D], over one period of a response, or many of
-    one that never repeats.
+    """The sampled states of each response, float64[n, D]: over one period, or over many for a
+    motion that never repeats.
     """
     spans = np.where(found.period > 0, spans_of(found), APERIODIC_PERIODS)
     if sample == "stroboscope":

@@ -1,38 +1,82 @@
 """Newton's method on many small systems of equations at once: fixed points of maps, limit cycles,
-equilibria.
+equilibria, points of curves.
+
+Damping, from far away: steps are shortened until they help, by the natural monotonicity test of
+Deuflhard, Newton Methods for Nonlinear Problems (2004), section 3.3.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
+from saltus.analysis.solve.deflation import Known, is_new, stretch, weight
 from saltus.analysis.solve.tolerances import (
     AMPLIFIED,
     CONVERGED,
+    FORESEEN,
+    LONGEST_DAMPED,
+    MAX_DAMPED_STEPS,
     MAX_NEWTON_STEPS,
     RANK,
+    SHORTEST_SHARE,
     SINGULAR,
     SLOW,
 )
 
-#: Residuals float64[m, d] and derivatives float64[m, d, d] of the rows int64[m], at float64[m, d];
+#: A step so short beside the unknowns is rounding.
+ROUNDED = 4 * np.finfo(float).eps
+#: Residuals float64[m, e] and derivatives float64[m, e, d] of the rows int64[m], at float64[m, d];
 #: all in units of the scale.
 Equations = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+
+@dataclass(frozen=True)
+class Zeros:
+    """Zeros of k systems of e equations in d unknowns.
+
+    Attributes
+    ----------
+    z : float64[k, d]
+        The zeros.
+    found : bool[k]
+        Where the iteration converged.
+    derivative : float64[k, e, d]
+        Of the equations in units of the scale, at the last evaluation: before a last step.
+    evaluations : int64[k]
+        How many there were, one that was foreseen included.
+    contraction : float64[k]
+        The second step, in first ones.
+    """
+
+    z: np.ndarray
+    found: np.ndarray
+    derivative: np.ndarray
+    evaluations: np.ndarray
+    contraction: np.ndarray
 
 
 def newton(
     equations: Equations,
     start: np.ndarray,
     scale: np.ndarray,
+    *,
+    planes: np.ndarray | None = None,
     enough: np.ndarray | float = CONVERGED,
+    foresee: bool = False,
     longest_step: float = 1.0,
-    farthest: float = np.inf,
-    max_slow: int = MAX_NEWTON_STEPS,
+    farthest: np.ndarray | float = np.inf,
+    max_steps: int | None = None,
+    max_slow: float = np.inf,
     least_squares: bool = False,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Zeros of k systems of d equations, float64[k, d], and where the iteration converged, bool[k].
+    damped: bool = False,
+    known: Known | None = None,
+) -> Zeros:
+    """Solve k systems of d equations.
+
+    A row is done where its step is short enough, or one that rounding amplifies gets no shorter.
 
     Parameters
     ----------
@@ -40,56 +84,170 @@ def newton(
         See :data:`Equations`.
     start, scale : float64[k, d]
         First guesses, and the unit of each unknown.
+    planes : float64[k, d], optional
+        Of one equation less: zeros in the planes through the starts across these, in units of the
+        scale. There a residual so small as ``enough`` is the last one: no step is taken from it,
+        and the derivative is that at the zero.
     enough : float or float64[k]
         A step so short is the last one.
-    longest_step, farthest : float
-        Rows are given up after a longer step, or farther from their start.
-    max_slow : int
-        Rows are given up after more slow steps.
+    foresee : bool
+        So is one behind which quadratic convergence foresees nothing but rounding: the derivative
+        is farther from the zero then.
+    longest_step : float
+        Rows are given up after a longer step; damped ones are shortened in place of it.
+    farthest : float or float64[k]
+        Rows are given up farther from their start.
+    max_steps, max_slow : int
+        Rows are given up after more steps, or more slow ones.
     least_squares : bool
         Of more equations than unknowns, or of zeros that aren't isolated: each step is the shortest
         of those that fit best. Rows of the derivative should be of one size.
+    damped : bool
+        Steps are shortened until they help.
+    known : Known, optional
+        Zeros that must not be found again.
     """
-    x, found, rows = (
-        np.array(start, float),
-        np.zeros(len(start), bool),
-        np.flatnonzero(np.isfinite(start).all(axis=1)),
-    )
-    before, slow, enough = (
-        np.full(len(start), np.inf),
-        np.zeros(len(start), np.int64),
-        np.broadcast_to(enough, len(start)),
-    )
-    for _ in range(MAX_NEWTON_STEPS):
+    work = _Iteration(start, scale, least_squares, known)
+    enough, farthest = (np.broadcast_to(one, len(start)) for one in (enough, farthest))
+    slow, rows = np.zeros(len(start), np.int64), np.flatnonzero(np.isfinite(start).all(axis=1))
+    for _ in range(max_steps or (MAX_DAMPED_STEPS if damped else MAX_NEWTON_STEPS)):
         if not len(rows):
             break
-        residual, derivative = equations(x[rows], rows)
-        good = np.flatnonzero(
-            np.isfinite(derivative).all(axis=(1, 2)) & np.isfinite(residual).all(axis=1)
-        )
-        if not least_squares:
-            good = good[np.linalg.cond(derivative[good]) < SINGULAR]
-        rows, residual, derivative = rows[good], residual[good], derivative[good]
-        if least_squares:
-            step = -(np.linalg.pinv(derivative, RANK) @ residual[:, :, None])[:, :, 0]
-        else:
-            step = -np.linalg.solve(derivative, residual[:, :, None])[:, :, 0]
-        x[rows] += step * scale[rows]
-        length = np.abs(step).max(axis=1)
-        rounding = np.all(
-            np.abs(step * scale[rows]) <= 4 * np.finfo(float).eps * np.abs(x[rows]), axis=1
-        )
-        done = (
-            (length < enough[rows])
-            | ((length < AMPLIFIED) & (length > 0.5 * before[rows]))
-            | rounding
-        )
-        found[rows[done]] = True
-        slow[rows] += length > SLOW * before[rows]
-        before[rows] = length
-        near = np.abs((x[rows] - start[rows]) / scale[rows]).max(axis=1) < farthest
-        rows = rows[~done & near & (length < longest_step) & (slow[rows] <= max_slow)]
-    return x, found
+        residual, derivative = equations(work.trial[rows], rows)
+        if planes is not None:
+            across = ((work.trial[rows] - start[rows]) / scale[rows] * planes[rows]).sum(axis=1)
+            residual = np.append(residual, across[:, None], axis=1)
+            derivative = np.append(derivative, planes[rows, None], axis=1)
+        retried = rows[:0]
+        if damped:
+            helps = work.helps(rows, residual)
+            retried = rows[~helps & (work.share[rows] >= SHORTEST_SHARE)]
+            rows, residual, derivative = rows[helps], residual[helps], derivative[helps]
+        if planes is not None:  # a zero is one where the derivative is singular too
+            closed = np.abs(residual).max(axis=1) < enough[rows]
+            work.settle(rows[closed], derivative[closed])
+            rows, residual, derivative = rows[~closed], residual[~closed], derivative[~closed]
+        rows = work.step(rows, residual, derivative)
+        done = work.done(rows, enough[rows], foresee, stay=planes is not None)
+        slow[rows] += work.length[rows] > SLOW * work.before[rows]
+        near = np.abs((work.trial[rows] - start[rows]) / scale[rows]).max(axis=1) <= farthest[rows]
+        near &= (work.length[rows] < longest_step) | damped
+        rows = rows[~done & near & (slow[rows] <= max_slow)]
+        rows = np.sort(np.append(rows, retried)) if damped else rows
+        work.ahead(rows, damped)
+    return work.zeros(planes is not None)
+
+
+class _Iteration:
+    """The states of k iterations: where each is, its Newton step from there in units of the scale,
+    and where it looks next.
+    """
+
+    def __init__(
+        self, start: np.ndarray, scale: np.ndarray, least_squares: bool, known: Known | None
+    ) -> None:
+        k = len(start)
+        self.scale, self.known, self.least_squares = scale, known, least_squares
+        self.x, self.trial = np.array(start, float), np.array(start, float)
+        self.newton_step = np.zeros(start.shape)
+        self.derivative = np.full((k, start.shape[1], start.shape[1]), np.nan)
+        self.length, self.before = np.full((2, k), np.inf)
+        self.share, self.cut = np.ones((2, k))
+        self.found, self.evaluations = np.zeros(k, bool), np.zeros(k, np.int64)
+        self.contraction = np.zeros(k)
+
+    def helps(self, rows: np.ndarray, residual: np.ndarray) -> np.ndarray:
+        """True where the step to the trial shortens the next one, or is too short to tell, bool[r];
+        elsewhere its share is halved.
+        """
+        better = (self.evaluations[rows] == 0) | (self.length[rows] < AMPLIFIED)
+        told, some = ~better, rows[~better]
+        if len(some):
+            with np.errstate(all="ignore"):
+                simplified = self._solved(self.derivative[some], residual[told])
+                now, before = (
+                    length * weight(x, self.scale[some], self.known)
+                    for length, x in (
+                        (np.abs(simplified).max(axis=1), self.trial[some]),
+                        (self.length[some], self.x[some]),
+                    )
+                )
+                better[told] = now <= (1.0 - 0.25 * self.cut[some]) * before
+        share = self.share[rows]
+        self.share[rows] = np.where(better, np.minimum(1.0, 2.0 * share), 0.5 * share)
+        return np.asarray(better)
+
+    def settle(self, rows: np.ndarray, derivative: np.ndarray) -> None:
+        """End at the trials."""
+        self.x[rows], self.found[rows] = self.trial[rows], True
+        self.evaluations[rows] += 1
+        self._keep(rows, derivative)
+
+    def _keep(self, rows: np.ndarray, derivative: np.ndarray) -> None:
+        if self.derivative.shape[1] != derivative.shape[1]:
+            self.derivative = np.full((len(self.x), *derivative.shape[1:]), np.nan)
+        self.derivative[rows] = derivative
+
+    def step(self, rows: np.ndarray, residual: np.ndarray, derivative: np.ndarray) -> np.ndarray:
+        """Go to the trials, where the next steps are known; the rows that have one, int64[r]."""
+        finite = np.isfinite(derivative).all(axis=(1, 2)) & np.isfinite(residual).all(axis=1)
+        good = np.flatnonzero(finite)
+        if not self.least_squares:
+            sizes = np.linalg.svd(derivative[good], compute_uv=False)
+            good = good[sizes[:, 0] < SINGULAR * sizes[:, -1]]
+        rows = rows[good]
+        self.x[rows] = self.trial[rows]
+        self._keep(rows, derivative[good])
+        step = -self._solved(derivative[good], residual[good])
+        self.newton_step[rows], self.before[rows] = step, self.length[rows]
+        self.length[rows] = np.abs(step).max(axis=1)
+        self.trial[rows] = self.x[rows] + step * self.scale[rows]
+        self.evaluations[rows] += 1
+        second = rows[self.evaluations[rows] == 2]
+        self.contraction[second] = self.length[second] / np.maximum(self.before[second], AMPLIFIED)
+        return rows
+
+    def _solved(self, matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+        if self.least_squares:
+            return np.asarray((np.linalg.pinv(matrix, RANK) @ right[:, :, None])[:, :, 0])
+        return np.asarray(np.linalg.solve(matrix, right[:, :, None])[:, :, 0])
+
+    def done(self, rows: np.ndarray, enough: np.ndarray, foresee: bool, stay: bool) -> np.ndarray:
+        """True where the step is the last one, bool[r]: it is taken, unless the zeros ``stay``
+        where the derivatives are known, which is told by the residual.
+        """
+        length, before = self.length[rows], self.before[rows]
+        step = np.abs(self.newton_step[rows] * self.scale[rows])
+        done = (length < AMPLIFIED) & (length > 0.5 * before)
+        if not stay:
+            rounding = np.all(step <= ROUNDED * np.abs(self.trial[rows]), axis=1)
+            done |= (length < enough) | rounding
+        taken = np.zeros_like(done) if stay else done.copy()
+        if foresee:
+            sure = ~done & np.isfinite(before) & (length * (length / before) ** 2 < FORESEEN)
+            self.evaluations[rows[sure]] += 1
+            done, taken = done | sure, taken | sure
+        self.x[rows[taken]], self.found[rows[done]] = self.trial[rows[taken]], True
+        return np.asarray(done)
+
+    def ahead(self, rows: np.ndarray, damped: bool) -> None:
+        """Where to look next: steps away from known zeros, and shortened ones."""
+        if self.known is None and not damped:
+            return
+        x, scale, step = self.x[rows], self.scale[rows], self.newton_step[rows]
+        step = step * stretch(x, step, scale, self.known)[:, None]
+        if damped:
+            longest = np.minimum(1.0, LONGEST_DAMPED / np.abs(step).max(axis=1, initial=1e-300))
+            self.cut[rows] = self.share[rows] * longest
+            step = step * self.cut[rows, None]
+        self.trial[rows] = x + step * scale
+
+    def zeros(self, bordered: bool) -> Zeros:
+        """What was found."""
+        found, derivative = self.found, self.derivative
+        found[found] = is_new(self.x[found], self.scale[found], self.known)
+        derivative = derivative[:, :-1] if bordered else derivative
+        return Zeros(self.x, found, derivative, self.evaluations, self.contraction)
 
 
 def leading_first(matrices: np.ndarray) -> np.ndarray:

@@ -40,6 +40,11 @@ CONVERGED = 1e-12
 AMPLIFIED = 1e-9
 #: A step longer than this many of the one before is slow: at a fold they halve.
 SLOW = 0.75
+#: A step that quadratic convergence foresees to be shorter than this isn't waited for.
+FORESEEN = 1e-16
+#: Damped steps: most of them, shortened ones included; the longest, in units of the scale; the
+#: share of a step below which it isn't shortened any more.
+MAX_DAMPED_STEPS, LONGEST_DAMPED, SHORTEST_SHARE = 60, 0.3, 1.0 / 64
 #: Condition number of a linear system from which its solution has no digit.
 SINGULAR = 1e15
 #: Singular values below this share of the largest are zero, where equations may depend on each

@@ -20,7 +20,7 @@ FOLDER = Path(__file__).resolve().parents[2] / "kernels/bitcode"
 
 
 def made(name: str) -> tuple[bytes, dict]:
-    """One bitcode, compressed, and what the manifest says of it."""
+    """One bitcode, compressed, and its entry in the manifest."""
     from saltus.codegen import templates
     from saltus.codegen.lowering import frontend
     from saltus.codegen.lowering.bitcode import bitcode

@@ -1,5 +1,5 @@
-"""One module of the templates as bitcode: made smaller by what doesn't depend on sizes or on the
-processor, with names for people.
+"""One module of the templates as bitcode, simplified as far as sizes and processor don't matter,
+with readable names.
 """
 
 from __future__ import annotations
@@ -8,8 +8,8 @@ import re
 
 import llvmlite.binding as llvm
 
-#: Functions that run at breaks of time, touches, starts and ends only: LLVM takes no trouble over
-#: them, a quarter of its time saved.
+#: Functions that run only at breaks of time, touches, starts and ends: LLVM doesn't optimise them,
+#: which saves a quarter of its time.
 COLD = {
     "place_clocks", "set_clocks", "follow_clocks", "first_guess", "begin_of", "hold_piece",
     "hold_polynomial", "on_from_to", "knots",
@@ -20,10 +20,9 @@ COLD = {
     "record", "saltate", "overflowed", "end_stretch", "is_slow", "periods_behind", "write_samples",
     "take_impacts", "order_matters", "end_impacts", "begins_uniquely",
 }  # fmt: skip
-#: Functions of lanes that few equations need: never inlined, so that they are out of the way of the
-#: others.
+#: Functions of lanes that few equations need: never inlined, to keep them out of the others.
 NOINLINE = {"probed", "look_ahead", "negligible_step", "add_what_was_left_out"}
-#: Functions that run once a contact: inlined only where LLVM's cost model says so. Always would
+#: Functions that run once a contact: inlined only by LLVM's cost model. Inlining them always would
 #: take time to compile, and gain none.
 _BY_COST_MODEL = {"attend", "change_side", "land_all"}
 _MANGLED = re.compile(r"_ZN8template(\d+)(\w+)")
@@ -45,7 +44,7 @@ def bitcode(module: llvm.ModuleRef, entry: str, symbol: str, inlined: set[str]) 
         Functions that are to be inlined, by the names that they have in the templates.
     """
     names = _names(module, symbol)
-    # Numba hands it down from callers to callees; kernels raise nothing
+    # Numba passes it from callers to callees; kernels raise nothing
     text = str(module).replace("alwaysinline", "nounwind")
     text = re.sub(
         r'@("[^"]+"|[\w.$]+)', lambda name: f"@{names.get(name[1].strip(chr(34)), name[1])}", text
@@ -57,7 +56,7 @@ def bitcode(module: llvm.ModuleRef, entry: str, symbol: str, inlined: set[str]) 
             _advise(function, inlined)
     for variable in clean.global_variables:
         if not variable.is_declaration:
-            variable.linkage = "internal"  # what Numba keeps for exceptions: nobody reads it
+            variable.linkage = "internal"  # Numba's constants of exceptions: nobody reads them
     clean.verify()
     _shrink(clean)
     clean.name = symbol
@@ -76,9 +75,7 @@ def _advise(function: llvm.ValueRef, inlined: set[str]) -> None:
 
 
 def _names(module: llvm.ModuleRef, symbol: str) -> dict[str, str]:
-    """What the functions of a module are called from now on: their name in the templates, and a
-    number.
-    """
+    """New names of the functions of a module: their name in the templates, and a number."""
     names = {}
     for i, function in enumerate(module.functions):
         if not function.is_declaration:
@@ -90,8 +87,8 @@ def _names(module: llvm.ModuleRef, symbol: str) -> dict[str, str]:
 
 
 def _caller(function: llvm.ValueRef, symbol: str, name: str) -> str:
-    """``i64 symbol(ptr values)``: calls a function of Numba's with arguments that stand one after
-    the other in memory; -1 if it fails.
+    """Write ``i64 symbol(ptr values)``: it calls a function of Numba's with arguments one after the
+    other in memory; -1 if that fails.
     """
     # its result, an exception, and its arguments
     kinds = [str(argument.type) for argument in function.arguments][2:]

@@ -82,7 +82,7 @@ class _Space:
         self._built: dict[str, dict[str, Any]] = {}
 
     def imported(self, module: str) -> dict[str, Any]:
-        """The names of a module that templates import: plain, or kernels built here."""
+        """The names of a module that templates import: plain ones, or kernels built here."""
         if module in _PLAIN:
             return _PLAIN[module]
         if module not in self._built:
@@ -121,7 +121,7 @@ def module_of(interface: Interface, lanes: int) -> tuple[llvm.ModuleRef, str, se
     Parameters
     ----------
     interface : Interface
-        What is left open.
+        The names left open.
     lanes : int
         Lanes of a step.
 
@@ -155,7 +155,7 @@ def module_of(interface: Interface, lanes: int) -> tuple[llvm.ModuleRef, str, se
 
 
 def _layout(interface: Interface, lanes: int) -> tuple[dict[str, Any], list[str]]:
-    """The names of a layout for some sizes, and those among them that change with the sizes."""
+    """The names of a layout for some sizes, and the names that change with the sizes."""
     space: dict[str, Any] = (
         dict.fromkeys(interface.sizes, 20)
         | dict.fromkeys(interface.flags, False)
@@ -169,7 +169,7 @@ def _layout(interface: Interface, lanes: int) -> tuple[dict[str, Any], list[str]
 
 @contextmanager
 def _front_end_only() -> Iterator[None]:
-    """Numba types and lowers, and leaves out all that follows: passes, machine code, loading."""
+    """Let Numba only type and lower, without passes, machine code and loading."""
     replaced = {
         (codegen.CPUCodeLibrary, "_optimize_functions"): lambda self, module: setattr(
             module, "data_layout", self._codegen._data_layout

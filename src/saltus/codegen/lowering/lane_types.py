@@ -313,9 +313,7 @@ for _f, _scalar in _LIBM.items():
 
 
 def _align_stack(builder):
-    """Lanes that don't fit the registers go to the stack: each to one cache line, not across two
-    (measured: 5 % of a step).
-    """
+    """Align lanes on the stack to cache lines, so that none is in two (measured: 5 % of a step)."""
     builder.function.attributes.alignstack = 64
     # llvmlite prints no alignment without another attribute; kernels raise nothing
     builder.function.attributes.add("nounwind")

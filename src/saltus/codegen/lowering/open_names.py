@@ -1,5 +1,5 @@
-"""Names that the templates leave open: loads from symbols and calls of functions that an equation
-brings later.
+"""Open names of the templates: loads from symbols and calls of functions that an equation brings
+later.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def _symbol(builder: Any, name: str, kind: Any) -> Any:
 
 
 def size(name: str, kind: type = int) -> Any:
-    """A function without arguments that gives the constant of this name: a whole number, a double
+    """A function without arguments that returns the constant of this name: a whole number, a double
     or a truth value.
     """
     numba_type, llvm_type = (types.float64, _REAL) if kind is float else (types.int64, _WHOLE)
@@ -44,7 +44,7 @@ def size(name: str, kind: type = int) -> Any:
 
 
 def table(name: str, kind: str) -> Any:
-    """A function of an index that gives an entry of the table of this name."""
+    """A function of an index that returns an entry of the table of this name."""
     numba_type, llvm_type = (types.float64, _REAL) if kind == REAL else (types.int64, _WHOLE)
 
     def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:

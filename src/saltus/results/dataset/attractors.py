@@ -1,20 +1,16 @@
-"""Tables of what ``basins``, ``attractors``, ``basin_fractions`` and ``compare`` return, and what
-is known of attractors.
-"""
+"""What is known of attractors, in every result that holds some."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from saltus.results.dataset.kinds import WITHOUT_WORDS
-from saltus.results.dataset.variable import TRAJECTORY_NUMBER, Variable
+from saltus.results.dataset.variable import Variable
 
-#: Meaning of the values of ``agreement``.
-AGREEING = {-1: "not_settled", 0: "differ", 1: "agree"}
 #: Ends of the names of a share and of its interval.
 ENDS = ("", "_low", "_high")
 
@@ -67,61 +63,21 @@ ATTRACTOR_VARIABLES = {
     ),
     "attractor_<state>": Variable(("attractor", "phase"), "<state>", "<state> <when>"),
 }
-#: The two states that a map is drawn over.
-_AXES = {"<state>": Variable(("<state>",), "<state>", "<state> at the start", coord=True)}
 
-#: Variables of what ``basins`` returns.
-BASINS_VARIABLES = {
-    **_AXES,
-    "basin": Variable(("...",), "1", "attractor", "i2"),
-    "periods_to_settle": Variable(
-        ("...",), "1", "forcing periods until it had settled, -1 if it hadn't", "i4"
-    ),
-    "status": Variable(("...",), "1", "how the trajectory ended", "i1"),
-    "grazes_unresolved": Variable(
-        ("...",), "1", "grazes shallower than the local error", "i2", clipped=True
-    ),
-    **ATTRACTOR_VARIABLES,
-}
 
-#: Variables of what ``attractors`` and ``basin_fractions`` return.
-ATTRACTORS_VARIABLES = {
-    **TRAJECTORY_NUMBER,
-    "basin": Variable(("trajectory",), "1", "attractor", "i2"),
-    "periods_to_settle": Variable(
-        ("trajectory",), "1", "forcing periods until it had settled, -1 if it hadn't", "i4"
-    ),
-    **ATTRACTOR_VARIABLES,
-}
-
-#: Variables of what ``compare`` returns.
-AGREEMENT_VARIABLES = {
-    **_AXES,
-    "agreement": Variable(("...",), "1", "whether the two maps agree", "i1", flags=AGREEING),
-    "basin_a": Variable(("...",), "1", "attractor in the first map", "i2"),
-    "basin_b": Variable(
-        ("...",), "1", "attractor in the second map, in the numbers of the first", "i2"
-    ),
-    "pair": Variable(
-        ("pair",),
-        "1",
-        "attractor: those of the first map, then those that only the second has",
-        "i8",
-        coord=True,
-    ),
-    "match_a": Variable(("pair",), "1", "number in the first map, -1 if it isn't there", "i8"),
-    "match_b": Variable(("pair",), "1", "number in the second map, -1 if it isn't there", "i8"),
-    "match_type": Variable(("pair",), "", "kind of motion", "str"),
-    "match_period": Variable(
-        ("pair",), "1", "period in forcing periods, 0 if it doesn't repeat", "i8"
-    ),
-    "match_fraction_a": Variable(("pair",), "1", "share of the starts in the first map"),
-    "match_fraction_b": Variable(("pair",), "1", "share of the starts in the second map"),
-    "match_agreeing_cells": Variable(("pair",), "1", "starts that lead to it in both maps", "i8"),
-    "match_orbit_distance": Variable(
-        ("pair",), "1", "distance of the two orbits in units of the axis ranges"
-    ),
-}
+def rows_as(what: str, without: Sequence[str] = ()) -> dict[str, Variable]:
+    """The rows of attractors as those of something of which the same is known: an orbit, a
+    response. ``without``: beginnings of names that are left out.
+    """
+    return {
+        name.replace("attractor", what): replace(
+            row,
+            dims=tuple(what if dim == "attractor" else dim for dim in row.dims),
+            long_name=row.long_name.replace("attractor", what),
+        )
+        for name, row in ATTRACTOR_VARIABLES.items()
+        if not name.removeprefix("attractor_").startswith(tuple(without))
+    }
 
 
 @dataclass(frozen=True)

@@ -130,7 +130,7 @@ def build(
     Parameters
     ----------
     kind : str
-        A key of :data:`saltus.results.dataset.schema.TABLES`.
+        One of :data:`saltus.results.dataset.schema.NAMES`.
     subject : Subject
         What it is about.
     values : mapping of str to array, or its items
@@ -192,7 +192,7 @@ class _Building:
         flags: Mapping[str, Any],
     ) -> None:
         self.table, self.subject, self.grid, self.along, self.flags = (
-            schema.TABLES[kind],
+            schema.KINDS[kind].variables,
             subject,
             grid,
             along,

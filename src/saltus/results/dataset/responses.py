@@ -1,18 +1,13 @@
-"""The table of what ``frequency_response`` and ``bifurcation_diagram`` return, and what of it
-follows from the responses.
-"""
+"""The variables of responses, from what is known of them as of attractors."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from saltus.results.dataset.attractors import ENDS, AttractorTable, padded
-from saltus.results.dataset.branches import BRANCHES_VARIABLES
 from saltus.results.dataset.kinds import WITHOUT_WORDS, Kind
-from saltus.results.dataset.variable import GUARDS, Variable
 
 #: What a bifurcation diagram may show of each response.
 SAMPLES = {
@@ -20,97 +15,6 @@ SAMPLES = {
     "stroboscope": "at whole forcing periods",
     "contacts": "at the contacts",
 }  # fmt: skip
-
-#: What belongs to a start at one place of the grid.
-_GRID = ("...", "start")
-_RESPONSE = ("response",)
-_MULTIPLIER = ("response", "multiplier")
-_OUTPUT = ("response", "output")
-
-#: Variables of what ``frequency_response`` and ``bifurcation_diagram`` return. ``<first>``: the
-#: unit of the first state; ``<gap>``: that of the gaps; ``<output>``: that in ``output_units``,
-#: which an output has of its own.
-RESPONSES_VARIABLES = {
-    "<parameter>": Variable(("<parameter>",), "<parameter>", "<parameter>", coord=True),
-    "response_of": Variable(
-        _GRID, "1", "response that the start leads to", "i4", flags=WITHOUT_WORDS
-    ),
-    "rms": Variable(_GRID, "<first>", "root mean square of the first state in the response"),
-    "peak": Variable(_GRID, "<first>", "largest magnitude of the first state in the response"),
-    "type": Variable(_GRID, "", "kind of motion, or what became of the start", "str"),
-    "period": Variable(
-        _GRID, "1", "period of the response in forcing periods, 0 if it doesn't repeat", "i4"
-    ),
-    "contacts_per_period": Variable(_GRID, "1", "contacts of the response in a forcing period"),
-    "start": Variable(("start",), "1", "start", "i8", coord=True),
-    "start_direction": Variable(
-        ("start",), "", "direction in which the parameter is swept", "str", coord=True
-    ),
-    "start_<state>": Variable(("start",), "<state>", "<state> at the start", coord=True),
-    "response": Variable(_RESPONSE, "1", "response", "i8", coord=True),
-    "response_<parameter>": Variable(_RESPONSE, "<parameter>", "<parameter>"),
-    "response_branch": Variable(
-        _RESPONSE, "1", "branch: orbits that go over into each other", "i8"
-    ),
-    "response_type": Variable(_RESPONSE, "", "kind of motion", "str"),
-    "response_period": Variable(
-        _RESPONSE, "1", "period in forcing periods, 0 if it doesn't repeat", "i8"
-    ),
-    "response_contacts": Variable(_RESPONSE, "1", "contacts in a forcing period"),
-    "response_peak": Variable(_RESPONSE, "<first>", "largest magnitude of the first state"),
-    "response_rms": Variable(_RESPONSE, "<first>", "root mean square of the first state"),
-    "response_margin": Variable(
-        _RESPONSE, "<gap>", "smallest distance by which the orbit misses or overshoots a boundary"
-    ),
-    "response_multiplier_real": Variable(_MULTIPLIER, "1", "Floquet multiplier, real part"),
-    "response_multiplier_imag": Variable(_MULTIPLIER, "1", "Floquet multiplier, imaginary part"),
-    "response_cycle": Variable(_RESPONSE, "s", "period of a limit cycle"),
-    "response_eigenvalue_real": Variable(
-        _MULTIPLIER, "1/s", "eigenvalue of the Jacobian of an equilibrium, real part"
-    ),
-    "response_eigenvalue_imag": Variable(
-        _MULTIPLIER, "1/s", "eigenvalue of the Jacobian of an equilibrium, imaginary part"
-    ),
-    "response_exponent": Variable(_RESPONSE, "1/s", "largest Lyapunov exponent"),
-    "response_exponent_error": Variable(_RESPONSE, "1/s", "error of the largest Lyapunov exponent"),
-    "response_share": Variable(_RESPONSE, "1", "share of the starts"),
-    "response_share_low": Variable(
-        _RESPONSE, "1", "share of the starts, lower end of the 95 % interval"
-    ),
-    "response_share_high": Variable(
-        _RESPONSE, "1", "share of the starts, upper end of the 95 % interval"
-    ),
-    "response_<state>": Variable(("response", "phase"), "<state>", "<state> <when>"),
-    "output": Variable(
-        ("output",), "", "output: a state, or a function of the motion", "str", coord=True
-    ),
-    "output_units": Variable(("output",), "", "unit of the output", "str", coord=True),
-    "output_maximum": Variable(_OUTPUT, "<output>", "largest value"),
-    "output_minimum": Variable(_OUTPUT, "<output>", "smallest value"),
-    "output_peak": Variable(_OUTPUT, "<output>", "largest magnitude"),
-    "output_peak_to_peak": Variable(_OUTPUT, "<output>", "largest less smallest value"),
-    "output_mean": Variable(_OUTPUT, "<output>", "mean"),
-    "output_rms": Variable(_OUTPUT, "<output>", "root mean square about zero"),
-    "output_rms_about_mean": Variable(_OUTPUT, "<output>", "root mean square about the mean"),
-    "output_amplitude": Variable(
-        _OUTPUT,
-        "<output>",
-        "amplitude A of the first harmonic A cos(2 pi f t + phase), f the forcing frequency",
-    ),
-    "output_phase": Variable(
-        _OUTPUT,
-        "rad",
-        "phase of the first harmonic A cos(2 pi f t + phase), t the time of the equations",
-    ),
-    "sample_<state>": Variable(("response", "sample"), "<state>", "<state> <sampled>"),
-    **{
-        name: row
-        for name, row in BRANCHES_VARIABLES.items()
-        if name not in ("output", "output_units")
-    },
-    **GUARDS,
-    "guard_boundary": replace(GUARDS["guard_boundary"], dims=("guard", "...?")),
-}
 
 
 def grid_values(response_of: np.ndarray, table: AttractorTable) -> dict[str, np.ndarray]:

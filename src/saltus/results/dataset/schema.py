@@ -1,156 +1,136 @@
-"""What every variable of a result is: one table for each kind of Dataset, and what is read off a
-Dataset by them.
+"""Kinds of result, and what is read off a Dataset by them.
 
-The rows are :class:`saltus.results.dataset.variable.Variable`;
-:func:`saltus.results.dataset.build.build` makes Datasets by them.
+The file of a kind in :mod:`saltus.results.kinds` holds its :class:`ResultKind`: variables, rows and
+account. :func:`saltus.results.dataset.build.build` makes Datasets by them.
 """
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from saltus.errors import ParameterError
-from saltus.results.dataset import motions
-from saltus.results.dataset.attractors import (
-    AGREEMENT_VARIABLES,
-    ATTRACTOR_VARIABLES,
-    ATTRACTORS_VARIABLES,
-    BASINS_VARIABLES,
-)
-from saltus.results.dataset.backbones import BACKBONE_VARIABLES
-from saltus.results.dataset.bifurcation_curves import CURVE_VARIABLES
-from saltus.results.dataset.branches import BRANCHES_VARIABLES
-from saltus.results.dataset.equilibria import EQUILIBRIA_VARIABLES
-from saltus.results.dataset.exponents import EXPONENTS_VARIABLES
 from saltus.results.dataset.kinds import Kind
-from saltus.results.dataset.methods import METHODS_VARIABLES, WIDTHS_VARIABLES
-from saltus.results.dataset.orbits import ORBIT_VARIABLES
-from saltus.results.dataset.responses import RESPONSES_VARIABLES
 from saltus.results.dataset.result import Result
-from saltus.results.dataset.structures import MODES_VARIABLES
-from saltus.results.dataset.trajectories import STROBOSCOPE_VARIABLES, TRAJECTORY_VARIABLES
+from saltus.results.dataset.variable import Variable
+from saltus.results.table import TextTable
 
-#: Version of the tables below, kept in every result as ``schema_version``.
+#: Version of the tables of variables, kept in every result as ``schema_version``.
 VERSION = 1
-TRAJECTORY, STROBOSCOPE = "trajectory", "stroboscope"
-BASINS, ATTRACTORS, AGREEMENT, RESPONSES = "basins", "attractors", "agreement", "responses"
-METHODS, EXPONENTS = "methods", "exponents"
-ORBITS = "orbits"
-SETTLED, WIDTHS, MODES, BRANCHES = "settled", "widths", "modes", "branches"
-CURVE, BACKBONE = "bifurcation_curve", "backbone"
-EQUILIBRIA = "equilibria"
-SECTION, SPECTRUM, IMPACTS, ENERGY = "section", "spectrum", "impacts", "energy"
-#: The function that returns each kind.
-MAKERS = {
-    TRAJECTORY: "sl.simulate", STROBOSCOPE: "sl.stroboscope", BASINS: "sl.basins",
-    ATTRACTORS: "sl.attractors "
-        "or sl.basin_fractions",
-    AGREEMENT: "sl.compare", RESPONSES: "sl.frequency_response or sl.bifurcation_diagram",
-    METHODS: "sl.compare_methods",
-    SECTION: "sl.poincare", SPECTRUM: "sl.spectrum", IMPACTS: "sl.impact_statistics",
-    ENERGY: "sl.energy_balance",
-    EXPONENTS: "sl.lyapunov or sl.wolf",
-    SETTLED: "sl.settled", WIDTHS: "sl.regularisation_widths",
-    ORBITS: "sl.periodic_orbits or sl.edge_orbit",
-    MODES: "sl.structure_modes", BRANCHES: "sl.branches",
-    CURVE: "sl.bifurcation_curve", BACKBONE: "sl.backbone",
-    EQUILIBRIA: "sl.equilibria",
-}  # fmt: skip
+#: Name of every kind of result, which is that of its file in :mod:`saltus.results.kinds`.
+NAMES = (
+    TRAJECTORY, STROBOSCOPE, BASINS, ATTRACTORS, AGREEMENT, RESPONSES, METHODS, SECTION, SPECTRUM,
+    IMPACTS, ENERGY, EXPONENTS, SETTLED, WIDTHS, MODES, ORBITS, EQUILIBRIA, BRANCHES, CURVE,
+    BACKBONE,
+) = (
+    "trajectory", "stroboscope", "basins", "attractors", "agreement", "responses", "methods",
+    "section", "spectrum", "impacts", "energy", "exponents", "settled", "widths", "modes", "orbits",
+    "equilibria", "branches", "bifurcation_curve", "backbone",
+)  # fmt: skip
 
-#: The table of each kind of result.
-TABLES = {
-    TRAJECTORY: TRAJECTORY_VARIABLES,
-    STROBOSCOPE: STROBOSCOPE_VARIABLES,
-    BASINS: BASINS_VARIABLES,
-    ATTRACTORS: ATTRACTORS_VARIABLES,
-    AGREEMENT: AGREEMENT_VARIABLES,
-    RESPONSES: RESPONSES_VARIABLES,
-    METHODS: METHODS_VARIABLES,
-    SECTION: motions.SECTION_VARIABLES,
-    SPECTRUM: motions.SPECTRUM_VARIABLES,
-    IMPACTS: motions.IMPACTS_VARIABLES,
-    ENERGY: motions.ENERGY_VARIABLES,
-    EXPONENTS: EXPONENTS_VARIABLES,
-    SETTLED: motions.SETTLED_VARIABLES,
-    WIDTHS: WIDTHS_VARIABLES,
-    MODES: MODES_VARIABLES,
-    ORBITS: ORBIT_VARIABLES,
-    EQUILIBRIA: EQUILIBRIA_VARIABLES,
-    BRANCHES: BRANCHES_VARIABLES,
-    CURVE: CURVE_VARIABLES,
-    BACKBONE: BACKBONE_VARIABLES,
-}
+
+@dataclass(frozen=True)
+class ResultKind:
+    """A kind of result.
+
+    Attributes
+    ----------
+    makers : str
+        The functions that return it: ``sl.lyapunov or sl.wolf``.
+    variables : mapping of str to Variable
+        Its variables.
+    needed : tuple of str
+        Variables without which nothing can be said about it; ``<state>`` stands for every state.
+    account : callable
+        Its extent and content in lines, for :func:`saltus.results.describe`.
+    rows : callable
+        Its content in tables under a title, for studies: ``rows("title", ds)``.
+    headline : callable, optional
+        Its content in a line, where that isn't the first lines of the account.
+    sheets : callable, optional
+        All of it as columns with headers, by the end of the name of a CSV file, ``""`` last. None
+        where no tables hold all of it.
+    """
+
+    makers: str
+    variables: Mapping[str, Variable]
+    needed: tuple[str, ...]
+    account: Callable[[xr.Dataset], list[str]]
+    rows: Callable[[str, xr.Dataset], list[TextTable]]
+    headline: Callable[[xr.Dataset], str] | None = None
+    sheets: Callable[[xr.Dataset], dict[str, Mapping[str, np.ndarray]]] | None = None
+
+
+#: Every kind by its name; :mod:`saltus.results.kinds` fills it.
+KINDS: dict[str, ResultKind] = {}
 
 
 # -- names and units -------------------------------------------------------------------------------
+def _apart(prefix: str, name: str, word: str, *kinds: str) -> str:
+    """``prefix_name``; ``prefix_word_name`` where the kinds have a variable of that name."""
+    plain = f"{prefix}_{name}"
+    taken = any(plain in KINDS[kind].variables for kind in kinds)
+    return f"{prefix}_{word}_{name}" if taken else plain
+
+
 def contact_name(state: str) -> str:
     """Name of the variable that holds a state at the contacts: ``contact_x``;
     ``contact_state_velocity`` where the name is taken.
     """
-    name = f"contact_{state}"
-    return f"contact_state_{state}" if name in TRAJECTORY_VARIABLES else name
+    return _apart("contact", state, "state", TRAJECTORY)
 
 
 def before_name(state: str) -> str:
     """Name of the variable that holds a state before the contacts: ``contact_x_before``."""
-    name = f"contact_{state}_before"
-    return f"contact_state_{state}_before" if name in TRAJECTORY_VARIABLES else name
+    return _apart("contact", f"{state}_before", "state", TRAJECTORY)
 
 
 def attractor_name(state: str) -> str:
     """Name of the variable that holds the points of the attractors: ``attractor_x``;
     ``attractor_state_type`` where the name is taken.
     """
-    name = f"attractor_{state}"
-    return f"attractor_state_{state}" if name in ATTRACTOR_VARIABLES else name
+    return _apart("attractor", state, "state", ATTRACTORS)
 
 
 def orbit_name(state: str) -> str:
     """Name of the variable that holds the points of periodic orbits: ``orbit_x``;
     ``orbit_state_type`` where the name is taken.
     """
-    name = f"orbit_{state}"
-    return f"orbit_state_{state}" if name in ORBIT_VARIABLES else name
+    return _apart("orbit", state, "state", ORBITS)
 
 
 def equilibrium_name(state: str) -> str:
     """Name of the variable that holds a state at rest: ``equilibrium_x``;
     ``equilibrium_state_type`` where the name is taken.
     """
-    name = f"equilibrium_{state}"
-    return f"equilibrium_state_{state}" if name in EQUILIBRIA_VARIABLES else name
+    return _apart("equilibrium", state, "state", EQUILIBRIA)
 
 
 def response_name(name: str) -> str:
     """Name of the variable that holds a parameter, or the points of a state, of each response:
-    ``response_frequency``, ``response_x``.
-
-    ``response_own_peak`` where the name is taken.
+    ``response_frequency``, ``response_x``; ``response_own_peak`` where the name is taken.
     """
-    return (
-        f"response_own_{name}" if f"response_{name}" in RESPONSES_VARIABLES else f"response_{name}"
-    )
+    return _apart("response", name, "own", RESPONSES)
 
 
 def event_name(parameter: str) -> str:
     """Name of the variable that holds a parameter or a state at the events: ``event_frequency``;
     ``event_own_kind`` where the name is taken.
     """
-    taken = (*RESPONSES_VARIABLES, *BRANCHES_VARIABLES)
-    return f"event_own_{parameter}" if f"event_{parameter}" in taken else f"event_{parameter}"
+    return _apart("event", parameter, "own", RESPONSES, BRANCHES)
 
 
 def point_name(name: str) -> str:
     """Name of the variable that holds a parameter or a state at the points of branches:
     ``point_x``; ``point_own_period`` where the name is taken.
     """
-    return f"point_own_{name}" if f"point_{name}" in BRANCHES_VARIABLES else f"point_{name}"
+    return _apart("point", name, "own", BRANCHES)
 
 
 def sample_name(state: str) -> str:
@@ -162,7 +142,7 @@ def start_name(state: str) -> str:
     """Name of the coordinate that holds a state at the starts: ``start_x``; ``start_own_direction``
     where the name is taken.
     """
-    return f"start_own_{state}" if f"start_{state}" in RESPONSES_VARIABLES else f"start_{state}"
+    return _apart("start", state, "own", RESPONSES)
 
 
 def end_name(state: str) -> str:
@@ -187,11 +167,11 @@ def root_unit(unit: str) -> str:
 
 
 def kind_of(ds: Any) -> str:
-    """A key of :data:`TABLES`, such as ``"trajectory"``; ``""`` for anything that isn't a result of
+    """A key of :data:`KINDS`, such as ``"trajectory"``; ``""`` for anything that isn't a result of
     saltus.
     """
     kind = ds.attrs.get("saltus_result", "") if isinstance(ds, xr.Dataset) else ""
-    return kind if kind in TABLES else ""
+    return kind if kind in KINDS else ""
 
 
 def period_text(n: int, none: str = "not periodic") -> str:
@@ -254,7 +234,7 @@ def forcing_period(ds: xr.Dataset) -> float:
 
 def check(ds: Any, *, caller: str, kinds: Sequence[str] = (TRAJECTORY, STROBOSCOPE)) -> None:
     """Raise a ParameterError unless ``ds`` is a result of saltus of one of these kinds."""
-    *makers, last = " or ".join(MAKERS[kind] for kind in kinds).split(" or ")
+    *makers, last = " or ".join(KINDS[kind].makers for kind in kinds).split(" or ")
     wanted = f"{', '.join(makers)} or {last}" if makers else last
     if not isinstance(ds, xr.Dataset):
         hint = (
@@ -275,7 +255,7 @@ def check(ds: Any, *, caller: str, kinds: Sequence[str] = (TRAJECTORY, STROBOSCO
         )
     if kind not in kinds:
         raise ParameterError(
-            f"{caller} takes what {wanted} returns; this Dataset is from {MAKERS[kind]}."
+            f"{caller} takes what {wanted} returns; this Dataset is from {KINDS[kind].makers}."
         )
     missing = [name for name in _needed(ds, kind) if name not in ds]
     if missing:
@@ -290,31 +270,13 @@ def a_or_an(word: str) -> str:
     return f"{'an' if word[0].lower() in 'aeio' else 'a'} {word}"
 
 
-def _needed(ds: xr.Dataset, kind: str) -> tuple[str, ...]:
+def _needed(ds: xr.Dataset, kind: str) -> list[str]:
     """Variables without which nothing can be said about a result."""
-    if kind in (TRAJECTORY, STROBOSCOPE):
-        return (*states_of(ds), "status")
-    if kind == SECTION:
-        return (*states_of(ds), "crossing_time", "status")
-    return {
-        BASINS: ("basin", "status", "attractor_type"),
-        ATTRACTORS: ("attractor_type",),
-        AGREEMENT: ("agreement", "match_a"),
-        RESPONSES: ("response_of", "response_type", "response_branch"),
-        METHODS: ("method", "agrees"),
-        SPECTRUM: ("frequency", "window"),
-        IMPACTS: ("contact_speed", "contacts_per_second", "status"),
-        ENERGY: ("energy", "residual", "status"),
-        EXPONENTS: ("lyapunov_exponent", "running_exponent"),
-        SETTLED: ("response_period", "mismatch"),
-        MODES: ("shape", "flexibility"),
-        ORBITS: ("orbit_type", "orbit_stable"),
-        EQUILIBRIA: ("equilibrium_type", "equilibrium_place"),
-        BRANCHES: ("point_branch", "point_stable", "branch_periods"),
-        CURVE: ("point_arclength", "codim2_kind"),
-        BACKBONE: ("backbone_frequency", "point_output_peak"),
-        WIDTHS: ("regularisation_error", "error", "steps_per_period"),
-    }[kind]
+    return [
+        name
+        for row in KINDS[kind].needed
+        for name in (states_of(ds) if row == "<state>" else (row,))
+    ]
 
 
 # -- after reading a file --------------------------------------------------------------------------
@@ -322,7 +284,7 @@ def restore(ds: xr.Dataset) -> xr.Dataset:
     """The Dataset with the types of the tables: netCDF-3 keeps 32-bit integers, and readers differ
     on text and attributes.
     """
-    table = TABLES[kind_of(ds)]
+    table = KINDS[kind_of(ds)].variables
     dtypes = {name: table[name].dtype for name in map(str, ds.variables) if name in table}
     variables = {}
     for name, variable in ds.variables.items():

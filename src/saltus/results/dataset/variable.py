@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True)
@@ -81,3 +81,53 @@ SHARED = {
     **VARIED,
     **TRAJECTORY_NUMBER,
 }
+#: What stands in every table of motions from given starts: how they ended, and at what cost.
+ENDINGS = {
+    "status": STATUS,
+    **{
+        name: COUNTERS[name]
+        for name in ("steps", "rejected_steps", "mode_violations", "grazes_unresolved")
+    },
+    **END_TIME,
+    **END_STATES,
+}
+#: What a graze does to the motions behind it.
+SQRT_COEFFICIENT = (
+    "change of the grazed gap when the orbit returns, over the square root of the depth by which a "
+    "motion would pass the boundary"
+)
+#: An output, and its unit.
+OUTPUT = {
+    "output": Variable(
+        ("output",), "", "output: a state, or a function of the motion", "str", coord=True
+    ),
+    "output_units": Variable(("output",), "", "unit of the output", "str", coord=True),
+}
+#: What is known of each output; ``<output>``: its unit, that in ``output_units``.
+_OF_OUTPUT = {
+    "maximum": Variable(("output",), "<output>", "largest value"),
+    "minimum": Variable(("output",), "<output>", "smallest value"),
+    "peak": Variable(("output",), "<output>", "largest magnitude"),
+    "peak_to_peak": Variable(("output",), "<output>", "largest less smallest value"),
+    "mean": Variable(("output",), "<output>", "mean"),
+    "rms": Variable(("output",), "<output>", "root mean square about zero"),
+    "rms_about_mean": Variable(("output",), "<output>", "root mean square about the mean"),
+    "amplitude": Variable(
+        ("output",),
+        "<output>",
+        "amplitude A of the first harmonic A cos(2 pi f t + phase), f the forcing frequency",
+    ),
+    "phase": Variable(
+        ("output",),
+        "rad",
+        "phase of the first harmonic A cos(2 pi f t + phase), t the time of the equations",
+    ),
+}
+
+
+def of_outputs(what: str, prefix: str = "") -> dict[str, Variable]:
+    """The rows of what is known of each output of something: a response, a point of a branch."""
+    return {
+        f"{prefix}output_{name}": replace(row, dims=(what, "output"))
+        for name, row in _OF_OUTPUT.items()
+    }

@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from saltus.errors import ParameterError, SaltusError, shown
-from saltus.whole_files import flush, is_older, rename
+from saltus.whole_files import drafted, flush, is_older, refused_as
 
 #: Names of drafts.
 _DRAFT = re.compile(r"\.(.+\.)?[0-9a-f]{8}\.part")
@@ -54,26 +54,22 @@ def replacing(*paths: Path) -> Iterator[list[Path]]:
     """
     paths = tuple(_target(path) for path in paths)
     temporary = [path.with_name(f".{path.name}.{uuid.uuid4().hex[:8]}.part") for path in paths]
-    try:
+    advice = "Nothing was left behind. Free some space or choose another folder."
+    with (
+        refused_as(ResultFileError, f"{paths[-1]} can't be written", advice),
+        drafted(paths, temporary),
+    ):
         yield temporary
         for part in temporary:
             flush(part)
-        rename(temporary, paths)
-    except OSError as error:
-        raise ResultFileError(
-            f"{paths[-1]} can't be written: {error.strerror or error}. Nothing was left behind. "
-            f"Free some space or choose another folder."
-        ) from error
-    finally:
-        for part in temporary:
-            part.unlink(missing_ok=True)
 
 
 def _target(path: Path) -> Path:
     """Where a path leads: through a link, so that the link stays, but not out of its folder, where
     it might lead to anything.
     """
-    try:
+    what = f"{shown(str(path))} can't be written"
+    with refused_as(ResultFileError, what, "Choose another name."):
         target = path.resolve()
         if path.is_symlink() and not target.is_relative_to(path.parent.resolve()):
             raise ResultFileError(
@@ -84,12 +80,6 @@ def _target(path: Path) -> Path:
             raise ResultFileError(
                 f"{path} can't be written: there is no folder {path.parent}. Make it first."
             )
-    except OSError as error:
-        if isinstance(error, ResultFileError):
-            raise
-        raise ResultFileError(
-            f"{shown(str(path))} can't be written: {error.strerror or error}. Choose another name."
-        ) from None
     return target
 
 
@@ -125,15 +115,11 @@ def usable_folder(path: Path) -> Path:
     ResultFileError
         If it can't be made or written to.
     """
-    try:
+    advice = "Nothing was computed; choose another folder."
+    with refused_as(ResultFileError, f"{path} can't hold results", advice):
         path.mkdir(parents=True, exist_ok=True)
         remove_old_drafts(path)
         probe = path / f".{uuid.uuid4().hex[:8]}.part"
         probe.touch()
         probe.unlink()
-    except OSError as error:
-        raise ResultFileError(
-            f"{path} can't hold results: {error.strerror or error}. Nothing was computed; choose "
-            f"another folder."
-        ) from error
     return path

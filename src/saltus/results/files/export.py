@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import importlib.util
 import os
 import re
@@ -13,14 +12,13 @@ from typing import Any
 import xarray as xr
 
 from saltus.errors import ParameterError, nearest, shown
-from saltus.fence import csv_cell
-from saltus.results import tables
 from saltus.results.dataset.reader import reader
-from saltus.results.dataset.schema import RESPONSES, STROBOSCOPE, TABLES, TRAJECTORY, check, kind_of
+from saltus.results.dataset.schema import KINDS, NAMES, check, kind_of
 from saltus.results.describe import describe
 from saltus.results.files import known
 from saltus.results.files.atomic import path_of, replacing
 from saltus.results.files.ending import checksum_in, with_ending
+from saltus.results.files.sheets import notes_of, write_rows
 from saltus.results.files.texts import place_of_control
 from saltus.results.provenance import file_hash
 
@@ -83,7 +81,7 @@ def to_netcdf(ds: xr.Dataset, path: Target) -> Path:
     """Write a result to a netCDF file; see :func:`save`. A checksum of the numbers goes with it,
     and one of the file, at its end.
     """
-    _check(ds, "to_netcdf", list(TABLES))
+    _check(ds, "to_netcdf", NAMES)
     marked = ds.assign_attrs(file_hash=file_hash(ds))
     try:
         # to memory: the HDF5 library crashes the process when it meets a full disk
@@ -168,7 +166,7 @@ def to_csv(ds: xr.Dataset, path: Target) -> Path:
     'time [s],period,x [m],v [m/s],mode'
     """
     try:
-        _check(ds, "to_csv", (TRAJECTORY, STROBOSCOPE, RESPONSES))
+        _check(ds, "to_csv", [name for name, kind in KINDS.items() if kind.sheets is not None])
     except ParameterError as error:
         if not isinstance(ds, xr.Dataset) or "saltus_result" not in ds.attrs:
             raise
@@ -177,36 +175,18 @@ def to_csv(ds: xr.Dataset, path: Target) -> Path:
             f"ds[['...']].to_dataframe().to_csv({str(path)!r}). "
             "A study writes its tables as CSV."
         ) from None
-    path = path_of(path)
-    if kind_of(ds) == RESPONSES:
-        main, side = tables.responses(ds), {"events": tables.events(ds)}
-    else:
-        main = tables.samples(ds)
-        side = {
-            "contacts": tables.contacts(ds),
-            "trajectories": tables.trajectories(ds) if "trajectory" in ds.dims else {},
-        }
-    sheets = {
-        path.with_name(f"{path.stem}_{name}{path.suffix}"): table
-        for name, table in side.items()
-        if table
+    path, sheets = path_of(path), KINDS[kind_of(ds)].sheets
+    assert sheets is not None
+    files = {
+        path.with_name(f"{path.stem}_{end}{path.suffix}") if end else path: columns
+        for end, columns in sheets(ds).items()
+        if columns
     }
-    sheets[path] = main
-    with replacing(*sheets) as parts:
-        for part, table in zip(parts, sheets.values(), strict=True):
-            _write_table(part, table, ds)
+    with replacing(*files) as parts:
+        for part, columns in zip(parts, files.values(), strict=True):
+            rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+            write_rows(part, notes_of(ds), [list(columns), *rows])
     return path
-
-
-def _write_table(path: Path, table: tables.Table, ds: xr.Dataset) -> None:
-    with path.open("w", newline="", encoding="utf-8") as file:
-        file.writelines(f"# {line}\n" for line in tables.notes(ds))
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(map(csv_cell, table))
-        writer.writerows(
-            map(csv_cell, row)
-            for row in zip(*(column.tolist() for column in table.values()), strict=True)
-        )
 
 
 # -- MATLAB ----------------------------------------------------------------------------------------
@@ -250,7 +230,7 @@ def to_mat(ds: xr.Dataset, path: Target) -> Path:
     from scipy.io import savemat  # 0.2 s that only this function needs
     from scipy.io.matlab import MatWriteError
 
-    _check(ds, "to_mat", list(TABLES))
+    _check(ds, "to_mat", NAMES)
     path = path_of(path)
     with replacing(path) as (part,):
         try:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import xarray as xr
 
-from saltus.results import tables
 from saltus.results.dataset.reader import reader
 from saltus.results.dataset.schema import STROBOSCOPE, TRAJECTORY, check
+from saltus.results.kinds.trajectory import Columns, contact_columns, sample_columns
 
 if TYPE_CHECKING:
     import pandas as pd  # type: ignore[import-untyped]
@@ -48,7 +48,7 @@ def contacts(run: xr.Dataset) -> pd.DataFrame:
     ['time', 'time_error', 'guard', 'direction']
     """
     check(run, caller="sl.contacts", kinds=(TRAJECTORY,))
-    return _frame(run, tables.contact_columns(run))
+    return _frame(run, contact_columns(run))
 
 
 @reader
@@ -81,10 +81,10 @@ def samples(run: xr.Dataset) -> pd.DataFrame:
     (['time', 'period', 'x'], 2001)
     """
     check(run, caller="sl.samples", kinds=(TRAJECTORY, STROBOSCOPE))
-    return _frame(run, tables.sample_columns(run))
+    return _frame(run, sample_columns(run))
 
 
-def _frame(run: xr.Dataset, columns: dict[str, tuple[str, Any]]) -> pd.DataFrame:
+def _frame(run: xr.Dataset, columns: Columns) -> pd.DataFrame:
     """A DataFrame of columns; each comes with the variable that it is."""
     import pandas as pd
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from saltus.results.store.durable import StoreError
 from saltus.results.store.lock import exclusive, is_held
-from saltus.whole_files import flush, is_older, write
+from saltus.whole_files import flush, is_older, refused_as, write
 
 #: A folder takes a moment to make: a draft of one that is older than this [s], and not locked, was
 #: left by a process that was killed.
@@ -42,21 +42,18 @@ def write_folder(path: Path, files: Mapping[str, bytes], folders: Iterable[str])
     """
     remove_old_drafts(path)
     draft = path.with_name(f".{path.name}.{uuid.uuid4().hex[:8]}.part")
+    advice = "Nothing was left behind; make room or choose another folder."
     try:
-        for name in folders:
-            (draft / name).mkdir(parents=True)
-        with _locked(draft):
-            for name, data in files.items():
-                write(draft / name, data)
-            for place in [draft, *(place for place in draft.rglob("*") if place.is_dir())]:
-                flush(place)
-            os.rename(draft, path)
-        flush(path.parent)
-    except OSError as error:
-        raise StoreError(
-            f"{path} can't be made: {error.strerror or error}. Nothing was left behind; make room "
-            f"or choose another folder."
-        ) from error
+        with refused_as(StoreError, f"{path} can't be made", advice):
+            for name in folders:
+                (draft / name).mkdir(parents=True)
+            with _locked(draft):
+                for name, data in files.items():
+                    write(draft / name, data)
+                for place in [draft, *(place for place in draft.rglob("*") if place.is_dir())]:
+                    flush(place)
+                os.rename(draft, path)
+            flush(path.parent)
     finally:
         shutil.rmtree(draft, ignore_errors=True)
 

@@ -37,14 +37,12 @@ def write_whole(path: Path, data: bytes, drafts: Path, name: str) -> None:
     StoreError
         If the disk is full, the folder is missing or may not be written to.
     """
-    try:
+    advice = (
+        "Nothing half-written was left behind, and what was done stays done: make room or mend the "
+        "disk, then start again."
+    )
+    with whole_files.refused_as(StoreError, f"{path} can't be written", advice):
         whole_files.put(path, data, drafts / f"{name}.part")
-    except OSError as error:
-        raise StoreError(
-            f"{path} can't be written: {error.strerror or error}. Nothing half-written was left "
-            f"behind, and what was done stays done: "
-            "make room or mend the disk, then start again."
-        ) from error
 
 
 def read(path: Path, most: int = fence.STORED_BYTES) -> bytes | None:

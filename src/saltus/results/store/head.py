@@ -83,7 +83,7 @@ def read_head(path: Path) -> dict[str, Any]:
     return head
 
 
-def _opened(data: bytes) -> dict[str, Any] | None:
+def _opened(data: bytes | None) -> dict[str, Any] | None:
     """What a head says; None if it is damaged, or holds what no head does. Another layout may say
     anything.
     """
@@ -126,7 +126,7 @@ def mend_head(path: Path, head: Mapping[str, Any]) -> None:
     StoreError
         If it is damaged and the chunks were made from something else.
     """
-    there = _opened(read(path / HEAD) or b"")
+    there = _opened(read(path / HEAD))
     if there is not None and (
         there.get("format") != FORMAT or fingerprint(there) == fingerprint(head)
     ):
@@ -161,7 +161,7 @@ def _made_under(path: Path, head: Mapping[str, Any]) -> bool | None:
                 return True
             strangers = True
     for file in sorted((path / "artifacts").glob("*.json")):
-        record = unseal(read(file) or b"")
+        record = unseal(read(file))
         if record is not None and "store" in record:
             if record["store"] == wanted:
                 return True

@@ -23,6 +23,7 @@ from pathlib import Path
 
 from saltus import fence
 from saltus.results.store.durable import StoreError
+from saltus.whole_files import refused_as
 
 #: All chunks, as a shard.
 WHOLE = (0, 1)
@@ -165,7 +166,8 @@ def _open(file: Path, flags: int = os.O_RDWR | os.O_CREAT) -> int:
     """Open a lock file: without waiting for the other end of a pipe, and not through a link, whose
     end would be emptied.
     """
-    try:
+    advice = "Choose a folder that can be written to."
+    with refused_as(StoreError, f"{file} can't be locked", advice):
         if file.is_symlink() or (file.exists() and not file.is_file()):
             raise StoreError(
                 f"{file} can't be locked: it is no regular file. Remove it, then start again."
@@ -173,12 +175,6 @@ def _open(file: Path, flags: int = os.O_RDWR | os.O_CREAT) -> int:
         return os.open(
             file, flags | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0), 0o666
         )
-    except StoreError:
-        raise
-    except OSError as error:
-        raise StoreError(
-            f"{file} can't be locked: {error.strerror}. Choose a folder that can be written to."
-        ) from error
 
 
 def _wait(handle: int, *, shared: bool, patience: float) -> bool:

@@ -15,7 +15,9 @@ is the same bit by bit however it came about.
 
 from __future__ import annotations
 
+import base64
 import os
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -25,8 +27,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from saltus.errors import ParameterError
-from saltus.results.store.artifacts import get_artifact, has_artifact, put_artifact
+from saltus.errors import ParameterError, shown
 from saltus.results.store.chunks import TRAILER, Chunks
 from saltus.results.store.draft_folder import remove_old_drafts, write_folder
 from saltus.results.store.durable import (
@@ -46,8 +47,8 @@ from saltus.results.store.head import (
     read_head,
 )
 from saltus.results.store.identity import agree, texts
-from saltus.results.store.lock import WHOLE, holders, locked
-from saltus.whole_files import flush, seal
+from saltus.results.store.lock import WHOLE, exclusive, holders, locked
+from saltus.whole_files import flush, refused_as, seal, unseal
 
 __all__ = ["Store", "StoreError", "StoreStatus"]
 
@@ -255,13 +256,10 @@ class Store:
                 f"{self.path} holds no {HEAD} any more. Was it moved or deleted? "
                 f"Start again to make it anew."
             )
-        try:
+        advice = "Mend its permissions or the disk."
+        with refused_as(StoreError, f"{self.path} can't be written to", advice):
             for name in _FOLDERS:
                 (self.path / name).mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise StoreError(
-                f"{self.path} can't be written to: {error}. Mend its permissions or the disk."
-            ) from error
 
     def _sweep(self, shard: tuple[int, int]) -> None:
         """Remove drafts of killed writers: those that only the holder of this lock may write."""
@@ -323,12 +321,8 @@ class Store:
         progress, from any machine too.
         """
         done = np.zeros(self.chunks.count, dtype=bool)
-        try:
+        with refused_as(StoreError, f"{self.path} can't be read", "Was it moved or deleted?"):
             there = numbered(self.path)
-        except OSError as error:
-            raise StoreError(
-                f"{self.path} can't be read: {error.strerror}. Was it moved or deleted?"
-            ) from error
         done[[index for index in there if index < len(done)]] = True
         return done
 
@@ -447,20 +441,54 @@ class Store:
         StoreError
             If the lock isn't held, the disk is full, or another value is kept.
         """
-        put_artifact(
-            self.path, self._made_under, name, value, existing=existing, shard=self._held()
+        held, file = self._held(), self._artifact(name)
+        content = (
+            {"base64": base64.b64encode(value).decode()}
+            if isinstance(value, bytes)
+            else {"value": value}
         )
+        data = seal({"name": name, "store": self._made_under, **content})
+        # shards may put at the same moment
+        with exclusive(self.path / "locks" / "artifacts", patience=10.0):
+            earlier = read(file)
+            another = self._opened(name, earlier) is not None and earlier != data
+            if another and existing == "same":
+                raise StoreError(
+                    f"{self.path} keeps another {name!r} already. Use that one: get({name!r})."
+                )
+            if another and existing == "replace" and held != WHOLE:
+                raise StoreError(
+                    f"{name!r} of {self.path} can only be replaced under the lock of the whole "
+                    f"store."
+                )
+            if earlier != data and (not another or existing == "replace"):
+                write_whole(file, data, self.path / "parts", "artifact")
         return self.get(name)
 
     def get(self, name: str) -> Any:
         """What :meth:`put` kept, lists where tuples were put; :class:`StoreError` if there is none,
         or it is damaged.
         """
-        return get_artifact(self.path, self._made_under, name)
+        data = read(self._artifact(name))
+        values = self._opened(name, data)
+        if values is None:
+            state = "has no" if data is None else "has a damaged"
+            raise StoreError(
+                f"{self.path} {state} {name!r}. Compute it again: put() takes its place."
+            )
+        return base64.b64decode(values["base64"]) if "base64" in values else values["value"]
 
     def has(self, name: str) -> bool:
         """Whether :meth:`get` would return something: kept, and not damaged."""
-        return has_artifact(self.path, self._made_under, name)
+        return self._opened(name, read(self._artifact(name))) is not None
+
+    def _opened(self, name: str, data: bytes | None) -> dict[str, Any] | None:
+        return unseal(data, name=name, store=self._made_under)
+
+    def _artifact(self, name: str) -> Path:
+        if not re.fullmatch(r"[\w-]+", name, re.ASCII):
+            raise ParameterError(f"artifact {shown(name)}: use letters, digits, _ and -.")
+        return self.path / "artifacts" / f"{name}.json"
 
     # -- for people --------------------------------------------------------------------------------
     def status(self, *, checksums: bool = False) -> StoreStatus:

@@ -6,21 +6,27 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from pydantic import Field, model_validator
+
 from saltus.analysis.basins.basins import map_of
 from saltus.analysis.basins.pipeline import BasinPlan, basin_plan
-from saltus.study.answers.basins_rows import agreement_table, attractor_table
-from saltus.study.answers.question import Answers, Question, Show
+from saltus.fence import MOST_COUNT
+from saltus.results.kinds.agreement import rows
+from saltus.study.answers.question import Answers, Question, Show, asked
 from saltus.study.identity import identity
 from saltus.study.setting import quantities
 from saltus.study.setting.arguments import arguments
 from saltus.study.setting.setting import Setting
-from saltus.study.tables.parts import slug
-from saltus.study.tables.questions import Map
+from saltus.study.tables.kinds import OF_RESPONSES
+from saltus.study.tables.methods import Method
+from saltus.study.tables.parts import FileTitle, Quantity, Range, Table, slug
+from saltus.study.tables.signature import Generated
+from saltus.study.tables.signature import table as asking
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from saltus.study.table import TextTable
+    from saltus.results.table import TextTable
 
 #: Trajectories of attractors drawn in a gallery, and the periods of one that never repeats.
 GALLERY, PERIODS = 8, 24
@@ -28,6 +34,83 @@ GALLERY, PERIODS = 8, 24
 ATTRACTORS, AGREEMENT = "-attractors", "-agreement"
 
 
+class Axis(Range):
+    """An axis of a basin map: starts from one value to another, ends included, or
+    given one by one.
+    """
+
+    first: Quantity | None = Field(None, description="The first start.", examples=["-5 mm"])
+    last: Quantity | None = Field(None, description="The last start.", examples=["5 mm"])
+    count: int | None = Field(
+        None, ge=2, le=MOST_COUNT, description="How many starts.", examples=[400]
+    )
+    values: list[Quantity] | None = Field(
+        None,
+        min_length=2,
+        description="The starts themselves, ascending.",
+        examples=[["-1 mm", "1 mm"]],
+    )
+
+
+class Map(Table):
+    """[[basins.map]]: one of the maps of a study, with what sets it apart from the others."""
+
+    name: FileTitle = Field(
+        description="What it is called in tables, pictures and file names.",
+        examples=["exact, 25.5 kN/m"],
+    )
+    method: Method | None = Field(
+        None,
+        description="How to integrate; the study's [method] by default.",
+        examples=[{"name": "Taylor"}],
+    )
+    values: dict[str, Quantity] = Field(
+        default_factory=dict,
+        description="Values that differ from [system].",
+        examples=[{"contact_stiffness": "25.5 kN/m"}],
+    )
+    compare: str | None = Field(
+        None,
+        description="The name of another map to compare with this one, cell by cell.",
+        examples=["exact"],
+    )
+
+
+class OfMaps(Generated):
+    """A table of one map, or of several."""
+
+    axes: dict[str, Axis] = Field(
+        description="The two states that the map is drawn over.",
+        examples=[{"x": {"first": "-5 mm", "last": "5 mm", "count": 400},
+            "v": {"first": "-1 m/s", "last": "1 m/s", "count": 400}}],
+    )  # fmt: skip
+    map: list[Map] = Field(
+        default_factory=list,
+        description="Several maps of one study.",
+        examples=[[{"name": "exact"}]],
+    )
+
+    @model_validator(mode="after")
+    def _fits(self) -> OfMaps:
+        if len(self.axes) != 2:
+            raise ValueError(f"a map has two axes, such as axes.x and axes.v, not {len(self.axes)}")
+        names = [one.name for one in self.map]
+        if len(set(names)) < len(names):
+            raise ValueError("two maps have the same name")
+        for one in self.map:
+            if one.compare is not None and (one.compare not in names or one.compare == one.name):
+                raise ValueError(
+                    f"map {one.name!r} is compared with {one.compare!r}, which is no "
+                    f"other map of this study"
+                )
+        return self
+
+
+@asked(
+    140,
+    asking("basins", ["basins"], OF_RESPONSES, base=OfMaps, without=("method",)),
+    lambda _table, _study: [],
+)
 def questions(table: Any, setting: Setting) -> list[Question]:
     """The maps of the table, then where those agree that are compared. Raises StudyError, UnitError
     or ParameterError.
@@ -93,10 +176,6 @@ class BasinMap(Question):
         """The map, all at once; nothing is stored before it is complete."""
         return map_of(self.plan, threads, progress)
 
-    def rows(self, ds: xr.Dataset, found: Answers) -> list[TextTable]:  # noqa: ARG002
-        """A row for each attractor."""
-        return [attractor_table(self.title, ds)]
-
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
         """The map, and the motions on its attractors."""
         from saltus import plot
@@ -142,8 +221,9 @@ class Agreement(Question):
         )
 
     def rows(self, ds: xr.Dataset, found: Answers) -> list[TextTable]:  # noqa: ARG002
-        """A row for each pair of attractors."""
-        return [agreement_table(ds)]
+        """A row for each pair of attractors, under the names of the maps."""
+        a, b = self.names
+        return rows(f"a: {a} / b: {b}", ds)
 
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
         """The cells on which they differ."""

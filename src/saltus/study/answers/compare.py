@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from saltus.errors import StudyError
+from saltus.results.table import Column, TextTable, table, words
 from saltus.study.answers.printed import Row, rows
-from saltus.study.table import Column, TextTable, table, words
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -3,30 +3,54 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from pydantic import Field
 
 from saltus.errors import StudyError, nearest, shown
-from saltus.results.dataset.schema import event_name, point_name
+from saltus.results.dataset.schema import event_name
 from saltus.results.provenance import to_json
-from saltus.results.wording import unit_of
-from saltus.study.answers.branches import DIGITS, Branches
-from saltus.study.answers.question import Answers, OneVerb, Question, Show, first_figure
+from saltus.study.answers.branches import Branches
+from saltus.study.answers.question import Answers, OneVerb, Question, Show, asked, first_figure
 from saltus.study.setting import quantities
-from saltus.study.table import ROWS, quantity, table, words
+from saltus.study.tables.kinds import OF_RESPONSES, whole
+from saltus.study.tables.parts import Interval, Quantity
+from saltus.study.tables.signature import Kind
+from saltus.study.tables.signature import table as asking
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from saltus.study.setting.setting import Setting
-    from saltus.study.table import TextTable
 
 
+#: A curve begins at an event of the study's branches, named by its kind.
+KEYS = OF_RESPONSES | {
+    "event": Kind(Literal["fold", "period_doubling", "neimark_sacker", "graze"], ("fold",),
+        "Kind of the bifurcation of [branches] at which it begins."),
+    "vary": Kind(dict[str, Interval],
+        ({"frequency": ["12 Hz", "22 Hz"], "force": ["1 N", "6 N"]},),
+        "Two parameters and their ranges.", convert="ranges"),
+    "points": whole(400),
+}  # fmt: skip
+_BRANCHES = Field(None, description="Name of the [branches], of several.", examples=["main"])
+_NEAR = Field(None, description="Value of the branches' parameter near it.", examples=["17.8 Hz"])
+
+
+@asked(
+    120,
+    asking(
+        "bifurcation_curve",
+        ["bifurcation_curve"],
+        KEYS,
+        called="Bifurcation curve",
+        branches=(str | None, _BRANCHES),
+        near=(Quantity | None, _NEAR),
+    ),
+)
 class Curve(OneVerb):
     """A curve of bifurcations."""
-
-    place, function = "bifurcation_curve", "bifurcation_curve"
 
     def check(self, table: Any, setting: Setting) -> None:  # noqa: ARG002
         """Which event of which branches."""
@@ -83,31 +107,6 @@ class Curve(OneVerb):
             )
         nearest_one = 0 if self.near is None else int(np.argmin(np.abs(at - self.near)))
         return ds.isel(event=int(here[nearest_one]))
-
-    def rows(self, ds: xr.Dataset, found: Answers) -> list[TextTable]:  # noqa: ARG002
-        """Points of codimension two, after some points of the curve."""
-        names = (ds.attrs["parameter_x"], ds.attrs["parameter_y"])
-        along = [
-            quantity(name.replace("_", " "), ds[point_name(name)].values,
-                     unit_of(ds[point_name(name)]), DIGITS)
-            for name in names
-        ]  # fmt: skip
-        along.append(words("contacts", ds["point_itinerary"].values))
-        count = ds.sizes["point"]
-        shown_rows = np.unique(np.linspace(0, count - 1, ROWS).astype(int)).tolist()
-        kind = ds.attrs["bifurcation"].replace("_", " ")
-        note = f"{kind}: {count} points; it ends with {ds.attrs['begin']} and {ds.attrs['end']}."
-        tables = [table(self.title, along, (note,), shown_rows)]
-        if ds.sizes["codim2"]:
-            special = [words("point", [one.replace("_", " ") for one in ds["codim2_kind"].values])]
-            special += [
-                quantity(name.replace("_", " "), ds[f"codim2_{name}"].values,
-                         unit_of(ds[f"codim2_{name}"]), DIGITS)
-                for name in names
-            ]  # fmt: skip
-            rows = list(range(min(ds.sizes["codim2"], ROWS)))
-            tables.append(table(f"{self.title}: codimension two", special, (), rows))
-        return tables
 
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
         """The curve in the plane of both parameters."""

@@ -4,23 +4,26 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from saltus.study.answers.lyapunov_rows import exponent_table
-from saltus.study.answers.question import Answers, OneVerb, first_figure
+from saltus.fence import MOST_PERIODS
+from saltus.study.answers.question import OneVerb, asked, first_figure
+from saltus.study.tables.kinds import KINDS, whole
+from saltus.study.tables.signature import table
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from saltus.study.table import TextTable
+
+LYAPUNOV = {
+    "transient": whole(500, least=0, most=MOST_PERIODS),
+    "periods": whole(2000, most=MOST_PERIODS),
+}
 
 
+@asked(60, table("lyapunov", ["lyapunov"], KINDS | LYAPUNOV, called="Lyapunov exponents"))
 class Exponents(OneVerb):
     """Lyapunov exponents of motions."""
 
-    place, function, how = "lyapunov", "lyapunov", "flow"
-
-    def rows(self, ds: xr.Dataset, found: Answers) -> list[TextTable]:  # noqa: ARG002
-        """A row for each motion."""
-        return [exponent_table(self.title, ds)]
+    how = "flow"
 
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
         """How the exponents settle."""

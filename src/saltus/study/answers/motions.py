@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from saltus.errors import StudyError, nearest
-from saltus.fence import shown
-from saltus.study.answers.motion_rows import TABLES
-from saltus.study.answers.question import Answers, OneVerb, first_figure
+from pydantic import Field
+
+from saltus.errors import StudyError, nearest, shown
+from saltus.study.answers.question import OneVerb, asked, first_figure
 from saltus.study.code import code_hash
 from saltus.study.setting import quantities
-from saltus.study.tables.signature import verb
+from saltus.study.tables.kinds import KINDS, whole
+from saltus.study.tables.signature import Asked, OfLength, table, verb
 from saltus.system.quantity import quantity
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from saltus.study.setting.setting import Setting
-    from saltus.study.table import TextTable
 
 #: The key of a surface that is a formula.
 FORMULA = "formula"
@@ -25,12 +25,15 @@ FORMULA = "formula"
 _PARTS, _OPTIONAL = ("energy", "supplied", "dissipated"), ("friction",)
 
 
+_BASE: Any = (OfLength, Asked)
+_STATES = Field(None, min_length=1, description="Which states; all by default.", examples=[["x"]])
+_LEFT_OUT = ("state", "keep", "time_errors", "surface", "direction")
+
+
 class OfMotions(OneVerb):
     """A question on motions from given starts, of some length after a transient."""
 
-    #: The function of :mod:`saltus.plot` that draws the answer; whether it draws some trajectories
-    #: of a batch.
-    picture: ClassVar[str]
+    #: Whether its picture draws some trajectories of a batch.
     several: ClassVar[bool] = False
 
     def check_first(self, table: Any) -> None:
@@ -63,13 +66,10 @@ class OfMotions(OneVerb):
     def check_more(self, table: Any, setting: Setting) -> None:
         """What this question asks besides."""
 
-    def rows(self, ds: xr.Dataset, found: Answers) -> list[TextTable]:  # noqa: ARG002
-        """The one table."""
-        return [TABLES[self.place](self.title, ds)]
-
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
-        """The picture of the same name."""
+        """The usual picture of such a result; of a large batch the first trajectories."""
         from saltus import plot
+        from saltus.plot.choice import default_kind
         from saltus.plot.selection import MOST
 
         some = (
@@ -77,7 +77,7 @@ class OfMotions(OneVerb):
             if self.several and "trajectory" in ds.dims
             else {}
         )
-        return {"": first_figure(getattr(plot, self.picture)(ds, **some))}
+        return {"": first_figure(getattr(plot, default_kind(ds))(ds, **some))}
 
     def needs_contacts(self) -> None:
         """Refuse a method that steps over contacts."""
@@ -88,10 +88,11 @@ class OfMotions(OneVerb):
             )
 
 
+@asked(20, table("poincare", ["poincare"], KINDS, base=_BASE, called="Poincare section"))
 class Section(OfMotions):
     """[poincare]: where motions cross a surface."""
 
-    place, function, picture, several = "poincare", "poincare", "section", True
+    picture, several = "section", True
 
     def check_more(self, table: Any, setting: Setting) -> None:
         """The surface in SI."""
@@ -114,17 +115,29 @@ class Section(OfMotions):
         elif surface not in known:
             level = f'surface = {{ {self.system.states[0]} = "0.3 mm" }}'
             raise StudyError(
-                f"[{self.place}] surface = {shown(surface)!r} is unknown. "
+                f"[{self.place}] surface = {shown(surface)} is unknown. "
                 f"{nearest(surface, known)} Or give a level: {level}."
             )
         crossed(self.system, surface, self.arguments["values"] or {})
         self.arguments["surface"] = surface
 
 
+@asked(
+    30,
+    table(
+        "spectrum",
+        ["spectrum", "simulate", "poincare"],
+        KINDS | {"samples": whole(200, least=4)},
+        base=_BASE,
+        called="Spectrum",
+        without=_LEFT_OUT,
+        states=(list[str] | None, _STATES),
+    ),
+)
 class Lines(OfMotions):
     """[spectrum]: motions by frequency."""
 
-    place, function, picture, several = "spectrum", "spectrum", "spectrum", True
+    picture, several = "spectrum", True
 
     def check_more(self, table: Any, setting: Setting) -> None:  # noqa: ARG002
         """Which states and periods."""
@@ -162,10 +175,11 @@ class Lines(OfMotions):
         return ds
 
 
+@asked(40, table("impacts", ["impact_statistics"], KINDS, base=_BASE, called="Impact statistics"))
 class Statistics(OfMotions):
     """[impacts]: how often, how hard and how long the contacts are."""
 
-    place, function, picture = "impacts", "impact_statistics", "impacts"
+    picture = "impacts"
 
     def check_more(self, table: Any, setting: Setting) -> None:
         """Sides and forces."""
@@ -191,10 +205,11 @@ class Statistics(OfMotions):
         self.arguments["force"] = force or None
 
 
+@asked(50, table("energy", ["energy_balance"], KINDS, base=_BASE, called="Energy balance"))
 class Balance(OfMotions):
     """[energy]: energy stored, supplied and dissipated."""
 
-    place, function, picture = "energy", "energy_balance", "energy"
+    picture = "energy"
 
     def check_more(self, table: Any, setting: Setting) -> None:
         """The three functions: as written, or those of the model, which stand in its code."""

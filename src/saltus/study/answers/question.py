@@ -6,20 +6,76 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from saltus.errors import SaltusError, StudyError
+from saltus.results.dataset.schema import KINDS, kind_of
 from saltus.study.identity import identity
 from saltus.study.setting.arguments import arguments, system_of_question
 from saltus.study.tables.signature import verb
-from saltus.study.tables.wording import fault
+from saltus.study.tables.toml import fault
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from saltus.results.table import TextTable
     from saltus.study.setting.inputs import Input
     from saltus.study.setting.setting import Setting
-    from saltus.study.table import TextTable
+    from saltus.study.tables.signature import Generated
+    from saltus.study.tables.study import Study
+
+#: What makes the questions of a table of a study.
+Make = Callable[[Any, "Setting"], "list[Question]"]
+M = TypeVar("M", bound="Make | type[OneVerb]")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A table of study files that asks something.
+
+    Attributes
+    ----------
+    rank : int
+        Where it stands among the others, which are answered in this order: the quick ones first.
+    table : type
+        The table.
+    make : callable
+        Its questions.
+    files : callable
+        Title and stem of each file of a table that can be known from the study alone.
+    """
+
+    rank: int
+    table: type[Generated]
+    make: Make
+    files: Callable[[Any, Study], list[tuple[str, str]]]
+
+
+#: Every table that asks something, by its name; those of the files beside this one.
+REGISTER: dict[str, Entry] = {}
+
+
+def asked(
+    rank: int,
+    table: Any,
+    files: Callable[[Any, Study], list[tuple[str, str]]] = lambda one, _: [(one.title, one.stem)],
+) -> Callable[[M], M]:
+    """Enter a table, and what answers it: a class of questions of one function, or a callable that
+    makes the questions of a table.
+    """
+
+    def entered(answer: M) -> M:
+        one: Any = answer
+        make = one
+        if isinstance(answer, type):
+            one.place, one.function = table.place, table.function
+            make = lambda asked, setting: [one(asked, setting)]  # noqa: E731
+        REGISTER[table.place] = Entry(rank, table, make, files)
+        return answer
+
+    return entered
+
 
 #: Datasets that answer a study, by the stems of their files.
 Answers = Mapping[str, "xr.Dataset"]
@@ -79,9 +135,9 @@ class Question(ABC):
     def compute(self, found: Answers, threads: int | None, progress: Show) -> xr.Dataset:
         """The answer."""
 
-    @abstractmethod
-    def rows(self, ds: xr.Dataset, found: Answers) -> list[TextTable]:
+    def rows(self, ds: xr.Dataset, found: Answers) -> list[TextTable]:  # noqa: ARG002
         """The answer in rows: tables to print, the first of which is the CSV file."""
+        return KINDS[kind_of(ds)].rows(self.title, ds)
 
     @abstractmethod
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
@@ -106,7 +162,7 @@ class OneVerb(Question):
     """
 
     #: Name of the function, and of its argument that says how to integrate.
-    function: ClassVar[str]
+    function: ClassVar[str] = ""
     how: ClassVar[str] = "method"
 
     def __init__(self, table: Any, setting: Setting) -> None:
@@ -149,6 +205,18 @@ class OneVerb(Question):
         """The answer; ``how`` are the method, the threads and the progress callable."""
         ds: xr.Dataset = verb(self.function)(self.system, **(self.arguments | how))
         return ds
+
+    def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
+        """The usual picture of such a result, if there is one, under the title of the question."""
+        from saltus import plot
+        from saltus.plot.choice import default_kind
+
+        kind = default_kind(ds)
+        if not kind:
+            return {}
+        axes = getattr(plot, kind)(ds)
+        axes.set_title(self.title, loc="left")
+        return {"": first_figure(axes)}
 
 
 def first_figure(axes: Any) -> Any:

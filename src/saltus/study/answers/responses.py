@@ -7,18 +7,38 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
+from pydantic import Field, model_validator
 
 from saltus.errors import SaltusError, StudyError
 from saltus.results.files.measured import measured_points
-from saltus.study.answers.question import Answers, OneVerb, first_figure
-from saltus.study.answers.responses_rows import tables
-from saltus.study.tables.wording import fault
+from saltus.study.answers.question import OneVerb, asked, first_figure
+from saltus.study.tables.kinds import OF_RESPONSES
+from saltus.study.tables.signature import Asked, table
+from saltus.study.tables.toml import fault
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from saltus.study.setting.setting import Setting
-    from saltus.study.table import TextTable
+
+
+_MEASURED = Field(
+    None,
+    description="CSV in the study's folder, drawn with it: frequency [Hz], amplitude [mm].",
+    examples=["shaker.csv"],
+)
+
+
+class Varied(Asked):
+    """A table that varies parameters."""
+
+    @model_validator(mode="after")
+    def _one_or_two(self) -> Varied:
+        if len(vary := getattr(self, "vary", {})) not in (1, 2):
+            raise ValueError(
+                f"varies one parameter, or two, such as vary.contact_stiffness, not {len(vary)}"
+            )
+        return self
 
 
 class Responses(OneVerb):
@@ -47,10 +67,6 @@ class Responses(OneVerb):
         """The responses."""
         return super().call(how | {self.axes: self.varied()})
 
-    def rows(self, ds: xr.Dataset, found: Answers) -> list[TextTable]:  # noqa: ARG002
-        """Branches, and what happens to them; kinds of motion over two parameters."""
-        return tables(self.title, ds)
-
     def drawn_with(self) -> dict[str, Any]:
         """What is drawn besides."""
         return {}
@@ -71,16 +87,36 @@ class Responses(OneVerb):
         return {"": first_figure(axes)}
 
 
+@asked(
+    80,
+    table(
+        "bifurcation_diagram",
+        ["bifurcation_diagram"],
+        OF_RESPONSES,
+        base=Varied,
+        called="Bifurcation diagram",
+    ),
+)
 class Diagram(Responses):
     """[bifurcation_diagram]."""
 
-    place, function, axes = "bifurcation_diagram", "bifurcation_diagram", "vary"
+    axes = "vary"
 
 
+@asked(
+    70,
+    table(
+        "frequency_response",
+        ["frequency_response"],
+        OF_RESPONSES,
+        called="Frequency response",
+        measured=(str | None, _MEASURED),
+    ),
+)
 class Response(Responses):
     """[frequency_response], with measured points."""
 
-    place, function, axes = "frequency_response", "frequency_response", "frequency"
+    axes = "frequency"
 
     def check_first(self, table: Any) -> None:  # noqa: ARG002
         """It needs a forcing frequency."""

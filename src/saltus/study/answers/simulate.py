@@ -6,20 +6,37 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from saltus.errors import StudyError
+from saltus.analysis.motion.settled import settled
+from saltus.errors import ParameterError, StudyError
+from saltus.kernels.status import STATUS
+from saltus.results.kinds.settled import responses
+from saltus.results.kinds.trajectory import rows
 from saltus.study.answers.compare import contact_table, exact_times, printed_rows
-from saltus.study.answers.question import Answers, OneVerb, Question, first_figure
-from saltus.study.answers.simulate_rows import run_table
+from saltus.study.answers.question import Answers, OneVerb, Question, asked, first_figure
 from saltus.study.setting import quantities
-from saltus.study.tables.questions import REFERENCE, RUN
+from saltus.study.tables.kinds import KINDS
+from saltus.study.tables.signature import OfLength
+from saltus.study.tables.signature import table as asking
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from saltus.results.table import TextTable
     from saltus.study.setting.setting import Setting
-    from saltus.study.table import TextTable
+    from saltus.study.tables.study import Study
 
 
+#: Stems of the files: of the run, and of that of a second method.
+RUN, REFERENCE = "run", "run-reference"
+
+
+def _files(_table: Any, study: Study) -> list[tuple[str, str]]:
+    second = study.compare is not None and study.compare.reference is not None
+    title = study.study.name
+    return [(title, RUN), *([(f"{title}, reference", REFERENCE)] if second else [])]
+
+
+@asked(10, asking("simulate", ["simulate"], KINDS, base=OfLength), _files)
 def questions(table: Any, setting: Setting) -> list[Question]:
     """How given starts move, by the study's method, and by the second one that [compare] names
     before it.
@@ -77,7 +94,7 @@ class Motion(OneVerb):
     def rows(self, ds: xr.Dataset, found: Answers) -> list[TextTable]:
         """A row for each trajectory, or for each contact that was printed."""
         if self.compare is None:
-            return [run_table(self.title, ds)]
+            return rows(self.title, ds, response_texts(ds), dict(STATUS.values()))
         return [contact_table(self.title, ds, self.printed, self.exact, found.get(REFERENCE))]
 
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
@@ -117,3 +134,13 @@ class Reference(Motion):
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:  # noqa: ARG002
         """None of its own."""
         return {}
+
+
+def response_texts(run: xr.Dataset) -> list[str]:
+    """``T``, ``3T`` or ``not periodic within 48T`` for each trajectory; empty for an unforced
+    system or too few samples.
+    """
+    try:
+        return responses(settled(run))
+    except ParameterError:
+        return []

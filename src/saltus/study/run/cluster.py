@@ -6,17 +6,21 @@ See docs/studies.md.
 
 from __future__ import annotations
 
-import asyncio
 import logging
 import re
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError, wait
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from saltus.errors import StudyError
+from saltus.flow.threads import on_threads
+from saltus.interrupt import check_stop
 
 if TYPE_CHECKING:
+    from distributed import Client
+
     from saltus.analysis.attractors.attractor_set import AttractorSet
     from saltus.analysis.basins.labels import Settling
     from saltus.analysis.basins.pipeline import BasinPlan
@@ -24,8 +28,10 @@ if TYPE_CHECKING:
 #: Chunks handed out at a time, for each worker: enough to keep it busy, few enough that a large map
 #: doesn't fill the scheduler.
 CHUNKS_PER_WORKER = 4
-#: Times that a chunk is given to another worker when its own dies.
-MAX_RETRIES = 5
+#: Workers that a chunk is given to, one after the other, when they die or it fails there.
+MAX_TRIES = 6
+#: Time between two questions whether to stop, while a chunk is computed [s].
+PATIENCE = 0.5
 _SILENT = (
     "the scheduler {} doesn't answer ({}). Start one with `dask scheduler`, or leave "
     "--scheduler out."
@@ -74,66 +80,55 @@ def check_scheduler(address: str) -> None:
 
 
 def _run(
-    client: Any,
+    client: Client,
     plan: BasinPlan,
     found: AttractorSet,
-    missing: list[int],
+    missing: Sequence[int],
     keep: Callable[[int, Settling], None],
     show: Callable[[float], None],
 ) -> None:
-    """Hand out chunks, keep what comes back, hand out more; a chunk whose worker dies goes to
-    another one.
-    """
-    from distributed import as_completed
+    """Compute chunks; a thread waits for each that is handed out."""
 
+    def watch(share: float) -> None:
+        _find_workers(client, 60.0)
+        show(share)
+
+    _find_workers(client, 30.0)
+    width = CHUNKS_PER_WORKER * len(client.scheduler_info()["workers"])
+    on_threads(lambda index: _chunk(client, plan, found, index), missing, keep, width, watch)
+
+
+def _chunk(client: Client, plan: BasinPlan, found: AttractorSet, index: int) -> Settling:
+    """One chunk by the cluster. The plan goes with each: it is small, and what workers keep is lost
+    with them.
+
+    Raises
+    ------
+    StudyError
+        If it fails again and again.
+    """
+    problem: Exception | None = None
+    for _ in range(MAX_TRIES):
+        future = client.get_executor(pure=False).submit(plan.chunk, index, found)
+        while not wait([future], PATIENCE).done:
+            check_stop()
+        try:
+            chunk: Settling = future.result()
+        except (Exception, CancelledError) as error:  # its workers have died, one after the other
+            problem = error
+            continue
+        return chunk
+    raise StudyError(
+        f"chunk {index} failed on {MAX_TRIES} workers, the last time with {problem!r}."
+    ) from problem
+
+
+def _find_workers(client: Client, seconds: float) -> None:
+    """Wait until the scheduler has a worker. Raises StudyError if none comes."""
     try:
-        client.wait_for_workers(1, timeout=30)
+        client.wait_for_workers(1, timeout=seconds)
     except TimeoutError as error:
         raise StudyError(
             "the scheduler has no workers. Start some with `dask worker ADDRESS`, or "
             "leave --scheduler out."
         ) from error
-    shared = client.scatter((plan, found), broadcast=True)
-    waiting, tries = iter(missing), dict.fromkeys(missing, 0)
-    width = max(
-        CHUNKS_PER_WORKER * max(len(client.scheduler_info()["workers"]), 1), CHUNKS_PER_WORKER
-    )
-    indices = {
-        _submit(client, shared, index): index
-        for _, index in zip(range(width), waiting, strict=False)
-    }
-    running, done = as_completed(list(indices)), 0
-    for future in running:
-        index = indices.pop(future)
-        try:
-            part = future.result()
-        # every worker with the plan has died: send it to their successors
-        except (Exception, asyncio.CancelledError) as error:
-            tries[index] += 1
-            if tries[index] > MAX_RETRIES:
-                raise StudyError(
-                    f"chunk {index} failed on {MAX_RETRIES} workers, the last time with {error!r}."
-                ) from error
-            client.wait_for_workers(1, timeout=60)
-            shared = client.scatter((plan, found), broadcast=True)
-            again = _submit(client, shared, index)
-            indices[again] = index
-            running.add(again)
-            continue
-        keep(index, part)
-        done += 1
-        show(done / len(missing))
-        following = next(waiting, None)
-        if following is not None:
-            added = _submit(client, shared, following)
-            indices[added] = following
-            running.add(added)
-
-
-def _submit(client: Any, shared: Any, index: int) -> Any:
-    return client.submit(_chunk, shared, index, retries=MAX_RETRIES, pure=False)
-
-
-def _chunk(shared: tuple[BasinPlan, AttractorSet], index: int) -> Settling:
-    plan, found = shared
-    return plan.chunk(index, found)

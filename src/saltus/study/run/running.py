@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from saltus.errors import StudyError
-from saltus.study.table import TextTable
+from saltus.results.table import TextTable
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from saltus.errors import SaltusError, StudyError
+from saltus.results.table import TextTable
+from saltus.study.read import read
 from saltus.study.run.copies import COPY, copy_of, inputs_of
 from saltus.study.run.maps import STORES
 from saltus.study.run.stored import PARTIAL
-from saltus.study.table import TextTable
-from saltus.study.tables.read import read
 
 if TYPE_CHECKING:
     from saltus.results.store.store import StoreStatus

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 
 from saltus.results import save
 from saltus.results.files.atomic import remove_old_drafts
-from saltus.study.answers.ask import naming_table, questions_of
 from saltus.study.answers.basins import BasinMap
+from saltus.study.ask import naming_table, questions_of
 from saltus.study.run.copies import keep_copy
 from saltus.study.run.maps import compute, finish, open_store
 from saltus.study.run.running import Outcome, Report, Resources, Running
 from saltus.study.run.stored import load_or_compute
 from saltus.study.run.write import write
 from saltus.study.setting.inputs import Inputs
-from saltus.study.tables.spec import Study
+from saltus.study.tables.study import Study
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,7 +46,7 @@ def run_study(
     study : Study
         What to compute.
     text : str
-        The file as it stands; a copy goes to the folder. :func:`saltus.study.tables.read.read`
+        The file as it stands; a copy goes to the folder. :func:`saltus.study.read.read`
         returns both.
     folder : Path
         Output: for each question a ``.nc``, a ``.csv`` and pictures; the stores of basins.

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from saltus.results import to_csv
 from saltus.results.files.atomic import replacing
+from saltus.results.files.sheets import write_table
 from saltus.study.run.running import Outcome, Running
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ def write(
     notes = [file.note for file in question.inputs]
     for table in tables[:1]:
         noted = replace(table, notes=(*table.notes, *notes))
-        files.append(noted.write_csv(at.folder / f"{question.stem}.csv"))
+        files.append(write_table(noted, at.folder / f"{question.stem}.csv"))
     if question.all_rows:
         files.append(to_csv(ds, at.folder / f"{question.stem}{question.all_rows}.csv"))
     if at.pictures:

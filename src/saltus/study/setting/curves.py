@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.errors import SaltusError, StudyError
+from saltus.errors import SaltusError
 from saltus.language import Table, curve
 from saltus.results.files.measured import columns
 from saltus.study.setting.inputs import Input
 from saltus.study.tables.parts import Curve
+from saltus.study.tables.toml import fault
 
 
 def curve_of(file: Input, how: Curve, name: str) -> Table:
@@ -21,9 +22,10 @@ def curve_of(file: Input, how: Curve, name: str) -> Table:
         If the file holds something else, or the points can't be those of a curve. What it holds
         isn't repeated.
     """
-    place = f"[system.tables.{name}]"
     try:
         points, values = columns(file.data, file.path)
-        return curve(np.array(points), np.array(values), how.kind, how.outside, name)
+        return curve(
+            np.array(points), np.array(values), how.kind, how.outside, name, title=file.name
+        )
     except SaltusError as error:
-        raise StudyError(f"{place} {str(error).replace('sl.table', file.name)}") from None
+        raise fault(f"system.tables.{name}", error) from None

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from saltus import fence
-from saltus.errors import StudyError
+from saltus.errors import StudyError, shown
 from saltus.whole_files import sha256
 
 
@@ -103,7 +103,7 @@ class Inputs:
         ]
         if not real:
             raise StudyError(
-                f"[{place}] {fence.shown(name)!r} lies outside the study's folder "
+                f"[{place}] {shown(name)} lies outside the study's folder "
                 f"{self._folders[0]}, and a study reads nothing there. "
                 "Put the file there; or, if you trust the study, allow the folder: --inputs FOLDER."
             )
@@ -133,7 +133,7 @@ class KeptInputs(Inputs):
     def _find(self, name: str, place: str) -> Path:
         if name not in self._copies:
             raise StudyError(
-                f"[{place}] {self._folders[0]} has no copy of {fence.shown(name)!r}. {self._advice}"
+                f"[{place}] {self._folders[0]} has no copy of {shown(name)}. {self._advice}"
             )
         return self._folders[0] / self._copies[name][0]
 

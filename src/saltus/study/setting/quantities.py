@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from saltus.errors import ParameterError, StudyError, UnitError, nearest
+from saltus.study.tables.toml import fault
 from saltus.units import to_si
 
 if TYPE_CHECKING:
@@ -28,9 +29,7 @@ def number(value: Quantity, unit: str, place: str, key: str) -> float:
     Raises
     ------
     StudyError
-        If a quantity with a dimension is a bare number.
-    UnitError
-        If its unit is the wrong one.
+        If a quantity with a dimension is a bare number, or its unit is the wrong one.
     """
     if not isinstance(value, str) and unit not in ("", "1"):
         raise StudyError(
@@ -40,7 +39,7 @@ def number(value: Quantity, unit: str, place: str, key: str) -> float:
     try:
         return to_si(value, unit, key)
     except (ParameterError, UnitError) as error:
-        raise type(error)(f"[{place}] {error}") from None
+        raise fault(place, error) from None
 
 
 def parameters(

@@ -11,14 +11,14 @@ from saltus import flow
 from saltus.errors import ParameterError, SaltusError, StudyError, nearest
 from saltus.study.setting import quantities
 from saltus.study.setting.curves import curve_of
-from saltus.study.tables.wording import fault
+from saltus.study.tables.toml import fault
 from saltus.system.formula import Equations, Formula, Formulas
 
 if TYPE_CHECKING:
     from saltus.study.setting.inputs import Inputs
     from saltus.study.tables.parts import Header, Output, Quantity, SystemTable
     from saltus.study.tables.parts import Table as SpecTable
-    from saltus.study.tables.spec import Study
+    from saltus.study.tables.study import Study
     from saltus.system import System
 
 

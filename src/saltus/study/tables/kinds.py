@@ -38,11 +38,6 @@ Surface = Annotated[
     Discriminator(lambda given: "dict[str]" if isinstance(given, dict) else "str"),
     AfterValidator(_one_level),
 ]
-#: A time, or a range of them.
-Period = Annotated[
-    Annotated[Interval, Tag("list")] | Annotated[Quantity, Tag("quantity")],
-    Discriminator(lambda given: "list" if isinstance(given, list) else "quantity"),
-]
 _POWER = "Power that {} [W], a formula; of a published model it is known."
 _STARTS = (
     'Every state at the start, the same at every value, lists making a batch; or "sweep_up", '
@@ -74,7 +69,7 @@ KINDS = {
     "every": _time("1 s"),
     "transient": Kind(Quantity, (500, "5 s"), convert="transient"),
     "box": Kind(dict[str, Interval], ({"x": ["-5 mm", "5 mm"], "v": ["-1 m/s", "1 m/s"]},),
-        convert="box"),
+        'Range (low, high) of each state for random starts: start = "random 20".', convert="box"),
     "outputs": Kind(Outputs,
         ({"spring force": "k*x", "power": {"formula": "c*v**2", "unit": "W"}},),
                     "What to read off each response besides its states, by name: "
@@ -111,52 +106,3 @@ OF_RESPONSES = KINDS | {
     ),
     "periods": whole(2000, most=MOST_PERIODS),
 }
-#: Branches go over a range, without steps.
-OF_BRANCHES = OF_RESPONSES | {
-    "vary": Kind(
-        dict[str, Interval], ({"frequency": ["2 Hz", "30 Hz"]},),
-        "One parameter and its range.", convert="ranges",
-    ),
-    "at": whole(12, most=MOST_COUNT),
-    "longest": whole(8),
-    "points": whole(1000),
-    "switch": Kind(
-        list[Literal["period_doubling", "branch_point"]], (["period_doubling"],),
-        default=["period_doubling", "branch_point"],
-    ),
-}  # fmt: skip
-#: Orbits, stable or not, that are found from many starts.
-OF_ORBITS = OF_RESPONSES | {
-    "start": Kind(Starts, (*KINDS["start"].examples, "random 1000"),
-        'Where to begin: every state, lists making a batch; or "random 1000" with box.',
-        convert="start"),
-    "periods": whole(3, most=MOST_PERIODS),
-    "period": Kind(Period, (["1 s", "5 s"], "0.1 s"), convert="period"),
-}  # fmt: skip
-#: Equilibria are looked for in a box, or from starts.
-OF_EQUILIBRIA = KINDS | {
-    "start": Kind(dict[str, Start], KINDS["start"].examples,
-        "Starts of Newton's method, in place of a box: every state; lists make a batch.", None,
-        convert="start"),
-    "starts": whole(256),
-}  # fmt: skip
-#: Curves begin at an event of the study's branches, named by its kind.
-OF_CURVES = OF_RESPONSES | {
-    "event": Kind(Literal["fold", "period_doubling", "neimark_sacker", "graze"], ("fold",),
-        "Kind of the bifurcation of [branches] at which it begins."),
-    "vary": Kind(dict[str, Interval],
-        ({"frequency": ["12 Hz", "22 Hz"], "force": ["1 N", "6 N"]},),
-        "Two parameters and their ranges.", convert="ranges"),
-    "points": whole(400),
-}  # fmt: skip
-#: Backbones go over a range of amplitudes; parameters that are zero are taken out.
-OF_BACKBONES = OF_RESPONSES | {
-    "amplitude": Kind(Interval, (["0.1 mm", "5 mm"],)),
-    "state": Kind(examples=("x",)),
-    "force": Kind(examples=("force",)),
-    "values": Kind(dict[str, Quantity], ({"force": "0 N", "damping_ratio": 0},),
-        "Values of parameters: of free vibrations the force and all that damps are zero.", {},
-        convert="values"),
-    "mode": whole(1),
-    "points": whole(400),
-}  # fmt: skip

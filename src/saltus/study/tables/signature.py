@@ -12,12 +12,12 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, ClassVar, Literal
 
-from pydantic import Field, create_model
+from pydantic import Field, create_model, model_validator
 
 import saltus
 from saltus.fence import MOST_COUNT
 from saltus.study.tables.parts import Named, Quantity, Table
-from saltus.study.tables.wording import in_toml, toml
+from saltus.study.tables.toml import TABLES, toml
 
 #: What a question leaves to the study: the system, and how it is run.
 _OF_THE_STUDY = ("system", "run", "threads", "progress")
@@ -60,12 +60,28 @@ class Kind:
 class Generated(Table):
     """A table whose keys are parameters of a function."""
 
+    #: Its name in the file, and the function that answers it.
+    place: ClassVar[str] = ""
+    function: ClassVar[str] = ""
     #: How each key that is an argument of the function is written.
     kinds: ClassVar[dict[str, Kind]] = {}
 
 
 class Asked(Generated, Named):
     """Such a table that may be asked for several times."""
+
+
+class OfLength(Generated):
+    """A table that says how long to go on."""
+
+    @model_validator(mode="after")
+    def _one_length(self) -> OfLength:
+        if (getattr(self, "periods", None) is None) == (getattr(self, "t_end", None) is None):
+            raise ValueError(
+                "give the length once: periods = 60, or, of a system without forcing, "
+                't_end = "20 s"'
+            )
+        return self
 
 
 def verb(name: str) -> Callable[..., Any]:
@@ -101,6 +117,7 @@ def table(
         Keys that no parameter stands for.
     """
     found: dict[str, tuple[Any, Kind]] = {}
+    TABLES[verbs[0]] = place
     for function in map(verb, verbs):
         for parameter in inspect.signature(function).parameters.values():
             name = parameter.name
@@ -119,6 +136,8 @@ def table(
     title, text = place.title().replace("_", ""), f"[{place}]: {_plain(summary)}{several}"
     made = create_model(title, __base__=base, __module__=__name__, __doc__=text, **fields)
     for name, value in {
+        "place": place,
+        "function": verbs[0],
         "kinds": {name: kind for name, (_, kind) in found.items()},
         "called": called,
     }.items():
@@ -209,8 +228,6 @@ def documented(function: Callable[..., Any]) -> dict[str, tuple[str, str]]:
 def _plain(text: str) -> str:
     """The first sentence, as it is said of a study file."""
     sentence = _SENTENCE.match(text)
-    return in_toml(
-        _ROLE.sub(
-            lambda role: role[1] or role[2], (sentence[1] if sentence else text).replace("\n", " ")
-        )
+    return _ROLE.sub(
+        lambda role: role[1] or role[2], (sentence[1] if sentence else text).replace("\n", " ")
     )

@@ -18,7 +18,8 @@ from saltus.system.structures.parts import Contact, Force, direction
 from saltus.system.system import System
 from saltus.system.trace import system
 
-#: Share of the largest entry of the mode shapes below which a mode doesn't move a place: rounding.
+#: An entry of the mode shapes below this share of the largest is rounding: the mode doesn't move
+#: that degree of freedom.
 NOTHING = 1e-13
 #: Unit of a deflection: those of its rate, a force, a stiffness and a damper.
 UNITS = {
@@ -44,7 +45,7 @@ class Coordinates:
     transform: np.ndarray | None
 
     def along(self, vector: np.ndarray) -> np.ndarray:
-        """A direction of the degrees of freedom, in these coordinates."""
+        """A direction of the degrees of freedom in these coordinates."""
         if self.transform is None:
             return vector
         found = vector @ self.transform
@@ -140,7 +141,7 @@ def _signature(states: tuple[str, ...], defaults: dict[str, Any]) -> inspect.Sig
 
 
 def _sum(coefficients: Any, values: Sequence[Any]) -> Any:
-    """The sum of products, those with zero left out, positive ones first."""
+    """The sum of products without zeros, positive ones first."""
     places = np.flatnonzero(coefficients).tolist()
     total: Any = 0.0
     for i in sorted(places, key=lambda i: coefficients[i] < 0):

@@ -1,4 +1,4 @@
-"""Matrices of a structure, dense or sparse: their checks and what is factorised."""
+"""Matrices of a structure, dense or sparse: their checks and factorisations."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from saltus.errors import ParameterError, shown
+from saltus.errors import ParameterError, must_be
 
 #: Largest asymmetry of a symmetric matrix, as a share of its largest entry: rounding of a sum.
 ASYMMETRY = 1e-10
 
 
 def is_sparse(matrix: Any) -> bool:
-    """Whether this is a SciPy sparse matrix or array."""
+    """True if this is a SciPy sparse matrix or array."""
     return hasattr(matrix, "tocsr") and hasattr(matrix, "nnz")
 
 
@@ -33,7 +33,7 @@ def checked(matrix: Any, name: str, size: int | None = None, symmetric: bool = F
         try:
             square = entries = np.asarray(matrix)
         except ValueError:  # rows of different lengths
-            raise ParameterError(f"{name} must be a square matrix, not {shown(matrix)}.") from None
+            raise must_be(name, "a square matrix", matrix) from None
     if entries.dtype.kind not in "fiu":
         raise ParameterError(f"{name} must hold real numbers, not {entries.dtype}.")
     if square.ndim != 2 or square.shape[0] != square.shape[1] or not square.shape[0]:

@@ -10,19 +10,19 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from saltus.errors import ParameterError, among, nearest, shown
+from saltus.errors import ParameterError, among, must_be, nearest, one_of, shown
 
-#: Where a contact begins: above its gap, below minus its gap, or at both.
+#: Sides on which contact begins: above the gap, below minus the gap, or both.
 SIDES = ("upper", "lower", "both")
 P = TypeVar("P", "Contact", "Force")
 
 
-#: How to write what is no part of a structure.
+#: Advice on parts that can't be given as data.
 BY_HAND = (
     "Write the equations of the modes with @sl.system: sl.structure_modes(mass, stiffness, "
     "modes) gives their frequencies and shapes."
 )
-#: What people ask of a contact or a force that has no such argument, and what to do.
+#: Advice on arguments that a contact or a force lacks.
 _ELSEWHERE = {
     "restitution": "A contact is a spring, and loses energy by damping=. " + BY_HAND.replace(
         "Write", "For a rigid stop, sl.impact, write"),
@@ -42,7 +42,7 @@ _ELSEWHERE = {
 
 
 def _answered(kind: type[P]) -> type[P]:
-    """A part whose wrong arguments are answered in words."""
+    """Answer wrong arguments of a part in words."""
     made = kind.__init__
 
     @functools.wraps(made)
@@ -55,7 +55,7 @@ def _answered(kind: type[P]) -> type[P]:
 
 
 def _check_names(kind: type[Any], given: Mapping[Any, Any], places: int = 0) -> None:
-    """Raise a ParameterError for arguments that a part hasn't, or that it needs."""
+    """Raise a ParameterError for unknown or missing arguments of a part."""
     allowed = [field.name for field in fields(kind)]
     for name in given:
         if not among(name, allowed):
@@ -143,7 +143,7 @@ def parts(kind: type[P], given: Any, word: str, known: Iterable[str]) -> list[tu
     given : sequence
         Of them, or of mappings of their arguments.
     word : str
-        How they are called by default.
+        Their default name.
     known : iterable of str
         Names of the degrees of freedom.
 
@@ -153,16 +153,18 @@ def parts(kind: type[P], given: Any, word: str, known: Iterable[str]) -> list[tu
         If one of them can't be used.
     """
     if isinstance(given, Contact | Force | Mapping) or not isinstance(given, Iterable):
-        raise ParameterError(f"{word}s must be a list of them, not {shown(given)}.")
+        raise must_be(f"{word}s", "a list of them", given)
     degrees = list(known)
-    found = [one if isinstance(one, kind) else _made(kind, one) for one in given]
-    unnamed = [one for one in found if one.name is None]
+    found = [part if isinstance(part, kind) else _made(kind, part) for part in given]
+    unnamed = [part for part in found if part.name is None]
     numbers = iter(range(1, len(unnamed) + 1))
     names = [
-        (word if len(unnamed) == 1 else f"{word}{next(numbers)}") if one.name is None else one.name
-        for one in found
+        (word if len(unnamed) == 1 else f"{word}{next(numbers)}")
+        if part.name is None
+        else part.name
+        for part in found
     ]
-    for name, one in zip(names, found, strict=True):
+    for name, part in zip(names, found, strict=True):
         if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
             raise ParameterError(f"{shown(name)} can't be the name of a {word}: use letters, "
                                  f"digits and _.")  # fmt: skip
@@ -172,7 +174,7 @@ def parts(kind: type[P], given: Any, word: str, known: Iterable[str]) -> list[tu
             )
         if names.count(name) > 1:
             raise ParameterError(f"two {word}s are called {name!r}. Give each its own name=.")
-        _check(name, one, degrees)
+        _check(name, part, degrees)
     return list(zip(names, found, strict=True))
 
 
@@ -187,9 +189,9 @@ def _made(kind: type[P], given: Any) -> P:
     return kind(**given)
 
 
-def _check(name: str, one: Contact | Force, known: list[str]) -> None:
-    """Raise a ParameterError for a part that names no degree of freedom, or something else."""
-    places = [one.at] + ([one.to] if isinstance(one, Contact) and one.to is not None else [])
+def _check(name: str, part: Contact | Force, known: list[str]) -> None:
+    """Raise a ParameterError for a part without a valid degree of freedom."""
+    places = [part.at] + ([part.to] if isinstance(part, Contact) and part.to is not None else [])
     for place in places:
         if not among(place, known):
             raise ParameterError(
@@ -197,33 +199,33 @@ def _check(name: str, one: Contact | Force, known: list[str]) -> None:
             )
     if len(places) == 2 and places[0] == places[1]:
         raise ParameterError(f"{name}: at and to are both {places[0]!r}.")
-    if isinstance(one, Force) and callable(one.amplitude):
+    if isinstance(part, Force) and callable(part.amplitude):
         raise ParameterError(
             f"{name}: a structure takes harmonic forces, amplitude*cos(2*pi*frequency*t), and no "
             f"record or function of the time. {BY_HAND}"
         )
-    if isinstance(one, Contact) and not among(one.side, SIDES):
-        raise ParameterError(f"{name}: side={shown(one.side)}. {nearest(one.side, SIDES)}")
-    if isinstance(one, Force) and (
-        isinstance(one.harmonic, bool)
-        or not isinstance(one.harmonic, int | np.integer)
-        or one.harmonic < 0
+    if isinstance(part, Contact):
+        one_of(SIDES, f"{name}: ", side=part.side)
+    if isinstance(part, Force) and (
+        isinstance(part.harmonic, bool)
+        or not isinstance(part.harmonic, int | np.integer)
+        or part.harmonic < 0
     ):
         raise ParameterError(f"{name}: harmonic must be a whole number, 0 or more.")
 
 
-def _named(place: Any, known: list[str]) -> str:
-    """What to write for a degree of freedom, given by its number or misspelt."""
-    number = isinstance(place, int | np.integer) and not isinstance(place, bool)
-    if number and 1 <= place <= len(known):
-        return f"They are given by name: number {place} is {known[place - 1]!r}, counted from 1."
-    return nearest(place, known)
+def _named(degree: Any, known: list[str]) -> str:
+    """Advice on a degree of freedom that is given by its number or misspelt."""
+    number = isinstance(degree, int | np.integer) and not isinstance(degree, bool)
+    if number and 1 <= degree <= len(known):
+        return f"They are given by name: number {degree} is {known[degree - 1]!r}, counted from 1."
+    return nearest(degree, known)
 
 
-def direction(one: Contact | Force, names: list[str]) -> np.ndarray:
+def direction(part: Contact | Force, names: list[str]) -> np.ndarray:
     """The vector b of a part: its deflection is b.x, its force acts along b."""
     vector = np.zeros(len(names))
-    vector[names.index(one.at)] = 1.0
-    if isinstance(one, Contact) and one.to is not None:
-        vector[names.index(one.to)] = -1.0
+    vector[names.index(part.at)] = 1.0
+    if isinstance(part, Contact) and part.to is not None:
+        vector[names.index(part.to)] = -1.0
     return vector

@@ -1,4 +1,4 @@
-"""Modes of a structure, and what is lost by keeping some of them only."""
+"""Modes of a structure, and the flexibility lost by keeping only some of them."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy as np
 from saltus.errors import ParameterError
 from saltus.system.structures.matrices import check_positive, dense, len_of
 
-#: Largest structure whose modes are all computed, as dense matrices.
+#: Most degrees of freedom of a structure whose modes are all computed, as dense matrices.
 MOST_DENSE = 1500
-#: A frequency below this share of the next is one of a rigid body.
+#: A frequency below this share of the next is that of a rigid body.
 RIGID = 1e-7
 
 
@@ -32,7 +32,7 @@ class Modes:
     shapes: np.ndarray
 
     def kept(self, count: int) -> Modes:
-        """The lowest of them."""
+        """The lowest ``count`` modes."""
         return Modes(self.angular[:count], self.shapes[:, :count])
 
 
@@ -66,7 +66,7 @@ def modes_of(mass: Any, stiffness: Any, count: int) -> Modes:
 
 def _lowest(mass: Any, stiffness: Any, count: int) -> tuple[np.ndarray, np.ndarray]:
     """The lowest eigenpairs of large matrices, by Lanczos' method about a shift below zero, which
-    rigid bodies don't disturb.
+    rigid-body modes don't disturb.
     """
     from scipy.sparse import csc_matrix
     from scipy.sparse.linalg import eigsh
@@ -83,7 +83,7 @@ def _lowest(mass: Any, stiffness: Any, count: int) -> tuple[np.ndarray, np.ndarr
 def flexibility(
     stiffness: Any, modes: Modes, count: int, at: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """How far the lowest modes carry the static deflection under a unit force.
+    """Static deflection under unit forces, and the part of it that the lowest modes miss.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def flexibility(
     modes : Modes
         All of them, or those that are kept.
     count : int
-        How many are kept.
+        Number of modes kept.
     at : float64[m, n]
         Directions of the forces.
 

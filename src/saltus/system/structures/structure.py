@@ -15,7 +15,7 @@ import numpy as np
 
 from saltus.arguments import checked
 from saltus.contact.guards import number_of
-from saltus.errors import ParameterError, SaltusWarning, among, shown
+from saltus.errors import ParameterError, SaltusWarning, among, must_be, shown
 from saltus.system.display import STRUCTURE
 from saltus.system.structures import matrices
 from saltus.system.structures.equations import UNITS, Coordinates, traced
@@ -25,11 +25,11 @@ from saltus.system.structures.reduction import Modes, flexibility, modal_damping
 from saltus.system.system import System
 from saltus.units import to_si
 
-#: Most coordinates of a system: what is compiled grows with them.
+#: Most coordinates of a system: the compiled code grows with them.
 MOST_COORDINATES = 128
 
 
-#: What people ask of a structure by another name, or that it hasn't.
+#: Advice on arguments that a structure lacks or calls otherwise.
 _ELSEWHERE = {
     **dict.fromkeys(("zeta", "xi", "loss_factor"), "Write damping_ratio=, such as \"2 %\"."),
     **dict.fromkeys(("n_modes", "nmodes", "modes_kept", "number"), "Write modes=."),
@@ -46,9 +46,9 @@ _ELSEWHERE = {
         "the coordinates: outputs= of sl.frequency_response and others, with the mode shapes of "
         "sl.structure_modes."),
 }  # fmt: skip
-#: Natural frequencies [Hz] below which a structure is none: mass and stiffness may be swapped.
+#: Natural frequency [Hz] below which mass and stiffness may be swapped.
 _ABSURD = 3e-2
-#: How many natural frequencies are told.
+#: Natural frequencies that the description lists.
 _TOLD = 6
 
 
@@ -90,7 +90,7 @@ def structure(
         In place of ``damping``: the ratio of every mode, such as 0.02 or ``"2 %"``, or one each for
         the lowest of them.
     modes : int, optional
-        How many of the lowest modes are kept; the states are then their coordinates. Default: all
+        Number of the lowest modes kept; the states are then their coordinates. Default: all
         degrees of freedom, as they are. ``modes=n`` loses nothing, and makes a full mass matrix
         quicker to compile.
     names : sequence of str, or str
@@ -134,7 +134,7 @@ def structure(
     (('x1', 'x2', 'v1', 'v2'), ['stop_gap', 'stop_stiffness', 'force', 'frequency'], 'stop')
     """
     if not among(unit, UNITS):
-        raise ParameterError(f"unit must be 'm', 'rad' or '', not {shown(unit)}.")
+        raise must_be("unit", "'m', 'rad' or ''", unit)
     reduced = modes is not None or damping_ratio is not None
     mass = matrices.checked(mass, "mass", symmetric=True)
     size = matrices.len_of(mass)
@@ -194,7 +194,7 @@ def rate_name(name: str) -> str:
 
 
 def _count(modes: Any, size: int) -> int:
-    """How many coordinates the system has, checked."""
+    """Number of coordinates of the system, checked."""
     if modes is None:
         if size > MOST_COORDINATES:
             raise ParameterError(
@@ -203,7 +203,7 @@ def _count(modes: Any, size: int) -> int:
             )
         return size
     if isinstance(modes, bool) or not isinstance(modes, int | np.integer) or modes < 1:
-        raise ParameterError(f"modes must be a whole number, 1 or more, not {shown(modes)}.")
+        raise must_be("modes", "a whole number, 1 or more", modes)
     if modes > min(size, MOST_COORDINATES):
         raise ParameterError(f"modes = {modes}, but at most {min(size, MOST_COORDINATES)} can be.")
     return int(modes)
@@ -216,16 +216,18 @@ def _physical(mass: Any, stiffness: Any, damping: Any, degrees: list[str]) -> Co
     )
 
 
-def _modal(kept: Modes, damping: Any) -> Coordinates:
-    names = [f"q{i}" for i in range(1, len(kept.angular) + 1)]
+def _modal(modes: Modes, damping: Any) -> Coordinates:
+    names = [f"q{i}" for i in range(1, len(modes.angular) + 1)]
     return Coordinates(
-        names, [f"{one}_rate" for one in names], None, np.diag(kept.angular**2), damping,
-        kept.shapes,
+        names, [f"{one}_rate" for one in names], None, np.diag(modes.angular**2), damping,
+        modes.shapes,
     )  # fmt: skip
 
 
 def _angular(moving: Coordinates, stiffness: Any) -> np.ndarray:
-    """Angular natural frequencies [rad/s], ascending; none of a stiffness that isn't symmetric."""
+    """Angular natural frequencies [rad/s], ascending; empty for a stiffness that isn't
+    symmetric.
+    """
     full = matrices.dense(stiffness)
     if moving.inverse is None or np.abs(full - full.T).max() > ASYMMETRY * np.abs(full).max():
         return np.zeros(0)
@@ -261,11 +263,9 @@ def _ratio(ratio: Any, modes: Modes, count: int) -> np.ndarray:
         plain = [_share(one) for one in ratio] if several else _share(ratio)
         ratios = np.broadcast_to(np.asarray(plain, float), count)
     except (TypeError, ValueError, OverflowError):
-        raise ParameterError(
-            f"damping_ratio must be one number or {count} of them, not {shown(ratio)}."
-        ) from None
+        raise must_be("damping_ratio", f"one number or {count} of them", ratio) from None
     if not (np.isfinite(ratios).all() and (ratios >= 0).all()):
-        raise ParameterError(f"damping_ratio must be 0 or more, not {shown(ratio)}.")
+        raise must_be("damping_ratio", "0 or more", ratio)
     if (ratios > 1).any():
         warnings.warn(
             f"damping_ratio = {ratios.max():g} is more than critical damping, 1: such modes don't "
@@ -277,7 +277,7 @@ def _ratio(ratio: Any, modes: Modes, count: int) -> np.ndarray:
 
 
 def _share(ratio: Any) -> Any:
-    """A ratio as a number; a text such as ``"2 %"`` has its unit taken off."""
+    """A ratio as a number; the unit of a text such as ``"2 %"`` is removed."""
     return to_si(ratio, "1", "damping_ratio") if isinstance(ratio, str) else ratio
 
 
@@ -285,7 +285,7 @@ def _words(
     stiffness: Any, modes: Modes, count: int, degrees: list[str],
     contacts: list[tuple[str, Contact]],
 ) -> str:  # fmt: skip
-    """What is said of a reduction."""
+    """The description of a reduced structure."""
     words = (
         f"{STRUCTURE} {len(degrees)} degrees of freedom, by its lowest {count} modes, up to "
         f"{modes.angular[count - 1] / (2 * math.pi):.6g} Hz{_told(modes.angular)}."

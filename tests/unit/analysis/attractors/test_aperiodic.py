@@ -9,7 +9,7 @@ import pytest
 
 from function_maps import FunctionMap
 from saltus.analysis.attractors.aperiodic import (
-    SampledAttractor,
+    SampledMotion,
     growth_rates,
     kind_of_growth,
     kinds_of,
@@ -276,10 +276,8 @@ def test_a_chaotic_saddle_is_not_an_attractor():
 
 
 # -- boxes -----------------------------------------------------------------------------------------
-def sampled(points, kind="chaotic") -> SampledAttractor:
-    return SampledAttractor(
-        kind, 0.1, 0.01, np.asarray(points, float), np.ones(np.shape(points)[1])
-    )
+def sampled(points, kind="chaotic") -> SampledMotion:
+    return SampledMotion(kind, 0.1, 0.01, np.asarray(points, float), np.ones(np.shape(points)[1]))
 
 
 def test_a_chaotic_attractor_of_four_states_is_one():

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from function_maps import FunctionMap
-from saltus.analysis.attractors.aperiodic import SampledAttractor
+from saltus.analysis.attractors.aperiodic import SampledMotion
 from saltus.analysis.attractors.attractor_set import AttractorSet
 from saltus.analysis.attractors.find_attractors import find_attractors
 from saltus.analysis.basins.labels import Settling, settle
@@ -22,7 +22,7 @@ from saltus.analysis.basins.serial import (
     settling_from,
 )
 from saltus.analysis.closed.capture import Neighbourhoods
-from saltus.analysis.closed.orbits import Orbit
+from saltus.analysis.closed.motions import ClosedMotion
 from saltus.errors import SaltusError
 from saltus.whole_files import seal, unseal
 
@@ -128,11 +128,11 @@ def test_numbers_that_text_may_lose():
         [[5e-324, -0.0], [0.1 + 0.2, 1.7976931348623157e308], [np.inf, -np.inf], [np.nan, 1 / 3]]
     )
     matrices = np.arange(16.0).reshape(4, 2, 2) / 7
-    orbit = Orbit(odd, np.array([0.3 + 0.4j, complex(-0.0, -0.4)]), np.float64(1e-17))
+    orbit = ClosedMotion(odd, np.array([0.3 + 0.4j, complex(-0.0, -0.4)]), np.float64(1e-17))
     found = AttractorSet(
         Neighbourhoods(odd[:2].copy(), matrices[:2], np.array([0, 1])),
         [orbit],
-        [SampledAttractor("quasi_periodic", -0.0, np.nan, odd, SCALE)],
+        [SampledMotion("quasi_periodic", -0.0, np.nan, odd, SCALE)],
         [orbit],
     )
     data = json.loads(json.dumps(found_data(found)))
@@ -190,7 +190,7 @@ def test_data_that_do_not_hold_together_are_refused(forge):
 
 
 def _periodic():
-    orbit = Orbit(np.zeros((2, 2)), np.zeros(2, complex), 0.0)
+    orbit = ClosedMotion(np.zeros((2, 2)), np.zeros(2, complex), 0.0)
     return AttractorSet(
         Neighbourhoods(np.zeros((2, 2)), np.stack([np.eye(2)] * 2), np.zeros(2, np.int64)), [orbit]
     )

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import saltus as sl
-from saltus.analysis.closed.all_cycles import Guess, _nearest, all_cycles, close
+from saltus.analysis.closed.all_cycles import all_cycles
+from saltus.analysis.closed.shooting import close
 from saltus.flow.maps import Stroboscope
 
 
@@ -22,9 +23,9 @@ PERIOD = 2 * np.pi / 5
 def known():
     map_ = Stroboscope(circle, sl.Taylor(), every=1.2)
     found = all_cycles(map_, np.array([[1.0, 0.2]]), (0.0, 2.0), 1.2)
-    (cycle,) = found.cycles
+    (cycle,) = found.motions
     assert cycle.time == pytest.approx(PERIOD, rel=1e-14)
-    return map_, cycle
+    return found
 
 
 def around(phase, radius=1.0, turns=1, n=4):
@@ -38,13 +39,12 @@ def around(phase, radius=1.0, turns=1, n=4):
 @pytest.mark.parametrize("turns", [1, 2])
 def test_a_known_cycle_is_a_zero_at_every_phase(known, turns):
     z = around(np.linspace(0, 6, 13), turns=turns)
-    np.testing.assert_allclose(_nearest((known[1],), 4)(z)[:, 0], z, atol=1e-9)
+    np.testing.assert_allclose(known.known(4)(z)[:, 0], z, atol=1e-9)
 
 
 def test_newtons_method_doesnt_come_back_to_a_deflated_cycle(known):
     """From beside the only cycle there is: it finds that, and with it deflated nothing."""
-    map_, cycle = known
     z = around(np.linspace(0, 6, 13), radius=1.05)
-    guess = Guess(z[:, :-1].reshape(13, 4, 2), z[:, -1], np.full((13, 2), 2.0), np.arange(13))
-    assert len(close(map_, guess, 2.0)) == 13
-    assert len(close(map_, guess, 2.0, _nearest((cycle,), 4))) == 0
+    guess = known.guess(z[:, :-1].reshape(13, 4, 2), z[:, -1], np.full((13, 2), 2.0))
+    assert len(close(guess)[1]) == 13
+    assert len(close(guess, known.known(4))[1]) == 0

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from function_maps import FunctionMap
-from saltus.analysis.closed.all_orbits import all_orbits, close, multipliers_of
+from saltus.analysis.closed.all_orbits import all_orbits, multipliers_of
 from saltus.analysis.closed.orbit_table import outside, stability_of
-from saltus.analysis.solve.damped import damped_newton
+from saltus.analysis.closed.shooting import close
+from saltus.analysis.solve.newton import newton
 
 LOGISTIC = FunctionMap(lambda x: 4 * x * (1 - x), "x", lambda x: (4 - 8 * x)[:, :, None])
 HENON = FunctionMap(
@@ -39,7 +40,7 @@ def henon():
 def test_the_logistic_map_at_4_has_2_to_the_n_points_of_period_n(logistic):
     """It is conjugate to doubling an angle: sin^2(pi j / (2^n +- 1)) are all its points."""
     for n in range(1, 7):
-        points = [x for one in logistic.orbits if n % one.period == 0 for x in one.points[:, 0]]
+        points = [x for one in logistic.motions if n % one.period == 0 for x in one.points[:, 0]]
         exact = [np.sin(np.pi * j / (2**n - 1)) ** 2 for j in range(2 ** (n - 1))]
         exact += [np.sin(np.pi * j / (2**n + 1)) ** 2 for j in range(1, 2 ** (n - 1) + 1)]
         assert np.sort(points) == pytest.approx(np.sort(exact), abs=1e-12)
@@ -47,7 +48,7 @@ def test_the_logistic_map_at_4_has_2_to_the_n_points_of_period_n(logistic):
 
 def test_their_multipliers_are_2_to_the_n(logistic):
     """But for the fixed point at the end of the interval, whose multiplier is 4."""
-    for one in logistic.orbits:
+    for one in logistic.motions:
         n = one.period
         exact = 4.0 if one.points[0, 0] < 1e-9 else 2.0**n
         assert abs(one.multipliers[0]) == pytest.approx(exact, rel=1e-10)
@@ -55,22 +56,22 @@ def test_their_multipliers_are_2_to_the_n(logistic):
 
 def test_the_henon_map_has_the_cycles_that_are_known(henon):
     """Biham & Wenzel, Phys. Rev. Lett. 63 (1989) 819, and the fixed point off the attractor."""
-    counts = np.bincount([one.period for one in henon.orbits], minlength=8)[1:]
+    counts = np.bincount([one.period for one in henon.motions], minlength=8)[1:]
     assert counts.tolist() == [2, 1, 0, 1, 0, 2, 4]
 
 
 def test_areas_shrink_by_the_determinant_of_the_map(henon):
-    for one in henon.orbits:
+    for one in henon.motions:
         assert np.prod(one.multipliers).real == pytest.approx((-0.3) ** one.period, rel=1e-12)
 
 
 def test_every_orbit_is_there_once_and_has_its_least_period(henon):
-    for i, one in enumerate(henon.orbits):
+    for i, one in enumerate(henon.motions):
         image = one.points
         for m in range(1, one.period):
             image = HENON.launch(image, 1).advance(1)[:, 0]
             assert np.abs(image - one.points).max() > 1e-3, m
-        others = [x.points for x in henon.orbits[i + 1 :] if x.period == one.period]
+        others = [x.points for x in henon.motions[i + 1 :] if x.period == one.period]
         assert all(np.abs(one.points[0] - x).max(axis=1).min() > 1e-4 for x in others)
 
 
@@ -89,12 +90,11 @@ def test_with_one_start_nothing_is_claimed():
 
 def test_deflation_never_returns_a_known_orbit(henon):
     start = np.random.default_rng(2).uniform([-1.5, -0.5], [1.5, 0.5], (200, 1, 2))
-    scale = np.array([2.6, 0.8])
-    first = henon.orbits[0].points.reshape(1, 2)
-    found = close(HENON, start, scale, first)
+    first = henon.motions[0].points.reshape(1, 2)
+    _, found = close(henon.guess(start), first)
     assert len(found)
-    assert np.abs(found[:, 0] - first).max(axis=1).min() > 0.1
-    assert not len(close(HENON, start, scale, henon.within(1)))
+    assert np.abs(found.points[:, 0] - first).max(axis=1).min() > 0.1
+    assert not len(close(henon.guess(start), henon.known(1))[1])
 
 
 def test_deflation_finds_what_the_starts_do_not_lead_to():
@@ -104,11 +104,12 @@ def test_deflation_finds_what_the_starts_do_not_lead_to():
         return x**3 - x, (3 * x**2 - 1)[:, :, None]
 
     start, known = np.linspace(0.7, 1.3, 13)[:, None], np.zeros((0, 1))
-    x, found = damped_newton(equations, start, np.ones((13, 1)))
-    assert found.all()
-    assert x == pytest.approx(np.ones((13, 1)), abs=1e-12)
+    zeros = newton(equations, start, np.ones((13, 1)), damped=True)
+    assert zeros.found.all()
+    assert zeros.z == pytest.approx(np.ones((13, 1)), abs=1e-12)
     for _ in range(3):
-        x, found = damped_newton(equations, start, np.ones((13, 1)), known)
+        zeros = newton(equations, start, np.ones((13, 1)), damped=True, known=known)
+        x, found = zeros.z, zeros.found
         assert not np.isin(np.round(x[found], 6), np.round(known, 6)).any()
         known = np.concatenate([known, x[found][:1]])
     assert np.sort(known[:, 0]) == pytest.approx([0, 1], abs=1e-12)
@@ -116,13 +117,14 @@ def test_deflation_finds_what_the_starts_do_not_lead_to():
 
 def test_damping_converges_where_the_plain_step_runs_away():
     """Newton's method on atan diverges from beyond 1.39."""
-    x, found = damped_newton(
+    zeros = newton(
         lambda x, _: (np.arctan(x), (100 / (1 + x**2))[:, :, None]),
         np.array([[10.0], [-50.0]]),
         np.full((2, 1), 100.0),
+        damped=True,
     )
-    assert found.all()
-    assert np.abs(x).max() < 1e-12
+    assert zeros.found.all()
+    assert np.abs(zeros.z).max() < 1e-12
 
 
 def test_small_multipliers_survive_large_ones():

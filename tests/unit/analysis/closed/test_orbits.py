@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from function_maps import FunctionMap, attracts, orbit_near
-from saltus.analysis.closed.orbits import Orbit, find_orbits, orbit_distance, phase_distances, same
+from saltus.analysis.closed.motions import (
+    ClosedMotion,
+    from_smallest,
+    least_period,
+    orbit_distance,
+    phase_distances,
+    same,
+)
+from saltus.analysis.closed.orbits import find_orbits
 
 UNIT = np.array([1.0, 1.0])
 
@@ -116,11 +124,12 @@ def test_no_orbit_is_none():
 def test_same_orbits_whatever_their_first_point_and_twins_that_are_not():
     points = np.array([[-1.0, 0.2], [0.5, 0.1], [1.0, 0.0]])
     a, shifted, twin = (
-        Orbit(p, np.zeros(2) + 0j, 0.0) for p in (points, np.roll(points, 1, axis=0), -points)
+        ClosedMotion(p, np.zeros(2) + 0j, 0.0)
+        for p in (points, np.roll(points, 1, axis=0), -points)
     )
     assert same(a, shifted, UNIT, 1e-9)
     assert not same(a, twin, UNIT, 1e-9)  # of equal amplitude
-    assert not same(a, Orbit(points[:1], np.zeros(2) + 0j, 0.0), UNIT, 1e-9)
+    assert not same(a, ClosedMotion(points[:1], np.zeros(2) + 0j, 0.0), UNIT, 1e-9)
 
 
 def test_an_orbit_of_an_inexact_map_does_not_depend_on_the_others_of_its_batch():
@@ -138,6 +147,19 @@ def test_an_orbit_of_an_inexact_map_does_not_depend_on_the_others_of_its_batch()
     alone = find_orbits(map_, start[:1], np.array([1]), scale[:1], np.full(1, map_.noise))
     assert both.period[0] == alone.period[0] == 1
     assert both.points[0, 0] == alone.points[0, 0]
+
+
+@pytest.mark.parametrize(("n", "least"), [(12, 1), (12, 3), (12, 4), (12, 12), (7, 7), (1, 1)])
+def test_the_least_period_is_that_of_all_points(n, least):
+    loop = np.random.default_rng(n + least).normal(size=(least, 2))
+    points = np.tile(loop, (n // least, 1)) + 1e-9 * np.random.default_rng(1).normal(size=(n, 2))
+    assert least_period(points[None], UNIT).tolist() == [least]
+    assert from_smallest(points)[0, 0] == points[:, 0].min()
+
+
+def test_one_point_that_comes_back_is_no_period():
+    figure = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0], [-1.0, 0.0]])
+    assert least_period(figure[None], UNIT).tolist() == [4]
 
 
 def test_the_distance_of_two_orbits_is_that_at_the_best_phase():

@@ -66,7 +66,7 @@ def test_a_crash_on_the_way_leaves_the_old_file(tmp_path, monkeypatch):
     def crash(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(export.tables, "notes", crash)
+    monkeypatch.setattr(export, "notes_of", crash)
     with pytest.raises(KeyboardInterrupt):
         save(sine_run((3e-3,)), path)
     assert {one.name: one.read_bytes() for one in tmp_path.iterdir()} == before

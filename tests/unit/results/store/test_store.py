@@ -489,6 +489,14 @@ def test_a_seal_sees_every_bit():
         assert unseal(text) is None
 
 
+def test_a_seal_belongs_where_its_identity_says():
+    sealed = seal({"name": "a", "store": "s", "value": [1.0]})
+    assert unseal(sealed, name="a", store="s")["value"] == [1.0]
+    assert unseal(sealed, name="b", store="s") is None
+    assert unseal(sealed, name="a", folder="s") is None
+    assert unseal(None, name="a") is None
+
+
 # -- status ----------------------------------------------------------------------------------------
 def test_status_tells_how_far_it_is(store):
     before = store.status()

@@ -1,0 +1,184 @@
+"""One search for closed motions, stable and unstable: Newton's method from many guesses, and again
+with the motions that are known deflated.
+
+1. Newton's method is started from every guess.
+2. What it found is sorted out: a motion that is known counts for it, another one is added.
+3. The known motions are taken out of the equations, and Newton's method is started from some of the
+   guesses and from beside the known motions, where a fold leaves the second of a pair. Again, until
+   nothing more is found.
+
+How many motions were missed is estimated from those that a single start led to: Good, Biometrika 40
+(1953) 237-264.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from saltus.analysis.closed.motions import ClosedMotion
+from saltus.analysis.closed.shooting import Shooting, close
+from saltus.analysis.solve.deflation import Known
+from saltus.flow.maps import Travel
+from saltus.kernels import status as st
+
+#: Iterates that starts are followed before Newton's method begins, in turn: none, so that motions
+#: are found which nothing comes near; some, so that a chaotic set is reached.
+AGES = (0, 4, 8, 12)
+#: Guesses that a search with known motions deflated begins with, and its steps: most of them lead
+#: nowhere.
+DEFLATED_STARTS, DEFLATED_STEPS = 64, 40
+#: How far beside known motions it begins too, in units of their range.
+BESIDE = np.repeat([0.01, 0.1, 0.3], 6)
+
+
+@dataclass
+class Search:
+    """What a search came to.
+
+    Attributes
+    ----------
+    period : int
+        n of the orbits of period n that were looked for; 0 of limit cycles.
+    starts, converged : int
+        Starts, and those of them that led to a closed motion.
+    found_once : int
+        Motions that one start alone led to.
+    deflated : int
+        Motions that no start led to before the others were deflated.
+    exhausted : bool
+        Whether the last search with all known motions deflated found nothing.
+    given_up : int
+        Starts that were dropped: their motion took more steps or contacts than the method allows.
+    """
+
+    period: int
+    starts: int
+    converged: int = 0
+    found_once: int = 0
+    deflated: int = 0
+    exhausted: bool = False
+    given_up: int = 0
+
+    @property
+    def unseen(self) -> float:
+        """Estimated share of the starts whose motion isn't known; NaN if none led to one."""
+        return self.found_once / self.converged if self.converged else np.nan
+
+
+M = TypeVar("M", bound=ClosedMotion)
+
+
+class Family(ABC, Generic[M]):
+    """Closed motions of one kind that were found, each once.
+
+    Attributes
+    ----------
+    motions : list of ClosedMotion
+        They.
+    found : list of int
+        Starts that led to each.
+    searches : list of Search
+        What was done.
+    """
+
+    #: Searches with the known motions deflated at most.
+    rounds: int
+
+    def __init__(self) -> None:
+        self.motions: list[M] = []
+        self.found: list[int] = []
+        self.searches: list[Search] = []
+
+    @abstractmethod
+    def motion(self, closed: Shooting) -> M | None:
+        """The motion that Newton's method found; None if it doesn't close."""
+
+    @abstractmethod
+    def same(self, motion: M, closed: Shooting) -> np.ndarray:
+        """Which of those that Newton's method found are a motion, bool[k]."""
+
+    @abstractmethod
+    def known(self, n: int) -> Known:
+        """What deflation takes out of the equations of n points."""
+
+    @abstractmethod
+    def beside(self, n: int, random: np.random.Generator) -> list[Shooting]:
+        """Guesses of n points beside the known motions."""
+
+    @abstractmethod
+    def place(self, motion: M) -> tuple[float, ...]:
+        """By what motions are ordered: it doesn't depend on discovery."""
+
+    def take(self, closed: Shooting) -> np.ndarray:
+        """Add what Newton's method found and isn't known yet; the number of each, int64[k], -1 of
+        one that doesn't close.
+        """
+        number = np.full(len(closed), -1)
+
+        def note(motion: M, i: int) -> None:
+            rows = np.flatnonzero(number == -1)
+            number[rows[self.same(motion, closed.rows(rows))]] = i
+
+        for i, motion in enumerate(self.motions):
+            note(motion, i)
+        for row in range(len(closed)):
+            if number[row] != -1:
+                continue
+            one = self.motion(closed.rows(np.array([row])))
+            number[row] = -2
+            if one is not None:
+                number[row] = len(self.motions)
+                note(one, len(self.motions))
+                self.motions.append(one)
+                self.found.append(0)
+        return np.asarray(np.maximum(number, -1))
+
+    def hunt(self, search: Search, guesses: Iterable[tuple[Shooting, np.ndarray]]) -> Shooting:
+        """Search from guesses, of which each part says what starts they come from, int64[k]; all
+        guesses.
+        """
+        self.searches.append(search)
+        tried, led = list[Shooting](), list[np.ndarray]()
+        for guess, start in guesses:
+            index, closed = close(guess)
+            number = self.take(closed)
+            tried.append(guess)
+            led.append(np.stack([start[index], number])[:, number >= 0])
+        pairs = np.unique(np.concatenate(led, axis=1), axis=1)
+        count = np.bincount(pairs[1], minlength=len(self.motions))
+        self.found = (np.array(self.found, np.int64) + count).tolist()
+        search.converged = len(np.unique(pairs[0]))
+        search.found_once = int(np.count_nonzero(count == 1))
+        return Shooting.joined(tried)
+
+    def deflate(self, search: Search, guesses: Shooting) -> None:
+        """Search on with the known motions deflated, from some guesses and from beside the known
+        motions, until nothing more is found.
+        """
+        n, random = guesses.points.shape[1], np.random.default_rng(0)
+        every = max(1, len(guesses) // DEFLATED_STARTS)
+        some = guesses.rows(np.arange(0, len(guesses), every))
+        for _ in range(self.rounds):
+            before = len(self.motions)
+            starts = Shooting.joined([some, *self.beside(n, random)])
+            self.take(close(starts, self.known(n), DEFLATED_STEPS)[1])
+            search.deflated += len(self.motions) - before
+            if len(self.motions) == before:
+                search.exhausted = True
+                return
+
+    def order(self, kept: Iterable[int]) -> None:
+        """Keep some of the motions, in an order that doesn't depend on discovery."""
+        order = sorted(kept, key=lambda i: self.place(self.motions[i]))
+        self.motions = [self.motions[i] for i in order]
+        self.found = [self.found[i] for i in order]
+
+
+def used_up(flight: Travel) -> np.ndarray:
+    """Trajectories that needed more steps or contacts than they were allowed, bool[k]."""
+    return np.isin(flight.status, (st.BUDGET_STEPS, st.BUDGET_EVENTS))

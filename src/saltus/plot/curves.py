@@ -1,0 +1,352 @@
+"""What over a parameter: responses as dots, branches as lines, in one frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+
+from saltus.errors import ParameterError, among, nearest, shown
+from saltus.plot import axes as draw
+from saltus.plot import motion_colors
+from saltus.plot import response_points as points
+from saltus.plot.style import QUIET, Scale, display_scale
+from saltus.results.dataset.schema import event_name, point_name, states_of
+
+#: What is known of the responses and of the points of branches alike.
+Size = Literal[
+    "rms", "peak", "maximum", "minimum", "peak_to_peak", "mean", "rms_about_mean", "amplitude",
+    "phase",
+]  # fmt: skip
+#: Name of each quantity on its axis.
+LABELS = {
+    "rms": "rms of {}", "peak": "peak |{}|", "maximum": "largest {}", "minimum": "smallest {}",
+    "peak_to_peak": "peak to peak of {}", "mean": "mean of {}",
+    "rms_about_mean": "rms of {} about its mean", "amplitude": "first harmonic of {}",
+    "phase": "phase of {}", "transmissibility": "{}", "period": "period", "frequency": "frequency",
+}  # fmt: skip
+#: Quantities that begin at zero.
+SIZES = (
+    "rms", "peak", "peak_to_peak", "rms_about_mean", "amplitude", "transmissibility", "period",
+)  # fmt: skip
+#: Phases over more than this [deg] have ticks at parts of a right angle.
+_WIDE_PHASE = 20.0
+#: Dashes of what is unstable.
+DASHES = (0, (3.0, 1.6))
+#: Diameter of the smallest dots [pt]: more than a pixel of a screen.
+_SMALLEST = 0.6
+#: Where the legend begins, in widths of the Axes: beside the Axes, beside the names of gaps.
+_BESIDE, _BESIDE_NAMES = 1.02, 1.16
+
+
+class Height(NamedTuple):
+    """What is drawn of responses or of points [SI], its unit, and of what it is."""
+
+    values: np.ndarray
+    unit: str
+    of: str
+
+
+@dataclass(frozen=True)
+class Curves:
+    """What is drawn of one Dataset.
+
+    Attributes
+    ----------
+    one : Shown
+        The Dataset, with the responses that are shown.
+    dots : array of float, shape (response,) or (response, sample), optional
+        Heights of its responses [SI].
+    along : sequence of array of float, shape (point,)
+        Heights of the points of its branches [SI], each a set of curves.
+    """
+
+    one: points.Shown
+    dots: np.ndarray | None
+    along: Sequence[np.ndarray] = ()
+
+    @property
+    def largest(self) -> float:
+        """Largest magnitude of what the scale is chosen by."""
+        seen = self.along if self.dots is None else [self.dots]
+        return max((float(np.nanmax(np.abs(one), initial=0.0)) for one in seen), default=0.0)
+
+    @property
+    def events_above(self) -> bool:
+        """Whether events stand above the picture, not on the branches."""
+        return self.dots is not None and bool(
+            self.one.name or not self.one.ds.attrs.get("unstable")
+        )
+
+
+@dataclass(frozen=True)
+class Dots:
+    """How responses are drawn.
+
+    Attributes
+    ----------
+    sizes : tuple of (float, float)
+        Up to so many dots: their diameter [pt]. They must not hide each other.
+    aperiodic : float
+        How many times as large are those of motion that never repeats.
+    first : float
+        How many times as large are those of the first of several Datasets, so that none is hidden.
+    marked : bool
+        Whether kinds and Datasets have markers of their own, and the first Dataset is hollow.
+    """
+
+    sizes: tuple[tuple[float, float], ...]
+    aperiodic: float
+    first: float
+    marked: bool
+
+    def size(self, count: int, times: float = 1.0) -> float:
+        """Diameter of so many dots [pt]."""
+        return max(times * next(size for most, size in self.sizes if count <= most), _SMALLEST)
+
+
+# -- quantities ------------------------------------------------------------------------------------
+def check_quantity(quantity: Any, known: Sequence[str]) -> None:
+    """Raise a ParameterError unless a quantity is known."""
+    if not among(quantity, known):
+        raise ParameterError(f"quantity={shown(quantity)}. Known: {', '.join(known)}.")
+
+
+def height(ds: xr.Dataset, quantity: str, output: str | None, prefix: str = "") -> Height:
+    """A quantity of each response, or with the prefix ``point_`` of each point of the branches."""
+    first = states_of(ds)[0]
+    if quantity in ("period", "frequency"):
+        period = ds[f"{prefix}period"].values
+        return Height(period, "s", "") if quantity == "period" else Height(1.0 / period, "Hz", "")
+    name = first if output is None else output
+    if not prefix and name == first and f"response_{quantity}" in ds:
+        own = ds[f"response_{quantity}"]
+        return Height(own.values, own.attrs.get("units", ""), first)
+    chosen, unit = of_output(ds, name)
+    return Height(
+        chosen[f"{prefix}output_{quantity}"].values, "rad" if quantity == "phase" else unit, name
+    )
+
+
+def of_output(ds: xr.Dataset, name: str) -> tuple[xr.Dataset, str]:
+    """The Dataset of one output, and its unit.
+
+    Raises
+    ------
+    ParameterError
+        If it has no such output.
+    """
+    known = ds["output"].values.tolist() if "output" in ds else []
+    if not among(name, known):
+        raise ParameterError(f"the Dataset has no output {shown(name)}. {nearest(name, known)}")
+    chosen = ds.sel(output=name)
+    return chosen, str(chosen["output_units"].item())
+
+
+def height_scale(unit: str, drawn: Sequence[Curves], quantity: str = "") -> Scale:
+    """Display unit of a quantity, over all Datasets; of a phase degrees."""
+    largest = max(one.largest for one in drawn)
+    return display_scale(unit, largest, "deg" if quantity == "phase" else None)
+
+
+def height_axis(ax: Axes, quantity: str, of: str, up: Scale, log: bool = False) -> None:
+    """Name, limits and ticks of the vertical axis."""
+    if log:
+        ax.set_yscale("log")
+    elif quantity in SIZES:
+        ax.set_ylim(bottom=0)
+    if quantity == "phase" and np.ptp(ax.get_ylim()) > _WIDE_PHASE:
+        ax.yaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 1.5, 3, 4.5, 9, 10]))
+    ax.set_ylabel(up.label(LABELS[quantity].format(of)))
+
+
+# -- frame -----------------------------------------------------------------------------------------
+@contextmanager
+def frame(
+    ax: Any,
+    tall: float,
+    drawn: Sequence[Curves],
+    up: Scale,
+    look: Dots | None = None,
+    *,
+    events: bool,
+    legend: bool,
+) -> Iterator[tuple[Axes, Scale]]:
+    """Draw Datasets over their parameter; give the Axes and the display unit of the parameter to
+    who draws more, and names the vertical axis; then mark events and name the colours.
+    """
+    datasets = [one.one for one in drawn]
+    with draw.panels(ax, 1, (6.3, tall)) as (panel,):
+        across = points.parameter_axis(panel, datasets)
+        named: dict[str, Any] = {}
+        for one in drawn:
+            if one.dots is not None and look is not None:
+                named |= (_compare if one.one.name else _kinds)(panel, one, look, across, up)
+            for curve in one.along:
+                named |= draw_branches(panel, one.one.ds, curve, across, up)
+                if events and not one.events_above:
+                    draw_marks(panel, one.one.ds, curve, across, up)
+        yield panel, across
+        if events:
+            points.draw_events(panel, [one.one for one in drawn if one.events_above], across)
+        if legend:
+            points.legend(panel, named, _BESIDE_NAMES if panel.texts else _BESIDE)
+        if look is not None:
+            points.say_if_empty(panel, datasets)
+
+
+# -- responses -------------------------------------------------------------------------------------
+def _flat(
+    one: points.Shown, heights: np.ndarray, mask: np.ndarray, across: Scale, up: Scale
+) -> tuple[np.ndarray, np.ndarray]:
+    """All dots of the responses of ``mask``; the padding is left out."""
+    y = heights[mask].reshape(int(mask.sum()), -1) * up.factor
+    x = np.broadcast_to(one.values[mask][:, None] * across.factor, y.shape)
+    there = np.isfinite(y)
+    return x[there], y[there]
+
+
+def _kinds(ax: Axes, drawn: Curves, look: Dots, across: Scale, up: Scale) -> dict[str, Any]:
+    """A colour for each kind of motion: dots, and lines along branches that are known by their
+    responses only. Chaos lies under the others.
+    """
+    one, dots = drawn.one, np.asarray(drawn.dots)
+    of = motion_colors.of(one.ds)
+    for code in np.unique(of).tolist():
+        mine, repeats, color = of == code, motion_colors.repeats(code), motion_colors.color(code)
+        if repeats and not drawn.along and dots.ndim == 1:
+            x, y = points.branch_lines(one, dots, mine)
+            ax.plot(
+                x * across.factor, y * up.factor, color=color, lw=0.8, zorder=2,
+                gid=f"branches {code}",
+            )  # fmt: skip
+        x, y = _flat(one, dots, mine, across, up)
+        draw.draw_points(
+            ax, x, y, marker=motion_colors.marker(code) if look.marked else "o", mfc=color,
+            mec="none", ms=look.size(x.size, 1.0 if repeats else look.aperiodic),
+            zorder=3 if repeats else 2, gid=f"kind {code}",
+        )  # fmt: skip
+    return points.kind_handles(one, of, markers=look.marked)
+
+
+def _compare(ax: Axes, drawn: Curves, look: Dots, across: Scale, up: Scale) -> dict[str, Any]:
+    """One colour for a Dataset among several; the first lies below in larger dots."""
+    one, dots = drawn.one, np.asarray(drawn.dots)
+    x, y = _flat(one, dots, np.ones(len(dots), dtype=bool), across, up)
+    color, marker = points.dataset_color(one), points.MARKERS[one.rank] if look.marked else "o"
+    hollow = look.marked and one.rank == 0
+    draw.draw_points(
+        ax, x, y, marker=marker, ms=look.size(x.size, look.first if one.rank == 0 else 1.0),
+        mfc="none" if hollow else color, mec=color, mew=0.6 if hollow else 0.0,
+        zorder=3 + 0.1 * one.rank, gid=f"dataset {one.name}",
+    )  # fmt: skip
+    return {one.name: points.dot(color, marker, hollow)}
+
+
+# -- branches --------------------------------------------------------------------------------------
+def within_view(ds: xr.Dataset, values: np.ndarray, drawn: np.ndarray) -> np.ndarray:
+    """Heights float64[point] of branches, NaN far above and below all responses, drawn at
+    float64[..], where a branch was stopped after so many points: it may grow without bound.
+    """
+    ends = np.stack([ds["branch_begin"].values, ds["branch_end"].values])
+    stopped = np.isin(ds["point_branch"].values, np.flatnonzero((ends == "points").any(axis=0)))
+    seen = np.concatenate([np.ravel(drawn), values[~stopped]])
+    largest = float(np.nanmax(np.abs(seen), initial=0.0))
+    return np.where(stopped & (np.abs(values) > 1.2 * largest), np.nan, values)
+
+
+def draw_branches(
+    ax: Axes, ds: xr.Dataset, values: np.ndarray, across: Scale, up: Scale
+) -> dict[str, Any]:
+    """Lines along the branches; the entries of the legend."""
+    kind = ds["branch_kind"].values
+    codes = motion_colors.codes(kind, np.where(kind == "periodic", ds["branch_periods"].values, 0))
+    periods = points.periods_of(ds)
+    place, height, of, stable = _with_events(ds, values)
+    place, height = place * across.factor, height * up.factor
+    named: dict[str, Any] = {}
+    for code in np.unique(codes).tolist():
+        color = tuple(motion_colors.color(code).tolist())
+        mine = np.flatnonzero(codes[of] == code)
+        for solid in (False, True):
+            ax.plot(
+                *lines(mine, of, stable == solid, place, height), color=color,
+                lw=1.3 if solid else 0.9, ls="-" if solid else DASHES, zorder=3 if solid else 2,
+                gid=f"{'stable' if solid else 'unstable'} {code}",
+            )  # fmt: skip
+        named[motion_colors.label(code, periods)] = Line2D([], [], color=color, lw=1.3)
+    if (ds["point_unstable_multipliers"].values > 0).any():
+        named["unstable"] = Line2D([], [], color=QUIET, lw=0.9, ls=DASHES)
+    return named
+
+
+def _with_events(
+    ds: xr.Dataset, values: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Where points lie and how high, their branches, and whether orbits behind them are stable;
+    between them the events at which stability changes.
+    """
+    place, of = ds[point_name(ds.attrs["parameter"])].values, ds["point_branch"].values
+    stable = ds["point_stable"].values > 0
+    if not ds.sizes.get("event"):
+        return place, values, of, stable
+    before = ds["event_point"].values
+    after = np.minimum(before + 1, ds.sizes["point"] - 1)
+    turns = np.flatnonzero((stable[before] != stable[after]) & (of[before] == of[after]))
+    at, height = _heights(ds, values)
+    where = before[turns] + 1
+    return (
+        np.insert(place, where, at[turns]),
+        np.insert(values, where, height[turns]),
+        np.insert(of, where, of[before[turns]]),
+        np.insert(stable, where, stable[after[turns]]),
+    )
+
+
+def _heights(ds: xr.Dataset, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where events lie, and how high: between the points that they lie between."""
+    at = ds[event_name(ds.attrs["parameter"])].values
+    before = ds["event_point"].values
+    after = np.minimum(before + 1, ds.sizes["point"] - 1)
+    place = ds[point_name(ds.attrs["parameter"])].values
+    with np.errstate(all="ignore"):
+        share = (at - place[before]) / (place[after] - place[before])
+    share = np.where((share >= 0) & (share <= 1), share, 0.5)
+    return at, values[before] + share * (values[after] - values[before])
+
+
+def lines(
+    mine: np.ndarray, of: np.ndarray, wanted: np.ndarray, x: np.ndarray, y: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Curves through neighbours on one branch of which the first is wanted, NaN between them."""
+    first = mine[:-1]
+    joined = (np.diff(mine) == 1) & (of[first] == of[first + 1]) & wanted[first]
+    keep = np.zeros(len(x) + 1, bool)
+    keep[first[joined]] = keep[first[joined] + 1] = True
+    breaks = np.setdiff1d(np.flatnonzero(keep[:-1]), first[joined])  # last point of each piece
+    index = np.flatnonzero(keep[:-1])
+    after = np.searchsorted(index, breaks) + 1
+    return np.insert(x[index], after, np.nan), np.insert(y[index], after, np.nan)
+
+
+def draw_marks(ax: Axes, ds: xr.Dataset, values: np.ndarray, across: Scale, up: Scale) -> None:
+    """Bifurcations on the branches, between the points that they lie between."""
+    if not ds.sizes.get("event"):
+        return
+    at, height = _heights(ds, values)
+    size = 4.5 if len(at) <= 40 else 3.2
+    for kind, (text, marker) in points.MARKS.items():
+        here = ds["event_kind"].values == kind
+        if here.any():
+            ax.plot(
+                at[here] * across.factor, height[here] * up.factor, ls="none", marker=marker,
+                ms=size, mfc="white", mec=QUIET, mew=0.8, zorder=5, label=text,
+                gid=f"event {kind}",
+            )  # fmt: skip

@@ -1,0 +1,252 @@
+"""What ``attractors`` and ``basin_fractions`` return: what starts settle to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import xarray as xr
+
+from saltus.errors import counted
+from saltus.results.dataset.attractors import ATTRACTOR_VARIABLES
+from saltus.results.dataset.kinds import LONGER, WITHOUT, Kind, sentences
+from saltus.results.dataset.schema import ResultKind, attractor_name, kind_text, states_of
+from saltus.results.dataset.variable import TRAJECTORY_NUMBER, Variable
+from saltus.results.table import (
+    Column,
+    TextTable,
+    number,
+    quantity,
+    table,
+    with_error,
+    words,
+)
+from saltus.results.wording import LINES, kind_texts, meanings, more, sized, unit_of
+
+#: Variables of what ``attractors`` and ``basin_fractions`` return.
+VARIABLES = {
+    **TRAJECTORY_NUMBER,
+    "basin": Variable(("trajectory",), "1", "attractor", "i2"),
+    "periods_to_settle": Variable(
+        ("trajectory",), "1", "forcing periods until it had settled, -1 if it hadn't", "i4"
+    ),
+    **ATTRACTOR_VARIABLES,
+}
+
+
+# -- account ---------------------------------------------------------------------------------------
+def account(ds: xr.Dataset) -> list[str]:
+    """The attractors, and what became of the starts."""
+    starts = (
+        f"{ds.sizes['trajectory']} starts"
+        if "trajectory" in ds.dims
+        else "attractors without their starts"
+    )
+    return [f"extent   {starts}", *found(ds)]
+
+
+def found(ds: xr.Dataset) -> list[str]:
+    """The lines on attractors and on starts that maps have too."""
+    lines = [f"found    {counted(ds.sizes['attractor'], 'attractor')}", *_attractors(ds)]
+    if "basin" not in ds:
+        return lines
+    lines.append(settled(ds["basin"]))
+    words = own_errors(ds) if (ds["basin"].values == Kind.UNCONVERGED).any() else ""
+    lines += [f"noise    {words}"] if words else []
+    lines += untyped(ds["basin"], Kind.UNCONVERGED)
+    return lines + [f"missed   {one}" for one in missed(_computed(ds["basin"]))]
+
+
+def settled(labels: xr.DataArray) -> str:
+    """The line on how many starts lead to an attractor, and what became of the others."""
+    codes, counts = np.unique(labels.values, return_counts=True)
+    others = [
+        f"{count} {meanings(labels)[int(code)]}"
+        for code, count in zip(codes, counts, strict=True)
+        if code < 0
+    ]
+    there = f"{int(counts[codes >= 0].sum())} of {labels.size} starts"
+    return f"settled  {', '.join([there, *others])}"
+
+
+def _computed(labels: xr.DataArray) -> int:
+    """How many starts were followed."""
+    return int((labels.values != Kind.NOT_COMPUTED).sum())
+
+
+def missed(starts: int, where: str = "") -> list[str]:
+    """What so many starts may have missed: by the rule of three a basin above 3/N of their box is
+    met with 95 %. Hanley & Lippman-Hand, J. Am. Med. Assoc. 249 (1983) 1743.
+    """
+    if not starts:
+        return []
+    size = f" with a basin below {300 / starts:.2g} % of where they lie" if starts > 3 else ""
+    return [f"{counted(starts, 'start')}{where}: other attractors{size} may be missed"]
+
+
+def untyped(labels: xr.DataArray, *codes: Kind) -> list[str]:
+    """A line on starts whose motion has no type: those with one of some codes."""
+    return [f"untyped  {LONGER}"] if np.isin(labels.values, codes).any() else []
+
+
+def own_errors(ds: xr.Dataset) -> str:
+    """What errors of a method have to do with starts that never settled, in a sentence or two; ""
+    for one whose errors are rounding.
+    """
+    attrs = ds.attrs
+    method = str(attrs.get("method", ""))
+    if method != "RK4" and not method.startswith("ODE"):
+        return ""
+    name, knob = (method, "step") if method == "RK4" else (method.lower(), "rtol")
+    if "unconverged_exactly" not in attrs:
+        return (
+            f"Errors of {name} itself can keep a motion from settling. A smaller {knob}, or "
+            "Taylor, tells."
+        )
+    if not attrs["unconverged_exactly"]:
+        return "By exact integration from where they stand they settle to no orbit either."
+    return (
+        f"Errors of {name} itself keep them from having a type: exact integration from where they "
+        "stand settles to "
+        f"{attrs['unconverged_exactly']}, and {name} strays from there by up to "
+        f"{float(attrs['unconverged_stray']):.0%} of the range of a "
+        f"state. Take a smaller {knob}, or Taylor."
+    )
+
+
+def _attractors(ds: xr.Dataset) -> Iterator[str]:
+    """A line on each of the first, and one on the others."""
+    each = [ds.isel(attractor=i) for i in range(ds.sizes["attractor"])]
+    texts = [_one(one) for one in each]
+    for i, (one, text) in enumerate(zip(each[:LINES], texts, strict=False)):
+        through = _through(one) if texts.count(text) > 1 else ""
+        share = (
+            f", {float(one['attractor_fraction']):.2%} of the starts"
+            if "attractor_fraction" in one
+            else ""
+        )
+        yield f"  {i}: {text}{through}{share}"
+    yield from more(len(each))
+
+
+def _one(one: xr.Dataset) -> str:
+    """Kind and size of an attractor."""
+    kind, period = str(one["attractor_type"].item()), int(one["attractor_period"])
+    name = f"{kind} {period}T" if kind == "periodic" else kind_text(kind, period)
+    if kind == "limit_cycle" and "attractor_cycle" in one:
+        cycle = float(one["attractor_cycle"])
+        name += f", period {cycle:.4g} s, {1 / cycle:.4g} Hz"
+    size = f"peak {sized(one['attractor_peak'])}"
+    if kind == Kind.NOISY_PERIODIC.word:
+        size += f", scatter {sized(one['attractor_scatter'], '.2g')}"
+    return f"{name}, {size}"
+
+
+def _through(one: xr.Dataset) -> str:
+    """The first point that an attractor is known by: it tells mirror images apart, whose sizes are
+    the same.
+    """
+    first = one.isel(phase=0, missing_dims="ignore")
+    place = ", ".join(
+        f"{name} = {sized(first[attractor_name(name)])}"
+        for name in states_of(one)
+        if attractor_name(name) in first and np.isfinite(first[attractor_name(name)])
+    )
+    return f", through {place}" if place else ""
+
+
+# -- rows ------------------------------------------------------------------------------------------
+def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
+    """A row for each attractor: type, contacts, size, stability, margin, share."""
+    known = {
+        name.removeprefix("attractor_"): ds[name]
+        for name in map(str, ds.data_vars)
+        if name.startswith("attractor_")
+    }
+    first, kinds = states_of(ds)[0], kind_texts(ds, "attractor_")
+
+    def sized(heading: str, name: str, digits: int = 4) -> list[Column]:
+        one = known.get(name)
+        return [] if one is None else [quantity(heading, one.values, unit_of(one), digits)]
+
+    columns = [
+        words("", ds["attractor"].values, "attractor"),
+        words("type", kinds),
+        number("contacts", known["contacts"].values.astype(float), "g"),
+        *sized(f"peak |{first}|", "peak"),
+        *sized(f"rms {first}", "rms"),
+        *sized(f"scatter {first}", "scatter", 2),
+        number("|multiplier|", _largest(ds) if kinds else np.empty(0), ".4f"),
+        with_error(
+            "exponent", known["exponent"].values, known["exponent_error"].values, unit="1/s"
+        ),
+        *sized("to a graze", "margin", 3),
+        *_share(ds),
+    ]
+    return [table(title, columns, tuple(_notes(ds)), range(len(kinds)))]
+
+
+def _largest(ds: xr.Dataset) -> np.ndarray:
+    """Magnitude of the first multiplier of each; NaN where there is none."""
+    real, imag = (ds[f"attractor_multiplier_{part}"].values[:, 0] for part in ("real", "imag"))
+    sizes = np.hypot(real, imag)
+    return np.where(np.isfinite(sizes), sizes, np.nan)
+
+
+def _share(ds: xr.Dataset) -> list[Column]:
+    """The share of the starts that lead to each, with its interval."""
+    if "attractor_fraction" not in ds:
+        return []
+    share, low, high = (
+        ds[f"attractor_fraction{end}"].values.tolist() for end in ("", "_low", "_high")
+    )
+    return [
+        Column(
+            "share of starts",
+            lambda i: f"{100 * share[i]:.2f} ± {50 * (high[i] - low[i]):.2g} %",
+            {"share of starts": share, "share from": low, "share to": high},
+        )
+    ]
+
+
+def _notes(ds: xr.Dataset) -> Iterator[str]:
+    """What the numbers are worth."""
+    if "basin" in ds:
+        yield from (f"{one}." for one in missed(_computed(ds["basin"])))
+    yield from _trust(ds)
+    for note in sentences(ds["basin"].values) if "basin" in ds else ():
+        yield f"{note} {own_errors(ds)}".rstrip() if WITHOUT[Kind.UNCONVERGED] in note else note
+    if "attractor_scatter" in ds:
+        yield (
+            "Noisy: errors of the method keep the motion from closing. It stays near an exact "
+            "orbit, whose numbers are in the row; "
+            "scatter is its root mean square distance from there."
+        )
+
+
+def _trust(ds: xr.Dataset) -> Iterator[str]:
+    """What the checks of a map say of its numbers, so far as they were made."""
+    attrs = ds.attrs
+    if attrs.get("flip_checked"):
+        yield (
+            f"{attrs['flip_checked']} starts recomputed more exactly: "
+            f"{100 * attrs['flip_rate']:.2g} % lead elsewhere "
+            f"({100 * attrs['flip_rate_low']:.2g} to {100 * attrs['flip_rate_high']:.2g} %)."
+        )
+    if np.isfinite(attrs.get("uncertainty_exponent", np.nan)):
+        yield (
+            f"Basin entropy {attrs['basin_entropy']:.4f}, at boundaries "
+            f"{attrs['boundary_basin_entropy']:.4f}; uncertainty exponent "
+            f"{attrs['uncertainty_exponent']:.3f} ± {attrs['uncertainty_exponent_error']:.2g} (1: "
+            f"a smooth boundary)."
+        )
+    if attrs.get("unresolved_cells"):
+        yield (
+            f"{attrs['unresolved_cells']} starts met a graze shallower than the local "
+            f"error: either outcome is possible."
+        )
+
+
+KIND = ResultKind(
+    "sl.attractors or sl.basin_fractions", VARIABLES, ("attractor_type",), account, rows
+)

@@ -1,0 +1,29 @@
+"""What ``stroboscope`` returns: motions at whole forcing periods. It says what runs say."""
+
+from __future__ import annotations
+
+from saltus.results.dataset.schema import ResultKind
+from saltus.results.dataset.variable import COUNTERS, GUARDS, MINIMA, SHARED, STATUS, Variable
+from saltus.results.kinds.trajectory import account, headline, rows, sheets
+
+#: Variables of what ``stroboscope`` returns.
+VARIABLES = {
+    "<state>": Variable(("trajectory", "period"), "<state>", "<state>"),
+    "period": Variable(("period",), "1", "whole forcing periods since the start", "i8", coord=True),
+    "status": STATUS,
+    **COUNTERS,
+    **MINIMA,
+    **GUARDS,
+    **SHARED,
+}
+
+
+KIND = ResultKind(
+    "sl.stroboscope",
+    VARIABLES,
+    ("<state>", "status"),
+    account,
+    rows,
+    headline=headline,
+    sheets=sheets,
+)
