@@ -65,7 +65,7 @@ class Given:
     value: Any
 
 
-class _Python:
+class _PythonDialect:
     """Those who write Python."""
 
     sl = "sl."
@@ -86,7 +86,7 @@ class _Python:
         return python
 
 
-PYTHON = _Python()
+PYTHON = _PythonDialect()
 
 
 def python(value: Any) -> str:

@@ -29,7 +29,7 @@ class Case(StrEnum):
     c = "c"
 
 
-class Kind(StrEnum):
+class PictureKind(StrEnum):
     """Pictures of a result."""
 
     history = "history"
@@ -281,7 +281,7 @@ def resume(
 def plot(
     result: Annotated[Path, typer.Argument(help="A result (.nc) that saltus wrote.")],
     kind: Annotated[
-        Kind | None,
+        PictureKind | None,
         typer.Option(
             help="history: state against time. phase: velocity against displacement. "
             "Others: the one picture of their result."

@@ -25,7 +25,7 @@ OSCILLATOR_TOLERANCE = 1e-13
 
 
 @dataclass(frozen=True)
-class Check:
+class Comparison:
     """One comparison with a closed form: its name, the largest error found, and the largest that
     passes.
     """
@@ -60,20 +60,22 @@ def machine() -> TextTable:
     return TextTable("saltus here", ("", ""), tuple(rows))
 
 
-def checks() -> list[Check]:
+def checks() -> list[Comparison]:
     """Run the self-check: contacts and states against closed forms, by Taylor and by ODE45."""
     from saltus.flow import ODE45, Taylor
 
     return [
-        Check("two contacts in one step, times, Taylor", _parabola(Taylor()), PARABOLA_TOLERANCE),
-        Check("oscillator, 10 cycles, Taylor", _oscillator(Taylor()), OSCILLATOR_TOLERANCE),
-        Check(
+        Comparison(
+            "two contacts in one step, times, Taylor", _parabola(Taylor()), PARABOLA_TOLERANCE
+        ),
+        Comparison("oscillator, 10 cycles, Taylor", _oscillator(Taylor()), OSCILLATOR_TOLERANCE),
+        Comparison(
             "oscillator, 10 cycles, ODE45 at 1e-9", _oscillator(ODE45(rtol=1e-9, atol=1e-12)), 1e-6
         ),
     ]
 
 
-def check_table(found: list[Check]) -> TextTable:
+def check_table(found: list[Comparison]) -> TextTable:
     """The self-check as a table."""
     rows = tuple(
         (

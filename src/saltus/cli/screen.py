@@ -142,14 +142,14 @@ def reporting(kind: str) -> Iterator[tuple[Callable[[Report], None], Callable[[s
 
 def _log_lines() -> Callable[[Report], None]:
     """A function of reports for standard error in a log: a line now and then for each question."""
-    from saltus.flow.progress import Lines
+    from saltus.flow.progress import LogLines
 
-    lines: dict[str, Lines] = {}
+    lines: dict[str, LogLines] = {}
 
     def report(report: Report) -> None:
         name = report.name
         if name not in lines:
-            lines[name] = Lines(
+            lines[name] = LogLines(
                 lambda text: console(stderr=True).print(escape(f"saltus: {name}: {text}"))
             )
         lines[name].show(report.done / max(report.total, 1))

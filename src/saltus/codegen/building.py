@@ -46,7 +46,7 @@ _OBJECTS: OrderedDict[str, bytes] = OrderedDict()
 
 
 @dataclass(frozen=True)
-class Order:
+class BuildOrder:
     """An object to be built.
 
     Attributes
@@ -97,7 +97,7 @@ class Order:
 _SLOW = frozenset(name for name in templates.BITCODE if name != "capture")
 
 
-def built(order: Order) -> bytes:
+def built(order: BuildOrder) -> bytes:
     """The object of an order: from memory, from the cache, or compiled now.
 
     Raises
@@ -124,7 +124,7 @@ def built(order: Order) -> bytes:
         return found
 
 
-def built_to_keep(order: Order) -> bytes:
+def built_to_keep(order: BuildOrder) -> bytes:
     """The object as from :func:`built`, compiled by a process that outlives this one. An object
     that took long is then on disk for the next process.
     """
@@ -136,7 +136,7 @@ def built_to_keep(order: Order) -> bytes:
     return built(order) if found is None else found
 
 
-def made(order: Order) -> bytes:
+def made(order: BuildOrder) -> bytes:
     """Compile in this process."""
     template = bitcode(order.template) if order.template else None
     return machine.object_code(
@@ -186,7 +186,7 @@ def _held(lock: threading.Lock) -> Iterator[None]:
         lock.release()
 
 
-def _made_elsewhere(order: Order) -> bytes | None:
+def _made_elsewhere(order: BuildOrder) -> bytes | None:
     """Compile in a process of its own (build_one.py); None if there is none, or it doesn't succeed.
 
     LLVM can't be stopped while it works. Here this process only waits: Ctrl-C ends the wait at
@@ -202,7 +202,7 @@ def _made_elsewhere(order: Order) -> bytes | None:
     return _answer_of("saltus.codegen.build_one", (), _given(order), order.title)
 
 
-def _kept_elsewhere(order: Order) -> None:
+def _kept_elsewhere(order: BuildOrder) -> None:
     """Compile and store in a process of its own, which nobody ends; return when it has ended."""
     with contextlib.suppress(OSError), tempfile.TemporaryFile() as file:
         file.write(_given(order))
@@ -215,7 +215,7 @@ def _kept_elsewhere(order: Order) -> None:
         process.wait()
 
 
-def _given(order: Order) -> bytes:
+def _given(order: BuildOrder) -> bytes:
     """An order as build_one.py reads it."""
     if order.template:
         bitcode(order.template)  # made first if it isn't current

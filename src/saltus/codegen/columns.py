@@ -16,7 +16,7 @@ _VALUE = re.compile(r"\bs\d+\b")
 _CONSTANT = re.compile(r"(?!load\(y,)\w+\([^()]*\)")
 
 
-class Lines:
+class LaneCode:
     """Assignments and stores of straight-line lane code, in order.
 
     What is made of a value of the column belongs to the column. Its code reads shared values from

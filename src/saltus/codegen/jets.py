@@ -18,7 +18,7 @@ from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
-from saltus.codegen.columns import Lines
+from saltus.codegen.columns import LaneCode
 from saltus.codegen.scalar import condition_code
 from saltus.codegen.series import Linear, Series, SeriesBuilder, is_constant
 from saltus.language import expression as ex
@@ -82,7 +82,7 @@ class JetCode:
         constants: Constants,
         shared: int | None = None,
     ) -> None:
-        self.lines = Lines()
+        self.lines = LaneCode()
         # (angular frequency, phase offset) of sines and cosines of time: row
         self.harmonics: dict[tuple[Expr, Expr], int] = {}
         self._fields, self._builder, self._shared = (

@@ -27,7 +27,7 @@ import numpy as np
 
 from saltus import cache
 from saltus.codegen import machine, templates
-from saltus.codegen.building import Order, built, built_to_keep
+from saltus.codegen.building import BuildOrder, built, built_to_keep
 from saltus.codegen.head import Constant, Head
 from saltus.codegen.interface import BATCH, Interface
 from saltus.codegen.lane_ir import constants_ir, equation_ir
@@ -240,30 +240,30 @@ class Kernels:
         )
         self.tier = tier
 
-    def _orders(self, tier: str) -> list[Order]:
+    def _orders(self, tier: str) -> list[BuildOrder]:
         """The objects of a tier."""
         return [self._order(tier)] if tier == FULL else [self._order(tier), self._equation()]
 
-    def _order(self, tier: str) -> Order:
+    def _order(self, tier: str) -> BuildOrder:
         entry = f"saltus_{self.interface.entry}"
         baked = {name: value for name, value in self._constants.items() if name in _BAKED}
         texts = [constants_ir(baked if tier == GENERIC else self._constants, self.interface)]
         if tier == FULL:
             texts.append(self._equation_text)
         title = f"{self.title if tier == FULL else self.template}, {tier}"
-        return Order(
+        return BuildOrder(
             self.template, tuple(texts), (entry,), title, self._said(tier), tier == GENERIC
         )
 
     def _said(self, tier: str) -> str:
         return "what all equations share, for this processor: once" if tier == GENERIC else ""
 
-    def _equation(self) -> Order:
+    def _equation(self) -> BuildOrder:
         """The equation alone, with the sizes and tables that generic code reads."""
         rest = {name: value for name, value in self._constants.items() if name not in _BAKED}
         called = tuple(f"saltus_{name}" for name in (*self.interface.functions, *rest))
         texts = (constants_ir(rest, self.interface), self._equation_text)
-        return Order("", texts, called, self.title, f"{self.what}: once for each new equation")
+        return BuildOrder("", texts, called, self.title, f"{self.what}: once for each new equation")
 
     @cached_property
     def _equation_text(self) -> str:

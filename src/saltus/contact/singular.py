@@ -32,7 +32,7 @@ _LOG = -1e-9
 _MOST_BRANCHES = 256
 
 
-class Order(NamedTuple):
+class VanishingOrder(NamedTuple):
     """Order of an expression on a boundary: it is like gap**order, or smaller; ``singular`` if it
     has no Taylor series there.
     """
@@ -207,7 +207,7 @@ class _Boundaries:
         self._guards = tuple(guards)
         self._states: dict[Expr, int] = {}
         self._one_more = (1 << place for place in count())
-        self._orders: list[dict[Expr, Order]] = [{} for _ in guards]
+        self._orders: list[dict[Expr, VanishingOrder]] = [{} for _ in guards]
         self._there: list[dict[Expr, Expr | None]] = [{} for _ in guards]
 
     def singular_terms(self, field: Sequence[Expr], number: int) -> list[Expr]:
@@ -218,7 +218,7 @@ class _Boundaries:
         return [node for node in ex.walk(*field) if self._breaks(node, orders)]
 
     @staticmethod
-    def _breaks(node: Expr, orders: dict[Expr, Order]) -> bool:
+    def _breaks(node: Expr, orders: dict[Expr, VanishingOrder]) -> bool:
         if not orders[node].singular or not node.args:
             return False
         match node.op:
@@ -230,43 +230,43 @@ class _Boundaries:
                 return _exponent_of_power(node, orders)
         return False
 
-    def orders(self, field: Sequence[Expr], number: int) -> dict[Expr, Order]:
+    def orders(self, field: Sequence[Expr], number: int) -> dict[Expr, VanishingOrder]:
         """Order of every node on boundary ``number``, with those computed before."""
         orders = self._orders[number]
         for node in ex.walk(*field, known=orders):
             orders[node] = self._order(node, orders, number)
         return orders
 
-    def _order(self, node: Expr, known: dict[Expr, Order], number: int) -> Order:
+    def _order(self, node: Expr, known: dict[Expr, VanishingOrder], number: int) -> VanishingOrder:
         if node.op == "const":
-            return Order(math.inf if node.payload == 0 else 0.0, False)
+            return VanishingOrder(math.inf if node.payload == 0 else 0.0, False)
         if node.op in ("state", "add", "sub", "select") and self._vanishes(node, number):
-            return Order(1.0, False)
+            return VanishingOrder(1.0, False)
         if not node.args:
-            return Order(0.0, False)
+            return VanishingOrder(0.0, False)
         parts = [known[child] for child in node.args]
         singular = any(part.singular for part in parts)
         first = parts[0].order
         match node.op:
             case "add" | "sub" | "select":
-                return Order(min(part.order for part in parts), singular)
+                return VanishingOrder(min(part.order for part in parts), singular)
             case "neg":
                 return parts[0]
             case "mul":
                 if any(part.order == math.inf for part in parts):
-                    return Order(math.inf, False)
-                return Order(first + parts[1].order, singular)
+                    return VanishingOrder(math.inf, False)
+                return VanishingOrder(first + parts[1].order, singular)
             case "div":
                 below = parts[1].order
                 return (
-                    Order(math.inf, False)
+                    VanishingOrder(math.inf, False)
                     if first == math.inf
-                    else Order(first - below, singular or below > 0)
+                    else VanishingOrder(first - below, singular or below > 0)
                 )
             case "pow":
                 return _order_of_power(parts[0], node.args[1])
             case "exp" if _exponent_of_power(node, known):
-                return Order(-_LOG, True)
+                return VanishingOrder(-_LOG, True)
         return _order_of_function(node.op, parts[0])
 
     def _vanishes(self, node: Expr, number: int) -> bool:
@@ -411,35 +411,37 @@ def _outermost_bit(node: Expr) -> int | None:
     return None
 
 
-def _order_of_power(base: Order, exponent: Expr) -> Order:
+def _order_of_power(base: VanishingOrder, exponent: Expr) -> VanishingOrder:
     """Order of ``base**exponent``. An exponent that is a parameter is assumed positive and not
     whole.
     """
     if base.order == math.inf:
-        return Order(math.inf, False)
+        return VanishingOrder(math.inf, False)
     if exponent.op != "const":
-        return Order(base.order, base.singular or base.order > 0)
-    return Order(
+        return VanishingOrder(base.order, base.singular or base.order > 0)
+    return VanishingOrder(
         base.order * exponent.payload,
         base.singular or (base.order > 0 and not _is_whole(exponent)),
     )
 
 
-def _order_of_function(op: str, inner: Order) -> Order:
+def _order_of_function(op: str, inner: VanishingOrder) -> VanishingOrder:
     if op in ("mod", "table"):  # of time alone
-        return Order(0.0, False)
+        return VanishingOrder(0.0, False)
     if inner.order == math.inf:
-        return Order(0.0 if op in ("exp", "cos") else math.inf, False)
+        return VanishingOrder(0.0 if op in ("exp", "cos") else math.inf, False)
     if op == "sqrt":
-        return Order(0.5 * inner.order, inner.singular or inner.order > 0)
+        return VanishingOrder(0.5 * inner.order, inner.singular or inner.order > 0)
     if op == "log":
-        return Order(_LOG, True) if inner.order > 0 else Order(0.0, inner.singular)
+        return (
+            VanishingOrder(_LOG, True) if inner.order > 0 else VanishingOrder(0.0, inner.singular)
+        )
     if inner.singular and inner.order < 0:
-        return Order(_LOG, True)  # a function of something infinite: its limit is unknown
-    return Order(0.0 if op in ("exp", "cos") else max(inner.order, 0.0), inner.singular)
+        return VanishingOrder(_LOG, True)  # a function of something infinite: its limit is unknown
+    return VanishingOrder(0.0 if op in ("exp", "cos") else max(inner.order, 0.0), inner.singular)
 
 
-def _exponent_of_power(node: Expr, orders: dict[Expr, Order]) -> bool:
+def _exponent_of_power(node: Expr, orders: dict[Expr, VanishingOrder]) -> bool:
     """True if the node is ``exp(y*log(u))``, the form of ``u**y`` with an exponent that varies."""
     if node.op != "exp" or node.args[0].op != "mul":
         return False

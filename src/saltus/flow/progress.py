@@ -37,7 +37,7 @@ def reporting(
     elif progress is not None and not progress:
         yield None
     elif progress is None and not os.isatty(2) and not _in_notebook():
-        yield Lines(_to_stderr).show
+        yield LogLines(_to_stderr).show
     else:
         bar = _NotebookBar() if _in_notebook() else _Bar()
         try:
@@ -58,7 +58,7 @@ def _to_stderr(text: str) -> None:
     sys.stderr.flush()
 
 
-class Lines:
+class LogLines:
     """Lines for a log: at 25, 50 and 75 %, and at least one in five minutes, once the work lasts.
 
     Parameters

@@ -32,7 +32,7 @@ from saltus.language.roots import with_root
 PI_MULTIPLES = {math.pi: "pi", 2 * math.pi: "2*pi", 4 * math.pi: "4*pi", math.pi / 2: "pi/2"}
 
 
-class Boundary(Protocol):
+class NamedBoundary(Protocol):
     """Interface of a guard to a writer."""
 
     @property
@@ -77,7 +77,7 @@ class Writer:
 
     def __init__(
         self,
-        guards: Sequence[Boundary] = (),
+        guards: Sequence[NamedBoundary] = (),
         shared: Iterable[Expr] = (),
         taken: Iterable[str] = (),
         limit: int | None = None,
@@ -245,7 +245,7 @@ class Writer:
         self.lines.append(self.line(self.name(name), text))
         return self.name(name), ATOM
 
-    def _guard_sides(self, guard: Boundary) -> tuple[str, str]:
+    def _guard_sides(self, guard: NamedBoundary) -> tuple[str, str]:
         if getattr(guard.law, "kind", None) == "hold":  # its gap is no boundary that the user wrote
             return guard.name, f"not {guard.name}"
         if guard.state is not None and guard.boundary is not None:

@@ -117,7 +117,7 @@ def _section(ds: xr.Dataset, sides: cells.Sides) -> str:
 
 # -- cells -----------------------------------------------------------------------------------------
 @dataclass(frozen=True)
-class Settling:
+class SettlingShade:
     """Periods to settle as lightness: logarithmic between the few that settle first and the few
     that settle last.
     """
@@ -146,14 +146,14 @@ class Settling:
         return sorted({round(value) for value in (self.first, middle, self.last)})
 
 
-def _settling(ds: xr.Dataset) -> Settling | None:
+def _settling(ds: xr.Dataset) -> SettlingShade | None:
     """The scale of lightness; None if nothing settles, or all at once."""
     periods = ds["periods_to_settle"].values
     settled = periods[(ds["basin"].values >= 0) & (periods >= 0)]
     if not settled.size:
         return None
     first, last = np.quantile(settled, [_BEYOND, 1 - _BEYOND], method="nearest")
-    return Settling(float(first), float(last)) if last > first else None
+    return SettlingShade(float(first), float(last)) if last > first else None
 
 
 # -- attractors ------------------------------------------------------------------------------------
@@ -309,7 +309,7 @@ def _legend(
     ds: xr.Dataset,
     sides: cells.Sides,
     colors: Mapping[int, np.ndarray],
-    settling: Settling | None,
+    settling: SettlingShade | None,
     points: bool,
 ) -> None:
     """Legend of the hues, the shades and the codes that occur."""

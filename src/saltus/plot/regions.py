@@ -22,7 +22,7 @@ _HELD = (" at rest", " held")
 
 
 @dataclass(frozen=True)
-class Boundary:
+class ContactLine:
     """A value of a state at which a contact begins.
 
     Attributes
@@ -74,7 +74,7 @@ class Regions:
     """
 
     regions: tuple[Region, ...]
-    boundaries: tuple[Boundary, ...]
+    boundaries: tuple[ContactLine, ...]
     state: str | None
     bits: tuple[int, ...]
     codes: np.ndarray
@@ -153,7 +153,7 @@ def along(ds: xr.Dataset, state: str) -> Regions:
         if owner == state and np.isfinite(values[i])
     ]
     bits = tuple(sorted(mine, key=lambda i: values[i]))
-    boundaries = tuple(Boundary(str(ds["guard"].values[i]), float(values[i])) for i in bits)
+    boundaries = tuple(ContactLine(str(ds["guard"].values[i]), float(values[i])) for i in bits)
     free = _free_region(boundaries)
     edges = [-np.inf, *(boundary.value for boundary in boundaries), np.inf]
     regions = []
@@ -167,7 +167,7 @@ def along(ds: xr.Dataset, state: str) -> Regions:
     return Regions(tuple(regions), boundaries, state, bits, np.arange(len(regions)))
 
 
-def _free_region(boundaries: Sequence[Boundary]) -> int:
+def _free_region(boundaries: Sequence[ContactLine]) -> int:
     """Which region is free of contact: above the guards called lower and below those called upper,
     else the one that holds zero.
 
@@ -183,7 +183,7 @@ def _free_region(boundaries: Sequence[Boundary]) -> int:
     return sum(boundary.value < 0 for boundary in boundaries)
 
 
-def _contact_label(boundary: Boundary) -> str:
+def _contact_label(boundary: ContactLine) -> str:
     """``upper_gap`` bounds the ``upper contact``; ``pitch = pitch_gap`` is no such name."""
     stem = boundary.name.removesuffix("_gap")
     return (

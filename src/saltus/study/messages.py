@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from saltus.errors import closest, nearest, shown
 from saltus.study.spec import QUESTIONS, Study
 from saltus.study.tables.methods import METHODS
-from saltus.study.tables.parts import Table
+from saltus.study.tables.parts import StudyTable
 from saltus.study.tables.toml import cut, toml
 
 #: Keys and indices on the way from the study to a value.
@@ -185,7 +185,7 @@ def _fault(place: Place, details: list[dict[str, Any]], data: Any) -> str:
     return f"{where}{key} = {cut(first['input'])} must be {expected}." + _example(place)
 
 
-def _table(place: Place) -> type[Table] | None:
+def _table(place: Place) -> type[StudyTable] | None:
     """The class of the table at a place in a study."""
     inside: Any = Study
     for part in place:
@@ -218,7 +218,7 @@ def _parts(kind: Any) -> Iterator[Any]:
 
 
 def _is_table(kind: Any) -> bool:
-    return isinstance(kind, type) and issubclass(kind, Table)
+    return isinstance(kind, type) and issubclass(kind, StudyTable)
 
 
 def _known(place: Place) -> Iterator[str]:

@@ -11,10 +11,10 @@ from pydantic import Field, create_model, model_validator
 
 from saltus.study.answers import questions
 from saltus.study.tables import study
-from saltus.study.tables.parts import Named, Table, distinct_names, one_or_many
+from saltus.study.tables.parts import Named, StudyTable, distinct_names, one_or_many
 
 #: Tables that ask something, in the order in which they are answered: the quick ones first.
-QUESTIONS: dict[str, type[Table]] = {name: entry.table for name, entry in questions().items()}
+QUESTIONS: dict[str, type[StudyTable]] = {name: entry.table for name, entry in questions().items()}
 #: Those that may be asked several times, as arrays of tables.
 SEVERAL = tuple(name for name, table in QUESTIONS.items() if issubclass(table, Named))
 
@@ -35,7 +35,7 @@ class _Asking(study.Study):
             distinct_names(getattr(self, name), name)
         return self
 
-    def questions(self) -> Iterator[tuple[str, Table]]:
+    def questions(self) -> Iterator[tuple[str, StudyTable]]:
         """Name and table of every question, in the order in which they are answered."""
         for name in QUESTIONS:
             tables = getattr(self, name)
@@ -49,7 +49,7 @@ class _Asking(study.Study):
             yield from questions()[name].files(table, self)
 
 
-def _key(name: str, table: type[Table]) -> Any:
+def _key(name: str, table: type[StudyTable]) -> Any:
     """Type and Field of the key of a question."""
     if name in SEVERAL:
         return one_or_many(table), Field(default_factory=list)

@@ -198,7 +198,9 @@ def test_what_cache_clear_keeps_is_said_and_goes_when_asked(monkeypatch, tmp_pat
 def test_doctor_fails_if_a_check_fails(monkeypatch):
     from saltus.cli import doctor
 
-    monkeypatch.setattr(doctor, "checks", lambda: [doctor.Check("a case", float("nan"), 1e-14)])
+    monkeypatch.setattr(
+        doctor, "checks", lambda: [doctor.Comparison("a case", float("nan"), 1e-14)]
+    )
     result = saltus("doctor")
     assert result.exit_code == 1
     assert "FAILED" in result.output

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from saltus import plot
 from saltus.cli import draw
-from saltus.cli.commands import Kind
+from saltus.cli.commands import PictureKind
 from saltus.plot.choice import TAKES, pictures_of
 from saltus.results.dataset.schema import NAMES
 
@@ -21,4 +21,4 @@ def test_every_kind_of_result_is_known():
 def test_every_picture_is_there_and_can_be_asked_for():
     assert set(plot.__all__) == {*TAKES, "OKABE_ITO", "style"}
     drawn = {name for kind in NAMES for name in pictures_of(kind)}
-    assert {kind.value for kind in Kind} == drawn == {*TAKES} - {"gallery"}
+    assert {kind.value for kind in PictureKind} == drawn == {*TAKES} - {"gallery"}

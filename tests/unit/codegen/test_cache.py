@@ -21,7 +21,7 @@ from saltus import cache
 from saltus.announce import silent
 from saltus.cache import entry
 from saltus.codegen import building, machine, templates
-from saltus.codegen.building import Order
+from saltus.codegen.building import BuildOrder
 from saltus.errors import CacheError, SaltusWarning
 from saltus.interrupt import Interrupted, Stop
 
@@ -34,7 +34,7 @@ define i64 @next(i64 %n) {
 
 
 def order(source=SOURCE):
-    return Order("", (source,), ("next",), "one line", "one line: once for each new equation")
+    return BuildOrder("", (source,), ("next",), "one line", "one line: once for each new equation")
 
 
 KEY = order().key
@@ -58,7 +58,7 @@ def folder(tmp_path, monkeypatch):
 @pytest.fixture
 def long(monkeypatch):
     """Everything takes long: it is announced, and compiled by another process."""
-    monkeypatch.setattr(Order, "seconds", 20.0)
+    monkeypatch.setattr(BuildOrder, "seconds", 20.0)
 
 
 def forget():
@@ -334,7 +334,7 @@ def test_where_no_process_can_be_started_this_one_compiles(folder, long, monkeyp
 
 @pytest.mark.parametrize("slowly", [False, True])
 def test_what_does_not_compile_says_so_and_leaves_nothing_behind(folder, slowly, monkeypatch):
-    monkeypatch.setattr(Order, "seconds", 20.0 if slowly else 0.0)
+    monkeypatch.setattr(BuildOrder, "seconds", 20.0 if slowly else 0.0)
     with pytest.raises(RuntimeError, match="parsing error"):
         load(SOURCE.replace("%n, 1", "%nothing, 1"))
     assert list(folder.iterdir()) == []

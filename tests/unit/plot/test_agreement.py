@@ -28,7 +28,7 @@ def test_maps_are_named_by_their_methods_where_these_differ():
         method_options_a='{"rtol": 1e-4, "atol": 1e-7, "events": "ignore"}',
         method_b="Taylor",
     )
-    titles = [one.get_title(loc="left") for one in agreement(ds)]
+    titles = [one.get_title(loc="left").replace("\n", " ") for one in agreement(ds)]
     assert titles[:2] == ["ode45, rtol 0.0001, atol 1e-07, contacts not located", "exact"]
 
 
@@ -101,7 +101,7 @@ def test_errors_teach():
 
 def test_long_names_of_maps_stay_above_their_maps():
     ds = agreement_map(np.zeros((3, 3), dtype=int), np.zeros((3, 3), dtype=int)).assign_attrs(
-        name_b="ode45, rtol 0.001, atol 1e-05, contacts not located"
+        name_b="ode45, rtol 0.001, atol 1e-05, step 0.001, contacts not located"
     )
     panels = agreement(ds)
     panels[0].figure.canvas.draw()

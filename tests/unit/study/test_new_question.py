@@ -7,7 +7,7 @@ import sys
 QUESTION = '''
 """[stroboscope]: motions at whole forcing periods."""
 
-from saltus.study import table as rows
+from saltus.results import table as rows
 from saltus.study.answers.question import OneVerb, asked
 from saltus.study.tables.kinds import KINDS
 from saltus.study.tables.signature import table

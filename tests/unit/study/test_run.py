@@ -243,7 +243,7 @@ def test_doctor():
 
 def test_doctor_notices_a_wrong_answer(monkeypatch):
     """An error above the allowed one, and one that isn't a number, both fail."""
-    assert not doctor.Check("a", 2e-14, 1e-14).passed
-    assert not doctor.Check("a", float("nan"), 1e-14).passed
+    assert not doctor.Comparison("a", 2e-14, 1e-14).passed
+    assert not doctor.Comparison("a", float("nan"), 1e-14).passed
     monkeypatch.setattr(doctor, "PARABOLA_TIMES", (0.9683772233983162, 1.0316227766016840 + 1e-12))
     assert not doctor.checks()[0].passed

@@ -52,7 +52,7 @@ LEAST_CLOSED, AGAIN = 8, 0.9
 PASSED, BENDS = 0.02, 0.1
 
 
-class Equations(Protocol):
+class CurveEquations(Protocol):
     """m equations F(z) = 0 in m + 1 unknowns, for k curves.
 
     Attributes
@@ -78,7 +78,7 @@ class Equations(Protocol):
 
 
 @dataclass
-class Curve:
+class Arc:
     """A curve in one direction from its start.
 
     Attributes
@@ -104,9 +104,9 @@ class Curve:
     length: list[float] = field(default_factory=list)
     end: str = ""
 
-    def behind(self, back: Curve) -> Curve:
+    def behind(self, back: Arc) -> Arc:
         """The curve through the start of both that comes along another one and goes on as this."""
-        return Curve(
+        return Arc(
             back.z[:0:-1] + self.z,
             [-tangent for tangent in back.tangent[:0:-1]] + self.tangent,
             back.derivative[:0:-1] + self.derivative,
@@ -116,7 +116,7 @@ class Curve:
 
 
 def correct(
-    equations: Equations,
+    equations: CurveEquations,
     guess: np.ndarray,
     normal: np.ndarray,
     rows: np.ndarray,
@@ -156,18 +156,18 @@ def tangents(derivative: np.ndarray, along: np.ndarray) -> np.ndarray:
 
 
 def follow(
-    equations: Equations,
+    equations: CurveEquations,
     start: np.ndarray,
     along: np.ndarray,
     bounds: Mapping[int, tuple[float, float]],
     points: int,
     first: float | np.ndarray = FIRST,
-    ends: Callable[[Curve], str] | None = None,
+    ends: Callable[[Arc], str] | None = None,
     group: np.ndarray | None = None,
     longest: float = LONGEST,
     foresee: bool = False,
     enough: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray] | None = None,
-) -> list[Curve]:
+) -> list[Arc]:
     """Curves from points float64[k, m + 1] on them, until they leave the range of an unknown, are
     closed or have ``points`` points.
 
@@ -200,7 +200,7 @@ def follow(
     """
     rows = np.arange(len(start))
     here = correct(equations, start, tangents_at(equations, start, along, rows), rows, 1.0)
-    fronts = _Fronts(equations, bounds, [Curve() for _ in rows], first, longest, foresee, group)
+    fronts = _Fronts(equations, bounds, [Arc() for _ in rows], first, longest, foresee, group)
     fronts.begin(here, tangents(_finite(here.derivative), along))
     while len(fronts.going):
         taken = fronts.step()
@@ -220,9 +220,9 @@ class _Fronts:
 
     def __init__(
         self,
-        equations: Equations,
+        equations: CurveEquations,
         bounds: Mapping[int, tuple[float, float]],
-        curves: list[Curve],
+        curves: list[Arc],
         first: float | np.ndarray,
         longest: float = LONGEST,
         foresee: bool = False,
@@ -400,7 +400,7 @@ class _Fronts:
             self.curves[i].end = self.curves[i].end or why
 
 
-def passes(curve: Curve, point: np.ndarray, scale: np.ndarray) -> bool:
+def passes(curve: Arc, point: np.ndarray, scale: np.ndarray) -> bool:
     """Whether the last step of a curve passes a point: the cubic between its ends does."""
     step, way = (curve.z[-1] - curve.z[-2]) / scale, (point - curve.z[-2]) / scale
     length = _size(step)
@@ -413,7 +413,7 @@ def passes(curve: Curve, point: np.ndarray, scale: np.ndarray) -> bool:
 
 
 def _has_passed(
-    equations: Equations, curve: Curve, other: Curve, row: int, either_way: bool = False
+    equations: CurveEquations, curve: Arc, other: Arc, row: int, either_way: bool = False
 ) -> bool:
     """Whether a curve has passed the start of another, in the direction in which that one left."""
     scale, one = equations.scale[row], np.array([row])
@@ -439,7 +439,7 @@ def _size(vector: np.ndarray) -> float:
 
 
 def tangents_at(
-    equations: Equations, start: np.ndarray, along: np.ndarray, rows: np.ndarray
+    equations: CurveEquations, start: np.ndarray, along: np.ndarray, rows: np.ndarray
 ) -> np.ndarray:
     """Tangents at points that lie nearly on the curves."""
     return tangents(_finite(equations.evaluate(start, rows)[1]), along)
@@ -451,7 +451,7 @@ def _finite(derivative: np.ndarray) -> np.ndarray:
 
 
 def _add(
-    curve: Curve, z: np.ndarray, tangent: np.ndarray, derivative: np.ndarray, moved: float
+    curve: Arc, z: np.ndarray, tangent: np.ndarray, derivative: np.ndarray, moved: float
 ) -> None:
     curve.z.append(z.copy())
     curve.tangent.append(tangent.copy())

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.branches.arclength import Curve, correct, follow
+from saltus.analysis.branches.arclength import Arc, correct, follow
 from saltus.analysis.branches.branch_table import numbers_of, stacked
-from saltus.analysis.branches.forced_vibration import Force, QuadratureOrbits, small_vibration
+from saltus.analysis.branches.forced_vibration import Forcing, QuadratureOrbits, small_vibration
 from saltus.analysis.branches.free_vibration import (
     LONGEST,
     FreeOrbits,
@@ -147,7 +147,7 @@ def backbone(
             lambda say: f'{say.key("phase")} is "free" or "quadrature", not {shown(phase)}.'
         )
     measured = system.states.index(state)
-    about = Force.of(system, force, state) if phase == "quadrature" else None
+    about = Forcing.of(system, force, state) if phase == "quadrature" else None
     with reporting(progress) as show:
         moving, orbits, z = (
             _free_start(system, (low, high), mode, measured, method, threads)
@@ -193,7 +193,7 @@ def _free_start(
 
 def _forced_start(
     system: System,
-    force: Force,
+    force: Forcing,
     limits: tuple[float, float],
     mode: int,
     measured: int,
@@ -267,7 +267,7 @@ def _family(
     along /= np.linalg.norm(along)
     z = correct(orbits, z, along, np.zeros(1, np.int64)).z
 
-    def ends(curve: Curve) -> str:
+    def ends(curve: Arc) -> str:
         nonlocal reached
         size = float(peak(curve.z[-1][None])[0])
         reached = max(reached, min(size / limits[1], 1.0))

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from saltus.analysis.branches.arclength import Curve, correct, follow, passes, tangents
+from saltus.analysis.branches.arclength import Arc, correct, follow, passes, tangents
 from saltus.analysis.branches.events import Event
 from saltus.analysis.branches.sequence_changes import contact_points
 from saltus.analysis.branches.shooting import PeriodicOrbits
@@ -53,7 +53,7 @@ class Branch:
     multipliers : complex128[p, D]
         Floquet multipliers, the largest first, without a trivial one.
     ends : (str, str)
-        Why it ends at its first and at its last point: see :class:`Curve`; ``period_doubling``
+        Why it ends at its first and at its last point: see :class:`Arc`; ``period_doubling``
         where it becomes an orbit of half the period, ``hopf`` where a limit cycle shrinks to an
         equilibrium, ``boundary_equilibrium`` where an equilibrium meets a boundary; ``accumulates``
         where its grazes do, ``held`` where it is lost with contacts that are held; ``unstable``
@@ -364,7 +364,7 @@ def retrace(branch: Branch, places: Sequence[int]) -> bool:
     return found
 
 
-def _arrived(point: np.ndarray, unit: np.ndarray, curve: Curve) -> str:
+def _arrived(point: np.ndarray, unit: np.ndarray, curve: Arc) -> str:
     return "arrived" if len(curve.z) > 1 and passes(curve, point, unit) else ""
 
 

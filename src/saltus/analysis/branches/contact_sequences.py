@@ -17,7 +17,7 @@ ONE = 1e-9
 
 
 @dataclass(frozen=True)
-class Contact:
+class SequenceContact:
     """What a contact of a sequence is.
 
     Attributes
@@ -56,7 +56,7 @@ class ContactSequence:
         Sides of all guards at the end.
     """
 
-    contacts: tuple[Contact, ...]
+    contacts: tuple[SequenceContact, ...]
     phase: np.ndarray
     after: np.ndarray
     velocity: np.ndarray
@@ -88,7 +88,7 @@ def sequences(orbits: PeriodicOrbits, z: np.ndarray) -> list[ContactSequence | N
         ])[:, rows]  # fmt: skip
         result.append(
             ContactSequence(
-                tuple(Contact(*one) for one in what.T.tolist()),
+                tuple(SequenceContact(*one) for one in what.T.tolist()),
                 phase[rows],
                 table.state[rows][:, : orbits.size],
                 table.velocity[rows],
@@ -134,7 +134,7 @@ def shift(one: ContactSequence, other: ContactSequence, n: int) -> int | None:
     return None
 
 
-def _alike(one: Contact, other: Contact) -> bool:
+def _alike(one: SequenceContact, other: SequenceContact) -> bool:
     return (one.guard, one.direction) == (other.guard, other.direction)
 
 

@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from saltus.analysis.branches.contact_sequences import Contact
+from saltus.analysis.branches.contact_sequences import SequenceContact
 from saltus.language import expression as ex
 from saltus.language.derivatives import gradient, time_derivative
 from saltus.language.evaluate import evaluate
@@ -59,9 +59,11 @@ class Jumps:
         D.
     """
 
-    def __init__(self, system: System, contacts: Sequence[Contact], size: int, mode: int = 0):
+    def __init__(
+        self, system: System, contacts: Sequence[SequenceContact], size: int, mode: int = 0
+    ):
         self._system, self._size = system, size
-        places: dict[Contact | None, list[int]] = {}
+        places: dict[SequenceContact | None, list[int]] = {}
         for i, contact in enumerate(contacts or (None,)):
             places.setdefault(contact, []).append(i)
         self._places = [
@@ -90,7 +92,9 @@ class Jumps:
 
 
 @lru_cache(maxsize=128)
-def _entries(system: System, contact: Contact | None, mode: int, size: int) -> tuple[Expr, ...]:
+def _entries(
+    system: System, contact: SequenceContact | None, mode: int, size: int
+) -> tuple[Expr, ...]:
     """What :class:`At` holds of a contact; without one, of a motion in a mode."""
     gap, after, before = ex.constant(0.0), tuple(map(ex.state, system.states[:size])), mode
     if contact is not None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from saltus.analysis.branches.arclength import Curve, follow, tangents
+from saltus.analysis.branches.arclength import Arc, follow, tangents
 from saltus.analysis.branches.codimension_two import Equations, find
 from saltus.analysis.branches.events import Event
 from saltus.analysis.branches.grazing_orbits import GrazingOrbits
@@ -29,7 +29,7 @@ class BifurcationCurve:
     multipliers : complex128[p, D]
         Floquet multipliers, without a trivial one.
     ends : (str, str)
-        Why it ends at its first and at its last point: see :class:`Curve`; ``resonance_1_1`` and
+        Why it ends at its first and at its last point: see :class:`Arc`; ``resonance_1_1`` and
         ``resonance_1_2`` where the multipliers of a torus meet; of a graze also
         ``double_graze``, ``graze_corner`` and ``degenerate_graze``, and ``contacts_change``.
     special : list of Event
@@ -77,7 +77,7 @@ def trace_curve(
     beyond: dict[int, np.ndarray] = {}
     reached = 0
 
-    def watch(curve: Curve) -> str:
+    def watch(curve: Arc) -> str:
         nonlocal reached
         reached = max(reached, len(curve.z))
         if progress is not None:
@@ -99,7 +99,7 @@ def trace_curve(
     return _joined(equations, curves)
 
 
-def _end_at_double(equations: GrazingOrbits, curve: Curve, beyond: np.ndarray) -> None:
+def _end_at_double(equations: GrazingOrbits, curve: Arc, beyond: np.ndarray) -> None:
     """End a curve of grazes at the second graze behind its last point, if that is why it ends."""
     z = equations.double(curve.z[-1], beyond)
     if z is None:
@@ -113,7 +113,7 @@ def _end_at_double(equations: GrazingOrbits, curve: Curve, beyond: np.ndarray) -
     curve.end = "double_graze"
 
 
-def _joined(equations: Equations, curves: list[Curve]) -> BifurcationCurve:
+def _joined(equations: Equations, curves: list[Arc]) -> BifurcationCurve:
     """One curve from those in both directions."""
     ahead, back = curves
     closed = [row for row, curve in enumerate(curves) if curve.end == "closed"]
@@ -135,7 +135,7 @@ def _joined(equations: Equations, curves: list[Curve]) -> BifurcationCurve:
     return BifurcationCurve(equations, z, length, own, ends, special)
 
 
-def _end(equations: Equations, curve: Curve) -> str:
+def _end(equations: Equations, curve: Arc) -> str:
     """Why a curve ends."""
     if not isinstance(equations, SingularOrbits) or not equations.torus or curve.end != "range":
         return curve.end

@@ -41,7 +41,7 @@ INTEGRAL = "displacement_on_force"
 
 
 @dataclass(frozen=True)
-class Force:
+class Forcing:
     """A force in proportion to a parameter.
 
     Attributes
@@ -63,7 +63,7 @@ class Force:
     row: int
 
     @classmethod
-    def of(cls, system: System, name: str, state: str) -> Force:
+    def of(cls, system: System, name: str, state: str) -> Forcing:
         """The force on the displacement ``state``, or on that whose velocity it is.
 
         Raises
@@ -154,7 +154,7 @@ class QuadratureOrbits(PeriodicOrbits):
     def __init__(
         self,
         system: System,
-        force: Force,
+        force: Forcing,
         scale: np.ndarray,
         unit: float,
         rest: np.ndarray,
@@ -180,7 +180,7 @@ class QuadratureOrbits(PeriodicOrbits):
 
 
 def small_vibration(
-    system: System, force: Force, mode: int, state: int, amplitude: float, method: Method
+    system: System, force: Forcing, mode: int, state: int, amplitude: float, method: Method
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The place of rest without the force, float64[D]; the linear vibration about it in quadrature
     in which a state has an amplitude: its complex amplitudes complex128[D]; and its unknowns
@@ -244,7 +244,7 @@ def _meets(gap: Expr, system: System, rest: np.ndarray) -> bool:
 
 def _on_boundary(
     system: System,
-    force: Force,
+    force: Forcing,
     rest: np.ndarray,
     shape: np.ndarray,
     state: int,

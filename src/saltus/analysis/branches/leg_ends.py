@@ -8,8 +8,8 @@ import numpy as np
 
 from saltus.analysis.branches.arclength import correct, tangents
 from saltus.analysis.branches.contact_sequences import (
-    Contact,
     ContactSequence,
+    SequenceContact,
     shift,
     without,
 )
@@ -130,7 +130,7 @@ def _touching(event: ContactEvent) -> np.ndarray:
 
 
 def with_impact(
-    event: ContactEvent, contact: Contact, like: Legs | None
+    event: ContactEvent, contact: SequenceContact, like: Legs | None
 ) -> tuple[np.ndarray, Legs]:
     """The orbit of a graze with the impact without speed among its contacts, float64[z], and its
     equations: those of another orbit if they are given.
@@ -181,7 +181,7 @@ def _leg_vanishes(legs: Legs, z: np.ndarray, place: int, tangent: np.ndarray) ->
 
 
 # -- contacts that appear --------------------------------------------------------------------------
-def _first_extra(legs: Legs, z: np.ndarray) -> tuple[Contact, float] | None:
+def _first_extra(legs: Legs, z: np.ndarray) -> tuple[SequenceContact, float] | None:
     """The first contact that the free flow meets beside those of a virtual orbit, and when."""
     free, begin = legs.free_flow(z[None])[0], legs.begin(z[None])[0]
     if free is None:
@@ -195,7 +195,11 @@ def _first_extra(legs: Legs, z: np.ndarray) -> tuple[Contact, float] | None:
 
 
 def _appears(
-    legs: Legs, z: np.ndarray, beyond: np.ndarray, extra: tuple[Contact, float], tangent: np.ndarray
+    legs: Legs,
+    z: np.ndarray,
+    beyond: np.ndarray,
+    extra: tuple[SequenceContact, float],
+    tangent: np.ndarray,
 ) -> End | None:
     """A boundary that is met beyond an orbit that touches it."""
     contact, phase = extra

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from saltus.analysis.branches.arclength import FIRST, Curve, correct, follow, tangents
+from saltus.analysis.branches.arclength import FIRST, Arc, correct, follow, tangents
 from saltus.analysis.branches.contact_sequences import sequences
 from saltus.analysis.branches.ladders import accumulation
 from saltus.analysis.branches.leg_ends import End, end_of
@@ -47,7 +47,7 @@ class Piece:
     """
 
     legs: Legs
-    curve: Curve
+    curve: Arc
     after_event: bool = False
     end: End | None = None
 
@@ -117,7 +117,7 @@ class _Way:
         """One contact sequence, and where it ends if that is at an event."""
         again, virtual = bool(self.pieces), list[np.ndarray]()
 
-        def ends(curve: Curve) -> str:
+        def ends(curve: Arc) -> str:
             if not legs.admissible(curve.z[-1][None])[0]:
                 virtual.append(curve.z[-1])
                 return "virtual"
@@ -144,7 +144,7 @@ class _Way:
             self.end = "lost"
         return piece.end
 
-    def _returns(self, legs: Legs, curve: Curve) -> bool:
+    def _returns(self, legs: Legs, curve: Arc) -> bool:
         """Whether the last step passed the orbit from which the branch was followed."""
         own, start = self.home
         if legs.contacts != own.contacts or len(curve.z) < 2:
@@ -194,7 +194,7 @@ def follow_legs(
     -------
     list of Piece, str, float
         The contact sequences one after the other, and why the branch ends: see
-        :class:`saltus.analysis.branches.arclength.Curve`; ``graze`` or ``corner`` where it isn't
+        :class:`saltus.analysis.branches.arclength.Arc`; ``graze`` or ``corner`` where it isn't
         known how it goes on; ``accumulates`` where its grazes do, and at which value of the
         parameter, NaN otherwise.
     """

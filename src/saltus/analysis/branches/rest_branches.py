@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.analysis.branches.arclength import Curve, tangents
+from saltus.analysis.branches.arclength import Arc, tangents
 from saltus.analysis.branches.branch import Branch, refine
 from saltus.analysis.branches.criticality import criticality
 from saltus.analysis.branches.events import Event
@@ -140,7 +140,7 @@ def trace_rests(
     ]
 
 
-def _left(orbits: Rests, curve: Curve) -> str:
+def _left(orbits: Rests, curve: Arc) -> str:
     """``boundary_equilibrium`` if a curve has just left its mode."""
     ends = orbits.sides(np.stack([curve.z[0], curve.z[-1]]))
     return "boundary_equilibrium" if (ends[0] != ends[1]).any() else ""

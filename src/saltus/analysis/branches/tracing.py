@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.analysis.branches.arclength import ENDING, FIRST, Curve, correct, follow, tangents
+from saltus.analysis.branches.arclength import ENDING, FIRST, Arc, correct, follow, tangents
 from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.events import Event
 from saltus.analysis.branches.legs import Legs
@@ -235,7 +235,7 @@ class Start:
         return None
 
 
-def halved(orbits: PeriodicOrbits | Legs, curve: Curve) -> str:
+def halved(orbits: PeriodicOrbits | Legs, curve: Arc) -> str:
     """``period_doubling`` if an orbit of 2m periods has just passed one of m periods."""
     if orbits.n % 2 or len(curve.z) < 2:
         return ""
@@ -244,7 +244,7 @@ def halved(orbits: PeriodicOrbits | Legs, curve: Curve) -> str:
     return "period_doubling" if apart[0] @ apart[1] < 0.0 else ""
 
 
-def _shrunk(orbits: PeriodicOrbits, curve: Curve) -> str:
+def _shrunk(orbits: PeriodicOrbits, curve: Arc) -> str:
     """The same; ``hopf`` if a limit cycle has shrunk to nothing."""
     why = halved(orbits, curve)
     turns = not why and orbits.free and len(curve.z) > 1 and orbits.turned(*curve.z[:-3:-1])
@@ -254,7 +254,7 @@ def _shrunk(orbits: PeriodicOrbits, curve: Curve) -> str:
 def both_ways(
     plan: Plan,
     starts: Sequence[Start],
-    ends: Callable[[Any, Curve], str] = _shrunk,
+    ends: Callable[[Any, Arc], str] = _shrunk,
     kind: type[Branch] = Branch,
 ) -> list[Branch | None]:
     """The branches of orbits over one period, side by side: see :class:`Plan`."""
@@ -288,7 +288,7 @@ def both_ways(
     return result
 
 
-def _joined(orbits: PeriodicOrbits, curves: list[Curve], kind: type[Branch]) -> Branch | None:
+def _joined(orbits: PeriodicOrbits, curves: list[Arc], kind: type[Branch]) -> Branch | None:
     """One branch from the curves to both sides."""
     if not curves:
         return None
@@ -301,7 +301,7 @@ def _joined(orbits: PeriodicOrbits, curves: list[Curve], kind: type[Branch]) -> 
     return _of(orbits, up.behind(down), (down.end, up.end), kind)
 
 
-def _of(orbits: PeriodicOrbits, curve: Curve, ends: tuple[str, str], kind: type[Branch]) -> Branch:
+def _of(orbits: PeriodicOrbits, curve: Arc, ends: tuple[str, str], kind: type[Branch]) -> Branch:
     """The branch of a curve, with the derivatives at its points themselves."""
     z, tangent, derivative = (np.array(one) for one in (curve.z, curve.tangent, curve.derivative))
     length = np.array(curve.length) - curve.length[0]

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from saltus.analysis.closed.mode_zeros import Piece, near
+from saltus.analysis.closed.mode_zeros import ModeEquations, near
 from saltus.analysis.solve.tolerances import RANK
 from saltus.contact.guards import Guard, Law, is_hold
 from saltus.errors import ParameterError
@@ -89,9 +89,9 @@ def all_equilibria(system: System, starts: np.ndarray, scale: np.ndarray) -> lis
         Size of each state.
     """
     found: list[Equilibrium] = []
-    continua: list[Piece] = []
+    continua: list[ModeEquations] = []
     for mode in _modes(system.guards):
-        piece = Piece(system, mode, scale)
+        piece = ModeEquations(system, mode, scale)
         rests: list[Equilibrium] = []
         for state in piece.zeros(starts):
             rest = _rest(piece, state)
@@ -141,7 +141,7 @@ def _modes(guards: Sequence[Guard]) -> list[tuple[bool, ...]]:
     return modes
 
 
-def _rest(piece: Piece, state: np.ndarray) -> Equilibrium | None:
+def _rest(piece: ModeEquations, state: np.ndarray) -> Equilibrium | None:
     """The equilibrium at a zero of the field; None where the mode doesn't hold."""
     state = piece.cleaned(state)
     touched, margin = [], np.inf
@@ -174,14 +174,14 @@ def _rest(piece: Piece, state: np.ndarray) -> Equilibrium | None:
     )  # fmt: skip
 
 
-def _gap(piece: Piece, gap: Expr, state: np.ndarray) -> tuple[float, float]:
+def _gap(piece: ModeEquations, gap: Expr, state: np.ndarray) -> tuple[float, float]:
     """A gap, and what rounding and Newton's method leave of it."""
     slopes = np.array([piece.one(one, state) for one in gradient(gap, piece.system.states)])
     noise = np.abs(slopes) @ (ON * np.abs(state) + ON_SCALE * piece.scale)
     return piece.one(gap, state), float(noise)
 
 
-def _holds(piece: Piece, law: Law, state: np.ndarray) -> tuple[bool, bool]:
+def _holds(piece: ModeEquations, law: Law, state: np.ndarray) -> tuple[bool, bool]:
     """Whether a contact is held at rest there, and not just about to be released."""
     assert law.drive is not None
     assert law.pivot is not None
@@ -193,7 +193,7 @@ def _holds(piece: Piece, law: Law, state: np.ndarray) -> tuple[bool, bool]:
     return room >= -noise, room > noise
 
 
-def _attracts(piece: Piece, law: Law, state: np.ndarray) -> bool:
+def _attracts(piece: ModeEquations, law: Law, state: np.ndarray) -> bool:
     """Whether motions come to a held contact from beside it."""
     if law.kind == "impact":
         return law.restitution is None or piece.one(law.restitution, state) < 1.0
@@ -201,7 +201,7 @@ def _attracts(piece: Piece, law: Law, state: np.ndarray) -> bool:
     return piece.one(law.pivot, state) < 0
 
 
-def _eigenvalues(piece: Piece, state: np.ndarray) -> np.ndarray:
+def _eigenvalues(piece: ModeEquations, state: np.ndarray) -> np.ndarray:
     """Of the linear part along the boundaries that hold the motion [1/s], the largest real part
     first.
     """

@@ -38,7 +38,7 @@ SAME, RESIDUAL = 1e-7, 1e-9
 ROUNDED = 1e-12
 
 
-class Piece:
+class ModeEquations:
     """The smooth equations of one mode, and their zeros.
 
     Attributes

@@ -46,7 +46,7 @@ class Evolutions:
 
 
 @dataclass(frozen=True)
-class Search:
+class NeighbourSearch:
     """Limits of the search for neighbours.
 
     Attributes
@@ -88,7 +88,7 @@ def _crowd(points: np.ndarray, tree: cKDTree, index: int, smallest: float, exclu
     return math.inf
 
 
-def follow(points: np.ndarray, search: Search) -> Evolutions:
+def follow(points: np.ndarray, search: NeighbourSearch) -> Evolutions:
     """The evolutions of the trajectory float64[n, m], from its first point with a neighbour on;
     empty if none has one.
     """
@@ -98,7 +98,7 @@ def follow(points: np.ndarray, search: Search) -> Evolutions:
 class _Chase:
     """A fiducial point and its neighbour, moving along the trajectory."""
 
-    def __init__(self, points: np.ndarray, search: Search):
+    def __init__(self, points: np.ndarray, search: NeighbourSearch):
         self._points, self._search = points, search
         # a neighbour must be able to go on
         self._tree = cKDTree(points[: len(points) - search.evolve])

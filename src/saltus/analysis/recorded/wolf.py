@@ -20,7 +20,13 @@ from saltus.analysis.recorded.embedding import (
     hardly_correlated,
     least_dimension,
 )
-from saltus.analysis.recorded.neighbours import CROWD, Evolutions, Search, crowd_distance, follow
+from saltus.analysis.recorded.neighbours import (
+    CROWD,
+    Evolutions,
+    NeighbourSearch,
+    crowd_distance,
+    follow,
+)
 from saltus.analysis.recorded.series import (
     LEAST_POINTS,
     check_length,
@@ -213,7 +219,7 @@ def wolf(
     return build(schema.EXPONENTS, Subject((), attrs=settings), values, words={"<rate>": unit})
 
 
-def measure(points: np.ndarray, interval: float, search: Search) -> Growing:
+def measure(points: np.ndarray, interval: float, search: NeighbourSearch) -> Growing:
     """Exponents from the neighbours on a trajectory float64[n, m] at this sampling interval [s]."""
     evolutions = follow(points, search)
     time, count = interval * search.evolve, len(evolutions.growth)
@@ -294,7 +300,9 @@ def _unfold(
     return embedded(series, dimension, delay), false_neighbours(series, dimension, delay, exclude)
 
 
-def _search(points: np.ndarray, evolve: int, smallest: Any, largest: Any, exclude: int) -> Search:
+def _search(
+    points: np.ndarray, evolve: int, smallest: Any, largest: Any, exclude: int
+) -> NeighbourSearch:
     """The distances, checked."""
     for name, value in (("smallest_distance", smallest), ("largest_distance", largest)):
         if value is not None and not (isinstance(value, int | float) and 0 < value < 1):
@@ -308,7 +316,7 @@ def default_search(
     exclude: int,
     smallest: float = CLEANEST,
     largest: float | None = None,
-) -> Search:
+) -> NeighbourSearch:
     """The search for neighbours; a largest distance that isn't given follows from the density of
     points.
     """
@@ -321,10 +329,12 @@ def default_search(
         raise ParameterError(
             f"largest_distance = {far:g} must be above smallest_distance = {smallest:g}."
         )
-    return Search(evolve, smallest, far, exclude)
+    return NeighbourSearch(evolve, smallest, far, exclude)
 
 
-def _warn(found: Growing, search: Search, false: float, dimension: int, by_density: bool) -> None:
+def _warn(
+    found: Growing, search: NeighbourSearch, false: float, dimension: int, by_density: bool
+) -> None:
     """Warn about the causes that make the exponent doubtful."""
     if false > UNFOLDED:
         warnings.warn(

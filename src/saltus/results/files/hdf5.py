@@ -33,14 +33,14 @@ def dataset(path: str | os.PathLike[str]) -> xr.Dataset:
 @contextmanager
 def _store(place: Any, mode: str) -> Iterator[H5NetCDFStore]:
     # variables in the order in which they were written: h5netcdf asks for that too
-    with _File(place, mode, track_order=True) as file:
+    with _Hdf5File(place, mode, track_order=True) as file:
         with ctrl_c_waits():  # h5netcdf can't close what is half open
             netcdf = h5netcdf.File(file, mode, decode_vlen_strings=True)
         with netcdf:
             yield H5NetCDFStore(netcdf)
 
 
-class _File(h5py.File):
+class _Hdf5File(h5py.File):
     """An HDF5 file whose objects stay found. h5netcdf asks for them by name, 40 times for each
     variable: without this a result takes twice as long to write and to read.
     """

@@ -7,11 +7,11 @@ import importlib
 import pkgutil
 from collections.abc import Mapping
 
-from saltus.study.answers.question import REGISTER, Entry
+from saltus.study.answers.question import REGISTER, RegisteredTable
 
 
 @functools.cache
-def questions() -> Mapping[str, Entry]:
+def questions() -> Mapping[str, RegisteredTable]:
     """Every table of study files that asks something, in the order in which they are answered."""
     for file in pkgutil.iter_modules(__path__):
         importlib.import_module(f"{__name__}.{file.name}")

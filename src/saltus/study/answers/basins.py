@@ -19,7 +19,7 @@ from saltus.study.setting.arguments import arguments
 from saltus.study.setting.setting import Setting
 from saltus.study.tables.kinds import OF_RESPONSES
 from saltus.study.tables.methods import Method
-from saltus.study.tables.parts import FileTitle, Quantity, Range, Table, slug
+from saltus.study.tables.parts import FileTitle, Quantity, Range, StudyTable, slug
 from saltus.study.tables.signature import Generated
 from saltus.study.tables.signature import table as asking
 
@@ -52,7 +52,7 @@ class Axis(Range):
     )
 
 
-class Map(Table):
+class MapTable(StudyTable):
     """[[basins.map]]: one of the maps of a study, with what sets it apart from the others."""
 
     name: FileTitle = Field(
@@ -84,7 +84,7 @@ class OfMaps(Generated):
         examples=[{"x": {"first": "-5 mm", "last": "5 mm", "count": 400},
             "v": {"first": "-1 m/s", "last": "1 m/s", "count": 400}}],
     )  # fmt: skip
-    map: list[Map] = Field(
+    map: list[MapTable] = Field(
         default_factory=list,
         description="Several maps of one study.",
         examples=[[{"name": "exact"}]],
@@ -116,7 +116,8 @@ def questions(table: Any, setting: Setting) -> list[Question]:
     or ParameterError.
     """
     maps = [
-        BasinMap(table, one, setting) for one in table.map or [Map(name=setting.study.study.name)]
+        BasinMap(table, one, setting)
+        for one in table.map or [MapTable(name=setting.study.study.name)]
     ]
     stems = {one.title: one.stem for one in maps}
     return [
@@ -142,7 +143,7 @@ class BasinMap(Question):
 
     place, shared = "basins", True
 
-    def __init__(self, table: Any, one: Map, setting: Setting) -> None:
+    def __init__(self, table: Any, one: MapTable, setting: Setting) -> None:
         self.title, self.group, self.compare = one.name, setting.study.study.name, one.compare
         self.stem = slug(one.name) if table.map else "basins"
         system, place = setting.system(one.values, "basins.map.values"), self.place

@@ -11,7 +11,7 @@ from saltus.study.answers.question import OneVerb, asked
 from saltus.study.setting import quantities
 from saltus.study.tables.kinds import OF_RESPONSES, whole
 from saltus.study.tables.parts import Interval, Quantity
-from saltus.study.tables.signature import Kind
+from saltus.study.tables.signature import WrittenAs
 from saltus.study.tables.signature import table as asking
 
 if TYPE_CHECKING:
@@ -20,24 +20,24 @@ if TYPE_CHECKING:
 
 #: Branches go over a range, without steps.
 OF_BRANCHES = OF_RESPONSES | {
-    "vary": Kind(
+    "vary": WrittenAs(
         dict[str, Interval], ({"frequency": ["2 Hz", "30 Hz"]},),
         "One parameter and its range.", convert="ranges",
     ),
     "at": whole(12, most=MOST_COUNT),
     "longest": whole(8),
     "points": whole(1000),
-    "switch": Kind(
+    "switch": WrittenAs(
         list[Literal["period_doubling", "branch_point"]], (["period_doubling"],),
         default=["period_doubling", "branch_point"],
     ),
 }  # fmt: skip
 #: Backbones go over a range of amplitudes; parameters that are zero are taken out.
 OF_BACKBONES = OF_RESPONSES | {
-    "amplitude": Kind(Interval, (["0.1 mm", "5 mm"],)),
-    "state": Kind(examples=("x",)),
-    "force": Kind(examples=("force",)),
-    "values": Kind(dict[str, Quantity], ({"force": "0 N", "damping_ratio": 0},),
+    "amplitude": WrittenAs(Interval, (["0.1 mm", "5 mm"],)),
+    "state": WrittenAs(examples=("x",)),
+    "force": WrittenAs(examples=("force",)),
+    "values": WrittenAs(dict[str, Quantity], ({"force": "0 N", "damping_ratio": 0},),
         "Values of parameters: of free vibrations the force and all that damps are zero.", {},
         convert="values"),
     "mode": whole(1),

@@ -12,7 +12,7 @@ import numpy as np
 
 from saltus.errors import StudyError
 from saltus.results.table import Column, TextTable, table, words
-from saltus.study.answers.printed import Row, rows
+from saltus.study.answers.printed import CsvRow, rows
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,7 +27,7 @@ RESIDUAL = "position_minus_boundary_m"
 def contact_table(
     title: str,
     run: xr.Dataset,
-    printed: Sequence[Row],
+    printed: Sequence[CsvRow],
     exact: Mapping[int, float],
     reference: xr.Dataset | None,
 ) -> TextTable:
@@ -110,7 +110,7 @@ def _column(
     )
 
 
-def printed_rows(data: bytes, path: Path) -> list[Row]:
+def printed_rows(data: bytes, path: Path) -> list[CsvRow]:
     """The rows that somebody printed; every number is looked at now, before anything is computed.
     Raises StudyError.
     """
@@ -155,7 +155,7 @@ def _notes(
     return tuple(notes)
 
 
-def _time(run: xr.Dataset, row: Row) -> float:
+def _time(run: xr.Dataset, row: CsvRow) -> float:
     """Time of the contact that a row names."""
     number = row.whole("event_number")
     if not 1 <= number <= run.sizes["contact"]:

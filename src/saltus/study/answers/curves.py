@@ -16,7 +16,7 @@ from saltus.study.answers.question import Answers, OneVerb, Question, Show, aske
 from saltus.study.setting import quantities
 from saltus.study.tables.kinds import OF_RESPONSES, whole
 from saltus.study.tables.parts import Interval, Quantity
-from saltus.study.tables.signature import Kind
+from saltus.study.tables.signature import WrittenAs
 from saltus.study.tables.signature import table as asking
 
 if TYPE_CHECKING:
@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 
 #: A curve begins at an event of the study's branches, named by its kind.
 KEYS = OF_RESPONSES | {
-    "event": Kind(Literal["fold", "period_doubling", "neimark_sacker", "graze"], ("fold",),
+    "event": WrittenAs(Literal["fold", "period_doubling", "neimark_sacker", "graze"], ("fold",),
         "Kind of the bifurcation of [branches] at which it begins."),
-    "vary": Kind(dict[str, Interval],
+    "vary": WrittenAs(dict[str, Interval],
         ({"frequency": ["12 Hz", "22 Hz"], "force": ["1 N", "6 N"]},),
         "Two parameters and their ranges.", convert="ranges"),
     "points": whole(400),
@@ -49,7 +49,7 @@ _NEAR = Field(None, description="Value of the branches' parameter near it.", exa
         near=(Quantity | None, _NEAR),
     ),
 )
-class Curve(OneVerb):
+class CurveQuestion(OneVerb):
     """A curve of bifurcations."""
 
     def check(self, table: Any, setting: Setting) -> None:  # noqa: ARG002

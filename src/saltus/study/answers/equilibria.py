@@ -11,7 +11,7 @@ from saltus.study.answers.question import OneVerb, asked
 from saltus.study.setting import quantities
 from saltus.study.tables.kinds import KINDS, whole
 from saltus.study.tables.parts import Interval, Start
-from saltus.study.tables.signature import Kind
+from saltus.study.tables.signature import WrittenAs
 from saltus.study.tables.signature import table as asking
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 #: They are looked for in a box, or from starts.
 KEYS = KINDS | {
-    "start": Kind(dict[str, Start], KINDS["start"].examples,
+    "start": WrittenAs(dict[str, Start], KINDS["start"].examples,
         "Starts of Newton's method, in place of a box: every state; lists make a batch.", None,
         convert="start"),
     "starts": whole(256),

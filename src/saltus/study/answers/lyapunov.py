@@ -20,7 +20,7 @@ LYAPUNOV = {
 
 
 @asked(60, table("lyapunov", ["lyapunov"], KINDS | LYAPUNOV, called="Lyapunov exponents"))
-class Exponents(OneVerb):
+class ExponentsQuestion(OneVerb):
     """Lyapunov exponents of motions."""
 
     how = "flow"

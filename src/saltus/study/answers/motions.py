@@ -134,7 +134,7 @@ class Section(OfMotions):
         states=(list[str] | None, _STATES),
     ),
 )
-class Lines(OfMotions):
+class LinesQuestion(OfMotions):
     """[spectrum]: motions by frequency."""
 
     picture, several = "spectrum", True

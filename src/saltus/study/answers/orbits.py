@@ -10,7 +10,7 @@ from saltus.fence import MOST_PERIODS
 from saltus.study.answers.question import OneVerb, asked
 from saltus.study.tables.kinds import KINDS, OF_RESPONSES, whole
 from saltus.study.tables.parts import Interval, Quantity, Starts
-from saltus.study.tables.signature import Kind
+from saltus.study.tables.signature import WrittenAs
 from saltus.study.tables.signature import table as asking
 
 #: A time, or a range of them.
@@ -20,14 +20,14 @@ Period = Annotated[
 ]
 #: They are found from many starts.
 KEYS = OF_RESPONSES | {
-    "start": Kind(Starts, (*KINDS["start"].examples, "random 1000"),
+    "start": WrittenAs(Starts, (*KINDS["start"].examples, "random 1000"),
         'Where to begin: every state, lists making a batch; or "random 1000" with box.',
         convert="start"),
     "periods": whole(3, most=MOST_PERIODS),
-    "period": Kind(Period, (["1 s", "5 s"], "0.1 s"), convert="period"),
+    "period": WrittenAs(Period, (["1 s", "5 s"], "0.1 s"), convert="period"),
 }  # fmt: skip
 
 
 @asked(100, asking("periodic_orbits", ["periodic_orbits"], KEYS, called="Periodic orbits"))
-class Orbits(OneVerb):
+class OrbitsQuestion(OneVerb):
     """Periodic orbits, stable and unstable."""

@@ -15,7 +15,7 @@ from saltus.errors import StudyError
 
 
 @dataclass(frozen=True)
-class Row:
+class CsvRow:
     """One row of a CSV file.
 
     Attributes
@@ -56,7 +56,7 @@ class Row:
         return int(value)
 
 
-def rows(data: bytes, path: Path, columns: tuple[str, ...]) -> list[Row]:
+def rows(data: bytes, path: Path, columns: tuple[str, ...]) -> list[CsvRow]:
     """The rows of a CSV file. Lines that begin with # are comments.
 
     Parameters
@@ -88,7 +88,7 @@ def rows(data: bytes, path: Path, columns: tuple[str, ...]) -> list[Row]:
             f"[compare] {path} lacks the column {lacking[0]!r}. It needs {', '.join(columns)}."
         )
     return [
-        Row(f"{path}, line {number}", dict(zip(header[1], cells, strict=False)))
+        CsvRow(f"{path}, line {number}", dict(zip(header[1], cells, strict=False)))
         for number, cells in table
     ]
 

@@ -31,7 +31,7 @@ M = TypeVar("M", bound="Make | type[OneVerb]")
 
 
 @dataclass(frozen=True)
-class Entry:
+class RegisteredTable:
     """A table of study files that asks something.
 
     Attributes
@@ -53,7 +53,7 @@ class Entry:
 
 
 #: Every table that asks something, by its name; those of the files beside this one.
-REGISTER: dict[str, Entry] = {}
+REGISTER: dict[str, RegisteredTable] = {}
 
 
 def asked(
@@ -71,7 +71,7 @@ def asked(
         if isinstance(answer, type):
             one.place, one.function = table.place, table.function
             make = lambda asked, setting: [one(asked, setting)]  # noqa: E731
-        REGISTER[table.place] = Entry(rank, table, make, files)
+        REGISTER[table.place] = RegisteredTable(rank, table, make, files)
         return answer
 
     return entered

@@ -65,7 +65,7 @@ class Report:
 
 
 @dataclass
-class Outcome:
+class StudyOutcome:
     """What a study gave: tables to print, files written, questions that other shards have still to
     answer.
     """
@@ -74,7 +74,7 @@ class Outcome:
     files: list[Path] = field(default_factory=list)
     waiting: list[str] = field(default_factory=list)
 
-    def add(self, other: Outcome) -> None:
+    def add(self, other: StudyOutcome) -> None:
         """Take in what another question gave."""
         self.tables += other.tables
         self.files += other.files

@@ -12,7 +12,7 @@ from saltus.study.answers.basins import BasinMap
 from saltus.study.ask import naming_table, questions_of
 from saltus.study.run.copies import keep_copy
 from saltus.study.run.maps import compute, finish, open_store
-from saltus.study.run.running import Outcome, Report, Resources, Running
+from saltus.study.run.running import Report, Resources, Running, StudyOutcome
 from saltus.study.run.stored import load_or_compute
 from saltus.study.run.write import write
 from saltus.study.setting.inputs import Inputs
@@ -38,7 +38,7 @@ def run_study(
     *,
     inputs: Inputs | None = None,
     only: Sequence[str] = (),
-) -> Outcome:
+) -> StudyOutcome:
     """Answer the questions of a study that have no answer yet, and write the results.
 
     Parameters
@@ -83,7 +83,7 @@ def run_study(
         if isinstance(question, BasinMap)
     }
     keep_copy(folder, text, inputs.taken)
-    at, outcome = Running(folder, text, resources, report, say, pictures), Outcome()
+    at, outcome = Running(folder, text, resources, report, say, pictures), StudyOutcome()
     found: dict[str, xr.Dataset] = {}
     for question in asked:
         first = resources.shard is None or resources.shard[0] == 0

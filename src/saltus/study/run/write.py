@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from saltus.results import to_csv
 from saltus.results.files.atomic import replacing
 from saltus.results.files.sheets import write_table
-from saltus.study.run.running import Outcome, Running
+from saltus.study.run.running import Running, StudyOutcome
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 def write(
     question: Question, ds: xr.Dataset, found: Mapping[str, xr.Dataset], at: Running
-) -> Outcome:
+) -> StudyOutcome:
     """Write what an answer says; its Dataset is written already."""
     tables, files = question.rows(ds, found), [at.folder / f"{question.stem}.nc"]
     notes = [file.note for file in question.inputs]
@@ -37,7 +37,7 @@ def write(
                 save_picture(figure, at.folder / f"{question.stem}{end}.png")
                 for end, figure in question.pictures(ds).items()
             ]
-    return Outcome(tables, files)
+    return StudyOutcome(tables, files)
 
 
 def save_picture(figure: Any, file: Path) -> Path:

@@ -8,11 +8,11 @@ from saltus.errors import SaltusError
 from saltus.language import Table, curve
 from saltus.results.files.measured import columns
 from saltus.study.setting.inputs import Input
-from saltus.study.tables.parts import Curve
+from saltus.study.tables.parts import MeasuredCurve
 from saltus.study.tables.toml import fault
 
 
-def curve_of(file: Input, how: Curve, name: str) -> Table:
+def curve_of(file: Input, how: MeasuredCurve, name: str) -> Table:
     """The curve through the points of a file: its first two columns, in SI by the units of their
     headings.
 

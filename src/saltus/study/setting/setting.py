@@ -16,8 +16,8 @@ from saltus.system.formula import Equations, Formula, Formulas
 
 if TYPE_CHECKING:
     from saltus.study.setting.inputs import Inputs
-    from saltus.study.tables.parts import Header, Output, Quantity, SystemTable
-    from saltus.study.tables.parts import Table as SpecTable
+    from saltus.study.tables.parts import Header, Output, Quantity, StudyTable, SystemTable
+
     from saltus.study.tables.study import Study
     from saltus.system import System
 
@@ -71,7 +71,7 @@ class Setting:
             raise fault(place, error) from None
         return outputs or None
 
-    def method(self, own: SpecTable | None, place: str) -> Any:
+    def method(self, own: StudyTable | None, place: str) -> Any:
         """The method of one question: its own, which stands at ``place``, or the study's."""
         return method_of(self.study.method) if own is None else method_of(own, place)
 
@@ -188,7 +188,7 @@ def _written(table: SystemTable, formulas: Formulas, header: Header | None) -> S
         raise fault("system", error) from None
 
 
-def method_of(table: SpecTable, place: str = "method") -> Any:
+def method_of(table: StudyTable, place: str = "method") -> Any:
     """The method that a table describes. Raises StudyError if it doesn't take one of
     the options.
     """

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 from pydantic import Field
 
 from saltus.flow import methods
-from saltus.study.tables.signature import Kind, options
+from saltus.study.tables.signature import WrittenAs, options
 
 _EXAMPLES = {
     "lanes": 4, "max_steps": 1_000_000, "tolerance": 1e-12, "rtol": 1e-4, "atol": 1e-7,
@@ -25,6 +25,6 @@ else:
         functools.reduce(operator.or_, METHODS.values()), Field(discriminator="name")
     ]
 #: A method of one question.
-OWN_METHOD = Kind(
+OWN_METHOD = WrittenAs(
     Method, ({"name": "Taylor"},), "How to integrate; the study's [method] by default."
 )

@@ -78,13 +78,13 @@ Title = Annotated[str, Field(min_length=1), AfterValidator(_title)]
 FileTitle = Annotated[Title, AfterValidator(_file_name)]
 
 
-class Table(BaseModel):
+class StudyTable(BaseModel):
     """A table of a study file: strict types, no unknown keys, never changed after reading."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
 
-class Header(Table):
+class Header(StudyTable):
     """[study]: title and description, for readers."""
 
     name: FileTitle = Field(description="A title.", examples=["Rig b4 at 15 Hz"])
@@ -98,7 +98,7 @@ class Header(Table):
     )
 
 
-class Curve(Table):
+class MeasuredCurve(StudyTable):
     """[system.tables.<name>]: measured points from a file, which formulas call by their name:
     ``stop(x)``, ``drive(t)``.
     """
@@ -121,7 +121,7 @@ class Curve(Table):
     )
 
 
-class SystemTable(Table):
+class SystemTable(StudyTable):
     """[system]: a model that comes with saltus, or equations of your own, and values of the
     parameters.
     """
@@ -169,7 +169,7 @@ class SystemTable(Table):
         "before it.",
         examples=[{"contact": "k*(x - gap) if x > gap else 0"}],
     )
-    tables: dict[str, Curve] = Field(
+    tables: dict[str, MeasuredCurve] = Field(
         default_factory=dict,
         description="Curves by name, for formulas to call.",
         examples=[{"stop": {"file": "stop.csv"}}],
@@ -182,7 +182,7 @@ class SystemTable(Table):
 
 
 # -- questions -------------------------------------------------------------------------------------
-class Range(Table):
+class Range(StudyTable):
     """Values of a parameter: from one to another, ends included, or given one by one."""
 
     first: Quantity | None = Field(None, description="The first value.", examples=["2 Hz"])
@@ -222,7 +222,7 @@ class Range(Table):
         return self
 
 
-class Named(Table):
+class Named(StudyTable):
     """What questions have in common that may be asked several times."""
 
     #: Name of one without a name.
@@ -252,7 +252,7 @@ Starts = Annotated[
 ]
 
 
-class Output(Table):
+class Output(StudyTable):
     """An output: a formula, and the unit that it is in."""
 
     formula: Formula = Field(description="What is read off the motion.", examples=["k*(x - gap)"])
@@ -270,7 +270,7 @@ def _alone(given: Any) -> Any:
 
 Outputs = dict[str, Annotated[Output, BeforeValidator(_alone, json_schema_input_type=str | Output)]]
 
-T = TypeVar("T", bound=Table)
+T = TypeVar("T", bound=StudyTable)
 
 
 def _as_list(given: Any) -> Any:

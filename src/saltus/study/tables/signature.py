@@ -16,7 +16,7 @@ from pydantic import Field, create_model, model_validator
 
 import saltus
 from saltus.fence import MOST_COUNT
-from saltus.study.tables.parts import Named, Quantity, Table
+from saltus.study.tables.parts import Named, Quantity, StudyTable
 from saltus.study.tables.toml import TABLES, toml
 
 #: What a question leaves to the study: the system, and how it is run.
@@ -28,7 +28,7 @@ _SENTENCE = re.compile(r"(.*?\.)(?:\s|$)")
 
 
 @dataclass(frozen=True)
-class Kind:
+class WrittenAs:
     """How a parameter of a function is written in a study file.
 
     Attributes
@@ -57,14 +57,14 @@ class Kind:
     convert: str = ""
 
 
-class Generated(Table):
+class Generated(StudyTable):
     """A table whose keys are parameters of a function."""
 
     #: Its name in the file, and the function that answers it.
     place: ClassVar[str] = ""
     function: ClassVar[str] = ""
     #: How each key that is an argument of the function is written.
-    kinds: ClassVar[dict[str, Kind]] = {}
+    kinds: ClassVar[dict[str, WrittenAs]] = {}
 
 
 class Asked(Generated, Named):
@@ -93,9 +93,9 @@ def verb(name: str) -> Callable[..., Any]:
 def table(
     place: str,
     verbs: Sequence[str],
-    kinds: Mapping[str, Kind],
+    kinds: Mapping[str, WrittenAs],
     *,
-    base: type[Table] | tuple[type[Table], ...] = Asked,
+    base: type[StudyTable] | tuple[type[StudyTable], ...] = Asked,
     without: Sequence[str] = (),
     called: str = "",
     **own: Any,
@@ -116,7 +116,7 @@ def table(
     **own : (type, Field)
         Keys that no parameter stands for.
     """
-    found: dict[str, tuple[Any, Kind]] = {}
+    found: dict[str, tuple[Any, WrittenAs]] = {}
     TABLES[verbs[0]] = place
     for function in map(verb, verbs):
         for parameter in inspect.signature(function).parameters.values():
@@ -125,7 +125,7 @@ def table(
                 name not in (*_OF_THE_STUDY, *without, *found, *own)
                 and parameter.kind != parameter.VAR_KEYWORD
             ):
-                found[name] = _key(function, parameter, kinds.get(name, Kind()))
+                found[name] = _key(function, parameter, kinds.get(name, WrittenAs()))
     summary = (inspect.getdoc(verb(verbs[0])) or "").split("\n\n")[0]
     several = (
         f" Several: [[{place}]], each with a name."
@@ -149,23 +149,23 @@ def options(method: type, examples: Mapping[str, Any]) -> Any:
     """The table of the options of a method."""
     parameters = inspect.signature(method).parameters.values()
     keys: dict[str, Any] = {
-        one.name: _key(method, one, Kind(examples=(examples.get(one.name, one.default),)))[0]
+        one.name: _key(method, one, WrittenAs(examples=(examples.get(one.name, one.default),)))[0]
         for one in parameters
     }
     summary = _plain((inspect.getdoc(method) or "").split("\n\n")[0])
     name: Any = method.__name__
     text = f"[method] name = {toml(name)}: {summary}"
     fields = {"name": (Literal[name], ...)} | keys
-    return create_model(name, __base__=Table, __module__=__name__, __doc__=text, **fields)
+    return create_model(name, __base__=StudyTable, __module__=__name__, __doc__=text, **fields)
 
 
 # -- one key ---------------------------------------------------------------------------------------
 def _key(
-    function: Callable[..., Any], parameter: inspect.Parameter, kind: Kind
-) -> tuple[Any, Kind]:
+    function: Callable[..., Any], parameter: inspect.Parameter, kind: WrittenAs
+) -> tuple[Any, WrittenAs]:
     """Type and Field of a key, and how it is written."""
     written, description = documented(function)[parameter.name]
-    kind = Kind() if written.startswith("{") else kind  # its choices say all
+    kind = WrittenAs() if written.startswith("{") else kind  # its choices say all
     holds, examples, limits = (
         kind.holds or _holds(parameter, written),
         kind.examples,

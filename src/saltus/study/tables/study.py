@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from pydantic import Field
 
 from saltus.study.tables.methods import METHODS, Method
-from saltus.study.tables.parts import Header, SystemTable, Table
+from saltus.study.tables.parts import Header, StudyTable, SystemTable
 
 
-class Compare(Table):
+class Compare(StudyTable):
     """[compare]: compare contact times with printed ones, and with exact ones."""
 
     printed: str = Field(
@@ -30,7 +30,7 @@ class Compare(Table):
     )
 
 
-class Study(Table):
+class Study(StudyTable):
     """A study file: one system, a method, and any number of questions."""
 
     study: Header
@@ -38,7 +38,7 @@ class Study(Table):
     method: Method = METHODS["Taylor"](name="Taylor")
     compare: Compare | None = None
 
-    def questions(self) -> Iterator[tuple[str, Table]]:
+    def questions(self) -> Iterator[tuple[str, StudyTable]]:
         """Name and table of every question, in the order in which they are answered."""
         raise NotImplementedError
 

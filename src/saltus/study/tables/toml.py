@@ -48,7 +48,7 @@ def cut(value: Any) -> str:
     return whole if len(whole) <= SHOWN else f"{whole[:SHOWN]}…"
 
 
-class _File:
+class _FileDialect:
     """Those who write study files: arguments are keys, functions are tables."""
 
     sl = ""
@@ -69,7 +69,7 @@ class _File:
         return file
 
 
-FILE = _File()
+FILE = _FileDialect()
 
 
 def fault(place: str, error: SaltusError) -> StudyError:

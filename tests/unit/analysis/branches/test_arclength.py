@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from saltus.analysis.branches.arclength import Curve, _Fronts, correct, follow
+from saltus.analysis.branches.arclength import Arc, _Fronts, correct, follow
 
 
 class Ellipses:
@@ -130,7 +130,7 @@ def test_a_step_follows_the_cubic_through_the_last_two_points():
     """What it misses falls by 2^4 where the step is halved."""
     missed = []
     for length in (0.1, 0.05):
-        fronts = _Fronts(Ellipses([1.0]), {}, [Curve()], length)
+        fronts = _Fronts(Ellipses([1.0]), {}, [Arc()], length)
         c, s = np.cos(length), np.sin(length)
         fronts.z, fronts.tangent = np.array([[1.0, 0.0]]), np.array([[0.0, 1.0]])
         fronts.before = np.array([[[c, -s]], [[s, c]]])

@@ -6,7 +6,7 @@ import pytest
 import saltus as sl
 from saltus.analysis.inputs.verb import verb
 from saltus.announce import announce
-from saltus.flow.progress import Lines, reporting
+from saltus.flow.progress import LogLines, reporting
 
 rig = sl.models.delangre("b")
 
@@ -160,7 +160,7 @@ def test_a_model_that_is_not_there_is_answered_by_those_that_are():
 def told(shares_at):
     """Lines of a work whose share done is so much at such a time [s]."""
     now, lines = [0.0], []
-    show = Lines(lines.append, clock=lambda: now[0]).show
+    show = LogLines(lines.append, clock=lambda: now[0]).show
     for when, share in shares_at:
         now[0] = when
         show(share)

@@ -14,7 +14,7 @@ from saltus.analysis.recorded.embedding import (
     least_dimension,
     mutual_information,
 )
-from saltus.analysis.recorded.neighbours import Search, crowd_distance, follow
+from saltus.analysis.recorded.neighbours import NeighbourSearch, crowd_distance, follow
 
 NOISE = np.random.default_rng(0).standard_normal(20_000)
 
@@ -66,7 +66,7 @@ def test_neighbours_that_part_at_a_known_rate():
         x = (2 * x + 1e-14 * rng.random()) % 1.0
         angles.append(2 * math.pi * x)
     points = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    evolutions = follow(points, Search(1, 1e-6, 0.01, 5))
+    evolutions = follow(points, NeighbourSearch(1, 1e-6, 0.01, 5))
     assert np.abs(evolutions.growth - math.log(2)).max() < 1e-3
     assert len(evolutions.growth) == 3999
     # five times as far where nobody near is in the right direction
@@ -76,11 +76,11 @@ def test_neighbours_that_part_at_a_known_rate():
 
 def test_excluded_neighbours_and_those_too_close_are_not_taken():
     line = np.arange(200.0)[:, None]
-    assert not len(follow(line, Search(1, 0.5, 3.0, 20)).growth)
-    assert len(follow(line, Search(1, 0.5, 30.0, 20)).growth)
+    assert not len(follow(line, NeighbourSearch(1, 0.5, 3.0, 20)).growth)
+    assert len(follow(line, NeighbourSearch(1, 0.5, 30.0, 20)).growth)
     twice = np.tile(np.arange(50.0), 4)[:, None]
     # copies of a point lie at distance 0
-    assert follow(twice, Search(1, 0.5, 1.0, 5)).distance.min() == 1.0
+    assert follow(twice, NeighbourSearch(1, 0.5, 1.0, 5)).distance.min() == 1.0
     assert crowd_distance(NOISE[:2000, None], 1e-9, 5) < 0.1
     assert crowd_distance(line[:10], 1e-9, 5) == math.inf
 

@@ -31,7 +31,7 @@ def test_bytes_and_content_are_those_of_xarray(results, name, tmp_path):
 
 
 def test_an_object_that_was_replaced_is_not_the_one_found_before(tmp_path):
-    with hdf5._File(tmp_path / "one.h5", "w") as file:
+    with hdf5._Hdf5File(tmp_path / "one.h5", "w") as file:
         file["x"] = np.zeros(2)
         assert file["x"] is file["/x"]
         del file["x"]
