@@ -30,7 +30,8 @@ WIDTHS = (2, 4, 8, 16)
 #: Interface and lanes of every bitcode.
 BITCODE: dict[str, tuple[Interface, int]] = {
     **{f"taylor_{lanes}": (TAYLOR, lanes) for lanes in WIDTHS}, "pair": (PAIR, 1),
-    "fixed_step": (FIXED_STEP, 1), "adams": (ADAMS, 1), "ndf": (NDF, 1), "capture": (CAPTURE, 1), "modal": (MODAL, 4),
+    "fixed_step": (FIXED_STEP, 1), "adams": (ADAMS, 1), "ndf": (NDF, 1), "capture": (CAPTURE, 1),
+    "modal": (MODAL, 4),
 }  # fmt: skip
 #: Kernels that the templates import.
 _SHARED = ("lanes", "trigonometry", "isolation", "status", "batch", "parts", "clocks_layout")

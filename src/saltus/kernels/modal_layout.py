@@ -1,9 +1,9 @@
 """Layout of the modal flow: what its tables and its work arrays hold.
 
-One trajectory after the other; the lanes of a step hold its modes. A contact state s is linear: z' =
-A z + b + drives. Its modes y = L (z - z_p(t)), z_p the steady answer to the drives, go their own
-ways: y_j(t) = y_j e^{lambda_j t}. Of a pair of complex modes one is kept, so z = z_p + Re(V y) with
-V twice the eigenvector. A gap is a row of amplitudes: g(t) = c + Re(sum_j w_j y_j(t)) + drives.
+One trajectory after the other; the lanes of a step hold its modes. A contact state is linear: z' = A
+z + b + drives. Its modes y = L (z - z_p(t)), z_p the steady answer to the drives, go their own ways:
+y_j(t) = y_j e^{lambda_j t}. Of a pair of complex modes one is kept, so z = z_p + Re(V y) with V
+twice the eigenvector. A gap is a row of amplitudes: g(t) = c + Re(sum_j w_j y_j(t)) + drives.
 
 Symbols
 -------
@@ -42,6 +42,6 @@ HUGE = 1.0e300
 
 Modal = namedtuple(
     "Modal",
-    "sizes row_of sign_of offset rate lag modes steady links y moved size sums q errors p bern bounds "
-    "slopes out touches state answer angle found",
+    "sizes row_of sign_of offset rate lag modes steady links y moved size sums q errors p bern "
+    "bounds slopes out touches state answer angle found",
 )

@@ -324,7 +324,7 @@ def land(i, tau, d, hits, modes, steady, batch, m):
     state_after(i, tau, d, modes, steady, batch, m)
     for g in range(m.sizes[GUARDS]):
         if (hits >> g) & 1:
-            value, rate = gap_of_moved(m.row_of[g], modes, steady, which, m)
+            _, rate = gap_of_moved(m.row_of[g], modes, steady, which, m)
             rate *= m.sign_of[g]
             size = m.errors[m.row_of[g], 2] + abs(m.offset[which, g])
             error = ROUNDED * size / abs(rate) if rate != 0.0 else math.inf

@@ -17,7 +17,6 @@ from saltus.system.formula import Equations, Formula, Formulas
 if TYPE_CHECKING:
     from saltus.study.setting.inputs import Inputs
     from saltus.study.tables.parts import Header, Output, Quantity, StudyTable, SystemTable
-
     from saltus.study.tables.study import Study
     from saltus.system import System
 
