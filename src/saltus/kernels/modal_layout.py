@@ -2,7 +2,8 @@
 
 One trajectory after the other; the lanes of a step hold its modes. A contact state is linear: z' =
 A z + b + drives. Its modes y = L (z - z_p(t)), z_p the steady answer to the drives, go their own
-ways: y_j(t) = y_j e^{lambda_j t}. Of a pair of complex modes one is kept, and z = z_p + Re(V y). A gap is a row of amplitudes: g(t) = c + Re(sum_j w_j y_j(t)) + drives.
+ways: y_j(t) = y_j e^{lambda_j t}. Of a pair of complex modes one is kept, and z = z_p + Re(V y).
+A gap is a row of amplitudes: g(t) = c + Re(sum_j w_j y_j(t)) + drives.
 
 Symbols
 -------
