@@ -1,5 +1,5 @@
-"""What kind of thing an argument of a public function may be, read off its annotation: asked once,
-where the function is entered.
+"""Checks of the types of arguments of public functions, from their annotations: made once, where
+the function is entered.
 
 Only the kinds are asked here, of arguments whose annotation consists of plain ones: ``int``,
 ``float``, ``bool``, ``str``, a ``Mapping`` and ``None``. What a number or a text may say is the
@@ -26,7 +26,7 @@ R = TypeVar("R")
 
 
 def _is_number(value: Any) -> bool:
-    """A real number of Python, of NumPy or in an array without axes, or a Quantity of pint."""
+    """True for a real number of Python or NumPy, an array without axes, or a Quantity of pint."""
     if hasattr(value, "magnitude") and hasattr(value, "units"):
         return True
     # NumPy's spans of time count as whole numbers
@@ -61,8 +61,8 @@ _KINDS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
 
 
 def has_mask(value: Any, depth: int = 3) -> bool:
-    """Whether numbers in an array, or in arrays in lists and mappings, are masked: as plain numbers
-    they would be whatever stands there.
+    """True if numbers in an array, or in arrays in lists and mappings, are masked. Read as plain
+    numbers they would have arbitrary values.
     """
     if isinstance(value, np.ma.MaskedArray):
         return bool(np.ma.is_masked(value))
@@ -86,8 +86,7 @@ _EXAMPLES = {
 
 
 class Kinds:
-    """The kinds of a function's arguments, so far as they are plain and the function doesn't say it
-    better itself.
+    """Kinds of a function's arguments, for those that are checked here.
 
     It does of whole numbers, which have a least one, and of a text whose default is a text: that is
     one of a few words.
@@ -99,19 +98,19 @@ class Kinds:
             kinds = [
                 re.sub(r"\[[^|]*\]$", "", kind) for kind in str(parameter.annotation).split(" | ")
             ]
-            own = set(kinds) <= {"int", "None"} or (
+            checks_itself = set(kinds) <= {"int", "None"} or (
                 kinds == ["str"] and isinstance(parameter.default, str)
             )
             if (
                 parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)
-                and not own
+                and not checks_itself
                 and set(kinds) <= set(_KINDS)
             ):
                 self._of[name] = kinds
 
     def check(self, caller: str, given: Mapping[str, Any]) -> None:
-        """Raise ParameterError for the first of the arguments that is of another kind, or has
-        masked numbers.
+        """Raise ParameterError for the first argument that is of another kind, or has masked
+        numbers.
         """
         for name, value in given.items():
             if has_mask(value):
@@ -133,11 +132,13 @@ class Kinds:
 
 
 class CallError(TraceError, TypeError):
-    """A function of equations was called with other arguments than it has."""
+    """A function of equations was called with wrong arguments."""
 
 
 def written(call: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Make a function of equations one that says how it is called where it is called otherwise."""
+    """Wrap a function of equations: a call with wrong arguments raises an error that shows the
+    right call.
+    """
 
     def made(function: Callable[P, R]) -> Callable[P, R]:
         @functools.wraps(function)
@@ -166,9 +167,8 @@ _OF_AXES = dict.fromkeys(
 
 
 def checked(function: Callable[P, R], elsewhere: Mapping[str, str] | None = None) -> Callable[P, R]:
-    """Make a function one that asks what kinds of arguments it is given, and answers those that it
-    doesn't have: by a sentence of ``elsewhere``, or the nearest that it has. Verbs ask that
-    themselves.
+    """Wrap a function: it checks the kinds of its arguments. For an unknown argument the error has
+    the sentence of ``elsewhere``, or the nearest known name. Verbs check that themselves.
     """
     signature, kinds = inspect.signature(function), Kinds(function)
     known = signature.parameters

@@ -1,4 +1,4 @@
-"""Exceptions. Every message says what happened, where, and what to do next."""
+"""Exceptions. Every message states the fault, its place, and what to do next."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MOST_NAMES = 24
 
 
 class SaltusError(Exception):
-    """Base of everything that saltus raises on purpose.
+    """Base of all exceptions that saltus raises on purpose.
 
     A message is at most :data:`LONGEST` characters long: of a longer one, which repeats what
     somebody gave, the middle is left out.
@@ -43,7 +43,7 @@ class SaltusError(Exception):
         return _cut(said(self, dialect))
 
     def _render_traceback_(self) -> list[str]:
-        """What IPython shows in place of a traceback: the user's own line, and the message."""
+        """Lines that IPython shows in place of a traceback: the user's line, and the message."""
         return [*_own_line(self), f"{type(self).__name__}: {self}"]
 
 
@@ -68,8 +68,8 @@ class CacheError(SaltusError, OSError):
 
 
 class SaltusWarning(UserWarning):
-    """Something that doesn't stop the work but should be known: trajectories that ended early, a
-    cache that can't be used.
+    """A problem that doesn't stop the work: trajectories that ended early, a cache that can't be
+    used.
     """
 
 
@@ -78,7 +78,7 @@ class UnusedParameterWarning(SaltusWarning):
 
 
 def _own_line(error: BaseException) -> list[str]:
-    """The user's line that called this package, with its number; nothing where it isn't known."""
+    """The user's line that called this package, with its number; empty if it isn't known."""
     found: list[str] = []
     for frame, number in traceback.walk_tb(error.__traceback__):
         package = str(frame.f_globals.get("__name__", "")).partition(".")[0]
@@ -113,18 +113,18 @@ def counted(number: int, word: str) -> str:
 
 
 def must_be(name: str, what: Text, given: object, *more: Text) -> ParameterError:
-    """The error of an argument of another kind: ``every must be a positive time, not -1.``"""
+    """Error for an argument of another kind: ``every must be a positive time, not -1.``"""
     return ParameterError(f"{name} must be ", what, f", not {shown(given)}.", *more)
 
 
 def unknown(what: str, name: object, known: Iterable[str], *more: Text) -> ParameterError:
-    """The error of a name: ``rig has no state 'y'. Did you mean 'x'?``"""
+    """Error for an unknown name: ``rig has no state 'y'. Did you mean 'x'?``"""
     return ParameterError(f"{what} {shown(name)}. {nearest(name, known)}", *more)
 
 
 def one_of(words: Iterable[str], before: str = "", **given: object) -> None:
     """Raise ParameterError unless an argument is one of some words: ``one_of(WINDOWS,
-    window=window)``; ``before`` begins the message.
+    window=window)``. The message begins with ``before``.
     """
     ((name, value),) = given.items()
     if not among(value, words):
@@ -135,14 +135,14 @@ def one_of(words: Iterable[str], before: str = "", **given: object) -> None:
 
 
 def among(value: object, words: Iterable[str]) -> bool:
-    """Whether a value is text, and one of some words. Lists and arrays, for which ``in`` fails or
-    asks each entry, are none of them.
+    """True if a value is text and one of some words. Lists and arrays are never one: ``in`` fails
+    for them, or compares each entry.
     """
     return isinstance(value, str) and value in words
 
 
 def closest(name: object, known: Iterable[str], cutoff: float = 0.5) -> str | None:
-    """The known name that is nearest, if one is near; ``cutoff`` is the likeness from which on."""
+    """Return the nearest known name, if one is near; ``cutoff`` is the least likeness."""
     if not isinstance(name, str):
         return None
     return next(iter(difflib.get_close_matches(name, list(known), n=1, cutoff=cutoff)), None)
@@ -151,8 +151,8 @@ def closest(name: object, known: Iterable[str], cutoff: float = 0.5) -> str | No
 def nearest(
     name: object, known: Iterable[str], cutoff: float = 0.5, otherwise: str | None = None
 ) -> str:
-    """A sentence that offers the :func:`closest` known name; if none is near ``otherwise``, by
-    default a list of all in their order, many of them shortened.
+    """Sentence that offers the :func:`closest` known name. If none is near it is ``otherwise``, by
+    default a list of all names in order, shortened if there are many.
     """
     known = sorted(known) if isinstance(known, set | frozenset) else list(dict.fromkeys(known))
     if isinstance(name, str):

@@ -1,5 +1,5 @@
-"""Sentences that hold code: put into words where they are shown, for those who write Python or for
-those who write a file.
+"""Sentences that hold code: put into words when they are shown, for readers who write Python or
+study files.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ _DIGITS = 60
 
 
 class Dialect(Protocol):
-    """How those write to whom a sentence is shown.
+    """Style in which a sentence addresses its reader: Python or a study file.
 
     Attributes
     ----------
     sl : str
-        What stands before a function of an equation.
+        Prefix of a function of an equation.
     """
 
     sl: str
@@ -32,13 +32,13 @@ class Dialect(Protocol):
         """A function of the analyses, with its arguments if they matter."""
 
     def method(self, name: str, **options: Any) -> str:
-        """How to integrate: a method, with those of its options that matter."""
+        """Name a method of integration, with those of its options that matter."""
 
     def system(self, **options: Any) -> str:
-        """What makes a system of equations, with those of its options that matter."""
+        """Name the call or table that makes a system, with those of its options that matter."""
 
     def either(self, python: str, file: str) -> str:
-        """What is another sentence in Python than in a file."""
+        """Choose the sentence for Python, or the one for a file."""
 
 
 #: A sentence, or a part of one: text; what makes it for a dialect; an error, which says its own.
@@ -60,13 +60,13 @@ class Word(str):
 
 @dataclass(frozen=True)
 class Given:
-    """A value that somebody gave, which may be anything."""
+    """A value from the user, which may be anything."""
 
     value: Any
 
 
 class _PythonDialect:
-    """Those who write Python."""
+    """Dialect for readers who write Python."""
 
     sl = "sl."
 
@@ -109,8 +109,8 @@ def python(value: Any) -> str:
 
 
 class _Repr(reprlib.Repr):
-    """``repr`` of anything that somebody may give: numbers and texts of NumPy as plain ones, never
-    an exception, never without an end.
+    """``repr`` of any value from the user: NumPy's numbers and texts look plain, no exception is
+    raised, and the length is limited.
     """
 
     def __init__(self) -> None:
@@ -134,7 +134,7 @@ class _Repr(reprlib.Repr):
 
 
 def shown(value: object, limit: int = 80) -> str:
-    """A value as a message shows it: on one line, cut if it is long."""
+    """Value for a message: on one line, cut if it is long."""
     try:
         text = _Repr().repr(value)
     except Exception:  # whatever an object of somebody else does when it is looked at

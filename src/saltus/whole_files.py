@@ -1,5 +1,5 @@
-"""Files that are there in full or not at all, and JSON that knows when it was damaged: what the
-cache, stores, results and the copies of studies are written by.
+"""Files that are complete or absent, and JSON that shows damage, for the cache, stores, results and
+the copies of studies.
 
 A file is written under another name, its draft, and renamed into place. What is to outlast the
 machine's power as well reaches the disk before it has its name, and the name before the call
@@ -32,9 +32,9 @@ def put(path: Path, data: bytes, draft: Path, *, lasting: bool = True, mode: int
     path : Path
         The file.
     data : bytes
-        What is in it.
+        Its content.
     draft : Path
-        Where it is written first, on the same disk; no other process writes there.
+        Path that is written first, on the same disk; no other process writes there.
     lasting : bool
         Whether it must be on the disk when this returns. What can be made again needn't.
     mode : int
@@ -53,8 +53,8 @@ def put(path: Path, data: bytes, draft: Path, *, lasting: bool = True, mode: int
 def drafted(
     paths: Sequence[Path], drafts: Sequence[Path], *, lasting: bool = True
 ) -> Iterator[None]:
-    """Within, drafts are written, which take the names of ``paths`` together at the end, in this
-    order: the last one tells that the others are complete.
+    """Write drafts within the block. At its end they take the names of ``paths`` in this order, so
+    the last file shows that the others are complete.
 
     Where ``lasting``, each draft must be on the disk by then. If anything fails, what stood under
     the names before stays, and no draft.
@@ -73,7 +73,7 @@ def drafted(
 
 @contextmanager
 def refused_as(error: type[OSError], what: str, advice: str) -> Iterator[None]:
-    """Within, what the disk refuses is raised as ``error``, such as "PATH can't be written: no
+    """Raise errors of the disk within the block as ``error``, such as "PATH can't be written: no
     space left on device. Free some space."
     """
     try:
@@ -86,7 +86,7 @@ def refused_as(error: type[OSError], what: str, advice: str) -> Iterator[None]:
 
 
 def write(path: Path, data: bytes, *, lasting: bool = True, mode: int = 0o666) -> None:
-    """Write a file, and wait until its bytes are on the disk unless it needn't last."""
+    """Write a file, and wait until its bytes are on the disk unless it needn't survive a crash."""
     flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_BINARY", 0)
     with os.fdopen(os.open(path, flags, mode), "wb") as file:
         file.write(data)
@@ -96,7 +96,7 @@ def write(path: Path, data: bytes, *, lasting: bool = True, mode: int = 0o666) -
 
 
 def flush(path: Path) -> None:
-    """Wait until what is in a file, or the names in a folder, are on the disk."""
+    """Wait until the content of a file, or the names in a folder, are on the disk."""
     if path.is_dir() and os.name == "nt":  # Windows can't open a folder
         return
     handle = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
@@ -107,7 +107,7 @@ def flush(path: Path) -> None:
 
 
 def is_older(path: Path, age: float = ABANDONED) -> bool:
-    """Whether a file was last written longer ago [s]; not, if it is gone."""
+    """True if a file was last written longer than ``age`` ago [s]; False if it is gone."""
     try:
         return time.time() - path.lstat().st_mtime > age
     except FileNotFoundError:  # a draft that has just taken its name
@@ -121,15 +121,13 @@ def sha256(data: bytes) -> str:
 
 
 def seal(values: Mapping[str, Any]) -> bytes:
-    """JSON text with a checksum of itself; the same values give the same bytes, whatever their
-    order.
-    """
+    """JSON text with a checksum of itself. Equal values give equal bytes, in any order."""
     return _text({**values, "checksum": sha256(_text(values))})
 
 
 def unseal(data: bytes | None, **identity: object) -> dict[str, Any] | None:
-    """What :func:`seal` was given; None if one bit of it is not what it was, there is no data, or
-    the values of ``identity`` don't stand in it: it belongs somewhere else then.
+    """Return what :func:`seal` was given. None if there is no data, a bit of it differs, or it
+    doesn't hold the values of ``identity``, so that it belongs elsewhere.
     """
     try:
         values = json.loads(data or b"")

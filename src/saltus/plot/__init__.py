@@ -1,5 +1,5 @@
-"""Pictures: a Dataset in, Axes out. Nothing is computed here, and nothing is shown: that is left to
-the caller.
+"""Pictures: a Dataset in, Axes out. Nothing is computed or shown here: showing is left to the
+caller.
 
 They come with matplotlib when the first of them is asked for: who wants colours alone
 (:mod:`saltus.plot.palette`) doesn't wait for it.
@@ -33,8 +33,20 @@ def __getattr__(name: str) -> Any:
     return value
 
 
+def __dir__() -> list[str]:
+    return __all__
+
+
 class _Pictures(ModuleType):
-    """A picture and its file have one name, which is the picture's, whichever is imported first."""
+    """Module in which a picture keeps its name if its file has the same name, in any order of
+    imports.
+    """
+
+    def __call__(self, *_: Any, **__: Any) -> None:
+        raise TypeError(
+            "sl.plot holds the pictures: write sl.plot.history(run), or another of "
+            f"{', '.join(__all__)}."
+        )
 
     def __setattr__(self, name: str, value: object) -> None:
         if not (name in _HOMES and isinstance(value, ModuleType)):

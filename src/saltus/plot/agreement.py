@@ -1,4 +1,4 @@
-"""Two maps of the same starts, and where they differ."""
+"""Comparison of two maps of the same starts."""
 
 from __future__ import annotations
 
@@ -47,9 +47,9 @@ def agreement(ds: xr.Dataset, ax: Any = None) -> Any:
     Parameters
     ----------
     ds : Dataset
-        What ``sl.compare`` returned.
+        Result of ``sl.compare``.
     ax : Axes or array of 3 Axes, optional
-        Where to draw; a new figure of three panels by default.
+        Axes to draw into; a new figure of three panels by default.
 
     Returns
     -------
@@ -102,7 +102,7 @@ def _three(panels: np.ndarray, ds: xr.Dataset, sides: cells.Sides) -> np.ndarray
 
 
 def _difference(ax: Axes, ds: xr.Dataset, sides: cells.Sides) -> None:
-    """Where the maps differ, with the share that agrees as title."""
+    """Draw the cells in which the maps differ. The title gives the share that agrees."""
     values = ds["agreement"].values
     colors = {key: np.array(to_rgb(color)) for key, (color, _) in _LOOKS.items()}
     cells.draw_cells(ax, sides, cells.paint(np.nan_to_num(values, nan=-1), colors))
@@ -121,7 +121,7 @@ def _difference(ax: Axes, ds: xr.Dataset, sides: cells.Sides) -> None:
 
 
 def _below(ax: Axes, handles: list[Any], columns: int) -> None:
-    """A legend under the name of the axis."""
+    """Draw a legend below the name of the axis."""
     below = ax.transAxes + ScaledTranslation(0, -0.4, ax.figure.dpi_scale_trans)
     ax.legend(
         handles=handles, loc="upper left", bbox_to_anchor=(0, 0), bbox_transform=below,

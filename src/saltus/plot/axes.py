@@ -1,4 +1,4 @@
-"""What every picture of a run draws: coloured pieces of curve, gap lines, contact regions, limits,
+"""Parts of every picture of a run: coloured pieces of curve, gap lines, contact regions, limits,
 notes.
 """
 
@@ -37,8 +37,8 @@ _NAME = 0.45
 
 @contextmanager
 def panels(ax: Any, count: int, size: tuple[float, float]) -> Iterator[list[Axes]]:
-    """The Axes to draw into: those that the user handed over, or a new figure of panels, one above
-    the other, in saltus's style.
+    """Axes to draw into: those of the user, or a new figure of panels, one above the other, in
+    saltus's style.
     """
     if ax is not None:
         given = _given(ax, count)
@@ -51,7 +51,7 @@ def panels(ax: Any, count: int, size: tuple[float, float]) -> Iterator[list[Axes
 
 
 def _given(ax: Any, count: int) -> list[Axes]:
-    """The Axes that the user handed over, one for each panel."""
+    """Axes of the user, one for each panel."""
     several = isinstance(ax, list | tuple | np.ndarray)
     axes = list(np.ravel(np.asarray(ax, dtype=object))) if several else [ax]
     if not all(isinstance(one, Axes) for one in axes):
@@ -68,7 +68,7 @@ def _given(ax: Any, count: int) -> list[Axes]:
 def draw_pieces(
     ax: Axes, x: np.ndarray, y: np.ndarray, region: np.ndarray, regions: Regions, width: float
 ) -> None:
-    """One line for each region that occurs; pieces of the same region are separated by NaN,
+    """Draw one line for each region that occurs. NaN separates pieces of the same region;
     neighbours share the point between them.
     """
     starts = np.concatenate([[0], np.flatnonzero(np.diff(region)) + 1])
@@ -93,15 +93,15 @@ def _join(pieces: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def draw_points(ax: Axes, x: np.ndarray, y: np.ndarray, **marks: Any) -> None:
-    """Markers, whole ones at the limits of the Axes too; many of them become pixels in vector
-    files.
+    """Draw markers, which the limits of the Axes don't cut. If there are many they become pixels in
+    vector files.
     """
     (points,) = ax.plot(x, y, ls="none", rasterized=x.size > RASTERISE_ABOVE, **marks)
     points.set_clip_box(_Around(ax, points.get_markersize() / 2 + points.get_markeredgewidth()))
 
 
 class _Around(BboxBase):
-    """The frame of an Axes, wider by some points (1/72 inch) on each side, whatever becomes of the
+    """Frame of an Axes, wider by some points (1/72 inch) on each side, at any size of the
     figure.
     """
 
@@ -124,8 +124,7 @@ def set_limits(
     marks: Sequence[float] = (),
     margin: float = 0.06,
 ) -> None:
-    """Limits around the finite values, and around the marks where the axis doesn't grow too much
-    for that.
+    """Set limits around the finite values, and around the marks if the axis doesn't grow too much.
 
     An Axes that was drawn into before keeps what it showed.
     """
@@ -147,8 +146,8 @@ def set_limits(
 
 
 def few_ticks(ax: Axes) -> None:
-    """Numbers under a narrow picture that don't touch: few of them, and a common power of ten in
-    place of leading zeros.
+    """Set few ticks, with a common power of ten in place of leading zeros, so that numbers under a
+    narrow picture don't touch.
     """
     ax.xaxis.set_major_locator(MaxNLocator(nbins=5))
     ax.ticklabel_format(axis="x", style="sci", scilimits=(-3, 5), useMathText=True)
@@ -157,8 +156,8 @@ def few_ticks(ax: Axes) -> None:
 def draw_gaps(
     ax: Axes, direction: Direction, regions: Regions, scale: Scale, label: bool = True
 ) -> None:
-    """Gap lines dashed and named, contact regions lightly shaded; once for an Axes, after its
-    limits are set.
+    """Draw gap lines dashed and named, and contact regions lightly shaded: once for an Axes, after
+    its limits are set.
     """
     tag = GAP_NAMES.format(direction)
     if any(artist.get_gid() == tag for artist in ax.get_children()):
@@ -188,15 +187,15 @@ def draw_gaps(
     line = ax.axvline if direction == "x" else ax.axhline
     names: list[tuple[float, str, bool]] = []
     for i, boundary in enumerate(regions.boundaries):
-        place = boundary.value * scale.factor
-        line(place, color=QUIET, lw=0.7, ls=(0, (4, 3)), zorder=1, gid=tag)
-        if label and low <= place <= high:
-            # else it meets the ticks
-            lower = i == 0 and len(regions.boundaries) > 1 and place - low > 0.12 * (high - low)
-            # else it meets the title
-            high_up = direction == "y" and high - place < 0.12 * (high - low)
+        position = boundary.value * scale.factor
+        line(position, color=QUIET, lw=0.7, ls=(0, (4, 3)), zorder=1, gid=tag)
+        if label and low <= position <= high:
+            # Near the lower end, a name on the lower side would touch the ticks.
+            lower = i == 0 and len(regions.boundaries) > 1 and position - low > 0.12 * (high - low)
+            # Near the upper end, a name on the upper side would touch the title.
+            high_up = direction == "y" and high - position < 0.12 * (high - low)
             names.append(
-                (place, f"{boundary.label}\n{scale.text(boundary.value)}", lower or high_up)
+                (position, f"{boundary.label}\n{scale.text(boundary.value)}", lower or high_up)
             )
     if names:
         _name_gaps(ax, direction, names, tag)
@@ -205,15 +204,16 @@ def draw_gaps(
 def _name_gaps(
     ax: Axes, direction: Direction, names: list[tuple[float, str, bool]], tag: str
 ) -> None:
-    """Name gap lines outside the axes: place, text, and whether it stands on the lower (left) side.
+    """Name gap lines outside the Axes. Each name has a position, a text, and True for the lower
+    (left) side.
 
     Above the picture they are labels of an axis of its own, which a title keeps clear of.
     """
     if direction == "y":
-        for place, text, below in names:
+        for position, text, below in names:
             ax.text(
                 1.01,
-                place,
+                position,
                 text,
                 transform=ax.get_yaxis_transform(),
                 va="top" if below else "bottom",
@@ -233,17 +233,17 @@ def _name_gaps(
         drawable(f"{text}\n\n" if raised else text)
         for (_, text, _), raised in zip(names, [*close, False], strict=True)
     ]  # one above the other
-    top.set_xticks([place for place, _, _ in names], texts, linespacing=1.1)
+    top.set_xticks([position for position, _, _ in names], texts, linespacing=1.1)
     for tick, (_, _, left) in zip(top.xaxis.get_major_ticks(), names, strict=True):
         tick.label2.set_horizontalalignment("right" if left else "left")
 
 
 def legend(ax: Axes, regions: Regions, **place: Any) -> None:
     """Name the colours and markers: regions from the top of the picture to its bottom, then the
-    rest, in as many of the columns as the figure is wide enough for.
+    others, in as many columns as fit the figure.
     """
     handles, labels = ax.get_legend_handles_labels()
-    # a picture of several trajectories names each thing once
+    # Several trajectories share names: each name is listed once.
     first = dict(zip(labels[::-1], handles[::-1], strict=True))
     known = [region.label for region in regions.regions[::-1] if region.label in first]
     if regions.state is None:
@@ -258,15 +258,13 @@ def legend(ax: Axes, regions: Regions, **place: Any) -> None:
 
 
 def _fits(ax: Axes, shown: Legend) -> bool:
-    """Whether a legend is no wider than the figure."""
+    """True if a legend is no wider than the figure."""
     figure = ax.get_figure(root=True)
     return figure is None or shown.get_window_extent().width <= figure.bbox.width
 
 
 def status_text(ds: xr.Dataset) -> str:
-    """How a trajectory ended, where it stopped early or rests on a graze that isn't decided; else
-    empty.
-    """
+    """Status of a trajectory that stopped early or has an undecided graze; else ""."""
     status = str(ds["status"].values)
     if status == "ok":
         return ""
@@ -275,9 +273,7 @@ def status_text(ds: xr.Dataset) -> str:
 
 
 def note_status(ax: Axes, ds: xr.Dataset) -> None:
-    """Say in the picture when a trajectory stopped early, or rests on a graze that
-    isn't decided.
-    """
+    """Note in the picture that a trajectory stopped early, or has an undecided graze."""
     text = status_text(ds)
     if text:
         ax.text(
@@ -293,7 +289,7 @@ def note_status(ax: Axes, ds: xr.Dataset) -> None:
 
 
 def say(ax: Axes, text: str, *datasets: xr.Dataset) -> None:
-    """A sentence in place of an empty frame, with how the trajectories ended."""
+    """Write a sentence in place of an empty frame, with the ends of the trajectories."""
     singles = [
         one
         for ds in datasets
@@ -317,7 +313,7 @@ def say(ax: Axes, text: str, *datasets: xr.Dataset) -> None:
 
 
 def count_at_top(ax: Axes, unit: float, ticks: int) -> Any:
-    """A second axis at the top that counts so many units of the axis below."""
+    """Add a second axis at the top, in multiples of a unit of the axis below."""
 
     def count(below: Any) -> Any:
         return np.asarray(below, dtype=float) / unit

@@ -22,11 +22,11 @@ def backbone(ds: xr.Dataset, *, output: str | None = None, ax: Any = None) -> Ax
     Parameters
     ----------
     ds : Dataset
-        What :func:`saltus.backbone` returned.
+        Result of :func:`saltus.backbone`.
     output : str, optional
         A state; default that whose amplitude was followed.
     ax : Axes, optional
-        Where to draw, such as what :func:`saltus.plot.branches` returned; a new figure by default.
+        Axes to draw into, such as those of :func:`saltus.plot.branches`; a new figure by default.
 
     Returns
     -------

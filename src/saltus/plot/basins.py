@@ -1,4 +1,4 @@
-"""Map of basins: which attractor each start settles to, and how soon."""
+"""Map of basins: the attractor that each start settles to, and the time to settle."""
 
 from __future__ import annotations
 
@@ -52,9 +52,9 @@ def basins(
     Parameters
     ----------
     ds : Dataset
-        What ``sl.basins`` returned.
+        Result of ``sl.basins``.
     ax : Axes, optional
-        Where to draw; a new figure by default.
+        Axes to draw into; a new figure by default.
     legend : bool
         Whether to draw the legend of the attractors.
     order : sequence of int, optional
@@ -96,7 +96,7 @@ def basins(
 
 
 def _section(ds: xr.Dataset, sides: cells.Sides) -> str:
-    """Where the other states start, in words; empty where there are none."""
+    """Initial values of the states that aren't axes of the map, in words; "" if there are none."""
     try:
         fixed = {
             name: float(value)
@@ -126,8 +126,8 @@ class SettlingShade:
     last: float
 
     def share(self, periods: np.ndarray) -> np.ndarray:
-        """0 for the first, 1 for the last; one is added to the periods, as a start on the attractor
-        takes none.
+        """Share of the scale: 0 for the first start that settles, 1 for the last. One is added to
+        the periods: a start on the attractor needs none.
         """
         low, high = np.log1p([self.first, self.last])
         share: np.ndarray = np.clip(
@@ -141,13 +141,13 @@ class SettlingShade:
         return np.round((cells.LEVELS - 1) * share).astype(np.int64)
 
     def ticks(self) -> list[int]:
-        """Both ends and the middle of the scale, as many of these as differ."""
+        """Ends and middle of the scale, without repeats."""
         middle = np.expm1(0.5 * np.log1p([self.first, self.last]).sum())
         return sorted({round(value) for value in (self.first, middle, self.last)})
 
 
 def _settling(ds: xr.Dataset) -> SettlingShade | None:
-    """The scale of lightness; None if nothing settles, or all at once."""
+    """Scale of lightness; None if nothing settles, or all starts settle at once."""
     periods = ds["periods_to_settle"].values
     settled = periods[(ds["basin"].values >= 0) & (periods >= 0)]
     if not settled.size:
@@ -174,8 +174,8 @@ def _points(
     sides: cells.Sides,
     colors: Mapping[int, np.ndarray],
 ) -> None:
-    """Every attractor at whole periods; those of many points first, so that a single one is never
-    buried.
+    """Draw every attractor at whole periods. Those of many points come first, so that they never
+    cover a single point.
     """
     clouds = {key: _stroboscopic(ds, sides, key) for key in colors}
     for key in sorted(colors, key=lambda key: -len(clouds[key])):
@@ -202,8 +202,8 @@ def _points(
 
 
 def _size(own: int, total: int) -> float:
-    """Diameter of the points of an attractor [pt]: smaller where they are many, its own or those of
-    all, so that they hide no basin.
+    """Diameter of the points of an attractor [pt]: smaller if there are many, so that they hide no
+    basin.
     """
     return min(
         5.5 if own <= 12 else 4.2 if own <= 40 else 2.0,
@@ -267,14 +267,14 @@ class _DrawRuler(HandlerBase):
         artists: list[Any] = [
             Line2D([-xdescent, width - xdescent], [top, top], color=QUIET, lw=0.6, transform=trans)
         ]
-        for value, place in _apart(
+        for value, position in _apart(
             orig_handle.values, orig_handle.places, width / (0.8 * fontsize)
         ):
-            x = place * width - xdescent
+            x = position * width - xdescent
             artists.append(
                 Line2D([x, x], [top, top - 0.25 * fontsize], color=QUIET, lw=0.6, transform=trans)
             )
-            side = "left" if place == 0 else "right" if place == 1 else "center"
+            side = "left" if position == 0 else "right" if position == 1 else "center"
             text = Text(
                 x,
                 top - 0.4 * fontsize,
@@ -292,8 +292,8 @@ class _DrawRuler(HandlerBase):
 def _apart(
     values: Sequence[float], places: Sequence[float], width: float
 ) -> list[tuple[float, float]]:
-    """The numbers of a ruler that don't touch: the middle one is left out where it would. ``width``
-    is that of the ruler, in font sizes.
+    """Numbers of a ruler that don't touch: the middle number is left out if it would. ``width`` is
+    that of the ruler, in font sizes.
     """
     ticks = list(zip(values, places, strict=True))
     if len(ticks) == 3:
@@ -369,7 +369,9 @@ def _legend(
 def _texts(
     ds: xr.Dataset, sides: cells.Sides, ids: Sequence[int], shares: Mapping[int, float]
 ) -> list[str]:
-    """Each attractor in words, with its share of the cells; equal ones with their peaks."""
+    """Each attractor in words, with its share of the cells. Equal texts get the peaks of their
+    attractors.
+    """
     names = [cells.describe(ds.sel(attractor=key)) for key in ids]
     texts = []
     for key, name in zip(ids, names, strict=True):
@@ -387,7 +389,7 @@ def _texts(
 
 
 def _inside(ds: xr.Dataset, sides: cells.Sides, key: int) -> bool:
-    """Whether a point of the attractor lies in the map, where it can be drawn."""
+    """True if a point of the attractor lies within the axes of the map."""
     cloud = _stroboscopic(ds, sides, key) * [side.scale.factor for side in sides]
     low, high = zip(*((side.edges.min(), side.edges.max()) for side in sides), strict=True)
     return bool(((cloud >= low) & (cloud <= high)).all(axis=1).any())

@@ -1,4 +1,4 @@
-"""Bifurcation diagram: what a state does in each response, against a parameter."""
+"""Bifurcation diagram: a state in each response, against a parameter."""
 
 from __future__ import annotations
 
@@ -47,17 +47,17 @@ def bifurcation_diagram(
     Parameters
     ----------
     ds : Dataset, or mapping of str to Dataset
-        What ``sl.bifurcation_diagram`` returned, or a part of it; of any other responses the points
+        Result of ``sl.bifurcation_diagram``, or a part of it; of any other responses the points
         at whole periods are drawn. Several by name are drawn over each other, a colour for each:
         ``{"located": a, "ignored": b}``.
     state : str, optional
-        Which state; by default the first.
+        State to show; by default the first.
     events : bool
         Whether to mark grazes, folds, period doublings and so on above the picture.
     legend : bool
         Whether to draw the legend.
     ax : Axes, optional
-        Where to draw; a new figure by default.
+        Axes to draw into; a new figure by default.
 
     Returns
     -------
@@ -86,7 +86,7 @@ def bifurcation_diagram(
 
 
 def _variable(one: points.Shown, state: str) -> str:
-    """The sampled values; where there are none, the points at whole periods."""
+    """Name of the sampled values; if there are none, of the points at whole periods."""
     name = sample_name(state) if sample_name(state) in one.ds else response_name(state)
     if name not in one.ds:
         raise PictureError(
@@ -97,14 +97,14 @@ def _variable(one: points.Shown, state: str) -> str:
 
 
 def _sample(ds: xr.Dataset, state: str) -> str:
-    """What was sampled of a state."""
+    """Kind of samples that are drawn of a state."""
     sampled = ds.attrs.get("sample") if sample_name(state) in ds else None
     return sampled if sampled in _SHOWN else "stroboscope"
 
 
 def _along(one: points.Shown, dots: np.ndarray, state: str) -> list[np.ndarray]:
-    """What is drawn of the branches that the responses lie on: their extremes where turning points
-    are drawn, else their points at whole periods.
+    """Heights of the branches that the responses lie on: extremes if turning points are drawn, else
+    points at whole periods.
     """
     ds = one.ds
     if one.name or "point_branch" not in ds:
@@ -120,15 +120,15 @@ def _along(one: points.Shown, dots: np.ndarray, state: str) -> list[np.ndarray]:
 def _limits_and_gaps(
     ax: Axes, drawn: Sequence[curves.Curves], state: str, up: Scale, across: Scale
 ) -> None:
-    """Limits around all dots, and the gaps near them."""
-    one = drawn[0].one
+    """Set limits around all dots, and draw the gaps near them."""
+    first = drawn[0].one
     values = np.concatenate([np.ravel(each.dots) for each in drawn if each.dots is not None])
-    varied, fixed = _boundaries(one.ds, state)
+    varied, fixed = _boundaries(first.ds, state)
     marks = [boundary.value * up.factor for boundary in fixed.boundaries] if fixed else []
     draw.set_limits(ax, "y", values * up.factor, marks)
     if fixed:
         draw.draw_gaps(ax, "y", fixed, up)
-    names = one.ds["guard"].values[one.ds["guard_state"].values == state] if len(varied) else []
+    names = first.ds["guard"].values[first.ds["guard_state"].values == state] if len(varied) else []
     for row, name in zip(varied * up.factor, names, strict=True):  # moved by the parameter itself
         low, high = ax.get_ylim()
         if low <= row[-1] <= high:
@@ -137,7 +137,13 @@ def _limits_and_gaps(
                 va="center", color=QUIET, fontsize=7,
             )  # fmt: skip
         ax.plot(
-            one.grid * across.factor, row, color=QUIET, lw=0.7, ls=(0, (4, 3)), zorder=1, gid="gap"
+            first.grid * across.factor,
+            row,
+            color=QUIET,
+            lw=0.7,
+            ls=(0, (4, 3)),
+            zorder=1,
+            gid="gap",
         )
 
 

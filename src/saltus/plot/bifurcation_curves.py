@@ -1,4 +1,6 @@
-"""Curves of bifurcations over two parameters, alone or on the map of what motions settle to."""
+"""Curves of bifurcations over two parameters, alone or on the map of the motions that starts settle
+to.
+"""
 
 from __future__ import annotations
 
@@ -43,15 +45,15 @@ def bifurcation_curves(
     Parameters
     ----------
     curves : Dataset, or sequence or mapping of Datasets
-        What :func:`saltus.bifurcation_curve` returned, all over the same two parameters; in a
+        Result of :func:`saltus.bifurcation_curve`, all over the same two parameters; in a
         mapping by the names that the legend shows.
     over : Dataset, optional
-        What ``sl.bifurcation_diagram`` returned over the same two parameters: its map of types is
+        Result of ``sl.bifurcation_diagram`` over the same two parameters: its map of types is
         drawn below the curves.
     legend : bool
         Whether to draw the legend of the curves.
     ax : Axes, optional
-        Where to draw; a new figure by default.
+        Axes to draw into; a new figure by default.
 
     Returns
     -------
@@ -91,7 +93,7 @@ def bifurcation_curves(
 
 
 def _named(curves: Any) -> list[tuple[str, xr.Dataset]]:
-    """The curves with the names that they are given in the legend."""
+    """Curves by their names in the legend."""
     if isinstance(curves, Mapping) and not isinstance(curves, xr.Dataset):
         named = [(str(name), ds) for name, ds in curves.items()]
     else:
@@ -138,7 +140,7 @@ def _limits(name: str, named: list[tuple[str, xr.Dataset]], scale: Scale) -> tup
 def _draw(
     ax: Axes, name: str, ds: xr.Dataset, pair: tuple[str, str], scales: list[Scale], color: Any
 ) -> None:
-    """A curve and its points."""
+    """Draw a curve and its points."""
     x, y = (ds[point_name(one)].values * s.factor for one, s in zip(pair, scales, strict=True))
     edge = [patheffects.withStroke(linewidth=2.6, foreground="white")]
     ax.plot(

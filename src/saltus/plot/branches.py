@@ -33,7 +33,7 @@ def branches(
     Parameters
     ----------
     ds : Dataset
-        What :func:`saltus.branches` returned.
+        Result of :func:`saltus.branches`.
     quantity : str
         ``"peak"`` (largest magnitude), ``"rms"``, ``"maximum"``, ``"minimum"``,
         ``"peak_to_peak"``, ``"mean"``, ``"rms_about_mean"``; ``"amplitude"`` or ``"phase"`` of the
@@ -45,7 +45,7 @@ def branches(
     legend : bool
         Whether to draw the legend.
     ax : Axes, optional
-        Where to draw; a new figure by default.
+        Axes to draw into; a new figure by default.
 
     Returns
     -------
@@ -57,10 +57,10 @@ def branches(
         If ``ds`` holds no branches, or an argument doesn't fit it.
     """
     curves.check_quantity(quantity, get_args(Quantity))
-    values, unit, of = curves.height(ds, quantity, output, "point_")
+    values, unit, long_name = curves.height(ds, quantity, output, "point_")
     one = Shown(ds, ds.attrs["parameter"], np.empty(0, dtype=int))
     drawn = [curves.Curves(one, None, [values])]
     up = curves.height_scale(unit, drawn, quantity)
     with curves.frame(ax, 3.4, drawn, up, events=events, legend=legend) as (panel, _):
-        curves.height_axis(panel, quantity, of, up)
+        curves.height_axis(panel, quantity, long_name, up)
     return panel

@@ -54,18 +54,18 @@ def ranked(ds: xr.Dataset, order: Sequence[int] | None) -> list[int]:
     """
     known = ds["attractor"].values.tolist()
     try:
-        first = [] if order is None else [int(one) for one in np.atleast_1d(order).tolist()]
+        first = [] if order is None else [int(number) for number in np.atleast_1d(order).tolist()]
     except (TypeError, ValueError, OverflowError):
         raise ParameterError(
             f"order must hold numbers of attractors, not {shown(order)}."
         ) from None
-    strange = [one for one in first if one not in known]
+    strange = [number for number in first if number not in known]
     if strange or len(set(first)) < len(first):
         what = f"there is no attractor {strange[0]}" if strange else "an attractor occurs twice"
         raise ParameterError(
             f"order={first}, but {what}. Known: {', '.join(map(str, known)) or 'none'}."
         )
-    return first + [one for one in known if one not in first]
+    return first + [number for number in known if number not in first]
 
 
 def colors_of(ds: xr.Dataset, order: Sequence[int] | None) -> dict[int, np.ndarray]:
@@ -104,8 +104,8 @@ def describe(one: xr.Dataset) -> str:
 
 
 def method_text(ds: xr.Dataset, suffix: str = "") -> str:
-    """How a map was computed, such as ``ode45, rtol 0.0001, atol 1e-07``; empty for the exact
-    method. ``suffix``: ``_a`` of two maps.
+    """Name and options of the method of a map, such as ``ode45, rtol 0.0001, atol 1e-07``; "" for
+    the exact method. ``suffix``: ``_a`` or ``_b`` for one of two maps.
     """
     name = str(ds.attrs.get(f"method{suffix}", "Taylor"))
     if name == "Taylor":
@@ -124,7 +124,9 @@ def method_text(ds: xr.Dataset, suffix: str = "") -> str:
 
 
 def share_text(fraction: float) -> str:
-    """A share in per cent; one that rounds to nothing, or to all, says that it isn't."""
+    """Share in per cent. A share that rounds to none or all is written as more than none, or less
+    than all.
+    """
     if 0 < fraction < 0.0005:
         return "< 0.1 %"
     if 0.9995 <= fraction < 1:
@@ -133,8 +135,8 @@ def share_text(fraction: float) -> str:
 
 
 def peak_text(one: xr.Dataset) -> str:
-    """The largest first state of an attractor, such as ``peak 0.91 mm``; of an equilibrium where it
-    lies, such as ``x = -0.91 mm``.
+    """Largest first state of an attractor, such as ``peak 0.91 mm``; for an equilibrium its value,
+    such as ``x = -0.91 mm``.
     """
     state = str(one.attrs.get("states", "")).split(" ")[0]
     unit = one["attractor_peak"].attrs.get("units", "")
@@ -159,7 +161,7 @@ class Side:
     scale : Scale
         Its display unit.
     values : array of float
-        Where the cells are centred [SI].
+        Centres of the cells [SI].
     log : bool
         Whether the axis is logarithmic.
     """
@@ -203,7 +205,7 @@ def _state(ds: xr.Dataset, name: str) -> Side:
 
 
 def parameter(ds: xr.Dataset, name: str) -> Side:
-    """A parameter on an axis; logarithmic where its values are even in their logarithms."""
+    """Axis of a parameter; logarithmic if its values have equal steps in their logarithms."""
     values = np.asarray(ds[name].values, dtype=float)
     log = is_log(values)
     scale = parameter_scale(values, ds[name].attrs.get("units", ""), log)
@@ -211,7 +213,7 @@ def parameter(ds: xr.Dataset, name: str) -> Side:
 
 
 def _edges(centres: np.ndarray) -> np.ndarray:
-    """Half-way between neighbours; the outer cells are symmetric."""
+    """Edges half-way between neighbours; the outer cells are symmetric."""
     if centres.size == 1:
         half = 0.5 * abs(centres[0]) or 0.5
         return np.array([centres[0] - half, centres[0] + half])
@@ -277,7 +279,7 @@ def draw_cells(ax: Axes, sides: Sides, colors: np.ndarray) -> None:
 
 
 def _is_even(side: Side) -> bool:
-    """Whether all cells have one width, as those of an image."""
+    """True if all cells have one width, like those of an image."""
     edges = side.edges
     width = (edges[-1] - edges[0]) / (edges.size - 1)
     return not side.log and np.allclose(np.diff(edges), width, rtol=1e-6, atol=0.0)

@@ -1,4 +1,4 @@
-"""Which pictures there are of each kind of result."""
+"""Pictures of each kind of result."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ _OF_SEVERAL = ("gallery",)
 
 
 def pictures_of(kind: str) -> tuple[str, ...]:
-    """Names of the pictures of a result of this kind alone, the usual one first."""
+    """Names of the pictures that take one result of this kind, the usual one first."""
     return tuple(name for name, kinds in TAKES.items() if kind in kinds and name not in _OF_SEVERAL)
 
 
 def default_kind(ds: xr.Dataset) -> str:
-    """The picture that fits a result; ``""`` if there is none."""
+    """Name of the usual picture of a result; ``""`` if there is none."""
     if kind_of(ds) == schema.RESPONSES:
         if len(parameters_of(ds)) == 2:
             return "type_map"

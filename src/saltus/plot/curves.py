@@ -1,4 +1,4 @@
-"""What over a parameter: responses as dots, branches as lines, in one frame."""
+"""Curves over a parameter: responses as dots, branches as lines, in one frame."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from saltus.plot import response_points as points
 from saltus.plot.style import QUIET, Scale, display_scale
 from saltus.results.dataset.schema import event_name, point_name, states_of
 
-#: What is known of the responses and of the points of branches alike.
+#: Quantities that both responses and points of branches have.
 Size = Literal[
     "rms", "peak", "maximum", "minimum", "peak_to_peak", "mean", "rms_about_mean", "amplitude",
     "phase",
@@ -38,16 +38,18 @@ SIZES = (
 )  # fmt: skip
 #: Phases over more than this [deg] have ticks at parts of a right angle.
 _WIDE_PHASE = 20.0
-#: Dashes of what is unstable.
+#: Dashes of unstable orbits.
 DASHES = (0, (3.0, 1.6))
 #: Diameter of the smallest dots [pt]: more than a pixel of a screen.
 _SMALLEST = 0.6
-#: Where the legend begins, in widths of the Axes: beside the Axes, beside the names of gaps.
-_BESIDE, _BESIDE_NAMES = 1.02, 1.16
+#: Left edge of a legend next to the Axes, in widths of the Axes.
+_BESIDE = 1.02
+#: Left edge of a legend next to the names of gaps, in widths of the Axes.
+_BESIDE_NAMES = 1.16
 
 
 class Height(NamedTuple):
-    """What is drawn of responses or of points [SI], its unit, and of what it is."""
+    """Heights of responses or of points [SI], their unit and their quantity."""
 
     values: np.ndarray
     unit: str
@@ -56,7 +58,7 @@ class Height(NamedTuple):
 
 @dataclass(frozen=True)
 class Curves:
-    """What is drawn of one Dataset.
+    """Curves of one Dataset.
 
     Attributes
     ----------
@@ -74,13 +76,13 @@ class Curves:
 
     @property
     def largest(self) -> float:
-        """Largest magnitude of what the scale is chosen by."""
+        """Largest magnitude, which decides the display unit."""
         seen = self.along if self.dots is None else [self.dots]
         return max((float(np.nanmax(np.abs(one), initial=0.0)) for one in seen), default=0.0)
 
     @property
     def events_above(self) -> bool:
-        """Whether events stand above the picture, not on the branches."""
+        """True if events stand above the picture, not on the branches."""
         return self.dots is not None and bool(
             self.one.name or not self.one.ds.attrs.get("unstable")
         )
@@ -88,16 +90,16 @@ class Curves:
 
 @dataclass(frozen=True)
 class Dots:
-    """How responses are drawn.
+    """Style of the dots of responses.
 
     Attributes
     ----------
     sizes : tuple of (float, float)
-        Up to so many dots: their diameter [pt]. They must not hide each other.
+        Largest number of dots, and their diameter [pt]. Dots must not hide each other.
     aperiodic : float
-        How many times as large are those of motion that never repeats.
+        Factor on the diameter for motion that never repeats.
     first : float
-        How many times as large are those of the first of several Datasets, so that none is hidden.
+        Factor on the diameter for the first of several Datasets, so that none is hidden.
     marked : bool
         Whether kinds and Datasets have markers of their own, and the first Dataset is hollow.
     """
@@ -108,7 +110,7 @@ class Dots:
     marked: bool
 
     def size(self, count: int, times: float = 1.0) -> float:
-        """Diameter of so many dots [pt]."""
+        """Diameter of dots [pt], given their number."""
         return max(times * next(size for most, size in self.sizes if count <= most), _SMALLEST)
 
 
@@ -156,15 +158,15 @@ def height_scale(unit: str, drawn: Sequence[Curves], quantity: str = "") -> Scal
     return display_scale(unit, largest, "deg" if quantity == "phase" else None)
 
 
-def height_axis(ax: Axes, quantity: str, of: str, up: Scale, log: bool = False) -> None:
-    """Name, limits and ticks of the vertical axis."""
+def height_axis(ax: Axes, quantity: str, long_name: str, up: Scale, log: bool = False) -> None:
+    """Set name, limits and ticks of the vertical axis."""
     if log:
         ax.set_yscale("log")
     elif quantity in SIZES:
         ax.set_ylim(bottom=0)
     if quantity == "phase" and np.ptp(ax.get_ylim()) > _WIDE_PHASE:
         ax.yaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 1.5, 3, 4.5, 9, 10]))
-    ax.set_ylabel(up.label(LABELS[quantity].format(of)))
+    ax.set_ylabel(up.label(LABELS[quantity].format(long_name)))
 
 
 # -- frame -----------------------------------------------------------------------------------------
@@ -179,23 +181,27 @@ def frame(
     events: bool,
     legend: bool,
 ) -> Iterator[tuple[Axes, Scale]]:
-    """Draw Datasets over their parameter; give the Axes and the display unit of the parameter to
-    who draws more, and names the vertical axis; then mark events and name the colours.
+    """Draw Datasets over their parameter. Give the Axes and the display unit of the parameter to
+    the caller, who draws more and names the vertical axis. Then mark events and name the colours.
     """
-    datasets = [one.one for one in drawn]
+    datasets = [drawing.one for drawing in drawn]
     with draw.panels(ax, 1, (6.3, tall)) as (panel,):
         across = points.parameter_axis(panel, datasets)
         named: dict[str, Any] = {}
-        for one in drawn:
-            if one.dots is not None and look is not None:
-                named |= (_compare if one.one.name else _kinds)(panel, one, look, across, up)
-            for curve in one.along:
-                named |= draw_branches(panel, one.one.ds, curve, across, up)
-                if events and not one.events_above:
-                    draw_marks(panel, one.one.ds, curve, across, up)
+        for drawing in drawn:
+            if drawing.dots is not None and look is not None:
+                named |= (_compare if drawing.one.name else _kinds)(
+                    panel, drawing, look, across, up
+                )
+            for curve in drawing.along:
+                named |= draw_branches(panel, drawing.one.ds, curve, across, up)
+                if events and not drawing.events_above:
+                    draw_marks(panel, drawing.one.ds, curve, across, up)
         yield panel, across
         if events:
-            points.draw_events(panel, [one.one for one in drawn if one.events_above], across)
+            points.draw_events(
+                panel, [drawing.one for drawing in drawn if drawing.events_above], across
+            )
         if legend:
             points.legend(panel, named, _BESIDE_NAMES if panel.texts else _BESIDE)
         if look is not None:
@@ -206,7 +212,7 @@ def frame(
 def _flat(
     one: points.Shown, heights: np.ndarray, mask: np.ndarray, across: Scale, up: Scale
 ) -> tuple[np.ndarray, np.ndarray]:
-    """All dots of the responses of ``mask``; the padding is left out."""
+    """Dots of the responses of ``mask`` in one row; padding is left out."""
     y = heights[mask].reshape(int(mask.sum()), -1) * up.factor
     x = np.broadcast_to(one.values[mask][:, None] * across.factor, y.shape)
     there = np.isfinite(y)
@@ -214,46 +220,47 @@ def _flat(
 
 
 def _kinds(ax: Axes, drawn: Curves, look: Dots, across: Scale, up: Scale) -> dict[str, Any]:
-    """A colour for each kind of motion: dots, and lines along branches that are known by their
-    responses only. Chaos lies under the others.
+    """Draw each kind of motion in its colour: dots, and lines along branches without points of
+    their own. Chaos lies under the others.
     """
-    one, dots = drawn.one, np.asarray(drawn.dots)
-    of = motion_colors.of(one.ds)
-    for code in np.unique(of).tolist():
-        mine, repeats, color = of == code, motion_colors.repeats(code), motion_colors.color(code)
+    shown, dots = drawn.one, np.asarray(drawn.dots)
+    kinds = motion_colors.of(shown.ds)
+    for code in np.unique(kinds).tolist():
+        mine, repeats, color = kinds == code, motion_colors.repeats(code), motion_colors.color(code)
         if repeats and not drawn.along and dots.ndim == 1:
-            x, y = points.branch_lines(one, dots, mine)
+            x, y = points.branch_lines(shown, dots, mine)
             ax.plot(
                 x * across.factor, y * up.factor, color=color, lw=0.8, zorder=2,
                 gid=f"branches {code}",
             )  # fmt: skip
-        x, y = _flat(one, dots, mine, across, up)
+        x, y = _flat(shown, dots, mine, across, up)
         draw.draw_points(
             ax, x, y, marker=motion_colors.marker(code) if look.marked else "o", mfc=color,
             mec="none", ms=look.size(x.size, 1.0 if repeats else look.aperiodic),
             zorder=3 if repeats else 2, gid=f"kind {code}",
         )  # fmt: skip
-    return points.kind_handles(one, of, markers=look.marked)
+    return points.kind_handles(shown, kinds, markers=look.marked)
 
 
 def _compare(ax: Axes, drawn: Curves, look: Dots, across: Scale, up: Scale) -> dict[str, Any]:
-    """One colour for a Dataset among several; the first lies below in larger dots."""
-    one, dots = drawn.one, np.asarray(drawn.dots)
-    x, y = _flat(one, dots, np.ones(len(dots), dtype=bool), across, up)
-    color, marker = points.dataset_color(one), points.MARKERS[one.rank] if look.marked else "o"
-    hollow = look.marked and one.rank == 0
+    """Draw one of several Datasets in one colour. The first lies below, in larger dots."""
+    shown, dots = drawn.one, np.asarray(drawn.dots)
+    x, y = _flat(shown, dots, np.ones(len(dots), dtype=bool), across, up)
+    color, marker = points.dataset_color(shown), points.MARKERS[shown.rank] if look.marked else "o"
+    hollow = look.marked and shown.rank == 0
     draw.draw_points(
-        ax, x, y, marker=marker, ms=look.size(x.size, look.first if one.rank == 0 else 1.0),
+        ax, x, y, marker=marker, ms=look.size(x.size, look.first if shown.rank == 0 else 1.0),
         mfc="none" if hollow else color, mec=color, mew=0.6 if hollow else 0.0,
-        zorder=3 + 0.1 * one.rank, gid=f"dataset {one.name}",
+        zorder=3 + 0.1 * shown.rank, gid=f"dataset {shown.name}",
     )  # fmt: skip
-    return {one.name: points.dot(color, marker, hollow)}
+    return {shown.name: points.dot(color, marker, hollow)}
 
 
 # -- branches --------------------------------------------------------------------------------------
 def within_view(ds: xr.Dataset, values: np.ndarray, drawn: np.ndarray) -> np.ndarray:
-    """Heights float64[point] of branches, NaN far above and below all responses, drawn at
-    float64[..], where a branch was stopped after so many points: it may grow without bound.
+    """Heights of the points of branches, float64[point], NaN far beyond ``drawn``, the heights of
+    the responses. Only branches that stopped at the largest number of points are cut: they may grow
+    without bound.
     """
     ends = np.stack([ds["branch_begin"].values, ds["branch_end"].values])
     stopped = np.isin(ds["point_branch"].values, np.flatnonzero((ends == "points").any(axis=0)))
@@ -265,19 +272,19 @@ def within_view(ds: xr.Dataset, values: np.ndarray, drawn: np.ndarray) -> np.nda
 def draw_branches(
     ax: Axes, ds: xr.Dataset, values: np.ndarray, across: Scale, up: Scale
 ) -> dict[str, Any]:
-    """Lines along the branches; the entries of the legend."""
+    """Draw lines along the branches; return the entries of the legend."""
     kind = ds["branch_kind"].values
     codes = motion_colors.codes(kind, np.where(kind == "periodic", ds["branch_periods"].values, 0))
     periods = points.periods_of(ds)
-    place, height, of, stable = _with_events(ds, values)
-    place, height = place * across.factor, height * up.factor
+    position, height, branch_of, stable = _with_events(ds, values)
+    position, height = position * across.factor, height * up.factor
     named: dict[str, Any] = {}
     for code in np.unique(codes).tolist():
         color = tuple(motion_colors.color(code).tolist())
-        mine = np.flatnonzero(codes[of] == code)
+        mine = np.flatnonzero(codes[branch_of] == code)
         for solid in (False, True):
             ax.plot(
-                *lines(mine, of, stable == solid, place, height), color=color,
+                *lines(mine, branch_of, stable == solid, position, height), color=color,
                 lw=1.3 if solid else 0.9, ls="-" if solid else DASHES, zorder=3 if solid else 2,
                 gid=f"{'stable' if solid else 'unstable'} {code}",
             )  # fmt: skip
@@ -290,34 +297,36 @@ def draw_branches(
 def _with_events(
     ds: xr.Dataset, values: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Where points lie and how high, their branches, and whether orbits behind them are stable;
-    between them the events at which stability changes.
+    """Positions, heights, branches and stability of the points of branches, with the events at
+    which stability changes inserted.
     """
-    place, of = ds[point_name(ds.attrs["parameter"])].values, ds["point_branch"].values
+    position, branch_of = ds[point_name(ds.attrs["parameter"])].values, ds["point_branch"].values
     stable = ds["point_stable"].values > 0
     if not ds.sizes.get("event"):
-        return place, values, of, stable
+        return position, values, branch_of, stable
     before = ds["event_point"].values
     after = np.minimum(before + 1, ds.sizes["point"] - 1)
-    turns = np.flatnonzero((stable[before] != stable[after]) & (of[before] == of[after]))
+    turns = np.flatnonzero(
+        (stable[before] != stable[after]) & (branch_of[before] == branch_of[after])
+    )
     at, height = _heights(ds, values)
     where = before[turns] + 1
     return (
-        np.insert(place, where, at[turns]),
+        np.insert(position, where, at[turns]),
         np.insert(values, where, height[turns]),
-        np.insert(of, where, of[before[turns]]),
+        np.insert(branch_of, where, branch_of[before[turns]]),
         np.insert(stable, where, stable[after[turns]]),
     )
 
 
 def _heights(ds: xr.Dataset, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where events lie, and how high: between the points that they lie between."""
+    """Positions and heights of events, interpolated between their neighbouring points."""
     at = ds[event_name(ds.attrs["parameter"])].values
     before = ds["event_point"].values
     after = np.minimum(before + 1, ds.sizes["point"] - 1)
-    place = ds[point_name(ds.attrs["parameter"])].values
+    position = ds[point_name(ds.attrs["parameter"])].values
     with np.errstate(all="ignore"):
-        share = (at - place[before]) / (place[after] - place[before])
+        share = (at - position[before]) / (position[after] - position[before])
     share = np.where((share >= 0) & (share <= 1), share, 0.5)
     return at, values[before] + share * (values[after] - values[before])
 
@@ -325,7 +334,9 @@ def _heights(ds: xr.Dataset, values: np.ndarray) -> tuple[np.ndarray, np.ndarray
 def lines(
     mine: np.ndarray, of: np.ndarray, wanted: np.ndarray, x: np.ndarray, y: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Curves through neighbours on one branch of which the first is wanted, NaN between them."""
+    """Curves through neighbours on one branch, where the first of two neighbours is wanted; NaN
+    between the curves.
+    """
     first = mine[:-1]
     joined = (np.diff(mine) == 1) & (of[first] == of[first + 1]) & wanted[first]
     keep = np.zeros(len(x) + 1, bool)
@@ -337,7 +348,7 @@ def lines(
 
 
 def draw_marks(ax: Axes, ds: xr.Dataset, values: np.ndarray, across: Scale, up: Scale) -> None:
-    """Bifurcations on the branches, between the points that they lie between."""
+    """Mark bifurcations on the branches, between their neighbouring points."""
     if not ds.sizes.get("event"):
         return
     at, height = _heights(ds, values)

@@ -1,4 +1,4 @@
-"""Pictures that other programs call otherwise: a sentence for each name that saltus.plot hasn't."""
+"""Names of pictures in other programs: a sentence for each name that saltus.plot doesn't have."""
 
 from __future__ import annotations
 
@@ -37,5 +37,7 @@ _NEAR = 0.7
 
 
 def picture_instead(name: str, known: Sequence[str]) -> str:
-    """A sentence for the name of a picture that saltus hasn't, which has the pictures ``known``."""
+    """Sentence for the name of a picture that saltus doesn't have; ``known`` are the pictures that
+    it has.
+    """
     return _PICTURES.get(name.lower().replace("_", "")) or nearest(name, known, _NEAR)

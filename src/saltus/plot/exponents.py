@@ -1,4 +1,4 @@
-"""How Lyapunov exponents converge: running means with their confidence intervals, against time."""
+"""Convergence of Lyapunov exponents: running means and confidence intervals, against time."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ def exponents(
     Parameters
     ----------
     ds : Dataset
-        What ``lyapunov`` or ``wolf`` returned.
+        Result of ``lyapunov`` or ``wolf``.
     trajectory : int or list of int, optional
-        Which of a batch; each gets a panel. Without it all are shown, at most 8.
+        Trajectory of a batch; each gets a panel. Without it all are shown, at most 8.
     ax : Axes or array of Axes, optional
-        Where to draw, one for each trajectory; a new figure by default.
+        Axes to draw into, one for each trajectory; a new figure by default.
     legend : bool
         Whether to give the values.
 
@@ -65,40 +65,40 @@ def exponents(
     return panels[0] if len(panels) == 1 else np.array(panels, dtype=object)
 
 
-def _panel(ax: Axes, one: xr.Dataset, legend: bool) -> None:
-    """One trajectory in one Axes."""
-    unit = one["lyapunov_exponent"].attrs.get("units", "")
-    time = one["running_time"].values
+def _panel(ax: Axes, motion: xr.Dataset, legend: bool) -> None:
+    """Draw one trajectory in one Axes."""
+    unit = motion["lyapunov_exponent"].attrs.get("units", "")
+    time = motion["running_time"].values
     finite = time[np.isfinite(time)]
     x = display_scale("s", float(finite.max(initial=0.0)))
-    settled = int(one["response_period"]) > 0 or one["kind"].item() == "equilibrium"
-    late = one.isel(running=np.flatnonzero(time >= _EARLY * finite.max(initial=0.0)))
+    settled = int(motion["response_period"]) > 0 or motion["kind"].item() == "equilibrium"
+    late = motion.isel(running=np.flatnonzero(time >= _EARLY * finite.max(initial=0.0)))
     time = late["running_time"].values
     shown = [late[f"running_{name}"].values.ravel() for name in ("low", "exponent", "high")]
-    shown += [one["lyapunov_low"].values, one["lyapunov_high"].values, np.zeros(1)]
+    shown += [motion["lyapunov_low"].values, motion["lyapunov_high"].values, np.zeros(1)]
     draw.set_limits(ax, "y", np.concatenate(shown), margin=0.12)
     draw.set_limits(ax, "x", np.concatenate([[0.0], finite * x.factor]), margin=0.0)
     ax.axhline(0.0, color=QUIET, lw=0.7, zorder=1)
-    for i in range(one.sizes["exponent"]):
+    for i in range(motion.sizes["exponent"]):
         color = CYCLE[i % len(CYCLE)]
         low, mean, high = (
             late[f"running_{name}"].values[i] for name in ("low", "exponent", "high")
         )
         ax.fill_between(time * x.factor, low, high, color=color, alpha=0.18, lw=0, zorder=1)
-        ax.plot(time * x.factor, mean, color=color, lw=1.1, zorder=2, label=_value(one, i, unit))
-        if settled and np.isfinite(final := float(one["lyapunov_exponent"][i])):
+        ax.plot(time * x.factor, mean, color=color, lw=1.1, zorder=2, label=_value(motion, i, unit))
+        if settled and np.isfinite(final := float(motion["lyapunov_exponent"][i])):
             ax.axhline(final, color=color, lw=0.9, ls=(0, (4, 3)), zorder=3)
     ax.set_xlabel(x.label("time after the transient"))
     ax.set_ylabel(Scale(1.0, unit).label("Lyapunov exponent"))
-    ax.set_title("motion: " + kind_text(str(one["kind"].item()), int(one["response_period"])))
-    draw.note_status(ax, one)
+    ax.set_title("motion: " + kind_text(str(motion["kind"].item()), int(motion["response_period"])))
+    draw.note_status(ax, motion)
     if legend:
         ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
 
 
 def _value(one: xr.Dataset, i: int, unit: str) -> str:
-    """An exponent with half of its interval, to the digits that it gives, six at most: ``5.98 ±
-    0.26 1/s``.
+    """Exponent with the half-width of its interval, in the digits that the interval justifies, six
+    at most: ``5.98 ± 0.26 1/s``.
     """
     value = float(one["lyapunov_exponent"][i])
     half = float(one["lyapunov_high"][i]) - value

@@ -1,4 +1,4 @@
-"""Frequency response: how large the steady responses are, branch by branch."""
+"""Frequency response: size of the steady responses, branch by branch."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def frequency_response(
     Parameters
     ----------
     ds : Dataset, or mapping of str to Dataset
-        What ``sl.frequency_response`` returned; a part of it, such as ``ds.sel(frequency=slice(14,
+        Result of ``sl.frequency_response``; a part of it, such as ``ds.sel(frequency=slice(14,
         17))``, is drawn alone. Several by name are drawn over each other, a colour and a marker for
         each: ``{"exact": a, "ode45": b}``.
     quantity : str
@@ -64,7 +64,7 @@ def frequency_response(
     legend : bool
         Whether to draw the legend.
     ax : Axes, optional
-        Where to draw; a new figure by default.
+        Axes to draw into; a new figure by default.
 
     Returns
     -------
@@ -105,7 +105,7 @@ def frequency_response(
 
 
 def _height(ds: xr.Dataset, quantity: str, output: str | None) -> curves.Height:
-    """What is drawn of the responses."""
+    """Heights of the responses."""
     if quantity != "transmissibility":
         return curves.height(ds, quantity, output)
     if quantity not in ds:
@@ -120,8 +120,8 @@ def _height(ds: xr.Dataset, quantity: str, output: str | None) -> curves.Height:
 def _along(
     one: points.Shown, dots: np.ndarray, quantity: str, output: str | None
 ) -> list[np.ndarray]:
-    """What is drawn of the branches that the responses lie on; a transmissibility is known of the
-    responses alone.
+    """Heights of the branches that the responses lie on. Transmissibility has none: it is known of
+    responses only.
     """
     if one.name or "point_branch" not in one.ds or quantity == "transmissibility":
         return []
@@ -147,7 +147,7 @@ def _measured(measured: Measured, one: points.Shown, unit: str) -> xr.Dataset:
 
 
 def _draw_measured(ax: Axes, x: np.ndarray, y: np.ndarray) -> None:
-    """Open circles above all that was computed."""
+    """Draw measured points as open circles above all computed curves."""
     marks = {"ms": 4.5, "mfc": "none", "mec": OKABE_ITO["black"], "mew": 0.9}
     draw.draw_points(ax, x, y, marker="o", zorder=4, label="measured", gid="measured", **marks)
 

@@ -23,10 +23,11 @@ from saltus.plot.picture import PictureError, caller, check, picture
 from saltus.plot.style import display_scale, style
 from saltus.results.dataset import schema
 
-#: Forcing periods in the time history of a response that doesn't repeat, and the fewest of one that
-#: does: it takes two to see a repeat.
-_SHOWN_IF_APERIODIC, _FEWEST = 12, 2
-#: The most rows that fit a figure.
+#: Forcing periods in the time history of a response that doesn't repeat.
+_SHOWN_IF_APERIODIC = 12
+#: Fewest forcing periods in the time history of one that does: a repeat shows only in two.
+_FEWEST = 2
+#: Most rows that fit a figure.
 _MOST = 20
 _ELSEWHERE = "#D2D2D2"
 #: A picture of Poincare points is no narrower than this share of the orbit: a single point would
@@ -50,9 +51,9 @@ def gallery(
     Parameters
     ----------
     ds : Dataset
-        What ``sl.basins`` (or ``sl.attractors``) returned.
+        Result of ``sl.basins`` or ``sl.attractors``.
     runs : Dataset
-        What ``simulate`` returned for a batch whose trajectory i starts on attractor i.
+        Result of ``simulate`` for a batch whose trajectory i starts on attractor i.
     attractors : sequence of int, optional
         Ids of those to show; all by default, at most 20.
     order : sequence of int, optional
@@ -100,8 +101,12 @@ def gallery(
 
 def _chosen(runs: xr.Dataset, ids: list[int], attractors: Any) -> list[int]:
     """Ids of the attractors to show, each with a trajectory."""
-    chosen = ids if attractors is None else [int(one) for one in np.atleast_1d(attractors).tolist()]
-    strange = [one for one in chosen if one not in ids]
+    chosen = (
+        ids
+        if attractors is None
+        else [int(number) for number in np.atleast_1d(attractors).tolist()]
+    )
+    strange = [number for number in chosen if number not in ids]
     if strange:
         raise ParameterError(
             f"there is no attractor {strange[0]}. Known: {', '.join(map(str, ids)) or 'none'}."
@@ -110,7 +115,7 @@ def _chosen(runs: xr.Dataset, ids: list[int], attractors: Any) -> list[int]:
         some = " Choose, such as attractors=[0, 1]." if ids else " Nothing settled in this Dataset."
         raise PictureError(f"{caller()} shows 1 to {_MOST} attractors, not {len(chosen)}.{some}")
     held = runs["trajectory"].values.tolist() if "trajectory" in runs.dims else [0]
-    lacking = [one for one in chosen if one not in held]
+    lacking = [number for number in chosen if number not in held]
     if lacking:
         raise ParameterError(
             f"runs holds {len(held)} trajectories, none for attractor {lacking[0]} of {len(ids)}. "
@@ -122,7 +127,7 @@ def _chosen(runs: xr.Dataset, ids: list[int], attractors: Any) -> list[int]:
 
 
 def _pair(runs: xr.Dataset) -> tuple[str, ...]:
-    """The states of the phase portrait, as plot.phase chooses them; one where there are no two."""
+    """States of the phase portrait, chosen as in plot.phase; one state if there is only one."""
     known = schema.states_of(runs)
     return (
         (known[0], selection.rate_of(runs, known[0]) or known[1]) if len(known) > 1 else known[:1]
@@ -131,16 +136,16 @@ def _pair(runs: xr.Dataset) -> tuple[str, ...]:
 
 # -- one row ---------------------------------------------------------------------------------------
 def _row(row: np.ndarray, ds: xr.Dataset, runs: xr.Dataset, key: int) -> None:
-    """The time history and the phase portrait."""
+    """Draw the time history and the phase portrait."""
     n = int(ds["attractor_period"].sel(attractor=key))
     label = key if "trajectory" in runs.dims else None
-    one = selection.single(runs, label)
-    axis = selection.sample_axis(one)
+    motion = selection.single(runs, label)
+    axis = selection.sample_axis(motion)
     held = float(axis[-1] - axis[0])
     shown = (max(n, _FEWEST), n) if n else (_SHOWN_IF_APERIODIC, held)
-    in_time, in_phase = (min(periods, held) if "period" in one else None for periods in shown)
+    in_time, in_phase = (min(periods, held) if "period" in motion else None for periods in shown)
     history(runs, label, periods=in_time, ax=row[0], time="T", legend=False)
-    # all else would be rounding
+    # A picture of an equilibrium would show rounding errors only.
     if len(row) > 1 and str(ds["attractor_type"].sel(attractor=key).item()) == "equilibrium":
         names = [name for name in schema.states_of(runs) if f"attractor_{name}" in ds]
         places = [ds[f"attractor_{name}"].sel(attractor=key).values.ravel()[0] for name in names]
@@ -156,14 +161,14 @@ def _row(row: np.ndarray, ds: xr.Dataset, runs: xr.Dataset, key: int) -> None:
     elif len(row) > 1:
         phase(runs, label, periods=in_phase, ax=row[1], legend=False)
         for names in [
-            one for one in row[1].child_axes if one.get_gid() == draw.GAP_NAMES.format("x")
+            child for child in row[1].child_axes if child.get_gid() == draw.GAP_NAMES.format("x")
         ]:
-            # the time history beside it names the gaps too; here the names would meet the title
+            # The time history next to it names the gaps too; here the names would touch the title.
             names.remove()
 
 
 def _poincare(ax: Axes, ds: xr.Dataset, runs: xr.Dataset, key: int, color: np.ndarray) -> None:
-    """The attractor at whole periods, the others pale behind it."""
+    """Draw the attractor at whole periods, and the others pale behind it."""
     pair = _pair(runs)
     clouds = np.stack(
         [ds[f"attractor_{name}"].transpose("attractor", "phase").values for name in pair], axis=-1
@@ -216,7 +221,7 @@ def _window(points: np.ndarray, orbit: np.ndarray) -> tuple[float, float]:
 
 # -- words -----------------------------------------------------------------------------------------
 def _title(ax: Axes, ds: xr.Dataset, key: int, color: np.ndarray) -> None:
-    """What the attractor is, after a dot in its hue."""
+    """Write the title of an attractor, after a dot in its hue."""
     title: Text = ax.set_title(title_of(ds, key))
     shift = ScaledTranslation(12 / 72, 0, ax.figure.dpi_scale_trans)
     title.set_transform(title.get_transform() + shift)
@@ -238,37 +243,38 @@ def title_of(ds: xr.Dataset, key: int) -> str:
     """An attractor in one line: ``3T, 8 contacts, multipliers |µ| = 0.53, peak 0.91 mm, 12.3 % of
     the starts``.
     """
-    one = ds.sel(attractor=key)
-    parts = [cells.describe(one), _stability(one)]
-    if "attractor_peak" in one:
-        parts.append(cells.peak_text(one))
-    if "attractor_fraction" in one and math.isfinite(float(one["attractor_fraction"])):
-        parts.append(f"{cells.share_text(float(one['attractor_fraction']))} of the starts")
+    attractor = ds.sel(attractor=key)
+    parts = [cells.describe(attractor), _stability(attractor)]
+    if "attractor_peak" in attractor:
+        parts.append(cells.peak_text(attractor))
+    if "attractor_fraction" in attractor and math.isfinite(float(attractor["attractor_fraction"])):
+        parts.append(f"{cells.share_text(float(attractor['attractor_fraction']))} of the starts")
     return ", ".join(part for part in parts if part)
 
 
-def _stability(one: xr.Dataset) -> str:
-    """The largest multiplier of what repeats, else the largest exponent."""
-    if int(one["attractor_period"]) > 0 and "attractor_multiplier_real" in one:
+def _stability(attractor: xr.Dataset) -> str:
+    """Largest multiplier if the motion repeats, else the largest exponent."""
+    if int(attractor["attractor_period"]) > 0 and "attractor_multiplier_real" in attractor:
         size = np.hypot(
-            one["attractor_multiplier_real"].values, one["attractor_multiplier_imag"].values
+            attractor["attractor_multiplier_real"].values,
+            attractor["attractor_multiplier_imag"].values,
         )
         size = np.sort(size[np.isfinite(size)])[::-1]
         texts = list(dict.fromkeys(f"{value:.3g}" for value in size))
         return f"multipliers |µ| = {', '.join(texts[:3])}" if texts else ""
-    if "attractor_exponent" in one and math.isfinite(float(one["attractor_exponent"])):
+    if "attractor_exponent" in attractor and math.isfinite(float(attractor["attractor_exponent"])):
         error = (
-            float(one["attractor_exponent_error"])
-            if "attractor_exponent_error" in one
+            float(attractor["attractor_exponent_error"])
+            if "attractor_exponent_error" in attractor
             else math.nan
         )
         spread = f" ± {error:.1g}" if math.isfinite(error) else ""
-        return f"exponent {float(one['attractor_exponent']):.3g}{spread} 1/s"
+        return f"exponent {float(attractor['attractor_exponent']):.3g}{spread} 1/s"
     return ""
 
 
 def _name_colours(figure: Figure, grid: np.ndarray) -> None:
-    """One legend for all rows."""
+    """Draw one legend for all rows."""
     named = {
         label: handle
         for one in grid.flat

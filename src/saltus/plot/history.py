@@ -54,15 +54,15 @@ def history(
     Parameters
     ----------
     run : Dataset
-        What ``simulate`` returned.
+        Result of ``simulate``.
     trajectory : int or list of int, optional
-        Which of a batch; each gets a panel. Without it all are shown, at most 8.
+        Trajectory of a batch; each gets a panel. Without it all are shown, at most 8.
     state : str, optional
         Name of the state; the first one by default.
     periods : int, float or pair, optional
         Number of forcing periods at the end, or (first, last) period; the whole run by default.
     ax : Axes or array of Axes, optional
-        Where to draw, one for each trajectory; a new figure by default.
+        Axes to draw into, one for each trajectory; a new figure by default.
     time : {"both", "s", "T"}
         Axis of time: seconds with forcing periods at the top, or one of the two.
     units : mapping of str to str, optional
@@ -86,18 +86,18 @@ def history(
     wanted = selection.units_of_states(run, units).get(state)
     labels = selection.chosen(run, trajectory)
     singles = [selection.single(run, label) for label in labels] or [selection.single(run, None)]
-    windows = [selection.window(one, periods) for one in singles]
+    windows = [selection.window(motion, periods) for motion in singles]
     with draw.panels(ax, len(singles), (6.3, 2.5)) as panels:
-        for i, (panel, one, part) in enumerate(zip(panels, singles, windows, strict=True)):
-            _panel(panel, one, state, part, time, wanted)
+        for i, (panel, motion, part) in enumerate(zip(panels, singles, windows, strict=True)):
+            _panel(panel, motion, state, part, time, wanted)
             if len(labels) > 1:
-                panel.set_ylabel(f"{selection.named(run, one, labels[i])}\n{panel.get_ylabel()}")
+                panel.set_ylabel(f"{selection.named(run, motion, labels[i])}\n{panel.get_ylabel()}")
             if legend and i == 0:
-                ticks = 0.25 if time == "both" and "period" in one else 0.05  # inches
+                ticks = 0.25 if time == "both" and "period" in motion else 0.05  # inches
                 above = panel.transAxes + ScaledTranslation(0, ticks, panel.figure.dpi_scale_trans)
                 draw.legend(
                     panel,
-                    regions.find(one, [state]),
+                    regions.find(motion, [state]),
                     loc="lower right",
                     bbox_to_anchor=(1, 1),
                     bbox_transform=above,
@@ -109,7 +109,7 @@ def history(
 def _panel(
     ax: Axes, ds: xr.Dataset, state: str, shown: tuple[float, float], time: str, unit: str | None
 ) -> None:
-    """One trajectory in one Axes."""
+    """Draw one trajectory in one Axes."""
     curve = selection.path(ds, (state,), *shown)
     if shown[0] == shown[1]:
         who = f"Trajectory {int(ds['trajectory'])}" if "trajectory" in ds.coords else "It"
@@ -126,7 +126,7 @@ def _panel(
         else display_scale("s", float(np.abs(curve.time).max()))
     )
     coloured = regions.find(ds, [state])
-    own = regions.along(ds, state)
+    state_regions = regions.along(ds, state)
 
     width = 1.1 if shown[1] - shown[0] <= 40 or "period" not in ds else 0.7
     draw.draw_pieces(
@@ -134,7 +134,10 @@ def _panel(
     )
     draw.set_limits(ax, "x", curve.time * x.factor, margin=0.0)
     draw.set_limits(
-        ax, "y", values * y.factor, [boundary.value * y.factor for boundary in own.boundaries]
+        ax,
+        "y",
+        values * y.factor,
+        [boundary.value * y.factor for boundary in state_regions.boundaries],
     )
     table = selection.contacts_in(ds, *shown)
     owners = {
@@ -151,7 +154,7 @@ def _panel(
     )
     _mark_contacts(ax, table.isel(contact=~theirs), state, x, y)
     _note_contacts(ax, table.isel(contact=theirs), owners, x)
-    draw.draw_gaps(ax, "y", own, y)
+    draw.draw_gaps(ax, "y", state_regions, y)
     draw.note_status(ax, ds)
     ax.set_xlabel(x.label("time"))
     ax.set_ylabel(y.label(state))
@@ -161,8 +164,8 @@ def _panel(
 
 
 def _note_contacts(ax: Axes, table: xr.Dataset, owners: Mapping[str, str], x: Scale) -> None:
-    """A stroke at the foot of the picture for each contact at a boundary of another state: on this
-    curve it would lie on no line.
+    """Draw a stroke at the foot of the picture for each contact of another state: its boundary
+    isn't on this axis.
     """
     if table.sizes["contact"]:
         names = ", ".join(
@@ -183,8 +186,8 @@ def _note_contacts(ax: Axes, table: xr.Dataset, owners: Mapping[str, str], x: Sc
 
 
 def _mark_contacts(ax: Axes, table: xr.Dataset, state: str, x: Scale, y: Scale) -> None:
-    """A marker for each contact, by its kind; smaller where they are many. The legend counts those
-    that would be a band.
+    """Draw a marker for each contact, by its kind; smaller if there are many. The legend counts
+    contacts that are too many to mark.
     """
     kinds = table["contact_kind"].values.astype(str)
     size = 3.4 if kinds.size <= 40 else 2.4

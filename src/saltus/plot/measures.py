@@ -15,9 +15,12 @@ from saltus.plot import selection
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
 
-#: Speeds of a guard that are equal to this share of the largest are one speed; the most speeds of a
-#: motion that repeats, and how often each must be seen.
-_SAME, _MOST_SPEEDS, _REPEATED = 1e-7, 6, 3
+#: Speeds closer than this share of the guard's largest speed are one speed.
+_SAME = 1e-7
+#: Most speeds that are listed in words; more make a histogram.
+_MOST_SPEEDS = 6
+#: Contacts per speed, at least, for speeds that repeat.
+_REPEATED = 3
 #: Characters of a line in a picture of words.
 _LINE = 60
 
@@ -32,11 +35,11 @@ def impacts(
     Parameters
     ----------
     ds : Dataset
-        What ``impact_statistics`` returned.
+        Result of ``impact_statistics``.
     trajectory : int, optional
-        Which of a batch; all of them together by default.
+        Trajectory of a batch; all of them together by default.
     ax : Axes, optional
-        Where to draw; a new figure by default.
+        Axes to draw into; a new figure by default.
     legend : bool
         Whether to name the guards.
 
@@ -84,8 +87,8 @@ def impacts(
 
 
 def _in_words(ds: xr.Dataset, labels: np.ndarray | None, counts: xr.DataArray, scale: Scale) -> str:
-    """What there is to say of contacts that make no histogram: there are none, or their speeds come
-    again and again.
+    """Describe contacts that make no histogram, because there are none, or because few speeds
+    repeat; else "".
     """
     if not counts.values.sum():
         return "No contact in the observed time."
@@ -93,16 +96,20 @@ def _in_words(ds: xr.Dataset, labels: np.ndarray | None, counts: xr.DataArray, s
     speeds, guards = ds["contact_speed"].values[mine], ds["contact_guard"].values[mine].astype(str)
     lines = []
     for name in ds["guard"].values.tolist():
-        own = np.sort(speeds[(guards == name) & np.isfinite(speeds)])
-        # of each group of equal ones
-        first = np.flatnonzero(np.diff(own, prepend=-np.inf) > _SAME * own.max(initial=0.0))
-        if len(own) and (len(first) > _MOST_SPEEDS or len(own) < _REPEATED * len(first)):
+        guard_speeds = np.sort(speeds[(guards == name) & np.isfinite(speeds)])
+        # Index of the first speed of each group of equal speeds.
+        first = np.flatnonzero(
+            np.diff(guard_speeds, prepend=-np.inf) > _SAME * guard_speeds.max(initial=0.0)
+        )
+        if len(guard_speeds) and (
+            len(first) > _MOST_SPEEDS or len(guard_speeds) < _REPEATED * len(first)
+        ):
             return ""
-        if len(own):
-            values = ", ".join(scale.text(float(f"{own[i]:.6g}")) for i in first)
+        if len(guard_speeds):
+            values = ", ".join(scale.text(float(f"{guard_speeds[i]:.6g}")) for i in first)
             lines.append(
                 textwrap.fill(
-                    f"{name.replace('_', ' ')}: {len(own)} contacts, at {values}",
+                    f"{name.replace('_', ' ')}: {len(guard_speeds)} contacts, at {values}",
                     _LINE,
                     subsequent_indent="    ",
                 )
@@ -120,11 +127,11 @@ def energy(
     Parameters
     ----------
     ds : Dataset
-        What ``energy_balance`` returned.
+        Result of ``energy_balance``.
     trajectory : int, optional
-        Which of a batch; the first one by default.
+        Trajectory of a batch; the first one by default.
     ax : Axes, optional
-        Where to draw; a new figure by default.
+        Axes to draw into; a new figure by default.
     legend : bool
         Whether to name the curves.
 

@@ -1,5 +1,5 @@
-"""Methods side by side over one parameter: the error that each makes, where it gives another
-answer, and what it costs.
+"""Comparison of methods over one parameter: the error of each, the share of different answers, and
+the cost.
 """
 
 from __future__ import annotations
@@ -20,15 +20,16 @@ from saltus.plot.style import CYCLE
 #: Pieces of the axis over which medians and shares are taken: the eye can't follow 2000 values, and
 #: a share needs some dozen.
 PIECES = 30
-#: Up to this number of values they are drawn as dots; up to this number of pieces their means as
-#: steps.
-FEW, STEPS = 100, 8
+#: Most values that are drawn as large dots.
+FEW = 100
+#: Most pieces of the axis over which numbers are drawn as steps.
+STEPS = 8
 
 
 @picture()
 def methods(ds: xr.Dataset, *, ax: Any = None) -> list[Axes]:
-    """What a method does to steady responses, against one parameter: three panels, the first method
-    of ``ds`` being the reference.
+    """Draw the effect of the method on steady responses, against one parameter: three panels, the
+    first method of ``ds`` being the reference.
 
     From above: the error of one forcing period started on the reference's own responses (dots, and
     medians over pieces of the axis); the share of starts whose answer differs from the reference's,
@@ -37,10 +38,10 @@ def methods(ds: xr.Dataset, *, ax: Any = None) -> list[Axes]:
     Parameters
     ----------
     ds : Dataset
-        What ``sl.compare_methods`` returned for a frequency response or a bifurcation diagram over
+        Result of ``sl.compare_methods`` for a frequency response or a bifurcation diagram over
         one parameter.
     ax : sequence of three Axes, optional
-        Where to draw; a new figure by default.
+        Axes to draw into; a new figure by default.
 
     Returns
     -------
@@ -95,9 +96,7 @@ def _middles(bins: np.ndarray) -> np.ndarray:
 
 
 def _over(bins: np.ndarray, values: Any) -> tuple[np.ndarray, np.ndarray]:
-    """What is drawn of a number for each piece: a curve through their middles; of few pieces a step
-    over each.
-    """
+    """Curve of a number for each piece: through the middles of many pieces, or steps over a few."""
     if len(bins) > STEPS:
         return _middles(bins), np.asarray(values)
     return np.repeat(bins, 2)[1:-1], np.repeat(np.asarray(values), 2)
@@ -139,14 +138,14 @@ def _draw_share(ax: Axes, one: xr.Dataset, x: np.ndarray, bins: np.ndarray, colo
     ax.plot(*_over(bins, 100 * share), color=color, lw=1.4, zorder=3)
 
 
-def _draw_cost(ax: Axes, one: xr.Dataset, x: np.ndarray, name: str, color: str) -> None:
-    cost = float(one["method_cpu_seconds"])
+def _draw_cost(ax: Axes, costs: xr.Dataset, x: np.ndarray, name: str, color: str) -> None:
+    cost = float(costs["method_cpu_seconds"])
     label = f"{name}: {cost:.3g} s" if np.isfinite(cost) else name
     size = 3.0 if x.size <= FEW else 1.5
     draw.draw_points(
         ax,
         x,
-        one["steps_per_period"].values,
+        costs["steps_per_period"].values,
         marker="o",
         ms=size,
         mfc=color,

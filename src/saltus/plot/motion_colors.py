@@ -1,6 +1,4 @@
-"""Kinds of motion as colours: the same kind has the same colour in every picture, whatever else is
-in it.
-"""
+"""Colours of the kinds of motion. A kind has the same colour in every picture."""
 
 from __future__ import annotations
 
@@ -12,16 +10,22 @@ import xarray as xr
 from saltus.plot.palette import hues, shades
 from saltus.results.dataset.schema import period_text
 
-#: Periods with a hue of their own; longer ones share the next. More hues than these can't be
-#: distinguished as small dots.
+#: Longest period with its own hue; longer periods share one. The eye can't distinguish more hues of
+#: small dots.
 OWN_HUES = 8
-#: Codes of the kinds: the period itself up to :data:`OWN_HUES`, then these.
-LONG, QUASI_PERIODIC, CHAOTIC = OWN_HUES + 1, OWN_HUES + 2, OWN_HUES + 3
-#: Of systems without forcing; a limit cycle has the hue of period 1, as there is no other, an
-#: equilibrium that of period 2.
-LIMIT_CYCLE, EQUILIBRIUM = OWN_HUES + 4, OWN_HUES + 5
-#: Motion that hasn't repeated, and whose exponent says nothing.
+#: Code of longer periods. The code of a shorter period is the period.
+LONG = OWN_HUES + 1
+#: Code of quasi-periodic motion.
+QUASI_PERIODIC = OWN_HUES + 2
+#: Code of chaos.
+CHAOTIC = OWN_HUES + 3
+#: Code of limit cycles.
+LIMIT_CYCLE = OWN_HUES + 4
+#: Code of equilibria.
+EQUILIBRIUM = OWN_HUES + 5
+#: Code of motion that hasn't repeated, and whose exponent is undecided.
 NOT_REPEATING = OWN_HUES + 6
+#: Periods whose hues limit cycles and equilibria take: systems without forcing have no periods.
 _HUE_OF = {LIMIT_CYCLE: 1, EQUILIBRIUM: 2}
 _NAMES = {
     QUASI_PERIODIC: "quasi-periodic",
@@ -36,7 +40,7 @@ _OWN = {
     "equilibrium": EQUILIBRIUM,
     "not_repeating": NOT_REPEATING,
 }
-#: Motion that never repeats is grey, so that no period is taken for it.
+#: Greys of motion that never repeats: a hue would suggest a period.
 _GREYS = {
     QUASI_PERIODIC: (0.70, 0.70, 0.70),
     CHAOTIC: (0.20, 0.20, 0.20),
@@ -44,8 +48,10 @@ _GREYS = {
 }
 #: Markers of the periods 1, 2, ..., and of longer ones.
 _MARKERS = dict(enumerate("osD^vPX*p", start=1))
-#: The shade of a hue for small dots and thin lines on white; the hue itself is for areas.
-_DOT, _SHADES = 4, 7
+#: Shades of a hue; the middle one, for areas, is the hue itself.
+_SHADES = 7
+#: Shade for small dots and thin lines on white: one darker than the hue.
+_DOT = 4
 
 
 def codes(kind: Sequence[str] | np.ndarray, period: Sequence[int] | np.ndarray) -> np.ndarray:
@@ -56,7 +62,7 @@ def codes(kind: Sequence[str] | np.ndarray, period: Sequence[int] | np.ndarray) 
 
 
 def repeats(code: int) -> bool:
-    """Whether motions of a kind repeat, or rest: their branches are lines."""
+    """True if motions of a kind repeat or rest: their branches are lines."""
     return code not in _GREYS
 
 
@@ -69,12 +75,12 @@ def color(code: int, dots: bool = True) -> np.ndarray:
 
 
 def marker(code: int) -> str:
-    """The marker of a kind, for readers and printers without colours."""
+    """Marker of a kind, for readers and printers without colours."""
     return _MARKERS.get(_HUE_OF.get(code, code), ".")
 
 
 def label(code: int, periods: np.ndarray) -> str:
-    """A kind in a legend; ``periods`` are those that occur, to name the long ones."""
+    """Name of a kind in a legend; ``periods`` are those that occur, to name the long ones."""
     if code == LONG:
         long = np.unique(periods[periods > OWN_HUES]).tolist()
         return (

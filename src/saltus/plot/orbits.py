@@ -1,4 +1,4 @@
-"""Points of periodic orbits in the plane of two states, also over a map of basins."""
+"""Points of periodic orbits in the plane of two states, alone or on a map of basins."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ def periodic_orbits(
     Parameters
     ----------
     ds : Dataset
-        What ``periodic_orbits`` or ``edge_orbit`` returned.
+        Result of ``periodic_orbits`` or ``edge_orbit``.
     x, y : str, optional
         States on the axes; by default those of ``over``, else the first two.
     ax : Axes, optional
-        Where to draw; a new figure by default.
+        Axes to draw into; a new figure by default.
     over : Dataset, optional
         A map of basins to draw them over: the saddles lie on its boundaries.
     units : mapping of str to str, optional
@@ -108,21 +108,21 @@ def _pair(ds: xr.Dataset, x: str | None, y: str | None, over: xr.Dataset | None)
 
 
 def _orbit(
-    ax: Axes, one: xr.Dataset, pair: tuple[str, str], scales: Any, number: int, over: bool
+    ax: Axes, orbit: xr.Dataset, pair: tuple[str, str], scales: Any, number: int, over: bool
 ) -> None:
-    """The points of an orbit."""
+    """Draw the points of an orbit."""
     at = [
-        one[orbit_name(name)].values * scale.factor
+        orbit[orbit_name(name)].values * scale.factor
         for name, scale in zip(pair, scales, strict=True)
     ]
-    here = np.isfinite(at[0]) & np.isfinite(at[1])
-    stable = int(one["orbit_stable"]) == 1
-    name = kind_text(str(one["orbit_type"].item()), int(one["orbit_period"]))
+    finite = np.isfinite(at[0]) & np.isfinite(at[1])
+    stable = int(orbit["orbit_stable"]) == 1
+    name = kind_text(str(orbit["orbit_type"].item()), int(orbit["orbit_period"]))
     color = "#222222" if over else CYCLE[number % len(CYCLE)]
     marks: dict[str, Any] = (
         {"marker": "o", "ms": 5, "mfc": color, "mec": "white", "mew": 0.8}
         if stable
         else {"marker": "x", "ms": 6, "mec": color, "mew": 1.6}
     )
-    label = f"{name}, {one['orbit_stability'].item()}" if number < _NAMED else None
-    draw.draw_points(ax, at[0][here], at[1][here], label=label, zorder=5, **marks)
+    label = f"{name}, {orbit['orbit_stability'].item()}" if number < _NAMED else None
+    draw.draw_points(ax, at[0][finite], at[1][finite], label=label, zorder=5, **marks)

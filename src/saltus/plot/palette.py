@@ -1,6 +1,4 @@
-"""Colours for any number of attractors: far apart for every reader, each with room for shades of
-its own.
-"""
+"""Colours for any number of attractors: far apart for every reader, each with several shades."""
 
 from __future__ import annotations
 
@@ -24,7 +22,7 @@ _TO_LAB = np.array(
         [0.0259040371, 0.7827717662, -0.8086757660],
     ]
 )
-#: What deuteranopes and protanopes see of linear sRGB: G. Machado, M. Oliveira and L. Fernandes,
+#: Linear sRGB as deuteranopes and protanopes see it: G. Machado, M. Oliveira and L. Fernandes,
 #: IEEE TVCG 15, 1291 (2009), severity 1.
 _DEUTERANOPIA = np.array(
     [
@@ -43,24 +41,24 @@ _PROTANOPIA = np.array(
 
 #: The first two colours, near Okabe and Ito's blue and orange; the rest follow from them.
 _SEEDS = ("#4C94D8", "#F2B046")
-#: Range of the others: no colour so dark that its shades get lost in black, none so light or vivid
-#: that it glares.
+#: Lightness of the other colours: shades of darker ones vanish in black, lighter ones glare.
 _LIGHTNESS = np.linspace(0.56, 0.86, 13)
 _CHROMA = np.array([0.06, 0.09, 0.115, 0.14])
 _HUE = np.deg2rad(np.arange(0.0, 360.0, 6.0))
-#: A hue's shades: the lightest is mixed with so much white, the darkest keeps so much of the
-#: lightness.
-_TINT, _DARKEST = 0.38, 0.64
+#: Share of white in the lightest shade of a hue.
+_TINT = 0.38
+#: Share of its lightness that the darkest shade of a hue keeps.
+_DARKEST = 0.64
 
 
 # -- colour spaces ---------------------------------------------------------------------------------
 def oklab(rgb: np.ndarray) -> np.ndarray:
-    """sRGB in 0 to 1, shape (..., 3), as OKLab: lightness, green to red, blue to yellow."""
+    """Convert sRGB in 0 to 1, shape (..., 3), to OKLab: lightness, green to red, blue to yellow."""
     return _lab(np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4))
 
 
 def srgb(lab: np.ndarray) -> np.ndarray:
-    """OKLab, shape (..., 3), as sRGB in 0 to 1; what no screen can show is clipped."""
+    """Convert OKLab, shape (..., 3), to sRGB in 0 to 1; colours beyond a screen's are clipped."""
     linear = np.clip(_linear(lab), 0.0, 1.0)
     encoded: np.ndarray = np.where(
         linear <= 0.0031308, 12.92 * linear, 1.055 * np.maximum(linear, 1e-9) ** (1 / 2.4) - 0.055
@@ -88,8 +86,8 @@ def hues(count: int) -> np.ndarray:
 
 
 def shades(colors: np.ndarray, count: int) -> np.ndarray:
-    """From a light tint of each colour through itself to its darkest shade, shape (colour, count,
-    3); the hue stays.
+    """Shades of each colour, from a light tint through the colour to its darkest shade, shape
+    (colour, count, 3). The hue stays.
 
     A single shade is the colour itself.
     """
@@ -102,9 +100,7 @@ def shades(colors: np.ndarray, count: int) -> np.ndarray:
 
 @lru_cache(maxsize=32)
 def _row(count: int) -> np.ndarray:
-    """The colours in OKLab, shape (count, 3): greedy choice of the candidate that is farthest from
-    those before.
-    """
+    """Colours in OKLab, shape (count, 3). Each is the candidate farthest from those before."""
     chosen = oklab(
         np.array([[int(text[i : i + 2], 16) / 255 for i in (1, 3, 5)] for text in _SEEDS])
     )

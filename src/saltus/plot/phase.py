@@ -43,9 +43,9 @@ def phase(
     Parameters
     ----------
     run : Dataset
-        What ``simulate`` or ``stroboscope`` returned.
+        Result of ``simulate`` or ``stroboscope``.
     trajectory : int or list of int, optional
-        Which of a batch; without it all are laid over one another, at most 8.
+        Trajectory of a batch; without it all are laid over one another, at most 8.
     states : pair of str, optional
         On the horizontal and the vertical axis; by default the first one and the state that is its
         rate, else the second one.
@@ -53,7 +53,7 @@ def phase(
         Number of forcing periods at the end, or (first, last) period. By default the last 30 % of a
         forced run, as the picture says, and all of a run without forcing.
     ax : Axes, optional
-        Where to draw; a new figure by default.
+        Axes to draw into; a new figure by default.
     poincare : bool
         Whether to draw the Poincare points.
     units : mapping of str to str, optional
@@ -74,18 +74,18 @@ def phase(
     labels = selection.chosen(run, trajectory)
     singles = [selection.single(run, label) for label in labels] or [selection.single(run, None)]
     share = SETTLED_SHARE if "period" in run else 1.0
-    windows = [selection.window(one, periods, share) for one in singles]
-    curves = [_values(one, pair, shown) for one, shown in zip(singles, windows, strict=True)]
+    windows = [selection.window(motion, periods, share) for motion in singles]
+    curves = [_values(motion, pair, shown) for motion, shown in zip(singles, windows, strict=True)]
     scales = _scales(run, pair, np.concatenate(curves), selection.units_of_states(run, units))
     with draw.panels(ax, 1, (4.6, 3.1)) as (panel,):
         if kind_of(run) != STROBOSCOPE and all(begin == end for begin, end in windows):
             draw.say(panel, "It stopped where it began: there is no motion to draw.", *singles)
             return panel
-        for i, (one, shown) in enumerate(zip(singles, windows, strict=True)):
-            name = selection.named(run, one, labels[i]) if len(labels) > 1 else None
+        for i, (motion, shown) in enumerate(zip(singles, windows, strict=True)):
+            name = selection.named(run, motion, labels[i]) if len(labels) > 1 else None
             color = CYCLE[i % len(CYCLE)] if name else None
             if kind_of(run) != STROBOSCOPE:
-                _curve(panel, one, pair, shown, scales, color, name)
+                _curve(panel, motion, pair, shown, scales, color, name)
             if poincare or kind_of(run) == STROBOSCOPE:
                 part = (
                     f", {shown[0]:g} T to {shown[1]:g} T"
@@ -94,15 +94,15 @@ def phase(
                 )
                 _dots(
                     panel,
-                    selection.stroboscope_points(one, pair, *shown),
+                    selection.stroboscope_points(motion, pair, *shown),
                     scales,
                     color,
                     name or f"Poincaré points{part}",
                 )
-            draw.note_status(panel, one)
+            draw.note_status(panel, motion)
         _frame(panel, singles[0], pair, np.concatenate(curves), scales)
         if legend:
-            # the names of gaps
+            # The names of gaps take the room next to the Axes.
             right = 1.25 if any(text.get_position()[0] > 1.0 for text in panel.texts) else 1.02
             draw.legend(
                 panel, regions.find(singles[0], pair), loc="upper left", bbox_to_anchor=(right, 1)
@@ -133,7 +133,7 @@ def _pair(run: xr.Dataset, states: Any) -> tuple[str, str]:
 
 
 def _values(ds: xr.Dataset, pair: tuple[str, str], shown: tuple[float, float]) -> np.ndarray:
-    """All points of one trajectory that will be drawn, shape (point, 2)."""
+    """Points of one trajectory in the window, shape (point, 2)."""
     if kind_of(ds) == STROBOSCOPE:
         return selection.stroboscope_points(ds, pair, *shown)
     return selection.path(ds, pair, *shown).values
@@ -160,7 +160,7 @@ def _curve(
     color: str | None,
     name: str | None,
 ) -> None:
-    """The orbit: a colour for each region, or one colour of its own among several."""
+    """Draw the orbit: a colour for each region, or one colour if there are several trajectories."""
     curve = selection.path(ds, pair, *shown)
     x, y = (curve.values[:, i] * scales[i].factor for i in (0, 1))
     width = 1.0 if shown[1] - shown[0] <= 40 or "period" not in ds else 0.6
@@ -174,7 +174,7 @@ def _curve(
 def _dots(
     ax: Axes, points: np.ndarray, scales: tuple[Scale, Scale], color: str | None, name: str
 ) -> None:
-    """The Poincare points; smaller where they are many."""
+    """Draw the Poincaré points; smaller if there are many."""
     size = 4.5 if len(points) <= 60 else 2.5 if len(points) <= 500 else 1.2
     label = name if color is None or name not in ax.get_legend_handles_labels()[1] else None
     marks = {
@@ -200,14 +200,14 @@ def _dots(
 def _frame(
     ax: Axes, ds: xr.Dataset, pair: tuple[str, str], values: np.ndarray, scales: tuple[Scale, Scale]
 ) -> None:
-    """Limits, gap lines and names of the axes."""
+    """Set limits, gap lines and names of the axes."""
     directions: tuple[draw.Direction, draw.Direction] = ("x", "y")
-    own = [regions.along(ds, name) for name in pair]
+    state_regions = [regions.along(ds, name) for name in pair]
     for i, direction in enumerate(directions):
-        marks = [boundary.value * scales[i].factor for boundary in own[i].boundaries]
+        marks = [boundary.value * scales[i].factor for boundary in state_regions[i].boundaries]
         draw.set_limits(ax, direction, values[:, i] * scales[i].factor, marks)
     for i, direction in enumerate(directions):
-        draw.draw_gaps(ax, direction, own[i], scales[i])
+        draw.draw_gaps(ax, direction, state_regions[i], scales[i])
     draw.few_ticks(ax)
     ax.set_xlabel(scales[0].label(pair[0]))
     ax.set_ylabel(scales[1].label(pair[1]))

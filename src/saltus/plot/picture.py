@@ -1,5 +1,5 @@
-"""What every public picture does besides its work: check its arguments, name itself in messages,
-and leave no text that can't be drawn.
+"""Checks that every public picture shares: of its arguments, of its name in messages, and of text
+that can't be drawn.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class PictureError(ParameterError):
 def picture(
     *, needs: Sequence[str] = (), checks: bool = True
 ) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Make a function that draws Axes or a Figure a public picture.
+    """Turn a function that draws Axes or a Figure into a public picture.
 
     Names of maps, outputs and boundaries may hold dollar signs. What is a formula between two of
     them is drawn as one; what isn't, and would end saving the figure, is drawn as it is written.
@@ -94,7 +94,7 @@ def check(
     Parameters
     ----------
     ds : Any
-        What was given.
+        The argument of the picture.
     needs : sequence of str
         Variables.
     kinds : sequence of str, optional
@@ -102,10 +102,10 @@ def check(
     argument : str, optional
         Argument that it was given as, if it isn't the first one.
     """
-    of = f"{caller()}({argument}=)" if argument else caller()
+    call = f"{caller()}({argument}=)" if argument else caller()
     wanted, kind = tuple(kinds) or TAKES[_NAME.get()], schema.kind_of(ds)
     try:
-        schema.check(ds, caller=of, kinds=wanted)
+        schema.check(ds, caller=call, kinds=wanted)
     except ParameterError as error:
         others = [f"plot.{name}" for name in pictures_of(kind)] if kind not in wanted else []
         better = f" Draw it with {_either(others)}." if others else ""
@@ -113,7 +113,7 @@ def check(
     missing = [one for one in needs if one not in ds.variables]
     if missing:
         raise PictureError(
-            f"{of} misses {', '.join(missing)} in this Dataset. Give it the whole Dataset, not "
+            f"{call} misses {', '.join(missing)} in this Dataset. Give it the whole Dataset, not "
             f"some variables of it."
         )
 
@@ -124,9 +124,7 @@ def _either(names: Sequence[str]) -> str:
 
 
 def keep_drawable(artist: Artist) -> None:
-    """Have every text of a Figure or Axes drawn as it is written if Matplotlib can't read the
-    formulas in it.
-    """
+    """Make every text of a Figure or Axes plain if Matplotlib can't read the formulas in it."""
     for text in artist.findobj(Text):
         if isinstance(text, Text) and drawable(text.get_text()) != text.get_text():
             text.set_text(drawable(text.get_text()))
@@ -134,8 +132,8 @@ def keep_drawable(artist: Artist) -> None:
 
 @functools.lru_cache(maxsize=256)
 def drawable(text: str) -> str:
-    """The text itself if Matplotlib can read the formulas in it, else one that is drawn as it is
-    written.
+    """Return the text if Matplotlib can read the formulas in it, else one that is drawn
+    literally.
     """
     parser: Any = MathTextParser("path")
     try:

@@ -1,4 +1,4 @@
-"""Which side of which contact a sample lies on, and the colour and name of that side."""
+"""Side of each contact on which a sample lies, and the colour and name of that side."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class ContactLine:
     name : str
         Name of the guard.
     value : float
-        Where it lies [unit of the state].
+        Its position [unit of the state].
     """
 
     name: str
@@ -44,8 +44,8 @@ class ContactLine:
 
 @dataclass(frozen=True)
 class Region:
-    """One side: its colour, its name in a legend, whether it is a contact and the interval of the
-    state that it covers.
+    """One side: its colour, its name in a legend, True for a contact, and the interval of the state
+    that it covers.
     """
 
     color: str
@@ -57,7 +57,7 @@ class Region:
 
 @dataclass(frozen=True)
 class Regions:
-    """All sides that a picture tells apart.
+    """Sides that a picture distinguishes.
 
     Attributes
     ----------
@@ -91,9 +91,7 @@ def _mask(bits: Sequence[int]) -> int:
 
 
 def _positive(mode: np.ndarray, bits: Sequence[int]) -> np.ndarray:
-    """How many of the guards are positive: along one state that is the place among
-    its boundaries.
-    """
+    """Count the positive guards. Along one state the count is the index among its boundaries."""
     return sum(
         ((np.asarray(mode) >> bit) & 1 for bit in bits),
         start=np.zeros(np.shape(mode), dtype=np.int64),
@@ -125,8 +123,8 @@ def find(ds: xr.Dataset, shown: Sequence[str]) -> Regions:
 
 
 def _by_holding(ds: xr.Dataset, shown: Sequence[str], held: Sequence[int]) -> Regions:
-    """A colour for every set of contacts that are held together; the boundaries of the first state
-    that has any.
+    """Regions with a colour for every set of contacts that are held together, and the boundaries of
+    the first state that has any.
     """
     owners = ds["guard_state"].values.tolist()
     lines = next((along(ds, state).boundaries for state in shown if state in owners), ())
@@ -145,7 +143,7 @@ def _by_holding(ds: xr.Dataset, shown: Sequence[str], held: Sequence[int]) -> Re
 
 
 def along(ds: xr.Dataset, state: str) -> Regions:
-    """The regions between the boundaries of one state; a single free one if it has none."""
+    """Regions between the boundaries of one state; one free region if there are none."""
     values = ds["guard_boundary"].values
     mine = [
         i
@@ -168,10 +166,10 @@ def along(ds: xr.Dataset, state: str) -> Regions:
 
 
 def _free_region(boundaries: Sequence[ContactLine]) -> int:
-    """Which region is free of contact: above the guards called lower and below those called upper,
-    else the one that holds zero.
+    """Index of the region free of contact: above the guards called lower and below those called
+    upper, else the region that holds zero.
 
-    Where zero is itself a boundary it is the middle one, and below a single boundary.
+    If zero is a boundary, it is the middle region, and the region below a single boundary.
     """
     lower = ["lower" in boundary.name for boundary in boundaries]
     if boundaries and all(
@@ -184,7 +182,9 @@ def _free_region(boundaries: Sequence[ContactLine]) -> int:
 
 
 def _contact_label(boundary: ContactLine) -> str:
-    """``upper_gap`` bounds the ``upper contact``; ``pitch = pitch_gap`` is no such name."""
+    """Name of the contact at a boundary: ``upper contact`` for ``upper_gap``; ``beyond ...`` for a
+    boundary without such a name.
+    """
     stem = boundary.name.removesuffix("_gap")
     return (
         f"{stem.replace('_', ' ')} contact"
@@ -194,8 +194,8 @@ def _contact_label(boundary: ContactLine) -> str:
 
 
 def _by_mode(ds: xr.Dataset) -> Regions:
-    """A colour for every combination of sides that occurs, named after the sides; where all guards
-    are contacts of a structure, after those that touch.
+    """Regions with a colour for every combination of sides that occurs, named after the sides. If
+    all guards are contacts of a structure, they are named after the contacts that touch.
     """
     names = ds["guard"].values.tolist()
     codes = np.unique(_modes(ds))
@@ -215,7 +215,7 @@ def _by_mode(ds: xr.Dataset) -> Regions:
 
 
 def _touching_sides(ds: xr.Dataset) -> dict[int, int]:
-    """Of each guard that is a contact of `sl.structure` the bit with which it touches."""
+    """Value of the guard's bit at touch, for each guard that is a contact of `sl.structure`."""
     equations = " ".join(equations_of(ds))
     sides = {}
     for i, name in enumerate(map(str, ds["guard"].values)):
@@ -226,18 +226,23 @@ def _touching_sides(ds: xr.Dataset) -> dict[int, int]:
 
 
 def _by_touching(codes: np.ndarray, names: Sequence[str], touching: Mapping[int, int]) -> Regions:
-    """A colour for every set of contacts that touch together, or for their number."""
+    """Regions with a colour for every set of contacts that touch together, or for the number of
+    contacts.
+    """
     sets = [
         [names[bit] for bit, side in touching.items() if int(code) >> bit & 1 == side]
         for code in codes
     ]
-    if len({tuple(one) for one in sets}) > _OWN_SETS:
-        keys = [f"{len(one)} contacts" if len(one) > 1 else "1 contact" for one in sets]
+    if len({tuple(members) for members in sets}) > _OWN_SETS:
+        keys = [f"{len(members)} contacts" if len(members) > 1 else "1 contact" for members in sets]
     else:
-        keys = [" and ".join(one) + (" touch" if len(one) > 1 else " touches") for one in sets]
-    labels = [key if one else "free" for key, one in zip(keys, sets, strict=True)]
+        keys = [
+            " and ".join(members) + (" touch" if len(members) > 1 else " touches")
+            for members in sets
+        ]
+    labels = [key if members else "free" for key, members in zip(keys, sets, strict=True)]
     ranked = sorted(
-        {label: len(one) for label, one in zip(labels, sets, strict=True)}.items(),
+        {label: len(members) for label, members in zip(labels, sets, strict=True)}.items(),
         key=lambda item: item[1],
     )
     others = [color for color in (*_ABOVE, *_BELOW, *CYCLE) if color != _FREE]
@@ -250,15 +255,15 @@ def _by_touching(codes: np.ndarray, names: Sequence[str], touching: Mapping[int,
 
 
 def _modes(ds: xr.Dataset) -> np.ndarray:
-    """The modes of the samples and behind the contacts."""
+    """Modes of the samples and after the contacts."""
     if "mode" not in ds:
         return np.zeros(1, dtype=np.int64)
     return np.concatenate([np.ravel(ds["mode"].values), ds["contact_mode_after"].values])
 
 
 def _freeplay(codes: Sequence[int]) -> tuple[int, int, int] | None:
-    """Where the modes are those of a freeplay: the places of the free one, and of those below and
-    above it.
+    """Indices of the free mode, and of the modes below and above it; None if the modes aren't those
+    of a freeplay.
 
     Two gaps of a freeplay give the modes none, one, both positive if they point the same way, and
     none, one, the other if they don't.
@@ -271,9 +276,7 @@ def _freeplay(codes: Sequence[int]) -> tuple[int, int, int] | None:
 
 
 def _mode_colors(codes: Sequence[int]) -> list[str]:
-    """The colours of a freeplay where the modes are those of one, so that green is free there too;
-    else a colour each.
-    """
+    """Colours of the modes. Those of a freeplay keep green for free; others get one colour each."""
     places = _freeplay(codes)
     if places:
         return [
@@ -285,8 +288,8 @@ def _mode_colors(codes: Sequence[int]) -> list[str]:
 
 
 def _mode_labels(codes: Sequence[int], names: Sequence[str]) -> list[str]:
-    """The sides in words: those of a freeplay by what is met, others by the guards in which they
-    differ; a single one has no name.
+    """Modes in words: those of a freeplay by the contact, others by the guards in which they
+    differ. A single mode has no name.
     """
     places = _freeplay(codes)
     changing = _changing(codes, len(names))
@@ -298,12 +301,12 @@ def _mode_labels(codes: Sequence[int], names: Sequence[str]) -> list[str]:
 
 
 def _changing(codes: Sequence[int], count: int) -> list[int]:
-    """The guards that don't have the same side in all modes."""
+    """Guards that change side between modes."""
     return [bit for bit in range(count) if len({code >> bit & 1 for code in codes}) > 1]
 
 
 def _side(name: str, positive: int) -> str:
-    """A side of a guard: ``gap`` is the name of a boundary, ``x - y = gap`` its equation."""
+    """Side of a guard in words: ``gap`` is the name of a boundary, ``x - y = gap`` its equation."""
     left, equal, right = name.replace("_", " ").partition(" = ")
     return (
         f"{left} {'>' if positive else '<'} {right}"

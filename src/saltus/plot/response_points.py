@@ -1,5 +1,5 @@
-"""What all pictures of responses share: one or several Datasets, which of their responses are
-shown, axes, events, legends.
+"""Parts of all pictures of responses: one or several Datasets, the responses that are shown, axes,
+events, legends.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
 from saltus.results.dataset.kinds import WITHOUT_WORDS
 from saltus.results.dataset.schema import event_name, parameters_of, point_name, response_name
 
-#: What a picture of responses takes: a Dataset, or several by their names.
+#: Input of a picture of responses: a Dataset, or several by their names.
 Source = xr.Dataset | Mapping[str, xr.Dataset]
 #: Variables without which no response can be drawn.
 NEEDS = ("response_of", "response_branch", "response_type", "response_period")
@@ -33,17 +33,21 @@ MARKS = {
     "hopf": ("Hopf", "p"), "graze": ("graze", "^"), "corner": ("two contacts at once", "v"),
     "boundary_equilibrium": ("boundary equilibrium", "P"),
 }  # fmt: skip
-#: Where the marks of events stand, in heights of the Axes.
+#: Height of the lowest marks of events, in heights of the Axes.
 _EVENTS_AT = 1.025
-#: Marks that would overlap stand above each other, so many sizes apart, in up to so many rows.
-_ROW, _MOST_ROWS = 1.3, 3
-#: Mark of the empty axis that keeps the title clear of them.
+#: Distance of marks that would overlap, in sizes of a mark: they stand in rows above each other.
+_ROW = 1.3
+#: Most rows of marks.
+_MOST_ROWS = 3
+#: Mark of the empty axis that keeps the title clear of the marks of events.
 _ROOM = "saltus-room-of-events"
-#: Values this even in their logarithms, and not in themselves, are drawn over a logarithmic axis.
+#: Largest relative difference of steps that count as equal. An axis whose steps are equal only in
+#: the logarithm is logarithmic.
 _EVEN = 1e-6
-#: Up to this number, marks of bifurcations stand on a line through the picture; more are drawn
-#: smaller, without it.
-_MANY_EVENTS, _FEW_EVENTS = 40, 12
+#: Most marks of bifurcations in full size; more are drawn smaller.
+_MANY_EVENTS = 40
+#: Most marks of bifurcations that stand on lines through the picture.
+_FEW_EVENTS = 12
 #: A legend of more entries is set smaller, so that it fits next to its picture.
 _LONG_LEGEND = 14
 
@@ -61,7 +65,7 @@ class Shown:
     place : array of int, shape (response,)
         Index of the response's value among the values of that parameter.
     name : str
-        What the Dataset is called where several are drawn; else empty.
+        Name of the Dataset among several; empty for one alone.
     rank : int
         Its number among them.
     """
@@ -93,7 +97,7 @@ class Shown:
 
 # -- which responses -------------------------------------------------------------------------------
 def shown(source: Any) -> list[Shown]:
-    """The Datasets to draw, each with the responses that are left in it.
+    """Datasets to draw, each with its remaining responses.
 
     Raises
     ------
@@ -145,8 +149,8 @@ def _of(ds: Any, name: str, rank: int) -> Shown:
 
 
 def select(ds: xr.Dataset) -> xr.Dataset:
-    """The Dataset with the responses at the values and starts that are left in it: what remains
-    after ``ds.sel(frequency=...)``.
+    """Dataset with the responses at its remaining values and starts, for example after
+    ``ds.sel(frequency=...)``.
 
     Responses that no start leads to at any value (found by following a branch) stay.
     """
@@ -164,21 +168,21 @@ def select(ds: xr.Dataset) -> xr.Dataset:
 
 
 # -- curves ----------------------------------------------------------------------------------------
-def branch_lines(one: Shown, y: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def branch_lines(shown: Shown, y: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Curves through the responses of ``mask``, neighbours on a branch joined, NaN between the
     pieces; shape (n,) each.
     """
     index = np.flatnonzero(mask)
-    branch, place = one.ds["response_branch"].values[index], one.place[index]
+    branch, place = shown.ds["response_branch"].values[index], shown.place[index]
     order = np.lexsort((place, branch))
     index, branch, place = index[order], branch[order], place[order]
     breaks = np.flatnonzero((np.diff(branch) != 0) | (np.diff(place) > 1)) + 1
-    return np.insert(one.values[index], breaks, np.nan), np.insert(y[index], breaks, np.nan)
+    return np.insert(shown.values[index], breaks, np.nan), np.insert(y[index], breaks, np.nan)
 
 
 # -- axes ------------------------------------------------------------------------------------------
 def is_log(values: np.ndarray) -> bool:
-    """Whether a grid is even in its logarithms rather than in its values."""
+    """True if a grid has equal steps in its logarithms rather than in its values."""
     values = np.sort(np.asarray(values, dtype=float))
     if values.size < 3 or values[0] <= 0:
         return False
@@ -187,14 +191,14 @@ def is_log(values: np.ndarray) -> bool:
 
 
 def parameter_scale(values: np.ndarray, unit: str, log: bool) -> Scale:
-    """Display unit of a parameter; over a logarithmic axis, which shows many sizes at once, the SI
-    unit itself.
+    """Display unit of a parameter. A logarithmic axis shows many sizes at once, so it has the SI
+    unit.
     """
     return Scale(1.0, unit) if log else display_scale(unit, float(np.abs(values).max(initial=0.0)))
 
 
 def parameter_axis(ax: Axes, datasets: Sequence[Shown]) -> Scale:
-    """Name, limits and scale of the horizontal axis; returns its display unit."""
+    """Set name, limits and scale of the horizontal axis; return its display unit."""
     name = datasets[0].axis
     grids = [one.grid for one in datasets]
     values, log = np.concatenate(grids), all(is_log(grid) for grid in grids)
@@ -213,12 +217,12 @@ def parameter_axis(ax: Axes, datasets: Sequence[Shown]) -> Scale:
 
 # -- colours and legend ----------------------------------------------------------------------------
 def dataset_color(one: Shown) -> str:
-    """The colour of a Dataset where several are drawn."""
+    """Colour of a Dataset among several."""
     return CYCLE[one.rank % len(CYCLE)]
 
 
-def kind_handles(one: Shown, of: np.ndarray, markers: bool = False) -> dict[str, Line2D]:
-    """The kinds that occur, in the order of the legend, with their colours, and their markers if
+def kind_handles(one: Shown, kinds: np.ndarray, markers: bool = False) -> dict[str, Line2D]:
+    """Legend handles of the kinds that occur, in order, with their colours, and their markers if
     asked for.
     """
     periods = periods_of(one.ds)
@@ -226,12 +230,12 @@ def kind_handles(one: Shown, of: np.ndarray, markers: bool = False) -> dict[str,
         motion_colors.label(code, periods): dot(
             motion_colors.color(code), motion_colors.marker(code) if markers else "o"
         )
-        for code in np.unique(of).tolist()
+        for code in np.unique(kinds).tolist()
     }
 
 
 def periods_of(ds: xr.Dataset) -> np.ndarray:
-    """Periods of the responses and of the branches, 0 of what doesn't follow a forcing."""
+    """Periods of the responses and of the branches; 0 for those that don't follow a forcing."""
     parts = [ds["response_period"].values] if "response_period" in ds else []
     if "branch_periods" in ds:
         forced = ds["branch_kind"].values == "periodic"
@@ -240,15 +244,15 @@ def periods_of(ds: xr.Dataset) -> np.ndarray:
 
 
 def draw_events(ax: Axes, datasets: Sequence[Shown], scale: Scale) -> None:
-    """Marks above the picture, clear of its ticks, where something happens to a branch; each kind
-    is named once.
+    """Mark the events of branches above the picture, clear of its ticks. Each kind is named
+    once.
     """
     rows = 0
-    for one in datasets:
-        name = event_name(one.axis)
-        if name not in one.ds or not one.ds.sizes.get("event"):
+    for shown in datasets:
+        name = event_name(shown.axis)
+        if name not in shown.ds or not shown.ds.sizes.get("event"):
             continue
-        values, words = one.ds[name].values * scale.factor, one.ds["event_kind"].values
+        values, words = shown.ds[name].values * scale.factor, shown.ds["event_kind"].values
         low, high = ax.get_xlim()
         drawn = np.isin(words, list(MARKS)) & (values >= low) & (values <= high)
         values, words = values[drawn], words[drawn]
@@ -256,13 +260,13 @@ def draw_events(ax: Axes, datasets: Sequence[Shown], scale: Scale) -> None:
         row = _rows(ax, values, size)
         rows = max(rows, int(row.max(initial=-1)) + 1)
         for word, (text, marker) in MARKS.items():
-            here = words == word
-            if not here.any():
+            mine = words == word
+            if not mine.any():
                 continue
-            above = _EVENTS_AT + row[here] * size * _ROW / _points(ax)[1]
+            above = _EVENTS_AT + row[mine] * size * _ROW / _points(ax)[1]
             if values.size <= _FEW_EVENTS:
                 stems = ax.vlines(
-                    values[here],
+                    values[mine],
                     0,
                     above,
                     transform=ax.get_xaxis_transform(),
@@ -273,9 +277,9 @@ def draw_events(ax: Axes, datasets: Sequence[Shown], scale: Scale) -> None:
                 )
                 stems.set(zorder=1, gid=f"line of event {word}")
             ax.plot(
-                values[here], above, transform=ax.get_xaxis_transform(), ls="none", marker=marker,
+                values[mine], above, transform=ax.get_xaxis_transform(), ls="none", marker=marker,
                 ms=size, mfc="white",
-                mec=dataset_color(one) if one.name else QUIET, mew=width, clip_on=False,
+                mec=dataset_color(shown) if shown.name else QUIET, mew=width, clip_on=False,
                 zorder=5, label=text, gid=f"event {word}",
             )  # fmt: skip
     if rows:
@@ -283,30 +287,30 @@ def draw_events(ax: Axes, datasets: Sequence[Shown], scale: Scale) -> None:
 
 
 def _points(ax: Axes) -> np.ndarray:
-    """About the width and the height of an Axes [1/72 inch]."""
+    """Approximate width and height of an Axes [1/72 inch]."""
     figure = ax.get_figure(root=True)
     size = (6.3, 3.4) if figure is None else figure.get_size_inches()
     return np.asarray(72.0 * np.multiply(size, ax.get_position().bounds[2:]))
 
 
 def _rows(ax: Axes, values: np.ndarray, size: float) -> np.ndarray:
-    """In which row each mark of a size [1/72 inch] stands, the lowest in which none of up to
-    _MOST_ROWS overlaps it: int64[e].
+    """Row of each mark of a size [1/72 inch], int64[e]: the lowest of _MOST_ROWS rows in which no
+    mark overlaps it, else the first.
     """
-    place = ax.transAxes.inverted().transform(
+    position = ax.transAxes.inverted().transform(
         ax.transData.transform(np.stack([values, np.zeros(len(values))], axis=1))
     )[:, 0]
     apart, ends = size * _ROW / _points(ax)[0], np.full(_MOST_ROWS, -np.inf)
     row = np.zeros(len(values), np.int64)
-    for i in np.argsort(place, kind="stable"):
-        row[i] = int(np.argmax(free)) if (free := place[i] - ends >= apart).any() else 0
-        ends[row[i]] = place[i]
+    for i in np.argsort(position, kind="stable"):
+        row[i] = int(np.argmax(free)) if (free := position[i] - ends >= apart).any() else 0
+        ends[row[i]] = position[i]
     return row
 
 
 def _raise_titles(ax: Axes, rows: int) -> None:
-    """Make room for the marks below a title, which may be given later: titles keep clear of what an
-    axis at the top says.
+    """Make room for the marks below a title, which may be set later: titles keep clear of an axis
+    at the top.
     """
     if any(one.get_gid() == _ROOM for one in ax.child_axes):
         return
@@ -326,23 +330,23 @@ def _raise_titles(ax: Axes, rows: int) -> None:
 
 
 def say_if_empty(ax: Axes, datasets: Sequence[Shown]) -> None:
-    """Where there is nothing to draw, say so in the picture, and what became of the starts."""
-    if any(one.ds.sizes["response"] for one in datasets):
+    """State in the picture that there are no responses, and the fate of the starts."""
+    if any(shown.ds.sizes["response"] for shown in datasets):
         return
-    labels = np.concatenate([one.ds["response_of"].values.ravel() for one in datasets])
+    labels = np.concatenate([shown.ds["response_of"].values.ravel() for shown in datasets])
     ends = [
         f"{count} {WITHOUT_WORDS[code].replace('_', ' ')}"
         for code in sorted(WITHOUT_WORDS, reverse=True)
         if (count := int(np.count_nonzero(labels == code)))
     ]
-    values = sum(one.ds.sizes[one.axis] for one in datasets)
+    values = sum(shown.ds.sizes[shown.axis] for shown in datasets)
     text = f"no response at any of {values} values" + (f":\n{', '.join(ends)}" if ends else "")
     ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center")
 
 
 def legend(ax: Axes, named: Mapping[str, Any], left: float = 1.02) -> None:
-    """Legend of the colours; above it that of the marks; ``left``: how far, in widths
-    of the Axes.
+    """Draw the legend of the colours, and above it that of the marks. ``left`` is its left edge, in
+    widths of the Axes.
     """
     known = dict(named)
     for handle, text in zip(*ax.get_legend_handles_labels(), strict=True):

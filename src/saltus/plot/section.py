@@ -44,14 +44,14 @@ def section(
     Parameters
     ----------
     ds : Dataset
-        What ``poincare`` returned.
+        Result of ``poincare``.
     x, y : str, optional
         A state, ``"phase"`` (t/T mod 1) or ``"time"``; by default the first two of the states that
         differ between crossings, then phase (if forced), then time.
     trajectory : int or list of int, optional
-        Which of a batch; without it all are laid over one another, at most 8.
+        Trajectory of a batch; without it all are laid over one another, at most 8.
     ax : Axes, optional
-        Where to draw; a new figure by default.
+        Axes to draw into; a new figure by default.
     units : mapping of str to str, optional
         Display units, such as ``{"v": "mm/s"}``; by the size of the numbers by default.
     legend : bool
@@ -93,7 +93,7 @@ def section(
             _frame(panel, ds, direction, name, values[rows], scale)  # type: ignore[arg-type]
         panel.set_title(f"section {ds.attrs.get('surface', '')}", loc="left", fontsize=8)
         if legend and len(panel.get_legend_handles_labels()[1]) > 1:
-            # beside gap names
+            # The names of gaps take the room next to the Axes.
             panel.legend(
                 loc="upper left",
                 bbox_to_anchor=(1.25 if names[1] in ds["guard_state"].values else 1.02, 1),
@@ -110,11 +110,10 @@ def _axes(ds: xr.Dataset, x: str | None, y: str | None) -> tuple[str, str]:
             raise ParameterError(
                 f"this section has no {shown(name)} to draw. {nearest(name, known)}"
             )
-    moving = (
-        [name for name in states_of(ds) if np.ptp(ds[name].values) > 0]
-        if ds.sizes["crossing"]
-        else list(states_of(ds))
-    )
+    sides = {side.strip() for side in str(ds.attrs["surface"]).split("=")}
+    moving = [name for name in states_of(ds) if name not in sides]
+    if ds.sizes["crossing"] and len(moving) == len(states_of(ds)):  # the surface fixes no state
+        moving = [name for name in moving if np.ptp(ds[name].values) > 0]
     free = [name for name in (*moving, *known[len(states_of(ds)) :]) if name not in (x, y)]
     first = x if x is not None else free.pop(0)
     return first, y if y is not None else free[0]
@@ -138,7 +137,7 @@ def _scale(ds: xr.Dataset, name: str, values: np.ndarray, unit: str | None) -> S
 def _groups(
     ds: xr.Dataset, labels: Sequence[int], rows: np.ndarray
 ) -> list[tuple[np.ndarray, str, str]]:
-    """Which crossings share a colour, the colour and its name."""
+    """Groups of crossings, each with its colour and its name."""
     if len(labels) > 1:
         who = ds["crossing_trajectory"].values
         names = [selection.named(ds, ds.sel(trajectory=label), label) for label in labels]
@@ -159,7 +158,7 @@ def _draw(
     color: str,
     name: str,
 ) -> None:
-    """One group of crossings; smaller where they are many."""
+    """Draw one group of crossings; smaller if there are many."""
     count = int(mask.sum())
     size = 4.5 if count <= 60 else 2.5 if count <= 500 else 1.2
     sure = ds["crossing_kind"].values.astype(str) == "crossing"
@@ -180,13 +179,13 @@ def _draw(
 def _frame(
     ax: Axes, ds: xr.Dataset, direction: draw.Direction, name: str, values: np.ndarray, scale: Scale
 ) -> None:
-    """Limits, gap lines and name of one axis."""
+    """Set limits, gap lines and name of one axis."""
     label = scale.label(_OTHERS[name][1] if name in _OTHERS and name not in states_of(ds) else name)
     (ax.set_xlabel if direction == "x" else ax.set_ylabel)(label)
     if name == "phase" and name not in states_of(ds):
         (ax.set_xlim if direction == "x" else ax.set_ylim)(0.0, 1.0)
         return
-    own = (
+    state_regions = (
         regions.along(ds, name)
         if name in states_of(ds) and ds["guard_boundary"].ndim == 1
         else None
@@ -195,9 +194,9 @@ def _frame(
         ax,
         direction,
         values * scale.factor,
-        [b.value * scale.factor for b in own.boundaries] if own else [],
+        [b.value * scale.factor for b in state_regions.boundaries] if state_regions else [],
     )
     if direction == "x":
         draw.few_ticks(ax)
-    if own:
-        draw.draw_gaps(ax, direction, own, scale)
+    if state_regions:
+        draw.draw_gaps(ax, direction, state_regions, scale)

@@ -1,4 +1,4 @@
-"""What part of a run a picture shows: one trajectory, a window of time, the samples and contacts in
+"""Selection from a run for a picture: one trajectory, a window of time, the samples and contacts in
 it.
 """
 
@@ -35,7 +35,7 @@ MOST_STATES = 2
 
 # -- trajectory ------------------------------------------------------------------------------------
 def chosen(run: xr.Dataset, trajectory: Any) -> list[int]:
-    """Labels of the trajectories to show; an empty list for a run of a single one.
+    """Labels of the trajectories to show; an empty list for a run with one trajectory.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def _span(known: list[int]) -> str:
 
 
 def single(run: xr.Dataset, label: int | None) -> xr.Dataset:
-    """One trajectory of a run, with its own contacts only."""
+    """Select one trajectory of a run, with its contacts only."""
     ds = run if label is None else run.sel(trajectory=label)
     if "contact_trajectory" in ds and "trajectory" in ds.coords:
         ds = ds.isel(
@@ -85,8 +85,8 @@ def single(run: xr.Dataset, label: int | None) -> xr.Dataset:
 
 
 def named(run: xr.Dataset, one: xr.Dataset, label: int) -> str:
-    """One trajectory of a batch by what sets it apart: the parameters that vary, else its start if
-    that is known, else its number.
+    """Name of a trajectory of a batch: the parameters that vary, else its start if that is known,
+    else its number.
     """
     varied = json.loads(one.attrs.get("varied_parameters", "[]"))
     known = [one[name] for name in varied if name in one.coords and one[name].ndim == 0]
@@ -104,9 +104,9 @@ def _valued(known: list[xr.DataArray]) -> str:
     return ", ".join(text.replace("_", " ") for text in texts)
 
 
-def _start_that_differs(run: xr.Dataset, one: xr.Dataset) -> list[xr.DataArray]:
-    """The states at the start that aren't the same for all trajectories; none if the start wasn't
-    kept, or more than a legend holds.
+def _start_that_differs(run: xr.Dataset, trajectory: xr.Dataset) -> list[xr.DataArray]:
+    """Initial values of the states that differ between trajectories; none if the start wasn't kept,
+    or they are more than fit a legend.
     """
     dim = sample_dim(run)
     sampled = dim in run.dims and all(name in run for name in states_of(run))
@@ -116,16 +116,22 @@ def _start_that_differs(run: xr.Dataset, one: xr.Dataset) -> list[xr.DataArray]:
         return []
     first = {name: run[name].isel({dim: 0}).values for name in states_of(run)}
     differing = [name for name, values in first.items() if np.ptp(values) > 0.0]
-    return [one[name].isel({dim: 0}) for name in differing] if len(differing) <= MOST_STATES else []
+    return (
+        [trajectory[name].isel({dim: 0}) for name in differing]
+        if len(differing) <= MOST_STATES
+        else []
+    )
 
 
 def rate_of(ds: xr.Dataset, state: str) -> str:
-    """The state that is the rate of another, as v is of x; empty if none is."""
+    """State that is the rate of another, as v is of x; empty if there is none."""
     return next((name for name in states_of(ds) if f"d{state}/dt = {name}" in equations_of(ds)), "")
 
 
 def state_named(run: xr.Dataset, name: str) -> str:
-    """The name, if it is that of a state; else a ParameterError with the nearest one."""
+    """Return the name if it is that of a state; else raise a ParameterError with the nearest
+    name.
+    """
     if not among(name, states_of(run)):
         raise ParameterError(
             f"this run has no state {shown(name)}. {nearest(name, states_of(run))}"
@@ -140,8 +146,7 @@ def units_of_states(run: xr.Dataset, units: Mapping[str, str] | None) -> dict[st
 
 # -- window ----------------------------------------------------------------------------------------
 def window(ds: xr.Dataset, periods: Periods, default_share: float = 1.0) -> tuple[float, float]:
-    """Begin and end of what is shown, in the run's own coordinate: periods if it is forced, else
-    seconds.
+    """Begin and end of the window in the run's coordinate: periods if it is forced, else seconds.
 
     Parameters
     ----------
@@ -162,7 +167,7 @@ def window(ds: xr.Dataset, periods: Periods, default_share: float = 1.0) -> tupl
     if not axis.size:
         raise ParameterError("this run holds no samples.")
     there = np.isfinite(np.stack([ds[name].values for name in states_of(ds)])).all(axis=0)
-    # one that stopped early has no more
+    # A trajectory that stopped early ends in NaN.
     first, last = float(axis[0]), float(axis[there][-1] if there.any() else axis[0])
     if there.sum() < 2:
         return first, first
@@ -239,8 +244,8 @@ def contacts_in(ds: xr.Dataset, begin: float, end: float) -> xr.Dataset:
 
 
 def path(ds: xr.Dataset, states: tuple[str, ...], begin: float, end: float) -> Path:
-    """The curve of one trajectory in the window, with the contacts put in, so that colours change
-    exactly there; where a state jumps, with both sides of the jump.
+    """Curve of one trajectory in the window. Contacts are inserted, so that colours change exactly
+    there; at a jump both sides are.
     """
     axis = sample_axis(ds)
     slack = 1e-9 * max(1.0, abs(end))
@@ -261,7 +266,7 @@ def path(ds: xr.Dataset, states: tuple[str, ...], begin: float, end: float) -> P
         [joined(name, [of_state(name) for of_state, _ in sides]) for name in states], axis=-1
     )
     mode = joined("mode", [name for _, name in sides])
-    # at equal times the contacts come last: the curve goes on in their mode
+    # At equal times contacts come last: the curve continues in their mode.
     order = np.argsort(time, kind="stable")
     return Path(time[order], values[order], mode[order])
 
@@ -275,7 +280,7 @@ def stroboscope_points(
     if "period" not in ds:
         return np.empty((0, len(states)))
     axis = sample_axis(ds)
-    # a millionth of a period is far less than the distance of two samples
-    whole = np.abs(axis - np.round(axis)) < 1e-6
-    index = np.flatnonzero(whole & (axis >= begin - 1e-6) & (axis <= end + 1e-6))
+    # A millionth of a period is far less than the distance of two samples.
+    at_periods = np.abs(axis - np.round(axis)) < 1e-6
+    index = np.flatnonzero(at_periods & (axis >= begin - 1e-6) & (axis <= end + 1e-6))
     return np.stack([ds[name].values[index] for name in states], axis=-1)

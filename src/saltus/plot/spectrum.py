@@ -1,4 +1,4 @@
-"""Amplitude spectrum: lines of a periodic response, a curve of any other."""
+"""Amplitude spectrum: lines for a periodic response, a curve for any other."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ def spectrum(
     Parameters
     ----------
     ds : Dataset
-        What ``spectrum`` returned.
+        Result of ``spectrum``.
     state : str, optional
         Name of the state; the first one by default.
     trajectory : int or list of int, optional
-        Which of a batch; without it all are laid over one another, at most 8.
+        Trajectory of a batch; without it all are laid over one another, at most 8.
     ax : Axes, optional
-        Where to draw; a new figure by default.
+        Axes to draw into; a new figure by default.
     highest : float, optional
         Highest frequency to show [Hz]; by default the last one with 1e-5 of the largest amplitude,
         and at least order 5.
@@ -72,7 +72,7 @@ def spectrum(
         raise ParameterError(f"this spectrum has no state {shown(state)}. {nearest(state, known)}")
     labels = selection.chosen(ds, trajectory)
     singles = [ds.sel(trajectory=label) for label in labels] or [ds]
-    curves = [np.asarray(one[f"{state}_amplitude"].values, dtype=float) for one in singles]
+    curves = [np.asarray(motion[f"{state}_amplitude"].values, dtype=float) for motion in singles]
     largest = max((float(np.nanmax(curve, initial=0.0)) for curve in curves), default=0.0) or 1.0
     scale = display_scale(
         ds[f"{state}_amplitude"].attrs.get("units", ""),
@@ -84,15 +84,17 @@ def spectrum(
             draw.say(panel, "There is no spectrum: the motion stopped before its end.", *singles)
             return panel
         floor = _SHOWN * largest * scale.factor / 3
-        for i, (one, curve) in enumerate(zip(singles, curves, strict=True)):
-            name = selection.named(ds, one, labels[i]) if len(labels) > 1 else None
-            _curve(panel, one, curve * scale.factor, floor, CYCLE[i % len(CYCLE)], name)
+        for i, (motion, curve) in enumerate(zip(singles, curves, strict=True)):
+            name = selection.named(ds, motion, labels[i]) if len(labels) > 1 else None
+            _curve(panel, motion, curve * scale.factor, floor, CYCLE[i % len(CYCLE)], name)
         panel.set_yscale("log")
         panel.set_ylim(floor, 3 * largest * scale.factor)
         top = (
             float(highest)
             if highest is not None
-            else max(_top(one, curve, largest) for one, curve in zip(singles, curves, strict=True))
+            else max(
+                _top(motion, curve, largest) for motion, curve in zip(singles, curves, strict=True)
+            )
         )
         panel.set_xlim(0.0, top)
         panel.set_xlabel("frequency [Hz]")
@@ -106,7 +108,7 @@ def spectrum(
 def _curve(
     ax: Axes, one: xr.Dataset, values: np.ndarray, floor: float, color: str, name: str | None
 ) -> None:
-    """Stems of a response that repeats, a curve of any other."""
+    """Draw stems for a response that repeats, a curve for any other."""
     frequency = one["frequency"].values
     if int(one["response_period"]) and one["window"].item() == "none":
         seen = values > floor
@@ -129,8 +131,8 @@ def _top(one: xr.Dataset, values: np.ndarray, largest: float) -> float:
 
 
 def _mark_orders(ax: Axes, singles: Sequence[xr.Dataset], top: float) -> None:
-    """Whole orders of the forcing as quiet lines, with an axis at the top; only where all
-    trajectories share a forcing frequency.
+    """Draw whole orders of the forcing as quiet lines, with an axis at the top, if all trajectories
+    share a forcing frequency.
     """
     forcing = {
         float(one["frequency"].values[-1] / one["order"].values[-1])

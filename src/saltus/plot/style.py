@@ -51,8 +51,7 @@ def style() -> Iterator[None]:
     The functions of this package use it themselves when they make the figure. A figure keeps its
     fonts and sizes when it is drawn or saved after the context has ended.
     """
-    # loads the backend, which may switch interaction on: inside the context that would be undone at
-    # its end
+    # Load the backend now: it may switch interaction on, which the end of the context would undo.
     plt.draw_if_interactive()
     with plt.style.context(_STYLE_FILE):
         # A generic family is resolved when a figure is saved, by the settings of that moment; a
@@ -69,21 +68,21 @@ def style() -> Iterator[None]:
 
 
 def styled(figure: Figure | None) -> bool:
-    """Whether a figure was made in the style, so that what is drawn into it later should be drawn
-    in the style too.
+    """True if a figure was made in the style. What is drawn into it later should be drawn in the
+    style too.
     """
     return figure is not None and figure.get_gid() == _MARK
 
 
 def _fonts(wanted: list[str]) -> list[str]:
-    """The fonts of a list that this machine has; Matplotlib brings the last one."""
+    """Fonts of a list that this machine has; Matplotlib brings the last one."""
     known = {font.name for font in fontManager.ttflist}
     return [name for name in wanted if name in known]
 
 
 def _keep_ticks(figure: Figure) -> None:
-    """Ticks are made as they are needed, by the settings of that moment: write the present ones
-    into the axes, but where a picture chose its own.
+    """Write the style of the present ticks into the axes, except where a picture chose its own:
+    Matplotlib makes ticks late, by the settings of that moment.
     """
     now: dict[str, Any] = {str(name): value for name, value in plt.rcParams.items()}
     for ax in figure.axes:
@@ -119,7 +118,7 @@ _AT_LEAST = 0.1
 
 @dataclass(frozen=True)
 class Scale:
-    """How a quantity is shown: multiply by ``factor``, write ``unit``."""
+    """Scale of a quantity in a picture: multiply by ``factor``, write ``unit``."""
 
     factor: float
     unit: str
@@ -136,7 +135,7 @@ class Scale:
 
 
 def display_scale(unit: str, largest: float, wanted: str | None = None) -> Scale:
-    """The prefix under which numbers of this size are best read.
+    """Choose the prefix under which numbers of this size read best.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Map of two parameters: which kind of motion a start settles to."""
+"""Map of two parameters: the kind of motion that a start settles to."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ def type_map(ds: xr.Dataset, *, start: int = 0, legend: bool = True, ax: Any = N
     Parameters
     ----------
     ds : Dataset
-        What ``sl.bifurcation_diagram`` returned with two entries in ``vary``.
+        Result of ``sl.bifurcation_diagram`` with two entries in ``vary``.
     start : int
-        Which start, by its number: each leads to a map of its own.
+        Number of the start. Each start has its own map.
     legend : bool
         Whether to draw the legend of the colours, with their shares.
     ax : Axes, optional
-        Where to draw; a new figure by default.
+        Axes to draw into; a new figure by default.
 
     Returns
     -------
@@ -64,11 +64,11 @@ def type_map(ds: xr.Dataset, *, start: int = 0, legend: bool = True, ax: Any = N
             f"{caller()} draws two parameters, this Dataset has {', '.join(pair) or 'none'}. See "
             f"plot.bifurcation_diagram."
         )
-    one = _of_start(ds, start).transpose(*pair, ...)
+    chosen = _of_start(ds, start).transpose(*pair, ...)
     code = np.where(
-        one["response_of"].values < 0,
-        one["response_of"].values,
-        motion_colors.codes(one["type"].values, one["period"].values),
+        chosen["response_of"].values < 0,
+        chosen["response_of"].values,
+        motion_colors.codes(chosen["type"].values, chosen["period"].values),
     )
     sides = cells.parameter(ds, pair[0]), cells.parameter(ds, pair[1])
     with draw.panels(ax, 1, (5.8, 3.9)) as (panel,):
@@ -76,7 +76,7 @@ def type_map(ds: xr.Dataset, *, start: int = 0, legend: bool = True, ax: Any = N
         cells.draw_cells(panel, sides, cells.paint(code, colors))
         panel.set_title(_title(ds, start))
         if legend:
-            handles = [_handle(key, code, one["period"].values) for key in _order(code)]
+            handles = [_handle(key, code, chosen["period"].values) for key in _order(code)]
             panel.legend(
                 handles=handles,
                 loc="upper left",
@@ -99,8 +99,8 @@ def _of_start(ds: xr.Dataset, start: int) -> xr.Dataset:
 
 
 def _order(code: np.ndarray) -> list[int]:
-    """Kinds in the order of the legend: by period, then what never repeats, then what never
-    settles.
+    """Kinds in the order of the legend: by period, then motion that never repeats, then starts that
+    never settle.
     """
     found = np.unique(code).tolist()
     return [key for key in found if key > 0] + [key for key in found[::-1] if key < 0]
@@ -121,13 +121,13 @@ def _handle(key: int, code: np.ndarray, period: np.ndarray) -> Patch:
 
 
 def _title(ds: xr.Dataset, start: int) -> str:
-    """The start in words; of a sweep its direction."""
-    one = ds.sel(start=start) if "start" in ds.dims else ds
-    if "start_direction" in one.coords:
-        return f"swept {one['start_direction'].item()}"
-    names = [name for name in states_of(ds) if start_name(name) in one.coords]
+    """Start in words; the direction of a sweep."""
+    ds = ds.sel(start=start) if "start" in ds.dims else ds
+    if "start_direction" in ds.coords:
+        return f"swept {ds['start_direction'].item()}"
+    names = [name for name in states_of(ds) if start_name(name) in ds.coords]
     return ", ".join(
         f"{name} = "
-        f"{from_si(float(one[start_name(name)]), one[start_name(name)].attrs.get('units', ''), 4)}"
+        f"{from_si(float(ds[start_name(name)]), ds[start_name(name)].attrs.get('units', ''), 4)}"
         for name in names
     )

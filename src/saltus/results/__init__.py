@@ -1,4 +1,4 @@
-"""Results: the schema of every Dataset, where it comes from, and files."""
+"""Results: the schema of every Dataset, its provenance, and files."""
 
 from saltus.results import kinds as kinds
 from saltus.results.dataset.attractors import AttractorTable

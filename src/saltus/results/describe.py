@@ -1,4 +1,4 @@
-"""`describe`: a few lines on a result."""
+"""`describe`: the content of a result in a few lines."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ _LINES = 8
 
 @reader
 def describe(ds: xr.Dataset) -> str:
-    """A few lines on what a result holds and where it comes from.
+    """Describe the content and the origin of a result in a few lines.
 
     Parameters
     ----------
     ds : Dataset
-        What any function of saltus returned, or :func:`~saltus.results.load`.
+        Result of any function of saltus, or of :func:`~saltus.results.load`.
 
     Returns
     -------
@@ -54,8 +54,8 @@ def describe(ds: xr.Dataset) -> str:
 
 
 def headline(ds: xr.Dataset) -> str:
-    """The content of a result in a line or a few, such as ``delangre: 60 T, 162 contacts, ok, no
-    unresolved graze``; ``""`` for a Dataset that isn't one.
+    """Content of a result in one line or a few, such as ``delangre: 60 T, 162 contacts, ok, no
+    unresolved graze``; ``""`` for a Dataset that isn't a result.
     """
     if not kind_of(ds):
         return ""

@@ -1,5 +1,4 @@
-"""Where a result comes from: attributes that are enough to compute it again, and a hash of its
-numbers.
+"""Origin of a result: attributes that are enough to compute it again, and a hash of its numbers.
 
 Nothing here depends on the clock, the host or the user: the same computation gives the same
 attributes, so files compare bit by bit.
@@ -20,7 +19,7 @@ import xarray as xr
 
 #: Packages whose versions can change the digits of a result or the layout of its file.
 _PACKAGES = ("numpy", "llvmlite", "xarray", "saltus")
-#: Made once: ``json.dumps`` with an option makes one each time.
+#: Encoder for all calls: ``json.dumps`` with an option makes a new one each time.
 _JSON = json.JSONEncoder(ensure_ascii=False)
 
 
@@ -83,7 +82,7 @@ def attributes(
 
 
 def inherited(ds: xr.Dataset) -> dict[str, Any]:
-    """Attributes of a result that one made of it takes over."""
+    """Attributes that a result takes over from the result that it is made of."""
     return {
         str(key): value
         for key, value in ds.attrs.items()
@@ -92,7 +91,7 @@ def inherited(ds: xr.Dataset) -> dict[str, Any]:
 
 
 def made_by() -> dict[str, str]:
-    """What made a result that comes from no system: the versions."""
+    """Attributes of a result without a system: the versions of saltus and its libraries."""
     return {"saltus_version": version("saltus"), "versions": _versions()}
 
 
@@ -150,8 +149,8 @@ def hash_of(variables: Mapping[str, tuple[tuple[Hashable, ...], np.ndarray]]) ->
 
 
 def file_hash(ds: xr.Dataset) -> str:
-    """SHA-256 of the numbers and of every attribute, in hexadecimal: what must come back from a
-    file.
+    """SHA-256 of the numbers and of every attribute, in hexadecimal: equal before writing and after
+    reading.
     """
     owners = {"": ds.attrs} | {str(name): variable.attrs for name, variable in ds.variables.items()}
     attrs = {

@@ -15,7 +15,7 @@ from saltus.units import from_si, titled
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Rows printed at most; the files hold them all.
+#: Most rows printed; the files hold all rows.
 ROWS = 24
 
 
@@ -47,12 +47,12 @@ class TextTable:
 # -- tables of numbers -----------------------------------------------------------------------------
 @dataclass(frozen=True)
 class Column:
-    """A column as it is shown, and the columns of numbers behind it.
+    """Column as it is printed, and the columns of numbers for the file.
 
     Attributes
     ----------
     heading : str
-        What stands above it on the screen.
+        Title on the screen.
     text : callable
         The text of a row on the screen, by the number of the row.
     data : mapping of str to sequence
@@ -68,7 +68,7 @@ class Column:
 def quantity(
     heading: str, values: Any, unit: str, digits: int = 4, name: str | None = None
 ) -> Column:
-    """Numbers with a unit, each shown as people write it: ``0.4 mm``; ``-`` where there is none.
+    """Numbers with a unit and a prefix: ``0.4 mm``; ``-`` where there is none.
 
     ``name`` is the heading in the file, if it is another.
     """
@@ -115,7 +115,7 @@ def number(
 
 
 def words(heading: str, values: Any, name: str | None = None) -> Column:
-    """Words, or whole numbers that stand for something."""
+    """Words, or whole numbers that serve as names."""
     found = _items(values)
     return Column(heading, lambda i: str(found[i]), {name or heading: found})
 
@@ -165,14 +165,12 @@ def left_out(count: int, what: str, shown: int = ROWS) -> list[str]:
 
 
 def spread(count: int) -> list[int]:
-    """Numbers of :data:`ROWS` rows in even steps over so many, the first and the last among
-    them.
-    """
+    """:data:`ROWS` row numbers in even steps, with the first and the last row."""
     return [*dict.fromkeys(i * (count - 1) // (ROWS - 1) for i in range(ROWS if count else 0))]
 
 
 def _cell(value: Any) -> str:
-    """A value as a program reads it, with every digit."""
+    """Text of a value for programs, with every digit."""
     return (
         ""
         if value is None or value != value
@@ -197,8 +195,8 @@ def of_trajectory(
     like: xr.DataArray | None = None,
     heading: str = "trajectory",
 ) -> list[Column]:
-    """Columns of the trajectory that each row is of, by a variable that holds its number, and of
-    the parameters that set it apart; none of a result that holds one. ``like``: see :func:`flat`.
+    """Columns for the trajectory of each row: its number, and the parameters that distinguish it;
+    none if the result holds one trajectory. ``like``: see :func:`flat`.
     """
     if "trajectory" not in ds.dims:
         return []

@@ -1,4 +1,4 @@
-"""Words that every text on a result shares: the lines of `describe`, the tables of studies, the
+"""Words that all texts on a result share: the lines of `describe`, the tables of studies, the
 headers of files.
 """
 
@@ -12,7 +12,7 @@ import xarray as xr
 from saltus.results.dataset.schema import kind_text
 from saltus.units import titled
 
-#: Things that get a line of their own in an account; the others are counted.
+#: Most things that an account lists, a line each; the others are counted.
 LINES = 12
 
 
@@ -27,7 +27,7 @@ def sized(value: xr.DataArray, form: str = ".4g") -> str:
 
 
 def header(ds: xr.Dataset, name: str) -> str:
-    """What stands above a variable as a column: ``x [m]``."""
+    """Heading of a variable as a column: ``x [m]``."""
     return titled(name, unit_of(ds[name]))
 
 
@@ -45,13 +45,13 @@ def kind_texts(ds: xr.Dataset, prefix: str) -> list[str]:
 
 
 def tally(words: np.ndarray | Sequence[str]) -> dict[str, int]:
-    """How often each word stands there, in the order of the alphabet."""
+    """Count each word, in alphabetical order."""
     found, counts = np.unique(np.atleast_1d(words).astype(str), return_counts=True)
     return dict(zip(found.tolist(), counts.tolist(), strict=True))
 
 
 def ended_early(ds: xr.Dataset) -> dict[str, int]:
-    """How many trajectories ended early, by how they did."""
+    """Count the trajectories that ended early, by their status."""
     return {word: count for word, count in tally(ds["status"].values).items() if word != "ok"}
 
 
@@ -67,12 +67,12 @@ def meanings(variable: xr.DataArray) -> Mapping[int, str]:
 
 
 def more(count: int) -> list[str]:
-    """A line on those that have none of their own."""
+    """Line on the number of things that have no line themselves."""
     return [f"  and {count - LINES} more"] if count > LINES else []
 
 
 def span(ds: xr.Dataset, names: tuple[str, ...], what: str) -> str:
-    """The line on how many there are along each coordinate, and from where to where they reach."""
+    """Line on the number of values along each coordinate, and their range."""
     parts = []
     for name in names:
         values, unit = ds[name].values, unit_of(ds[name])

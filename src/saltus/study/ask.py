@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a question of a study comes to.
+    """Answer to a question of a study.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class Answer:
     dataset : Dataset
         All of it.
     rows : list of TextTable
-        What it says, in rows.
+        The answer in rows.
     """
 
     question: Question
@@ -68,7 +68,7 @@ def ask(
     own : System, optional
         The system, if it isn't one of saltus's models.
     inputs : Inputs, optional
-        Where the files are that the study names; by default none may be read.
+        Files that the study names; by default none may be read.
     only : sequence of str
         Names of questions to answer; by default all.
     threads : int, optional
@@ -108,7 +108,7 @@ def ask(
 
 
 class NoInputs(Inputs):
-    """Where no file may be read."""
+    """Inputs of a study that may read no file."""
 
     def __init__(self) -> None:
         super().__init__(Path())
@@ -132,7 +132,7 @@ def naming_table(table: str) -> Iterator[None]:
 def questions_of(
     study: Study, own: System | None, inputs: Inputs, only: Sequence[str] = ()
 ) -> list[Question]:
-    """The questions of a study, or some of them, checked against its system.
+    """Questions of a study, or some of them, checked against its system.
 
     Raises
     ------
@@ -172,7 +172,7 @@ def questions_of(
 
 
 def _names(question: Question) -> set[str]:
-    """What a question may be called."""
+    """Return the names by which a question may be called."""
     return {
         name for name in (question.place, question.group, question.title, question.stem) if name
     }

@@ -1,5 +1,5 @@
-"""The hash of code: of its statements, whatever stands in comments and docstrings, and whichever
-Python reads it.
+"""Hash of code: it depends on the statements only, not on comments, docstrings and the version of
+Python.
 """
 
 from __future__ import annotations
@@ -53,9 +53,7 @@ def hash_of(texts: Mapping[str, bytes]) -> str:
 
 @cache
 def statement_hash(source: bytes) -> str:
-    """SHA-256 of what code says without its comments and docstrings; versions of Python agree on
-    it.
-    """
+    """SHA-256 of code without its comments and docstrings; versions of Python agree on it."""
     return hashlib.sha256(_written(ast.parse(source)).encode("utf-8", "surrogatepass")).hexdigest()
 
 
@@ -64,23 +62,25 @@ def _written(value: Any) -> str:
         return f"[{' '.join(map(_written, value))}]"
     if not isinstance(value, ast.AST):
         return repr(value)
-    fields = {name: one for name, one in ast.iter_fields(value) if name not in _IDLE}
+    fields = {name: part for name, part in ast.iter_fields(value) if name not in _IDLE}
     if isinstance(
         value, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
     ) and _is_text(value.body[:1]):
         fields["body"] = value.body[1:]
     if isinstance(value, ast.JoinedStr):
-        # 3.12 has such
+        # Python 3.12 adds empty constants.
         fields["values"] = [
-            one for one in value.values if not (isinstance(one, ast.Constant) and one.value == "")
+            part
+            for part in value.values
+            if not (isinstance(part, ast.Constant) and part.value == "")
         ]
     # Python versions differ in empty fields
-    said = sorted((name, one) for name, one in fields.items() if one is not None and one != [])
-    return f"{type(value).__name__}({' '.join(f'{name}={_written(one)}' for name, one in said)})"
+    said = sorted((name, part) for name, part in fields.items() if part is not None and part != [])
+    return f"{type(value).__name__}({' '.join(f'{name}={_written(part)}' for name, part in said)})"
 
 
 def _is_text(body: list[ast.stmt]) -> bool:
-    """Whether a body begins with a docstring."""
+    """True if a body begins with a docstring."""
     first = body[0] if body else None
     return (
         isinstance(first, ast.Expr)
@@ -90,8 +90,8 @@ def _is_text(body: list[ast.stmt]) -> bool:
 
 
 def _sources(place: str) -> Iterator[tuple[str, bytes]]:
-    """Name and text of the modules of a package of saltus, such as ``study.answers``, rooms in it
-    too, or of one module alone.
+    """Names and texts of the modules of a package of saltus, such as ``study.answers``, with its
+    subpackages, or of one module alone.
     """
     alone = PACKAGE / f"{place.replace('.', '/')}.py"
     for file in [alone] if alone.is_file() else sorted(alone.with_suffix("").rglob("*.py")):

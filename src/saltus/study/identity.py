@@ -1,4 +1,4 @@
-"""What must be the same for a result to be that of a study."""
+"""Texts that must be the same for a result to be that of a study."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ def identity(system: System, method: Any, arguments: Mapping[str, Any]) -> dict[
     """Texts that must be the same to go on with what was computed: equations, values, method,
     arguments, code.
     """
-    own = {
+    fixed = {
         "equations": system.fingerprint(), "values": to_json(dict(system.values)),
         "method": method.name,
         "method options": to_json(method.options()), "saltus": version("saltus"),
         "code": code_hash(),
     }  # fmt: skip
     asked = {
-        f"{name} of the question" if name in own else name: value
+        f"{name} of the question" if name in fixed else name: value
         for name, value in arguments.items()
     }
-    return own | {name: to_json(_plain(value)) for name, value in asked.items()}
+    return fixed | {name: to_json(_plain(value)) for name, value in asked.items()}
 
 
 def _plain(value: Any) -> Any:
-    """A value with data in place of formulas."""
+    """Convert a value to plain data: formulas become data."""
     if isinstance(value, Mapping):
         return {name: _plain(one) for name, one in value.items()}
     if isinstance(value, list | tuple):

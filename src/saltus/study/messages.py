@@ -1,4 +1,4 @@
-"""What is wrong with a study file, said so that it can be mended: place, fault, what to write."""
+"""Messages on errors in a study file: the place, the fault, and what to write instead."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ _ELSEWHERE = {
 
 
 def _instead(place: Place) -> str:
-    """What to write for a key or a table that isn't there."""
+    """Suggest what to write for a key or a table that doesn't exist."""
     key, known = str(place[-1]), list(_known(place[:-1]))
     if len(place) == 1 and key in _ELSEWHERE:
         return _ELSEWHERE[key]
@@ -87,8 +87,8 @@ def _instead(place: Place) -> str:
 
 
 def syntax_fault(error: TOMLDecodeError, text: str) -> str:
-    """A sentence on text that isn't TOML: the line, and what to write if the fault is
-    a common one.
+    """Sentence on text that isn't TOML: the line, and the correction if the fault is a common
+    one.
     """
     place = re.search(r"line (\d+)", str(error))
     number = int(place[1]) if place else text.rstrip().count("\n") + 1
@@ -106,9 +106,7 @@ def syntax_fault(error: TOMLDecodeError, text: str) -> str:
 
 
 def content_faults(error: ValidationError, data: Any = None) -> list[str]:
-    """A sentence for each fault of a study that is TOML, but not a study; ``data`` is what the TOML
-    holds.
-    """
+    """Sentences on the faults of a TOML file that isn't a study; ``data`` is its content."""
     faults: dict[Place, list[dict[str, Any]]] = {}
     for detail in error.errors():
         place = tuple(
@@ -121,8 +119,8 @@ def content_faults(error: ValidationError, data: Any = None) -> list[str]:
 
 
 def _path(place: Place, data: Any) -> list[str]:
-    """The place as words: tables of an array are counted from 1, ``lyapunov 2``; one that stands
-    alone isn't.
+    """Place in words. Tables of an array are counted from 1, ``lyapunov 2``; a single table has no
+    number.
     """
     path: list[str] = []
     for part in place:
@@ -194,20 +192,18 @@ def _table(place: Place) -> type[StudyTable] | None:
 
 
 def _inside(kind: Any, part: int | str) -> Any:
-    """The type of what stands in a table, list or mapping by a key or an index; None if nothing
-    does.
-    """
-    for one in _parts(kind):
-        if _is_table(one):
-            field = one.model_fields.get(str(part))
+    """Type of the value at a key or an index of a table, list or mapping; None if there is none."""
+    for branch in _parts(kind):
+        if _is_table(branch):
+            field = branch.model_fields.get(str(part))
             return field.annotation if field is not None else None
-        if get_origin(one) in (list, dict):
-            return get_args(one)[-1]
+        if get_origin(branch) in (list, dict):
+            return get_args(branch)[-1]
     return None
 
 
 def _parts(kind: Any) -> Iterator[Any]:
-    """The types that a type is one of."""
+    """Members of a union type, or the type itself."""
     if get_origin(kind) is Annotated:
         yield from _parts(get_args(kind)[0])
     elif get_origin(kind) in (Union, UnionType):

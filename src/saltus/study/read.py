@@ -17,7 +17,7 @@ from saltus.system.formula import LONGEST
 
 
 def read(path: Path | str) -> tuple[Study, str]:
-    """A study file, checked as far as that is possible without its system.
+    """Read a study file, and check it as far as possible without its system.
 
     Parameters
     ----------
@@ -95,9 +95,7 @@ _FORMULAS = ("rates", "terms", "guards", "outputs", "energy", "friction", "force
 
 
 def _short(data: Any, key: str = "", most: int = _WORD) -> None:
-    """Refuse a text that is longer than any that could stand there; ``most`` holds where the key
-    says nothing of its own.
-    """
+    """Refuse a text that is too long; ``most`` is the limit for keys without one."""
     if isinstance(data, dict):
         for name, value in data.items():
             _short(value, name, LONGEST if name in _FORMULAS else most)

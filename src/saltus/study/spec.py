@@ -1,5 +1,5 @@
-"""What a study file may hold: one class a table, every key typed, unknown keys refused. The tables
-that ask something are those that stand with their answers.
+"""Schema of a study file: one class a table, every key typed, unknown keys refused. The tables of
+the questions stand with their answers.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ SEVERAL = tuple(name for name, table in QUESTIONS.items() if issubclass(table, N
 
 
 class _Asking(study.Study):
-    """What holds of the questions of a study together."""
+    """Study whose questions are checked together."""
 
     @model_validator(mode="after")
     def _fits(self) -> _Asking:

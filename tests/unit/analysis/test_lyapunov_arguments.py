@@ -28,7 +28,7 @@ WING = sl.models.find("aeroelastic")()
         (
             WING,
             {"every": 0.2, "unit": "bit/period"},
-            "has no forcing period, so 'bit/period'.*Take unit='bit/s'",
+            "has no forcing period, so 'bit/period'.*Take unit=.bit/s.",
         ),
         ("rig", {}, "must be a System"),
     ],

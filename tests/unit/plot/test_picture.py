@@ -10,6 +10,7 @@ import matplotlib.pyplot as plt
 import pytest
 from matplotlib.text import Text
 
+import saltus as sl
 from saltus import plot
 from saltus.errors import ParameterError
 from saltus.plot.choice import TAKES, default_kind, pictures_of
@@ -122,3 +123,24 @@ def test_a_picture_names_itself_once():
         with pytest.raises(ParameterError) as caught:
             call()
         assert str(caught.value).startswith(says)
+
+
+def test_the_pictures_are_listed_and_a_call_of_their_module_says_what_to_write():
+    assert dir(plot) == plot.__all__
+    with pytest.raises(TypeError, match=r"sl\.plot\.history\(run\)"):
+        plot(1)
+
+
+def test_the_section_of_a_settled_motion_shows_the_states_that_its_surface_leaves_free():
+    """Its velocity at the stop is the same at every contact; a range of zero is no reason to leave
+    it out.
+    """
+
+    @sl.system(states="x v", forced_at="f", units={"f": "Hz"})
+    def hammer(t, x, v, *, gap=2e-3, f=14.0):
+        push = 20.0 * sl.cos(2 * sl.pi * f * t) - 4.0 * v - 4e3 * x
+        return v, push, sl.impact(x < gap, v, restitution=0.7)
+
+    found = sl.poincare(hammer, (0, 0), "gap", periods=300, transient=400, progress=False)
+    axes = plot.section(found)
+    assert axes.get_xlabel().startswith("v")

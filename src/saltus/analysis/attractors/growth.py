@@ -60,13 +60,15 @@ def growth_rates(
     block by block, float64[blocks, k]: those after it has found its way.
     """
     stretched = _neighbours if by_neighbours(map_, start.shape[1]) else _tangents
-    state, direction, growths = start, scale / math.sqrt(start.shape[1]), []
+    state, begin, growths = start, scale / math.sqrt(start.shape[1]), []
+    direction = begin
     for _ in range(blocks):
         state, image = stretched(map_, state, direction)
         length = np.linalg.norm(image / scale, axis=1)
         with np.errstate(all="ignore"):
             growths.append(np.log(length) / BLOCK)
-            direction = image / length[:, None]
+            ahead = (length > 0) & np.isfinite(length)  # at rest on a stop nothing is left of it
+            direction = np.where(ahead[:, None], image / length[:, None], begin)
     return state, np.array(growths[blocks // ALIGNING :])
 
 

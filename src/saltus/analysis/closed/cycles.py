@@ -21,7 +21,15 @@ from saltus.analysis.closed.motions import ClosedMotions
 from saltus.analysis.closed.shooting import Shooting
 from saltus.analysis.solve.floquet import nontrivial
 from saltus.analysis.solve.newton import newton
-from saltus.analysis.solve.tolerances import AMPLIFIED, BESIDE, CONVERGED, LONGEST, RESTS, ROUNDING
+from saltus.analysis.solve.tolerances import (
+    AMPLIFIED,
+    BESIDE,
+    CONVERGED,
+    DECAYED,
+    LONGEST,
+    RESTS,
+    ROUNDING,
+)
 from saltus.flow.maps import Stroboscope
 from saltus.flow.polynomials import between
 from saltus.flow.request import Schedule
@@ -250,6 +258,7 @@ def find_cycles(
         found none.
     """
     result, moved = ClosedMotions.none(*start.shape), np.full(len(start), np.nan)
+    scale = np.maximum(scale, DECAYED)
     x, time, found = _newton(map_, start, time, scale)
     rows = np.flatnonzero(found)
     if not len(rows):

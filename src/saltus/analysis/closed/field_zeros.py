@@ -17,6 +17,7 @@ from scipy.linalg import solve_continuous_lyapunov
 from saltus.analysis.closed.capture import RADII, SAFETY, sphere
 from saltus.analysis.closed.motions import ClosedMotions
 from saltus.analysis.solve.newton import newton
+from saltus.analysis.solve.tolerances import DECAYED
 from saltus.flow.maps import Stroboscope
 from saltus.language.evaluate import evaluate
 from saltus.language.expression import Expr, depends_on
@@ -25,8 +26,6 @@ from saltus.system import System
 #: Longest step of Newton's method, in units of the scale: the field of a motion that has escaped
 #: points anywhere.
 FARTHEST_STEP = 1e6
-#: Least range of a state that goes on decaying: the square of less is no number.
-DECAYED = 1e-150
 #: Share of the norm of the Jacobian that a real part must lie below zero: more than rounding.
 MARGINAL = 1e-10
 #: A constraint that is zero to so small a share of its terms is held.

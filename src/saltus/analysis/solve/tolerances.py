@@ -62,3 +62,5 @@ JITTER = 2.0
 APART = 5.0
 #: Scatter below which period doubling isn't looked for.
 SHOWING = 1e-6
+#: Least range of a state that goes on decaying: the square of less is no number.
+DECAYED = 1e-150

@@ -1,1 +1,1 @@
-"""Datasets: what every variable of a result is, and arrays put under these names."""
+"""Datasets: the description of every variable, and the building of Datasets by it."""

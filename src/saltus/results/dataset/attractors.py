@@ -1,4 +1,4 @@
-"""What is known of attractors, in every result that holds some."""
+"""Numbers of attractors, in every result that holds some."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ENDS = ("", "_low", "_high")
 
 _EACH = ("attractor",)
 _MULTIPLIER = ("attractor", "multiplier")
-#: What is known of each attractor; ``phase`` counts the points of its orbit.
+#: Variables of attractors; ``phase`` counts the points of an orbit.
 #: ``<first>``: the unit of the first state.
 ATTRACTOR_VARIABLES = {
     "attractor": Variable(_EACH, "1", "attractor", "i8", coord=True),
@@ -66,7 +66,7 @@ ATTRACTOR_VARIABLES = {
 
 
 def rows_as(what: str, without: Sequence[str] = ()) -> dict[str, Variable]:
-    """The rows of attractors as those of something of which the same is known: an orbit, a
+    """Variables of attractors under the name of something with the same properties: an orbit, a
     response. ``without``: beginnings of names that are left out.
     """
     return {
@@ -116,8 +116,8 @@ class AttractorTable:
         Of a system without forcing: eigenvalues of the Jacobian of each equilibrium [1/s], else
         NaN.
     scatter : array, shape (m,), optional
-        Where one is noisy: root mean square distance of its points from the exact orbit, first
-        state [its unit]; NaN of the others.
+        Root mean square distance of the points of a noisy attractor from the exact orbit, first
+        state [its unit]; NaN for the others.
     """
 
     kind: Sequence[str]
@@ -141,12 +141,12 @@ class AttractorTable:
 
     @property
     def points_when(self) -> str:
-        """When the points are taken, in words."""
+        """Times of the points, in words."""
         return "at whole forcing periods" if self.cycle is None else "in equal steps of time"
 
     def columns(self, size: int) -> dict[str, Any]:
-        """What is known of each attractor, by the names of the variables without ``attractor_``.
-        ``size``: D, where there are none.
+        """Columns of the attractors, by the names of the variables without ``attractor_``.
+        ``size``: number of states, D, for a table without attractors.
         """
         real, imag = _parts(self.multipliers, len(self), size)
         found = {
@@ -179,7 +179,7 @@ class AttractorTable:
 def _parts(both: np.ndarray, count: int, size: int) -> tuple[np.ndarray, np.ndarray]:
     """Real and imaginary parts, shape (count, D) each."""
     both = np.asarray(both, dtype=complex).reshape(count, -1 if count else size)
-    # a plain NaN has the imaginary part 0
+    # The imaginary part of a real NaN is 0.
     return both.real, np.where(np.isnan(both), np.nan, both.imag)
 
 

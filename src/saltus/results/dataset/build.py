@@ -1,4 +1,4 @@
-"""Arrays in, a Dataset out: every result is made here, by the table of its kind.
+"""Arrays in, a Dataset out: every result is built here, by the table of its kind.
 
 Everything that goes in is an array of NumPy. Of anything else xarray asks whether an array is one
 of dask, pint, cupy or sparse, and imports for it those that are installed: dask.array alone takes
@@ -26,7 +26,7 @@ _TWICE = (
     "{!r} would stand for two things in the result. Rename the state, or the parameter, of "
     "this name."
 )
-#: Where a name of the system would collide with one of the table, another is taken.
+#: Other names for names of a system that the tables use already.
 _NAMES = {
     "contact_<state>": schema.contact_name, "contact_<state>_before": schema.before_name,
     "attractor_<state>": schema.attractor_name,
@@ -81,7 +81,7 @@ class Guards:
 
 @dataclass(frozen=True)
 class Subject:
-    """What a result is about: a system, and where there are any its trajectories.
+    """Subject of a result: a system, and its trajectories if there are any.
 
     Attributes
     ----------
@@ -132,7 +132,7 @@ def build(
     kind : str
         One of :data:`saltus.results.dataset.schema.NAMES`.
     subject : Subject
-        What it is about.
+        Its system and trajectories.
     values : mapping of str to array, or its items
         Variables in the order of the result, under their names in the table and with all dims that
         it names: with ``trajectory`` also where that is dropped. A row for all states or parameters
@@ -143,7 +143,7 @@ def build(
     along : mapping of str to str, optional
         Dims in place of those of the table.
     words : mapping of str to str, optional
-        What stands in angle brackets among the units and long names of the table.
+        Values of the names in angle brackets in the units and long names of the table.
     flags : mapping of str to mapping of int to str, optional
         Meanings of the codes in a variable, where they follow the result.
     carried : mapping of str to xarray.Variable, optional
@@ -180,7 +180,7 @@ def build(
 
 # -- assembly --------------------------------------------------------------------------------------
 class _Building:
-    """The variables of one Dataset, as they are taken."""
+    """Variables of a Dataset under construction."""
 
     def __init__(
         self,
@@ -210,7 +210,9 @@ class _Building:
         self.coords: dict[str, xr.Variable] = {}
 
     def take(self, row: str, values: Any) -> None:
-        """Add the variable of a row; of one that stands for all states or parameters, theirs."""
+        """Add the variable of a row; for a row that stands for all states or parameters, add one
+        variable each.
+        """
         spec = self.table[row]
         if "<" not in row:
             if self.subject.batch or not row.endswith("trajectory"):
@@ -222,7 +224,7 @@ class _Building:
             if isinstance(values, Mapping)
             else zip(self.subject.states, np.moveaxis(values, -1, 0), strict=True)
         )
-        for name, one in of_each:
+        for name, given in of_each:
             if row == f"<{what}>" and name in self._reserved():
                 rename = (
                     "Rename the state in the system."
@@ -234,7 +236,9 @@ class _Building:
                 )
             own = _NAMES[row](name) if row in _NAMES else row.replace(f"<{what}>", name)
             text = name if what == "state" else name.replace("_", " ")
-            self._put(own, spec, one, {f"<{what}>": (name, self.subject.units.get(name, ""), text)})
+            self._put(
+                own, spec, given, {f"<{what}>": (name, self.subject.units.get(name, ""), text)}
+            )
 
     def _reserved(self) -> set[str]:
         """Names of the table, and of its dims."""
@@ -297,12 +301,12 @@ class _Building:
 
 @cache
 def _is_plain(dims: tuple[str, ...]) -> bool:
-    """Whether these dims are the same in every result of the kind."""
+    """True where these dims are the same in every result of the kind."""
     return not any(dim[0] in ".<" or dim[-1] == "?" for dim in dims)
 
 
 def _array(name: str, spec: Variable, values: Any) -> np.ndarray:
-    """The values in the type of the table."""
+    """Convert values to the type of the table."""
     if spec.clipped:
         values = np.minimum(values, np.iinfo(spec.dtype).max)
     array = np.asarray(values, dtype=np.str_ if spec.dtype == "str" else spec.dtype)
@@ -319,7 +323,7 @@ def _array(name: str, spec: Variable, values: Any) -> np.ndarray:
 
 
 def _only(array: np.ndarray, dims: tuple[str, ...]) -> tuple[np.ndarray, tuple[str, ...]]:
-    """The array of the one trajectory."""
+    """Drop the dim ``trajectory`` of an array with one trajectory."""
     axis = dims.index("trajectory")
     if array.shape[axis] != 1:
         raise ParameterError(
@@ -330,7 +334,7 @@ def _only(array: np.ndarray, dims: tuple[str, ...]) -> tuple[np.ndarray, tuple[s
 
 
 def _common(units: Iterable[str]) -> str:
-    """The unit that all share, else ``""``."""
+    """Return the unit that all share, else ``""``."""
     found = set(units)
     return found.pop() if len(found) == 1 else ""
 
@@ -365,7 +369,7 @@ def finish(
 
 
 def _index(name: str, values: np.ndarray) -> xr.indexes.PandasIndex:
-    """What a coordinate is looked up by; numbers stay where they are."""
+    """Index of a coordinate. Numbers aren't copied."""
     if values.dtype.kind == "U":
         return _text_index(name, values.dtype, tuple(values.tolist()))
     return xr.indexes.PandasIndex(pd.Index(values, copy=False, name=name), name, values.dtype)

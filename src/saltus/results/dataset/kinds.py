@@ -1,5 +1,5 @@
-"""Kinds of motion, and why a start may lead to none: one code and one word for each, wherever they
-are named.
+"""Kinds of motion, and reasons why a start leads to none: one code and one word for each, used
+everywhere.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 
 
 class Kind(IntEnum):
-    """A kind of motion; below zero, why a start leads to none."""
+    """Kind of motion; codes below zero are reasons why a start leads to none."""
 
     PERIODIC = 0
     QUASI_PERIODIC = 1
@@ -20,7 +20,7 @@ class Kind(IntEnum):
     LIMIT_CYCLE = 4
     #: An orbit that errors of the method keep from closing.
     NOISY_PERIODIC = 5
-    #: It hasn't repeated, and what was spent on its exponent didn't tell what it is.
+    #: Motion that hasn't repeated, and whose exponent is undecided after the time spent on it.
     NOT_REPEATING = 6
     ESCAPED = -1
     UNCONVERGED = -2
@@ -29,27 +29,27 @@ class Kind(IntEnum):
 
     @property
     def word(self) -> str:
-        """As it stands in Datasets."""
+        """Word for the kind in Datasets."""
         return self.name.lower()
 
 
 #: Longest period at which a motion is known to repeat [forcing periods]; no argument raises it.
 LONGEST = 64
-#: Of motions without a type, in the words of every result.
+#: Sentence on motions without a type, in every result.
 LONGER = (
     f"An orbit is recognised up to {LONGEST} periods, which no argument raises: a longer one has "
     "no type. sl.stroboscope and sl.poincare show its points."
 )
 #: Kinds that Newton's method closes.
 CLOSED = (Kind.PERIODIC, Kind.EQUILIBRIUM, Kind.LIMIT_CYCLE)
-#: What became of starts that lead to no attractor, as the end of a sentence.
+#: Fate of starts that lead to no attractor, as the end of a sentence.
 WITHOUT: Mapping[Kind, str] = {
     Kind.ESCAPED: "escaped: their motion grew beyond all numbers",
     Kind.UNCONVERGED: "lead to no known attractor within the periods allowed",
-    Kind.FAILED: "failed: they begin beyond a stop or ended early, and status says why",
+    Kind.FAILED: "failed: they begin beyond a stop, or a law or a budget ended them (sl.simulate)",
     Kind.NOT_COMPUTED: "weren't computed: the run was stopped",
 }
-#: What was left out where motions were not typed, and what pays for it, as the end of a sentence.
+#: Check left out for motions without a type, and the argument that adds it: end of a sentence.
 OPEN = (
     "haven't repeated, and their exponents don't say yet whether they are quasi-periodic or "
     "chaotic: numbers are those of 64 periods. A larger periods= spends more on it; sl.lyapunov "
@@ -60,8 +60,8 @@ WITHOUT_WORDS = {int(kind): kind.word for kind in WITHOUT}
 
 
 def sentences(labels: np.ndarray) -> list[str]:
-    """A sentence for each reason why starts lead to no attractor, with how many they are: labels
-    int[...] of attractors, or codes.
+    """A sentence for each reason why starts lead to no attractor, with the number of these starts.
+    ``labels``, int[...], are attractors or codes.
     """
     counts = {kind: int(np.count_nonzero(labels == kind)) for kind in WITHOUT}
     return [f"{count} starts {WITHOUT[kind]}." for kind, count in counts.items() if count]

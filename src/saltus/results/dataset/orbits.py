@@ -1,4 +1,4 @@
-"""The variables of orbits, from what is known of them as of attractors."""
+"""Variables of orbits, many of which attractors have too."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from saltus.results.dataset.attractors import AttractorTable, padded
 
-#: What is known of attractors, and of no orbit alone.
+#: Variables that attractors have and other orbits lack.
 OF_ATTRACTORS = ("exponent_error", "scatter", "eigenvalue", "fraction")
 
 
@@ -21,7 +21,7 @@ class OrbitTable:
     Attributes
     ----------
     orbits : AttractorTable
-        What is known of them as of attractors.
+        Properties that attractors have too.
     stability : sequence of str, length m
         Kind of stability.
     unstable : array of int, shape (m,)

@@ -1,4 +1,6 @@
-"""Functions that read a result: what they say when it isn't one any more."""
+"""Functions that read a result, with an error that explains when the Dataset isn't a result any
+more.
+"""
 
 from __future__ import annotations
 
@@ -17,8 +19,8 @@ R = TypeVar("R")
 
 
 def reader(function: Callable[P, R]) -> Callable[P, R]:
-    """A function that takes Datasets of saltus: where it fails over one that was changed since, or
-    forged, it says so.
+    """Wrap a function that takes results: if it fails, and a Dataset was changed or forged, the
+    error says so.
 
     A variable that was renamed, a dim that was cut to nothing, an attribute of another kind fail
     anywhere. What ``result_hash`` says is asked only then. A failure over Datasets as they were
@@ -52,17 +54,17 @@ def reader(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def _datasets(given: Any) -> Iterator[xr.Dataset]:
-    for one in given:
-        if isinstance(one, xr.Dataset):
-            yield one
-        elif isinstance(one, list | tuple):
-            yield from _datasets(one)
-        elif isinstance(one, dict):
-            yield from _datasets(one.values())
+    for item in given:
+        if isinstance(item, xr.Dataset):
+            yield item
+        elif isinstance(item, list | tuple):
+            yield from _datasets(item)
+        elif isinstance(item, dict):
+            yield from _datasets(item.values())
 
 
 def _is_changed(ds: xr.Dataset) -> bool:
-    """Whether the variables, or the attributes that are JSON, aren't those that a function of
+    """True where the variables, or the attributes that are JSON, aren't those that a function of
     saltus returned.
     """
     try:

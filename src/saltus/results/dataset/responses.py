@@ -1,4 +1,4 @@
-"""The variables of responses, from what is known of them as of attractors."""
+"""Variables of responses, many of which attractors have too."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from saltus.results.dataset.attractors import ENDS, AttractorTable, padded
 from saltus.results.dataset.kinds import WITHOUT_WORDS, Kind
 
-#: What a bifurcation diagram may show of each response.
+#: Samples of each response that a bifurcation diagram may show.
 SAMPLES = {
     "turning_points": "where the velocity is zero",
     "stroboscope": "at whole forcing periods",
@@ -18,8 +18,8 @@ SAMPLES = {
 
 
 def grid_values(response_of: np.ndarray, table: AttractorTable) -> dict[str, np.ndarray]:
-    """What each start leads to at each value: the number of the response, and its columns looked
-    up.
+    """Variables of the grid: the response that each start leads to at each value, and the columns
+    of that response.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def grid_values(response_of: np.ndarray, table: AttractorTable) -> dict[str, np.
 def response_values(
     table: AttractorTable, branch: np.ndarray, parameters: dict[str, np.ndarray], size: int
 ) -> dict[str, Any]:
-    """What is known of each response.
+    """Variables of the responses.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def response_values(
 
 
 def _per_period(table: AttractorTable) -> np.ndarray:
-    """Contacts in a forcing period; in a cycle, where nothing forces it."""
+    """Contacts in a forcing period, or in a cycle of an unforced system."""
     contacts = np.asarray(table.contacts, dtype=float)
     rates: np.ndarray = contacts / np.maximum(np.asarray(table.period), 1)
     return rates

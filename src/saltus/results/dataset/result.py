@@ -1,4 +1,4 @@
-"""The type of every result: an xarray.Dataset that doesn't multiply its tables."""
+"""Type of every result: an xarray.Dataset that refuses to build the product of its tables."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import xarray as xr
 from saltus.errors import ParameterError
 
 _CONTACTS = "Write run.contact_time, or sl.contacts(run) for a table."
-#: What results of other programs are asked, and what it is called here.
+#: Names that other programs use for parts of a result, and the names used here.
 _ELSEWHERE = {
     "t": "Write run.time.",
     **dict.fromkeys(("y", "ys", "u"), "Each state has its name: run.x, or run['x'].values."),
@@ -37,7 +37,7 @@ class Result(xr.Dataset):
     _headline: ClassVar[Callable[[xr.Dataset], str]] = str
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: the content in a few lines, and below it what xarray shows."""
+        """Text for a notebook: the content in a few lines, then the table of xarray."""
         try:
             text = type(self)._headline(self)
         except Exception:  # of a Dataset that somebody has changed since, xarray shows what is left
@@ -53,7 +53,7 @@ class Result(xr.Dataset):
         indexes: Mapping[str, xr.Index],
         attrs: dict[str, Any],
     ) -> Result:
-        """The Dataset of variables that fit each other, and that nobody else holds.
+        """Dataset of variables that fit each other and belong to nobody else.
 
         xarray's own constructor aligns, merges and copies them first, which for the thirty of a run
         takes as long as its hash. That two of them give a dim two lengths is found here too.
@@ -85,8 +85,8 @@ class Result(xr.Dataset):
             raise AttributeError(f"{error}. {words}") from None
 
     def to_dataframe(self, dim_order: Sequence[Hashable] | None = None) -> Any:
-        """A pandas.DataFrame with a row for each point of the dims, as that of a Dataset; of one
-        table only.
+        """A pandas.DataFrame with a row for each point of the dims, as for any Dataset; refused for
+        several tables.
 
         Raises
         ------
@@ -106,12 +106,12 @@ class Result(xr.Dataset):
     def to_dataarray(
         self, dim: Hashable = "variable", name: Hashable | None = None
     ) -> xr.DataArray:
-        """One array of all variables, as that of a Dataset; of one table only."""
+        """One array of all variables, as for any Dataset; refused for several tables."""
         self._refuse_product("to_dataarray")
         return super().to_dataarray(dim, name)
 
     def _refuse_product(self, caller: str) -> None:
-        """Raise unless one variable has all dims."""
+        """Raise ParameterError unless one variable has all dims."""
         dims = set(self.dims)
         if not dims or any(set(variable.dims) == dims for variable in self.variables.values()):
             return

@@ -1,4 +1,4 @@
-"""Kinds of result, and what is read off a Dataset by them.
+"""Kinds of result, and functions that read properties of a Dataset by its kind.
 
 The file of a kind in :mod:`saltus.results.kinds` holds its :class:`ResultKind`: variables, rows and
 account. :func:`saltus.results.dataset.build.build` makes Datasets by them.
@@ -106,7 +106,7 @@ def orbit_name(state: str) -> str:
 
 
 def equilibrium_name(state: str) -> str:
-    """Name of the variable that holds a state at rest: ``equilibrium_x``;
+    """Name of the variable that holds a state of the equilibria: ``equilibrium_x``;
     ``equilibrium_state_type`` where the name is taken.
     """
     return _apart("equilibrium", state, "state", EQUILIBRIA)
@@ -271,7 +271,7 @@ def a_or_an(word: str) -> str:
 
 
 def _needed(ds: xr.Dataset, kind: str) -> list[str]:
-    """Variables without which nothing can be said about a result."""
+    """Variables that every text on a result needs."""
     return [
         name
         for row in KINDS[kind].needed
@@ -291,7 +291,7 @@ def restore(ds: xr.Dataset) -> xr.Dataset:
         dtype = dtypes.get(str(name), "f8")
         data = np.asarray(variable.values).astype(np.str_ if dtype == "str" else dtype)
         attrs = {key: _plain(value) for key, value in variable.attrs.items()}
-        # a single number comes back as such, and the codes have the type of their variable
+        # An array of one number is read back as a number. Codes have the type of their variable.
         if "flag_values" in attrs:
             attrs["flag_values"] = np.atleast_1d(np.asarray(attrs["flag_values"], dtype=data.dtype))
         variables[name] = xr.Variable(variable.dims, data, attrs)

@@ -1,4 +1,4 @@
-"""What one variable of a result is, and the variables that several kinds of result share."""
+"""Description of one variable of a result, and the variables that several kinds of result share."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 @dataclass(frozen=True)
 class Variable:
-    """What one variable of a result is: a row of the table of its kind.
+    """Description of one variable of a result: a row of the table of its kind.
 
     The name of a row may hold ``<state>`` or ``<parameter>``: it then stands for one variable a
     state, or a parameter.
@@ -74,14 +74,14 @@ GUARDS = {
         ("guard", "trajectory?"), "<gap>", "value of the state on the guard"
     ),
 }
-#: What stands at the end of every table of trajectories: a period that all share is the attribute
-#: ``forcing_period_s``.
+#: Last variables of every table of trajectories. A period that all trajectories share is the
+#: attribute ``forcing_period_s``.
 SHARED = {
     "forcing_period": Variable(_EACH, "s", "forcing period", coord=True),
     **VARIED,
     **TRAJECTORY_NUMBER,
 }
-#: What stands in every table of motions from given starts: how they ended, and at what cost.
+#: Variables of every table of motions from given starts: their ends and their costs.
 ENDINGS = {
     "status": STATUS,
     **{
@@ -91,7 +91,7 @@ ENDINGS = {
     **END_TIME,
     **END_STATES,
 }
-#: What a graze does to the motions behind it.
+#: Coefficient of the square root that a graze adds to motions after it.
 SQRT_COEFFICIENT = (
     "change of the grazed gap when the orbit returns, over the square root of the depth by which a "
     "motion would pass the boundary"
@@ -103,7 +103,7 @@ OUTPUT = {
     ),
     "output_units": Variable(("output",), "", "unit of the output", "str", coord=True),
 }
-#: What is known of each output; ``<output>``: its unit, that in ``output_units``.
+#: Variables of each output; ``<output>``: its unit in ``output_units``.
 _OF_OUTPUT = {
     "maximum": Variable(("output",), "<output>", "largest value"),
     "minimum": Variable(("output",), "<output>", "smallest value"),
@@ -126,7 +126,7 @@ _OF_OUTPUT = {
 
 
 def of_outputs(what: str, prefix: str = "") -> dict[str, Variable]:
-    """The rows of what is known of each output of something: a response, a point of a branch."""
+    """Variables of each output of something: a response, a point of a branch."""
     return {
         f"{prefix}output_{name}": replace(row, dims=(what, "output"))
         for name, row in _OF_OUTPUT.items()

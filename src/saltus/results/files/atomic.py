@@ -1,4 +1,4 @@
-"""The files of single results, written: what goes wrong with one is a ResultFileError."""
+"""Writing of result files. Errors of the disk become ResultFileErrors."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class ResultFileError(SaltusError, OSError):
 
 
 def path_of(given: object) -> Path:
-    """What a caller gave as the path of a file. Raises ParameterError if it is none."""
+    """Return what a caller gave as the path of a file. Raises ParameterError if it is no path."""
     if not isinstance(given, str | os.PathLike) or "\0" in os.fspath(given):
         raise ParameterError(
             f"{shown(given)} isn't the path of a file. Write it as text, such as 'run.nc'."
@@ -65,8 +65,8 @@ def replacing(*paths: Path) -> Iterator[list[Path]]:
 
 
 def _target(path: Path) -> Path:
-    """Where a path leads: through a link, so that the link stays, but not out of its folder, where
-    it might lead to anything.
+    """Return the file that a path leads to. A link is followed and stays; a link out of its folder
+    is refused, since it might lead to anything.
     """
     what = f"{shown(str(path))} can't be written"
     with refused_as(ResultFileError, what, "Choose another name."):
@@ -84,9 +84,7 @@ def _target(path: Path) -> Path:
 
 
 def remove_old_drafts(folder: Path) -> None:
-    """Remove the drafts that processes left in a folder which were killed while they wrote: those
-    older than a day.
-    """
+    """Remove the drafts of killed processes from a folder: those older than a day."""
     for draft in folder.glob(".*.part"):
         with suppress(OSError):  # it isn't ours to remove, or has just taken its place
             if _DRAFT.fullmatch(draft.name) and draft.is_file() and is_older(draft):
@@ -95,7 +93,7 @@ def remove_old_drafts(folder: Path) -> None:
 
 @contextmanager
 def no_folder_left(path: Path) -> Iterator[None]:
-    """Folders that are made inside are taken away again if an error leaves them empty."""
+    """Remove the folders that are made inside the block if an error leaves them empty."""
     missing = [one for one in (path, *path.parents) if not one.exists()]
     try:
         yield
@@ -107,8 +105,8 @@ def no_folder_left(path: Path) -> Iterator[None]:
 
 
 def usable_folder(path: Path) -> Path:
-    """A folder that can be written to, made if it isn't there: asked before long work, not after
-    it.
+    """Check that a folder can be written to, and make it if it doesn't exist. Call this before long
+    work.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The end of a result file: a checksum of all bytes before it, asked before any parser sees the
+"""Ending of a result file: a checksum of all bytes before it, checked before any parser sees the
 file.
 
 netCDF-4 and netCDF-3 both say where their data end, and readers stop there: what follows is ours. A
@@ -22,14 +22,17 @@ from saltus.results.files.atomic import ResultFileError
 
 _ENDING = re.compile(rb"\nsaltus-sha256:([0-9a-f]{64})\n")
 _LENGTH = 80
-#: Time that reading a file without an ending may take [s], and how much of it is read in a second
-#: at the least [byte].
-PATIENCE, SLOWEST = 60.0, 1e7
-#: Time after which a line says what is being done [s].
+#: Time limit for reading an empty file without an ending [s].
+PATIENCE = 60.0
+#: Slowest rate of reading [byte/s]; a larger file gets more time.
+SLOWEST = 1e7
+#: Time after which a line tells the user to wait [s].
 SILENT = 2.0
-#: Memory that it may take: multiple of its size, and least value [byte].
-TIMES, LEAST = 8, 4 << 30
-#: What xarray reads by is tried, without xarray, which takes longer to load than most files.
+#: Memory limit for reading, in sizes of the file.
+TIMES = 8
+#: Least memory limit for reading [byte].
+LEAST = 4 << 30
+#: Program that tries the libraries below xarray: xarray takes longer to load than most files.
 _TRIAL = """
 import contextlib, sys
 with contextlib.suppress(ImportError, ValueError, OSError):
@@ -53,19 +56,20 @@ dict(getattr(file, "attrs", {}))
 
 
 def with_ending(content: bytes | memoryview) -> bytes:
-    """The bytes of a file with its ending."""
+    """Append the ending to the bytes of a file."""
     return (
         bytes(content) + b"\nsaltus-sha256:" + hashlib.sha256(content).hexdigest().encode() + b"\n"
     )
 
 
 def checksum_in(ended: bytes) -> str:
-    """The checksum that stands in what :func:`with_ending` returned."""
+    """Checksum in the ending that :func:`with_ending` appended."""
     return ended[-65:-1].decode()
 
 
 def checksum(path: Path) -> str | None:
-    """The checksum at the end of a file, which is that of its bytes; None if there is none.
+    """Checksum at the end of a file, after a check of the bytes before it; None if there is no
+    checksum.
 
     Raises
     ------
@@ -95,8 +99,7 @@ def checksum(path: Path) -> str | None:
 
 
 def try_elsewhere(path: Path, engine: str) -> None:
-    """Read a file of unknown origin in a process that can be stopped, and that has not more memory
-    than a result takes.
+    """Read a file of unknown origin in a subprocess with a time and memory limit.
 
     Raises
     ------

@@ -42,7 +42,7 @@ def save(ds: xr.Dataset, path: Target) -> Path:
     Parameters
     ----------
     ds : Dataset
-        What ``simulate`` or ``stroboscope`` returned.
+        Result of ``simulate`` or ``stroboscope``.
     path : str or path
         File to write, in a folder that exists.
 
@@ -101,7 +101,9 @@ def to_netcdf(ds: xr.Dataset, path: Target) -> Path:
 
 
 def _check(ds: xr.Dataset, caller: str, kinds: Sequence[str]) -> None:
-    """Raise ParameterError unless a Dataset is a result of such a kind, and of plain text."""
+    """Raise ParameterError unless a Dataset is a result of one of these kinds, and its texts are
+    plain.
+    """
     check(ds, caller=caller, kinds=kinds)
     place = place_of_control(ds)
     if place:
@@ -112,7 +114,7 @@ def _check(ds: xr.Dataset, caller: str, kinds: Sequence[str]) -> None:
 
 
 def _content(ds: xr.Dataset) -> bytes | memoryview:
-    """netCDF-4, or netCDF-3 where what writes the former isn't installed."""
+    """Bytes of a netCDF-4 file, or of netCDF-3 if the writer of netCDF-4 isn't installed."""
     if not (_has("h5netcdf") and _has("h5py")):
         return ds.to_netcdf(engine="scipy")
     from saltus.results.files import hdf5
@@ -140,8 +142,7 @@ def to_csv(ds: xr.Dataset, path: Target) -> Path:
     Parameters
     ----------
     ds : Dataset
-        What ``simulate``, ``stroboscope``, ``frequency_response`` or ``bifurcation_diagram``
-        returned.
+        Result of ``simulate``, ``stroboscope``, ``frequency_response`` or ``bifurcation_diagram``.
     path : str or path
         The file of samples, or of responses; the others get their names from it.
 
@@ -203,7 +204,7 @@ def to_mat(ds: xr.Dataset, path: Target) -> Path:
     Parameters
     ----------
     ds : Dataset
-        What ``simulate`` or ``stroboscope`` returned.
+        Result of ``simulate`` or ``stroboscope``.
     path : str or path
         File to write.
 
@@ -239,7 +240,7 @@ def to_mat(ds: xr.Dataset, path: Target) -> Path:
             raise ParameterError(
                 f"{path}: {error}. Write '.nc', which has no limit, or keep fewer samples."
             ) from error
-        # the header is 116 bytes of text, in which scipy puts the time of day
+        # Replace the header, 116 bytes of text: scipy writes the time of day into it.
         with part.open("r+b") as file:
             file.write(b"MATLAB 5.0 MAT-file, written by saltus".ljust(116))
     return path
@@ -309,7 +310,7 @@ def _matlab_names(
 
 @xr.register_dataset_accessor("saltus")
 class Accessor:
-    """``ds.saltus``: what a result can do beside what every Dataset can."""
+    """``ds.saltus``: methods that a result has besides those of every Dataset."""
 
     def __init__(self, ds: xr.Dataset) -> None:
         self._ds = ds

@@ -1,4 +1,4 @@
-"""The tables of a run for pandas: one row a sample, one row a contact."""
+"""Tables of a run for pandas: one row a sample, one row a contact."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def contacts(run: xr.Dataset) -> pd.DataFrame:
     Parameters
     ----------
     run : Dataset
-        What ``simulate`` returned.
+        Result of ``simulate``.
 
     Returns
     -------
@@ -58,7 +58,7 @@ def samples(run: xr.Dataset) -> pd.DataFrame:
     Parameters
     ----------
     run : Dataset
-        What ``simulate`` or ``stroboscope`` returned.
+        Result of ``simulate`` or ``stroboscope``.
 
     Returns
     -------

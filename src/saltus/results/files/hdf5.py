@@ -25,7 +25,7 @@ def content(ds: xr.Dataset) -> bytes:
 
 
 def dataset(path: str | os.PathLike[str]) -> xr.Dataset:
-    """What a file holds, in memory."""
+    """Return the Dataset of a file, loaded into memory."""
     with _store(path, mode="r") as store:
         return xr.load_dataset(store)
 
@@ -41,8 +41,8 @@ def _store(place: Any, mode: str) -> Iterator[H5NetCDFStore]:
 
 
 class _Hdf5File(h5py.File):
-    """An HDF5 file whose objects stay found. h5netcdf asks for them by name, 40 times for each
-    variable: without this a result takes twice as long to write and to read.
+    """HDF5 file that remembers its objects. h5netcdf looks each variable up by name 40 times:
+    without this, a result takes twice as long to write and to read.
     """
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
@@ -61,7 +61,7 @@ class _Hdf5File(h5py.File):
 
     @property
     def attrs(self) -> Any:
-        """Those of the first folder: a file's own have lost their order."""
+        """Attributes of the first folder: the file's attributes have lost their order."""
         return super().__getitem__("/").attrs
 
     def __delitem__(self, name: str) -> None:

@@ -1,5 +1,4 @@
-"""Result files that need no trial: those that this user's saltus wrote here, or has tried before;
-by the checksums at their ends.
+"""Checksums of result files that need no trial: this user's saltus wrote them, or has tried them.
 
 Each is an empty file of that name in a folder of the user's alone. The folder is safe to lose: what
 it held is tried again.
@@ -17,25 +16,24 @@ from saltus.cache import entry
 from saltus.cache import folder as cache_folder
 from saltus.cache.entry import NotOurs, check_folder
 
-#: Names that are kept: where there are more when a process writes its first, all of them are
-#: forgotten.
+#: Most checksums kept; above that the folder is emptied by the next process that writes.
 MOST = 20_000
 _HERE: set[str] = set()
 
 
 def folder() -> Path:
-    """Where they are kept: in ``$SALTUS_CACHE``, else in the user's cache folder."""
+    """Return the folder of the checksums: in ``$SALTUS_CACHE``, else in the user's cache folder."""
     return cache_folder() / "known-results"
 
 
 def is_known(digest: str) -> bool:
-    """Whether the file with this checksum was written by this user's saltus, or has been tried."""
-    place = folder()
+    """True if this user's saltus wrote the file with this checksum, or has tried it."""
+    path = folder()
     if digest in _HERE:
         return True
     try:
-        check_folder(place)
-        return stat.S_ISREG(os.lstat(place / digest).st_mode)
+        check_folder(path)
+        return stat.S_ISREG(os.lstat(path / digest).st_mode)
     except (OSError, NotOurs):
         return False
 
@@ -43,18 +41,18 @@ def is_known(digest: str) -> bool:
 def note(digest: str) -> None:
     """Remember a checksum: in this process, and for others where the folder can be used."""
     _HERE.add(digest)
-    place = folder()
+    path = folder()
     with suppress(OSError, NotOurs):
-        place.mkdir(parents=True, exist_ok=True, mode=0o700)
-        check_folder(place)
-        _sweep(place)
+        path.mkdir(parents=True, exist_ok=True, mode=0o700)
+        check_folder(path)
+        _sweep(path)
         os.close(
-            os.open(place / digest, os.O_CREAT | os.O_WRONLY | getattr(os, "O_NOFOLLOW", 0), 0o600)
+            os.open(path / digest, os.O_CREAT | os.O_WRONLY | getattr(os, "O_NOFOLLOW", 0), 0o600)
         )
 
 
 def count() -> int:
-    """How many there are."""
+    """Count the checksums."""
     try:
         return len(os.listdir(folder()))
     except OSError:
@@ -62,15 +60,15 @@ def count() -> int:
 
 
 def forget() -> int:
-    """Forget all of them; returns how many there were. Each file is tried once more when it is
-    loaded next.
+    """Forget all checksums; return their number. Each file is tried again when it is loaded
+    next.
     """
-    before, place = count(), folder()
+    before, path = count(), folder()
     _HERE.clear()
     with suppress(OSError, NotOurs):
-        check_folder(place)
-        for name in os.listdir(place):
-            entry.remove(place / name)
+        check_folder(path)
+        for name in os.listdir(path):
+            entry.remove(path / name)
     return before - count()
 
 

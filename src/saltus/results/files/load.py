@@ -1,4 +1,4 @@
-"""Files back to results."""
+"""Loading of result files."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def _read(path: Path) -> xr.Dataset:
         regular(path)
         engine = _engine(path)
         digest = checksum(path)
-        # not written by saltus.save here: anybody can write a checksum
+        # A file from elsewhere is tried first: anybody can write a checksum.
         if digest is None or not known.is_known(digest):
             try_elsewhere(path, engine)
             if digest is not None:

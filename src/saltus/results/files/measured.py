@@ -25,7 +25,7 @@ _HEADER = re.compile(r"\s*(?P<name>.*?)\s*\[(?P<unit>[^]]*)\]\s*")
 def read_measured(
     path: str | os.PathLike[str], axis: str, axis_unit: str, amplitude_unit: str
 ) -> xr.Dataset:
-    """Points that somebody measured, in SI.
+    """Read measured points, in SI.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def read_measured(
         the header: ``frequency [Hz], amplitude [mm]``. Other columns are passed over, lines that
         begin with # are comments.
     axis : str
-        What the points are measured over, such as ``frequency``.
+        Quantity over which the points are measured, such as ``frequency``.
     axis_unit, amplitude_unit : str
         SI units; those of the file are converted.
 
@@ -59,8 +59,8 @@ def read_measured(
 def measured_points(
     data: bytes, path: Path, axis: str, axis_unit: str, amplitude_unit: str
 ) -> xr.Dataset:
-    """The same from what is in the file; ``path`` is for messages, in which nothing of the file is
-    repeated.
+    """Measured points from the bytes of a file, in SI. ``path`` is for messages, which repeat
+    nothing of the file.
     """
     units = {axis: axis_unit, "amplitude": amplitude_unit}
     rows = _rows(data, path)
@@ -148,7 +148,7 @@ def _rows(data: bytes, path: Path) -> Iterator[tuple[int, list[str]]]:
 def _column(
     path: Path, header: list[str], name: str, unit: str, units: dict[str, str]
 ) -> tuple[int, str, str, str]:
-    """Where a column is, its name, the unit it is in, and the one it is wanted in."""
+    """Locate a column: its index, its name, the unit in the file, and the unit wanted."""
     found: dict[str, tuple[int, str]] = {}
     for i, text in enumerate(header):
         match = _HEADER.fullmatch(text)

@@ -1,5 +1,5 @@
-"""Texts of a result: none holds what a terminal would obey, neither when it is written nor when it
-is read.
+"""Texts of a result: control characters, which a terminal would obey, are refused in writing and in
+reading.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from saltus.fence import has_control
 
 
 def place_of_control(ds: xr.Dataset) -> str:
-    """Where the first control character stands among names, texts and attributes, such as ``the
-    attribute 'source'``; "" if nowhere.
+    """Locate the first control character among names, texts and attributes, such as ``the attribute
+    'source'``; "" if there is none.
     """
     for place, text in _texts(ds):
         if has_control(text):

@@ -1,4 +1,4 @@
-"""What ``compare`` returns: where two maps agree."""
+"""Result of ``compare``: the agreement of two maps."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from saltus.results.wording import kind_texts, meanings, span
 
 #: Meaning of the values of ``agreement``.
 AGREEING = {-1: "not_settled", 0: "differ", 1: "agree"}
-#: Variables of what ``compare`` returns.
+#: Variables of the result of ``compare``.
 VARIABLES = {
     **AXES,
     "agreement": Variable(("...",), "1", "whether the two maps agree", "i1", flags=AGREEING),
@@ -46,7 +46,7 @@ VARIABLES = {
 
 
 def account(ds: xr.Dataset) -> list[str]:
-    """The maps, and how far they agree."""
+    """Lines on the maps and on their agreement."""
     values, words = ds["agreement"].values, meanings(ds["agreement"])
     counts = [f"{int((values == code).sum())} {words[code]}" for code in sorted(words)[::-1]]
     a, b = ds["match_a"].values, ds["match_b"].values
@@ -79,7 +79,7 @@ def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
 
 
 def _share(heading: str, shares: list[float], numbers: list[int]) -> Column:
-    """Shares of the starts of those that are in a map."""
+    """Shares of the starts, for attractors that are in a map."""
     found = [share if n >= 0 else math.nan for share, n in zip(shares, numbers, strict=True)]
     return Column(
         heading, lambda i: "-" if numbers[i] < 0 else f"{100 * found[i]:.2f} %", {heading: found}

@@ -1,4 +1,4 @@
-"""What ``attractors`` and ``basin_fractions`` return: what starts settle to."""
+"""Result of ``attractors`` and ``basin_fractions``: the attractors that starts settle to."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from saltus.results.table import (
 )
 from saltus.results.wording import LINES, kind_texts, meanings, more, sized, unit_of
 
-#: Variables of what ``attractors`` and ``basin_fractions`` return.
+#: Variables of the results of ``attractors`` and ``basin_fractions``.
 VARIABLES = {
     **TRAJECTORY_NUMBER,
     "basin": Variable(("trajectory",), "1", "attractor", "i2"),
@@ -36,7 +36,7 @@ VARIABLES = {
 
 # -- account ---------------------------------------------------------------------------------------
 def account(ds: xr.Dataset) -> list[str]:
-    """The attractors, and what became of the starts."""
+    """Lines on the attractors, and on the fate of the starts."""
     starts = (
         f"{ds.sizes['trajectory']} starts"
         if "trajectory" in ds.dims
@@ -58,7 +58,7 @@ def found(ds: xr.Dataset) -> list[str]:
 
 
 def settled(labels: xr.DataArray) -> str:
-    """The line on how many starts lead to an attractor, and what became of the others."""
+    """Line on the number of starts that lead to an attractor, and on the fate of the others."""
     codes, counts = np.unique(labels.values, return_counts=True)
     others = [
         f"{count} {meanings(labels)[int(code)]}"
@@ -70,13 +70,14 @@ def settled(labels: xr.DataArray) -> str:
 
 
 def _computed(labels: xr.DataArray) -> int:
-    """How many starts were followed."""
+    """Count the starts that were followed."""
     return int((labels.values != Kind.NOT_COMPUTED).sum())
 
 
 def missed(starts: int, where: str = "") -> list[str]:
-    """What so many starts may have missed: by the rule of three a basin above 3/N of their box is
-    met with 95 %. Hanley & Lippman-Hand, J. Am. Med. Assoc. 249 (1983) 1743.
+    """State which basins N starts may have missed. By the rule of three, a basin above 3/N of the
+    box of starts is met with 95 % confidence. Hanley & Lippman-Hand, J. Am. Med. Assoc. 249 (1983)
+    1743.
     """
     if not starts:
         return []
@@ -85,13 +86,13 @@ def missed(starts: int, where: str = "") -> list[str]:
 
 
 def untyped(labels: xr.DataArray, *codes: Kind) -> list[str]:
-    """A line on starts whose motion has no type: those with one of some codes."""
+    """Line on motions without a type, if there are starts with one of these codes."""
     return [f"untyped  {LONGER}"] if np.isin(labels.values, codes).any() else []
 
 
 def own_errors(ds: xr.Dataset) -> str:
-    """What errors of a method have to do with starts that never settled, in a sentence or two; ""
-    for one whose errors are rounding.
+    """Explain in a sentence or two how errors of the method keep starts from settling; "" for a
+    method whose errors are only rounding.
     """
     attrs = ds.attrs
     method = str(attrs.get("method", ""))
@@ -115,44 +116,42 @@ def own_errors(ds: xr.Dataset) -> str:
 
 
 def _attractors(ds: xr.Dataset) -> Iterator[str]:
-    """A line on each of the first, and one on the others."""
+    """A line on each of the first attractors, and one line on the others."""
     each = [ds.isel(attractor=i) for i in range(ds.sizes["attractor"])]
-    texts = [_one(one) for one in each]
-    for i, (one, text) in enumerate(zip(each[:LINES], texts, strict=False)):
-        through = _through(one) if texts.count(text) > 1 else ""
+    texts = [_one(attractor) for attractor in each]
+    for i, (attractor, text) in enumerate(zip(each[:LINES], texts, strict=False)):
+        through = _through(attractor) if texts.count(text) > 1 else ""
         share = (
-            f", {float(one['attractor_fraction']):.2%} of the starts"
-            if "attractor_fraction" in one
+            f", {float(attractor['attractor_fraction']):.2%} of the starts"
+            if "attractor_fraction" in attractor
             else ""
         )
         yield f"  {i}: {text}{through}{share}"
     yield from more(len(each))
 
 
-def _one(one: xr.Dataset) -> str:
+def _one(attractor: xr.Dataset) -> str:
     """Kind and size of an attractor."""
-    kind, period = str(one["attractor_type"].item()), int(one["attractor_period"])
+    kind, period = str(attractor["attractor_type"].item()), int(attractor["attractor_period"])
     name = f"{kind} {period}T" if kind == "periodic" else kind_text(kind, period)
-    if kind == "limit_cycle" and "attractor_cycle" in one:
-        cycle = float(one["attractor_cycle"])
+    if kind == "limit_cycle" and "attractor_cycle" in attractor:
+        cycle = float(attractor["attractor_cycle"])
         name += f", period {cycle:.4g} s, {1 / cycle:.4g} Hz"
-    size = f"peak {sized(one['attractor_peak'])}"
+    size = f"peak {sized(attractor['attractor_peak'])}"
     if kind == Kind.NOISY_PERIODIC.word:
-        size += f", scatter {sized(one['attractor_scatter'], '.2g')}"
+        size += f", scatter {sized(attractor['attractor_scatter'], '.2g')}"
     return f"{name}, {size}"
 
 
 def _through(one: xr.Dataset) -> str:
-    """The first point that an attractor is known by: it tells mirror images apart, whose sizes are
-    the same.
-    """
+    """First point of an attractor. It distinguishes mirror images, whose sizes are equal."""
     first = one.isel(phase=0, missing_dims="ignore")
-    place = ", ".join(
+    point = ", ".join(
         f"{name} = {sized(first[attractor_name(name)])}"
         for name in states_of(one)
         if attractor_name(name) in first and np.isfinite(first[attractor_name(name)])
     )
-    return f", through {place}" if place else ""
+    return f", through {point}" if point else ""
 
 
 # -- rows ------------------------------------------------------------------------------------------
@@ -187,14 +186,14 @@ def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
 
 
 def _largest(ds: xr.Dataset) -> np.ndarray:
-    """Magnitude of the first multiplier of each; NaN where there is none."""
+    """Magnitude of the first multiplier of each attractor; NaN if there is none."""
     real, imag = (ds[f"attractor_multiplier_{part}"].values[:, 0] for part in ("real", "imag"))
     sizes = np.hypot(real, imag)
     return np.where(np.isfinite(sizes), sizes, np.nan)
 
 
 def _share(ds: xr.Dataset) -> list[Column]:
-    """The share of the starts that lead to each, with its interval."""
+    """Share of the starts that lead to each attractor, with its interval."""
     if "attractor_fraction" not in ds:
         return []
     share, low, high = (
@@ -210,7 +209,7 @@ def _share(ds: xr.Dataset) -> list[Column]:
 
 
 def _notes(ds: xr.Dataset) -> Iterator[str]:
-    """What the numbers are worth."""
+    """Sentences on how far the numbers can be trusted."""
     if "basin" in ds:
         yield from (f"{one}." for one in missed(_computed(ds["basin"])))
     yield from _trust(ds)
@@ -225,7 +224,7 @@ def _notes(ds: xr.Dataset) -> Iterator[str]:
 
 
 def _trust(ds: xr.Dataset) -> Iterator[str]:
-    """What the checks of a map say of its numbers, so far as they were made."""
+    """Sentences on the checks of a map that were made."""
     attrs = ds.attrs
     if attrs.get("flip_checked"):
         yield (

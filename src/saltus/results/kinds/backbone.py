@@ -1,4 +1,4 @@
-"""What ``backbone`` returns: the vibrations that resonances follow."""
+"""Result of ``backbone``: the free vibrations that resonances follow."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from saltus.results.kinds import branches
 from saltus.results.table import TextTable, number, quantity, spread, table, words
 
 _POINT = ("point",)
-#: Why a backbone may end before the amplitude asked for.
+#: Reasons for which a backbone may end before the amplitude asked for.
 _ENDS = ("points", "lost")
 
-#: Variables of what ``backbone`` returns. ``<first>``: the unit of the first state; ``<output>``:
+#: Variables of the result of ``backbone``. ``<first>``: the unit of the first state; ``<output>``:
 #: that in ``output_units``.
 VARIABLES = {
     "point": Variable(_POINT, "1", "point of the backbone", "i8", coord=True),
@@ -37,7 +37,7 @@ VARIABLES = {
 
 
 def account(ds: xr.Dataset) -> list[str]:
-    """Its ends, and how much of it is stable."""
+    """Lines on the ends of the backbone, and on the share of it that is stable."""
     frequency, name = ds["backbone_frequency"].values, ds.attrs["amplitude_of"]
     one = ds.sel(output=name)
     peak, unit = one["point_output_peak"].values, one["output_units"].item()

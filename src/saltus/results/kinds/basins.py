@@ -1,4 +1,4 @@
-"""What ``basins`` returns: which attractor each start of a grid leads to."""
+"""Result of ``basins``: the attractor that each start of a grid leads to."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from saltus.results.wording import span
 
 #: The two states that a map is drawn over.
 AXES = {"<state>": Variable(("<state>",), "<state>", "<state> at the start", coord=True)}
-#: Trust numbers of a map, and what they are called in the text.
+#: Trust numbers of a map, and their names in the text.
 _TRUST = {
     "basin_entropy": "basin entropy",
     "boundary_basin_entropy": "on the boundary",
     "uncertainty_exponent": "uncertainty exponent",
 }
 
-#: Variables of what ``basins`` returns.
+#: Variables of the result of ``basins``.
 VARIABLES = {
     **AXES,
     "basin": Variable(("...",), "1", "attractor", "i2"),
@@ -35,7 +35,7 @@ VARIABLES = {
 
 
 def account(ds: xr.Dataset) -> list[str]:
-    """The grid, what was found, and what it is worth."""
+    """Lines on the grid, the attractors, and the trust in the numbers."""
     trust = [f"{words} {ds.attrs[name]:.3g}" for name, words in _TRUST.items() if name in ds.attrs]
     lines = [span(ds, axes_of(ds), "starts"), *found(ds)]
     return lines + ([f"trust    {', '.join(trust)}"] if trust else [])

@@ -1,4 +1,4 @@
-"""What ``bifurcation_curve`` returns: a bifurcation over two parameters."""
+"""Result of ``bifurcation_curve``: a bifurcation over two parameters."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from saltus.results.wording import plain, unit_of
 _POINT = ("point",)
 _CODIM2 = ("codim2",)
 
-#: Variables of what ``bifurcation_curve`` returns. ``<first>``: the unit of the first state;
+#: Variables of the result of ``bifurcation_curve``. ``<first>``: the unit of the first state;
 #: ``<gap>``: that of the gaps; ``<root gap>``: of their square roots.
 VARIABLES = {
     "point": Variable(_POINT, "1", "point of the curve", "i8", coord=True),

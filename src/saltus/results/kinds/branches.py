@@ -1,4 +1,4 @@
-"""What ``branches`` returns: orbits over a parameter, stable or not, and their bifurcations."""
+"""Result of ``branches``: orbits over a parameter, stable or not, and their bifurcations."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ _EVENT = ("event",)
 #: Digits of the parameter at a bifurcation.
 DIGITS = 10
 
-#: Variables of what ``branches`` returns. ``<first>``: the unit of the first state; ``<gap>``: that
-#: of the gaps; ``<varied>``: that of the parameter; ``<output>``: that in ``output_units``, which
-#: an output has of its own.
+#: Variables of the result of ``branches``. ``<first>``: the unit of the first state; ``<gap>``:
+#: that of the gaps; ``<varied>``: that of the parameter; ``<output>``: that of the output, in
+#: ``output_units``.
 VARIABLES = {
     "point": Variable(_POINT, "1", "point of a branch", "i8", coord=True),
     "point_branch": Variable(_POINT, "1", "branch that the point lies on", "i8"),
@@ -130,7 +130,7 @@ VARIABLES = {
 }
 
 
-#: Why a branch stops within the range though it goes on, in the words of an account.
+#: Reasons for which following stops within the range though the branch goes on, in words.
 _STOPPED = {
     "points": "stopped by points=",
     "lost": "lost",
@@ -140,7 +140,9 @@ _STOPPED = {
 
 # -- account ---------------------------------------------------------------------------------------
 def account(ds: xr.Dataset) -> list[str]:
-    """A line on each branch with its events, and one on each whose stability isn't explained."""
+    """A line on each branch with its events, and a line on each branch with unexplained changes of
+    stability.
+    """
     stable = ds["point_stable"].values
     lines = [
         f"found    {counted(ds.sizes['branch'], 'branch')}, {int(ds['branch_closed'].sum())} of "
@@ -179,7 +181,9 @@ def _one(ds: xr.Dataset, i: int) -> str:
 
 
 def _stopped(branch: xr.Dataset, ends: np.ndarray) -> str:
-    """Where a branch ends within the range though it goes on."""
+    """Describe the ends of a branch at which following stopped within the range, though the branch
+    goes on.
+    """
     text = ""
     for side, last in zip(("begin", "end"), ends, strict=True):
         why = branch[f"branch_{side}"].item()
@@ -200,11 +204,11 @@ def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
 
 def _branches(title: str, ds: xr.Dataset) -> TextTable:
     """A row for each branch; on the screen the longest ones if there are many."""
-    name, of = ds.attrs["parameter"], ds["point_branch"].values
+    name, branch_of = ds.attrs["parameter"], ds["point_branch"].values
     values, unit = ds[point_name(name)].values, unit_of(ds[point_name(name)])
     stable, peak = ds["point_stable"].values, ds["point_peak"].values
     numbers = ds["branch"].values
-    mine = [np.flatnonzero(of == number) for number in numbers]
+    mine = [np.flatnonzero(branch_of == number) for number in numbers]
     along, first = plain(name), states_of(ds)[0]
     columns = [
         words("branch", numbers),
@@ -216,7 +220,7 @@ def _branches(title: str, ds: xr.Dataset) -> TextTable:
         quantity(f"largest |{first}|", [peak[i].max() for i in mine], unit_of(ds["point_peak"])),
         words("bifurcations", [int((ds["event_branch"].values == i).sum()) for i in numbers]),
     ]
-    notes = [f"{len(of)} orbits on {len(numbers)} branches."]
+    notes = [f"{len(branch_of)} orbits on {len(numbers)} branches."]
     notes += [f"{one}." for one in _unexplained(ds)]
     shown = np.sort(np.argsort([-len(i) for i in mine], kind="stable")[:ROWS]).tolist()
     return table(title, columns, tuple(notes), shown)

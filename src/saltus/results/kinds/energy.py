@@ -1,4 +1,4 @@
-"""What ``energy_balance`` returns: energy stored, supplied and taken."""
+"""Result of ``energy_balance``: energy stored, supplied and taken."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from saltus.results.wording import failed
 
 _INTERVAL = ("trajectory", "period")
 
-#: Variables of what ``energy_balance`` returns. Of an unforced system they lie along ``time`` in
-#: place of ``period``.
+#: Variables of the result of ``energy_balance``. For an unforced system their dim is ``time``, not
+#: ``period``.
 VARIABLES = {
     "period": Variable(
         ("period",),

@@ -1,4 +1,4 @@
-"""What ``equilibria`` returns: where a system without forcing can rest."""
+"""Result of ``equilibria``: the equilibria of a system without forcing."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from saltus.results.wording import sized, unit_of
 
 _EACH = ("equilibrium",)
 _EIGENVALUE = ("equilibrium", "eigenvalue")
-#: Digits of a state at rest.
+#: Digits of a state of an equilibrium.
 DIGITS = 10
 
-#: Variables of what ``equilibria`` returns.
+#: Variables of the result of ``equilibria``.
 VARIABLES = {
     "equilibrium": Variable(_EACH, "1", "equilibrium", "i8", coord=True),
     "equilibrium_type": Variable(_EACH, "", "node, focus, saddle, ... by its eigenvalues", "str"),
@@ -49,20 +49,22 @@ VARIABLES = {
 
 
 def account(ds: xr.Dataset) -> list[str]:
-    """A line on each."""
+    """A line on each equilibrium."""
     count = ds.sizes["equilibrium"]
     lines = [f"found    {counted(count, 'equilibrium')}"]
     return lines + [f"  {i}: {_one(ds.isel(equilibrium=i))}" for i in range(count)]
 
 
-def _one(one: xr.Dataset) -> str:
+def _one(equilibrium: xr.Dataset) -> str:
     """Type, state and contacts of an equilibrium."""
-    at = ", ".join(f"{name} = {sized(one[equilibrium_name(name)])}" for name in states_of(one))
-    kind = _kind(one["equilibrium_type"].item())
-    stable = "stable" if one["equilibrium_stable"] else "unstable"
+    at = ", ".join(
+        f"{name} = {sized(equilibrium[equilibrium_name(name)])}" for name in states_of(equilibrium)
+    )
+    kind = _kind(equilibrium["equilibrium_type"].item())
+    stable = "stable" if equilibrium["equilibrium_stable"] else "unstable"
     word = kind if kind in ("center", "degenerate", "undecided") else f"{stable} {kind}"
-    contacts = one["equilibrium_contacts"].item()
-    on = "held at" if one["equilibrium_place"].item() == "pseudo" else "on the boundary"
+    contacts = equilibrium["equilibrium_contacts"].item()
+    on = "held at" if equilibrium["equilibrium_place"].item() == "pseudo" else "on the boundary"
     return f"{word} at {at}{contacts and f', {on} {contacts}'}"
 
 
@@ -72,7 +74,7 @@ def _kind(kind: str) -> str:
 
 
 def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
-    """A row for each."""
+    """A row for each equilibrium."""
     states = {name: ds[equilibrium_name(name)] for name in states_of(ds)}
     growth = ds["equilibrium_eigenvalue_real"].values
     largest = np.fmax.reduce(growth, axis=1, initial=-np.inf)

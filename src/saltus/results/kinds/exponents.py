@@ -1,4 +1,4 @@
-"""What ``lyapunov`` and ``wolf`` return: Lyapunov exponents of motions."""
+"""Result of ``lyapunov`` and ``wolf``: Lyapunov exponents of motions."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ COLUMNS = 4
 #: Sum of the exponents, and the mean divergence that it must equal.
 _SUMS = {"sum": "exponent_sum", "mean divergence": "mean_divergence"}
 
-#: Variables of what ``lyapunov`` and ``wolf`` return: exponents in descending order, and running
+#: Variables of the results of ``lyapunov`` and ``wolf``: exponents in descending order, and running
 #: means. ``<rate>``: the unit that was asked for, such as ``bit/period``.
 VARIABLES = {
     **TRAJECTORY_NUMBER,
@@ -143,7 +143,7 @@ def _kinds(ds: xr.Dataset) -> list[str]:
 
 
 def _grazes(ds: xr.Dataset) -> list[str]:
-    """``near a graze`` for each motion that is, else ``""``."""
+    """``near a graze`` for each motion near one, else ``""``."""
     if "near_graze" not in ds:
         return [""] * ds.sizes["trajectory"]
     return ["near a graze" if one else "" for one in ds["near_graze"].values]

@@ -1,4 +1,4 @@
-"""What ``impact_statistics`` returns: how often, how hard and how long contacts are."""
+"""Result of ``impact_statistics``: number, speeds and durations of contacts."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from saltus.results.wording import failed, sized, unit_of
 _CONTACT = ("contact",)
 _GUARD = ("trajectory", "guard")
 
-#: Variables of what ``impact_statistics`` returns.
+#: Variables of the result of ``impact_statistics``.
 VARIABLES = {
     "contact_time": Variable(_CONTACT, "s", "time at which the contact begins"),
     "contact_guard": Variable(_CONTACT, "", "guard that was met", "str"),

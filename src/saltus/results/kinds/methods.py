@@ -1,4 +1,4 @@
-"""What ``compare_methods`` returns: an analysis by several methods, side by side."""
+"""Result of ``compare_methods``: an analysis by several methods, side by side."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from saltus.results.kinds import responses
 from saltus.results.kinds.agreement import AGREEING
 from saltus.results.table import Column, TextTable, interval, number, quantity, table, words
 
-#: What belongs to a method and a place of the grid, and may belong to a start there.
+#: Dims of numbers of a method at a place of the grid; of a start there if they differ by start.
 _FIELD = ("method", "...", "start?")
 
-#: Variables of what ``compare_methods`` returns, beside the coordinates of the analysis.
+#: Variables of the result of ``compare_methods``, besides the coordinates of the analysis.
 VARIABLES = {
     "method": Variable(("method",), "", "method, the reference first", "str", coord=True),
     "method_cpu_seconds": Variable(
@@ -59,7 +59,7 @@ VARIABLES = {
 
 
 def account(ds: xr.Dataset) -> list[str]:
-    """A line on each method: how far it agrees with the reference, and what it costs."""
+    """A line on each method: its agreement with the reference, and its cost."""
     names = ds["method"].values.tolist()
     lines = [f"found    {ds.attrs.get('analysis', 'an analysis')} by {len(names)} methods"]
     for i, name in enumerate(names):

@@ -1,4 +1,4 @@
-"""What ``structure_modes`` returns: the modes of a structure from its matrices."""
+"""Result of ``structure_modes``: the modes of a structure from its matrices."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from saltus.results.dataset.schema import ResultKind
 from saltus.results.dataset.variable import Variable
 from saltus.results.table import TextTable, quantity, table, words
 
-#: Variables of what ``structure_modes`` returns.
+#: Variables of the result of ``structure_modes``.
 VARIABLES = {
     "frequency": Variable(("mode",), "Hz", "natural frequency"),
     "shape": Variable(("degree", "mode"), "kg^-0.5", "mode shape of unit modal mass"),
@@ -24,7 +24,7 @@ VARIABLES = {
 
 
 def account(ds: xr.Dataset) -> list[str]:
-    """How many there are, and what they leave out."""
+    """Lines on the modes: their number, their frequencies, and the compliance left out."""
     frequency = ds["frequency"].values
     return [
         f"found    {len(frequency)} modes of {ds.sizes['degree']} degrees of freedom",

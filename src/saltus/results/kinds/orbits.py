@@ -1,5 +1,5 @@
-"""What ``periodic_orbits`` and ``edge_orbit`` return: the variables of attractors that mean the
-same of any orbit, and what only a search for all of them knows.
+"""Result of ``periodic_orbits`` and ``edge_orbit``: those variables of attractors that any orbit
+has, and those that only a search for all orbits gives.
 """
 
 from __future__ import annotations
@@ -17,9 +17,10 @@ from saltus.results.dataset.variable import Variable
 from saltus.results.table import Column, TextTable, number, quantity, table, words
 from saltus.results.wording import LINES, more, sized, unit_of
 
-_EACH, _SEARCH = ("orbit",), ("search_period",)
+_EACH = ("orbit",)
+_SEARCH = ("search_period",)
 
-#: Variables of what ``periodic_orbits`` returns.
+#: Variables of the result of ``periodic_orbits``.
 VARIABLES = {
     **rows_as("orbit", without=OF_ATTRACTORS),
     "orbit_stable": Variable(
@@ -61,7 +62,7 @@ VARIABLES = {
 
 # -- account ---------------------------------------------------------------------------------------
 def account(ds: xr.Dataset) -> list[str]:
-    """A line on each orbit, and what the search says of those that it missed."""
+    """A line on each orbit, and lines on the search for the others."""
     stable = int((ds["orbit_stable"].values == 1).sum())
     count = ds.sizes["orbit"]
     lines = [f"found    {counted(count, 'orbit')}, {stable} of them stable"]
@@ -78,35 +79,37 @@ def account(ds: xr.Dataset) -> list[str]:
     return lines
 
 
-def _one(one: xr.Dataset) -> str:
+def _one(orbit: xr.Dataset) -> str:
     """Kind, stability, size and largest multiplier of an orbit."""
     real, imag = (
-        float(np.ravel(one[f"orbit_multiplier_{part}"].values)[0]) for part in ("real", "imag")
+        float(np.ravel(orbit[f"orbit_multiplier_{part}"].values)[0]) for part in ("real", "imag")
     )
-    cycle = f" of {float(one['orbit_cycle']):.8g} s" if "orbit_cycle" in one else ""
-    kind = kind_text(str(one["orbit_type"].item()), int(one["orbit_period"]))
+    cycle = f" of {float(orbit['orbit_cycle']):.8g} s" if "orbit_cycle" in orbit else ""
+    kind = kind_text(str(orbit["orbit_type"].item()), int(orbit["orbit_period"]))
     return (
-        f"{kind}{cycle}, {one['orbit_stability'].item()}, peak {sized(one['orbit_peak'])}, "
+        f"{kind}{cycle}, {orbit['orbit_stability'].item()}, peak {sized(orbit['orbit_peak'])}, "
         f"largest multiplier {np.hypot(real, imag):.4g}"
     )
 
 
 def _searches(ds: xr.Dataset) -> Iterator[str]:
-    """What the search for orbits of each period found, and what it may have missed."""
+    """Lines on the search for orbits of each period: the orbits found, and the share that may be
+    missed.
+    """
     for i in range(ds.sizes.get("search_period", 0)):
-        one = ds.isel(search_period=i)
-        share = float(one["search_unseen"])
+        search = ds.isel(search_period=i)
+        share = float(search["search_unseen"])
         unseen = f", about {share:.1%} of them to one that isn't known" if share == share else ""
         yield (
-            f"{period_text(int(one['search_period']), 'limit cycles')}: "
-            f"{int(one['search_converged'])} of {ds.attrs.get('starts', '?')} starts led to an "
-            f"orbit{unseen}; deflation found {int(one['search_deflated'])} more"
+            f"{period_text(int(search['search_period']), 'limit cycles')}: "
+            f"{int(search['search_converged'])} of {ds.attrs.get('starts', '?')} starts led to an "
+            f"orbit{unseen}; deflation found {int(search['search_deflated'])} more"
         )
 
 
 # -- rows ------------------------------------------------------------------------------------------
 def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
-    """A row for each orbit; what the search says of those that it missed."""
+    """A row for each orbit. Notes tell the share that the search may have missed."""
     real, imag = (ds[f"orbit_multiplier_{part}"].values for part in ("real", "imag"))
     columns = [
         _periods(ds),
@@ -120,14 +123,14 @@ def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
 
 
 def _periods(ds: xr.Dataset) -> Column:
-    """The periods: in forcing periods, of limit cycles in seconds."""
+    """Periods: forcing periods, or seconds for limit cycles."""
     if "orbit_cycle" in ds:
         return quantity("period", ds["orbit_cycle"].values, "s")
     return words("period", [period_text(int(n)) for n in ds["orbit_period"].values])
 
 
 def _largest(sizes: np.ndarray) -> np.ndarray:
-    """The largest of each row; NaN in one without numbers."""
+    """Largest number of each row; NaN for a row without numbers."""
     return np.where(np.isnan(sizes).all(axis=1), np.nan, np.fmax.reduce(sizes, axis=1, initial=0))
 
 

@@ -1,4 +1,4 @@
-"""What ``frequency_response`` and ``bifurcation_diagram`` return: all steady responses."""
+"""Result of ``frequency_response`` and ``bifurcation_diagram``: all steady responses."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from saltus.results.table import ROWS, Column, TextTable, interval, number, quan
 from saltus.results.wording import LINES, header, kind_texts, plain, span, tally, unit_of
 from saltus.units import from_si, titled
 
-#: What belongs to a start at one place of the grid.
+#: Dims of numbers of a start at a place of the grid.
 _GRID = ("...", "start")
 _RESPONSE = ("response",)
 
-#: Variables of what ``frequency_response`` and ``bifurcation_diagram`` return. ``<first>``: the
-#: unit of the first state; ``<gap>``: that of the gaps; ``<output>``: that in ``output_units``,
-#: which an output has of its own.
+#: Variables of the results of ``frequency_response`` and ``bifurcation_diagram``. ``<first>``: the
+#: unit of the first state; ``<gap>``: that of the gaps; ``<output>``: that of the output, in
+#: ``output_units``.
 VARIABLES = {
     "<parameter>": Variable(("<parameter>",), "<parameter>", "<parameter>", coord=True),
     "response_of": Variable(
@@ -72,7 +72,7 @@ VARIABLES = {
 
 # -- account ---------------------------------------------------------------------------------------
 def account(ds: xr.Dataset) -> list[str]:
-    """What was found: branches, kinds of motion, events; and what became of the starts."""
+    """Lines on branches, kinds of motion and events, and on the fate of the starts."""
     starts, labels = ds.sizes["start"], ds["response_of"]
     lines = [
         f"{span(ds, parameters_of(ds), 'values')}, {counted(starts, 'start')} at each",
@@ -88,7 +88,7 @@ def account(ds: xr.Dataset) -> list[str]:
 
 
 def _found(ds: xr.Dataset) -> str:
-    """How many responses there are, on how many branches, and of which kinds."""
+    """Line on the number of responses, their branches and their kinds."""
     kinds = kind_texts(ds, "response_")
     found = f"found    {counted(len(kinds), 'response')}"
     if len(parameters_of(ds)) == 1:
@@ -97,7 +97,7 @@ def _found(ds: xr.Dataset) -> str:
 
 
 def _ends(ds: xr.Dataset) -> list[str]:
-    """Lines on branches that aren't known to their end."""
+    """Lines on branches whose ends aren't known."""
     lines = []
     if text := ds.attrs.get("branches_refused"):
         lines.append(f"unsure   branches are matched by where responses lie: {text}")
@@ -125,7 +125,7 @@ def _tally(kinds: list[str]) -> str:
 
 
 def _open(ds: xr.Dataset) -> int:
-    """How many responses haven't repeated, and may be of either kind."""
+    """Count the responses that haven't repeated, and may be periodic or not."""
     return int((ds["response_type"].values == Kind.NOT_REPEATING.word).sum())
 
 
@@ -146,24 +146,29 @@ def _branches(title: str, ds: xr.Dataset) -> TextTable:
     numbers, sizes = np.unique(branch, return_counts=True)
     shown = np.sort(np.argsort(-sizes, kind="stable")[:ROWS]).tolist()
     each = [ds.isel(response=np.flatnonzero(branch == number)) for number in numbers]
-    tops = [int(np.nan_to_num(one["response_rms"].values, nan=-math.inf).argmax()) for one in each]
+    tops = [
+        int(np.nan_to_num(responses["response_rms"].values, nan=-math.inf).argmax())
+        for responses in each
+    ]
     first, along, values = states_of(ds)[0], plain(axis), response_name(axis)
     unit, size, gap = (unit_of(ds[name]) for name in (axis, "response_rms", "response_margin"))
 
     def ends(name: str, pick: Callable[[np.ndarray], Any]) -> list[float]:
-        return [float(pick(one[name].values)) for one in each]
+        return [float(pick(responses[name].values)) for responses in each]
 
     def at_top(name: str) -> list[float]:
-        return [float(one[name].values[top]) for one, top in zip(each, tops, strict=True)]
+        return [
+            float(responses[name].values[top]) for responses, top in zip(each, tops, strict=True)
+        ]
 
     extents = [
-        _extent(ds, int(number), one[values].values)
-        for number, one in zip(numbers, each, strict=True)
+        _extent(ds, int(number), responses[values].values)
+        for number, responses in zip(numbers, each, strict=True)
     ]
     fewest, most = (ends("response_contacts", pick) for pick in (_least, _most))
     columns = [
         words("branch", numbers),
-        words("type", [_types(one) for one in each]),
+        words("type", [_types(responses) for responses in each]),
         words("values", sizes),
         quantity(f"{along} from", [low for low, _ in extents], unit, 5),
         quantity("to", [high for _, high in extents], unit, 5, name=f"{along} to"),
@@ -178,8 +183,8 @@ def _branches(title: str, ds: xr.Dataset) -> TextTable:
 
 
 def _extent(ds: xr.Dataset, branch: int, values: np.ndarray) -> tuple[float, float]:
-    """Least and largest value of the parameter on a branch: of its responses, and as far as it was
-    followed.
+    """Least and largest value of the parameter on a branch: of its responses, and of its points if
+    it was followed.
     """
     if "point_branch" in ds:
         followed = ds[point_name(parameters_of(ds)[0])].values[ds["point_branch"].values == branch]
@@ -188,7 +193,7 @@ def _extent(ds: xr.Dataset, branch: int, values: np.ndarray) -> tuple[float, flo
 
 
 def _least(values: np.ndarray) -> float:
-    """The least of the numbers that are there; NaN of none."""
+    """Least of the finite numbers; NaN if there are none."""
     return (
         float(values[~np.isnan(values)].min(initial=math.inf))
         if not np.isnan(values).all()
@@ -206,23 +211,23 @@ def _types(ds: xr.Dataset) -> str:
 
 
 def _notes(ds: xr.Dataset, more: int = 0) -> tuple[str, ...]:
-    of = ds["response_of"].values
+    labels = ds["response_of"].values
     notes = [
-        f"{ds.sizes['response']} different responses from {of.size} starts at "
-        f"{math.prod(of.shape[:-1])} values."
+        f"{ds.sizes['response']} different responses from {labels.size} starts at "
+        f"{math.prod(labels.shape[:-1])} values."
     ]
     if more:
         notes.append(f"{more} shorter branches are in the file.")
     if left := _open(ds):
         notes.append(f"{left} responses {OPEN}")
-    return (*notes, *sentences(of))
+    return (*notes, *sentences(labels))
 
 
 def _kinds(title: str, ds: xr.Dataset) -> TextTable:
-    """A row for each kind of motion: on how much of the map it is, and where."""
-    of = ds["response_of"].values
+    """A row for each kind of motion: its share of the map, and its ranges of the parameters."""
+    labels = ds["response_of"].values
     names = np.array(kind_texts(ds, "response_"), dtype=np.str_)
-    cells = np.append(names, "")[np.where(of < 0, len(names), of)]
+    cells = np.append(names, "")[np.where(labels < 0, len(names), labels)]
     kinds = sorted(set(names.tolist()), key=lambda kind: (len(kind), kind))
     shares = [float((cells == kind).mean()) for kind in kinds]
     columns = [
@@ -232,7 +237,7 @@ def _kinds(title: str, ds: xr.Dataset) -> TextTable:
     for dim, axis in enumerate(parameters_of(ds)):
         values, unit = ds[axis].values, unit_of(ds[axis])
         where = [values[np.nonzero((cells == kind).any(axis=-1))[dim]] for kind in kinds]
-        low, high = ([of(found) for found in where] for of in (_least, _most))
+        low, high = ([pick(found) for found in where] for pick in (_least, _most))
         columns.append(
             interval(plain(axis), low, high, partial(from_si, unit=unit, digits=4), unit)
         )
@@ -255,7 +260,7 @@ def sheets(ds: xr.Dataset) -> dict[str, Mapping[str, np.ndarray]]:
 
 
 def _along(ds: xr.Dataset, dim: str) -> list[str]:
-    """The variables that have a number for each response, or event."""
+    """Variables that have a number for each response, or for each event."""
     return [str(name) for name in ds.variables if ds[name].dims == (dim,)]
 
 

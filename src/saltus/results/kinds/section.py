@@ -1,4 +1,4 @@
-"""What ``poincare`` returns: crossings of a surface."""
+"""Result of ``poincare``: crossings of a surface."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from saltus.results.wording import failed, unit_of
 
 _CROSSING = ("crossing",)
 
-#: Variables of what ``poincare`` returns. Crossings are one table for all trajectories.
+#: Variables of the result of ``poincare``. Crossings are one table for all trajectories.
 VARIABLES = {
     "<state>": Variable(_CROSSING, "<state>", "<state> at the crossing"),
     "crossing_time": Variable(_CROSSING, "s", "time of the crossing"),
@@ -52,7 +52,7 @@ VARIABLES = {
 
 
 def account(ds: xr.Dataset) -> list[str]:
-    """The surface, and what was found on it."""
+    """Lines on the surface, and on its crossings."""
     directions = {0: "both ways", 1: "upwards", -1: "downwards"}[int(ds.attrs["direction"])]
     return [f"surface  {ds.attrs['surface']}, {directions}", f"found    {_totals(ds)}"]
 

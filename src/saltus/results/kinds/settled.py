@@ -1,4 +1,4 @@
-"""What ``settled`` returns: the responses that runs end in."""
+"""Result of ``settled``: the responses that runs end in."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from saltus.results.kinds.spectrum import RESPONSE_PERIOD
 from saltus.results.table import TextTable, left_out, number, of_trajectory, quantity, table, words
 from saltus.results.wording import unit_of
 
-#: Variables of what ``settled`` returns. The last three are those of a run with samples between
+#: Variables of the result of ``settled``. The last three are those of a run with samples between
 #: whole periods.
 VARIABLES = {
     "mismatch": Variable(
@@ -28,7 +28,7 @@ VARIABLES = {
 
 
 def account(ds: xr.Dataset) -> list[str]:
-    """How many trajectories repeat, and after how many periods."""
+    """Line on the trajectories that repeat, counted by their period."""
     found, counts = np.unique(ds["response_period"].values, return_counts=True)
     each = [f"{count} {word}" for count, word in zip(counts, _words(ds, found), strict=True)]
     return [f"found    {', '.join(each)}"]

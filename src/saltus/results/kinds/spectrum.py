@@ -1,4 +1,4 @@
-"""What ``spectrum`` returns: motions by frequency."""
+"""Result of ``spectrum``: motions by frequency."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ RESPONSE_PERIOD = Variable(
     ("trajectory",), "1", "period of the response in forcing periods, 0 if none was found", "i8"
 )
 
-#: Variables of what ``spectrum`` returns. Of trajectories with forcing periods of their own they
-#: lie along ``order`` in place of ``frequency``.
+#: Variables of the result of ``spectrum``. If forcing periods differ between trajectories their dim
+#: is ``order``, not ``frequency``.
 VARIABLES = {
     "frequency": Variable(("trajectory?", "frequency"), "Hz", "frequency", coord=True),
     "order": Variable(
@@ -48,13 +48,13 @@ VARIABLES = {
 
 def account(ds: xr.Dataset) -> list[str]:
     """The largest lines of each state, of the first trajectory."""
-    one = ds.isel(trajectory=0) if "trajectory" in ds.dims else ds
-    frequency = one["frequency"].values
+    run = ds.isel(trajectory=0) if "trajectory" in ds.dims else ds
+    frequency = run["frequency"].values
     lines = [
-        f"extent   {len(frequency)} lines up to {frequency[-1]:g} Hz, window {one['window'].item()}"
+        f"extent   {len(frequency)} lines up to {frequency[-1]:g} Hz, window {run['window'].item()}"
     ]
     for name in states_of(ds):
-        amplitude = one[f"{name}_amplitude"]
+        amplitude = run[f"{name}_amplitude"]
         largest = np.argsort(amplitude.values)[::-1][:_LARGEST]
         told = [f"{sized(amplitude[i])} at {frequency[i]:.6g} Hz" for i in largest]
         lines.append(f"  {name}: {', '.join(told)}")
@@ -94,7 +94,7 @@ def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
     return [table(title, columns, [*notes, *failed(ds)], shown)]
 
 
-#: Of a motion whose period wasn't found.
+#: Word for the period of a motion whose period wasn't found.
 _NONE = "not periodic within the samples"
 
 
@@ -103,9 +103,9 @@ def _different(values: xr.DataArray) -> list[Any]:
 
 
 def _above_rounding(amplitude: xr.DataArray) -> xr.DataArray:
-    """Which lines are larger than what rounding alone can make: eps for each of the log2(N) stages
-    of the transform of N samples, of the root of the sum of all squares (N. J. Higham, Accuracy and
-    Stability of Numerical Algorithms, 2nd ed., theorem 24.2).
+    """True for lines larger than rounding errors. The bound is eps for each of the log2(N) stages
+    of the transform of N samples, times the root of the sum of all squares (N. J. Higham, Accuracy
+    and Stability of Numerical Algorithms, 2nd ed., theorem 24.2).
     """
     along = str(amplitude.dims[-1])
     stages = np.log2(2 * amplitude.sizes[along])

@@ -1,4 +1,4 @@
-"""What ``stroboscope`` returns: motions at whole forcing periods. It says what runs say."""
+"""Result of ``stroboscope``: motions at whole forcing periods."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from saltus.results.dataset.schema import ResultKind
 from saltus.results.dataset.variable import COUNTERS, GUARDS, MINIMA, SHARED, STATUS, Variable
 from saltus.results.kinds.trajectory import account, headline, rows, sheets
 
-#: Variables of what ``stroboscope`` returns.
+#: Variables of the result of ``stroboscope``.
 VARIABLES = {
     "<state>": Variable(("trajectory", "period"), "<state>", "<state>"),
     "period": Variable(("period",), "1", "whole forcing periods since the start", "i8", coord=True),

@@ -1,4 +1,4 @@
-"""What ``simulate`` returns: motions, their contacts and how they ended."""
+"""Result of ``simulate``: motions, their contacts and how they ended."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ from saltus.results.wording import ended_early, header, plain, tally, unit_of
 
 _CONTACT = ("contact",)
 
-#: Variables of what ``simulate`` returns. Trajectories with forcing periods of their own share
-#: phases, not times: their samples lie along ``period`` in place of ``time``. Contacts are one
-#: table for all trajectories.
+#: Variables of the result of ``simulate``. Trajectories whose forcing periods differ share phases,
+#: not times: the dim of their samples is ``period``, not ``time``. Contacts are one table for all
+#: trajectories.
 VARIABLES = {
     "<state>": Variable(("trajectory", "time"), "<state>", "<state>"),
     "time": Variable(("trajectory?", "time"), "s", "time", coord=True),
@@ -76,7 +76,7 @@ def account(ds: xr.Dataset) -> list[str]:
 
 
 def headline(ds: xr.Dataset) -> str:
-    """Length, contacts, status and grazes in a line, so far as they are there."""
+    """Length, contacts, status and grazes in a line, as far as the Dataset has them."""
     return ", ".join(_content(ds))
 
 
@@ -152,7 +152,7 @@ def rows(
 
 
 # -- all of it -------------------------------------------------------------------------------------
-#: Columns by name, each with the variable of the result that it is.
+#: Columns by name, each with the name and the values of its variable.
 Columns = dict[str, tuple[str, np.ndarray]]
 
 
@@ -167,8 +167,8 @@ def sample_columns(ds: xr.Dataset) -> Columns:
 
 
 def contact_columns(ds: xr.Dataset) -> Columns:
-    """One row a contact, of the trajectories that the Dataset (still) has. The prefix ``contact_``
-    is dropped; empty for a result without contacts.
+    """Columns with one row a contact, of the trajectories that the Dataset has. The prefix
+    ``contact_`` is dropped; empty for a result without contacts.
     """
     names = [str(name) for name in ds.data_vars if ds[name].dims == ("contact",)]
     names.sort(key=lambda name: name != "contact_trajectory")

@@ -1,4 +1,4 @@
-"""What ``regularisation_widths`` returns: errors of smooth stand-ins by their width."""
+"""Result of ``regularisation_widths``: errors of smooth approximations by their width."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from saltus.results.dataset.variable import Variable
 from saltus.results.table import TextTable, number, quantity, table
 from saltus.results.wording import unit_of
 
-#: Variables of what ``regularisation_widths`` returns.
+#: Variables of the result of ``regularisation_widths``.
 VARIABLES = {
     "width": Variable(("width",), "<gap>", "width of the blend", coord=True),
     "regularisation_error": Variable(("width",), "1", "error of a forcing period by the width"),

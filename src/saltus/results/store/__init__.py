@@ -1,1 +1,1 @@
-"""A map on disk, chunk by chunk, that any process may be killed over."""
+"""Maps on disk, chunk by chunk. Killed processes leave them intact."""

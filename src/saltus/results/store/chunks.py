@@ -1,5 +1,5 @@
-"""The grid of a map, cut into chunks, and a chunk as bytes that know what they are. store.py writes
-them, whole_files.py makes them last; nothing here touches the disk.
+"""Grid of a map, divided into chunks, and the bytes of a chunk, which name their place. store.py
+writes them, whole_files.py makes them durable; nothing here touches the disk.
 
 A chunk is one file: its arrays in the order of their names, as little-endian numbers; then its
 number and the hash of its store; then the SHA-256 of all that. In another place, or another store,
@@ -28,7 +28,7 @@ TRAILER = _PLACE.size + hashlib.sha256().digest_size
 
 @dataclass(frozen=True)
 class Chunks:
-    """How a map is cut.
+    """Division of a map into chunks.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class Chunks:
     chunk : int
         Cells in one chunk, the last one excepted.
     arrays : dict of str to dtype
-        What is kept of each cell, by name.
+        Values kept of each cell, by name.
     """
 
     shape: tuple[int, ...]
@@ -46,7 +46,7 @@ class Chunks:
 
     @classmethod
     def checked(cls, shape: tuple[int, ...], chunk: int, arrays: Mapping[str, Any]) -> Chunks:
-        """The same from what a caller passed.
+        """Chunks from the arguments of a caller.
 
         Raises
         ------
@@ -95,7 +95,7 @@ class Chunks:
         return slice(index * self.chunk, min((index + 1) * self.chunk, self.cells))
 
     def as_text(self) -> dict[str, str]:
-        """The same in words: what must agree when a store is resumed."""
+        """Texts that must agree when a store is resumed."""
         return {
             "shape": " x ".join(map(str, self.shape)),
             "chunk": str(self.chunk),
@@ -109,7 +109,7 @@ class Chunks:
         return cells * sum(dtype.itemsize for dtype in self.arrays.values()) + TRAILER
 
     def encode(self, index: int, values: Mapping[str, np.ndarray], store: str) -> bytes:
-        """The file of a chunk.
+        """Bytes of the file of a chunk.
 
         Parameters
         ----------
@@ -164,7 +164,7 @@ class Chunks:
 
     @staticmethod
     def fits(index: int, trailer: bytes, store: str) -> bool:
-        """Whether the last bytes of a file say that it is this chunk of this store."""
+        """True if the last bytes of a file name this chunk of this store."""
         return trailer[: _PLACE.size] == _place(index, store)
 
 
@@ -173,6 +173,6 @@ def _place(index: int, store: str) -> bytes:
 
 
 def is_whole(data: bytes) -> bool:
-    """Whether the bytes of a file are those that its checksum was made of."""
+    """True if the bytes of a file match the checksum at their end."""
     end = max(0, len(data) - hashlib.sha256().digest_size)
     return len(data) >= TRAILER and hashlib.sha256(memoryview(data)[:end]).digest() == data[end:]

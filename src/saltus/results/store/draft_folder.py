@@ -1,5 +1,5 @@
-"""A folder that appears under its name with everything in it, or not at all, and what is left of it
-when its maker is killed.
+"""Folders that appear under their names complete or not at all, and removal of the drafts that
+killed processes leave.
 """
 
 from __future__ import annotations
@@ -15,23 +15,23 @@ from saltus.results.store.durable import StoreError
 from saltus.results.store.lock import exclusive, is_held
 from saltus.whole_files import flush, is_older, refused_as, write
 
-#: A folder takes a moment to make: a draft of one that is older than this [s], and not locked, was
-#: left by a process that was killed.
+#: Age of a draft without a lock [s] above which its process was killed: making a folder takes a
+#: moment only.
 _DRAFT_AGE = 60.0
-#: Lock file in a draft, held while it is filled: a clock that jumps ahead makes it seem old, but
-#: not abandoned.
+#: Lock file in a draft, held while the draft is filled. A clock that jumps ahead makes the draft
+#: seem old, but the lock shows that it is in use.
 _LOCK = Path("locks") / "draft"
 
 
 def write_folder(path: Path, files: Mapping[str, bytes], folders: Iterable[str]) -> None:
-    """Make a folder that appears under its name with everything in it, or not at all.
+    """Make a folder that appears under its name complete or not at all.
 
     Parameters
     ----------
     path : Path
         Its name, not taken yet.
     files : mapping of str to bytes
-        What is in it, by path in the folder.
+        Its content, by path in the folder.
     folders : iterable of str
         Folders in it; ``locks`` is one of them.
 
@@ -59,14 +59,14 @@ def write_folder(path: Path, files: Mapping[str, bytes], folders: Iterable[str])
 
 
 def _locked(draft: Path) -> AbstractContextManager[object]:
-    """Hold the lock of a draft. Windows renames no folder with an open file in it: there the age
-    alone must do.
+    """Hold the lock of a draft. Windows renames no folder with an open file in it: on Windows only
+    the age of a draft counts.
     """
     return nullcontext() if os.name == "nt" else exclusive(draft / _LOCK)
 
 
 def remove_old_drafts(path: Path) -> None:
-    """Remove what processes left that were killed within :func:`write_folder`."""
+    """Remove drafts of processes that were killed within :func:`write_folder`."""
     for draft in path.parent.iterdir():
         if (
             draft.name.startswith(f".{path.name}.")

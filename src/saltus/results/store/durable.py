@@ -1,4 +1,4 @@
-"""The files of a store, read and written: what goes wrong with one is a StoreError."""
+"""Reading and writing of the files of a store. Errors of the disk become StoreErrors."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ class StoreError(SaltusError, OSError):
 
 
 def write_whole(path: Path, data: bytes, drafts: Path, name: str) -> None:
-    """Write a file that appears under its name complete or not at all, whatever befalls the process
-    or the disk.
+    """Write a file that appears under its name complete or not at all, even if the process is
+    killed or the disk fails.
 
     The bytes are on the disk before the name appears, and the name is before this returns. A disk
     that fills up leaves all as it was.
@@ -26,7 +26,7 @@ def write_whole(path: Path, data: bytes, drafts: Path, name: str) -> None:
     path : Path
         The file.
     data : bytes
-        What is in it.
+        Its content.
     drafts : Path
         Folder on the same disk for the draft; what a killed process leaves behind lies there.
     name : str
@@ -46,8 +46,8 @@ def write_whole(path: Path, data: bytes, drafts: Path, name: str) -> None:
 
 
 def read(path: Path, most: int = fence.STORED_BYTES) -> bytes | None:
-    """What is in a file; None if it isn't there, isn't one of at most ``most`` bytes, or the disk
-    can't read it any more.
+    """Return the bytes of a file; None if it isn't there, isn't a file of at most ``most`` bytes,
+    or the disk can't read it any more.
     """
     try:
         return fence.content(path, most)

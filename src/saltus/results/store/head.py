@@ -1,5 +1,5 @@
-"""``store.json``: what a store holds and what it was made from. Its hash stands in every record, so
-that chunks know where they belong.
+"""``store.json``: the content of a store and its origin. Its hash is in every record, so that each
+chunk names its store.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from saltus.results.store.durable import StoreError, read, write_whole
 from saltus.results.store.lock import exclusive
 from saltus.whole_files import seal, sha256, unseal
 
-#: Layout of the files. A store of another one is refused, not guessed at.
+#: Number of the layout of the files. A store with another layout is refused, not guessed at.
 FORMAT = 3
 #: Name of the file.
 HEAD = "store.json"
 #: Folder of the chunks.
 CHUNKS = "chunks"
-#: Most cells of a map that a head may speak of: of more, not even the list of chunks is to be made.
+#: Most cells of a map: a damaged head with more would fill memory with the list of chunks.
 MOST_CELLS = 10**9
 _TYPES = {
     "bool",
@@ -35,7 +35,7 @@ _TYPES = {
 
 
 def head_of(identity: Mapping[str, str], note: Mapping[str, Any], chunks: Chunks) -> dict[str, Any]:
-    """What ``store.json`` says."""
+    """Return the content of ``store.json``."""
     return {
         "format": FORMAT, "identity": dict(identity), "note": dict(note),
         "shape": list(chunks.shape), "chunk": chunks.chunk,
@@ -44,8 +44,8 @@ def head_of(identity: Mapping[str, str], note: Mapping[str, Any], chunks: Chunks
 
 
 def fingerprint(head: Mapping[str, Any]) -> str:
-    """SHA-256 of a head without its note, which is for people: equal for stores whose chunks may
-    stand for each other.
+    """SHA-256 of a head without its note, which is for people. Stores with equal fingerprints may
+    exchange chunks.
     """
     return sha256(
         seal({name: head[name] for name in ("format", "identity", "shape", "chunk", "arrays")})
@@ -84,8 +84,8 @@ def read_head(path: Path) -> dict[str, Any]:
 
 
 def _opened(data: bytes | None) -> dict[str, Any] | None:
-    """What a head says; None if it is damaged, or holds what no head does. Another layout may say
-    anything.
+    """Return the content of a head; None if it is damaged, or isn't the content of a head. The
+    content of another layout isn't checked.
     """
     head = unseal(data)
     if head is None or not isinstance(head.get("format"), int):
@@ -118,7 +118,7 @@ def _texts(values: Any) -> bool:
 
 
 def mend_head(path: Path, head: Mapping[str, Any]) -> None:
-    """Write ``store.json`` again where it is damaged, gone or another store's, if the chunks beside
+    """Write ``store.json`` again if it is damaged, gone or another store's, and the chunks next to
     it were made under ``head``.
 
     Raises
@@ -147,8 +147,8 @@ def mend_head(path: Path, head: Mapping[str, Any]) -> None:
 
 
 def _made_under(path: Path, head: Mapping[str, Any]) -> bool | None:
-    """Whether an intact chunk or artifact in a folder was made under a head; None if there is no
-    intact one at all.
+    """True if an intact chunk or artifact in a folder was made under this head, False if all of
+    them were made under another; None if none is intact.
     """
     chunks = Chunks.checked(tuple(head["shape"]), head["chunk"], head["arrays"])
     wanted, strangers = fingerprint(head), False

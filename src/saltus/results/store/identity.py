@@ -1,4 +1,4 @@
-"""What a kept result was made from: it stands for another question's only if nothing differs."""
+"""Identity of a kept result: the result answers another question only if nothing differs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from saltus.results.store.durable import StoreError
 
 
 def texts(identity: Mapping[str, str]) -> dict[str, str]:
-    """An identity in one order.
+    """Texts of an identity, sorted.
 
     Raises
     ------
@@ -27,8 +27,8 @@ def texts(identity: Mapping[str, str]) -> dict[str, str]:
 
 
 def differing(there: Mapping[str, str], here: Mapping[str, str]) -> list[str]:
-    """Names of what differs between the identity of what is kept and that of a question, or what
-    only one of them has.
+    """Names of texts that differ between a kept result and a question, or that only one of them
+    has.
     """
     return [name for name in {**there, **here} if there.get(name) != here.get(name)]
 
@@ -55,7 +55,7 @@ def agree(path: Path, there: Mapping[str, str], here: Mapping[str, str]) -> None
 
 
 def _near(text: str | None, other: str | None) -> str:
-    """A text, shortened to where it differs from another."""
+    """Shorten a text to the part where it differs from another."""
     if text is None:
         return "not set"
     same = next(

@@ -1,5 +1,4 @@
-"""One writer at a time: locks of the operating system, which end with the process that holds them,
-however it ends.
+"""Locks for one writer at a time. The operating system ends them with the process, however it ends.
 
 A lock is for one shard k of n: the chunks k, k + n, k + 2n ... The whole store is shard 0 of 1. Two
 shards exclude each other if they have a chunk in common. Each has a file of its own, and the rule
@@ -27,14 +26,14 @@ from saltus.whole_files import refused_as
 
 #: All chunks, as a shard.
 WHOLE = (0, 1)
-#: How long to wait for a lock [s]: longer than another process's check of it takes, too short to be
-#: taken for queueing.
+#: Time to wait for a lock [s]: longer than another process takes to check it, too short to seem
+#: like a queue.
 _PATIENCE = 0.5
-#: Most bytes of the note of who holds a lock.
+#: Most bytes of the note that names the holder of a lock.
 _NOTE = 10_000
 
-#: Open lock files of this process. A forked child closes its copies, else it would go on holding
-#: the locks of a parent that was killed.
+#: Open lock files of this process. A forked child closes its copies: otherwise it would hold the
+#: locks after its parent was killed.
 _HANDLES: set[int] = set()
 
 
@@ -45,7 +44,7 @@ def locked(folder: Path, shard: tuple[int, int]) -> Iterator[None]:
     Parameters
     ----------
     folder : Path
-        Where the lock files lie.
+        Folder of the lock files.
     shard : tuple of int
         (k, n); :data:`WHOLE` for everything.
 
@@ -66,7 +65,7 @@ def locked(folder: Path, shard: tuple[int, int]) -> Iterator[None]:
 
 @contextmanager
 def exclusive(file: Path, patience: float = _PATIENCE) -> Iterator[int]:
-    """Hold the operating system's lock on one file, made if need be; gives the open file.
+    """Hold the operating system's lock on one file, made if it doesn't exist; gives the open file.
 
     The file is emptied but stays: if it were removed, two processes could hold locks on two files
     of the same name.
@@ -87,21 +86,21 @@ def exclusive(file: Path, patience: float = _PATIENCE) -> Iterator[int]:
         if os.getpid() == process:
             os.ftruncate(handle, 0)
     finally:
-        # in a forked child the file is closed already, and its number may be another's
+        # In a forked child the file is closed already, and its number may belong to another file.
         if os.getpid() == process:
             _HANDLES.discard(handle)
             os.close(handle)  # which gives the lock back
 
 
 def holders(folder: Path) -> list[str]:
-    """Who holds a lock: a text each, in the order of the shards."""
+    """Return a text for each holder of a lock, in the order of the shards."""
     return [
         _holder(file) for _, file in sorted(_locks(folder).items()) if is_held(file, patience=0.0)
     ]
 
 
 def overlap(one: tuple[int, int], other: tuple[int, int]) -> bool:
-    """Whether two shards have a chunk in common."""
+    """True if two shards have a chunk in common."""
     return (one[0] - other[0]) % math.gcd(one[1], other[1]) == 0
 
 
@@ -126,9 +125,7 @@ def _refuse_if_held(folder: Path, shard: tuple[int, int], *, others_only: bool) 
 
 
 def is_held(file: Path, patience: float = 0.0) -> bool:
-    """Whether somebody holds the lock on a file, and goes on holding it for
-    ``patience`` seconds.
-    """
+    """True if the lock on a file is held, and stays held for ``patience`` seconds."""
     handle = _open(file, os.O_RDONLY)  # so that anyone who may read the store may ask
     try:
         return not _wait(handle, shared=True, patience=patience)
@@ -154,7 +151,7 @@ def _holder(file: Path) -> str:
     """``process 4711 on node7 since 2026-01-01 12:00:00+00:00, shard 0 of 4``."""
     k, n = file.name.split("-of-") if "-of-" in file.name else ("0", "1")
     part = "" if n == "1" else f", shard {k} of {n}"
-    # it may be about to write who it is
+    # The note may be incomplete: the holder writes it after it takes the lock.
     with suppress(OSError, ValueError, LookupError, TypeError, RecursionError):
         who = json.loads(fence.content(file, _NOTE))
         return f"process {who['process']} on {who['host']} since {who['since']}{part}"
@@ -163,8 +160,8 @@ def _holder(file: Path) -> str:
 
 # -- the operating system --------------------------------------------------------------------------
 def _open(file: Path, flags: int = os.O_RDWR | os.O_CREAT) -> int:
-    """Open a lock file: without waiting for the other end of a pipe, and not through a link, whose
-    end would be emptied.
+    """Open a lock file. A pipe isn't waited for; a link isn't followed, since its target would be
+    emptied.
     """
     advice = "Choose a folder that can be written to."
     with refused_as(StoreError, f"{file} can't be locked", advice):
@@ -178,8 +175,8 @@ def _open(file: Path, flags: int = os.O_RDWR | os.O_CREAT) -> int:
 
 
 def _wait(handle: int, *, shared: bool, patience: float) -> bool:
-    """Try to lock until it works or ``patience`` is spent: another process's check takes a moment
-    and is no reason to give up.
+    """Try to lock until it succeeds or ``patience`` is spent: another process's check takes a
+    moment only.
     """
     end = time.monotonic() + patience
     while not _try(handle, shared=shared):
@@ -193,8 +190,8 @@ if sys.platform == "win32":
     import msvcrt
 
     def _try(handle: int, *, shared: bool) -> bool:  # noqa: ARG001
-        """Without shared locks: checks exclude each other for a moment. Locked bytes can't be read:
-        take one far behind the text.
+        """Try once to lock a file on Windows. It has no shared locks: checks exclude each other for
+        a moment. Locked bytes can't be read, so the locked byte lies far behind the text.
         """
         os.lseek(handle, 1 << 30, os.SEEK_SET)
         try:

@@ -1,5 +1,5 @@
-"""A store: a map computed chunk by chunk, by one process or many, killed and resumed as often as
-need be, with one outcome.
+"""Store: a map computed chunk by chunk, by one process or many, killed and resumed at any time,
+with one outcome.
 
 ::
 
@@ -57,7 +57,7 @@ _FOLDERS = (CHUNKS, "artifacts", "locks", "parts")
 
 @dataclass(frozen=True)
 class StoreStatus:
-    """How far a store is.
+    """Progress of a store.
 
     Attributes
     ----------
@@ -71,9 +71,9 @@ class StoreStatus:
     bytes : int
         Size on the disk.
     last_written : datetime or None
-        When the last chunk was committed (UTC); None before the first.
+        Time at which the last chunk was committed (UTC); None before the first.
     writers : tuple of str
-        Who holds a lock, since when.
+        Holders of locks, each with the time since when.
     """
 
     path: Path
@@ -127,14 +127,14 @@ class Store:
         path : str or path
             A folder that isn't there yet, in one that is.
         identity : mapping of str to str
-            What a process must agree on to add chunks: hashes of study and system, versions,
+            Texts on which a process must agree to add chunks: hashes of study and system, versions,
             options.
         shape : tuple of int
             Size of the grid along each dim.
         chunk : int
             Cells of the flattened grid (C order) that are one task.
         arrays : mapping of str to dtype
-            What is kept of each cell.
+            Values kept of each cell.
         note : mapping, optional
             Anything else worth keeping with it, as plain values; never compared.
 
@@ -164,7 +164,7 @@ class Store:
 
     @classmethod
     def open(cls, path: str | os.PathLike[str], identity: Mapping[str, str] | None = None) -> Store:
-        """Open a store that is there.
+        """Open a store.
 
         Parameters
         ----------
@@ -196,7 +196,7 @@ class Store:
         arrays: Mapping[str, Any],
         note: Mapping[str, Any] | None = None,
     ) -> Store:
-        """:meth:`create` if there is nothing yet, else :meth:`open`; ``shape``, ``chunk`` and
+        """:meth:`create` if there is no store yet, else :meth:`open`; ``shape``, ``chunk`` and
         ``arrays`` must agree too.
 
         A ``store.json`` that is damaged is written again if the chunks beside it were made from the
@@ -248,8 +248,8 @@ class Store:
                 self._shard = None
 
     def _make_folders(self) -> None:
-        """Make those that are gone again: tools that copy trees leave empty ones out. A store that
-        was deleted stays so.
+        """Make missing folders again: tools that copy folders leave empty ones out. A deleted store
+        isn't made again.
         """
         if not (self.path / HEAD).exists():
             raise StoreError(
@@ -262,7 +262,7 @@ class Store:
                 (self.path / name).mkdir(parents=True, exist_ok=True)
 
     def _sweep(self, shard: tuple[int, int]) -> None:
-        """Remove drafts of killed writers: those that only the holder of this lock may write."""
+        """Remove the drafts of killed writers that only the holder of this lock may write."""
         remove_old_drafts(self.path)
         for draft in (self.path / "parts").iterdir():
             owner = draft.name.split(".")[0]
@@ -278,7 +278,7 @@ class Store:
 
     # -- chunks ------------------------------------------------------------------------------------
     def commit(self, index: int, values: Mapping[str, np.ndarray]) -> None:
-        """Write one chunk: all of it is there, or none of it.
+        """Write one chunk, complete or not at all.
 
         Committing the same values again does nothing.
 
@@ -317,8 +317,8 @@ class Store:
         write_whole(self._file(index), data, self.path / "parts", str(index))
 
     def done(self) -> np.ndarray:
-        """Which chunks are committed: bool (chunks,). One listing of a folder, so it serves as
-        progress, from any machine too.
+        """Return which chunks are committed: bool (chunks,). It lists one folder only, so it shows
+        progress from any machine.
         """
         done = np.zeros(self.chunks.count, dtype=bool)
         with refused_as(StoreError, f"{self.path} can't be read", "Was it moved or deleted?"):
@@ -395,8 +395,8 @@ class Store:
         return damaged
 
     def damaged(self, *, checksums: bool = True) -> list[int]:
-        """Committed chunks whose files aren't what was committed; without ``checksums`` only their
-        sizes and last bytes are read.
+        """Committed chunks whose files have changed; without ``checksums`` only sizes and last
+        bytes are checked.
         """
         intact = self._is_intact if checksums else self._seems_intact
         return [int(index) for index in np.flatnonzero(self.done()) if not intact(int(index))]
@@ -418,8 +418,7 @@ class Store:
     def put(
         self, name: str, value: Any, *, existing: Literal["same", "keep", "replace"] = "same"
     ) -> Any:
-        """Keep a small value that belongs to all chunks: the table of attractors, what follows from
-        the finished map.
+        """Keep a small value that belongs to all chunks, such as the table of attractors.
 
         Parameters
         ----------
@@ -434,7 +433,7 @@ class Store:
         Returns
         -------
         bytes or plain values
-            What is kept now. With "keep" it may be what another shard put first.
+            The value that is kept now. With "keep", another shard may have put it first.
 
         Raises
         ------
@@ -448,7 +447,7 @@ class Store:
             else {"value": value}
         )
         data = seal({"name": name, "store": self._made_under, **content})
-        # shards may put at the same moment
+        # Other shards may put at the same moment.
         with exclusive(self.path / "locks" / "artifacts", patience=10.0):
             earlier = read(file)
             another = self._opened(name, earlier) is not None and earlier != data
@@ -466,8 +465,8 @@ class Store:
         return self.get(name)
 
     def get(self, name: str) -> Any:
-        """What :meth:`put` kept, lists where tuples were put; :class:`StoreError` if there is none,
-        or it is damaged.
+        """Return what :meth:`put` kept, with lists for tuples. Raises :class:`StoreError` if there
+        is none, or it is damaged.
         """
         data = read(self._artifact(name))
         values = self._opened(name, data)
@@ -479,7 +478,7 @@ class Store:
         return base64.b64decode(values["base64"]) if "base64" in values else values["value"]
 
     def has(self, name: str) -> bool:
-        """Whether :meth:`get` would return something: kept, and not damaged."""
+        """True if :meth:`get` would return something: kept, and not damaged."""
         return self._opened(name, read(self._artifact(name))) is not None
 
     def _opened(self, name: str, data: bytes | None) -> dict[str, Any] | None:
@@ -492,7 +491,7 @@ class Store:
 
     # -- for people --------------------------------------------------------------------------------
     def status(self, *, checksums: bool = False) -> StoreStatus:
-        """How far the store is; no lock needed.
+        """Return the progress of the store; no lock needed.
 
         Parameters
         ----------

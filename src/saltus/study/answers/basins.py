@@ -1,5 +1,5 @@
-"""[basins]: which attractor each start of a grid leads to; one map, or several and where they
-agree.
+"""[basins]: the attractor that each start of a grid leads to, in one map or several, and their
+agreement.
 """
 
 from __future__ import annotations
@@ -28,10 +28,14 @@ if TYPE_CHECKING:
 
     from saltus.results.table import TextTable
 
-#: Trajectories of attractors drawn in a gallery, and the periods of one that never repeats.
-GALLERY, PERIODS = 8, 24
-#: Ends of the names of files that belong to a map.
-ATTRACTORS, AGREEMENT = "-attractors", "-agreement"
+#: Most attractors in a gallery.
+GALLERY = 8
+#: Forcing periods drawn of an attractor that never repeats.
+PERIODS = 24
+#: End of the stem of the file of a map's attractors.
+ATTRACTORS = "-attractors"
+#: End of the stem of the file of a map's agreement with another.
+AGREEMENT = "-agreement"
 
 
 class Axis(Range):
@@ -112,8 +116,8 @@ class OfMaps(Generated):
     lambda _table, _study: [],
 )
 def questions(table: Any, setting: Setting) -> list[Question]:
-    """The maps of the table, then where those agree that are compared. Raises StudyError, UnitError
-    or ParameterError.
+    """Questions of the table: its maps, then the agreement of those that are compared. Raises
+    StudyError, UnitError or ParameterError.
     """
     maps = [
         BasinMap(table, one, setting)
@@ -160,11 +164,11 @@ class BasinMap(Question):
 
     @property
     def stems(self) -> tuple[str, ...]:
-        """Of the map, and of the gallery of its attractors."""
+        """Stems of the files of the map, and of the gallery of its attractors."""
         return self.stem, f"{self.stem}{ATTRACTORS}"
 
     def identity(self) -> dict[str, str]:
-        """What must be the same to go on with a store."""
+        """Texts that must be the same to go on with a store."""
         plan = self.plan
         axes = {
             name: f"{float(values[0])!r} to {float(values[-1])!r} in {len(values)}"
@@ -189,7 +193,7 @@ class BasinMap(Question):
         return {"": axes.figure, ATTRACTORS: plot.gallery(ds, self._motions(ds), attractors=shown)}
 
     def _motions(self, ds: xr.Dataset) -> xr.Dataset:
-        """A motion on each attractor, long enough for its picture."""
+        """Motions on the attractors, long enough for their pictures."""
         from saltus.analysis.motion.simulate import simulate
 
         system = self.plan.system
@@ -201,7 +205,7 @@ class BasinMap(Question):
 
 
 class Agreement(Question):
-    """Where two maps agree."""
+    """Agreement of two maps."""
 
     place, shared = "basins", True
 

@@ -1,5 +1,5 @@
 """[branches]: periodic orbits over a parameter, stable or not, and their bifurcations; [backbone]:
-the vibrations that resonances follow.
+the free vibrations that resonances follow.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Backbone(OneVerb):
     """The backbone of resonances over their amplitude."""
 
     def check(self, table: Any, setting: Setting) -> None:  # noqa: ARG002
-        """The amplitude is in the unit of its state."""
+        """Read the amplitude in the unit of its state."""
         state = table.state or self.system.states[0]
         place = f"{self.place}.amplitude"
         self.arguments["amplitude"] = tuple(

@@ -1,6 +1,4 @@
-"""Contact times compared with those that a paper printed, with exact ones, and with a second
-method.
-"""
+"""Comparison of contact times with printed ones, with exact ones, and with a second method."""
 
 from __future__ import annotations
 
@@ -102,7 +100,7 @@ def _column(
     form: Callable[[float], str],
     name: str | None = None,
 ) -> Column:
-    """Numbers of which some may not be there."""
+    """Column of numbers, some of which may be missing."""
     return Column(
         heading,
         lambda i: "" if (value := values[i]) is None else form(value),
@@ -111,8 +109,8 @@ def _column(
 
 
 def printed_rows(data: bytes, path: Path) -> list[CsvRow]:
-    """The rows that somebody printed; every number is looked at now, before anything is computed.
-    Raises StudyError.
+    """Rows of a printed table. Every number is checked now, before anything is computed. Raises
+    StudyError.
     """
     found = rows(data, path, COLUMNS)
     for row in found:
@@ -179,7 +177,7 @@ def residuals(run: xr.Dataset) -> np.ndarray:
 
 
 def _legs(run: xr.Dataset) -> np.ndarray:
-    """Accepted steps of the leg before each contact."""
+    """Accepted steps on the segment before each contact."""
     return np.diff(run["contact_steps"].values, prepend=0)
 
 

@@ -53,7 +53,7 @@ class CurveQuestion(OneVerb):
     """A curve of bifurcations."""
 
     def check(self, table: Any, setting: Setting) -> None:  # noqa: ARG002
-        """Which event of which branches."""
+        """Read the event, and the branches that it is on."""
         self.kind, self.near, self.of = table.event, table.near, table.branches
 
     def join(self, asked: Sequence[Question]) -> None:
@@ -83,11 +83,11 @@ class CurveQuestion(OneVerb):
             self.near = quantities.parameters(self.system, {name: self.near}, place)[name]
 
     def identity(self) -> dict[str, str]:
-        """Also of the branches at which it begins."""
+        """Identity of the question, with that of the branches at which the curve begins."""
         return super().identity() | {"near": to_json(self.near), "branches": self.parent}
 
     def compute(self, found: Answers, threads: int | None, progress: Show) -> xr.Dataset:
-        """Follow the bifurcation that was meant."""
+        """Follow the bifurcation that the table names."""
         self.arguments["event"] = self._event(found[self.needs[0]])
         try:
             return super().compute(found, threads, progress)
@@ -95,18 +95,18 @@ class CurveQuestion(OneVerb):
             self.arguments["event"] = self.kind
 
     def _event(self, ds: xr.Dataset) -> xr.Dataset:
-        """The event of that kind which is nearest to a value, or the only one."""
-        here = np.flatnonzero(ds["event_kind"].values == self.kind)
-        at = ds[event_name(ds.attrs["parameter"])].values[here]
-        if not len(here) or (self.near is None and len(here) > 1):
+        """Select the event of that kind that is nearest to a value, or the only one."""
+        events = np.flatnonzero(ds["event_kind"].values == self.kind)
+        at = ds[event_name(ds.attrs["parameter"])].values[events]
+        if not len(events) or (self.near is None and len(events) > 1):
             parameter = ds.attrs["parameter"].replace("_", " ")
-            many = f"{len(here)} events" if len(here) else "no event"
+            many = f"{len(events)} events" if len(events) else "no event"
             raise StudyError(
                 f"[{self.place}] the branches have {many} of the kind {self.kind!r}."
-                + (f" Say near which {parameter}: near = ..." if len(here) else "")
+                + (f" Say near which {parameter}: near = ..." if len(events) else "")
             )
         nearest_one = 0 if self.near is None else int(np.argmin(np.abs(at - self.near)))
-        return ds.isel(event=int(here[nearest_one]))
+        return ds.isel(event=int(events[nearest_one]))
 
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
         """The curve in the plane of both parameters."""

@@ -1,4 +1,4 @@
-"""[equilibria]: where a system without forcing can rest, stable or not."""
+"""[equilibria]: the equilibria of a system without forcing, stable or not."""
 
 from __future__ import annotations
 
@@ -48,11 +48,11 @@ class Equilibria(OneVerb):
     """Equilibria in each region, on boundaries, and held by contacts."""
 
     def check(self, table: Any, setting: Setting) -> None:  # noqa: ARG002
-        """The ranges of a box are arguments of their own."""
+        """Refuse start together with a box. The ranges of the box become arguments."""
         if table.start is not None and (table.box or table.at):
             raise StudyError("[equilibria] takes start, or box and at; leave out one of them.")
         self.arguments |= quantities.box(self.system, table.box, self.place) or {}
 
     def call(self, how: dict[str, Any]) -> xr.Dataset:  # noqa: ARG002
-        """Nothing is integrated: there are no threads, and no method."""
+        """Call the analysis without threads and method: nothing is integrated."""
         return super().call({})

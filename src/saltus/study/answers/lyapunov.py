@@ -26,7 +26,7 @@ class ExponentsQuestion(OneVerb):
     how = "flow"
 
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
-        """How the exponents settle."""
+        """Draw the convergence of the exponents."""
         from saltus import plot
         from saltus.plot.selection import MOST
 

@@ -21,8 +21,10 @@ if TYPE_CHECKING:
 
 #: The key of a surface that is a formula.
 FORMULA = "formula"
-#: Parts of a balance, and those that needn't be there.
-_PARTS, _OPTIONAL = ("energy", "supplied", "dissipated"), ("friction",)
+#: Parts that every energy balance needs.
+_PARTS = ("energy", "supplied", "dissipated")
+#: Parts that an energy balance may have.
+_OPTIONAL = ("friction",)
 
 
 _BASE: Any = (OfLength, Asked)
@@ -31,13 +33,13 @@ _LEFT_OUT = ("state", "keep", "time_errors", "surface", "direction")
 
 
 class OfMotions(OneVerb):
-    """A question on motions from given starts, of some length after a transient."""
+    """Question on motions from given starts, of given length after a transient."""
 
     #: Whether its picture draws some trajectories of a batch.
     several: ClassVar[bool] = False
 
     def check_first(self, table: Any) -> None:
-        """Lengths are periods if there is forcing, else times."""
+        """Check that lengths are forcing periods if there is forcing, else times."""
         forced = self.system.forced_at is not None
         if forced != (table.periods is not None):
             right = (
@@ -51,7 +53,7 @@ class OfMotions(OneVerb):
             )
 
     def check(self, table: Any, setting: Setting) -> None:
-        """Start, length and values; then what the question asks besides."""
+        """Check start, length and values, then the keys that only this question has."""
         from saltus.analysis.motion.window import stretch
 
         stretch(
@@ -64,7 +66,7 @@ class OfMotions(OneVerb):
         self.check_more(table, setting)
 
     def check_more(self, table: Any, setting: Setting) -> None:
-        """What this question asks besides."""
+        """Read and check the keys that only this question has."""
 
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
         """The usual picture of such a result; of a large batch the first trajectories."""
@@ -90,7 +92,7 @@ class OfMotions(OneVerb):
 
 @asked(20, table("poincare", ["poincare"], KINDS, base=_BASE, called="Poincare section"))
 class Section(OfMotions):
-    """[poincare]: where motions cross a surface."""
+    """[poincare]: crossings of a surface."""
 
     picture, several = "section", True
 
@@ -140,7 +142,7 @@ class LinesQuestion(OfMotions):
     picture, several = "spectrum", True
 
     def check_more(self, table: Any, setting: Setting) -> None:  # noqa: ARG002
-        """Which states and periods."""
+        """Read and check states and periods."""
         self.arguments["states"] = table.states
         for name in table.states or []:
             if name not in self.system.states:
@@ -177,7 +179,7 @@ class LinesQuestion(OfMotions):
 
 @asked(40, table("impacts", ["impact_statistics"], KINDS, base=_BASE, called="Impact statistics"))
 class Statistics(OfMotions):
-    """[impacts]: how often, how hard and how long the contacts are."""
+    """[impacts]: number, speeds and durations of contacts."""
 
     picture = "impacts"
 
@@ -246,7 +248,7 @@ class Balance(OfMotions):
             quantity(self.system, self.arguments[name], f"{name} =")
 
     def identity(self) -> dict[str, str]:
-        """With the code of the models, if that holds the functions."""
+        """Identity of the question. If a model holds the functions, its code is part of it."""
         return super().identity() | ({"models": code_hash("models")} if self.of_model else {})
 
     def call(self, how: dict[str, Any]) -> xr.Dataset:

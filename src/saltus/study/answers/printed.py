@@ -1,4 +1,4 @@
-"""CSV files in the folder of a study: printed numbers and exact ones. Messages never repeat their
+"""CSV files in the folder of a study: printed and exact numbers. Messages never repeat their
 contents.
 """
 
@@ -30,11 +30,11 @@ class CsvRow:
     cells: dict[str, str]
 
     def text(self, column: str) -> str:
-        """A cell as it stands; "" if there is none."""
+        """Text of a cell; "" if there is none."""
         return self.cells.get(column) or ""
 
     def number(self, column: str) -> float:
-        """A finite number. Raises StudyError if the cell holds something else."""
+        """Finite number of a cell. Raises StudyError if the cell holds something else."""
         try:
             value = float(self.text(column))
         except ValueError:
@@ -46,7 +46,9 @@ class CsvRow:
         return value
 
     def whole(self, column: str) -> int:
-        """A whole number from 1 on. Raises StudyError if the cell holds something else."""
+        """Whole number of a cell, at least 1. Raises StudyError if the cell holds something
+        else.
+        """
         value = self.number(column)
         if value != int(value) or not 1 <= value <= fence.MOST_COUNT:
             raise StudyError(
@@ -62,7 +64,7 @@ def rows(data: bytes, path: Path, columns: tuple[str, ...]) -> list[CsvRow]:
     Parameters
     ----------
     data : bytes
-        What is in the file.
+        Content of the file.
     path : Path
         Its name, for messages.
     columns : tuple of str
@@ -94,7 +96,7 @@ def rows(data: bytes, path: Path, columns: tuple[str, ...]) -> list[CsvRow]:
 
 
 def _lines(text: str) -> Iterator[tuple[int, str]]:
-    """The lines that hold something, with their numbers."""
+    """Lines that aren't empty, with their numbers."""
     for number, line in enumerate(text.splitlines(), 1):
         if line.strip() and not line.startswith("#"):
             yield number, line

@@ -1,5 +1,5 @@
-"""What every question of a study can do: compute its Dataset, say it in rows, draw it. Nothing here
-writes a file.
+"""Questions of a study: each computes its Dataset, puts it into rows, draws it. Nothing here writes
+a file.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ M = TypeVar("M", bound="Make | type[OneVerb]")
 
 @dataclass(frozen=True)
 class RegisteredTable:
-    """A table of study files that asks something.
+    """Table of study files that asks a question.
 
     Attributes
     ----------
     rank : int
-        Where it stands among the others, which are answered in this order: the quick ones first.
+        Rank among the questions, which are answered in this order: the quick ones first.
     table : type
         The table.
     make : callable
@@ -61,16 +61,16 @@ def asked(
     table: Any,
     files: Callable[[Any, Study], list[tuple[str, str]]] = lambda one, _: [(one.title, one.stem)],
 ) -> Callable[[M], M]:
-    """Enter a table, and what answers it: a class of questions of one function, or a callable that
+    """Register a table with its answer: a class of questions of one function, or a callable that
     makes the questions of a table.
     """
 
     def entered(answer: M) -> M:
-        one: Any = answer
-        make = one
+        question_type: Any = answer
+        make = question_type
         if isinstance(answer, type):
-            one.place, one.function = table.place, table.function
-            make = lambda asked, setting: [one(asked, setting)]  # noqa: E731
+            question_type.place, question_type.function = table.place, table.function
+            make = lambda asked, setting: [question_type(asked, setting)]  # noqa: E731
         REGISTER[table.place] = RegisteredTable(rank, table, make, files)
         return answer
 
@@ -84,19 +84,19 @@ Show = Callable[[float], None]
 
 
 class Question(ABC):
-    """A question of a study whose answer is one Dataset: everything that could be checked before
-    computing was.
+    """Question of a study whose answer is one Dataset. All checks that need no computation are done
+    when it is made.
 
     Attributes
     ----------
     title : str
-        What it is called.
+        Its name in tables and pictures.
     stem : str
         Stem of the names of its files.
     place : str
         The table of the study that asks it.
     group : str
-        What it may be called together with others, besides its table.
+        Name that it shares with other questions, besides its table.
     needs : tuple of str
         Stems of the questions whose answers it takes.
     shared : bool
@@ -122,13 +122,15 @@ class Question(ABC):
         return (self.stem,)
 
     def identity(self) -> dict[str, str] | None:
-        """What must be the same for a file to hold the answer; None if it follows at once from
-        other answers.
+        """Texts that must be the same for a file to hold the answer; None if the answer follows at
+        once from other answers.
         """
         return None
 
     def join(self, asked: Sequence[Question]) -> None:  # noqa: ARG002
-        """Find the questions whose answers it takes. Raises StudyError if there are none."""
+        """Find the questions whose answers this question needs. Raises StudyError if there are
+        none.
+        """
         return
 
     @abstractmethod
@@ -145,13 +147,13 @@ class Question(ABC):
 
 
 class OneVerb(Question):
-    """A question that one function of the analyses answers, whose table was made from its
-    parameters.
+    """Question that one function of the analyses answers. Its table was made from the parameters of
+    the function.
 
     Parameters
     ----------
     table : Generated
-        What the study asks.
+        Arguments of the function, from the study.
     setting : Setting
         Of the study.
 
@@ -183,7 +185,7 @@ class OneVerb(Question):
         return table.title, table.stem
 
     def check_first(self, table: Any) -> None:  # noqa: ARG002
-        """Refuse what doesn't fit the system before quantities are read."""
+        """Refuse a table that doesn't fit the system, before quantities are read."""
         return
 
     def check(self, table: Any, setting: Setting) -> None:  # noqa: ARG002
@@ -191,7 +193,7 @@ class OneVerb(Question):
         return
 
     def identity(self) -> dict[str, str]:
-        """What must be the same for a file to hold the answer."""
+        """Texts that must be the same for a file to hold the answer."""
         return identity(self.system, self.method, self.arguments)
 
     def compute(self, found: Answers, threads: int | None, progress: Show) -> xr.Dataset:  # noqa: ARG002
@@ -202,7 +204,7 @@ class OneVerb(Question):
             raise fault(self.place, error) from error
 
     def call(self, how: dict[str, Any]) -> xr.Dataset:
-        """The answer; ``how`` are the method, the threads and the progress callable."""
+        """Compute the answer; ``how`` holds the method, the threads and the progress callable."""
         ds: xr.Dataset = verb(self.function)(self.system, **(self.arguments | how))
         return ds
 
@@ -220,5 +222,5 @@ class OneVerb(Question):
 
 
 def first_figure(axes: Any) -> Any:
-    """The figure of the Axes, or the array of them, that a picture returns."""
+    """Figure of the Axes, or of the array of Axes, that a picture returns."""
     return (axes.flat[0] if hasattr(axes, "flat") else axes).figure

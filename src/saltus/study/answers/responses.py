@@ -68,7 +68,7 @@ class Responses(OneVerb):
         return super().call(how | {self.axes: self.varied()})
 
     def drawn_with(self) -> dict[str, Any]:
-        """What is drawn besides."""
+        """Arguments of the picture of a frequency response."""
         return {}
 
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
@@ -162,5 +162,5 @@ class Response(Responses):
 
 
 def _array(values: Any) -> Any:
-    """Values one by one as the array that the analyses take."""
+    """Array of values given one by one, as the analyses take them."""
     return np.array(values) if isinstance(values, list) else values

@@ -1,5 +1,5 @@
-"""[simulate]: move one start, or a batch of them, and keep the motion with its contacts; [compare]:
-with printed and exact times.
+"""[simulate]: motions from one start or a batch, with their contacts; [compare]: comparison with
+printed and exact times.
 """
 
 from __future__ import annotations
@@ -26,8 +26,10 @@ if TYPE_CHECKING:
     from saltus.study.tables.study import Study
 
 
-#: Stems of the files: of the run, and of that of a second method.
-RUN, REFERENCE = "run", "run-reference"
+#: Stem of the file of the run.
+RUN = "run"
+#: Stem of the file of the run by a second method.
+REFERENCE = "run-reference"
 
 
 def _files(_table: Any, study: Study) -> list[tuple[str, str]]:
@@ -38,8 +40,8 @@ def _files(_table: Any, study: Study) -> list[tuple[str, str]]:
 
 @asked(10, asking("simulate", ["simulate"], KINDS, base=OfLength), _files)
 def questions(table: Any, setting: Setting) -> list[Question]:
-    """How given starts move, by the study's method, and by the second one that [compare] names
-    before it.
+    """Questions on how given starts move: by the study's method, and before it by the second method
+    that [compare] names.
 
     Raises
     ------
@@ -54,7 +56,7 @@ def questions(table: Any, setting: Setting) -> list[Question]:
 
 
 class Motion(OneVerb):
-    """How given starts move."""
+    """Motions from given starts."""
 
     place, function = "simulate", "simulate"
 
@@ -64,7 +66,7 @@ class Motion(OneVerb):
         return self.group, RUN
 
     def check_first(self, table: Any) -> None:
-        """Periods are those of a forcing."""
+        """Refuse forcing periods for an unforced system."""
         if table.periods is not None and self.system.forced_at is None:
             raise StudyError(
                 f"[simulate] periods: {self.system.name} has no forcing period. Write "
@@ -138,7 +140,7 @@ class Reference(Motion):
 
 def response_texts(run: xr.Dataset) -> list[str]:
     """``T``, ``3T`` or ``not periodic within 48T`` for each trajectory; empty for an unforced
-    system or too few samples.
+    system, and for too few samples.
     """
     try:
         return responses(settled(run))

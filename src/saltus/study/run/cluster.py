@@ -1,4 +1,4 @@
-"""Chunks on a dask cluster, which a scheduler's address stands for. Needs the extra ``cluster``.
+"""Chunks on a dask cluster, given by its scheduler's address. Needs the extra ``cluster``.
 
 A dask scheduler runs any code: whoever can reach it can run anything as the user who started it.
 See docs/studies.md.
@@ -58,7 +58,7 @@ def cluster_runner(scheduler: str) -> Iterator[Callable[..., None]]:
         raise StudyError(
             'a cluster needs dask. Install "saltus[cluster]", or leave --scheduler out.'
         ) from None
-    # late heartbeats and lost workers are handled here, or raise errors
+    # Silence dask on late heartbeats and lost workers: both are handled here, or raise errors.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
         client = Client(scheduler, timeout=10)
@@ -69,7 +69,7 @@ def cluster_runner(scheduler: str) -> Iterator[Callable[..., None]]:
 
 
 def check_scheduler(address: str) -> None:
-    """Raise StudyError if nobody listens there: asked before long work, and answered at once."""
+    """Raise StudyError if nobody listens at the scheduler's address. Call this before long work."""
     place = re.fullmatch(r"(?:\w+://)?(\[.*\]|[^:/]+):(\d+)/?", address)
     if place is None:
         raise StudyError(_SILENT.format(address, "that is no address such as tcp://127.0.0.1:8786"))
@@ -87,7 +87,7 @@ def _run(
     keep: Callable[[int, Settling], None],
     show: Callable[[float], None],
 ) -> None:
-    """Compute chunks; a thread waits for each that is handed out."""
+    """Compute chunks; one thread waits for each chunk that is handed out."""
 
     def watch(share: float) -> None:
         _find_workers(client, 60.0)
@@ -99,8 +99,8 @@ def _run(
 
 
 def _chunk(client: Client, plan: BasinPlan, found: AttractorSet, index: int) -> Settling:
-    """One chunk by the cluster. The plan goes with each: it is small, and what workers keep is lost
-    with them.
+    """Compute one chunk on the cluster. The plan goes with each chunk: it is small, and a worker
+    that dies loses what it keeps.
 
     Raises
     ------

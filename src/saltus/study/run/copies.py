@@ -1,5 +1,5 @@
-"""The copy of a study in its output folder, with the files that it names, under a seal: what
-`resume` reads.
+"""Copy of a study in its output folder, with the files that it names, under a seal. `resume` reads
+this copy.
 """
 
 from __future__ import annotations
@@ -15,9 +15,12 @@ from saltus.results.files.atomic import ResultFileError, replacing
 from saltus.study.setting.inputs import Input, Inputs, KeptInputs
 from saltus.whole_files import seal, sha256, unseal
 
-#: Names of the copy of the study, of the seal with its hashes, and of the folder of copies of its
-#: files.
-COPY, SEAL, INPUTS = "study.toml", "study.seal", "inputs"
+#: Name of the copy of the study.
+COPY = "study.toml"
+#: Name of the seal, which holds the hashes of the copies.
+SEAL = "study.seal"
+#: Folder of the copies of the files that the study names.
+INPUTS = "inputs"
 _CHANGED = (
     "changed since it was written. Run the study that it was made from again, with --out "
     "{}: finished results are reused."
@@ -45,16 +48,14 @@ def keep_copy(folder: Path, text: str, files: Iterable[Input]) -> None:
 
 
 def _write(path: Path, data: bytes) -> None:
-    """Write a file unless it is there already: a study that is run again leaves its
-    copy untouched.
-    """
+    """Write a file unless it exists: a study that is run again leaves its copy untouched."""
     if path.is_symlink() or not path.is_file() or path.read_bytes() != data:
         with replacing(path) as (part,):
             part.write_bytes(data)
 
 
 def _names(files: Iterable[Input]) -> dict[str, str]:
-    """A file name for the copy of each file, no two the same on any system."""
+    """File names for the copies, different on every file system."""
     names: dict[str, str] = {}
     for file in files:
         plain = PurePosixPath(
@@ -105,7 +106,7 @@ def inputs_of(folder: Path, text: str) -> Inputs:
 
 
 def _is_seal(sealed: dict[str, Any]) -> bool:
-    """Whether a seal has its form: hashes, and names of copies in one folder."""
+    """True if a seal has its form: hashes, and names of copies in one folder."""
     inputs = sealed.get("inputs")
     return (
         isinstance(sealed.get("study"), str)

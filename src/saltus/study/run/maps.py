@@ -41,8 +41,8 @@ STORES = "stores"
 
 
 def open_store(job: BasinMap, folder: Path) -> Store:
-    """The store of a map in a study's output folder, made if it isn't there yet. Raises StoreError
-    if it belongs to something else.
+    """Open the store of a map in a study's output folder, or make it. Raises StoreError if it
+    belongs to something else.
     """
     (folder / STORES).mkdir(parents=True, exist_ok=True)
     return Store.create_or_resume(
@@ -59,7 +59,7 @@ def compute(
     report: Callable[[Report], None],
     say: Callable[[str], None],
 ) -> bool:
-    """Compute the missing chunks of a map (of a shard of it); returns whether the whole map is
+    """Compute the missing chunks of a map, or of a shard of it. Returns True if the whole map is
     done.
 
     Every chunk is committed when it is ready: stopped at any moment, by anything, the work goes on
@@ -93,7 +93,9 @@ def compute(
 
 
 def _attractors(job: BasinMap, store: Store, resources_: Resources) -> AttractorSet:
-    """The attractors that all chunks are labelled with: found once, by whoever comes first."""
+    """Attractors that all chunks are labelled with. The first process finds them, for all
+    others.
+    """
     if not store.has("attractors"):
         store.put("attractors", found_data(job.plan.scout(resources_.threads)), existing="keep")
     return found_from(store.get("attractors"), len(job.plan.system.states))
@@ -127,8 +129,8 @@ def finish(job: BasinMap, store: Store, threads: int | None = None) -> xr.Datase
 
 
 def estimate(plan: BasinPlan, found: AttractorSet, resources_: Resources) -> str:
-    """A sentence on the time, memory and disk that a map will take, from a few hundred of its
-    cells.
+    """Sentence on the time, memory and disk space that a map will take, estimated from a few
+    hundred of its cells.
     """
     cells = plan.sample(TIMED_CELLS)
     map_ = plan.map(1)

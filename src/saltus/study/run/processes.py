@@ -1,5 +1,5 @@
-"""Chunks by processes of this machine, each at the end of a pipe of its own: nothing listens, so
-nobody else can hand them work.
+"""Chunks by processes of this machine. Each process has a pipe of its own: no port is opened, so
+nobody else can send work.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def run_on_processes(
     workers : int, optional
         Processes; by default one for each usable core.
     plan, found : BasinPlan, AttractorSet
-        What is computed, and the attractors.
+        The map, and its attractors.
     missing : sequence of int
         Chunks to compute.
     keep, show : callable
@@ -57,7 +57,7 @@ def run_on_processes(
     StudyError
         If a chunk can't be computed, or its processes die again and again.
     """
-    # compiles once, before every process does
+    # Compile once here, so that no process compiles.
     plan.map(1).launch(plan.starts(plan.cells_of(missing[0])[:1]), 1)
     team = _Team(plan, found)
     try:
@@ -67,7 +67,7 @@ def run_on_processes(
 
 
 class _Team:
-    """Processes; as many as there are threads that ask for a chunk."""
+    """Team of processes: one for each thread that asks for a chunk."""
 
     def __init__(self, plan: BasinPlan, found: AttractorSet):
         self._job = plan, found
@@ -102,7 +102,7 @@ class _Team:
 
 
 class _Worker:
-    """A process, and the pipe to it."""
+    """Process, and the pipe to it."""
 
     def __init__(self, plan: BasinPlan, found: AttractorSet):
         context = multiprocessing.get_context("spawn")
@@ -134,8 +134,8 @@ class _Worker:
 
 @contextmanager
 def _without_ctrl_c() -> Iterator[None]:
-    """Processes that are started within never see Ctrl-C, since they inherit the mask of this
-    thread: it is for the process that ends them.
+    """Block Ctrl-C in processes that start within the block: they inherit the signal mask of this
+    thread, and the parent process ends them.
     """
     if not hasattr(signal, "pthread_sigmask"):
         yield
@@ -150,7 +150,9 @@ def _without_ctrl_c() -> Iterator[None]:
 
 
 def _work(pipe: Connection, plan: BasinPlan, found: AttractorSet) -> None:
-    """The life of a process: chunks come, answers go, until the other end of the pipe is closed."""
+    """Loop of a process: it receives chunks and sends answers until the other end of the pipe is
+    closed.
+    """
     from saltus.announce import silent
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)

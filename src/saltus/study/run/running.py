@@ -13,7 +13,7 @@ from saltus.results.table import TextTable
 
 @dataclass(frozen=True)
 class Resources:
-    """What to compute with.
+    """Resources to compute with.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class Resources:
 
 
 def shard_of(text: str) -> tuple[int, int]:
-    """(k, n) from "k/n". Raises StudyError if that isn't what stands there."""
+    """Read (k, n) from "k/n". Raises StudyError for any other text."""
     match = re.fullmatch(r"(\d+)/(\d+)", text.strip())
     if not match or not int(match[1]) < int(match[2]):
         raise StudyError(f"--shard {text}: write K/N with K from 0 to N - 1, such as 0/4.")
@@ -44,8 +44,8 @@ def shard_of(text: str) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class Report:
-    """How far a question is; of a map read off its store, so that the work of other machines counts
-    too.
+    """Progress of a question. For a map it is read from the store, so the work of other machines
+    counts too.
 
     ``what`` is counted: chunks, or per cent.
     """
@@ -66,8 +66,8 @@ class Report:
 
 @dataclass
 class StudyOutcome:
-    """What a study gave: tables to print, files written, questions that other shards have still to
-    answer.
+    """Outcome of a study: tables to print, files written, and the questions that other shards have
+    yet to answer.
     """
 
     tables: list[TextTable] = field(default_factory=list)
@@ -75,7 +75,7 @@ class StudyOutcome:
     waiting: list[str] = field(default_factory=list)
 
     def add(self, other: StudyOutcome) -> None:
-        """Take in what another question gave."""
+        """Add the outcome of another question."""
         self.tables += other.tables
         self.files += other.files
         self.waiting += other.waiting
@@ -83,7 +83,7 @@ class StudyOutcome:
 
 @dataclass(frozen=True)
 class Running:
-    """Where and with what the questions of a study are answered.
+    """Settings of a run of a study: its output folder and its resources.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""How far the questions of a study are, read off its output folder."""
+"""Progress of the questions of a study, read from its output folder."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _TIME = "%Y-%m-%d %H:%M:%S UTC"
 
 
 def status_tables(folder: Path) -> list[TextTable]:
-    """How far the maps and the other questions of an output folder are, or a store.
+    """Tables of the progress of a store, or of the maps and other questions of an output folder.
 
     Raises
     ------
@@ -40,14 +40,16 @@ def status_tables(folder: Path) -> list[TextTable]:
 
 @dataclass(frozen=True)
 class DamagedStore:
-    """A store that can't be opened, and why."""
+    """Store that can't be opened, with the reason."""
 
     name: str
     why: str
 
 
 def stores(folder: Path) -> list[StoreStatus | DamagedStore]:
-    """How far the stores of an output folder are, or a store itself; empty if there are none."""
+    """Progress of the stores of an output folder, or of the folder if it is a store; empty if there
+    are none.
+    """
     from saltus.results.store.store import Store, StoreError
 
     found: list[StoreStatus | DamagedStore] = []
@@ -65,7 +67,7 @@ def stores(folder: Path) -> list[StoreStatus | DamagedStore]:
 
 
 def status_table(found: list[StoreStatus | DamagedStore]) -> TextTable:
-    """A row for each store; errors of those that can't be opened follow below."""
+    """A row for each store; errors of stores that can't be opened follow below."""
     columns = ("map", "chunks", "done", "damaged", "MB", "last written", "at work")
     return TextTable(
         "Maps",
@@ -75,15 +77,15 @@ def status_table(found: list[StoreStatus | DamagedStore]) -> TextTable:
     )
 
 
-def _row(one: StoreStatus | DamagedStore) -> tuple[str, ...]:
-    if isinstance(one, DamagedStore):
-        return one.name, "damaged", "-", "-", "-", "-", "-"
+def _row(store: StoreStatus | DamagedStore) -> tuple[str, ...]:
+    if isinstance(store, DamagedStore):
+        return store.name, "damaged", "-", "-", "-", "-", "-"
     return (
-        str(one.note.get("name", one.path.name)), f"{one.done} of {one.total}",
-        f"{100 * one.done / max(one.total, 1):.0f} %",
-        str(one.damaged), f"{one.bytes / 1e6:.1f}",
-        one.last_written.strftime(_TIME) if one.last_written else "never",
-        ", ".join(one.writers) or "-",
+        str(store.note.get("name", store.path.name)), f"{store.done} of {store.total}",
+        f"{100 * store.done / max(store.total, 1):.0f} %",
+        str(store.damaged), f"{store.bytes / 1e6:.1f}",
+        store.last_written.strftime(_TIME) if store.last_written else "never",
+        ", ".join(store.writers) or "-",
     )  # fmt: skip
 
 
@@ -113,7 +115,7 @@ def question_table(folder: Path) -> TextTable | None:
 
 
 def _state(file: Path) -> tuple[str, str]:
-    """Whether an answer is there, and since when."""
+    """State of an answer, and the time when it was written."""
     from saltus.results import load
 
     if not file.exists():

@@ -1,4 +1,4 @@
-"""Results of one file: stored once computed, and reused while their identity is that of the
+"""Results in one file: stored once computed, and reused if their identity is that of the
 question.
 """
 
@@ -33,7 +33,8 @@ def load_or_compute(
     compute: Callable[[Callable[[float], None]], xr.Dataset],
     at: Running,
 ) -> xr.Dataset:
-    """The result in ``STEM.nc`` if it has this question's identity, else computed and stored there.
+    """Load the result in ``STEM.nc`` if it has this question's identity, else compute it and store
+    it there.
 
     Parameters
     ----------
@@ -62,7 +63,7 @@ def load_or_compute(
 def _stored(
     file: Path, title: str, identity: Mapping[str, str], say: Callable[[str], None]
 ) -> xr.Dataset | None:
-    """The result in a file, if it is there, sound, and of this identity."""
+    """Result in a file, if the file exists, is intact, and has this identity."""
     if not file.exists():
         return None
     try:

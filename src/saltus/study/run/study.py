@@ -1,4 +1,4 @@
-"""Run a study: from a checked file to the answers of its questions."""
+"""Running of a study: from a checked file to the answers of its questions."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def run_study(
     Parameters
     ----------
     study : Study
-        What to compute.
+        The questions, and their system.
     text : str
         The file as it stands; a copy goes to the folder. :func:`saltus.study.read.read`
         returns both.
@@ -53,7 +53,7 @@ def run_study(
     own : System, optional
         The system, if it isn't one of saltus's models.
     resources : Resources
-        What to compute with.
+        Resources to compute with.
     report, say : callable
         Called with the progress of a question; with a sentence.
     pictures : bool
@@ -101,7 +101,7 @@ def run_study(
 def _answer(
     question: Question, found: Mapping[str, xr.Dataset], at: Running, stores: Mapping[str, Store]
 ) -> xr.Dataset | None:
-    """The answer, loaded or computed; None if other shards have still to work on it."""
+    """Load or compute an answer; None if other shards have yet to work on it."""
     if (identity := question.identity()) is None:
         ds = question.compute(found, at.resources.threads, lambda _: None)
         save(ds, at.folder / f"{question.stem}.nc")

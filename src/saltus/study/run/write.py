@@ -1,4 +1,4 @@
-"""The files of an answer: its Dataset, rows and pictures, each written in full or not at all."""
+"""Files of an answer: its Dataset, rows and pictures, each written complete or not at all."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def write(
     question: Question, ds: xr.Dataset, found: Mapping[str, xr.Dataset], at: Running
 ) -> StudyOutcome:
-    """Write what an answer says; its Dataset is written already."""
+    """Write the rows and pictures of an answer; its Dataset is written already."""
     tables, files = question.rows(ds, found), [at.folder / f"{question.stem}.nc"]
     notes = [file.note for file in question.inputs]
     for table in tables[:1]:
@@ -41,7 +41,7 @@ def write(
 
 
 def save_picture(figure: Any, file: Path) -> Path:
-    """Write a figure, in full or not at all, and forget it."""
+    """Write a figure, complete or not at all, and close it."""
     import matplotlib.pyplot as plt
 
     from saltus.plot.picture import keep_drawable

@@ -1,1 +1,1 @@
-"""What all questions of a study share: its system, its units, the files that it names."""
+"""Setting that all questions of a study share: its system, its units, the files that it names."""

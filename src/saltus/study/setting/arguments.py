@@ -1,6 +1,4 @@
-"""The arguments of an analysis, from the table of a study that asks for it: quantities in SI,
-formulas traced.
-"""
+"""Arguments of an analysis, from the table of its question: quantities in SI, formulas traced."""
 
 from __future__ import annotations
 
@@ -67,7 +65,7 @@ def arguments(table: Generated, system: System, setting: Setting, place: str) ->
 # -- readings, by what the kind of a key names -----------------------------------------------------
 @dataclass(frozen=True)
 class _At:
-    """Where a key stands."""
+    """Place of a key."""
 
     system: System
     setting: Setting
@@ -76,14 +74,14 @@ class _At:
 
 
 def _transient(value: Any, at: _At) -> float:
-    """Forcing periods, or of a system without forcing a time [s]."""
+    """Transient: forcing periods, or a time for a system without forcing [s]."""
     forced = at.system.forced_at is not None
     found = quantities.number(value, "1" if forced else "s", at.place, at.key)
     return int(found) if forced and found == int(found) else found
 
 
 def _values(value: Any, at: _At) -> dict[str, list[float]] | None:
-    """Those that differ from trajectory to trajectory."""
+    """Values that differ from trajectory to trajectory."""
     return (
         quantities.varied(
             at.system,
@@ -102,7 +100,7 @@ def _vary(value: Any, at: _At) -> dict[str, Any]:
 
 
 def _period(value: Any, at: _At) -> float | tuple[float, ...]:
-    """A time, or the two ends of a range of them [s]."""
+    """Period: a time, or the two ends of a range of times [s]."""
     ends = value if isinstance(value, list) else [value]
     found = tuple(quantities.number(one, "s", at.place, at.key) for one in ends)
     return found if isinstance(value, list) else found[0]

@@ -14,16 +14,16 @@ from saltus.whole_files import sha256
 
 @dataclass(frozen=True)
 class Input:
-    """A file that a study names.
+    """File that a study names.
 
     Attributes
     ----------
     name : str
         As the study writes it.
     path : Path
-        Where it was read; for messages.
+        Path from which it was read; for messages.
     data : bytes
-        What it holds.
+        Its content.
     """
 
     name: str
@@ -37,13 +37,13 @@ class Input:
 
     @property
     def note(self) -> str:
-        """A line for the answer that it takes part in."""
+        """Line on the file, for the notes of an answer."""
         return f"{self.name}: SHA-256 {self.sha256}"
 
 
 class Inputs:
-    """Where the files that a study names are found: in its own folder, and in those that the user
-    allows.
+    """Files that a study names. They are searched for in the study's folder, and in those that the
+    user allows.
 
     Parameters
     ----------
@@ -61,11 +61,11 @@ class Inputs:
 
     @property
     def taken(self) -> list[Input]:
-        """The files that were read, in the order in which the study names them."""
+        """Files that were read, in the order in which the study names them."""
         return list(self._taken.values())
 
     def read(self, name: str, place: str) -> Input:
-        """A file by the name that the study gives it, in the table ``place``.
+        """Read a file by the name that the study uses in the table ``place``.
 
         Raises
         ------
@@ -84,8 +84,8 @@ class Inputs:
         return self._taken[name]
 
     def _find(self, name: str, place: str) -> Path:
-        """Path of the file. It is checked as text first: a query for a network path already
-        connects to it.
+        """Path of the file. Its text is checked first: a query for a network path connects to the
+        network.
         """
         if "\0" in name:
             raise StudyError(
@@ -114,7 +114,7 @@ class Inputs:
 
 
 class KeptInputs(Inputs):
-    """The copies of files in an output folder: by the names that the study gives them.
+    """Copies of files in an output folder, by the names that the study uses.
 
     Parameters
     ----------

@@ -1,4 +1,6 @@
-"""Quantities of a study, from text with units to SI: what has a dimension must show its unit."""
+"""Quantities of a study, from text with units to SI: every quantity with a dimension must show its
+unit.
+"""
 
 from __future__ import annotations
 
@@ -65,7 +67,7 @@ def states(system: System, table: Mapping[str, Quantity], place: str) -> dict[st
 def start(
     system: System, table: Mapping[str, Start], place: str = "simulate"
 ) -> dict[str, float | list[float]]:
-    """``start`` in SI: a number a state, or a list for a batch.
+    """Start in SI: a number for each state, or a list for a batch.
 
     Raises
     ------
@@ -88,8 +90,8 @@ def start(
 def starts(
     system: System, given: Starts | None, place: str
 ) -> dict[str, float | list[float]] | str | None:
-    """``start`` of an analysis that follows many: states in SI, or text such as ``"sweep_up"``,
-    which the analysis reads.
+    """Starts of an analysis that follows many: states in SI, or text such as ``"sweep_up"``, which
+    the analysis reads.
     """
     return given if given is None or isinstance(given, str) else start(system, given, place)
 
@@ -153,7 +155,7 @@ def _values(given: Range, unit: str, name: str, place: str) -> tuple[Any, ...] |
 def varied(
     system: System, table: Mapping[str, list[Quantity]], place: str = "simulate.values"
 ) -> dict[str, list[float]]:
-    """Values that differ from trajectory to trajectory in SI: a list a parameter."""
+    """Values that differ from trajectory to trajectory, in SI: a list for each parameter."""
     return {
         name: [
             number(value, _unit(system, name, system.values, place), place, name) for value in row
@@ -163,7 +165,7 @@ def varied(
 
 
 def is_batch(*tables: Mapping[str, Start], place: str = "simulate") -> bool:
-    """Whether there are lists among values. Raises StudyError if two of them differ in length, or
+    """True if there are lists among the values. Raises StudyError if two lists differ in length, or
     one is empty.
     """
     lengths = {

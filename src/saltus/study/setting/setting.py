@@ -1,4 +1,4 @@
-"""What all questions of a study share: its system, its method, the files that it names."""
+"""Setting that all questions of a study share: its system, its method, the files that it names."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Setting:
-    """What the questions of one study share.
+    """Setting that the questions of one study share.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class Setting:
         return outputs or None
 
     def method(self, own: StudyTable | None, place: str) -> Any:
-        """The method of one question: its own, which stands at ``place``, or the study's."""
+        """Method of one question: its own, which the table ``place`` holds, or the study's."""
         return method_of(self.study.method) if own is None else method_of(own, place)
 
 
@@ -150,9 +150,7 @@ def system_of(
 
 
 def _with_values(system: System, values: Mapping[str, Quantity], place: str) -> System:
-    """The system with values as a table gives them. Raises StudyError or UnitError if one is
-    refused.
-    """
+    """System with the values of a table. Raises StudyError or UnitError if one is refused."""
     given = quantities.parameters(system, values, place)
     try:
         return system.with_values(**given)

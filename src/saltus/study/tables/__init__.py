@@ -1,1 +1,1 @@
-"""What a study file may hold, read strictly: no more than texts and numbers, nothing computed."""
+"""Content of a study file, read strictly: only texts and numbers, nothing is executed."""

@@ -1,6 +1,4 @@
-"""How the parameters of the analyses are written in a study file, by their names: those that Python
-writes in another way.
-"""
+"""Parameters of the analyses, by name, that a study file writes in another way than Python."""
 
 from __future__ import annotations
 

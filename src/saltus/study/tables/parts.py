@@ -1,5 +1,5 @@
-"""What the tables of a study file are made of: the strict base, quantities as written, systems,
-methods, ranges.
+"""Parts of the tables of a study file: the strict base, quantities as written, systems, methods,
+ranges.
 
 Quantities stay as written here ("4 N"); :mod:`saltus.study.setting.quantities` turns them into SI
 once the system is known.
@@ -32,7 +32,7 @@ Formula = str
 
 
 def _ends(given: Any) -> Any:
-    """The ends of an interval, which may be written as those of a range: first and last."""
+    """Ends of an interval, which may be written like a range: first and last."""
     if not isinstance(given, dict):
         return given
     if "count" in given or "scale" in given:
@@ -53,7 +53,7 @@ Interval = Annotated[
 
 
 def slug(name: str) -> str:
-    """A name as a file name: nothing that leads out of the folder."""
+    """File name made of a name: it can't lead out of the folder."""
     return re.sub(r"[^a-z0-9.]+", "-", name.lower()).strip("-.") or "map"
 
 
@@ -223,7 +223,7 @@ class Range(StudyTable):
 
 
 class Named(StudyTable):
-    """What questions have in common that may be asked several times."""
+    """Base of questions that may be asked several times."""
 
     #: Name of one without a name.
     called: ClassVar[str]
@@ -236,7 +236,7 @@ class Named(StudyTable):
 
     @property
     def title(self) -> str:
-        """What it is called."""
+        """Return the name, or the default name."""
         return self.name or self.called
 
     @property
@@ -278,15 +278,15 @@ def _as_list(given: Any) -> Any:
 
 
 def one_or_many(table: type[T]) -> Any:
-    """The type of a question that may be asked once, as a table, or several times, as an array of
-    tables: always a tuple.
+    """Type of a question that may be asked once, as a table, or several times, as an array of
+    tables. Its value is always a tuple.
     """
     rows = BeforeValidator(_as_list, json_schema_input_type=table | list[table])  # type: ignore[valid-type]
     return Annotated[list[table], rows]  # type: ignore[valid-type]
 
 
 def distinct_names(tables: Sequence[Any], key: str) -> None:
-    """Raise a ValueError unless several tables have names, no two the same."""
+    """Raise a ValueError if several tables have no names, or two names are equal."""
     names = [one.name for one in tables]
     if len(names) > 1 and None in names:
         raise ValueError(f"each of several [[{key}]] needs a name of its own")

@@ -1,5 +1,5 @@
-"""Tables made from the functions that answer them: what a key is called, holds by default and means
-stands once, with the function.
+"""Tables made from the functions that answer them: name, default and meaning of a key come from the
+function only.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ _SENTENCE = re.compile(r"(.*?\.)(?:\s|$)")
 
 @dataclass(frozen=True)
 class WrittenAs:
-    """How a parameter of a function is written in a study file.
+    """Form in which a study file writes a parameter of a function.
 
     Attributes
     ----------
     holds : type
-        What stands there; by default what the function's annotation says.
+        Type in the file; by default that of the function's annotation.
     examples : tuple
         The first one stands in messages.
     description : str
@@ -45,8 +45,8 @@ class WrittenAs:
     limits : mapping
         ``ge=`` and others.
     convert : str
-        Which reading of :mod:`saltus.study.setting.arguments` makes the function's argument of it;
-        by default it is the argument.
+        Name of the conversion in :mod:`saltus.study.setting.arguments` that makes the function's
+        argument of it; by default there is none.
     """
 
     holds: Any = None
@@ -85,7 +85,7 @@ class OfLength(Generated):
 
 
 def verb(name: str) -> Callable[..., Any]:
-    """A public function of the analyses, looked up now."""
+    """Look up a public function of the analyses."""
     function: Callable[..., Any] = getattr(importlib.import_module(saltus._HOMES[name]), name)
     return function
 
@@ -110,7 +110,7 @@ def table(
         Functions of the analyses whose parameters are keys, the first one giving the table its
         summary.
     kinds : mapping of str to Kind
-        How parameters are written that aren't plain numbers, words and choices.
+        Forms of parameters that aren't plain numbers, words and choices.
     base, without, called
         Classes below it; parameters that it leaves out; what one without a name is called.
     **own : (type, Field)
@@ -188,7 +188,7 @@ def _key(
 
 
 def _holds(parameter: inspect.Parameter, written: str) -> Any:
-    """The type of a key, from the choices that the docstring names or the annotation."""
+    """Type of a key, from the choices in the docstring, or from the annotation."""
     if choices := re.match(r"\{(.*)\}", written):
         return Literal[tuple(_choice(one) for one in choices[1].split(", "))]
     plain = {"bool": bool, "int": int, "float": float, "float | str": Quantity, "str": str}
@@ -199,14 +199,14 @@ def _holds(parameter: inspect.Parameter, written: str) -> Any:
 
 
 def _choice(text: str) -> Any:
-    """A choice as a docstring names it: a word in quotes, or a whole number."""
+    """Choice in a docstring: a word in quotes, or a whole number."""
     return text.strip('"') if text.startswith('"') else int(text)
 
 
 @cache
 def documented(function: Callable[..., Any]) -> dict[str, tuple[str, str]]:
-    """Type and meaning of each parameter, as the docstring has them; of one that is "as for"
-    another function those of that one.
+    """Type and meaning of each parameter, from the docstring. "As for" another function stands for
+    the parameters of that function.
     """
     part = (
         (inspect.getdoc(function) or "").partition("Parameters\n----------\n")[2].split("\n\n")[0]
@@ -226,7 +226,7 @@ def documented(function: Callable[..., Any]) -> dict[str, tuple[str, str]]:
 
 
 def _plain(text: str) -> str:
-    """The first sentence, as it is said of a study file."""
+    """First sentence of a docstring, in the words of a study file."""
     sentence = _SENTENCE.match(text)
     return _ROLE.sub(
         lambda role: role[1] or role[2], (sentence[1] if sentence else text).replace("\n", " ")

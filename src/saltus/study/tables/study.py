@@ -1,4 +1,4 @@
-"""What every study has beside its questions."""
+"""Parts of every study besides its questions."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""What a study file writes: values as TOML, and what the analyses say of Python arguments said of
-its keys.
+"""Texts for study files: values as TOML, and sentences on Python arguments turned into sentences on
+keys.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ TABLES: dict[str, str] = {}
 
 
 def toml(value: Any) -> str:
-    """A value as TOML would write it on one line; a tuple (first, last, count) of Python is a
-    range, any other an array.
+    """Value as TOML on one line. A tuple (first, last, count) of Python becomes a range, any other
+    tuple an array.
     """
     match value:
         case Word():
@@ -43,13 +43,13 @@ def toml(value: Any) -> str:
 
 
 def cut(value: Any) -> str:
-    """A value as a message repeats it: as TOML would write it, cut if it is long."""
+    """Value for a message: as TOML, cut if it is long."""
     whole = toml(value)
     return whole if len(whole) <= SHOWN else f"{whole[:SHOWN]}…"
 
 
 class _FileDialect:
-    """Those who write study files: arguments are keys, functions are tables."""
+    """Dialect for readers who write study files: arguments are keys, functions are tables."""
 
     sl = ""
 
@@ -73,7 +73,5 @@ FILE = _FileDialect()
 
 
 def fault(place: str, error: SaltusError) -> StudyError:
-    """The error of a table of a study, from that of its arguments: with its place, if it doesn't
-    name it.
-    """
+    """Error of a table of a study, made from that of an argument: it names the table."""
     return error if isinstance(error, StudyError) else StudyError(f"[{place}] ", error.said(FILE))

@@ -128,3 +128,19 @@ def test_ctrl_c_hands_out_the_frequencies_that_are_done():
     part = stop.value.partial
     assert part.type.values[1:].ravel().tolist() == ["periodic", "periodic"]
     assert part.type.values[0].item() == "not_computed"
+
+
+@sl.system(states="x v", forced_at="f", units={"f": "Hz"})
+def hammer(t, x, v, *, force=7.0, gap=1e-4, f=28.0):
+    """A mass on a spring that chatters against a stop until it rests."""
+    push = force * sl.cos(2 * sl.pi * f * t) - 4.0 * v - 4e3 * x
+    return v, push, sl.impact(x < gap, v, restitution=0.8)
+
+
+def test_a_motion_that_rests_on_a_stop_goes_on_where_no_deviation_is_left():
+    map_ = Stroboscope(hammer, sl.Taylor(), threads=1)
+    scale = np.array([[1e-2, 0.1]])
+    state, rates = growth_rates(map_, np.zeros((1, 2)), scale, 32)
+    assert np.isfinite(state).all()
+    assert np.isneginf(rates).any()
+    assert not np.isnan(rates).any()

@@ -201,7 +201,8 @@ def test_a_backbone_as_a_picture():
     spine = sl.backbone(sl.models.delangre("a"), ("0.1 mm", "1 mm"), values=FREE)
     ax = sl.plot.backbone(spine)
     (line,) = [line for line in ax.lines if line.get_gid() == "backbone"]
-    np.testing.assert_allclose(line.get_xdata(), spine.backbone_frequency)
-    np.testing.assert_allclose(line.get_ydata(), spine.point_output_peak[:, 0] * 1e3)
+    x, y = np.array(line.get_data())[:, np.isfinite(line.get_xdata())]
+    np.testing.assert_allclose(x, spine.backbone_frequency)
+    np.testing.assert_allclose(y, spine.point_output_peak[:, 0] * 1e3)
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("frequency [Hz]", "peak |x| [mm]")
     assert "5.00" in sl.describe(spine)
