@@ -15,7 +15,7 @@ from pydantic_core import PydanticUndefined
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
-from saltus.study.spec import Study, Table
+from saltus.study.spec import Study, StudyTable
 from saltus.study.tables.toml import toml
 
 #: What the types of keys are called.
@@ -24,7 +24,9 @@ _UNIONS = (typing.Union, types.UnionType)
 
 
 # -- tables ----------------------------------------------------------------------------------------
-def tables(model: type[Table] = Study, place: str = "") -> Iterator[tuple[str, type[Table]]]:
+def tables(
+    model: type[StudyTable] = Study, place: str = ""
+) -> Iterator[tuple[str, type[StudyTable]]]:
     """(place such as ``[[basins.map]]``, class) of every table, the outer ones first; a table that
     has its place already isn't repeated.
     """
@@ -37,9 +39,11 @@ def tables(model: type[Table] = Study, place: str = "") -> Iterator[tuple[str, t
             yield from tables(one, path if "<" not in inner else inner.strip("[]"))
 
 
-def _tables_in(annotation: Any, path: str, form: str = "[{}]") -> Iterator[tuple[str, type[Table]]]:
+def _tables_in(
+    annotation: Any, path: str, form: str = "[{}]"
+) -> Iterator[tuple[str, type[StudyTable]]]:
     """The tables that a key may hold."""
-    if isinstance(annotation, type) and issubclass(annotation, Table):
+    if isinstance(annotation, type) and issubclass(annotation, StudyTable):
         yield form.format(path), annotation
     elif typing.get_origin(annotation) in (list, tuple):
         yield from _tables_in(typing.get_args(annotation)[0], path, "[[{}]]")
@@ -56,7 +60,7 @@ def type_text(annotation: Any) -> str:
     origin, inside = typing.get_origin(annotation), typing.get_args(annotation)
     if annotation is type(None):
         return ""
-    if isinstance(annotation, type) and issubclass(annotation, Table):
+    if isinstance(annotation, type) and issubclass(annotation, StudyTable):
         return "table"
     if annotation in _WORDS:
         return _WORDS[annotation]
@@ -92,10 +96,10 @@ def _default(field: FieldInfo) -> str:
         return "*needed*"
     if field.default is PydanticUndefined or field.default in (None, ""):
         return "-"
-    return "-" if isinstance(field.default, Table) else f"`{toml(field.default)}`"
+    return "-" if isinstance(field.default, StudyTable) else f"`{toml(field.default)}`"
 
 
-def key_rows(model: type[Table]) -> list[tuple[str, str, str, str]]:
+def key_rows(model: type[StudyTable]) -> list[tuple[str, str, str, str]]:
     """(key, type, default, meaning with an example) of every key of a table."""
     rows = []
     for name, field in model.model_fields.items():

@@ -277,7 +277,7 @@ CHILD = """
 import ctypes, sys
 from saltus.codegen import building, machine
 words = "one line", "one line: once for each new equation"
-data = building.built(building.Order("", (sys.stdin.read(),), ("next",), *words))
+data = building.built(building.BuildOrder("", (sys.stdin.read(),), ("next",), *words))
 loaded = machine.loaded([data], "next")
 print(ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(loaded.address)(1))
 """

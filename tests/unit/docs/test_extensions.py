@@ -27,11 +27,11 @@ def test_every_row_of_the_glossary_becomes_a_term(root):
 def test_every_key_of_a_study_stands_in_the_tables():
     from study_tables import markdown, tables
 
-    from saltus.study.spec import Study, Table
+    from saltus.study.spec import Study, StudyTable
 
     described = {model for _, model in tables()}
     text = markdown()
-    for model in reachable(Study, Table):
+    for model in reachable(Study, StudyTable):
         assert model in described
         for name in model.model_fields:
             assert f"| `{name}` |" in text
