@@ -22,7 +22,7 @@ from saltus.kernels import status as st
 from saltus.kernels.batch import Batch
 from saltus.kernels.isolation import DEEPEST, MOST_TOUCHES
 from saltus.system import System
-from saltus.system.linear import Linear, linear_pieces
+from saltus.system.linear import LinearSystem, linear_pieces
 
 #: Share of a period, or of an unforced span, that is tried as the first step.
 FIRST_STEP = 1.0 / 64
@@ -35,11 +35,11 @@ class ModalFlow:
 
     Parameters
     ----------
-    linear : Linear
+    linear : LinearSystem
         The system.
     """
 
-    def __init__(self, linear: Linear) -> None:
+    def __init__(self, linear: LinearSystem) -> None:
         self.tables, self._kernel = Tables(linear), modal_module()
         self._lanes, self._memory = self.tables.modes.table.shape[1], threading.local()
         self.CARRY = layout.AMPLITUDES + 2 * self.tables.groups * self._lanes

@@ -11,7 +11,7 @@ import numpy as np
 
 from saltus.codegen.module import MODAL_LANES as LANES
 from saltus.errors import ParameterError
-from saltus.system.linear import Linear, Piece
+from saltus.system.linear import LinearPiece, LinearSystem
 
 #: Condition of the eigenvectors of a contact state above which its modes don't carry its motion.
 MOST_CONDITION = 1e9
@@ -54,10 +54,10 @@ class _Modes:
 
 @dataclass(frozen=True)
 class _Set:
-    """What depends on parameter values and on no contact state."""
+    """Gaps and drives for one set of parameter values, in any contact state."""
 
     values: dict[str, float]
-    gaps: Piece
+    gaps: LinearPiece
     rates: np.ndarray
     lags: np.ndarray
 
@@ -67,11 +67,11 @@ class Tables:
 
     Parameters
     ----------
-    linear : Linear
+    linear : LinearSystem
         The system.
     """
 
-    def __init__(self, linear: Linear) -> None:
+    def __init__(self, linear: LinearSystem) -> None:
         self.linear = linear
         self.lock = threading.Lock()
         self.modes, self.steady = _Rows(), _Rows()
@@ -202,7 +202,7 @@ class Tables:
             [one.ravel() for one in (lam.real, lam.imag, size, left, right, waves)]
         )
 
-    def _steady_of(self, modes: _Modes, piece: Piece, given: _Set) -> int:
+    def _steady_of(self, modes: _Modes, piece: LinearPiece, given: _Set) -> int:
         """First row of the table of the steady answer to the drives."""
         rates = np.concatenate([[0.0], given.rates])
         far = 1j * rates[:, None] - modes.values[None]

@@ -145,7 +145,7 @@ def total_of(rows, row):
 
 @kernel
 def followed(modes, h, m):
-    """How many groups of modes are followed over a time h."""
+    """Number of groups of modes that are followed over a time h."""
     groups = m.sizes[MODE_GROUPS]
     sizes = modes + 2 * groups - 1
     while groups > 0 and m.modes[sizes + groups, LANES - 1] * h > FOLLOWED:

@@ -79,7 +79,7 @@ def terms_of(i, g, side, batch, m):
 
 @kernel
 def decide(i, g, batch, m):
-    """What a gap does over the step: CLEAR, CROSSES, or OPEN: a shorter step must tell. The place
+    """Outcome of a gap over the step: CLEAR, CROSSES, or OPEN: a shorter step must tell. The place
     of a crossing goes to found[g, 0]; found[g, 1] says whether that is final.
     """
     side = side_of(g, batch.mode[i])
@@ -236,7 +236,7 @@ def time_of(i, tau, batch):
 
 @inner
 def has_room(batch, m):
-    """Whether the contacts of one more step fit in the table."""
+    """True if the contacts of one more step fit in the table."""
     most = m.sizes[GUARDS] + MOST_TOUCHES
     return batch.rec_i.shape[0] == 0 or batch.rec_used[0] + most <= batch.rec_i.shape[0]
 
@@ -378,7 +378,7 @@ def at_the_end(i, batch):
 
 @inner
 def is_lost(i, batch, m):
-    """Whether the amplitudes are no numbers any more."""
+    """True if the amplitudes are no numbers any more."""
     total = 0.0
     for g in range(2 * m.sizes[MODE_GROUPS]):
         for k in range(LANES):

@@ -44,7 +44,7 @@ class Drive:
 
 
 @dataclass(frozen=True)
-class Piece:
+class LinearPiece:
     """The equations of one contact state for one set of parameter values.
 
     Attributes
@@ -63,8 +63,8 @@ class Piece:
 
 
 @dataclass(frozen=True, eq=False)
-class Linear:
-    """What a system is made of that is linear between its contacts.
+class LinearSystem:
+    """A system that is linear between its contacts, with the drives in it.
 
     Attributes
     ----------
@@ -79,14 +79,14 @@ class Linear:
     _field: tuple[Expr, ...]
     _gaps: tuple[Expr, ...]
 
-    def piece(self, values: Mapping[str, float], mode: int) -> Piece:
+    def piece(self, values: Mapping[str, float], mode: int) -> LinearPiece:
         """The equations of a contact state, bit i the side of guard i."""
         bits = [bool(mode >> i & 1) for i in range(len(self.system.guards))]
-        return Piece(*self._coefficients(self._field, values, bits))
+        return LinearPiece(*self._coefficients(self._field, values, bits))
 
-    def gaps(self, values: Mapping[str, float]) -> Piece:
+    def gaps(self, values: Mapping[str, float]) -> LinearPiece:
         """a, c and e of all guards, float64[guards, N], float64[guards], float64[guards, D]."""
-        return Piece(*self._coefficients(self._gaps, values, []))
+        return LinearPiece(*self._coefficients(self._gaps, values, []))
 
     def rates(self, values: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
         """Rates [rad/s] and phases [rad] of the drives as cosines."""
@@ -119,7 +119,7 @@ def _name(drive: int) -> str:
 
 
 @functools.lru_cache(maxsize=256)
-def linear_pieces(system: System) -> Linear | str:
+def linear_pieces(system: System) -> LinearSystem | str:
     """The system as one that is linear between its contacts, or the reason why it isn't."""
     if system.tangent_of is not None:
         return "it carries its own derivatives"
@@ -142,11 +142,11 @@ def linear_pieces(system: System) -> Linear | str:
         return "a boundary of it moves when another is crossed"
     if not all(_is_affine(entry, len(drives)) for entry in (*field, *gaps)):
         return "it isn't linear between its contacts"
-    return Linear(system, tuple(drives.values()), field, gaps)
+    return LinearSystem(system, tuple(drives.values()), field, gaps)
 
 
 def _is_affine(root: Expr, drives: int) -> bool:
-    """Whether an expression is linear in the states and drives, whichever sides its conditions
+    """True if an expression is linear in the states and drives, whichever sides its conditions
     choose.
     """
     moving = {_name(i) for i in range(drives)}
