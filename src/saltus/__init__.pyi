@@ -47,6 +47,7 @@ from saltus.flow import ODE45 as ODE45
 from saltus.flow import ODE113 as ODE113
 from saltus.flow import RK4 as RK4
 from saltus.flow import Interrupted as Interrupted
+from saltus.flow import Modal as Modal
 from saltus.flow import ODE15s as ODE15s
 from saltus.flow import Taylor as Taylor
 from saltus.interrupt import Stop as Stop

@@ -14,7 +14,16 @@ import numpy as np
 from saltus.announce import working
 from saltus.codegen import machine, tableaux, templates
 from saltus.codegen.head import Constant, Head
-from saltus.codegen.interface import ADAMS, CAPTURE, FIXED_STEP, NDF, PAIR, TAYLOR, Interface
+from saltus.codegen.interface import (
+    ADAMS,
+    CAPTURE,
+    FIXED_STEP,
+    MODAL,
+    NDF,
+    PAIR,
+    TAYLOR,
+    Interface,
+)
 from saltus.codegen.kernels import Kernels
 from saltus.codegen.rates_head import rates_head
 from saltus.codegen.taylor_head import taylor_head
@@ -24,6 +33,8 @@ from saltus.language.expression import walk
 from saltus.system import System
 from saltus.system.quantity import acting_guards
 
+#: Modes that a step of the modal flow holds in a lane each.
+MODAL_LANES = templates.BITCODE["modal"][1]
 #: Text above the templates when they run as plain Python.
 _PREAMBLE = """
 import math
@@ -120,6 +131,13 @@ def _printed(system: System, head: Callable[[], Head]) -> Head:
 def capture_module() -> Any:
     """The compiled test of capture, the same for all systems."""
     return _flow(CAPTURE, "capture", Head({}, ""), "capture", "the test of capture")
+
+
+@lru_cache(maxsize=1)
+def modal_module() -> Any:
+    """The compiled modal flow, the same for all systems."""
+    head = Head({"LANES": MODAL_LANES}, "")
+    return _flow(MODAL, "modal", head, "modal", "the modal flow")
 
 
 def _described(system: System) -> str:

@@ -13,7 +13,16 @@ from functools import cache
 from importlib import resources
 from typing import Any
 
-from saltus.codegen.interface import ADAMS, CAPTURE, FIXED_STEP, NDF, PAIR, TAYLOR, Interface
+from saltus.codegen.interface import (
+    ADAMS,
+    CAPTURE,
+    FIXED_STEP,
+    MODAL,
+    NDF,
+    PAIR,
+    TAYLOR,
+    Interface,
+)
 from saltus.errors import CacheError
 
 #: Widths of a step of the Taylor flow.
@@ -22,6 +31,7 @@ WIDTHS = (2, 4, 8, 16)
 BITCODE: dict[str, tuple[Interface, int]] = {
     **{f"taylor_{lanes}": (TAYLOR, lanes) for lanes in WIDTHS}, "pair": (PAIR, 1),
     "fixed_step": (FIXED_STEP, 1), "adams": (ADAMS, 1), "ndf": (NDF, 1), "capture": (CAPTURE, 1),
+    "modal": (MODAL, 4),
 }  # fmt: skip
 #: Kernels that the templates import.
 _SHARED = ("lanes", "trigonometry", "isolation", "status", "batch", "parts", "clocks_layout")

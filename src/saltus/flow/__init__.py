@@ -2,7 +2,7 @@
 :mod:`saltus.analysis`.
 """
 
-from saltus.flow.methods import ODE23, ODE45, ODE113, RK4, ODE15s, Taylor
+from saltus.flow.methods import ODE23, ODE45, ODE113, RK4, Modal, ODE15s, Taylor
 from saltus.interrupt import Interrupted
 
-__all__ = ["ODE23", "ODE45", "ODE113", "RK4", "Interrupted", "ODE15s", "Taylor"]
+__all__ = ["ODE23", "ODE45", "ODE113", "RK4", "Interrupted", "Modal", "ODE15s", "Taylor"]

@@ -88,6 +88,7 @@ def run(
         On Ctrl-C, with the partial Outcome.
     """
     threads = threads if threads is None else whole_number(threads, "threads", 1, MOST_THREADS)
+    method = method.serving(system.origin)
     module = method.kernels(system.origin)
     outcome, arrays = allocate(request, system, module)
     periods = float(np.max(request.end_count + request.end_phase / request.period, initial=0.0))

@@ -72,6 +72,7 @@ class Flight:
     ):
         count = len(start)
         check_steps(system, method, period)
+        method = method.serving(system.origin)
         self._module = method.kernels(system.origin)
         _, self._arrays = allocate(
             Request.periods(start, parameters, period, 0), system, self._module

@@ -110,6 +110,10 @@ class Method:
         """
         return None
 
+    def serving(self, system: System) -> Method:  # noqa: ARG002  (most methods serve all)
+        """The method that moves a system: this one, or the one that stands in for it."""
+        return self
+
     def suited_to(self, count: int) -> Method:  # noqa: ARG002  (unused by most methods)
         """The fastest variant of the method for ``count`` trajectories; its results are the same to
         the bit.

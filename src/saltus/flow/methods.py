@@ -9,6 +9,7 @@ from saltus.errors import ParameterError, shown
 from saltus.flow.fixed_step import RK4
 from saltus.flow.matlab import ODE23, ODE45, ODE113, ODE15s
 from saltus.flow.method import Method
+from saltus.flow.modal import Modal
 from saltus.flow.taylor import Taylor
 
 __all__ = [
@@ -18,6 +19,7 @@ __all__ = [
     "ODE113",
     "RK4",
     "Method",
+    "Modal",
     "ODE15s",
     "Taylor",
     "check_method",
@@ -25,7 +27,7 @@ __all__ = [
 
 #: Every method, as people write it.
 METHODS: Mapping[str, type[Method]] = {
-    one.__name__: one for one in (Taylor, RK4, ODE23, ODE45, ODE113, ODE15s)
+    one.__name__: one for one in (Taylor, Modal, RK4, ODE23, ODE45, ODE113, ODE15s)
 }
 
 

@@ -56,6 +56,7 @@ class Shots:
     ):
         k, states = len(period), len(system.states)
         check_steps(system, method, period)
+        method = method.serving(system.origin)
         module = method.kernels(system.origin)
         request = Request.periods(np.zeros((k, states)), parameters, period, periods)
         _, arrays = allocate(request, system, module)

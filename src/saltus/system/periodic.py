@@ -83,13 +83,13 @@ def timing_of(entry: Expr) -> Timing:
             clocks |= {
                 relation.gap: cycles_of(relation.gap) for relation in relations_in(node.payload)
             }
-        elif node.op in ("sin", "cos") and (rate := _rate(node.args[0])) is not None:
+        elif node.op in ("sin", "cos") and (rate := rate_of(node.args[0])) is not None:
             phases[node], below = div(rate, 2 * math.pi), []
         waiting += below
     return Timing(tuple(clocks.values()), tuple(phases.values()), complete)
 
 
-def _rate(angle: Expr) -> Expr | None:
+def rate_of(angle: Expr) -> Expr | None:
     """The rate of ``rate*t + (anything without time)``, if it depends on parameters only; None for
     any other angle.
     """

@@ -69,6 +69,7 @@ def measured(
     RunInterrupted
         On Ctrl-C, with the Outcome so far.
     """
+    method = method.serving(system.origin)
     if method.exact and len(request.start) <= FEW:
         outcome, distance = _in_one_call(system, method, request, threads, show)
     else:

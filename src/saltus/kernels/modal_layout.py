@@ -1,0 +1,47 @@
+"""Layout of the modal flow: what its tables and its work arrays hold.
+
+One trajectory after the other; the lanes of a step hold its modes. A contact state is linear: z' =
+A z + b + drives. Its modes y = L (z - z_p(t)), z_p the steady answer to the drives, go their own
+ways: y_j(t) = y_j e^{lambda_j t}. Of a pair of complex modes one is kept, and z = z_p + Re(V y).
+A gap is a row of amplitudes: g(t) = c + Re(sum_j w_j y_j(t)) + drives.
+
+Symbols
+-------
+N states; G groups of LANES modes, ascending by |lambda|; S groups of LANES states; R rows of gaps,
+of which guards are plus or minus one, and an offset; H drives Re(e^{i (rate t + phase)}).
+"""
+
+from collections import namedtuple
+
+#: Terms of a gap's series beyond the first, and what the last one's successor is divided by.
+ORDER = 15
+FACTORIAL = 20922789888000.0
+#: A mode is followed in the series of a gap while |lambda| h is at most this; what is left out of
+#: its own series is at most its amplitude there.
+FOLLOWED = 6.0
+# Columns of `sizes`.
+STATES, MODE_GROUPS, STATE_GROUPS, GAP_ROWS, GUARDS, DRIVES = range(6)
+# Columns of `links`: first row of the modes' table, first row of the drives' table; then for each
+# guard the contact state behind its boundary, -1 where it hasn't been made yet.
+MODES, STEADY, BEHIND = range(3)
+# Columns of `carry`: the contact state (-1: to be looked up), whether its amplitudes must be made
+# of the state, the next step [s], the time of the last landing, landings there since, guards that
+# the state has ridden from its start on (bits), the set of parameter values; then the amplitudes.
+AT, ENTERS, NEXT_STEP, LANDED_AT, LANDINGS, RIDES, SET, AMPLITUDES = range(8)
+# Columns of `options`.
+MOST_STEPS, MOST_CONTACTS = range(2)
+# What is known of a guard in a step.
+CLEAR, CROSSES, OPEN = range(3)
+#: Landings at one instant before they count as sliding.
+MOST_LANDINGS = 100
+#: Times within this many ulp are one event.
+COINCIDENT = 10.0 * 2.220446049250313e-16
+#: Rounding of a gap, in units of the sizes of its terms.
+ROUNDED = 16.0 * 2.220446049250313e-16
+HUGE = 1.0e300
+
+Modal = namedtuple(
+    "Modal",
+    "sizes row_of sign_of offset rate lag modes steady links y moved size sums q errors p bern "
+    "bounds slopes out touches state answer angle found",
+)

@@ -1,0 +1,174 @@
+"""Systems that are linear between their contacts: matrices of each contact state, read off the
+equations.
+
+In a contact state s the equations are ``z' = A_s z + b_s + sum_d B_s[:, d] u_d(t)`` and the gap of
+guard g is ``a_g z + c_g + sum_d e_g[d] u_d(t)``, where a drive ``u_d`` is a sine or cosine of
+``rate*t + phase``.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from saltus.language import expression as ex
+from saltus.language.evaluate import evaluate
+from saltus.language.expression import Expr
+from saltus.system.periodic import rate_of
+from saltus.system.system import System
+
+#: Size of the states and drives by which coefficients are read off: so large that constants of the
+#: equations leave no rounding in them.
+PROBE = 2.0**40
+
+
+@dataclass(frozen=True)
+class Drive:
+    """``sin`` or ``cos`` of ``rate*t + phase``.
+
+    Attributes
+    ----------
+    rate, phase : Expr
+        Of parameters only [rad/s], [rad].
+    lag : float
+        Phase of the function behind a cosine [rad].
+    """
+
+    rate: Expr
+    phase: Expr
+    lag: float
+
+
+@dataclass(frozen=True)
+class LinearPiece:
+    """The equations of one contact state for one set of parameter values.
+
+    Attributes
+    ----------
+    matrix : float64[N, N]
+        A.
+    constant : float64[N]
+        b.
+    driven : float64[N, D]
+        B.
+    """
+
+    matrix: np.ndarray
+    constant: np.ndarray
+    driven: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class LinearSystem:
+    """A system that is linear between its contacts, with the drives in it.
+
+    Attributes
+    ----------
+    system : System
+        The system.
+    drives : tuple of Drive
+        The sines and cosines of time in it.
+    """
+
+    system: System
+    drives: tuple[Drive, ...]
+    _field: tuple[Expr, ...]
+    _gaps: tuple[Expr, ...]
+
+    def piece(self, values: Mapping[str, float], mode: int) -> LinearPiece:
+        """The equations of a contact state, bit i the side of guard i."""
+        bits = [bool(mode >> i & 1) for i in range(len(self.system.guards))]
+        return LinearPiece(*self._coefficients(self._field, values, bits))
+
+    def gaps(self, values: Mapping[str, float]) -> LinearPiece:
+        """a, c and e of all guards, float64[guards, N], float64[guards], float64[guards, D]."""
+        return LinearPiece(*self._coefficients(self._gaps, values, []))
+
+    def rates(self, values: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
+        """Rates [rad/s] and phases [rad] of the drives as cosines."""
+        found = evaluate([part for d in self.drives for part in (d.rate, d.phase)], values=values)
+        pairs = np.array(found, float).reshape(-1, 2)
+        return pairs[:, 0], pairs[:, 1] + [d.lag for d in self.drives]
+
+    def _coefficients(
+        self, entries: tuple[Expr, ...], values: Mapping[str, float], bits: list[bool]
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Coefficients of the states, constants, and coefficients of the drives."""
+        n, m = len(self.system.states), len(self.drives)
+        probes = np.zeros((n + m, 1 + 2 * (n + m)))
+        probes[:, 1 : 1 + n + m] = PROBE * np.eye(n + m)
+        probes[:, 1 + n + m :] = -PROBE * np.eye(n + m)
+        states = dict(zip(self.system.states, probes[:n], strict=True))
+        known = {**values, **{_name(d): probes[n + d] for d in range(m)}}
+        found = np.array(
+            [
+                np.broadcast_to(one, probes.shape[1])
+                for one in evaluate(entries, states=states, values=known, bits=bits)
+            ]
+        ).reshape(len(entries), -1)
+        slopes = (found[:, 1 : 1 + n + m] - found[:, 1 + n + m :]) / (2 * PROBE)
+        return slopes[:, :n], found[:, 0], slopes[:, n:]
+
+
+def _name(drive: int) -> str:
+    return f"drive {drive}"
+
+
+@functools.lru_cache(maxsize=256)
+def linear_pieces(system: System) -> LinearSystem | str:
+    """The system as one that is linear between its contacts, or the reason why it isn't."""
+    if system.tangent_of is not None:
+        return "it carries its own derivatives"
+    if any(guard.law for guard in system.guards):
+        return "a contact of it has a law: an impact, a jump, friction"
+    drives: dict[Expr, Drive] = {}
+    for node in ex.walk(*system.field, *(guard.gap for guard in system.guards)):
+        if node.op in ("sin", "cos") and ex.depends_on(node, ("time",)):
+            rate = rate_of(node.args[0])
+            if rate is None:
+                return "a sine in it isn't one of a rate times the time"
+            phase = ex.substituted(node.args[0], {ex.TIME: ex.constant(0.0)})
+            if ex.depends_on(phase, ("state",)):
+                return "the phase of a sine in it depends on the state"
+            drives[node] = Drive(rate, phase, -math.pi / 2 if node.op == "sin" else 0.0)
+    names = {node: ex.parameter(_name(i)) for i, node in enumerate(drives)}
+    field = tuple(ex.substituted(entry, names) for entry in system.field)
+    gaps = tuple(ex.substituted(guard.gap, names) for guard in system.guards)
+    if any(ex.depends_on(gap, ("select",)) for gap in gaps):
+        return "a boundary of it moves when another is crossed"
+    if not all(_is_affine(entry, len(drives)) for entry in (*field, *gaps)):
+        return "it isn't linear between its contacts"
+    return LinearSystem(system, tuple(drives.values()), field, gaps)
+
+
+def _is_affine(root: Expr, drives: int) -> bool:
+    """True if an expression is linear in the states and drives, whichever sides its conditions
+    choose.
+    """
+    moving = {_name(i) for i in range(drives)}
+    degree: dict[Expr, float] = {}
+    for node in ex.walk(root):
+        below = [degree[one] for one in node.args]
+        match node.op:
+            case "state":
+                degree[node] = 1
+            case "param":
+                degree[node] = 1 if node.payload in moving else 0
+            case "const":
+                degree[node] = 0
+            case "add" | "sub" | "neg":
+                degree[node] = max(below)
+            case "mul":
+                degree[node] = sum(below)
+            case "div":
+                degree[node] = below[0] if below[1] == 0 else math.inf
+            case "select":
+                asks_bits = next(ex.relations_in(node.payload), None) is None
+                degree[node] = max(below) if asks_bits else math.inf
+            case _:
+                degree[node] = 0 if node.args and not any(below) else math.inf
+    return degree[root] <= 1
