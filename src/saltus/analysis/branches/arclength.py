@@ -349,8 +349,8 @@ class _Fronts:
         return guess, normal, at >= 0
 
     def _ahead(self, going: np.ndarray, share: np.ndarray) -> np.ndarray:
-        """How far the curves go in shares float64[g] of the next steps, by the cubic through the
-        last two points with their tangents; behind a single point, by its tangent.
+        """Steps of the curves over shares float64[g] of the next step lengths, by the cubic through
+        the last two points with their tangents; by the tangent if there is only one point.
         """
         scale, here = self.equations.scale[going], self.tangent[going]
         length = (share * self.length[going])[:, None]
@@ -401,7 +401,7 @@ class _Fronts:
 
 
 def passes(curve: Arc, point: np.ndarray, scale: np.ndarray) -> bool:
-    """Whether the last step of a curve passes a point: the cubic between its ends does."""
+    """True if the last step of a curve passes a point, by the cubic between its ends."""
     step, way = (curve.z[-1] - curve.z[-2]) / scale, (point - curve.z[-2]) / scale
     length = _size(step)
     share = float(way @ step) / length**2 if length else 0.0
@@ -415,7 +415,9 @@ def passes(curve: Arc, point: np.ndarray, scale: np.ndarray) -> bool:
 def _has_passed(
     equations: CurveEquations, curve: Arc, other: Arc, row: int, either_way: bool = False
 ) -> bool:
-    """Whether a curve has passed the start of another, in the direction in which that one left."""
+    """True if a curve has passed the start of another one, in the direction in which that one left;
+    with ``either_way``, also in the opposite direction.
+    """
     scale, one = equations.scale[row], np.array([row])
     starts = equations.alike(other.z[0][None], one)[0]
     ways = equations.alike(other.tangent[0][None] * scale, one)[0] / scale

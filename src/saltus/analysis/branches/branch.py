@@ -84,7 +84,7 @@ class Branch:
 
     @property
     def closed(self) -> bool:
-        """Whether it returns to where it began."""
+        """True if the branch returns to where it began."""
         return self.ends == ("closed", "closed")
 
     @property
@@ -163,7 +163,7 @@ class Branch:
                 break
 
     def _contacts(self) -> list[Event]:
-        """Where the contact sequence changes."""
+        """Events at which the contact sequence changes."""
         return contact_points(self.orbits, self.row, self.z, self.tangent)
 
 
@@ -218,8 +218,8 @@ def _located(branch: Branch) -> list[Event]:
 
 
 def _vertical(branch: Branch) -> np.ndarray:
-    """Where a branch stays at one value of the parameter, bool[p]: a family of orbits about the
-    centre of a linear system, of which none is isolated and a multiplier is 1.
+    """True at points where a branch stays at one value of the parameter, bool[p]: a family of
+    orbits about the centre of a linear system, of which none is isolated and a multiplier is 1.
     """
     still = np.abs(branch.tangent[:, -1]) < STILL
     beside = np.append(still[1:], False) | np.append(False, still[:-1])
@@ -233,7 +233,7 @@ def _in_order(branch: Branch, events: Sequence[Event]) -> list[Event]:
 
 
 def _is_vertex(event: Event, events: Sequence[Event], branch: Branch) -> bool:
-    """Whether a fold is where a branch point's crossing branch turns back."""
+    """True if a fold is the point where the crossing branch of a branch point turns back."""
     return event.kind == "fold" and any(
         other.kind == "branch_point" and np.abs((other.z - event.z) / branch.scale).max() < VERTEX
         for other in events
@@ -241,8 +241,8 @@ def _is_vertex(event: Event, events: Sequence[Event], branch: Branch) -> bool:
 
 
 def _is_real(point: Event) -> bool:
-    """Whether a test vanishes at a point: it may also change its sign by a leap, between branches
-    that run alongside or at two real multipliers whose product is one.
+    """True if the test of a bifurcation vanishes at a point. A test may also change its sign by a
+    jump, between branches that run alongside or at two real multipliers whose product is one.
     """
     own = point.multipliers
     if point.kind == "fold":

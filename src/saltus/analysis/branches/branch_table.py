@@ -55,7 +55,9 @@ def table_of(
 def attributes_of(
     name: str, limits: tuple[float, float], branches: Sequence[Branch]
 ) -> dict[str, Any]:
-    """What branches over a parameter are about."""
+    """Attributes of a Dataset of branches: the parameter's name, its range, and the number of
+    changes that are not explained.
+    """
     return {
         "parameter": name, "parameter_low": limits[0], "parameter_high": limits[1],
         "unexplained_changes": sum(len(branch.unexplained) for branch in branches),
@@ -148,14 +150,14 @@ def _eigenvalues(points: Sequence[tuple[Branch, np.ndarray]], size: int) -> np.n
 
 
 def _kind(branch: Branch) -> str:
-    """What lies on a branch."""
+    """Kind of the orbits on a branch: ``equilibrium``, ``limit_cycle`` or ``periodic``."""
     if isinstance(branch.orbits, Rests):
         return "equilibrium"
     return "limit_cycle" if branch.orbits.free else "periodic"
 
 
 def _branches(branches: Sequence[Branch]) -> dict[str, Any]:
-    """What is known of each branch."""
+    """Variables with one entry for each branch, such as its kind, its parent and its ends."""
     return {
         "branch": np.arange(len(branches)),
         "branch_kind": [_kind(branch) for branch in branches],

@@ -186,8 +186,8 @@ def find(
 
 
 def _resolved(point: Event) -> bool:
-    """Whether a cusp is more than rounding: next to a graze of a rigid stop the map bends without
-    bound, and its derivatives are noise.
+    """False if a point is a cusp that is only rounding. Next to a graze of a rigid stop the map
+    bends without bound, and its derivatives are noise.
     """
     if point.kind != "cusp":
         return True

@@ -18,7 +18,7 @@ ONE = 1e-9
 
 @dataclass(frozen=True)
 class SequenceContact:
-    """What a contact of a sequence is.
+    """One contact of a sequence.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class ContactSequence:
 
     @property
     def flies(self) -> bool:
-        """Whether no contact is held, so that the orbit is made of legs (legs.py)."""
+        """True if no contact is held, so that the orbit is made of legs (legs.py)."""
         return all(one.kind in (st.CROSSING, st.IMPACT) for one in self.contacts)
 
 
@@ -103,7 +103,7 @@ def sequences(orbits: PeriodicOrbits, z: np.ndarray) -> list[ContactSequence | N
 def _reported_before(
     guard: np.ndarray, direction: np.ndarray, phase: np.ndarray, n: int
 ) -> np.ndarray:
-    """Which contacts are those before them, at a whole period, bool[c]."""
+    """True for a contact that is the one before it, reported again at a whole period, bool[c]."""
     if len(guard) < 2:
         return np.zeros(len(guard), bool)
     apart = (phase - np.roll(phase, 1)) % n

@@ -1,5 +1,5 @@
-"""What happens at the contacts of a sequence, as functions of the state and the time: the gap, its
-rate, the state behind the contact, and their derivatives.
+"""Contacts of a sequence as functions of the state and the time: the gap, its rate, the state
+behind the contact, and their derivatives.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class Jumps:
         ]
 
     def at(self, time: np.ndarray, states: np.ndarray) -> At:
-        """What happens at times float64[r, m] in states float64[r, m, E]."""
+        """Evaluate the contacts at times float64[r, m] in states float64[r, m, E]."""
         (r, m, width), size = states.shape, self._size
         columns = np.empty((1 + width + 1 + size * (width + 3), r, m))
         for entries, alike in self._places:
@@ -95,7 +95,7 @@ class Jumps:
 def _entries(
     system: System, contact: SequenceContact | None, mode: int, size: int
 ) -> tuple[Expr, ...]:
-    """What :class:`At` holds of a contact; without one, of a motion in a mode."""
+    """Expressions for the entries of :class:`At` at a contact; without one, in a mode."""
     gap, after, before = ex.constant(0.0), tuple(map(ex.state, system.states[:size])), mode
     if contact is not None:
         guard, before = system.guards[contact.guard], contact.before

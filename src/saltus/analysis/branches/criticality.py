@@ -1,5 +1,5 @@
-"""Whether the limit cycle that is born at a Hopf point is stable: the first Lyapunov coefficient,
-from the derivatives of the expressions themselves.
+"""Stability of the limit cycle that is born at a Hopf point: the first Lyapunov coefficient, from
+the derivatives of the expressions themselves.
 
 Kuznetsov, Elements of Applied Bifurcation Theory (2004), section 5.4.
 """

@@ -136,7 +136,7 @@ def _joined(equations: Equations, curves: list[Arc]) -> BifurcationCurve:
 
 
 def _end(equations: Equations, curve: Arc) -> str:
-    """Why a curve ends."""
+    """Reason why a curve ends."""
     if not isinstance(equations, SingularOrbits) or not equations.torus or curve.end != "range":
         return curve.end
     cosine = curve.z[-1][-1]

@@ -1,4 +1,4 @@
-"""What happens on branches of orbits, and on curves of bifurcations."""
+"""Events on branches of orbits, and on curves of bifurcations."""
 
 from __future__ import annotations
 

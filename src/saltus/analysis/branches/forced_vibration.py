@@ -236,7 +236,7 @@ def small_vibration(
 
 
 def _meets(gap: Expr, system: System, rest: np.ndarray) -> bool:
-    """Whether a place of rest lies on a boundary."""
+    """True if an equilibrium lies on a boundary."""
     named = dict(zip(system.states, rest, strict=True))
     (found,) = evaluate([gap], states=named, values=system.values)
     return bool(found == 0)

@@ -142,7 +142,7 @@ class FreeOrbits(PeriodicOrbits):
 
 
 def place_of_rest(system: System) -> np.ndarray:
-    """Where the field vanishes, by Newton's method from zero."""
+    """Locate an equilibrium, where the field vanishes, by Newton's method from zero."""
     values = {name: np.array([value]) for name, value in system.values.items()}
     zero, units = np.zeros((1, len(system.states))), np.ones((1, len(system.states)))
     size = np.abs(jacobian_of(system, zero, values)).max(axis=2)

@@ -160,8 +160,8 @@ def touch(
 def touching(
     legs: Legs, place: int, gap: Gap, u: np.ndarray, rows: np.ndarray
 ) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray, np.ndarray, np.ndarray]:
-    """What :meth:`Legs.evaluate` returns of orbits float64[k, z + 1], whose last entry is a time,
-    and what :func:`touch` does: all flights in one.
+    """Results of :meth:`Legs.evaluate` and of :func:`touch` for orbits float64[k, z + 1], whose
+    last entry is a time: all flights are computed in one call.
     """
     z, when, size = u[:, :-1], u[:, -1], legs.size
     first, _, rest = legs.nodes(z)
@@ -180,7 +180,9 @@ def touching(
 
 
 def nearest_turn(legs: Legs, z: np.ndarray, place: int, gap: Gap, since: float) -> float:
-    """When after a contact the motion turns away from the boundary, next to a time [periods]."""
+    """Time after a contact [periods] at which the motion turns away from the boundary: the one
+    nearest to the time ``since``, or ``since`` itself if there is none.
+    """
     first, _, rest = legs.nodes(z[None])
     spans, state = legs.flight(z, place, LOOKS)
     own = np.repeat(legs.orbits.own(rest)[0], len(spans), axis=0)

@@ -149,7 +149,7 @@ class GrazingOrbits:
 
     # -- where it ends -----------------------------------------------------------------------------
     def why_virtual(self, z: np.ndarray) -> str:
-        """Why the free flow doesn't make an orbit float64[z]; empty if it does."""
+        """Reason why the free flow doesn't make an orbit float64[z]; empty if it does."""
         legs = self.legs
         _, _, slopes = touch(legs, self.place, self.gap, z[None])
         rise = slopes[0, 1, -1] * self.gap.side / legs.unit  # of the gap, along the motion
@@ -215,7 +215,7 @@ class GrazingOrbits:
 
     # -- normal form -------------------------------------------------------------------------------
     def is_smooth(self, event: ContactEvent) -> bool:
-        """Whether a graze has no square root, since the force begins at zero."""
+        """True if a graze has no square root, since the force begins at zero."""
         own = self.legs.orbits.own(self.legs.nodes(event.z[None])[2])[0]
         full, when = np.append(event.state, own[0]), event.phase * self.legs.unit
         return self._law.is_continuous(np.array([when]), full[None])
@@ -280,7 +280,7 @@ def sqrt_coefficient(event: ContactEvent) -> float:
 
 
 class _Law:
-    """What a boundary does to a motion that meets it slowly.
+    """Effect of a boundary on a motion that meets it slowly.
 
     An impact changes the state at once, and a crossing by the other field for as long as the
     motion is on the other side; both by an amount in proportion to the speed.
@@ -330,7 +330,9 @@ class _Law:
         return np.where(beyond[:, None] > 0, kick, np.nan)
 
     def is_continuous(self, time: np.ndarray, states: np.ndarray) -> bool:
-        """Whether no rate changes at the boundary, at times float64[r] in states float64[r, E]."""
+        """True if there is no impact and no rate changes at the boundary, at times float64[r] in
+        states float64[r, E].
+        """
         return not self.impact and not self._change(self._columns(time, states)).any()
 
     def _change(self, columns: np.ndarray) -> np.ndarray:

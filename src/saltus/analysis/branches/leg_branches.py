@@ -139,7 +139,9 @@ def _leg_branch(plan: Plan, start: Start) -> Branch | None:
 
 
 def _where_held(branch: Branch) -> tuple[str, str]:
-    """Why a branch ends, with ``held`` for ``lost`` where contacts of its last orbit are held."""
+    """Reasons for the two ends of a branch, with ``held`` for ``lost`` where contacts of the last
+    orbit are held.
+    """
     last = sequences(branch.orbits, branch.z[[0, -1]])
     begin, end = (
         "held" if why == "lost" and not (one is not None and one.flies) else why

@@ -1,4 +1,4 @@
-"""Where a branch of orbits with one contact sequence ends, and how it goes on with another one."""
+"""Ends of branches of orbits with one contact sequence, and their continuation with another one."""
 
 from __future__ import annotations
 
@@ -57,7 +57,8 @@ class End:
 
 
 def end_of(legs: Legs, z: np.ndarray, beyond: np.ndarray, tangent: np.ndarray) -> End | None:
-    """Why a branch ends between an orbit of the free flow and a virtual one.
+    """Locate the end of a branch between an orbit of the free flow and a virtual one; None if it
+    isn't found.
 
     Parameters
     ----------

@@ -53,7 +53,9 @@ class Piece:
 
     @property
     def outcome(self) -> str:
-        """How the branch goes on behind the end: see above; empty if it doesn't."""
+        """Continuation of the branch behind the end, ``persistence`` or ``nonsmooth_fold``; empty
+        if there is none.
+        """
         if self.end is None or self.end.onto is None or not self.curve.tangent:
             return ""
         into = self.end.into(self.legs, self.curve.tangent[-1])
@@ -145,7 +147,7 @@ class _Way:
         return piece.end
 
     def _returns(self, legs: Legs, curve: Arc) -> bool:
-        """Whether the last step passed the orbit from which the branch was followed."""
+        """True if the last step passed the orbit from which the branch was followed."""
         own, start = self.home
         if legs.contacts != own.contacts or len(curve.z) < 2:
             return False

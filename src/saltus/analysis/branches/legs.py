@@ -114,7 +114,7 @@ class Legs:
         return z[..., self.count * (self.size + 1) + self.free :]
 
     def spans(self, phase: np.ndarray) -> np.ndarray:
-        """How long the leg behind each contact lasts, in periods."""
+        """Durations of the legs behind the contacts, in periods."""
         span: np.ndarray = np.roll(phase, -1, axis=1) - phase
         span[:, -1] += self.n
         return span
@@ -128,7 +128,7 @@ class Legs:
         return self._modes[place]
 
     def jumps_at(self, place: int) -> bool:
-        """Whether the state jumps at a contact."""
+        """True if the state jumps at a contact."""
         return self.contacts[place].kind == st.IMPACT
 
     def sequence_at(self, z: np.ndarray) -> ContactSequence:
@@ -219,7 +219,9 @@ class Legs:
         return np.concatenate([after, own, times], axis=2)
 
     def at(self, z: np.ndarray) -> At:
-        """What happens at the contacts of orbits float64[r, z]."""
+        """Evaluate the contacts of orbits float64[r, z]: gaps, rates, states behind, and
+        derivatives.
+        """
         phase, before, rest = self.nodes(z)
         own = np.repeat(self.orbits.own(rest)[0][:, None], self.count, axis=1)
         return self._jumps.at(phase * self.unit, np.concatenate([before, own], axis=2))
@@ -239,7 +241,9 @@ class Legs:
         derivative: np.ndarray,
         by_end: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """What :meth:`evaluate` returns, from what :meth:`along` does at the ends of the legs."""
+        """Residual and derivative that :meth:`evaluate` returns, from the results of :meth:`along`
+        at the ends of the legs.
+        """
         phase, before, rest = self.nodes(z)
         derivative = np.concatenate([derivative, self._of_gaps(at, rest)], axis=2)
         for i in range(self.count):
@@ -401,8 +405,9 @@ class Legs:
         return np.asarray(closing * way)
 
     def begin(self, z: np.ndarray) -> np.ndarray:
-        """When limit cycles float64[r, z], and all of their parts, may begin well away from a
-        contact [periods], float64[r]; 0 of orbits that the forcing tells where to begin.
+        """Times well away from a contact at which limit cycles float64[r, z], and all of their
+        parts, may begin [periods], float64[r]; 0 without contacts, and for orbits that the forcing
+        tells where to begin.
         """
         if not self.free or not self.contacts:
             return np.zeros(len(z))
@@ -430,7 +435,7 @@ class Legs:
         return self.orbits.points(self.orbit(z))
 
     def admissible(self, z: np.ndarray) -> np.ndarray:
-        """Whether the free flow makes the orbits float64[r, z]: they meet these contacts and no
+        """True for orbits float64[r, z] that the free flow makes: they meet these contacts and no
         others, bool[r].
         """
         result = np.array((self.spans(self.nodes(z)[0]) > 0).all(axis=1))

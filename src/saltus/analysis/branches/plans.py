@@ -1,4 +1,6 @@
-"""How the branches of a system are followed: over one period, or from contact to contact."""
+"""Plans by which the branches of a system are followed: over one period, or from contact to
+contact.
+"""
 
 from __future__ import annotations
 

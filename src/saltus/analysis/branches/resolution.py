@@ -1,4 +1,4 @@
-"""How finely branches are resolved: as many orbits as a picture of their size needs."""
+"""Resolution of branches: as many orbits as a picture of their size needs."""
 
 from __future__ import annotations
 

@@ -147,7 +147,9 @@ def _left(orbits: Rests, curve: Arc) -> str:
 
 
 def _told(branch: RestBranch, event: Event, known: Sequence[Event]) -> bool:
-    """Whether a boundary equilibrium is the end of a branch that came from its other side."""
+    """True if an event is a boundary equilibrium that is already known from the branch on its other
+    side.
+    """
     return event.kind == "boundary_equilibrium" and any(
         np.abs((event.z - other.z) / branch.scale).max() < ONE for other in known
     )
@@ -222,7 +224,9 @@ def _on_boundary(orbits: Rests, row: int, z: np.ndarray, guard: int) -> np.ndarr
 def _behind(
     branch: RestBranch, z: np.ndarray, guard: int, out: np.ndarray
 ) -> tuple[str, np.ndarray | None]:
-    """How the equilibria go on behind a boundary, and in which direction, in units of the scale."""
+    """Continuation of the equilibria behind a boundary, and its direction in units of the scale;
+    empty and None if there is none.
+    """
     if branch.orbits.system.guards[guard].law is not None:
         return "", None
     other, one = branch.orbits.across(z, branch.row, guard), np.array([0])

@@ -1,4 +1,4 @@
-"""Which branch an orbit lies on, so that each is followed once."""
+"""Find the branch on which an orbit lies, so that each branch is followed once."""
 
 from __future__ import annotations
 
@@ -29,23 +29,23 @@ def branch_of(z: np.ndarray, n: int, branches: Sequence[Branch]) -> int:
 
 
 def on_branch(z: np.ndarray, n: int, branch: Branch) -> np.ndarray:
-    """Which orbits of n periods float64[r, z] lie on a branch, bool[r]."""
+    """True for orbits of n periods float64[r, z] that lie on a branch, bool[r]."""
     return _on(z, branch) if _is_alike(branch, n, z.shape[1]) else np.zeros(len(z), bool)
 
 
 def has_twin(branch: Branch) -> bool:
-    """Whether the mirror image of a branch is another one."""
+    """True if the mirror image of a branch is another branch."""
     middle = branch.z[len(branch.z) // 2][None]
     return branch.orbits.symmetric and not _on(branch.orbits.mirrored(middle), branch)[0]
 
 
 def _is_alike(branch: Branch, n: int, width: int) -> bool:
-    """Whether orbits of n periods may lie on a branch; equilibria are no limit cycles."""
+    """True if orbits of n periods may lie on a branch; equilibria are no limit cycles."""
     return branch.orbits.n == n and branch.z.shape[1] == width
 
 
 def _on(z: np.ndarray, branch: Branch) -> np.ndarray:
-    """Which orbits float64[r, z] lie on a branch of their kind, bool[r]."""
+    """True for orbits float64[r, z] that lie on a branch of their kind, bool[r]."""
     result, (guess, which) = np.zeros(len(z), bool), _passes(branch, z[:, -1])
     near = [_apart(z[i], one, branch) <= PASSES for i, one in zip(which, guess, strict=True)]
     guess, which = guess[near], which[near]
@@ -61,8 +61,9 @@ def _on(z: np.ndarray, branch: Branch) -> np.ndarray:
 
 
 def _passes(branch: Branch, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where a branch passes values of the parameter float64[r], and which of them: float64[g, z],
-    int64[g]. By cubics between its points, which turn back beyond a fold as it does.
+    """Points float64[g, z] at which a branch passes values of the parameter float64[r], and the
+    number of the value at each, int64[g]. Cubics between the points of the branch turn back beyond
+    a fold as the branch does.
     """
     step = np.diff(branch.z, axis=0) / branch.scale
     length = np.append(0.0, np.cumsum(np.linalg.norm(step, axis=1)))
@@ -91,8 +92,8 @@ def _passes(branch: Branch, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 def _apart(a: np.ndarray, b: np.ndarray, branch: Branch, exact: bool = False) -> float:
-    """How far two orbits lie apart, in units of the scale, from whichever point they begin; for
-    limit cycles only roughly unless ``exact``.
+    """Distance between two orbits in units of the scale, from whichever point they begin; for limit
+    cycles only rough unless ``exact``.
     """
     orbits, row = branch.orbits, branch.row
     size = orbits.n * orbits.size

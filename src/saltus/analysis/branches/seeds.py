@@ -1,4 +1,4 @@
-"""Where branches begin: the periodic responses and attractors that were found."""
+"""Seeds of branches: the periodic responses, attractors and equilibria that were found."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where along a branch the contact sequence changes, and by what: grazes and corners."""
+"""Changes of the contact sequence along a branch, and their causes: grazes and corners."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def _ahead(
 def _ahead_of(
     orbits: PeriodicOrbits, row: int, tangent: np.ndarray, z: np.ndarray, other: np.ndarray
 ) -> float:
-    """How far a point lies ahead of another one along a tangent, in units of the scale."""
+    """Distance of a point ahead of another one along a tangent, in units of the scale."""
     return float((other - z) / orbits.scale[row] @ tangent)
 
 

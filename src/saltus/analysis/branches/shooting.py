@@ -107,9 +107,9 @@ class PeriodicOrbits:
         return np.full(z.shape[:-1], self.n * self.system.period())
 
     def own(self, rest: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """What the states of the parametric system beside the points begin with, from the unknowns
-        beside the points float64[r, e], the derivative of each with respect to its unknown, both
-        float64[r, e], and which unknown that is, int64[e].
+        """Initial values of the states of the parametric system beside the points, from the
+        unknowns beside the points float64[r, e]; the derivative of each with respect to its
+        unknown, both float64[r, e]; and the number of that unknown, int64[e].
         """
         slopes = np.ones(rest.shape)
         if self.system.forced_at not in self.names:
@@ -175,7 +175,7 @@ class PeriodicOrbits:
         return other
 
     def beside(self, z: np.ndarray, point: np.ndarray, row: int) -> float:
-        """How far a point float64[D] lies from the limit cycle z, in units of the scale."""
+        """Distance of a point float64[D] from the limit cycle z, in units of the scale."""
         start = self.starts(z[None])[:, 0]
         unit = self.scale[row, : self.size]
         run = self.map.run(start, self.n, Schedule.even(self.n, SAMPLES)).samples[0]
@@ -193,14 +193,14 @@ class PeriodicOrbits:
         return float(np.abs(way).max())
 
     def turned(self, z: np.ndarray, before: np.ndarray) -> bool:
-        """Whether a small limit cycle has passed an equilibrium since the one before, so that its
+        """True if a small limit cycle has passed an equilibrium since the one before, so that its
         flow is reversed.
         """
         rates = self._flow(np.stack([z, before])) / self.scale[0, : self.size]
         return bool(rates[0] @ rates[1] < 0.0 and self.radius(before) < SMALL)
 
     def radius(self, z: np.ndarray) -> float:
-        """How large the limit cycle float64[z] would be if it were a circle, in units of the
+        """Radius that the limit cycle float64[z] would have if it were a circle, in units of the
         scale.
         """
         rates = self._flow(z[None])[0] / self.scale[0, : self.size]

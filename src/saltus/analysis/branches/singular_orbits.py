@@ -51,7 +51,7 @@ class SingularOrbits:
 
     @property
     def torus(self) -> bool:
-        """Whether the multipliers are a complex pair."""
+        """True if the multipliers are a complex pair."""
         return self.multiplier is None
 
     @classmethod

@@ -199,7 +199,7 @@ def _branch_point(
 
 
 def outside(multipliers: np.ndarray) -> np.ndarray:
-    """How many multipliers lie outside the unit circle beyond +1, beyond -1, and in complex pairs,
+    """Number of multipliers outside the unit circle: beyond +1, beyond -1, and in complex pairs,
     int64[p, 3].
     """
     size, real = np.abs(multipliers), np.abs(multipliers.imag) <= COMPLEX * np.abs(multipliers)
@@ -217,5 +217,7 @@ def unstable(
     derivative: np.ndarray,
     rows: np.ndarray,
 ) -> np.ndarray:
-    """Which orbits float64[r, z] don't attract, bool[r]; ``multipliers``: those of equations."""
+    """True for orbits float64[r, z] that don't attract, bool[r]; ``multipliers``: those of
+    equations.
+    """
     return np.asarray(outside(multipliers(z, derivative, rows)).any(axis=1))

@@ -1,4 +1,4 @@
-"""Where branches leave others: seeds of the doubled, halved and crossing ones."""
+"""Branches that leave others: seeds of the doubled, halved and crossing ones."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ BORN = 0.015
 
 @dataclass(frozen=True)
 class Seed:
-    """Where a branch begins.
+    """Orbit at which a branch begins.
 
     Attributes
     ----------
@@ -105,7 +105,7 @@ def crossing(event: Event) -> np.ndarray:
 
 
 def ends_there(seed: Seed, branches: Sequence[Branch]) -> bool:
-    """Whether the branch that leaves a period doubling or a Hopf point is one that was seen to end
+    """True if the branch that leaves a period doubling or a Hopf point is one that was seen to end
     there.
     """
     if seed.along is None:

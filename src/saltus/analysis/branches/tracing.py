@@ -33,7 +33,7 @@ ABREAST = 512
 
 @dataclass(frozen=True)
 class Plan:
-    """What is followed, and how far.
+    """Rules by which branches are followed, and how far.
 
     Attributes
     ----------
@@ -133,12 +133,12 @@ def _abreast(waiting: list[Seed]) -> list[Seed]:
 
 
 def _leave_one(seed: Seed, other: Seed) -> bool:
-    """Whether two seeds leave one branch."""
+    """True if two seeds leave the same branch."""
     return None not in (seed.parent, other.parent) and seed.parent[0] == other.parent[0]  # type: ignore[index]
 
 
 def _is_known(start: Start, branches: Sequence[Branch]) -> bool:
-    """Whether an orbit lies on a branch already followed, or leaves where one was seen to end."""
+    """True if an orbit lies on a branch already followed, or leaves where one was seen to end."""
     return branch_of(start.z, start.n, branches) >= 0 or ends_there(start.seed, branches)
 
 
@@ -174,7 +174,7 @@ def _place(branch: Branch, branches: list[Branch], *waiting: list[Seed]) -> int:
 
 
 def _holds(branch: Branch, other: Branch) -> bool:
-    """Whether a branch passes both ends of another."""
+    """True if a branch passes both ends of another."""
     ends = other.z[[1, -2]] if len(other.z) > 2 else other.z
     n = other.orbits.n
     return n == branch.orbits.n and all(branch_of(z, n, [branch]) == 0 for z in ends)
