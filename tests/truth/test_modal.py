@@ -191,3 +191,41 @@ def test_what_it_does_not_serve_is_moved_by_taylor():
     kw = {"periods": 5, "progress": False}
     one, other = (sl.simulate(rig, (0, 0), method=m, **kw) for m in (sl.Modal(), sl.Taylor()))
     assert float(one.end_x) == float(other.end_x)
+
+
+@pytest.mark.nojit
+def test_a_mass_between_two_stops_meets_them_as_by_taylor():
+    """Small enough to run without the compiler: two modes, a stop of two sides and one of one."""
+    stiffness = np.array([[300.0, -100.0], [-100.0, 250.0]])
+    system = sl.structure(
+        np.eye(2),
+        stiffness,
+        0.01 * stiffness,
+        contacts=[
+            sl.Contact("x1", stiffness=2e3, gap=0.01, side="both", name="first"),
+            sl.Contact("x2", stiffness=1e3, gap=0.005, name="second"),
+        ],
+        forces=[sl.Force("x1", 5.0), sl.Force("x2", 1.0, harmonic=2)],
+        frequency=2.0,
+    )
+    modal, taylor = runs(system, 3)
+    assert modal.sizes["contact"] == taylor.sizes["contact"] > 8
+    assert modal.contact_guard.values.tolist() == taylor.contact_guard.values.tolist()
+    np.testing.assert_allclose(modal.contact_time, taylor.contact_time, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(modal.x1, taylor.x1, rtol=0, atol=1e-13)
+
+
+@pytest.mark.nojit
+def test_a_free_flight_that_only_touches_is_a_graze_of_both_flows():
+    """From rest at its turning point a linear oscillator comes back to where it began."""
+
+    @sl.system(states="x v")
+    def oscillator(t, x, v, *, gap=1.0, stiffness=50.0):
+        return v, -x - stiffness * sl.max(x - gap, 0.0)
+
+    for start, touches in ((1.0 - 1e-6, 0), (1.0 + 1e-6, 1)):
+        run = sl.simulate(oscillator, (-start, 0.0), t_end=4.0, samples=4, method=sl.Modal(),
+            progress=False, time_errors="local")  # fmt: skip
+        assert (run.sizes["contact"] > 0) == bool(touches)
+        if not touches:
+            assert float(run.smallest_gap_margin) == pytest.approx(1e-6, rel=1e-6)
