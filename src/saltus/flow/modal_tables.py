@@ -4,6 +4,7 @@ made when a motion first comes to them.
 
 from __future__ import annotations
 
+import math
 import threading
 from dataclasses import dataclass
 
@@ -11,10 +12,16 @@ import numpy as np
 
 from saltus.codegen.module import MODAL_LANES as LANES
 from saltus.errors import ParameterError
+from saltus.kernels import modal_layout as layout
+from saltus.language.expression import Expr
 from saltus.system.linear import LinearPiece, LinearSystem
 
 #: Condition of the eigenvectors of a contact state above which its modes don't carry its motion.
 MOST_CONDITION = 1e9
+#: Rounding of a coefficient of the equations, relative to it.
+ROUNDED = 16 * np.finfo(float).eps
+#: Turns of a drive in a period that are whole to so much are whole [relative].
+WHOLE = 1e-12
 #: Distance of a drive from an eigenvalue, relative to its rate, below which it is in resonance.
 RESONANCE = 1e-9
 
@@ -80,6 +87,7 @@ class Tables:
         self._known: dict[tuple[bytes, bytes], _Modes] = {}
         self._states: dict[tuple[int, int], int] = {}
         self._links: list[list[int]] = []
+        self._pieces: list[LinearPiece] = []
         n, guards = len(linear.system.states), len(linear.system.guards)
         self.row_of, self.sign_of = self._rows_of_gaps()
         rows = int(self.row_of.max(initial=-1)) + 1
@@ -88,7 +96,7 @@ class Tables:
         slots = len(_slots(np.linalg.eigvals(linear.piece(values, 0).matrix))) + rows
         self.groups, self.state_groups = -(-slots // LANES), -(-n // LANES)
         self.sizes = np.array(
-            [n, self.groups, self.state_groups, rows, guards, len(linear.drives)], np.int64
+            [n, self.groups, self.state_groups, rows, guards, len(linear.drives), 0], np.int64
         )
 
     def _rows_of_gaps(self) -> tuple[np.ndarray, np.ndarray]:
@@ -115,12 +123,12 @@ class Tables:
 
     # -- what the kernel reads ---------------------------------------------------------------------
     def arrays(self) -> tuple[np.ndarray, ...]:
-        """The tables, in the order in which the kernel takes them."""
+        """The tables, in the order in which the kernel takes them after the sizes."""
         offset = np.array([one.gaps.constant for one in self.sets]).reshape(len(self.sets), -1)
         rate = np.array([one.rates for one in self.sets]).reshape(len(self.sets), -1)
         lag = np.array([one.lags for one in self.sets]).reshape(len(self.sets), -1)
         return (
-            self.sizes, self.row_of, self.sign_of, offset, rate, lag, self.modes.table,
+            self.row_of, self.sign_of, offset, rate, lag, self.modes.table,
             self.steady.table, np.array(self._links, np.int64),
         )  # fmt: skip
 
@@ -145,13 +153,17 @@ class Tables:
         piece = self.linear.piece(given.values, mode)
         modes = self._modes_of(piece.matrix, given.gaps.matrix)
         number, guards = len(self._links), len(self.linear.system.guards)
-        links = [modes.row, self._steady_of(modes, piece, given)]
+        links = [modes.row, self._steady_of(modes, piece, given), 0]
         for g in range(guards):
             behind = self._states.get((which, mode ^ 1 << g), -1)
             links.append(behind)
             if behind >= 0:
-                self._links[behind][2 + g] = number
+                self._links[behind][layout.BEHIND + g] = number
+                if _is_smooth(piece, self._pieces[behind], given.gaps, g):
+                    links[layout.SMOOTH] |= 1 << g
+                    self._links[behind][layout.SMOOTH] |= 1 << g
         self._links.append(links)
+        self._pieces.append(piece)
         self._states[which, mode] = number
 
     # -- one contact state -------------------------------------------------------------------------
@@ -202,8 +214,43 @@ class Tables:
             [one.ravel() for one in (lam.real, lam.imag, size, left, right, waves)]
         )
 
+    def waves(self, row: np.ndarray, mode: int, quantities: tuple[Expr, ...]) -> Waves:
+        """The waves of a contact state, with the states, these quantities and the gaps."""
+        with self.lock:
+            given = self.sets[self.set_of(row)]
+            piece = self.linear.piece(given.values, mode)
+            modes = self._modes_of(piece.matrix, given.gaps.matrix)
+        answers = self._answers(modes, piece, given)
+        asked = self.linear.rows(quantities, given.values, mode)
+        kept, size = _slots(modes.values), len(modes.values)
+        weight = np.where(modes.values[kept].imag > 0, 2.0, 1.0)
+        rows = np.vstack([np.eye(size), asked.matrix, given.gaps.matrix])
+        direct = np.zeros((len(rows), len(answers)))
+        direct[size:, 0] = np.append(asked.constant, given.gaps.constant)
+        direct[size:, 1:] = np.vstack([asked.driven, given.gaps.driven])
+        return Waves(
+            np.concatenate([modes.values[kept], [0.0], 1j * given.rates]),
+            np.hstack([rows @ (modes.vectors[:, kept] * weight), rows @ answers.T + direct]),
+            modes.inverse[kept], answers, given.rates, given.lags,
+        )  # fmt: skip
+
     def _steady_of(self, modes: _Modes, piece: LinearPiece, given: _Set) -> int:
         """First row of the table of the steady answer to the drives."""
+        answers = self._answers(modes, piece, given)
+        padded = np.zeros((len(answers), LANES * self.state_groups), complex)
+        padded[:, : answers.shape[1]] = answers
+        waves = np.stack([padded.real, padded.imag], axis=1).reshape(-1, padded.shape[1])
+        states = np.delete(waves, 1, axis=0)  # the constant has no imaginary part
+        first = self.first_guard
+        gaps = given.gaps.matrix[first] @ answers.T  # [rows, 1 + drives]
+        gaps[:, 1:] += given.gaps.driven[first]
+        pairs = np.stack([gaps.real, gaps.imag], axis=2).reshape(len(first), -1)
+        numbers = np.delete(pairs, 1, axis=1).ravel()
+        numbers = np.concatenate([numbers, np.zeros(-len(numbers) % LANES)])
+        return self.steady.add(np.concatenate([states.ravel(), numbers]))
+
+    def _answers(self, modes: _Modes, piece: LinearPiece, given: _Set) -> np.ndarray:
+        """The steady answer to the constant load and to each drive, complex128[1 + D, N]."""
         rates = np.concatenate([[0.0], given.rates])
         far = 1j * rates[:, None] - modes.values[None]
         loads = np.column_stack([piece.constant, piece.driven])
@@ -219,18 +266,55 @@ class Tables:
             )
         with np.errstate(all="ignore"):
             answers = modes.vectors @ np.where(parts == 0, 0, parts / far.T)
-        answers = answers.T  # float64[1 + drives, N]
-        padded = np.zeros((len(rates), LANES * self.state_groups), complex)
-        padded[:, : answers.shape[1]] = answers
-        waves = np.stack([padded.real, padded.imag], axis=1).reshape(-1, padded.shape[1])
-        states = np.delete(waves, 1, axis=0)  # the constant has no imaginary part
-        first = self.first_guard
-        gaps = given.gaps.matrix[first] @ answers.T  # [rows, 1 + drives]
-        gaps[:, 1:] += given.gaps.driven[first]
-        pairs = np.stack([gaps.real, gaps.imag], axis=2).reshape(len(first), -1)
-        numbers = np.delete(pairs, 1, axis=1).ravel()
-        numbers = np.concatenate([numbers, np.zeros(-len(numbers) % LANES)])
-        return self.steady.add(np.concatenate([states.ravel(), numbers]))
+        return answers.T
+
+
+@dataclass(frozen=True)
+class Waves:
+    """The waves of a contact state: its modes, a constant and the drives; see flow/waves.py.
+
+    Attributes
+    ----------
+    rates : complex128[E]
+        [1/s].
+    rows : complex128[R, E]
+        What each adds to each quantity.
+    """
+
+    rates: np.ndarray
+    rows: np.ndarray
+    _inverse: np.ndarray
+    _answers: np.ndarray
+    _drive_rates: np.ndarray
+    _lags: np.ndarray
+
+    def amplitudes(
+        self, states: np.ndarray, count: np.ndarray, period: float, phase: np.ndarray
+    ) -> np.ndarray:
+        """Amplitudes complex128[p, E] in states float64[p, N], ``phase`` [s] after whole
+        periods.
+        """
+        turns = self._drive_rates * period / (2 * math.pi)
+        whole = np.abs(turns - np.round(turns)) <= WHOLE * np.abs(turns)
+        angle = self._lags + self._drive_rates * phase[:, None]
+        angle = angle + np.where(whole, 0.0, count[:, None] * self._drive_rates * period)
+        loads = np.column_stack([np.ones(len(states)), np.exp(1j * angle)])
+        modes = (states - (loads @ self._answers).real) @ self._inverse.T
+        return np.column_stack([modes, loads])
+
+
+def _is_smooth(one: LinearPiece, other: LinearPiece, gaps: LinearPiece, g: int) -> bool:
+    """True if the rates in two contact states agree where the gap of a guard is zero: their
+    difference is a multiple of the gap, to rounding.
+    """
+    first, second, rows = (
+        np.column_stack([piece.matrix, piece.constant, piece.driven])
+        for piece in (one, other, gaps)
+    )
+    gap, jump = rows[g] / np.linalg.norm(rows[g]), first - second
+    noise = ROUNDED * (np.abs(first) + np.abs(second))
+    left = jump - np.outer(jump @ gap, gap)
+    return bool((np.abs(left) <= noise + np.outer(noise @ np.abs(gap), np.abs(gap))).all())
 
 
 def _slots(values: np.ndarray) -> np.ndarray:

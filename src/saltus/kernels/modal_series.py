@@ -1,4 +1,4 @@
-"""Template, 1 of 2 of the modal flow: amplitudes on their way, and what they say of gaps."""
+"""Template, 1 of 3 of the modal flow: amplitudes on their way, and what they say of gaps."""
 
 import math
 
@@ -59,10 +59,10 @@ def begin_period(i, batch, m):
 
 @kernel
 def drive(i, tau, batch, m):
-    """Cosine and sine of each drive at a time of the period, to `angle`."""
+    """Cosine, sine and rate of each drive at a time of the period, to `angle`."""
     which = int(batch.carry[i, SET])
     for d in range(m.sizes[DRIVES]):
-        at = m.angle[d, 0] + m.rate[which, d] * tau
+        at, m.angle[d, 3] = m.angle[d, 0] + m.rate[which, d] * tau, m.rate[which, d]
         m.angle[d, 1], m.angle[d, 2] = math.cos(at), math.sin(at)
 
 
@@ -79,13 +79,31 @@ def answer_now(steady, m):
         store(m.answer, s, total)
 
 
-# -- states and amplitudes -------------------------------------------------------------------------
 @kernel
-def amplitudes_of(modes, m):
-    """Amplitudes of the state in `state`, to `y`: L (z - z_p). Needs `answer`."""
-    width, count = 2 * m.sizes[MODE_GROUPS], LANES * m.sizes[STATE_GROUPS]
+def answer_rate_now(steady, m):
+    """The rate of the steady answer to the drives, whose phases are in `angle`, to `answer`."""
+    groups = m.sizes[STATE_GROUPS]
+    for s in range(groups):
+        total = splat(0.0, LANES)
+        for d in range(m.sizes[DRIVES]):
+            row = steady + (1 + 2 * d) * groups + s
+            total = fma(load(m.steady, row, LANES), -m.angle[d, 2] * m.angle[d, 3], total)
+            total = fma(load(m.steady, row + groups, LANES), -m.angle[d, 1] * m.angle[d, 3], total)
+        store(m.answer, s, total)
+
+
+# -- states and amplitudes -------------------------------------------------------------------------
+@inner
+def less_answer(m):
+    """Subtract the answer from `state`."""
     for s in range(m.sizes[STATE_GROUPS]):
         store(m.state, s, load(m.state, s, LANES) - load(m.answer, s, LANES))
+
+
+@kernel
+def amplitudes_of(modes, y, m):
+    """Amplitudes of what is in `state`, to y: L z."""
+    width, count = 2 * m.sizes[MODE_GROUPS], LANES * m.sizes[STATE_GROUPS]
     for g in range(width):
         row = modes + 3 * m.sizes[MODE_GROUPS] + g * count
         a, b = splat(0.0, LANES), splat(0.0, LANES)
@@ -95,7 +113,7 @@ def amplitudes_of(modes, m):
             b = fma(load(m.modes, row + i + 1, LANES), number(m.state, 0, i + 1), b)
             c = fma(load(m.modes, row + i + 2, LANES), number(m.state, 0, i + 2), c)
             d = fma(load(m.modes, row + i + 3, LANES), number(m.state, 0, i + 3), d)
-        store(m.y, g, (a + b) + (c + d))
+        store(y, g, (a + b) + (c + d))
 
 
 @kernel
@@ -116,17 +134,29 @@ def state_of(modes, y, m):
         store(m.state, s, (a + b) + (c + d))
 
 
+@inner
+def factor_of(modes, g, h, m):
+    """e^{lambda h} of a group of modes: its real and its imaginary part."""
+    decay = exponential(load(m.modes, modes + g, LANES) * h)
+    sine, cosine = sincos(load(m.modes, modes + m.sizes[MODE_GROUPS] + g, LANES) * h)
+    return cosine * decay, sine * decay
+
+
+@inner
+def turn(y, g, a, b, to, m):
+    """Write (a + i b) y of a group of modes."""
+    groups = m.sizes[MODE_GROUPS]
+    real, imaginary = load(y, g, LANES), load(y, groups + g, LANES)
+    store(to, g, fma(-imaginary, b, real * a))
+    store(to, groups + g, fma(imaginary, a, real * b))
+
+
 @kernel
 def move(modes, h, m):
     """The amplitudes after a time h, to `moved`."""
-    groups = m.sizes[MODE_GROUPS]
-    for g in range(groups):
-        decay = exponential(load(m.modes, modes + g, LANES) * h)
-        sine, cosine = sincos(load(m.modes, modes + groups + g, LANES) * h)
-        real, imaginary = load(m.y, g, LANES), load(m.y, groups + g, LANES)
-        cosine, sine = cosine * decay, sine * decay
-        store(m.moved, g, fma(-imaginary, sine, real * cosine))
-        store(m.moved, groups + g, fma(imaginary, cosine, real * sine))
+    for g in range(m.sizes[MODE_GROUPS]):
+        a, b = factor_of(modes, g, h, m)
+        turn(m.y, g, a, b, m.moved, m)
 
 
 @inner

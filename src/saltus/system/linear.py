@@ -78,6 +78,20 @@ class LinearSystem:
     drives: tuple[Drive, ...]
     _field: tuple[Expr, ...]
     _gaps: tuple[Expr, ...]
+    _names: Mapping[Expr, Expr]
+
+    def of(self, quantities: tuple[Expr, ...]) -> tuple[Expr, ...] | None:
+        """Quantities as functions of the states and the drives; None if one isn't linear."""
+        found = tuple(ex.substituted(entry, self._names) for entry in quantities)
+        linear = all(_is_affine(entry, len(self.drives)) for entry in found)
+        return found if linear else None
+
+    def rows(
+        self, quantities: tuple[Expr, ...], values: Mapping[str, float], mode: int
+    ) -> LinearPiece:
+        """Coefficients of quantities that :meth:`of` has given, in a contact state."""
+        bits = [bool(mode >> i & 1) for i in range(len(self.system.guards))]
+        return LinearPiece(*self._coefficients(quantities, values, bits))
 
     def piece(self, values: Mapping[str, float], mode: int) -> LinearPiece:
         """The equations of a contact state, bit i the side of guard i."""
@@ -109,7 +123,7 @@ class LinearSystem:
                 np.broadcast_to(one, probes.shape[1])
                 for one in evaluate(entries, states=states, values=known, bits=bits)
             ]
-        ).reshape(len(entries), -1)
+        ).reshape(len(entries), probes.shape[1])
         slopes = (found[:, 1 : 1 + n + m] - found[:, 1 + n + m :]) / (2 * PROBE)
         return slopes[:, :n], found[:, 0], slopes[:, n:]
 
@@ -142,7 +156,7 @@ def linear_pieces(system: System) -> LinearSystem | str:
         return "a boundary of it moves when another is crossed"
     if not all(_is_affine(entry, len(drives)) for entry in (*field, *gaps)):
         return "it isn't linear between its contacts"
-    return LinearSystem(system, tuple(drives.values()), field, gaps)
+    return LinearSystem(system, tuple(drives.values()), field, gaps, names)
 
 
 def _is_affine(root: Expr, drives: int) -> bool:
