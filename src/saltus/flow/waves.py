@@ -137,8 +137,7 @@ def _raise(one: Legs, best: np.ndarray) -> None:
             for first in range(0, len(leg), block):
                 part = slice(first, first + block)
                 at = leg[part], row[part], middle[part], half[part]
-                waves = one.values(at[0], at[2], at[1])
-                value, room = waves.real.sum(axis=1), _room(waves, one.rates, at[3])
+                value, room = _bounds(one, *at)
                 np.maximum.at(best, at[1], value)
                 on = value + room > best[at[1]] + tolerance[at[1]]
                 if on.any():
@@ -146,6 +145,21 @@ def _raise(one: Legs, best: np.ndarray) -> None:
         waiting = ahead
         if not waiting:
             return
+
+
+def _bounds(
+    one: Legs, leg: np.ndarray, row: np.ndarray, middle: np.ndarray, half: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Quantities int64[m] on legs int64[m] at times float64[m], and :func:`_room` there: what the
+    quantities share is computed once.
+    """
+    _, first, same = np.unique(leg + 1j * middle, return_index=True, return_inverse=True)
+    waves = one.amplitudes[leg[first]] * np.exp(one.rates * middle[first, None])
+    parts = _parts_of_room(np.abs(waves), one.rates, half[first])
+    rows, sizes = one.rows[row], np.abs(one.rows)[row]
+    slopes = np.where(parts[0], one.rates * waves, 0.0)
+    value, slope = (np.einsum("me,me->m", rows, each[same]).real for each in (waves, slopes))
+    return value, np.abs(slope) * half + np.einsum("me,me->m", sizes, parts[1][same])
 
 
 def _growth(rates: np.ndarray, time: np.ndarray) -> np.ndarray:
@@ -157,12 +171,20 @@ def _room(waves: np.ndarray, rates: np.ndarray, half: np.ndarray) -> np.ndarray:
     """Most by which the sum of waves complex128[m, E] changes within a time float64[m] before or
     after.
     """
+    slow, rest = _parts_of_room(np.abs(waves), rates, half)
+    room: np.ndarray = np.abs(np.where(slow, rates * waves, 0.0).real.sum(axis=1)) * half
+    return room + rest.sum(axis=1)
+
+
+def _parts_of_room(
+    size: np.ndarray, rates: np.ndarray, half: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Waves that are bounded by their slopes, bool[m, E], and what waves of sizes float64[m, E] add
+    besides: the slow ones by their curvature, the others by what they are.
+    """
     reach = np.abs(rates) * half[:, None]
-    size, slow = np.abs(waves), reach < 1.0
-    grown = size * np.exp(np.abs(rates.real) * half[:, None])
-    slope = np.abs(np.where(slow, rates * waves, 0.0).real.sum(axis=1)) * half
-    room: np.ndarray = slope + np.where(slow, 0.5 * grown * reach**2, grown + size).sum(axis=1)
-    return room
+    grown, slow = size * np.exp(np.abs(rates.real) * half[:, None]), reach < 1.0
+    return slow, np.where(slow, 0.5 * grown * reach**2, grown + size)
 
 
 def _halves(
