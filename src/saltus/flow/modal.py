@@ -42,7 +42,7 @@ class ModalFlow:
     def __init__(self, linear: LinearSystem) -> None:
         self.tables, self._kernel = Tables(linear), modal_module()
         self._lanes, self._memory = self.tables.modes.table.shape[1], threading.local()
-        self.CARRY = layout.AMPLITUDES + 2 * self.tables.groups * self._lanes
+        self.CARRY = layout.AMPLITUDES + self.tables.rows * self._lanes
         self.STEP_RECORDS = len(linear.system.guards) + MOST_TOUCHES
 
     def workspace(self) -> tuple[np.ndarray, ...]:
@@ -73,16 +73,17 @@ class ModalFlow:
     def _work(self) -> tuple[np.ndarray, ...]:
         """Work arrays of this thread, in the order in which the kernel takes them."""
         if not hasattr(self._memory, "arrays"):
-            _, groups, states, rows, guards, drives = self.tables.sizes.tolist()
+            _, groups, states, rows, guards, drives, amplitudes = self.tables.sizes.tolist()
             terms, lanes = layout.ORDER + 1, self._lanes
             empty = np.zeros
             self._memory.arrays = (
-                empty((2 * groups, lanes)), empty((2 * groups, lanes)), empty((groups, lanes)),
+                empty((amplitudes, lanes)), empty((amplitudes, lanes)), empty((groups, lanes)),
                 empty((terms + 3, lanes)),
                 empty((max(rows, 1), terms)), empty((max(rows, 1), 3)), empty(terms),
                 empty((DEEPEST + 2, terms)), empty((DEEPEST + 2, 2)), empty(terms), empty(2),
                 empty((MOST_TOUCHES, 2)), empty((states, lanes)), empty((states, lanes)),
                 empty((max(drives, 1), 3)), empty((max(guards, 1), 4)),
+                empty(((terms + 2) * self.tables.block_groups, lanes)),
             )  # fmt: skip
         arrays: tuple[np.ndarray, ...] = self._memory.arrays
         return arrays

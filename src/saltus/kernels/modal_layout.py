@@ -8,7 +8,8 @@ A gap is a row of amplitudes: g(t) = c + Re(sum_j w_j y_j(t)) + drives.
 Symbols
 -------
 N states; G groups of LANES modes, ascending by |lambda|; S groups of LANES states; R rows of gaps,
-of which guards are plus or minus one, and an offset; H drives Re(e^{i (rate t + phase)}).
+of which guards are plus or minus one, and an offset; H drives Re(e^{i (rate t + phase)}). Modes
+that don't go their own ways go together in a block: see modal_blocks.py.
 """
 
 from collections import namedtuple
@@ -19,8 +20,9 @@ FACTORIAL = 20922789888000.0
 #: A mode is followed in the series of a gap while |lambda| h is at most this; what is left out of
 #: its own series is at most its amplitude there.
 FOLLOWED = 6.0
-# Columns of `sizes`.
-STATES, MODE_GROUPS, STATE_GROUPS, GAP_ROWS, GUARDS, DRIVES = range(6)
+# Columns of `sizes`; the last one is the rows of amplitudes: those of the modes, real parts then
+# imaginary ones, then those of a block.
+STATES, MODE_GROUPS, STATE_GROUPS, GAP_ROWS, GUARDS, DRIVES, ROWS = range(7)
 # Columns of `links`: first row of the modes' table, first row of the drives' table; then for each
 # guard the contact state behind its boundary, -1 where it hasn't been made yet.
 MODES, STEADY, BEHIND = range(3)
@@ -43,5 +45,5 @@ HUGE = 1.0e300
 Modal = namedtuple(
     "Modal",
     "sizes row_of sign_of offset rate lag modes steady links y moved size sums q errors p bern "
-    "bounds slopes out touches state answer angle found",
+    "bounds slopes out touches state answer angle found chain",
 )

@@ -1,4 +1,4 @@
-"""Template, 1 of 2 of the modal flow: amplitudes on their way, and what they say of gaps."""
+"""Template, 2 of 3 of the modal flow: amplitudes on their way, and what they say of gaps."""
 
 import math
 
@@ -96,6 +96,7 @@ def amplitudes_of(modes, m):
             c = fma(load(m.modes, row + i + 2, LANES), number(m.state, 0, i + 2), c)
             d = fma(load(m.modes, row + i + 3, LANES), number(m.state, 0, i + 3), d)
         store(m.y, g, (a + b) + (c + d))
+    block_amplitudes(modes, m)
 
 
 @kernel
@@ -114,6 +115,7 @@ def state_of(modes, y, m):
             c = fma(load(m.modes, row + 2 * j + 2, LANES), number(y, 0, j + 1), c)
             d = fma(load(m.modes, row + 2 * j + 3, LANES), number(y, groups, j + 1), d)
         store(m.state, s, (a + b) + (c + d))
+    add_block_state(modes, y, m)
 
 
 @kernel
@@ -127,12 +129,13 @@ def move(modes, h, m):
         cosine, sine = cosine * decay, sine * decay
         store(m.moved, g, fma(-imaginary, sine, real * cosine))
         store(m.moved, groups + g, fma(imaginary, cosine, real * sine))
+    move_block(modes, h, m)
 
 
 @inner
 def keep_moved(m):
     """Make `moved` the amplitudes."""
-    for g in range(2 * m.sizes[MODE_GROUPS]):
+    for g in range(m.sizes[ROWS]):
         store(m.y, g, load(m.moved, g, LANES))
 
 
@@ -188,6 +191,7 @@ def series_of(r, modes, steady, which, h, m):
     store(m.sums, ORDER + 1, left)
     store(m.sums, ORDER + 2, slope)
     store(m.sums, ORDER + 3, size)
+    add_block_series(r, modes, h, m)
     for k in range(ORDER + 1):
         m.q[r, k] = total_of(m.sums, k)
     e0, e1, scale = (
@@ -236,6 +240,7 @@ def gap_of_moved(r, modes, steady, which, m):
         rate = fma(-load(m.modes, modes + groups + g, LANES), imaginary, rate)
     store(m.sums, 0, value)
     store(m.sums, 1, rate)
+    add_block_gap(r, modes, m)
     v, w = total_of(m.sums, 0), total_of(m.sums, 1)
     first = steady + (1 + 2 * drives) * m.sizes[STATE_GROUPS]
     at = r * (1 + 2 * drives)
