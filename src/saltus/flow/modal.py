@@ -46,11 +46,10 @@ class ModalFlow:
     def __init__(self, tables: Tables, tangents: bool = False) -> None:
         self.tables, self._kernel, self._tangents = tables, modal_module(), tangents
         self._lanes, self._memory = self.tables.modes.table.shape[1], threading.local()
-        size, _, _, _, guards, _, _ = tables.sizes.tolist()
+        size, _, _, _, guards, _, rows, _ = tables.sizes.tolist()
         self._states, self._sizes = size, tables.sizes.copy()
         self._sizes[layout.TANGENTS] = tangents
-        self.CARRY = layout.AMPLITUDES + 2 * tables.groups * self._lanes
-        self.CARRY += tangents * (size + guards)
+        self.CARRY = layout.AMPLITUDES + rows * self._lanes + tangents * (size + guards)
         self.STEP_RECORDS = guards + MOST_TOUCHES
 
     def workspace(self) -> tuple[np.ndarray, ...]:
@@ -81,17 +80,18 @@ class ModalFlow:
     def _work(self) -> tuple[np.ndarray, ...]:
         """Work arrays of this thread, in the order in which the kernel takes them."""
         if not hasattr(self._memory, "arrays"):
-            size, groups, states, rows, guards, drives, _ = self._sizes.tolist()
+            size, groups, states, rows, guards, drives, amplitudes, _ = self._sizes.tolist()
             terms, lanes, empty = layout.ORDER + 1, self._lanes, np.zeros
             columns = size if self._tangents else 1
             self._memory.arrays = (
-                empty((2 * groups, lanes)), empty((2 * groups, lanes)), empty((groups, lanes)),
+                empty((amplitudes, lanes)), empty((amplitudes, lanes)), empty((groups, lanes)),
                 empty((terms + 3, lanes)),
                 empty((max(rows, 1), terms)), empty((max(rows, 1), 3)), empty(terms),
                 empty((DEEPEST + 2, terms)), empty((DEEPEST + 2, 2)), empty(terms), empty(2),
                 empty((MOST_TOUCHES, 2)), empty((states, lanes)), empty((states, lanes)),
                 empty((max(drives, 1), 4)), empty((max(guards, 1), 4)),
-                empty((2 * groups, lanes)), empty((2 * groups, lanes)), empty((columns, columns)),
+                empty(((terms + 2) * self.tables.block_groups, lanes)),
+                empty((2 * groups, lanes)), empty((amplitudes, lanes)), empty((columns, columns)),
             )  # fmt: skip
         arrays: tuple[np.ndarray, ...] = self._memory.arrays
         return arrays

@@ -4,26 +4,20 @@ made when a motion first comes to them.
 
 from __future__ import annotations
 
-import math
 import threading
 from dataclasses import dataclass
 
 import numpy as np
 
 from saltus.codegen.module import MODAL_LANES as LANES
-from saltus.errors import ParameterError
+from saltus.flow.modal_blocks import Eigen, Modes, eigen_of, modes_of, slots_of, table_of
 from saltus.kernels import modal_layout as layout
-from saltus.language.expression import Expr
 from saltus.system.linear import LinearPiece, LinearSystem
 
-#: Condition of the eigenvectors of a contact state above which its modes don't carry its motion.
-MOST_CONDITION = 1e9
 #: Rounding of a coefficient of the equations, relative to it.
 ROUNDED = 16 * np.finfo(float).eps
-#: Turns of a drive in a period that are whole to so much are whole [relative].
-WHOLE = 1e-12
-#: Distance of a drive from an eigenvalue, relative to its rate, below which it is in resonance.
-RESONANCE = 1e-9
+#: Most matrices that are kept, with their modes.
+KEPT = 256
 
 
 class _Rows:
@@ -47,16 +41,6 @@ class _Rows:
         self._memory[first : first + len(rows)] = rows
         self.used += len(rows)
         return first
-
-
-@dataclass(frozen=True)
-class _Modes:
-    """Modes of one contact state: z = V y, y = L z; all of them, and the row of their table."""
-
-    values: np.ndarray
-    vectors: np.ndarray
-    inverse: np.ndarray
-    row: int
 
 
 @dataclass(frozen=True)
@@ -84,19 +68,25 @@ class Tables:
         self.modes, self.steady = _Rows(), _Rows()
         self._sets: dict[bytes, int] = {}
         self.sets: list[_Set] = []
-        self._known: dict[tuple[bytes, bytes], _Modes] = {}
+        self._eigen: dict[bytes, Eigen] = {}
+        self._known: dict[tuple[bytes, bytes], int] = {}
         self._states: dict[tuple[int, int], int] = {}
         self._links: list[list[int]] = []
-        self._pieces: list[LinearPiece] = []
+        #: Equations and modes of each contact state.
+        self.made: list[tuple[LinearPiece, Modes]] = []
+        self._pieces: dict[tuple[int, tuple[float, ...]], LinearPiece] = {}
         n, guards = len(linear.system.states), len(linear.system.guards)
         self.row_of, self.sign_of = self._rows_of_gaps()
         rows = int(self.row_of.max(initial=-1)) + 1
         self.first_guard = [int(np.flatnonzero(self.row_of == r)[0]) for r in range(rows)]
         values = dict(linear.system.values)
-        slots = len(_slots(np.linalg.eigvals(linear.piece(values, 0).matrix))) + rows
+        slots = len(slots_of(np.linalg.eigvals(linear.piece(values, 0).matrix))) + rows
         self.groups, self.state_groups = -(-slots // LANES), -(-n // LANES)
+        drives = len(linear.drives)
+        self.block_groups = -(-(n + 1 + 2 * drives) // LANES)
+        self.rows = 2 * self.groups + self.block_groups
         self.sizes = np.array(
-            [n, self.groups, self.state_groups, rows, guards, len(linear.drives), 0], np.int64
+            [n, self.groups, self.state_groups, rows, guards, drives, self.rows, 0], np.int64
         )
 
     def _rows_of_gaps(self) -> tuple[np.ndarray, np.ndarray]:
@@ -150,93 +140,85 @@ class Tables:
 
     def _make(self, which: int, mode: int) -> None:
         given = self.sets[which]
-        piece = self.linear.piece(given.values, mode)
-        modes = self._modes_of(piece.matrix, given.gaps.matrix)
+        piece = self._piece_of(given, mode)
         number, guards = len(self._links), len(self.linear.system.guards)
-        links = [modes.row, self._steady_of(modes, piece, given), 0]
+        others = (0, (1 << guards) - 1) if piece.constant.any() else ()
+        matrices = [self._piece_of(given, one).matrix for one in others]
+        fastest = max((np.abs(self._eigen_of(one)[0]).max() for one in matrices), default=0.0)
+        eigen, most = self._eigen_of(piece.matrix), LANES * self.groups
+        modes = modes_of(piece, given.gaps, given.rates, most, eigen, float(fastest))
+        key = piece.matrix.tobytes()
+        links = [self._modes_of(key, modes, given), self._steady_of(modes, given), 0]
         for g in range(guards):
             behind = self._states.get((which, mode ^ 1 << g), -1)
             links.append(behind)
             if behind >= 0:
                 self._links[behind][layout.BEHIND + g] = number
-                if _is_smooth(piece, self._pieces[behind], given.gaps, g):
+                if _is_smooth(piece, self.made[behind][0], given.gaps, g):
                     links[layout.SMOOTH] |= 1 << g
                     self._links[behind][layout.SMOOTH] |= 1 << g
         self._links.append(links)
-        self._pieces.append(piece)
+        self.made.append((piece, modes))
         self._states[which, mode] = number
 
     # -- one contact state -------------------------------------------------------------------------
-    def _modes_of(self, matrix: np.ndarray, gaps: np.ndarray) -> _Modes:
-        """Modes of a matrix and their table."""
-        key = (matrix.tobytes(), gaps.tobytes())
+    def _piece_of(self, given: _Set, mode: int) -> LinearPiece:
+        """The equations of a contact state, read off once for all rates of the drives."""
+        key = mode, tuple(given.values[name] for name in self.linear.parameters)
+        if key not in self._pieces:
+            if len(self._pieces) >= KEPT:
+                self._pieces.clear()
+            self._pieces[key] = self.linear.piece(given.values, mode)
+        return self._pieces[key]
+
+    def _eigen_of(self, matrix: np.ndarray) -> Eigen:
+        """Modes of a matrix, computed once."""
+        key = matrix.tobytes()
+        if key not in self._eigen:
+            self._eigen[key] = eigen_of(matrix)
+        return self._eigen[key]
+
+    def _modes_of(self, matrix: bytes, modes: Modes, given: _Set) -> int:
+        """First row of the table of some modes; those of equal matrices share one, but for blocks,
+        which hold drives.
+        """
+        key = (matrix, given.gaps.matrix.tobytes())
+        if modes.block is not None:
+            return self.modes.add(self._table(modes, given.gaps.matrix))
         if key not in self._known:
-            values, vectors = np.linalg.eig(matrix)
-            if not np.linalg.cond(vectors) < MOST_CONDITION:
-                raise ParameterError(
-                    f"a contact state of {self.linear.system.name} has modes that coincide, as at "
-                    "critical damping: they don't carry its motion. Use method=sl.Taylor()."
-                )
-            inverse = np.linalg.inv(vectors)
-            inverse += inverse @ (np.eye(len(matrix)) - vectors @ inverse)
-            row = self.modes.add(self._table(values, vectors, inverse, gaps))
-            self._known[key] = _Modes(values, vectors, inverse, row)
+            self._known[key] = self.modes.add(self._table(modes, given.gaps.matrix))
         return self._known[key]
 
-    def _table(
-        self, values: np.ndarray, vectors: np.ndarray, inverse: np.ndarray, gaps: np.ndarray
-    ) -> np.ndarray:
-        """The table of some modes: lambda, its size, L, V, amplitudes of the gaps."""
-        slots = _slots(values)
+    def _table(self, modes: Modes, gaps: np.ndarray) -> np.ndarray:
+        """The table of some modes: lambda, its size, L, V, amplitudes of the gaps; the block."""
+        values, vectors, inverse = modes.values, modes.vectors, modes.inverse
+        slots, states = slots_of(values), len(vectors)
         width, count = LANES * self.groups, LANES * self.state_groups
-        if len(slots) > width:
-            raise ParameterError(
-                f"{len(slots) - width} more modes of {self.linear.system.name} are overdamped in a "
-                "contact state than its contacts can explain. Use method=sl.Taylor()."
-            )
         weight = np.where(values[slots].imag > 0, 2.0, 1.0)
         lam, size = np.zeros(width, complex), np.zeros(width)
         lam[: len(slots)] = values[slots]
         size[: len(slots)] = np.abs(values[slots])
-        size[len(slots) :] = size[: len(slots)].max()
+        size[len(slots) :] = size[: len(slots)].max(initial=0.0)
         to_modes, to_states = np.zeros((width, count), complex), np.zeros((count, width), complex)
-        to_modes[: len(slots), : len(values)] = inverse[slots]
-        to_states[: len(values), : len(slots)] = vectors[:, slots] * weight
+        to_modes[: len(slots), :states] = inverse[slots]
+        to_states[:states, : len(slots)] = vectors[:, slots] * weight
         # L: by groups of modes, real parts then imaginary ones, each for all states
         left = to_modes.reshape(self.groups, LANES, count).transpose(0, 2, 1)
         left = np.concatenate([left.real, left.imag])
         # V: by groups of states, for each mode the real part and minus the imaginary one
         right = to_states.reshape(self.state_groups, LANES, width).transpose(0, 2, 1)
         right = np.stack([right.real, -right.imag], axis=2)
-        rows = gaps[self.first_guard] @ to_states[: len(values)]
+        gaps = gaps[self.first_guard]
+        rows = gaps @ to_states[:states]
         waves = np.stack([rows.real, rows.imag, np.abs(rows)], axis=1)
+        block = table_of(modes.block, gaps, LANES, self.state_groups)
         return np.concatenate(
-            [one.ravel() for one in (lam.real, lam.imag, size, left, right, waves)]
+            [one.ravel() for one in (lam.real, lam.imag, size, left, right, waves, *block)]
         )
 
-    def waves(self, row: np.ndarray, mode: int, quantities: tuple[Expr, ...]) -> Waves:
-        """The waves of a contact state, with the states, these quantities and the gaps."""
-        with self.lock:
-            given = self.sets[self.set_of(row)]
-            piece = self.linear.piece(given.values, mode)
-            modes = self._modes_of(piece.matrix, given.gaps.matrix)
-        answers = self._answers(modes, piece, given)
-        asked = self.linear.rows(quantities, given.values, mode)
-        kept, size = _slots(modes.values), len(modes.values)
-        weight = np.where(modes.values[kept].imag > 0, 2.0, 1.0)
-        rows = np.vstack([np.eye(size), asked.matrix, given.gaps.matrix])
-        direct = np.zeros((len(rows), len(answers)))
-        direct[size:, 0] = np.append(asked.constant, given.gaps.constant)
-        direct[size:, 1:] = np.vstack([asked.driven, given.gaps.driven])
-        return Waves(
-            np.concatenate([modes.values[kept], [0.0], 1j * given.rates]),
-            np.hstack([rows @ (modes.vectors[:, kept] * weight), rows @ answers.T + direct]),
-            modes.inverse[kept], answers, given.rates, given.lags,
-        )  # fmt: skip
-
-    def _steady_of(self, modes: _Modes, piece: LinearPiece, given: _Set) -> int:
+    def _steady_of(self, modes: Modes, given: _Set) -> int:
         """First row of the table of the steady answer to the drives."""
-        answers = self._answers(modes, piece, given)
+        answers = modes.answers.T  # [1 + drives, N]
         padded = np.zeros((len(answers), LANES * self.state_groups), complex)
         padded[:, : answers.shape[1]] = answers
         waves = np.stack([padded.real, padded.imag], axis=1).reshape(-1, padded.shape[1])
@@ -248,59 +230,6 @@ class Tables:
         numbers = np.delete(pairs, 1, axis=1).ravel()
         numbers = np.concatenate([numbers, np.zeros(-len(numbers) % LANES)])
         return self.steady.add(np.concatenate([states.ravel(), numbers]))
-
-    def _answers(self, modes: _Modes, piece: LinearPiece, given: _Set) -> np.ndarray:
-        """The steady answer to the constant load and to each drive, complex128[1 + D, N]."""
-        rates = np.concatenate([[0.0], given.rates])
-        far = 1j * rates[:, None] - modes.values[None]
-        loads = np.column_stack([piece.constant, piece.driven])
-        parts = modes.inverse @ loads
-        least = np.abs(far).min(axis=1)
-        near = (least < RESONANCE * np.maximum(rates, np.abs(modes.values).max() * 1e-6)) & (
-            np.abs(loads).max(axis=0) > 0
-        )
-        if near.any():
-            raise ParameterError(
-                f"{self.linear.system.name}: a drive, or a constant force, is in resonance with an "
-                "undamped mode. Use method=sl.Taylor()."
-            )
-        with np.errstate(all="ignore"):
-            answers = modes.vectors @ np.where(parts == 0, 0, parts / far.T)
-        return answers.T
-
-
-@dataclass(frozen=True)
-class Waves:
-    """The waves of a contact state: its modes, a constant and the drives; see flow/waves.py.
-
-    Attributes
-    ----------
-    rates : complex128[E]
-        [1/s].
-    rows : complex128[R, E]
-        What each adds to each quantity.
-    """
-
-    rates: np.ndarray
-    rows: np.ndarray
-    _inverse: np.ndarray
-    _answers: np.ndarray
-    _drive_rates: np.ndarray
-    _lags: np.ndarray
-
-    def amplitudes(
-        self, states: np.ndarray, count: np.ndarray, period: float, phase: np.ndarray
-    ) -> np.ndarray:
-        """Amplitudes complex128[p, E] in states float64[p, N], ``phase`` [s] after whole
-        periods.
-        """
-        turns = self._drive_rates * period / (2 * math.pi)
-        whole = np.abs(turns - np.round(turns)) <= WHOLE * np.abs(turns)
-        angle = self._lags + self._drive_rates * phase[:, None]
-        angle = angle + np.where(whole, 0.0, count[:, None] * self._drive_rates * period)
-        loads = np.column_stack([np.ones(len(states)), np.exp(1j * angle)])
-        modes = (states - (loads @ self._answers).real) @ self._inverse.T
-        return np.column_stack([modes, loads])
 
 
 def _is_smooth(one: LinearPiece, other: LinearPiece, gaps: LinearPiece, g: int) -> bool:
@@ -315,11 +244,3 @@ def _is_smooth(one: LinearPiece, other: LinearPiece, gaps: LinearPiece, g: int) 
     noise = ROUNDED * (np.abs(first) + np.abs(second))
     left = jump - np.outer(jump @ gap, gap)
     return bool((np.abs(left) <= noise + np.outer(noise @ np.abs(gap), np.abs(gap))).all())
-
-
-def _slots(values: np.ndarray) -> np.ndarray:
-    """Indices of one of each pair of complex eigenvalues and of all real ones, ascending by
-    size.
-    """
-    kept = np.flatnonzero(values.imag >= 0)
-    return kept[np.argsort(np.abs(values[kept]), kind="stable")]

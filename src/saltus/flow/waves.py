@@ -44,7 +44,9 @@ class Legs:
     begin: np.ndarray
     length: np.ndarray
 
-    def values(self, leg: np.ndarray, time: np.ndarray, row: np.ndarray | None = None) -> np.ndarray:
+    def values(
+        self, leg: np.ndarray, time: np.ndarray, row: np.ndarray | None = None
+    ) -> np.ndarray:
         """Waves of some quantities int64[m] (default: of all, added up) on legs int64[m] at times
         float64[m] since their beginnings: complex128[m, E]; float64[m, R].
         """

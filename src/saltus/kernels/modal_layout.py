@@ -9,7 +9,8 @@ with respect to the state at the start, if it is carried, is moved from contact 
 Symbols
 -------
 N states; G groups of LANES modes, ascending by |lambda|; S groups of LANES states; R rows of gaps,
-of which guards are plus or minus one, and an offset; H drives Re(e^{i (rate t + phase)}).
+of which guards are plus or minus one, and an offset; H drives Re(e^{i (rate t + phase)}). Modes
+that don't go their own ways go together in a block: see modal_blocks.py.
 """
 
 from collections import namedtuple
@@ -20,11 +21,12 @@ FACTORIAL = 20922789888000.0
 #: A mode is followed in the series of a gap while |lambda| h is at most this; what is left out of
 #: its own series is at most its amplitude there.
 FOLLOWED = 6.0
-# Columns of `sizes`: TANGENTS is 1 where the derivative of the state is carried.
-STATES, MODE_GROUPS, STATE_GROUPS, GAP_ROWS, GUARDS, DRIVES, TANGENTS = range(7)
+# Columns of `sizes`; ROWS is the rows of amplitudes: those of the modes, real parts then imaginary
+# ones, then those of a block; TANGENTS is 1 where the derivative of the state is carried.
+STATES, MODE_GROUPS, STATE_GROUPS, GAP_ROWS, GUARDS, DRIVES, ROWS, TANGENTS = range(8)
 # Columns of `links`: first row of the modes' table, first row of the drives' table, guards where
-# the rates don't jump (bits); then for each guard the contact state behind its boundary, -1 where it
-# hasn't been made yet.
+# the rates don't jump (bits); then for each guard the contact state behind its boundary, -1 where
+# it hasn't been made yet.
 MODES, STEADY, SMOOTH, BEHIND = range(4)
 # Columns of `carry`: the contact state (-1: to be looked up), whether its amplitudes must be made
 # of the state, the next step [s], the time of the last landing, landings there since, guards that
@@ -47,5 +49,5 @@ HUGE = 1.0e300
 Modal = namedtuple(
     "Modal",
     "sizes row_of sign_of offset rate lag modes steady links y moved size sums q errors p bern "
-    "bounds slopes out touches state answer angle found factor column columns",
+    "bounds slopes out touches state answer angle found chain factor column columns",
 )

@@ -1,4 +1,4 @@
-"""Template, 1 of 3 of the modal flow: amplitudes on their way, and what they say of gaps."""
+"""Template, 2 of 4 of the modal flow: amplitudes on their way, and what they say of gaps."""
 
 import math
 
@@ -114,6 +114,7 @@ def amplitudes_of(modes, y, m):
             c = fma(load(m.modes, row + i + 2, LANES), number(m.state, 0, i + 2), c)
             d = fma(load(m.modes, row + i + 3, LANES), number(m.state, 0, i + 3), d)
         store(y, g, (a + b) + (c + d))
+    block_amplitudes(modes, y, m)
 
 
 @kernel
@@ -132,6 +133,7 @@ def state_of(modes, y, m):
             c = fma(load(m.modes, row + 2 * j + 2, LANES), number(y, 0, j + 1), c)
             d = fma(load(m.modes, row + 2 * j + 3, LANES), number(y, groups, j + 1), d)
         store(m.state, s, (a + b) + (c + d))
+    add_block_state(modes, y, m)
 
 
 @inner
@@ -157,12 +159,13 @@ def move(modes, h, m):
     for g in range(m.sizes[MODE_GROUPS]):
         a, b = factor_of(modes, g, h, m)
         turn(m.y, g, a, b, m.moved, m)
+    move_block(modes, h, m.y, m.moved, m)
 
 
 @inner
 def keep_moved(m):
     """Make `moved` the amplitudes."""
-    for g in range(2 * m.sizes[MODE_GROUPS]):
+    for g in range(m.sizes[ROWS]):
         store(m.y, g, load(m.moved, g, LANES))
 
 
@@ -218,6 +221,7 @@ def series_of(r, modes, steady, which, h, m):
     store(m.sums, ORDER + 1, left)
     store(m.sums, ORDER + 2, slope)
     store(m.sums, ORDER + 3, size)
+    add_block_series(r, modes, h, m)
     for k in range(ORDER + 1):
         m.q[r, k] = total_of(m.sums, k)
     e0, e1, scale = (
@@ -266,6 +270,7 @@ def gap_of_moved(r, modes, steady, which, m):
         rate = fma(-load(m.modes, modes + groups + g, LANES), imaginary, rate)
     store(m.sums, 0, value)
     store(m.sums, 1, rate)
+    add_block_gap(r, modes, m)
     v, w = total_of(m.sums, 0), total_of(m.sums, 1)
     first = steady + (1 + 2 * drives) * m.sizes[STATE_GROUPS]
     at = r * (1 + 2 * drives)

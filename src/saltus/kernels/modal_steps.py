@@ -1,4 +1,4 @@
-"""Template, 3 of 3 of the modal flow: steps that are proven to cross no boundary, or just one, and
+"""Template, 4 of 4 of the modal flow: steps that are proven to cross no boundary, or just one, and
 the life of a trajectory.
 
 A step is tried and halved until every gap is decided. Modes that are too fast for it are bounded:
@@ -174,6 +174,8 @@ def reach(i, tau, h, modes, steady, batch, m):
         store(m.moved, g, real)
         store(m.moved, groups + g, imaginary)
         store(m.size, g, root(fma(real, real, imaginary * imaginary)))
+    for g in range(2 * groups, m.sizes[ROWS]):
+        store(m.moved, g, load(m.y, g, LANES))
     waves = modes + groups * (3 + 4 * LANES * m.sizes[STATE_GROUPS])
     for g in range(m.sizes[GUARDS]):
         r, side = m.row_of[g], side_of(g, batch.mode[i])
@@ -194,6 +196,7 @@ def reach(i, tau, h, modes, steady, batch, m):
             near -= 1
         most = max(most, near)
     fastest = m.modes[modes + 2 * groups + most - 1, LANES - 1] if most > 0 else 0.0
+    fastest = max(fastest, block_limit(modes, m))
     return FOLLOWED / fastest if h * fastest > FOLLOWED else h
 
 
@@ -204,6 +207,7 @@ def look(i, tau, h, modes, steady, batch, m):
     """
     which = int(batch.carry[i, SET])
     drive(i, tau, batch, m)
+    follow_block(modes, h, m)
     for r in range(m.sizes[GAP_ROWS]):
         series_of(r, modes, steady, which, h, m)
     m.out[MARGIN], m.found[0, 3] = batch.minima[i, GAP_MARGIN], 0.0
@@ -390,7 +394,7 @@ def at_the_end(i, batch):
 def is_lost(i, batch, m):
     """True if the amplitudes are no numbers any more."""
     total = 0.0
-    for g in range(2 * m.sizes[MODE_GROUPS]):
+    for g in range(m.sizes[ROWS]):
         for k in range(LANES):
             total += abs(m.y[g, k])
     return not total < HUGE
@@ -401,12 +405,12 @@ def advance(i, budget, batch, m):
     """Move a trajectory to its end, until the budget of steps is used up, the table of contacts is
     full, or it comes to a contact state that hasn't been made. Returns the budget left.
     """
-    tau, groups = batch.phase[i], 2 * m.sizes[MODE_GROUPS]
+    tau, rows = batch.phase[i], m.sizes[ROWS]
     begin_period(i, batch, m)
     if batch.carry[i, ENTERS] > 0.5:
         enter(i, tau, batch, m)
     else:
-        for k in range(groups * LANES):
+        for k in range(rows * LANES):
             m.y[k // LANES, k % LANES] = batch.carry[i, AMPLITUDES + k]
     status = RUNNING
     while status == RUNNING and budget > 0 and batch.carry[i, AT] >= 0.0 and has_room(batch, m):
@@ -426,6 +430,7 @@ def advance(i, budget, batch, m):
         budget -= 1
         h = min(batch.carry[i, NEXT_STEP], end - tau)
         drive(i, tau, batch, m)
+        set_block_drives(modes, m)
         h = reach(i, tau, h, modes, steady, batch, m)
         answer, d, hits = look(i, tau, h, modes, steady, batch, m)
         if batch.status[i] != RUNNING:
@@ -462,7 +467,7 @@ def put_back(i, tau, status, batch, m):
     """Store a trajectory that has ended or is paused."""
     if batch.carry[i, ENTERS] < 0.5:
         at = int(batch.carry[i, AT])
-        for k in range(2 * m.sizes[MODE_GROUPS] * LANES):
+        for k in range(m.sizes[ROWS] * LANES):
             batch.carry[i, AMPLITUDES + k] = m.y[k // LANES, k % LANES]
         drive(i, tau, batch, m)
         answer_now(m.links[at, STEADY], m)
@@ -479,7 +484,7 @@ def propagate(
     end_phase, counters, minima, sample_count, sample_fraction, cursor, samples, sample_mode,
     rec_first, rec_i, rec_f, rec_used, options, data, budget, sizes, row_of, sign_of, offset, rate,
     lag, modes, steady, links, y, moved, size, sums, q, errors, p, bern, bounds, slopes, out,
-    touches, place, answer, angle, found, factor, column, columns,
+    touches, place, answer, angle, found, chain, factor, column, columns,
 ):  # fmt: skip
     """Move every trajectory whose status is RUNNING and whose contact state has been made, `budget`
     steps at most. See kernels/batch.py for the arrays.
@@ -491,8 +496,8 @@ def propagate(
     )  # fmt: skip
     m = Modal(
         sizes, row_of, sign_of, offset, rate, lag, modes, steady, links, y, moved, size, sums, q,
-        errors, p, bern, bounds, slopes, out, touches, place, answer, angle, found, factor, column,
-        columns,
+        errors, p, bern, bounds, slopes, out, touches, place, answer, angle, found, chain, factor,
+        column, columns,
     )  # fmt: skip
     waits = False
     for i in range(status.shape[0]):

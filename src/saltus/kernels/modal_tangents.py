@@ -1,4 +1,4 @@
-"""Template, 2 of 3 of the modal flow: the derivative of the state with respect to the state at the
+"""Template, 3 of 4 of the modal flow: the derivative of the state with respect to the state at the
 start.
 
 In a contact state it is moved by e^{A h}, whatever the motion does, so it waits until the motion
@@ -37,6 +37,7 @@ def columns_after(i, modes, h, batch, m):
                     m.column, g, load(m.factor, g, LANES), load(m.factor, groups + g, LANES),
                     m.column, m,
                 )  # fmt: skip
+            move_block(modes, h, m.column, m.column, m)
             state_of(modes, m.column, m)
         for r in range(states):
             m.columns[r, c] = m.state[r // LANES, r % LANES]
@@ -62,6 +63,7 @@ def rates_of(modes, steady, y, m):
     for g in range(groups):
         a, b = load(m.modes, modes + g, LANES), load(m.modes, modes + groups + g, LANES)
         turn(y, g, a, b, m.column, m)
+    block_rates(modes, y, m.column, m)
     answer_rate_now(steady, m)
     state_of(modes, m.column, m)
 
@@ -100,7 +102,7 @@ def slope_along(r, modes, m):
         a, b = load(m.modes, row + g, LANES), load(m.modes, row + groups + g, LANES)
         total = fma(load(m.column, g, LANES), a, total)
         total = fma(-load(m.column, groups + g, LANES), b, total)
-    store(m.sums, 0, total)
+    store(m.sums, 0, total + block_gap(r, modes, m.column, m))
     return total_of(m.sums, 0)
 
 

@@ -80,6 +80,15 @@ class LinearSystem:
     _gaps: tuple[Expr, ...]
     _names: Mapping[Expr, Expr]
 
+    @functools.cached_property
+    def parameters(self) -> tuple[str, ...]:
+        """The parameters of the equations between contacts, those of the drives' rates left
+        out.
+        """
+        nodes = ex.walk(*self._field)
+        used = {node.payload for node in nodes if node.op == "param"}
+        return tuple(name for name in self.system.values if name in used)
+
     def of(self, quantities: tuple[Expr, ...]) -> tuple[Expr, ...] | None:
         """Quantities as functions of the states and the drives; None if one isn't linear."""
         found = tuple(ex.substituted(entry, self._names) for entry in quantities)

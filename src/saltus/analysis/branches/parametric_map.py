@@ -152,7 +152,9 @@ class ParametricStroboscope(Stroboscope):
         size = np.where(below.values[name] == 0.0, 1.0, np.abs(below.values[name]))
         rows = below.parameters[each]
         rows[:, at] += np.tile([-2.0, -1.0, 1.0, 2.0], k) * STEP * size[each]
-        ends, status = below.with_parameters(rows, each).ends(start[each], np.broadcast_to(count, k)[each])
+        ends, status = below.with_parameters(rows, each).ends(
+            start[each], np.broadcast_to(count, k)[each]
+        )
         ends[(status != st.OK) & (status != st.GRAZE_UNRESOLVED)] = np.nan
         weights = np.array([1.0, -8.0, 8.0, -1.0]) / 12.0
         slopes: np.ndarray = np.einsum("s,ksd->kd", weights, ends.reshape(k, 4, -1))
