@@ -16,31 +16,36 @@ from saltus.system.linear import LinearPiece, LinearSystem
 
 #: Rounding of a coefficient of the equations, relative to it.
 ROUNDED = 16 * np.finfo(float).eps
-#: Most matrices that are kept, with their modes.
-KEPT = 256
 
 
 class _Rows:
-    """A table that grows: float64[rows, LANES]."""
+    """A table that grows: [rows, width]."""
 
-    def __init__(self) -> None:
-        self.used, self._memory = 0, np.zeros((256, LANES))
-
-    @property
-    def table(self) -> np.ndarray:
-        """All of it, with room behind."""
-        return self._memory
+    def __init__(self, width: int = LANES, kind: type = float) -> None:
+        self.used = 0
+        self.table: np.ndarray = np.zeros((64, width), kind)
 
     def add(self, numbers: np.ndarray) -> int:
         """Append rows; returns the first."""
-        first, rows = self.used, numbers.reshape(-1, LANES)
-        if first + len(rows) > len(self._memory):
-            grown = np.zeros((2 * (first + len(rows)), LANES))
-            grown[:first] = self._memory[:first]
-            self._memory = grown
-        self._memory[first : first + len(rows)] = rows
+        first, rows = self.used, numbers.reshape(-1, self.table.shape[1])
+        if first + len(rows) > len(self.table):
+            grown = np.zeros((2 * (first + len(rows)), self.table.shape[1]), self.table.dtype)
+            grown[:first] = self.table[:first]
+            self.table = grown
         self.used += len(rows)
+        self.table[first : self.used] = rows
         return first
+
+
+@dataclass(frozen=True)
+class _Equations:
+    """The equations of a contact state, the eigenvalues and -vectors of their matrix, and the
+    fastest eigenvalue of other states [1/s]: the same for all rates of the drives.
+    """
+
+    piece: LinearPiece
+    eigen: Eigen
+    fastest: float
 
 
 @dataclass(frozen=True)
@@ -68,14 +73,16 @@ class Tables:
         self.modes, self.steady = _Rows(), _Rows()
         self._sets: dict[bytes, int] = {}
         self.sets: list[_Set] = []
-        self._eigen: dict[bytes, Eigen] = {}
-        self._known: dict[tuple[bytes, bytes], int] = {}
+        self._equations: dict[tuple[object, ...], _Equations] = {}
+        self._smooth: dict[tuple[object, ...], bool] = {}
+        self._known: dict[tuple[int, bytes], int] = {}
         self._states: dict[tuple[int, int], int] = {}
-        self._links: list[list[int]] = []
         #: Equations and modes of each contact state.
-        self.made: list[tuple[LinearPiece, Modes]] = []
-        self._pieces: dict[tuple[int, tuple[float, ...]], LinearPiece] = {}
+        self.made: list[tuple[_Equations, Modes]] = []
         n, guards = len(linear.system.states), len(linear.system.guards)
+        self._offset, self._rate = _Rows(max(guards, 1)), _Rows(max(len(linear.drives), 1))
+        self._lag = _Rows(max(len(linear.drives), 1))
+        self._links = _Rows(layout.BEHIND + guards, int)
         self.row_of, self.sign_of = self._rows_of_gaps()
         rows = int(self.row_of.max(initial=-1)) + 1
         self.first_guard = [int(np.flatnonzero(self.row_of == r)[0]) for r in range(rows)]
@@ -114,13 +121,8 @@ class Tables:
     # -- what the kernel reads ---------------------------------------------------------------------
     def arrays(self) -> tuple[np.ndarray, ...]:
         """The tables, in the order in which the kernel takes them after the sizes."""
-        offset = np.array([one.gaps.constant for one in self.sets]).reshape(len(self.sets), -1)
-        rate = np.array([one.rates for one in self.sets]).reshape(len(self.sets), -1)
-        lag = np.array([one.lags for one in self.sets]).reshape(len(self.sets), -1)
-        return (
-            self.row_of, self.sign_of, offset, rate, lag, self.modes.table,
-            self.steady.table, np.array(self._links, np.int64),
-        )  # fmt: skip
+        parts = (self._offset, self._rate, self._lag, self.modes, self.steady, self._links)
+        return self.row_of, self.sign_of, *(one.table for one in parts)
 
     def set_of(self, row: np.ndarray) -> int:
         """Number of a set of parameter values."""
@@ -128,7 +130,14 @@ class Tables:
         if key not in self._sets:
             values = dict(zip(self.linear.system.values, row.tolist(), strict=True))
             rates, lags = self.linear.rates(values)
-            self.sets.append(_Set(values, self.linear.gaps(values), rates, lags))
+            gaps = self.linear.gaps(values)
+            for table, numbers in (
+                (self._offset, gaps.constant),
+                (self._rate, rates),
+                (self._lag, lags),
+            ):
+                table.add(np.append(numbers, np.zeros(table.table.shape[1] - len(numbers))))
+            self.sets.append(_Set(values, gaps, rates, lags))
             self._sets[key] = len(self.sets) - 1
         return self._sets[key]
 
@@ -139,50 +148,48 @@ class Tables:
         return self._states[which, mode]
 
     def _make(self, which: int, mode: int) -> None:
-        given = self.sets[which]
-        piece = self._piece_of(given, mode)
-        number, guards = len(self._links), len(self.linear.system.guards)
-        others = (0, (1 << guards) - 1) if piece.constant.any() else ()
-        matrices = [self._piece_of(given, one).matrix for one in others]
-        fastest = max((np.abs(self._eigen_of(one)[0]).max() for one in matrices), default=0.0)
-        eigen, most = self._eigen_of(piece.matrix), LANES * self.groups
-        modes = modes_of(piece, given.gaps, given.rates, most, eigen, float(fastest))
-        key = piece.matrix.tobytes()
-        links = [self._modes_of(key, modes, given), self._steady_of(modes, given), 0]
+        given, known = self.sets[which], self._equations_of(self.sets[which], mode)
+        modes = modes_of(
+            known.piece, given.gaps, given.rates, LANES * self.groups, known.eigen, known.fastest
+        )
+        number, guards = len(self.made), len(self.linear.system.guards)
+        links = [self._modes_of(known, modes, given), self._steady_of(modes, given), 0]
         for g in range(guards):
             behind = self._states.get((which, mode ^ 1 << g), -1)
             links.append(behind)
             if behind >= 0:
-                self._links[behind][layout.BEHIND + g] = number
-                if _is_smooth(piece, self.made[behind][0], given.gaps, g):
+                self._links.table[behind, layout.BEHIND + g] = number
+                if self._is_smooth(known, self.made[behind][0], given.gaps, g):
                     links[layout.SMOOTH] |= 1 << g
-                    self._links[behind][layout.SMOOTH] |= 1 << g
-        self._links.append(links)
-        self.made.append((piece, modes))
+                    self._links.table[behind, layout.SMOOTH] |= 1 << g
+        self._links.add(np.array(links))
+        self.made.append((known, modes))
         self._states[which, mode] = number
 
     # -- one contact state -------------------------------------------------------------------------
-    def _piece_of(self, given: _Set, mode: int) -> LinearPiece:
+    def _equations_of(self, given: _Set, mode: int) -> _Equations:
         """The equations of a contact state, read off once for all rates of the drives."""
-        key = mode, tuple(given.values[name] for name in self.linear.parameters)
-        if key not in self._pieces:
-            if len(self._pieces) >= KEPT:
-                self._pieces.clear()
-            self._pieces[key] = self.linear.piece(given.values, mode)
-        return self._pieces[key]
+        used = tuple(given.values[name] for name in self.linear.parameters)
+        if (mode, used) not in self._equations:
+            piece, fastest = self.linear.piece(given.values, mode), 0.0
+            every = (1 << len(self.linear.system.guards)) - 1
+            if piece.constant.any():
+                others = [self.linear.piece(given.values, one).matrix for one in (0, every)]
+                fastest = max(float(np.abs(np.linalg.eigvals(one)).max()) for one in others)
+            self._equations[mode, used] = _Equations(piece, eigen_of(piece.matrix), fastest)
+        return self._equations[mode, used]
 
-    def _eigen_of(self, matrix: np.ndarray) -> Eigen:
-        """Modes of a matrix, computed once."""
-        key = matrix.tobytes()
-        if key not in self._eigen:
-            self._eigen[key] = eigen_of(matrix)
-        return self._eigen[key]
+    def _is_smooth(self, one: _Equations, other: _Equations, gaps: LinearPiece, g: int) -> bool:
+        key = id(one), id(other), g, gaps.constant[g], gaps.matrix[g].tobytes()
+        if key not in self._smooth:
+            self._smooth[key] = _is_smooth(one.piece, other.piece, gaps, g)
+        return self._smooth[key]
 
-    def _modes_of(self, matrix: bytes, modes: Modes, given: _Set) -> int:
-        """First row of the table of some modes; those of equal matrices share one, but for blocks,
+    def _modes_of(self, known: _Equations, modes: Modes, given: _Set) -> int:
+        """First row of the table of some modes; those of equal equations share one, but for blocks,
         which hold drives.
         """
-        key = (matrix, given.gaps.matrix.tobytes())
+        key = id(known), given.gaps.matrix.tobytes()
         if modes.block is not None:
             return self.modes.add(self._table(modes, given.gaps.matrix))
         if key not in self._known:
