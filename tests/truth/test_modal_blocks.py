@@ -107,3 +107,27 @@ def test_an_oscillator_meets_its_stop_where_matrix_exponentials_say(case):
     run = moved(system, (0.0, 0.0), periods=40)
     assert str(run.status.values) == "ok"
     assert check_contacts(system, (0.0, 0.0), run, 16, 1e-12 * 2 * np.pi) > 5
+
+
+def test_tables_that_are_dropped_and_made_anew_give_the_same_bits(monkeypatch):
+    """Many sets of parameter values in memory for a few contact states only, on two threads."""
+    from saltus.flow import modal, modal_tables
+
+    start, values = np.zeros((60, 2)), {"gap": np.linspace(0.2, 1.2, 60)}
+
+    def run():
+        modal.modal_flow.cache_clear()
+        return sl.stroboscope(
+            struck.with_values(damper=0.1), start, 30, values=values, keep=1, progress=False,
+            method=sl.Modal(), threads=2,
+        )  # fmt: skip
+
+    whole = run()
+    monkeypatch.setattr(modal_tables, "MOST_BYTES", 2**16)
+    few = run()
+    tables = modal.modal_flow(struck.origin).tables
+    assert tables.generation > 5
+    assert tables.modes.table.nbytes + tables.steady.table.nbytes < 2**18
+    for name in ("x", "v"):
+        assert np.isfinite(whole[name]).all()
+        assert (whole[name].values == few[name].values).all()

@@ -54,21 +54,32 @@ class ModalFlow:
         return functools.partial(self.propagate, *values)
 
     def propagate(self, *values: Any) -> int:
-        """Move the trajectories of a batch; contact states that they come to are made meanwhile."""
+        """Move the trajectories of a batch, until contact states that haven't been made must be."""
         batch = Batch(*values[:-1])
         budget = values[-1] * max(batch.state.shape[1] // 4, 1)
-        self._begin(batch)
-        while True:
-            with self.tables.lock:
-                tables = self.tables.arrays()
-            answer: int = self._kernel.propagate(*batch, budget, *tables, *self._work())
-            lost = (batch.status == st.RUNNING) & (batch.carry[:, layout.AT] < 0)
-            if answer == st.FINISHED or not lost.any():
-                return answer
-            with self.tables.lock:
-                for i in np.flatnonzero(lost).tolist():
-                    which = int(batch.carry[i, layout.SET])
-                    batch.carry[i, layout.AT] = self.tables.state_of(which, int(batch.mode[i]))
+        with self.tables.lock:
+            self._begin(batch)
+            self._look_up(batch)
+            tables = self.tables.arrays()
+        answer: int = self._kernel.propagate(*batch, budget, *tables, *self._work())
+        return answer
+
+    def _look_up(self, batch: Batch) -> None:
+        """Find the contact states that trajectories have come to: as many as the tables have room
+        for. The others wait until these trajectories have ended.
+        """
+        running, tables = batch.status == st.RUNNING, self.tables
+        dropped = running & (batch.carry[:, layout.TABLES] != tables.generation)
+        batch.carry[dropped, layout.AT] = -1.0
+        lost = running & (batch.carry[:, layout.AT] < 0)
+        if (lost == running).all() and tables.full:
+            tables.clear()
+        for i in np.flatnonzero(lost).tolist():
+            if tables.full:
+                return
+            which = tables.set_of(batch.param[i if batch.stride else 0])
+            at = tables.state_of(which, int(batch.mode[i]))
+            batch.carry[i, [layout.AT, layout.SET, layout.TABLES]] = at, which, tables.generation
 
     def _work(self) -> tuple[np.ndarray, ...]:
         """Work arrays of this thread, in the order in which the kernel takes them."""
@@ -90,16 +101,15 @@ class ModalFlow:
 
     # -- starts ------------------------------------------------------------------------------------
     def _begin(self, batch: Any) -> None:
-        """Find the contact states of trajectories that haven't begun."""
+        """Find the sides of trajectories that haven't begun."""
         new = np.flatnonzero((batch.mode < 0) & (batch.status == st.RUNNING))
         if not len(new):
             return
-        with self.tables.lock:
-            rows = batch.param[new] if batch.stride else batch.param[:1]
-            sets = np.array([self.tables.set_of(row) for row in rows], np.int64)
-            sets = np.broadcast_to(sets, len(new))
-            for which in np.unique(sets).tolist():
-                self._begin_set(batch, new[sets == which], which)
+        rows = batch.param[new] if batch.stride else batch.param[:1]
+        sets = np.array([self.tables.set_of(row) for row in rows], np.int64)
+        sets = np.broadcast_to(sets, len(new))
+        for which in np.unique(sets).tolist():
+            self._begin_set(batch, new[sets == which], which)
 
     def _begin_set(self, batch: Any, who: np.ndarray, which: int) -> None:
         """The same for trajectories with one set of parameter values."""
@@ -121,8 +131,7 @@ class ModalFlow:
             mode[i] |= self._ways(which, int(mode[i]), zero[i], batch.state[who[i]], time[i])
         batch.mode[who], batch.fresh[who] = mode, fresh
         carry = np.zeros((len(who), layout.AMPLITUDES))
-        carry[:, layout.AT] = [self.tables.state_of(which, int(one)) for one in mode]
-        carry[:, layout.ENTERS], carry[:, layout.SET] = 1.0, which
+        carry[:, layout.AT], carry[:, layout.ENTERS] = -1.0, 1.0
         carry[:, layout.NEXT_STEP] = FIRST_STEP * batch.period[who]
         carry[:, layout.LANDED_AT], carry[:, layout.RIDES] = -math.inf, fresh
         batch.carry[who, : layout.AMPLITUDES] = carry

@@ -51,7 +51,7 @@ class Block:
 
 
 @dataclass(frozen=True)
-class Modes:
+class StateModes:
     """Modes of one contact state, z = V y and y = L z, and its block.
 
     Attributes
@@ -72,7 +72,7 @@ class Modes:
 
 
 @dataclass(frozen=True)
-class _Space:
+class _Subspace:
     """An invariant subspace: v' = T v."""
 
     matrix: np.ndarray
@@ -82,7 +82,7 @@ class _Space:
 
 @dataclass(frozen=True)
 class _Loads:
-    """What acts on the modes, and where it matters.
+    """Loads on the modes, and the gaps in which their answers matter.
 
     Attributes
     ----------
@@ -117,7 +117,7 @@ def modes_of(
     most: int,
     eigen: Eigen,
     fastest: float = 0.0,
-) -> Modes:
+) -> StateModes:
     """Modes of a contact state.
 
     Parameters
@@ -144,11 +144,11 @@ def modes_of(
         fastest,
     )
     if not _together(values, vectors, inverse, acts).any() and len(slots_of(values)) <= most:
-        return Modes(values, vectors, inverse, None, _answers(values, vectors, inverse, acts))
+        return StateModes(values, vectors, inverse, None, _answers(values, vectors, inverse, acts))
     spaces, values, vectors, inverse = _parted(piece.matrix, acts, most)
     answers = _answers(values, vectors, inverse, acts)
     block, answers = _block_of(spaces, acts, answers)
-    return Modes(values, vectors, inverse, block, answers)
+    return StateModes(values, vectors, inverse, block, answers)
 
 
 def slots_of(values: np.ndarray) -> np.ndarray:
@@ -210,14 +210,14 @@ def _answers(
 # -- parting -----------------------------------------------------------------------------------
 def _parted(
     matrix: np.ndarray, acts: _Loads, most: int
-) -> tuple[list[_Space], np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[list[_Subspace], np.ndarray, np.ndarray, np.ndarray]:
     """Subspaces whose modes go together, and the other modes. States that the equations keep apart
     stay apart: a rigid body isn't rounded by the stiffest mode.
     """
     from scipy.sparse.csgraph import connected_components
 
     count, part = connected_components(matrix != 0, directed=False)
-    size, spaces, found = len(matrix), list[_Space](), list[Eigen]()
+    size, spaces, found = len(matrix), list[_Subspace](), list[Eigen]()
     members = [np.flatnonzero(part == one) for one in range(count)]
     eigen = [eigen_of(matrix[np.ix_(one, one)]) for one in members]
     joined = [_together(*e, acts.of(one)) for e, one in zip(eigen, members, strict=True)]
@@ -227,7 +227,7 @@ def _parted(
         if space is not None:
             right, left = np.zeros((size, len(space.matrix))), np.zeros((len(space.matrix), size))
             right[one], left[:, one] = space.right, space.left
-            spaces.append(_Space(space.matrix, right, left))
+            spaces.append(_Subspace(space.matrix, right, left))
         vectors = np.zeros((size, len(modes[0])), complex)
         inverse = np.zeros((len(modes[0]), size), complex)
         vectors[one], inverse[:, one] = modes[1], modes[2]
@@ -255,7 +255,7 @@ def _make_room(values: list[np.ndarray], joined: list[np.ndarray], most: int) ->
 
 def _split(
     matrix: np.ndarray, values: np.ndarray, joined: np.ndarray, acts: _Loads
-) -> tuple[_Space | None, Eigen]:
+) -> tuple[_Subspace | None, Eigen]:
     """A matrix as a subspace whose modes go together and the other modes."""
     while True:
         joined = _closed(values, joined)
@@ -282,7 +282,7 @@ def _closed(values: np.ndarray, joined: np.ndarray) -> np.ndarray:
 
 def _separated(
     matrix: np.ndarray, values: np.ndarray, joined: np.ndarray
-) -> tuple[_Space | None, Eigen]:
+) -> tuple[_Subspace | None, Eigen]:
     """The invariant subspace of some eigenvalues, and the modes of the others, by an ordered Schur
     form and a Sylvester equation (Bavely & Stewart, SIAM J. Numer. Anal. 16 (1979) 359).
     """
@@ -294,7 +294,7 @@ def _separated(
         return None, eigen_of(matrix)
     even, (scale, _) = linalg.matrix_balance(matrix, permute=False, separate=True)
     if joined.all():
-        return _Space(even, np.diag(scale), np.diag(1 / scale)), none
+        return _Subspace(even, np.diag(scale), np.diag(1 / scale)), none
 
     def chosen(real: float, imaginary: float = 0.0) -> bool:
         return bool(joined[np.argmin(np.abs(values - (real + 1j * imaginary)))])
@@ -302,9 +302,9 @@ def _separated(
     try:
         schur, turn, k = linalg.schur(even, output="real", sort=chosen)
     except linalg.LinAlgError:  # rounding brought an eigenvalue to the other side
-        return _Space(even, np.diag(scale), np.diag(1 / scale)), none
+        return _Subspace(even, np.diag(scale), np.diag(1 / scale)), none
     if not 0 < k < size:
-        return _Space(even, np.diag(scale), np.diag(1 / scale)), none
+        return _Subspace(even, np.diag(scale), np.diag(1 / scale)), none
     mixed = linalg.solve_sylvester(schur[:k, :k], -schur[k:, k:], -schur[:k, k:])
     own, within, back = eigen_of(schur[k:, k:])
     right = scale[:, None] * turn[:, :k]
@@ -313,11 +313,13 @@ def _separated(
     inverse = back @ turn[:, k:].T / scale
     every, lefts = np.hstack([right, vectors]), np.vstack([left, inverse])
     lefts = lefts + lefts @ (np.eye(size) - every @ lefts)
-    return _Space(schur[:k, :k], right, lefts[:k].real), (own, vectors, lefts[k:])
+    return _Subspace(schur[:k, :k], right, lefts[:k].real), (own, vectors, lefts[k:])
 
 
 # -- the block -----------------------------------------------------------------------------------
-def _block_of(spaces: list[_Space], acts: _Loads, answers: np.ndarray) -> tuple[Block, np.ndarray]:
+def _block_of(
+    spaces: list[_Subspace], acts: _Loads, answers: np.ndarray
+) -> tuple[Block, np.ndarray]:
     """The block of some subspaces and the drives near them; answers with those to the others."""
     size = sum(len(space.matrix) for space in spaces)
     first = np.cumsum([0, *(len(space.matrix) for space in spaces)])

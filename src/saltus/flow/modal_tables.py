@@ -10,8 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from saltus.codegen.module import MODAL_LANES as LANES
-from saltus.flow.modal_blocks import Eigen, Modes, eigen_of, modes_of, slots_of, table_of
+from saltus.flow.modal_blocks import Eigen, StateModes, eigen_of, modes_of, slots_of, table_of
 from saltus.system.linear import LinearPiece, LinearSystem
+
+#: Memory of the tables of one system [bytes]. Beyond it all are dropped, as soon as no trajectory
+#: that a call moves needs them; those still to be moved make theirs anew.
+MOST_BYTES = 2**28
+#: Memory of a set of parameter values besides its arrays [bytes].
+SET_BYTES = 4096
 
 
 class _Rows:
@@ -54,18 +60,17 @@ class Tables:
     ----------
     linear : LinearSystem
         The system.
+
+    Notes
+    -----
+    They take MOST_BYTES, 256 MB, at most, and what one more contact state needs.
     """
 
     def __init__(self, linear: LinearSystem) -> None:
         self.linear = linear
         self.lock = threading.Lock()
-        self.modes, self.steady = _Rows(), _Rows()
-        self._sets: dict[bytes, int] = {}
-        self.sets: list[_Set] = []
-        self._eigen: dict[bytes, Eigen] = {}
-        self._known: dict[tuple[bytes, bytes], int] = {}
-        self._states: dict[tuple[int, int], int] = {}
-        self._links: list[list[int]] = []
+        self.generation = 0
+        self.clear()
         n, guards = len(linear.system.states), len(linear.system.guards)
         self.row_of, self.sign_of = self._rows_of_gaps()
         rows = int(self.row_of.max(initial=-1)) + 1
@@ -79,6 +84,26 @@ class Tables:
         self.sizes = np.array(
             [n, self.groups, self.state_groups, rows, guards, drives, self.rows], np.int64
         )
+
+    def clear(self) -> None:
+        """Drop all sets and contact states: their numbers are of a new generation. Arrays that
+        kernels hold stay as they are.
+        """
+        self.generation += 1
+        self.modes, self.steady = _Rows(), _Rows()
+        self._sets: dict[bytes, int] = {}
+        self.sets: list[_Set] = []
+        self._eigen: dict[bytes, Eigen] = {}
+        self._known: dict[tuple[bytes, bytes], int] = {}
+        self._states: dict[tuple[int, int], int] = {}
+        self._links: list[list[int]] = []
+        self._arrays: tuple[np.ndarray, ...] | None = None
+        self._held = 0
+
+    @property
+    def full(self) -> bool:
+        """True if the tables hold MOST_BYTES or more."""
+        return self._held + self.modes.table.nbytes + self.steady.table.nbytes >= MOST_BYTES
 
     def _rows_of_gaps(self) -> tuple[np.ndarray, np.ndarray]:
         """Row and sign of each guard's gap: guards whose gaps differ by a number only share one."""
@@ -105,13 +130,16 @@ class Tables:
     # -- what the kernel reads ---------------------------------------------------------------------
     def arrays(self) -> tuple[np.ndarray, ...]:
         """The tables, in the order in which the kernel takes them."""
-        offset = np.array([one.gaps.constant for one in self.sets]).reshape(len(self.sets), -1)
-        rate = np.array([one.rates for one in self.sets]).reshape(len(self.sets), -1)
-        lag = np.array([one.lags for one in self.sets]).reshape(len(self.sets), -1)
-        return (
-            self.sizes, self.row_of, self.sign_of, offset, rate, lag, self.modes.table,
-            self.steady.table, np.array(self._links, np.int64),
-        )  # fmt: skip
+        if self._arrays is None:
+            count = len(self.sets)
+            offset = np.array([one.gaps.constant for one in self.sets]).reshape(count, -1)
+            rate = np.array([one.rates for one in self.sets]).reshape(count, -1)
+            lag = np.array([one.lags for one in self.sets]).reshape(count, -1)
+            self._arrays = (
+                self.sizes, self.row_of, self.sign_of, offset, rate, lag, self.modes.table,
+                self.steady.table, np.array(self._links, np.int64).reshape(len(self._links), -1),
+            )  # fmt: skip
+        return self._arrays
 
     def set_of(self, row: np.ndarray) -> int:
         """Number of a set of parameter values."""
@@ -120,7 +148,8 @@ class Tables:
             values = dict(zip(self.linear.system.values, row.tolist(), strict=True))
             rates, lags = self.linear.rates(values)
             self.sets.append(_Set(values, self.linear.gaps(values), rates, lags))
-            self._sets[key] = len(self.sets) - 1
+            self._sets[key], self._arrays = len(self.sets) - 1, None
+            self._held += SET_BYTES + self.sets[-1].gaps.matrix.nbytes
         return self._sets[key]
 
     def state_of(self, which: int, mode: int) -> int:
@@ -146,7 +175,7 @@ class Tables:
             if behind >= 0:
                 self._links[behind][2 + g] = number
         self._links.append(links)
-        self._states[which, mode] = number
+        self._states[which, mode], self._arrays = number, None
 
     # -- one contact state -------------------------------------------------------------------------
     def _eigen_of(self, matrix: np.ndarray) -> Eigen:
@@ -154,9 +183,10 @@ class Tables:
         key = matrix.tobytes()
         if key not in self._eigen:
             self._eigen[key] = eigen_of(matrix)
+            self._held += sum(part.nbytes for part in self._eigen[key])
         return self._eigen[key]
 
-    def _modes_of(self, matrix: bytes, modes: Modes, given: _Set) -> int:
+    def _modes_of(self, matrix: bytes, modes: StateModes, given: _Set) -> int:
         """First row of the table of some modes; those of equal matrices share one, but for blocks,
         which hold drives.
         """
@@ -167,7 +197,7 @@ class Tables:
             self._known[key] = self.modes.add(self._table(modes, given.gaps.matrix))
         return self._known[key]
 
-    def _table(self, modes: Modes, gaps: np.ndarray) -> np.ndarray:
+    def _table(self, modes: StateModes, gaps: np.ndarray) -> np.ndarray:
         """The table of some modes: lambda, its size, L, V, amplitudes of the gaps; the block."""
         values, vectors, inverse = modes.values, modes.vectors, modes.inverse
         slots, states = slots_of(values), len(vectors)
@@ -194,7 +224,7 @@ class Tables:
             [one.ravel() for one in (lam.real, lam.imag, size, left, right, waves, *block)]
         )
 
-    def _steady_of(self, modes: Modes, given: _Set) -> int:
+    def _steady_of(self, modes: StateModes, given: _Set) -> int:
         """First row of the table of the steady answer to the drives."""
         answers = modes.answers.T  # [1 + drives, N]
         padded = np.zeros((len(answers), LANES * self.state_groups), complex)

@@ -28,8 +28,9 @@ STATES, MODE_GROUPS, STATE_GROUPS, GAP_ROWS, GUARDS, DRIVES, ROWS = range(7)
 MODES, STEADY, BEHIND = range(3)
 # Columns of `carry`: the contact state (-1: to be looked up), whether its amplitudes must be made
 # of the state, the next step [s], the time of the last landing, landings there since, guards that
-# the state has ridden from its start on (bits), the set of parameter values; then the amplitudes.
-AT, ENTERS, NEXT_STEP, LANDED_AT, LANDINGS, RIDES, SET, AMPLITUDES = range(8)
+# the state has ridden from its start on (bits), the set of parameter values, the generation of the
+# tables in which these numbers stand; then the amplitudes.
+AT, ENTERS, NEXT_STEP, LANDED_AT, LANDINGS, RIDES, SET, TABLES, AMPLITUDES = range(9)
 # Columns of `options`.
 MOST_STEPS, MOST_CONTACTS = range(2)
 # What is known of a guard in a step.
