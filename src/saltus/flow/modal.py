@@ -84,7 +84,9 @@ class ModalFlow:
     def _work(self) -> tuple[np.ndarray, ...]:
         """Work arrays of this thread, in the order in which the kernel takes them."""
         if not hasattr(self._memory, "arrays"):
-            _, groups, states, rows, guards, drives, amplitudes = self.tables.sizes.tolist()
+            _, groups, states, rows, guards, drives, amplitudes, courses = (
+                self.tables.sizes.tolist()
+            )
             terms, lanes = layout.ORDER + 1, self._lanes
             empty = np.zeros
             self._memory.arrays = (
@@ -95,6 +97,7 @@ class ModalFlow:
                 empty((MOST_TOUCHES, 2)), empty((states, lanes)), empty((states, lanes)),
                 empty((max(drives, 1), 3)), empty((max(guards, 1), 4)),
                 empty(((terms + 2) * self.tables.block_groups, lanes)),
+                empty((max(courses, 1), layout.VALUE + layout.COURSE_TERMS)),
             )  # fmt: skip
         arrays: tuple[np.ndarray, ...] = self._memory.arrays
         return arrays
@@ -115,7 +118,12 @@ class ModalFlow:
         """The same for trajectories with one set of parameter values."""
         given = self.tables.sets[which]
         time = batch.origin[who] + batch.count[who] * batch.period[who] + batch.phase[who]
-        drives = np.cos(given.rates * time[:, None] + given.lags)
+        drives = np.column_stack(
+            [
+                np.cos(given.rates * time[:, None] + given.lags),
+                *(course.at(time)[0] for course in given.courses),
+            ]
+        )
         parts = [
             batch.state[who] @ given.gaps.matrix.T,
             np.broadcast_to(given.gaps.constant, (len(who), len(given.gaps.constant))),
@@ -142,17 +150,17 @@ class ModalFlow:
         """
         given = self.tables.sets[which]
         piece = self.tables.linear.piece(given.values, mode)
-        wave, bits = np.exp(1j * (given.rates * time + given.lags)), 0
+        values, sizes = self._drives_at(which, time)
         rate, size, steady = state, np.abs(state), piece.constant
-        open_ = set(np.flatnonzero(zero).tolist())
+        open_, bits = set(np.flatnonzero(zero).tolist()), 0
         for order in range(1, WAYS + 1):
-            forced = (piece.driven @ wave).real
-            rate = piece.matrix @ rate + forced + steady
+            rate = piece.matrix @ rate + piece.driven @ values[order - 1] + steady
             size = (
-                np.abs(piece.matrix) @ size + np.abs(piece.driven) @ np.abs(wave) + np.abs(steady)
+                np.abs(piece.matrix) @ size
+                + np.abs(piece.driven) @ sizes[order - 1]
+                + np.abs(steady)
             )
-            steady, wave = 0.0 * steady, wave * (1j * given.rates)
-            drive = (given.gaps.driven @ wave).real
+            steady, drive = 0.0 * steady, given.gaps.driven @ values[order]
             for g in sorted(open_):
                 value = float(given.gaps.matrix[g] @ rate + drive[g])
                 least = layout.ROUNDED * float(
@@ -162,6 +170,18 @@ class ModalFlow:
                     open_.discard(g)
                     bits |= (1 << g) if value > 0 else 0
         return bits
+
+    def _drives_at(self, which: int, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """The drives and their derivatives at a time, and what their sizes are at most:
+        float64[1 + WAYS, drives].
+        """
+        given = self.tables.sets[which]
+        orders = np.arange(WAYS + 1)[:, None]
+        waves = np.exp(1j * (given.rates * time + given.lags)) * (1j * given.rates) ** orders
+        courses = np.zeros((WAYS + 1, len(given.courses)))
+        for p, course in enumerate(given.courses):
+            courses[: layout.COURSE_TERMS, p] = course.at(np.array(time))
+        return np.hstack([waves.real, courses]), np.hstack([np.abs(waves), np.abs(courses)])
 
 
 @functools.lru_cache(maxsize=64)

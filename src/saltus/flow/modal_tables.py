@@ -10,7 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from saltus.codegen.module import MODAL_LANES as LANES
-from saltus.flow.modal_blocks import Eigen, StateModes, eigen_of, modes_of, slots_of, table_of
+from saltus.flow.modal_blocks import table_of
+from saltus.flow.modal_modes import Eigen, StateModes, eigen_of, modes_of, slots_of
+from saltus.language.expression import Expr, walk
+from saltus.system.courses import TERMS, Course, course_of
 from saltus.system.linear import LinearPiece, LinearSystem
 
 #: Memory of the tables of one system [bytes]. Beyond it all are dropped, as soon as no trajectory
@@ -51,6 +54,8 @@ class _Set:
     gaps: LinearPiece
     rates: np.ndarray
     lags: np.ndarray
+    courses: tuple[Course, ...]
+    course_rows: np.ndarray
 
 
 class Tables:
@@ -79,10 +84,11 @@ class Tables:
         slots = len(slots_of(np.linalg.eigvals(linear.piece(values, 0).matrix))) + rows
         self.groups, self.state_groups = -(-slots // LANES), -(-n // LANES)
         drives = len(linear.drives)
-        self.block_groups = -(-(n + 1 + 2 * drives) // LANES)
+        courses = len(linear.courses)
+        self.block_groups = -(-(n + 1 + 2 * drives + TERMS * courses) // LANES)
         self.rows = 2 * self.groups + self.block_groups
         self.sizes = np.array(
-            [n, self.groups, self.state_groups, rows, guards, drives, self.rows], np.int64
+            [n, self.groups, self.state_groups, rows, guards, drives, self.rows, courses], np.int64
         )
 
     def clear(self) -> None:
@@ -90,7 +96,8 @@ class Tables:
         kernels hold stay as they are.
         """
         self.generation += 1
-        self.modes, self.steady = _Rows(), _Rows()
+        self.modes, self.steady, self.pieces = _Rows(), _Rows(), _Rows()
+        self._courses: dict[tuple[Expr, bytes], tuple[Course, list[float]]] = {}
         self._sets: dict[bytes, int] = {}
         self.sets: list[_Set] = []
         self._eigen: dict[bytes, Eigen] = {}
@@ -103,7 +110,8 @@ class Tables:
     @property
     def full(self) -> bool:
         """True if the tables hold MOST_BYTES or more."""
-        return self._held + self.modes.table.nbytes + self.steady.table.nbytes >= MOST_BYTES
+        rows = sum(one.table.nbytes for one in (self.modes, self.steady, self.pieces))
+        return self._held + rows >= MOST_BYTES
 
     def _rows_of_gaps(self) -> tuple[np.ndarray, np.ndarray]:
         """Row and sign of each guard's gap: guards whose gaps differ by a number only share one."""
@@ -135,9 +143,11 @@ class Tables:
             offset = np.array([one.gaps.constant for one in self.sets]).reshape(count, -1)
             rate = np.array([one.rates for one in self.sets]).reshape(count, -1)
             lag = np.array([one.lags for one in self.sets]).reshape(count, -1)
+            course = np.array([one.course_rows for one in self.sets]).reshape(count, -1)
             self._arrays = (
                 self.sizes, self.row_of, self.sign_of, offset, rate, lag, self.modes.table,
                 self.steady.table, np.array(self._links, np.int64).reshape(len(self._links), -1),
+                course, self.pieces.table,
             )  # fmt: skip
         return self._arrays
 
@@ -147,10 +157,29 @@ class Tables:
         if key not in self._sets:
             values = dict(zip(self.linear.system.values, row.tolist(), strict=True))
             rates, lags = self.linear.rates(values)
-            self.sets.append(_Set(values, self.linear.gaps(values), rates, lags))
+            found = [self._course_of(node, values) for node in self.linear.courses]
+            rows = np.array([row for _, row in found], float)
+            courses = tuple(course for course, _ in found)
+            gaps = self.linear.gaps(values)
+            self.sets.append(_Set(values, gaps, rates, lags, courses, rows))
             self._sets[key], self._arrays = len(self.sets) - 1, None
             self._held += SET_BYTES + self.sets[-1].gaps.matrix.nbytes
         return self._sets[key]
+
+    def _course_of(self, node: Expr, values: dict[str, float]) -> tuple[Course, list[float]]:
+        """A course and its row of numbers for the kernel: one for all values that it doesn't ask
+        for.
+        """
+        asked = [one.payload for one in walk(node) if one.op == "param"]
+        key = (node, np.array([values[name] for name in asked]).tobytes())
+        if key not in self._courses:
+            course = course_of(node, values)
+            begins = np.concatenate([course.begins, np.zeros(-len(course.begins) % LANES)])
+            first = self.pieces.add(np.concatenate([begins, course.terms.ravel()]))
+            row = [first, len(course.begins), course.cycle, len(begins) // LANES]
+            self._courses[key] = course, row
+            self._held += course.begins.nbytes + course.terms.nbytes
+        return self._courses[key]
 
     def state_of(self, which: int, mode: int) -> int:
         """Number of a contact state, made if it isn't known."""
@@ -166,7 +195,8 @@ class Tables:
         matrices = [self.linear.piece(given.values, one).matrix for one in others]
         fastest = max((np.abs(self._eigen_of(one)[0]).max() for one in matrices), default=0.0)
         eigen, most = self._eigen_of(piece.matrix), LANES * self.groups
-        modes = modes_of(piece, given.gaps, given.rates, most, eigen, float(fastest))
+        speeds = np.array([one.speeds for one in given.courses]).reshape(-1, TERMS)
+        modes = modes_of(piece, given.gaps, given.rates, speeds, most, eigen, float(fastest))
         key = piece.matrix.tobytes()
         links = [self._modes_of(key, modes, given), self._steady_of(modes, given)]
         for g in range(guards):
@@ -225,16 +255,24 @@ class Tables:
         )
 
     def _steady_of(self, modes: StateModes, given: _Set) -> int:
-        """First row of the table of the steady answer to the drives."""
-        answers = modes.answers.T  # [1 + drives, N]
+        """First row of the table of the steady answer: to the constant, to cosine and sine of each
+        harmonic drive, to each derivative of each course.
+        """
+        harmonic, first = 1 + len(given.rates), self.first_guard
+        answers = modes.answers.T  # [1 + drives + TERMS * courses, N]
         padded = np.zeros((len(answers), LANES * self.state_groups), complex)
         padded[:, : answers.shape[1]] = answers
-        waves = np.stack([padded.real, padded.imag], axis=1).reshape(-1, padded.shape[1])
-        states = np.delete(waves, 1, axis=0)  # the constant has no imaginary part
-        first = self.first_guard
-        gaps = given.gaps.matrix[first] @ answers.T  # [rows, 1 + drives]
-        gaps[:, 1:] += given.gaps.driven[first]
-        pairs = np.stack([gaps.real, gaps.imag], axis=2).reshape(len(first), -1)
-        numbers = np.delete(pairs, 1, axis=1).ravel()
-        numbers = np.concatenate([numbers, np.zeros(-len(numbers) % LANES)])
-        return self.steady.add(np.concatenate([states.ravel(), numbers]))
+        gaps = given.gaps.matrix[first] @ answers.T
+        gaps[:, 1:harmonic] += given.gaps.driven[first, : harmonic - 1]
+        gaps[:, harmonic::TERMS] += given.gaps.driven[first, harmonic - 1 :]
+        # only the harmonic ones have an imaginary part
+        states = [padded[0].real]
+        numbers = [gaps[:, 0].real]
+        for d in range(1, harmonic):
+            states += [padded[d].real, padded[d].imag]
+            numbers += [gaps[:, d].real, gaps[:, d].imag]
+        states += list(padded[harmonic:].real)
+        numbers += list(gaps[:, harmonic:].T.real)
+        flat = np.array(numbers).T.ravel()
+        flat = np.concatenate([flat, np.zeros(-len(flat) % LANES)])
+        return self.steady.add(np.concatenate([*states, flat]))

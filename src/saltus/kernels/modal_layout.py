@@ -9,7 +9,8 @@ Symbols
 -------
 N states; G groups of LANES modes, ascending by |lambda|; S groups of LANES states; R rows of gaps,
 of which guards are plus or minus one, and an offset; H drives Re(e^{i (rate t + phase)}). Modes
-that don't go their own ways go together in a block: see modal_blocks.py.
+that don't go their own ways go together in a block: see modal_blocks.py. Drives that are
+polynomials between breaks are courses: see modal_records.py.
 """
 
 from collections import namedtuple
@@ -20,9 +21,14 @@ FACTORIAL = 20922789888000.0
 #: A mode is followed in the series of a gap while |lambda| h is at most this; what is left out of
 #: its own series is at most its amplitude there.
 FOLLOWED = 6.0
-# Columns of `sizes`; the last one is the rows of amplitudes: those of the modes, real parts then
-# imaginary ones, then those of a block.
-STATES, MODE_GROUPS, STATE_GROUPS, GAP_ROWS, GUARDS, DRIVES, ROWS = range(7)
+# Columns of `sizes`; ROWS are the rows of amplitudes: those of the modes, real parts then imaginary
+# ones, then those of a block.
+STATES, MODE_GROUPS, STATE_GROUPS, GAP_ROWS, GUARDS, DRIVES, ROWS, COURSES = range(8)
+# Columns of `record`: the time of a course at the beginning of the period, the times of the period
+# at which its piece begins and ends [s], the row of that piece, its value and derivatives.
+BASE, SINCE, UNTIL, PIECE, VALUE = range(5)
+#: Value and derivatives of a course.
+COURSE_TERMS = 4
 # Columns of `links`: first row of the modes' table, first row of the drives' table; then for each
 # guard the contact state behind its boundary, -1 where it hasn't been made yet.
 MODES, STEADY, BEHIND = range(3)
@@ -45,6 +51,6 @@ HUGE = 1.0e300
 
 Modal = namedtuple(
     "Modal",
-    "sizes row_of sign_of offset rate lag modes steady links y moved size sums q errors p bern "
-    "bounds slopes out touches state answer angle found chain",
+    "sizes row_of sign_of offset rate lag modes steady links course pieces y moved size sums q "
+    "errors p bern bounds slopes out touches state answer angle found chain record",
 )
