@@ -11,6 +11,9 @@ import numpy as np
 MOST_LOSS = 2.0**10
 #: The same for each of two modes that coincide: their losses are multiplied.
 MOST_LOSS_OF_TWO = 2.0**5
+#: Times that the slowest pair of modes may be slower than the fastest: its amplitudes hold speeds
+#: over its rate, and its vectors rounding of the others.
+MOST_SPREAD = 2.0**14
 #: Rounding of an eigenvalue, in units of the largest.
 ROUNDING = 64 * 2.220446049250313e-16
 
@@ -85,10 +88,12 @@ def loss_of(speeds: np.ndarray, sizes: np.ndarray, scale: float) -> np.ndarray:
     """The loss of modes in their answer to a course: slow ones don't follow its derivatives, and
     their motion is a small difference of large answers.
     """
-    sizes = np.where(sizes > ROUNDING * scale, sizes, 0.0)
-    with np.errstate(divide="ignore"):
-        powers = (1 / sizes)[:, None] ** np.arange(4)
-    return np.array(np.where(sizes > 0, (speeds * np.nan_to_num(powers)).max(axis=1), np.inf))
+    with np.errstate(all="ignore"):
+        terms = (speeds[speeds > 0] / sizes[:, None] ** np.flatnonzero(speeds)).max(
+            axis=1, initial=1.0
+        )
+        losses = terms * np.maximum(_speed(speeds) / sizes, 1.0) ** 2
+    return np.array(np.where(sizes > ROUNDING * scale, losses, np.inf))
 
 
 def block_of(spaces: list[Subspace], acts: Loads, answers: np.ndarray) -> tuple[Block, np.ndarray]:
@@ -107,7 +112,7 @@ def block_of(spaces: list[Subspace], acts: Loads, answers: np.ndarray) -> tuple[
             elif load.any():
                 _answer(d, space, load, acts, answers)
         if column.any():
-            speed = _speed(acts.speeds[d - harmonic]) if d >= harmonic else 1.0
+            speed = (_speed(acts.speeds[d - harmonic]) if d >= harmonic else 0.0) or 1.0
             own.append(_generator(d, speed, acts))
             fastest = max(norm, np.abs(own[-1]).max())
             scale = np.abs(column).max() / fastest if fastest > 0 else 1.0
@@ -139,7 +144,7 @@ def _generator(drive: int, speed: float, acts: Loads) -> np.ndarray:
 
 def _speed(speeds: np.ndarray) -> float:
     """Rate of change of a course, that makes its derivatives as large as its values [1/s]."""
-    return float(max(speeds[1], speeds[2] ** (1 / 2), speeds[3] ** (1 / 3))) or 1.0
+    return float(max(speeds[1], speeds[2] ** (1 / 2), speeds[3] ** (1 / 3)))
 
 
 def _is_near(drive: int, values: np.ndarray, acts: Loads) -> bool:

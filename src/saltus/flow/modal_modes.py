@@ -15,6 +15,7 @@ import numpy as np
 from saltus.flow.modal_blocks import (
     MOST_LOSS,
     MOST_LOSS_OF_TWO,
+    MOST_SPREAD,
     ROUNDING,
     Block,
     Loads,
@@ -126,8 +127,8 @@ def _together(
     found: np.ndarray = ~((np.abs(inverse.T) * np.abs(vectors)).sum(axis=0) <= MOST_LOSS)
     found |= values.real > NO_GROWTH * acts.scale
     parts, sizes = inverse @ acts.loads, np.abs(values)
-    zero = sizes <= ROUNDING * acts.scale
-    found |= zero & (zero.sum() > 1)  # in other units of the speeds a rigid body's don't coincide
+    slow = MOST_SPREAD * sizes <= acts.scale
+    found |= slow & (slow.sum() > 1)
     for rate, part in zip(acts.rates[1:], parts.T[1:], strict=False):
         far = np.minimum(np.abs(1j * rate - values), np.abs(1j * rate + values))
         found |= (part != 0) & (MOST_LOSS * far <= np.maximum(abs(rate), sizes))
@@ -138,6 +139,7 @@ def _together(
         static = np.abs(acts.gaps @ vectors * (parts[:, 0] / values))
     known = np.where(np.isfinite(static), static, 0.0)
     others = known @ (sizes[:, None] > 1.5 * sizes) + np.abs(acts.offsets)[:, None]
+    zero = sizes <= ROUNDING * acts.scale
     far_off = (static > MOST_LOSS * others).any(axis=0) | zero
     slow = sizes < max(acts.scale / MOST_LOSS_OF_TWO, acts.fastest / MOST_LOSS)
     found |= (parts[:, 0] != 0) & far_off & slow

@@ -18,6 +18,8 @@ from saltus.language.expression import Expr
 TERMS = 4
 #: Breaks of one cycle closer than this part of it are one.
 SAME_BREAK = 1e-14
+#: Difference of two values at a break that is none, in units of the largest value.
+SAME_VALUE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -56,12 +58,23 @@ class Course:
 
     @property
     def speeds(self) -> np.ndarray:
-        """Largest derivatives, in units of the largest value: float64[TERMS]."""
-        bounds = np.append(self.begins, self.begins[0] + self.cycle) if self.cycle else self.begins
-        last = self.at(np.nextafter(bounds[1:], -np.inf))[0] if len(bounds) > 1 else np.zeros(1)
+        """Largest derivatives, in units of the largest value: float64[TERMS]. A value that jumps
+        changes over the shortest piece.
+        """
+        begins = np.append(self.begins, self.begins[0] + self.cycle) if self.cycle else self.begins
+        lengths = np.diff(begins)
+        powers = lengths[:, None] ** np.arange(TERMS)
+        ends = (self.terms[: len(lengths)] * powers).sum(axis=1)
         derivatives = np.abs(self.terms * np.cumprod([1, 1, 2, 3])).max(axis=0)
-        largest = max(derivatives[0], np.abs(last).max())
-        return np.array(derivatives / largest if largest > 0 else np.sign(derivatives))
+        largest = max(derivatives[0], np.abs(ends).max(initial=0.0))
+        if largest == 0.0:
+            return np.array(np.sign(derivatives))
+        found = derivatives / largest
+        jumps = np.abs(ends - np.roll(self.terms[:, 0], -1)[: len(ends)]) > SAME_VALUE * largest
+        inner = lengths if self.cycle else lengths[1:]
+        if jumps.any() and len(inner):
+            found[1] = max(found[1], 1 / inner.min())
+        return np.array(found)
 
 
 def reason_against(node: Expr) -> str | None:
