@@ -1,10 +1,4 @@
-"""Modes of one contact state: those that go their own ways, and those that go together in a block.
-
-Modes go together if taking them apart loses digits: eigenvectors that nearly coincide (critical
-damping, a rigid body), or a drive near the eigenvalue of a mode. What is lost is a factor, by which
-rounding is multiplied; a block keeps it below MOST_LOSS. Modes that grow go into it too: a step
-never bounds a block, it follows it.
-"""
+"""The block of a contact state: modes that don't go their own ways, and the drives near them."""
 
 from __future__ import annotations
 
@@ -13,18 +7,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from saltus.system.linear import LinearPiece
-
 #: Most that rounding may be multiplied by: 2^10 * 2.2e-16 = 2.3e-13 of the motion.
 MOST_LOSS = 2.0**10
 #: The same for each of two modes that coincide: their losses are multiplied.
 MOST_LOSS_OF_TWO = 2.0**5
+#: Times that the slowest pair of modes may be slower than the fastest: its amplitudes hold speeds
+#: over its rate, and its vectors rounding of the others.
+MOST_SPREAD = 2.0**14
 #: Rounding of an eigenvalue, in units of the largest.
 ROUNDING = 64 * 2.220446049250313e-16
-#: Rate of growth that is none, in units of the largest eigenvalue.
-NO_GROWTH = 1e-12
-#: Eigenvalues, eigenvectors, and the inverse of these.
-Eigen = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -37,8 +28,9 @@ class Block:
         T, with the drives among the amplitudes.
     right, left : float64[N, K], float64[K, N]
         R and L; zero for drives.
-    drives : tuple of (int, int, float)
-        Number of each drive in it (0: the constant 1), its first amplitude, and its scale.
+    drives : tuple of (int, int, float, float)
+        Number of each drive in it (0: the constant 1; the harmonic ones; the courses), its first
+        amplitude, its scale, and by what each derivative of a course is divided [1/s].
     limit : float
         alpha of kernels/modal_blocks.py [1/s].
     """
@@ -46,33 +38,12 @@ class Block:
     matrix: np.ndarray
     right: np.ndarray
     left: np.ndarray
-    drives: tuple[tuple[int, int, float], ...]
+    drives: tuple[tuple[int, int, float, float], ...]
     limit: float
 
 
 @dataclass(frozen=True)
-class Modes:
-    """Modes of one contact state, z = V y and y = L z, and its block.
-
-    Attributes
-    ----------
-    values, vectors, inverse : complex128[M], complex128[N, M], complex128[M, N]
-        Eigenvalues [1/s], V and L of the modes that go their own ways.
-    block : Block or None
-        Those that don't.
-    answers : complex128[N, 1 + D]
-        Steady answers to the constant and to each drive, as far as they aren't in the block.
-    """
-
-    values: np.ndarray
-    vectors: np.ndarray
-    inverse: np.ndarray
-    block: Block | None
-    answers: np.ndarray
-
-
-@dataclass(frozen=True)
-class _Space:
+class Subspace:
     """An invariant subspace: v' = T v."""
 
     matrix: np.ndarray
@@ -81,14 +52,16 @@ class _Space:
 
 
 @dataclass(frozen=True)
-class _Loads:
-    """What acts on the modes, and where it matters.
+class Loads:
+    """Loads on the modes, and the gaps in which their answers matter.
 
     Attributes
     ----------
     rates : float64[1 + D]
-        Of the constant, 0, and of the drives [rad/s].
-    loads : float64[N, 1 + D]
+        Of the constant, 0, and of the harmonic drives [rad/s].
+    speeds : float64[C, 4]
+        Derivatives of the courses, in units of their values.
+    loads : float64[N, 1 + D + C]
         Their factors in the equations.
     gaps, offsets : float64[G, N], float64[G]
         Rows and constants of the gaps.
@@ -99,254 +72,60 @@ class _Loads:
     """
 
     rates: np.ndarray
+    speeds: np.ndarray
     loads: np.ndarray
     gaps: np.ndarray
     offsets: np.ndarray
     scale: float
     fastest: float
 
-    def of(self, states: np.ndarray) -> _Loads:
+    def of(self, states: np.ndarray) -> Loads:
         """The same for some states."""
         return replace(self, loads=self.loads[states], gaps=self.gaps[:, states])
 
 
-def modes_of(
-    piece: LinearPiece,
-    gaps: LinearPiece,
-    rates: np.ndarray,
-    most: int,
-    eigen: Eigen,
-    fastest: float = 0.0,
-) -> Modes:
-    """Modes of a contact state.
-
-    Parameters
-    ----------
-    piece, gaps : LinearPiece
-        Its equations; the gaps.
-    rates : float64[D]
-        Rates of the drives [rad/s].
-    most : int
-        Modes that may go their own ways; of a pair one counts.
-    eigen : tuple
-        :func:`eigen_of` the matrix.
-    fastest : float
-        Size of the largest eigenvalue of other contact states [1/s]: they tell how slow a mode is.
+def loss_of(speeds: np.ndarray, sizes: np.ndarray, scale: float) -> np.ndarray:
+    """The loss of modes in their answer to a course: slow ones don't follow its derivatives, and
+    their motion is a small difference of large answers.
     """
-    values, vectors, inverse = eigen
-    every = np.concatenate([[0.0], rates])
-    acts = _Loads(
-        every,
-        np.column_stack([piece.constant, piece.driven]),
-        gaps.matrix,
-        gaps.constant,
-        float(max(np.abs(values).max(), np.abs(every).max())),
-        fastest,
-    )
-    if not _together(values, vectors, inverse, acts).any() and len(slots_of(values)) <= most:
-        return Modes(values, vectors, inverse, None, _answers(values, vectors, inverse, acts))
-    spaces, values, vectors, inverse = _parted(piece.matrix, acts, most)
-    answers = _answers(values, vectors, inverse, acts)
-    block, answers = _block_of(spaces, acts, answers)
-    return Modes(values, vectors, inverse, block, answers)
-
-
-def slots_of(values: np.ndarray) -> np.ndarray:
-    """Indices of one of each pair of complex eigenvalues and of all real ones, ascending by
-    size.
-    """
-    kept = np.flatnonzero(values.imag >= 0)
-    return kept[np.argsort(np.abs(values[kept]), kind="stable")]
-
-
-def eigen_of(matrix: np.ndarray) -> Eigen:
-    """Eigenvalues, eigenvectors and the inverse of these, large where they coincide."""
-    values, vectors = np.linalg.eig(matrix)
-    if np.linalg.cond(vectors) < 1 / ROUNDING:
-        inverse = np.linalg.inv(vectors)
-        inverse += inverse @ (np.eye(len(matrix)) - vectors @ inverse)
-        return values, vectors, inverse
-    size = np.maximum(np.abs(vectors).max(axis=1, keepdims=True), ROUNDING)
-    left, parts, right = np.linalg.svd(vectors / size)
-    least = np.maximum(parts, ROUNDING * parts[0])
-    return values, vectors, (right.conj().T / least) @ left.conj().T / size.T
-
-
-def _together(
-    values: np.ndarray, vectors: np.ndarray, inverse: np.ndarray, acts: _Loads
-) -> np.ndarray:
-    """True for modes that don't go their own ways: bool[M]."""
-    # sum_i |L_ji V_ij|: what rounding of the states is multiplied by, in any units of theirs
-    found: np.ndarray = ~((np.abs(inverse.T) * np.abs(vectors)).sum(axis=0) <= MOST_LOSS)
-    found |= values.real > NO_GROWTH * acts.scale
-    parts, sizes = inverse @ acts.loads, np.abs(values)
-    zero = sizes <= ROUNDING * acts.scale
-    found |= zero & (zero.sum() > 1)  # in other units of the speeds a rigid body's don't coincide
-    for rate, part in zip(acts.rates[1:], parts.T[1:], strict=True):
-        far = np.minimum(np.abs(1j * rate - values), np.abs(1j * rate + values))
-        found |= (part != 0) & (MOST_LOSS * far <= np.maximum(abs(rate), sizes))
-    # a force that is constant moves a slow mode far before it is balanced
     with np.errstate(all="ignore"):
-        static = np.abs(acts.gaps @ vectors * (parts[:, 0] / values))
-    known = np.where(np.isfinite(static), static, 0.0)
-    others = known @ (sizes[:, None] > 1.5 * sizes) + np.abs(acts.offsets)[:, None]
-    far_off = (static > MOST_LOSS * others).any(axis=0) | zero
-    slow = sizes < max(acts.scale / MOST_LOSS_OF_TWO, acts.fastest / MOST_LOSS)
-    found |= (parts[:, 0] != 0) & far_off & slow
-    return found
+        terms = (speeds[speeds > 0] / sizes[:, None] ** np.flatnonzero(speeds)).max(
+            axis=1, initial=1.0
+        )
+        losses = terms * np.maximum(_speed(speeds) / sizes, 1.0) ** 2
+    return np.array(np.where(sizes > ROUNDING * scale, losses, np.inf))
 
 
-def _answers(
-    values: np.ndarray, vectors: np.ndarray, inverse: np.ndarray, acts: _Loads
-) -> np.ndarray:
-    """Steady answers of modes that go their own ways: complex128[N, 1 + D]."""
-    far = 1j * acts.rates[:, None] - values[None]
-    parts = inverse @ acts.loads
-    with np.errstate(all="ignore"):
-        answers: np.ndarray = vectors @ np.where(parts == 0, 0, parts / far.T)
-    return answers
-
-
-# -- parting -----------------------------------------------------------------------------------
-def _parted(
-    matrix: np.ndarray, acts: _Loads, most: int
-) -> tuple[list[_Space], np.ndarray, np.ndarray, np.ndarray]:
-    """Subspaces whose modes go together, and the other modes. States that the equations keep apart
-    stay apart: a rigid body isn't rounded by the stiffest mode.
-    """
-    from scipy.sparse.csgraph import connected_components
-
-    count, part = connected_components(matrix != 0, directed=False)
-    size, spaces, found = len(matrix), list[_Space](), list[Eigen]()
-    members = [np.flatnonzero(part == one) for one in range(count)]
-    eigen = [eigen_of(matrix[np.ix_(one, one)]) for one in members]
-    joined = [_together(*e, acts.of(one)) for e, one in zip(eigen, members, strict=True)]
-    _make_room([e[0] for e in eigen], joined, most)
-    for one, (values, *_), go in zip(members, eigen, joined, strict=True):
-        space, modes = _split(matrix[np.ix_(one, one)], values, go, acts.of(one))
-        if space is not None:
-            right, left = np.zeros((size, len(space.matrix))), np.zeros((len(space.matrix), size))
-            right[one], left[:, one] = space.right, space.left
-            spaces.append(_Space(space.matrix, right, left))
-        vectors = np.zeros((size, len(modes[0])), complex)
-        inverse = np.zeros((len(modes[0]), size), complex)
-        vectors[one], inverse[:, one] = modes[1], modes[2]
-        found.append((modes[0], vectors, inverse))
-    return (
-        spaces,
-        np.concatenate([one[0] for one in found]),
-        np.concatenate([one[1] for one in found], axis=1),
-        np.concatenate([one[2] for one in found]),
-    )
-
-
-def _make_room(values: list[np.ndarray], joined: list[np.ndarray], most: int) -> None:
-    """Let the slowest modes go together if there are more than the lanes hold."""
-    left = sum(len(slots_of(v[~go])) for v, go in zip(values, joined, strict=True)) - most
-    order = sorted(
-        (abs(v[j]), c, j)
-        for c, (v, go) in enumerate(zip(values, joined, strict=True))
-        for j in slots_of(v)
-        if not go[j]
-    )
-    for _, c, j in order[: max(left, 0)]:
-        joined[c][j] = True
-
-
-def _split(
-    matrix: np.ndarray, values: np.ndarray, joined: np.ndarray, acts: _Loads
-) -> tuple[_Space | None, Eigen]:
-    """A matrix as a subspace whose modes go together and the other modes."""
-    while True:
-        joined = _closed(values, joined)
-        space, modes = _separated(matrix, values, joined)
-        again = _together(*modes, acts)
-        if not again.any():
-            return space, modes
-        for value in modes[0][again]:
-            free = np.flatnonzero(~joined)
-            joined[free[np.argmin(np.abs(values[free] - value))]] = True
-
-
-def _closed(values: np.ndarray, joined: np.ndarray) -> np.ndarray:
-    """With each mode its complex partner, and those whose eigenvalues nearly coincide with it."""
-    sizes = np.maximum(np.abs(values)[:, None], np.abs(values))
-    apart = np.abs(values[:, None] - values)
-    near = MOST_LOSS * np.minimum(apart, np.abs(values[:, None] - values.conj())) <= sizes
-    while True:
-        grown: np.ndarray = joined | near[:, joined].any(axis=1)
-        if (grown == joined).all():
-            return grown
-        joined = grown
-
-
-def _separated(
-    matrix: np.ndarray, values: np.ndarray, joined: np.ndarray
-) -> tuple[_Space | None, Eigen]:
-    """The invariant subspace of some eigenvalues, and the modes of the others, by an ordered Schur
-    form and a Sylvester equation (Bavely & Stewart, SIAM J. Numer. Anal. 16 (1979) 359).
-    """
-    from scipy import linalg
-
-    size = len(matrix)
-    none = (np.zeros(0, complex), np.zeros((size, 0), complex), np.zeros((0, size), complex))
-    if not joined.any():
-        return None, eigen_of(matrix)
-    even, (scale, _) = linalg.matrix_balance(matrix, permute=False, separate=True)
-    if joined.all():
-        return _Space(even, np.diag(scale), np.diag(1 / scale)), none
-
-    def chosen(real: float, imaginary: float = 0.0) -> bool:
-        return bool(joined[np.argmin(np.abs(values - (real + 1j * imaginary)))])
-
-    try:
-        schur, turn, k = linalg.schur(even, output="real", sort=chosen)
-    except linalg.LinAlgError:  # rounding brought an eigenvalue to the other side
-        return _Space(even, np.diag(scale), np.diag(1 / scale)), none
-    if not 0 < k < size:
-        return _Space(even, np.diag(scale), np.diag(1 / scale)), none
-    mixed = linalg.solve_sylvester(schur[:k, :k], -schur[k:, k:], -schur[:k, k:])
-    own, within, back = eigen_of(schur[k:, k:])
-    right = scale[:, None] * turn[:, :k]
-    left = (turn[:, :k].T - mixed @ turn[:, k:].T) / scale
-    vectors = scale[:, None] * (turn[:, :k] @ mixed + turn[:, k:]) @ within
-    inverse = back @ turn[:, k:].T / scale
-    every, lefts = np.hstack([right, vectors]), np.vstack([left, inverse])
-    lefts = lefts + lefts @ (np.eye(size) - every @ lefts)
-    return _Space(schur[:k, :k], right, lefts[:k].real), (own, vectors, lefts[k:])
-
-
-# -- the block -----------------------------------------------------------------------------------
-def _block_of(spaces: list[_Space], acts: _Loads, answers: np.ndarray) -> tuple[Block, np.ndarray]:
+def block_of(spaces: list[Subspace], acts: Loads, answers: np.ndarray) -> tuple[Block, np.ndarray]:
     """The block of some subspaces and the drives near them; answers with those to the others."""
-    size = sum(len(space.matrix) for space in spaces)
     first = np.cumsum([0, *(len(space.matrix) for space in spaces)])
-    drives, columns = list[tuple[int, int, float]](), list[tuple[int, np.ndarray, float]]()
-    for d, rate in enumerate(acts.rates):
-        column = np.zeros(size)
+    norm = max(np.abs(space.matrix).sum(axis=1).max() for space in spaces)
+    size, harmonic = int(first[-1]), len(acts.rates)
+    columns, drives = list[np.ndarray](), list[tuple[int, int, float, float]]()
+    own = list[np.ndarray]()
+    for d in range(acts.loads.shape[1]):
+        column = np.zeros(first[-1])
         for space, at in zip(spaces, first, strict=False):
-            load, values = space.left @ acts.loads[:, d], np.linalg.eigvals(space.matrix)
-            if not load.any():
-                continue
-            if _is_near(rate, values, max(acts.scale, acts.fastest)):
+            load = space.left @ acts.loads[:, d]
+            if load.any() and _is_near(d, np.linalg.eigvals(space.matrix), acts):
                 column[at : at + len(load)] = load
-            else:
-                away = 1j * rate * np.eye(len(load)) - space.matrix
-                answers[:, d] += space.right @ np.linalg.solve(away, load)
+            elif load.any():
+                _answer(d, space, load, acts, answers)
         if column.any():
-            norm = max(abs(rate), *(np.abs(space.matrix).sum(axis=1).max() for space in spaces))
-            columns.append((d, column, np.abs(column).max() / norm if norm > 0 else 1.0))
-    for d, _, scale in columns:
-        drives.append((d, size, float(scale)))
-        size += 1 if d == 0 else 2
+            speed = (_speed(acts.speeds[d - harmonic]) if d >= harmonic else 0.0) or 1.0
+            own.append(_generator(d, speed, acts))
+            fastest = max(norm, np.abs(own[-1]).max())
+            scale = np.abs(column).max() / fastest if fastest > 0 else 1.0
+            drives.append((d, size, float(scale), speed))
+            columns.append(column / scale)
+            size += len(own[-1])
     matrix = np.zeros((size, size))
     for space, at in zip(spaces, first, strict=False):
         end = at + len(space.matrix)
         matrix[at:end, at:end] = space.matrix
-    for (d, column, scale), (_, at, _) in zip(columns, drives, strict=True):
-        matrix[: len(column), at] = column / scale
-        if d > 0:
-            matrix[at : at + 2, at : at + 2] = acts.rates[d] * np.array([[0, -1], [1, 0]])
+    for column, generator, (_, at, _, _) in zip(columns, own, drives, strict=True):
+        matrix[: len(column), at] = column
+        matrix[at : at + len(generator), at : at + len(generator)] = generator
     states = len(answers)
     right, left = np.zeros((states, size)), np.zeros((size, states))
     right[:, : first[-1]] = np.hstack([space.right for space in spaces])
@@ -354,10 +133,44 @@ def _block_of(spaces: list[_Space], acts: _Loads, answers: np.ndarray) -> tuple[
     return Block(matrix, right, left, tuple(drives), _limit(matrix)), answers
 
 
-def _is_near(rate: float, values: np.ndarray, scale: float) -> bool:
+def _generator(drive: int, speed: float, acts: Loads) -> np.ndarray:
+    """How a drive goes on: the constant; cosine and sine; a value and its derivatives."""
+    if drive == 0:
+        return np.zeros((1, 1))
+    if drive < len(acts.rates):
+        return np.array([[0.0, -1.0], [1.0, 0.0]]) * float(acts.rates[drive])
+    return np.array(speed * np.eye(4, k=1))
+
+
+def _speed(speeds: np.ndarray) -> float:
+    """Rate of change of a course, that makes its derivatives as large as its values [1/s]."""
+    return float(max(speeds[1], speeds[2] ** (1 / 2), speeds[3] ** (1 / 3)))
+
+
+def _is_near(drive: int, values: np.ndarray, acts: Loads) -> bool:
     """True if a drive resonates with one of the modes of a subspace."""
-    sizes = scale if rate == 0.0 else np.maximum(abs(rate), np.abs(values))
-    return bool((MOST_LOSS_OF_TWO * np.abs(1j * rate - values) <= sizes).any())
+    sizes, harmonic = np.abs(values), len(acts.rates)
+    scale = max(acts.scale, acts.fastest)
+    if drive >= harmonic:
+        losses = loss_of(acts.speeds[drive - harmonic], sizes, scale)
+        return bool((losses >= MOST_LOSS_OF_TWO).any())
+    rate = float(acts.rates[drive])
+    far = scale if drive == 0 else np.maximum(abs(rate), sizes)
+    return bool((MOST_LOSS_OF_TWO * np.abs(1j * rate - values) <= far).any())
+
+
+def _answer(
+    drive: int, space: Subspace, load: np.ndarray, acts: Loads, answers: np.ndarray
+) -> None:
+    """Add the steady answer of a subspace to a drive to `answers`."""
+    harmonic = len(acts.rates)
+    if drive < harmonic:
+        away = 1j * acts.rates[drive] * np.eye(len(load)) - space.matrix
+        answers[:, drive] += space.right @ np.linalg.solve(away, load)
+        return
+    for k in range(4):
+        load = np.linalg.solve(space.matrix, load) * (-1.0 if k == 0 else 1.0)
+        answers[:, harmonic + 4 * (drive - harmonic) + k] += space.right @ load
 
 
 def _limit(matrix: np.ndarray) -> float:
@@ -384,5 +197,5 @@ def table_of(
     rows = gaps @ right[:states]
     head = np.zeros((1 + len(block.drives), lanes))
     head[0, :3] = groups, block.limit, len(block.drives)
-    head[1:, :3] = np.reshape(block.drives, (-1, 3))
+    head[1:, :4] = np.reshape(block.drives, (-1, 4))
     yield from (head[0], matrix.T, left.T, right.T, rows, rows @ matrix, head[1:])

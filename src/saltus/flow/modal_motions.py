@@ -11,7 +11,7 @@ import numpy as np
 from saltus.contact.guards import Guard
 from saltus.flow.maps import Stroboscope
 from saltus.flow.modal import Modal, modal_flow
-from saltus.flow.modal_blocks import slots_of
+from saltus.flow.modal_modes import slots_of
 from saltus.flow.modal_tables import Tables
 from saltus.flow.request import Outcome
 from saltus.flow.waves import Legs
@@ -40,7 +40,7 @@ def wave_motions(
     list of list of Legs, Outcome
         The legs of each motion, none of one that didn't reach the end; their quantities are the
         states, then those asked for, then the gaps. None if another method moves this system, a
-        quantity isn't linear, or modes go together in a block.
+        quantity isn't linear, a drive is a record, or modes go together in a block.
     """
     system = map_.system
     method = map_.method.serving(system.origin)
@@ -50,7 +50,7 @@ def wave_motions(
         return None
     tables = modal_flow(system.origin).tables
     asked = tables.linear.of(tuple(quantities))
-    if asked is None:
+    if asked is None or tables.linear.courses:
         return None
     outcome = map_.run(start, periods, record=0)
     begins, motions = outcome.contacts.begins(len(start)), []

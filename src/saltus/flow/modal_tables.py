@@ -10,10 +10,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from saltus.codegen.module import MODAL_LANES as LANES
-from saltus.flow.modal_blocks import Eigen, Modes, eigen_of, modes_of, slots_of, table_of
+from saltus.flow.modal_blocks import table_of
+from saltus.flow.modal_modes import Eigen, StateModes, eigen_of, modes_of, slots_of
 from saltus.kernels import modal_layout as layout
+from saltus.language.expression import Expr, walk
+from saltus.system.courses import TERMS, Course, course_of
 from saltus.system.linear import LinearPiece, LinearSystem
 
+#: Memory of the tables of one system [bytes]. Beyond it all are dropped, as soon as no trajectory
+#: that a call moves needs them; those still to be moved make theirs anew.
+MOST_BYTES = 2**28
+#: Memory of a set of parameter values besides its arrays [bytes].
+SET_BYTES = 4096
 #: Rounding of a coefficient of the equations, relative to it.
 ROUNDED = 16 * np.finfo(float).eps
 
@@ -56,6 +64,7 @@ class _Set:
     gaps: LinearPiece
     rates: np.ndarray
     lags: np.ndarray
+    courses: tuple[Course, ...]
 
 
 class Tables:
@@ -65,24 +74,18 @@ class Tables:
     ----------
     linear : LinearSystem
         The system.
+
+    Notes
+    -----
+    They take MOST_BYTES, 256 MB, at most, and what one more contact state needs.
     """
 
     def __init__(self, linear: LinearSystem) -> None:
         self.linear = linear
         self.lock = threading.Lock()
-        self.modes, self.steady = _Rows(), _Rows()
-        self._sets: dict[bytes, int] = {}
-        self.sets: list[_Set] = []
-        self._equations: dict[tuple[object, ...], _Equations] = {}
-        self._smooth: dict[tuple[object, ...], bool] = {}
-        self._known: dict[tuple[int, bytes], int] = {}
-        self._states: dict[tuple[int, int], int] = {}
-        #: Equations and modes of each contact state.
-        self.made: list[tuple[_Equations, Modes]] = []
+        self.generation = 0
+        self.clear()
         n, guards = len(linear.system.states), len(linear.system.guards)
-        self._offset, self._rate = _Rows(max(guards, 1)), _Rows(max(len(linear.drives), 1))
-        self._lag = _Rows(max(len(linear.drives), 1))
-        self._links = _Rows(layout.BEHIND + guards, int)
         self.row_of, self.sign_of = self._rows_of_gaps()
         rows = int(self.row_of.max(initial=-1)) + 1
         self.first_guard = [int(np.flatnonzero(self.row_of == r)[0]) for r in range(rows)]
@@ -90,11 +93,40 @@ class Tables:
         slots = len(slots_of(np.linalg.eigvals(linear.piece(values, 0).matrix))) + rows
         self.groups, self.state_groups = -(-slots // LANES), -(-n // LANES)
         drives = len(linear.drives)
-        self.block_groups = -(-(n + 1 + 2 * drives) // LANES)
+        courses = len(linear.courses)
+        self.block_groups = -(-(n + 1 + 2 * drives + TERMS * courses) // LANES)
         self.rows = 2 * self.groups + self.block_groups
         self.sizes = np.array(
-            [n, self.groups, self.state_groups, rows, guards, drives, self.rows, 0], np.int64
+            [n, self.groups, self.state_groups, rows, guards, drives, self.rows, courses, 0],
+            np.int64,
         )
+
+    def clear(self) -> None:
+        """Drop all sets and contact states: their numbers are of a new generation. Arrays that
+        kernels hold stay as they are.
+        """
+        self.generation += 1
+        self.modes, self.steady, self.pieces = _Rows(), _Rows(), _Rows()
+        self._courses: dict[tuple[Expr, bytes], tuple[Course, list[float]]] = {}
+        self._sets: dict[bytes, int] = {}
+        self.sets: list[_Set] = []
+        self._equations: dict[tuple[object, ...], _Equations] = {}
+        self._smooth: dict[tuple[object, ...], bool] = {}
+        self._known: dict[tuple[int, bytes], int] = {}
+        self._states: dict[tuple[int, int], int] = {}
+        #: Equations and modes of each contact state.
+        self.made: list[tuple[_Equations, StateModes]] = []
+        drives, guards = max(len(self.linear.drives), 1), len(self.linear.system.guards)
+        self._offset, self._rate, self._lag = _Rows(max(guards, 1)), _Rows(drives), _Rows(drives)
+        self._links = _Rows(layout.BEHIND + guards, int)
+        self._course = _Rows(max(4 * len(self.linear.courses), 1))
+        self._held = 0
+
+    @property
+    def full(self) -> bool:
+        """True if the tables hold MOST_BYTES or more."""
+        rows = sum(one.table.nbytes for one in (self.modes, self.steady, self.pieces))
+        return self._held + rows >= MOST_BYTES
 
     def _rows_of_gaps(self) -> tuple[np.ndarray, np.ndarray]:
         """Row and sign of each guard's gap: guards whose gaps differ by a number only share one."""
@@ -121,8 +153,11 @@ class Tables:
     # -- what the kernel reads ---------------------------------------------------------------------
     def arrays(self) -> tuple[np.ndarray, ...]:
         """The tables, in the order in which the kernel takes them after the sizes."""
-        parts = (self._offset, self._rate, self._lag, self.modes, self.steady, self._links)
-        return self.row_of, self.sign_of, *(one.table for one in parts)
+        links = self._links.table[: self._links.used].copy()  # others change while a kernel reads
+        return (
+            self.row_of, self.sign_of, self._offset.table, self._rate.table, self._lag.table,
+            self.modes.table, self.steady.table, links, self._course.table, self.pieces.table,
+        )  # fmt: skip
 
     def set_of(self, row: np.ndarray) -> int:
         """Number of a set of parameter values."""
@@ -130,16 +165,33 @@ class Tables:
         if key not in self._sets:
             values = dict(zip(self.linear.system.values, row.tolist(), strict=True))
             rates, lags = self.linear.rates(values)
-            gaps = self.linear.gaps(values)
+            found = [self._course_of(node, values) for node in self.linear.courses]
+            rows = np.array([row for _, row in found], float).ravel()
+            courses, gaps = tuple(course for course, _ in found), self.linear.gaps(values)
             for table, numbers in (
-                (self._offset, gaps.constant),
-                (self._rate, rates),
-                (self._lag, lags),
-            ):
+                (self._offset, gaps.constant), (self._rate, rates), (self._lag, lags),
+                (self._course, rows),
+            ):  # fmt: skip
                 table.add(np.append(numbers, np.zeros(table.table.shape[1] - len(numbers))))
-            self.sets.append(_Set(values, gaps, rates, lags))
+            self.sets.append(_Set(values, gaps, rates, lags, courses))
             self._sets[key] = len(self.sets) - 1
+            self._held += SET_BYTES + self.sets[-1].gaps.matrix.nbytes
         return self._sets[key]
+
+    def _course_of(self, node: Expr, values: dict[str, float]) -> tuple[Course, list[float]]:
+        """A course and its row of numbers for the kernel: one for all values that it doesn't ask
+        for.
+        """
+        asked = [one.payload for one in walk(node) if one.op == "param"]
+        key = (node, np.array([values[name] for name in asked]).tobytes())
+        if key not in self._courses:
+            course = course_of(node, values)
+            begins = np.concatenate([course.begins, np.zeros(-len(course.begins) % LANES)])
+            first = self.pieces.add(np.concatenate([begins, course.terms.ravel()]))
+            row = [first, len(course.begins), course.cycle, len(begins) // LANES]
+            self._courses[key] = course, row
+            self._held += course.begins.nbytes + course.terms.nbytes
+        return self._courses[key]
 
     def state_of(self, which: int, mode: int) -> int:
         """Number of a contact state, made if it isn't known."""
@@ -149,9 +201,11 @@ class Tables:
 
     def _make(self, which: int, mode: int) -> None:
         given, known = self.sets[which], self._equations_of(self.sets[which], mode)
+        speeds = np.array([one.speeds for one in given.courses]).reshape(-1, TERMS)
         modes = modes_of(
-            known.piece, given.gaps, given.rates, LANES * self.groups, known.eigen, known.fastest
-        )
+            known.piece, given.gaps, given.rates, speeds, LANES * self.groups, known.eigen,
+            known.fastest,
+        )  # fmt: skip
         number, guards = len(self.made), len(self.linear.system.guards)
         links = [self._modes_of(known, modes, given), self._steady_of(modes, given), 0]
         for g in range(guards):
@@ -177,6 +231,7 @@ class Tables:
                 others = [self.linear.piece(given.values, one).matrix for one in (0, every)]
                 fastest = max(float(np.abs(np.linalg.eigvals(one)).max()) for one in others)
             self._equations[mode, used] = _Equations(piece, eigen_of(piece.matrix), fastest)
+            self._held += 8 * piece.matrix.nbytes
         return self._equations[mode, used]
 
     def _is_smooth(self, one: _Equations, other: _Equations, gaps: LinearPiece, g: int) -> bool:
@@ -185,7 +240,7 @@ class Tables:
             self._smooth[key] = _is_smooth(one.piece, other.piece, gaps, g)
         return self._smooth[key]
 
-    def _modes_of(self, known: _Equations, modes: Modes, given: _Set) -> int:
+    def _modes_of(self, known: _Equations, modes: StateModes, given: _Set) -> int:
         """First row of the table of some modes; those of equal equations share one, but for blocks,
         which hold drives.
         """
@@ -196,7 +251,7 @@ class Tables:
             self._known[key] = self.modes.add(self._table(modes, given.gaps.matrix))
         return self._known[key]
 
-    def _table(self, modes: Modes, gaps: np.ndarray) -> np.ndarray:
+    def _table(self, modes: StateModes, gaps: np.ndarray) -> np.ndarray:
         """The table of some modes: lambda, its size, L, V, amplitudes of the gaps; the block."""
         values, vectors, inverse = modes.values, modes.vectors, modes.inverse
         slots, states = slots_of(values), len(vectors)
@@ -223,20 +278,28 @@ class Tables:
             [one.ravel() for one in (lam.real, lam.imag, size, left, right, waves, *block)]
         )
 
-    def _steady_of(self, modes: Modes, given: _Set) -> int:
-        """First row of the table of the steady answer to the drives."""
-        answers = modes.answers.T  # [1 + drives, N]
+    def _steady_of(self, modes: StateModes, given: _Set) -> int:
+        """First row of the table of the steady answer: to the constant, to cosine and sine of each
+        harmonic drive, to each derivative of each course.
+        """
+        harmonic, first = 1 + len(given.rates), self.first_guard
+        answers = modes.answers.T  # [1 + drives + TERMS * courses, N]
         padded = np.zeros((len(answers), LANES * self.state_groups), complex)
         padded[:, : answers.shape[1]] = answers
-        waves = np.stack([padded.real, padded.imag], axis=1).reshape(-1, padded.shape[1])
-        states = np.delete(waves, 1, axis=0)  # the constant has no imaginary part
-        first = self.first_guard
-        gaps = given.gaps.matrix[first] @ answers.T  # [rows, 1 + drives]
-        gaps[:, 1:] += given.gaps.driven[first]
-        pairs = np.stack([gaps.real, gaps.imag], axis=2).reshape(len(first), -1)
-        numbers = np.delete(pairs, 1, axis=1).ravel()
-        numbers = np.concatenate([numbers, np.zeros(-len(numbers) % LANES)])
-        return self.steady.add(np.concatenate([states.ravel(), numbers]))
+        gaps = given.gaps.matrix[first] @ answers.T
+        gaps[:, 1:harmonic] += given.gaps.driven[first, : harmonic - 1]
+        gaps[:, harmonic::TERMS] += given.gaps.driven[first, harmonic - 1 :]
+        # only the harmonic ones have an imaginary part
+        states = [padded[0].real]
+        numbers = [gaps[:, 0].real]
+        for d in range(1, harmonic):
+            states += [padded[d].real, padded[d].imag]
+            numbers += [gaps[:, d].real, gaps[:, d].imag]
+        states += list(padded[harmonic:].real)
+        numbers += list(gaps[:, harmonic:].T.real)
+        flat = np.array(numbers).T.ravel()
+        flat = np.concatenate([flat, np.zeros(-len(flat) % LANES)])
+        return self.steady.add(np.concatenate([*states, flat]))
 
 
 def _is_smooth(one: LinearPiece, other: LinearPiece, gaps: LinearPiece, g: int) -> bool:

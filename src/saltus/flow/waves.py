@@ -1,10 +1,10 @@
-"""Motions as the modal flow moves them: between two contacts every quantity is a sum of waves, whose
-mean, mean square, largest value and turning points are exact.
+"""Motions as the modal flow moves them: between two contacts every quantity is a sum of waves,
+whose mean, mean square, largest value and turning points are exact.
 
 On a leg, q(t) = Re(sum_e r_e a_e e^{mu_e t}): the waves are the modes of the contact state, a
 constant (mu = 0) and the drives (mu = i rate). Largest values and turning points are found by
-halving: an interval is left out once bounds of the waves show that it can't hold one. A wave that is
-slow in an interval is bounded by its slope and curvature there, a fast one by its size.
+halving: an interval is left out once bounds of the waves show that it can't hold one. A wave that
+is slow in an interval is bounded by its slope and curvature there, a fast one by its size.
 """
 
 from __future__ import annotations
@@ -51,7 +51,8 @@ class Legs:
         float64[m] since their beginnings: complex128[m, E]; float64[m, R].
         """
         waves = self.amplitudes[leg] * np.exp(self.rates * time[:, None])
-        return (waves @ self.rows.T).real if row is None else waves * self.rows[row]
+        found: np.ndarray = (waves @ self.rows.T).real if row is None else waves * self.rows[row]
+        return found
 
     def integrals(self, rates: np.ndarray) -> np.ndarray:
         """The integral of e^{rate t} over each leg, rates complex128[..]; complex128[p, ..]."""
@@ -166,7 +167,7 @@ def _bounds(
 
 def _growth(rates: np.ndarray, time: np.ndarray) -> np.ndarray:
     """Largest factor by which waves grow on the way, float64[.., E]."""
-    return np.exp(np.maximum(rates.real * time[:, None], 0.0))
+    return np.asarray(np.exp(np.maximum(rates.real * time[:, None], 0.0)))
 
 
 def _room(waves: np.ndarray, rates: np.ndarray, half: np.ndarray) -> np.ndarray:
@@ -174,8 +175,8 @@ def _room(waves: np.ndarray, rates: np.ndarray, half: np.ndarray) -> np.ndarray:
     after.
     """
     slow, rest = _parts_of_room(np.abs(waves), rates, half)
-    room: np.ndarray = np.abs(np.where(slow, rates * waves, 0.0).real.sum(axis=1)) * half
-    return room + rest.sum(axis=1)
+    slope = np.abs(np.where(slow, rates * waves, 0.0).real.sum(axis=1)) * half
+    return np.asarray(slope + rest.sum(axis=1))
 
 
 def _parts_of_room(

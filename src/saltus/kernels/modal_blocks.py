@@ -1,10 +1,11 @@
-"""Template, 1 of 4 of the modal flow: modes that don't go their own ways go together, in a block.
+"""Template, 2 of 5 of the modal flow: modes that don't go their own ways go together, in a block.
 
 The block of a contact state is v' = T v: amplitudes of an invariant subspace, and of the drives
 that it resonates with. Its table: a row (groups, alpha, drives); T, column by column; L and V; for
-each row of gaps w and w T; for each of its drives a row (number, first amplitude, scale). alpha is
-such that ||T^k|| <= alpha^k for all k > 11 (Al-Mohy & Higham, SIAM J. Matrix Anal. Appl. 31 (2009),
-theorem 4.2): exp(T h) v is its Taylor series in parts of alpha h <= 1. A block is always followed.
+each row of gaps w and w T; for each of its drives a row (number, first amplitude, scale, rate).
+alpha is such that ||T^k|| <= alpha^k for all k > 11 (Al-Mohy & Higham, SIAM J. Matrix Anal. Appl.
+31 (2009), theorem 4.2): exp(T h) v is its Taylor series in parts of alpha h <= 1. A block is always
+followed.
 """
 
 from saltus.kernels.lanes import fma, larger, load, magnitude, splat, store
@@ -56,9 +57,14 @@ def set_block_drives(modes, m):
         d, k, scale = int(m.modes[row + e, 0]), int(m.modes[row + e, 1]), m.modes[row + e, 2]
         if d == 0:
             m.y[first + k // LANES, k % LANES] = scale
-        else:
+        elif d <= m.sizes[DRIVES]:
             m.y[first + k // LANES, k % LANES] = scale * m.angle[d - 1, 1]
             m.y[first + (k + 1) // LANES, (k + 1) % LANES] = scale * m.angle[d - 1, 2]
+        else:
+            for j in range(COURSE_TERMS):
+                value = scale * m.record[d - 1 - m.sizes[DRIVES], VALUE + j]
+                m.y[first + (k + j) // LANES, (k + j) % LANES] = value
+                scale /= m.modes[row + e, 3]
 
 
 @kernel

@@ -1,4 +1,4 @@
-"""Template, 2 of 4 of the modal flow: amplitudes on their way, and what they say of gaps."""
+"""Template, 3 of 5 of the modal flow: amplitudes on their way, and what they say of gaps."""
 
 import math
 
@@ -55,15 +55,17 @@ def begin_period(i, batch, m):
             + turned(rate, batch.origin[i], 1)
             + turned(rate, batch.period[i], batch.count[i])
         )
+    begin_courses(i, batch, m)
 
 
 @kernel
 def drive(i, tau, batch, m):
-    """Cosine, sine and rate of each drive at a time of the period, to `angle`."""
+    """Cosine and sine of each drive at a time of the period, to `angle`; the courses there."""
     which = int(batch.carry[i, SET])
     for d in range(m.sizes[DRIVES]):
-        at, m.angle[d, 3] = m.angle[d, 0] + m.rate[which, d] * tau, m.rate[which, d]
+        at = m.angle[d, 0] + m.rate[which, d] * tau
         m.angle[d, 1], m.angle[d, 2] = math.cos(at), math.sin(at)
+    courses_at(tau, m)
 
 
 @kernel
@@ -76,20 +78,37 @@ def answer_now(steady, m):
             row = steady + (1 + 2 * d) * groups + s
             total = fma(load(m.steady, row, LANES), m.angle[d, 1], total)
             total = fma(load(m.steady, row + groups, LANES), -m.angle[d, 2], total)
+        for p in range(m.sizes[COURSES]):
+            row = steady + (1 + 2 * m.sizes[DRIVES] + COURSE_TERMS * p) * groups + s
+            for k in range(COURSE_TERMS):
+                part = load(m.steady, row + k * groups, LANES)
+                total = fma(part, m.record[p, VALUE + k], total)
         store(m.answer, s, total)
 
 
 @kernel
-def answer_rate_now(steady, m):
-    """The rate of the steady answer to the drives, whose phases are in `angle`, to `answer`."""
+def answer_rate(steady, which, m):
+    """The rate of the steady answer, whose phases are in `angle`, to `answer`."""
     groups = m.sizes[STATE_GROUPS]
     for s in range(groups):
         total = splat(0.0, LANES)
         for d in range(m.sizes[DRIVES]):
-            row = steady + (1 + 2 * d) * groups + s
-            total = fma(load(m.steady, row, LANES), -m.angle[d, 2] * m.angle[d, 3], total)
-            total = fma(load(m.steady, row + groups, LANES), -m.angle[d, 1] * m.angle[d, 3], total)
+            row, rate = steady + (1 + 2 * d) * groups + s, m.rate[which, d]
+            total = fma(load(m.steady, row, LANES), -rate * m.angle[d, 2], total)
+            total = fma(load(m.steady, row + groups, LANES), -rate * m.angle[d, 1], total)
+        for p in range(m.sizes[COURSES]):
+            row = steady + (1 + 2 * m.sizes[DRIVES] + COURSE_TERMS * p) * groups + s
+            for k in range(COURSE_TERMS - 1):
+                part = load(m.steady, row + k * groups, LANES)
+                total = fma(part, m.record[p, VALUE + k + 1], total)
         store(m.answer, s, total)
+
+
+@inner
+def numbers_of_gap(r, steady, m):
+    """Place of the steady answer of a row of gaps: the first row of numbers, the first of them."""
+    numbers = 1 + 2 * m.sizes[DRIVES] + COURSE_TERMS * m.sizes[COURSES]
+    return steady + numbers * m.sizes[STATE_GROUPS], r * numbers
 
 
 # -- states and amplitudes -------------------------------------------------------------------------
@@ -229,8 +248,7 @@ def series_of(r, modes, steady, which, h, m):
         total_of(m.sums, ORDER + 2),
         total_of(m.sums, ORDER + 3),
     )
-    first = steady + (1 + 2 * drives) * m.sizes[STATE_GROUPS]
-    at = r * (1 + 2 * drives)
+    first, at = numbers_of_gap(r, steady, m)
     m.q[r, 0] += number(m.steady, first, at)
     scale += abs(number(m.steady, first, at))
     for d in range(drives):
@@ -247,6 +265,7 @@ def series_of(r, modes, steady, which, h, m):
         for k in range(ORDER + 1):
             m.q[r, k] += real
             real, imaginary = -imaginary * reach, real * reach
+    scale += add_course_series(r, first, at + 1 + 2 * drives, h, m)
     share = 1.0
     for k in range(2, ORDER + 1):
         share /= k
@@ -272,11 +291,11 @@ def gap_of_moved(r, modes, steady, which, m):
     store(m.sums, 1, rate)
     add_block_gap(r, modes, m)
     v, w = total_of(m.sums, 0), total_of(m.sums, 1)
-    first = steady + (1 + 2 * drives) * m.sizes[STATE_GROUPS]
-    at = r * (1 + 2 * drives)
+    first, at = numbers_of_gap(r, steady, m)
     v += number(m.steady, first, at)
     for d in range(drives):
         a, b = number(m.steady, first, at + 1 + 2 * d), number(m.steady, first, at + 2 + 2 * d)
         v += a * m.angle[d, 1] - b * m.angle[d, 2]
         w -= (a * m.angle[d, 2] + b * m.angle[d, 1]) * m.rate[which, d]
-    return v, w
+    value_of, rate_of = course_gap(first, at + 1 + 2 * drives, m)
+    return v + value_of, w + rate_of

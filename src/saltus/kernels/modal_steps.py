@@ -1,4 +1,4 @@
-"""Template, 4 of 4 of the modal flow: steps that are proven to cross no boundary, or just one, and
+"""Template, 5 of 5 of the modal flow: steps that are proven to cross no boundary, or just one, and
 the life of a trajectory.
 
 A step is tried and halved until every gap is decided. Modes that are too fast for it are bounded:
@@ -302,7 +302,7 @@ def write_samples(i, tau, until, modes, steady, batch, m):
         for j in range(states):
             batch.samples[i, k, j] = m.state[j // LANES, j % LANES]
         if m.sizes[TANGENTS] != 0:
-            columns_after(i, modes, batch.carry[i, SINCE] + (due - tau), batch, m)
+            columns_after(i, modes, batch.carry[i, WAITED] + (due - tau), batch, m)
             for j in range(states * states):
                 batch.samples[i, k, states + j] = m.columns[j // states, j % states]
         batch.sample_mode[i, k] = batch.mode[i]
@@ -327,6 +327,26 @@ def enter(i, tau, batch, m):
 
 
 @kernel
+def leave(i, tau, batch, m):
+    """Make the state of the amplitudes before a course changes its piece; nothing without one."""
+    if m.sizes[COURSES] > 0:
+        at = int(batch.carry[i, AT])
+        drive(i, tau, batch, m)
+        answer_now(m.links[at, STEADY], m)
+        state_of(m.links[at, MODES], m.y, m)
+        for j in range(m.sizes[STATES]):
+            batch.state[i, j] = m.state[j // LANES, j % LANES]
+
+
+@kernel
+def take_up(i, tau, batch, m):
+    """Make the amplitudes anew of the state that :func:`leave` has left."""
+    if m.sizes[COURSES] > 0:
+        follow_courses(i, tau, batch, m)
+        enter(i, tau, batch, m)
+
+
+@kernel
 def land(i, tau, d, hits, modes, steady, batch, m):
     """Cross boundaries a time d after tau: the contacts are recorded, the contact state changes.
     Returns the status.
@@ -347,7 +367,7 @@ def land(i, tau, d, hits, modes, steady, batch, m):
     for j in range(m.sizes[STATES]):
         batch.state[i, j] = m.state[j // LANES, j % LANES]
     if m.sizes[TANGENTS] != 0:
-        batch.carry[i, SINCE] += d
+        batch.carry[i, WAITED] += d
         leave_columns(i, hits, modes, steady, batch, m)
     at = int(batch.carry[i, AT])
     for g in range(m.sizes[GUARDS]):
@@ -407,6 +427,7 @@ def advance(i, budget, batch, m):
     """
     tau, rows = batch.phase[i], m.sizes[ROWS]
     begin_period(i, batch, m)
+    follow_courses(i, tau, batch, m)
     if batch.carry[i, ENTERS] > 0.5:
         enter(i, tau, batch, m)
     else:
@@ -420,15 +441,18 @@ def advance(i, budget, batch, m):
         end = end_of(i, batch)
         if tau >= end:
             if batch.count[i] < batch.end_count[i]:
+                leave(i, tau, batch, m)
                 batch.count[i] += 1
                 tau = 0.0
                 begin_period(i, batch, m)
+                take_up(i, tau, batch, m)
                 write_samples(i, tau, tau, modes, steady, batch, m)
             if batch.count[i] >= batch.end_count[i] and tau >= batch.end_phase[i]:
                 status = at_the_end(i, batch)
             continue
         budget -= 1
-        h = min(batch.carry[i, NEXT_STEP], end - tau)
+        following, wanted = next_break(m), batch.carry[i, NEXT_STEP]
+        h = min(wanted, end - tau, following - tau)
         drive(i, tau, batch, m)
         set_block_drives(modes, m)
         h = reach(i, tau, h, modes, steady, batch, m)
@@ -446,13 +470,21 @@ def advance(i, budget, batch, m):
                 move(modes, h, m)
                 keep_moved(m)
                 keep_on(i, h, batch, m)
-                batch.carry[i, SINCE] += h
-                tau = end if h == end - tau else tau + h
+                batch.carry[i, WAITED] += h
+                if h == following - tau:
+                    batch.carry[i, NEXT_STEP] = max(wanted, 2.0 * h)
+                    tau = following
+                else:
+                    tau = end if h == end - tau else tau + h
+                if is_break(i, tau, batch, m):
+                    leave(i, tau, batch, m)
+                    take_up(i, tau, batch, m)
                 status = NONFINITE if is_lost(i, batch, m) else RUNNING
             else:
                 status = land(i, tau, d, hits, modes, steady, batch, m)
                 tau += d
                 if batch.carry[i, AT] >= 0.0:
+                    follow_courses(i, tau, batch, m)
                     enter(i, tau, batch, m)
         if status == RUNNING and batch.counters[i, EVENTS] >= batch.options[i, MOST_CONTACTS]:
             status = BUDGET_EVENTS
@@ -483,8 +515,8 @@ def propagate(
     period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count,
     end_phase, counters, minima, sample_count, sample_fraction, cursor, samples, sample_mode,
     rec_first, rec_i, rec_f, rec_used, options, data, budget, sizes, row_of, sign_of, offset, rate,
-    lag, modes, steady, links, y, moved, size, sums, q, errors, p, bern, bounds, slopes, out,
-    touches, place, answer, angle, found, chain, factor, column, columns,
+    lag, modes, steady, links, course, pieces, y, moved, size, sums, q, errors, p, bern, bounds,
+    slopes, out, touches, place, answer, angle, found, chain, follows, factor, column, columns,
 ):  # fmt: skip
     """Move every trajectory whose status is RUNNING and whose contact state has been made, `budget`
     steps at most. See kernels/batch.py for the arrays.
@@ -495,9 +527,9 @@ def propagate(
         rec_first, rec_i, rec_f, rec_used, options, data,
     )  # fmt: skip
     m = Modal(
-        sizes, row_of, sign_of, offset, rate, lag, modes, steady, links, y, moved, size, sums, q,
-        errors, p, bern, bounds, slopes, out, touches, place, answer, angle, found, chain, factor,
-        column, columns,
+        sizes, row_of, sign_of, offset, rate, lag, modes, steady, links, course, pieces, y, moved,
+        size, sums, q, errors, p, bern, bounds, slopes, out, touches, place, answer, angle, found,
+        chain, follows, factor, column, columns,
     )  # fmt: skip
     waits = False
     for i in range(status.shape[0]):

@@ -1,4 +1,4 @@
-"""Template, 3 of 4 of the modal flow: the derivative of the state with respect to the state at the
+"""Template, 4 of 5 of the modal flow: the derivative of the state with respect to the state at the
 start.
 
 In a contact state it is moved by e^{A h}, whatever the motion does, so it waits until the motion
@@ -46,25 +46,25 @@ def columns_after(i, modes, h, batch, m):
 @kernel
 def move_columns(i, modes, batch, m):
     """Move the derivative to where the motion is."""
-    if m.sizes[TANGENTS] == 0 or batch.carry[i, SINCE] == 0.0:
+    if m.sizes[TANGENTS] == 0 or batch.carry[i, WAITED] == 0.0:
         return
     states = m.sizes[STATES]
-    columns_after(i, modes, batch.carry[i, SINCE], batch, m)
+    columns_after(i, modes, batch.carry[i, WAITED], batch, m)
     for r in range(states):
         for c in range(states):
             batch.state[i, states + states * r + c] = m.columns[r, c]
-    batch.carry[i, SINCE] = 0.0
+    batch.carry[i, WAITED] = 0.0
 
 
 @kernel
-def rates_of(modes, steady, y, m):
+def rates_of(modes, steady, which, y, m):
     """The rates of the states where the amplitudes are y, to `state`. Needs `angle`."""
     groups = m.sizes[MODE_GROUPS]
     for g in range(groups):
         a, b = load(m.modes, modes + g, LANES), load(m.modes, modes + groups + g, LANES)
         turn(y, g, a, b, m.column, m)
     block_rates(modes, y, m.column, m)
-    answer_rate_now(steady, m)
+    answer_rate(steady, which, m)
     state_of(modes, m.column, m)
 
 
@@ -85,7 +85,7 @@ def leave_columns(i, hits, modes, steady, batch, m):
     for g in range(m.sizes[GUARDS]):
         _, rate = gap_of_moved(m.row_of[g], modes, steady, int(batch.carry[i, SET]), m)
         batch.carry[i, first + states + g] = m.sign_of[g] * rate
-    rates_of(modes, steady, m.moved, m)
+    rates_of(modes, steady, int(batch.carry[i, SET]), m.moved, m)
     for r in range(states):
         batch.carry[i, first + r] = m.state[r // LANES, r % LANES]
     batch.carry[i, CROSSED] = float(hits)
@@ -119,7 +119,7 @@ def enter_columns(i, at, batch, m):
     g = 0
     while (jumps >> g) & 1 == 0:
         g += 1
-    rates_of(modes, m.links[at, STEADY], m.y, m)
+    rates_of(modes, m.links[at, STEADY], int(batch.carry[i, SET]), m.y, m)
     for r in range(states):
         batch.carry[i, first + r] = m.state[r // LANES, r % LANES] - batch.carry[i, first + r]
     share = m.sign_of[g] / batch.carry[i, first + states + g]
