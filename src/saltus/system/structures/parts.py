@@ -6,7 +6,7 @@ import fnmatch
 import functools
 import keyword
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import MISSING, dataclass, field, fields
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
@@ -53,7 +53,7 @@ def _answered(kind: type[P]) -> type[P]:
 
 def _check_names(kind: type[Any], given: Mapping[Any, Any], places: int = 0) -> None:
     """Raise a ParameterError for unknown or missing arguments of a part."""
-    allowed = [field.name for field in fields(kind)]
+    allowed = [one.name for one in fields(kind)]
     for name in given:
         if not among(name, allowed):
             advice = _ELSEWHERE.get(name) if isinstance(name, str) else None
@@ -62,7 +62,9 @@ def _check_names(kind: type[Any], given: Mapping[Any, Any], places: int = 0) -> 
             )
     if places > len(allowed) or set(given) & set(allowed[:places]):
         raise ParameterError(f"write sl.{kind.__name__}({', '.join(allowed[:3])}, ...).")
-    needed = [field.name for field in fields(kind) if field.default is MISSING]
+    needed = [
+        one.name for one in fields(kind) if one.default is MISSING or "needed" in one.metadata
+    ]
     if missing := [name for name in needed[places:] if name not in given]:
         raise ParameterError(f"a {kind.__name__} needs {', '.join(missing)}.")
 
@@ -110,7 +112,7 @@ class Contact:
 
     at: str
     stiffness: float | str | None = None
-    gap: float | str | None = None
+    gap: float | str | None = field(default=None, metadata={"needed": True})
     to: str | None = None
     side: str = "upper"
     damping: float | str | None = None
@@ -204,7 +206,8 @@ def parts(kind: type[P], given: Any, word: str, known: Iterable[str]) -> list[tu
     ParameterError
         If one of them can't be used.
     """
-    if isinstance(given, Contact | Force | Base | Mapping) or not isinstance(given, Iterable):
+    alone = isinstance(given, Contact | Force | Base | Mapping | str)
+    if alone or not isinstance(given, Iterable):
         raise must_be(f"{word}s", "a list of them", given)
     degrees = list(known)
     found = [part if isinstance(part, kind) else _made(kind, part) for part in given]
@@ -231,7 +234,7 @@ def parts(kind: type[P], given: Any, word: str, known: Iterable[str]) -> list[tu
 
 
 def _made(kind: type[P], given: Any) -> P:
-    allowed = [field.name for field in fields(kind)]
+    allowed = [one.name for one in fields(kind)]
     if not isinstance(given, Mapping):
         raise ParameterError(
             f"write sl.{kind.__name__}({', '.join(allowed[:3])}, ...), or a mapping of these "
@@ -276,14 +279,13 @@ def _check_contact(name: str, part: Contact, known: list[str]) -> None:
     one_of(SIDES, f"{name}: ", side=part.side)
     if part.to is not None:
         _check_places(name, [part.at, part.to], known)
-    if part.gap is None:
-        raise ParameterError("a Contact needs gap.")
     if (part.stiffness is None) == (part.restitution is None):
         raise ParameterError(
             f"{name}: a stop is a spring, by stiffness= and damping=, or rigid, by restitution=. "
             f"Give one of the two."
         )
-    if part.restitution is not None and (part.damping, part.power) != (None, None):
+    sprung = any(one is not None for one in (part.damping, part.power))
+    if part.restitution is not None and sprung:
         raise ParameterError(
             f"{name}: damping= and power= are those of a spring, and a rigid stop has none. It "
             f"loses energy by restitution=."

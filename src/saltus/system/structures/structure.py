@@ -58,7 +58,7 @@ def structure(
     *,
     contacts: Sequence[Any] = (),
     forces: Sequence[Any] = (),
-    base: Any = (),
+    base: Base | Sequence[Any] | Mapping[str, Any] | None = None,
     frequency: float | str | None = None,
     damping_ratio: Any = None,
     modes: int | None = None,
@@ -151,7 +151,8 @@ def structure(
     degrees = degree_names(names, size)
     touching = parts(Contact, contacts, "stop", degrees)
     driving = parts(Force, forces, "force", degrees)
-    shaking = parts(Base, [base] if isinstance(base, Base | Mapping) else base, "base", degrees)
+    bases = base if isinstance(base, list | tuple) else [base] if base is not None else []
+    shaking = parts(Base, bases, "base", degrees)
     loads = Loads(
         touching, [*driving, *shaking],
         [direction(one, degrees) for _, one in driving]
