@@ -21,6 +21,8 @@ from saltus.system.trace import system
 #: An entry of the mode shapes below this share of the largest is rounding: the mode doesn't move
 #: that degree of freedom.
 NOTHING = 1e-13
+#: A modal force below this share of the largest is rounding of a sum over all degrees of freedom.
+ROUNDING = 1e-12
 #: Unit of a deflection: those of its rate, a force, a stiffness, a damper and an acceleration.
 UNITS = {
     "m": ("m/s", "N", "N/m", "N*s/m", "m/s^2"),
@@ -49,8 +51,18 @@ class Coordinates:
         if self.transform is None:
             return vector
         found = vector @ self.transform
-        largest = np.abs(self.transform).max() * np.abs(vector).max()
-        return np.where(np.abs(found) <= NOTHING * largest, 0.0, found)
+        return np.where(np.abs(found) <= NOTHING * np.abs(self.transform).max(), 0.0, found)
+
+    def compliance(self, along: np.ndarray) -> float:
+        """1/mass of the structure along a direction of its coordinates [1/kg]."""
+        return float(along @ (along if self.inverse is None else self.inverse @ along))
+
+    def load(self, vector: np.ndarray) -> np.ndarray:
+        """A force on the degrees of freedom in these coordinates."""
+        if self.transform is None:
+            return vector
+        found = vector @ self.transform
+        return np.where(np.abs(found) <= ROUNDING * np.abs(found).max(), 0.0, found)
 
 
 @dataclass(frozen=True)
@@ -83,7 +95,7 @@ def traced(
     """The system, and the boundary of each contact by its name."""
     needs, repeats = drives.forcing(loads.drives, frequency)
     ways = [_way(moving, degrees, label, contact) for label, contact in loads.contacts]
-    along = [moving.along(one) for one in loads.along]
+    along = [moving.load(one) for one in loads.along]
     defaults, units = _parameters(loads, unit)
     if needs:
         defaults[FREQUENCY] = frequency
