@@ -113,19 +113,10 @@ def traced(
             _add(load, place, drives.value(t, label, drive, values))
         for (label, contact), way in zip(loads.contacts, ways, strict=True):
             at = way.moving(z, w)
-            for side in laws.sides(contact):
-                both = f"{label} {side}" if contact.side == "both" else label
-                sides[both] = laws.relation(label, side, at, values)
-            pushed, rubbed = laws.forces(label, contact, at, values)
-            if contact.preload is not None:
-                pressing = values[f"{label}_preload"]
-                _add(load, way.pushed if contact.side == "upper" else -way.pushed, pressing)
-            if pushed is None:
+            sides.update(laws.boundaries(label, contact, at, values))
+            if contact.restitution is not None:
                 stops += laws.impacts(label, contact, at, values, way.inertia)
-                continue
-            _add(load, -way.pushed, pushed)
-            if rubbed is not None:
-                _add(load, -way.rubbed, rubbed)
+            _press(load, label, contact, way, at, values)
         for matrix, of in ((moving.stiffness, z), (moving.damping, w)):
             if matrix is not None:
                 rows = matrices.dense(matrix)
@@ -144,6 +135,20 @@ def traced(
         check_units=False,  # numbers of the matrices carry units of their own
     )
     return made(rates), sides
+
+
+def _press(
+    load: list[Any], label: str, contact: Contact, way: Way, at: laws.Moving, values: dict[str, Any]
+) -> None:
+    """Add the forces of a contact to the loads: preload, spring and damper, friction."""
+    if contact.preload is not None:
+        towards = way.pushed if contact.side == "upper" else -way.pushed
+        _add(load, towards, values[f"{label}_preload"])
+    pushed, rubbed = laws.forces(label, contact, at, values)
+    if pushed is not None:
+        _add(load, -way.pushed, pushed)
+    if rubbed is not None:
+        _add(load, -way.rubbed, rubbed)
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from saltus.arguments import checked
+from saltus.contact.contacts import renamed
 from saltus.contact.guards import number_of
 from saltus.errors import ParameterError, SaltusWarning, among, must_be, shown
 from saltus.system.structures import matrices, told
@@ -62,7 +63,9 @@ def structure(
     name: str = "structure",
     source: str = "",
 ) -> System:
-    """A system of n degrees of freedom, from its matrices, with contacts and forces given as data::
+    """A system of n degrees of freedom, from its matrices, with contacts and forces given as data.
+
+    Its equation of motion is::
 
         mass x'' + damping x' + stiffness x = forces - contacts - mass direction acceleration
 
@@ -183,12 +186,9 @@ def structure(
         if spring is not None and contact.power in (None, 1):
             compliance = moving.compliance(moving.along(direction(contact, degrees)))
             told.doubt_stiff(label, spring, compliance, angular[:count].max(initial=0.0))
-    guards = list(made.guards)
-    for label, side in sides.items():
-        number = number_of(side, made.guards)
-        if number is not None:
-            guards[number] = replace(guards[number], name=label)
-    return replace(made, guards=tuple(guards), description=words)
+    numbers = {label: number_of(side, made.guards) for label, side in sides.items()}
+    named = {number: label for label, number in numbers.items() if number is not None}
+    return replace(made, guards=renamed(made.guards, named), description=words)
 
 
 # -- coordinates -----------------------------------------------------------------------------------
