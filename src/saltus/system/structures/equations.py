@@ -153,7 +153,7 @@ def _press(
 
 @dataclass(frozen=True)
 class Way:
-    """How a contact moves, in the coordinates of the structure: its deflection is ``pushed.z``, its
+    """The motion of a contact in the coordinates of the structure: its deflection is ``pushed.z``, its
     slip ``rubbed.z'``; ``inertia`` is that of the rates which a rigid stop changes.
     """
 

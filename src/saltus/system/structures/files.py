@@ -151,7 +151,7 @@ def _texts(given: Any) -> list[str]:
 
 # -- formats ---------------------------------------------------------------------------------------
 def _held(file: File) -> dict[str, Any]:
-    """What a file holds, by name; a matrix without a name is called ``""``."""
+    """The matrices of a file by their names; a matrix without a name is called ``""``."""
     parts = file.name.lower().rsplit(".", 1)
     reader = _READERS.get(parts[-1]) if len(parts) == 2 else None
     if reader is None:
