@@ -67,7 +67,7 @@ class Coordinates:
 
 @dataclass(frozen=True)
 class Loads:
-    """What acts on a structure, each with its name.
+    """Contacts and drives of a structure, each with its name.
 
     Attributes
     ----------
