@@ -154,7 +154,8 @@ def _press(
 @dataclass(frozen=True)
 class Way:
     """The motion of a contact in the coordinates of the structure: its deflection is
-    ``pushed.z``, its slip ``rubbed.z'``; ``inertia`` is that of the rates which a rigid stop changes.
+    ``pushed.z``, its slip ``rubbed.z'``; ``inertia`` is that of the rates which a rigid stop
+    changes.
     """
 
     pushed: np.ndarray
