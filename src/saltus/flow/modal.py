@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,7 +14,7 @@ from saltus.codegen.module import Flow, modal_module
 from saltus.errors import ParameterError
 from saltus.flow.counts import whole
 from saltus.flow.method import Method, explain_unknown_options, step_budget
-from saltus.flow.modal_tables import Tables
+from saltus.flow.modal_tables import Tables, ValueSet
 from saltus.flow.taylor import Taylor
 from saltus.kernels import modal_layout as layout
 from saltus.kernels import status as st
@@ -43,7 +42,7 @@ class ModalFlow:
         self.tables, self._kernel = Tables(linear), modal_module()
         self._lanes, self._memory = self.tables.modes.table.shape[1], threading.local()
         self.CARRY = layout.AMPLITUDES + 2 * self.tables.groups * self._lanes
-        self.STEP_RECORDS = len(linear.system.guards) + MOST_TOUCHES
+        self.STEP_RECORDS = 2 * len(linear.system.guards) + MOST_TOUCHES
 
     def workspace(self) -> tuple[np.ndarray, ...]:
         """None that the engine must keep."""
@@ -83,6 +82,7 @@ class ModalFlow:
                 empty((DEEPEST + 2, terms)), empty((DEEPEST + 2, 2)), empty(terms), empty(2),
                 empty((MOST_TOUCHES, 2)), empty((states, lanes)), empty((states, lanes)),
                 empty((max(drives, 1), 3)), empty((max(guards, 1), 4)),
+                empty((3, len(self.tables.linear.system.states))),
             )  # fmt: skip
         arrays: tuple[np.ndarray, ...] = self._memory.arrays
         return arrays
@@ -113,18 +113,38 @@ class ModalFlow:
         gap = parts[0] + parts[1] + parts[2]
         size = np.abs(batch.state[who]) @ np.abs(given.gaps.matrix.T)
         zero = np.abs(gap) <= layout.ROUNDED * (size + np.abs(parts[1]) + np.abs(parts[2]))
-        bits = 1 << np.arange(gap.shape[1])
-        mode = ((gap > 0) & ~zero) @ bits if gap.shape[1] else np.zeros(len(who), np.int64)
+        bits, allowed, plain = 1 << np.arange(gap.shape[1]), self.tables.allowed, self.tables.plain
+        zero &= plain | (allowed != 0)
+        up = np.where(zero, allowed > 0, gap > 0) & ~self.tables.holds
+        mode = up @ bits if gap.shape[1] else np.zeros(len(who), np.int64)
         fresh = zero @ bits if gap.shape[1] else mode
-        for i in np.flatnonzero(fresh).tolist():
+        zero &= plain
+        for i in np.flatnonzero(zero.any(axis=1)).tolist():
             mode[i] |= self._ways(which, int(mode[i]), zero[i], batch.state[who[i]], time[i])
         batch.mode[who], batch.fresh[who] = mode, fresh
         carry = np.zeros((len(who), layout.AMPLITUDES))
         carry[:, layout.AT] = [self.tables.state_of(which, int(one)) for one in mode]
-        carry[:, layout.ENTERS], carry[:, layout.SET] = 1.0, which
+        carry[:, layout.ENTERS], carry[:, layout.SET], carry[:, layout.STARTS] = 1.0, which, 1.0
         carry[:, layout.NEXT_STEP] = FIRST_STEP * batch.period[who]
-        carry[:, layout.LANDED_AT], carry[:, layout.RIDES] = -math.inf, fresh
+        carry[:, layout.TWICE] = self._at_rest(given, batch.state[who], drives, fresh)
+        carry[:, layout.LANDED_AT] = time
+        carry[:, layout.RIDES] = zero @ bits if gap.shape[1] else 0.0
         batch.carry[who, : layout.AMPLITUDES] = carry
+
+    def _at_rest(
+        self, given: ValueSet, states: np.ndarray, drives: np.ndarray, fresh: np.ndarray
+    ) -> np.ndarray:
+        """Bits of the stops among those in `fresh` that neither close nor open."""
+        closing = given.impacts.closing
+        parts = states @ closing.matrix.T, drives @ closing.driven.T
+        size = np.abs(states) @ np.abs(closing.matrix.T) + np.abs(parts[1])
+        slow = np.abs(parts[0] + parts[1] + closing.constant) <= layout.ROUNDED * (
+            size + np.abs(closing.constant)
+        )
+        bits = 1 << np.arange(slow.shape[1])
+        stops = (self.tables.allowed != 0) & ((fresh[:, None] & bits) != 0)
+        found: np.ndarray = (slow & stops) @ bits if slow.shape[1] else fresh
+        return found
 
     def _ways(self, which: int, mode: int, zero: np.ndarray, state: np.ndarray, time: float) -> int:
         """Bits of the guards at zero whose gaps open upwards: by the first derivative that isn't

@@ -1,4 +1,4 @@
-"""Template, 2 of 2 of the modal flow: steps that are proven to cross no boundary, or just one, and
+"""Template, 3 of 3 of the modal flow: steps that are proven to cross no boundary, or just one, and
 the life of a trajectory.
 
 A step is tried and halved until every gap is decided. Modes that are too fast for it are bounded:
@@ -34,6 +34,7 @@ from saltus.kernels.status import (
     GAP_MARGIN,
     GRAZE_SHALLOW,
     GRAZE_UNRESOLVED,
+    HOLD_LAW,
     MODE_VIOLATION,
     NONFINITE,
     OK,
@@ -53,7 +54,6 @@ from saltus.kernels.status import (
     REJECTED,
     RESTING,
     RUNNING,
-    SLIDING,
     STEPS,
     UNRESOLVED,
 )
@@ -85,12 +85,14 @@ def decide(i, g, batch, m):
     side = side_of(g, batch.mode[i])
     noise = terms_of(i, g, side, batch, m)
     error, slope_error = m.errors[m.row_of[g], 0], m.errors[m.row_of[g], 1]
-    exact, fresh = error <= noise, (batch.fresh[i] >> g) & 1 == 1
-    degree, m.found[g, 2] = ORDER, 0.0
+    exact, known = error <= noise, known_zeros(i, g, batch)
+    fresh, degree = known > 0, ORDER - known
     if fresh:
-        for k in range(ORDER):
-            m.p[k] = m.p[k + 1]
-        m.p[ORDER], degree, error = 0.0, ORDER - 1, slope_error
+        for k in range(ORDER + 1):
+            m.p[k] = m.p[k + known] if k <= degree else 0.0
+        error = slope_error
+        if known > 1 and not exact:
+            return OPEN
         if exact and is_rounding(m.p, degree, noise):
             m.found[g, 2] = 1.0  # it is ridden
             return CLEAR
@@ -102,10 +104,11 @@ def decide(i, g, batch, m):
     elif not exact and m.p[0] <= error:
         return OPEN
     elif m.p[0] <= noise:
-        if m.p[0] < -noise:
+        if m.p[0] < -noise and m.laws[g, KIND] != HOLD_LAW:
             batch.status[i] = MODE_VIOLATION
             return CLEAR
-        if side_of_leaving(m.p, degree, False, noise) < 0:
+        # what presses a contact at rest jumps where the state does
+        if m.p[0] < -noise or side_of_leaving(m.p, degree, False, noise) < 0:
             m.found[g, 0], m.found[g, 1] = 0.0, 1.0
             return CROSSES
     to_bernstein(m.p, degree, m.bern[0])
@@ -176,6 +179,8 @@ def reach(i, tau, h, modes, steady, batch, m):
         store(m.size, g, root(fma(real, real, imaginary * imaginary)))
     waves = modes + groups * (3 + 4 * LANES * m.sizes[STATE_GROUPS])
     for g in range(m.sizes[GUARDS]):
+        if not is_watched(g, batch.mode[i], m):
+            continue
         r, side = m.row_of[g], side_of(g, batch.mode[i])
         value, rate = gap_of_moved(r, modes, steady, which, m)
         value, rate = side * (m.sign_of[g] * value + m.offset[which, g]), side * m.sign_of[g] * rate
@@ -209,7 +214,8 @@ def look(i, tau, h, modes, steady, batch, m):
     m.out[MARGIN], m.found[0, 3] = batch.minima[i, GAP_MARGIN], 0.0
     crossing, hits, first = 0, 0, h
     for g in range(m.sizes[GUARDS]):
-        answer = decide(i, g, batch, m)
+        m.found[g, 2] = 0.0
+        answer = decide(i, g, batch, m) if is_watched(g, batch.mode[i], m) else CLEAR
         if answer == OPEN:
             return OPEN, 0.0, 0
         if answer == CROSSES:
@@ -237,7 +243,7 @@ def time_of(i, tau, batch):
 @inner
 def has_room(batch, m):
     """True if the contacts of one more step fit in the table."""
-    most = m.sizes[GUARDS] + MOST_TOUCHES
+    most = 2 * m.sizes[GUARDS] + MOST_TOUCHES
     return batch.rec_i.shape[0] == 0 or batch.rec_used[0] + most <= batch.rec_i.shape[0]
 
 
@@ -320,7 +326,9 @@ def land(i, tau, d, hits, modes, steady, batch, m):
     """Cross boundaries a time d after tau: the contacts are recorded, the contact state changes.
     Returns the status.
     """
-    which, before = int(batch.carry[i, SET]), batch.mode[i]
+    which, before, law = int(batch.carry[i, SET]), batch.mode[i], first_law(hits, m)
+    if law >= 0:
+        return act(i, law, tau, d, hits, modes, steady, batch, m)
     state_after(i, tau, d, modes, steady, batch, m)
     for g in range(m.sizes[GUARDS]):
         if (hits >> g) & 1:
@@ -333,20 +341,13 @@ def land(i, tau, d, hits, modes, steady, batch, m):
             batch.counters[i, EVENTS] += 1
             batch.minima[i, CONTACT_SPEED] = min(batch.minima[i, CONTACT_SPEED], abs(rate))
             record(i, g, tau + d, CROSSING, direction, rate, after, error, batch, m)
-    for j in range(m.sizes[STATES]):
-        batch.state[i, j] = m.state[j // LANES, j % LANES]
-    at = int(batch.carry[i, AT])
+    if d > 0.0:
+        know_nothing(i, batch)
     for g in range(m.sizes[GUARDS]):
-        if (hits >> g) & 1 and at >= 0:
-            at = m.links[at, BEHIND + g]
-    batch.mode[i], batch.fresh[i] = before ^ hits, hits
-    batch.carry[i, AT], batch.carry[i, ENTERS] = at, 1.0
-    now = time_of(i, tau + d, batch)
-    batch.carry[i, LANDINGS] = (
-        batch.carry[i, LANDINGS] + 1.0 if now == batch.carry[i, LANDED_AT] else 0.0
-    )
-    batch.carry[i, LANDED_AT] = now
-    return SLIDING if batch.carry[i, LANDINGS] >= MOST_LANDINGS else RUNNING
+        if (hits >> g) & 1:
+            know_zeros(i, g, 1, batch)
+    batch.mode[i] = before ^ hits
+    return leave(i, tau + d, before, batch, m)
 
 
 @inner
@@ -356,7 +357,10 @@ def keep_on(i, h, batch, m):
     for g in range(m.sizes[GUARDS]):
         if m.found[g, 2] > 0.5:
             fresh |= 1 << g
+    twice, thrice = int(batch.carry[i, TWICE]), int(batch.carry[i, THRICE])
+    know_nothing(i, batch)
     batch.fresh[i] = fresh
+    batch.carry[i, TWICE], batch.carry[i, THRICE] = float(twice & fresh), float(thrice & fresh)
     batch.carry[i, RIDES] = float(int(batch.carry[i, RIDES]) & fresh)
     batch.carry[i, NEXT_STEP] = 2.0 * h
     batch.minima[i, GAP_MARGIN] = m.out[MARGIN]
@@ -453,11 +457,12 @@ def put_back(i, tau, status, batch, m):
         at = int(batch.carry[i, AT])
         for k in range(2 * m.sizes[MODE_GROUPS] * LANES):
             batch.carry[i, AMPLITUDES + k] = m.y[k // LANES, k % LANES]
-        drive(i, tau, batch, m)
-        answer_now(m.links[at, STEADY], m)
-        state_of(m.links[at, MODES], m.y, m)
-        for j in range(m.sizes[STATES]):
-            batch.state[i, j] = m.state[j // LANES, j % LANES]
+        if not has_just_landed(i, tau, batch):
+            drive(i, tau, batch, m)
+            answer_now(m.links[at, STEADY], m)
+            state_of(m.links[at, MODES], m.y, m)
+            for j in range(m.sizes[STATES]):
+                batch.state[i, j] = m.state[j // LANES, j % LANES]
     batch.phase[i], batch.status[i] = tau, status
 
 
@@ -466,8 +471,8 @@ def propagate(
     period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count,
     end_phase, counters, minima, sample_count, sample_fraction, cursor, samples, sample_mode,
     rec_first, rec_i, rec_f, rec_used, options, data, budget, sizes, row_of, sign_of, offset, rate,
-    lag, modes, steady, links, y, moved, size, sums, q, errors, p, bern, bounds, slopes, out,
-    touches, place, answer, angle, found,
+    lag, modes, steady, links, laws, acts, presses, y, moved, size, sums, q, errors, p, bern,
+    bounds, slopes, out, touches, place, answer, angle, found, struck,
 ):  # fmt: skip
     """Move every trajectory whose status is RUNNING and whose contact state has been made, `budget`
     steps at most. See kernels/batch.py for the arrays.
@@ -478,8 +483,9 @@ def propagate(
         rec_first, rec_i, rec_f, rec_used, options, data,
     )  # fmt: skip
     m = Modal(
-        sizes, row_of, sign_of, offset, rate, lag, modes, steady, links, y, moved, size, sums, q,
-        errors, p, bern, bounds, slopes, out, touches, place, answer, angle, found,
+        sizes, row_of, sign_of, offset, rate, lag, modes, steady, links, laws, acts, presses, y,
+        moved, size, sums, q, errors, p, bern, bounds, slopes, out, touches, place, answer, angle,
+        found, struck,
     )  # fmt: skip
     waits = False
     for i in range(status.shape[0]):

@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from saltus.contact.guards import Guard, is_hold
 from saltus.language import expression as ex
 from saltus.language.evaluate import evaluate
 from saltus.language.expression import Expr
@@ -36,11 +37,14 @@ class Drive:
         Of parameters only [rad/s], [rad].
     lag : float
         Phase of the function behind a cosine [rad].
+    node : Expr
+        The function.
     """
 
     rate: Expr
     phase: Expr
     lag: float
+    node: Expr
 
 
 @dataclass(frozen=True)
@@ -84,9 +88,18 @@ class LinearSystem:
         bits = [bool(mode >> i & 1) for i in range(len(self.system.guards))]
         return LinearPiece(*self._coefficients(self._field, values, bits))
 
-    def gaps(self, values: Mapping[str, float]) -> LinearPiece:
-        """a, c and e of all guards, float64[guards, N], float64[guards], float64[guards, D]."""
-        return LinearPiece(*self._coefficients(self._gaps, values, []))
+    def gaps(self, values: Mapping[str, float], mode: int = 0) -> LinearPiece:
+        """a, c and e of all guards in a contact state, float64[guards, N], float64[guards],
+        float64[guards, D]; only those of hold guards depend on it.
+        """
+        bits = [bool(mode >> i & 1) for i in range(len(self.system.guards))]
+        return LinearPiece(*self._coefficients(self._gaps, values, bits))
+
+    def pieces_of(self, entries: Sequence[Expr], values: Mapping[str, float]) -> LinearPiece:
+        """Coefficients of other linear functions of the states and drives of the system."""
+        names = {d.node: ex.parameter(_name(i)) for i, d in enumerate(self.drives)}
+        known = tuple(ex.substituted(one, names) for one in entries)
+        return LinearPiece(*self._coefficients(known, values, []))
 
     def rates(self, values: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
         """Rates [rad/s] and phases [rad] of the drives as cosines."""
@@ -123,10 +136,13 @@ def linear_pieces(system: System) -> LinearSystem | str:
     """The system as one that is linear between its contacts, or the reason why it isn't."""
     if system.tangent_of is not None:
         return "it carries its own derivatives"
-    if any(guard.law for guard in system.guards):
-        return "a contact of it has a law: an impact, a jump, friction"
+    missing = _missing_law(system.guards)
+    if missing is not None:
+        return missing
+    stops = [guard.law for guard in system.guards if guard.law and guard.law.kind == "impact"]
+    laws = [one for law in stops for one in (law.constraint, *law.settled) if one is not None]
     drives: dict[Expr, Drive] = {}
-    for node in ex.walk(*system.field, *(guard.gap for guard in system.guards)):
+    for node in ex.walk(*system.field, *(guard.gap for guard in system.guards), *laws):
         if node.op in ("sin", "cos") and ex.depends_on(node, ("time",)):
             rate = rate_of(node.args[0])
             if rate is None:
@@ -134,15 +150,29 @@ def linear_pieces(system: System) -> LinearSystem | str:
             phase = ex.substituted(node.args[0], {ex.TIME: ex.constant(0.0)})
             if ex.depends_on(phase, ("state",)):
                 return "the phase of a sine in it depends on the state"
-            drives[node] = Drive(rate, phase, -math.pi / 2 if node.op == "sin" else 0.0)
+            drives[node] = Drive(rate, phase, -math.pi / 2 if node.op == "sin" else 0.0, node)
     names = {node: ex.parameter(_name(i)) for i, node in enumerate(drives)}
     field = tuple(ex.substituted(entry, names) for entry in system.field)
     gaps = tuple(ex.substituted(guard.gap, names) for guard in system.guards)
-    if any(ex.depends_on(gap, ("select",)) for gap in gaps):
+    laws = [ex.substituted(one, names) for one in laws]
+    plain = [gap for gap, guard in zip(gaps, system.guards, strict=True) if not is_hold(guard)]
+    if any(ex.depends_on(one, ("select",)) for one in (*plain, *laws)):
         return "a boundary of it moves when another is crossed"
-    if not all(_is_affine(entry, len(drives)) for entry in (*field, *gaps)):
+    if not all(_is_affine(entry, len(drives)) for entry in (*field, *gaps, *laws)):
         return "it isn't linear between its contacts"
     return LinearSystem(system, tuple(drives.values()), field, gaps)
+
+
+def _missing_law(guards: Sequence[Guard]) -> str | None:
+    """The reason why the laws of some guards aren't carried; None if they are."""
+    for law in [guard.law for guard in guards if guard.law]:
+        if law.kind == "jump":
+            return "a contact of it makes its state jump"
+        if law.kind == "surface" or law.friction is not None:
+            return "a contact of it has friction, or a force that jumps"
+        if law.restitution is not None and ex.varies(law.restitution):
+            return "a restitution of it isn't a number"
+    return None
 
 
 def _is_affine(root: Expr, drives: int) -> bool:

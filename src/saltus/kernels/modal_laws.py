@@ -1,0 +1,469 @@
+"""Template, 2 of 3 of the modal flow: laws of contact - impacts, contacts at rest, their release.
+
+A contact at rest has a guard of its own, the hold guard (docs/decisions/0040): its bit names the
+contact state in which the contact is held, and its gap there is the acceleration with which the
+contact would close. One law acts in a landing. What else happens at that instant is found by the
+next step, of no length: boundaries that the state stands on are known to be zero, so the side to
+which it leaves them is that of the first rate that isn't.
+"""
+
+import math
+
+from saltus.kernels.isolation import ROUNDING
+from saltus.kernels.status import (
+    AMBIGUOUS_IMPACT,
+    CONTACT_SPEED,
+    CROSSING,
+    EVENTS,
+    HOLD,
+    HOLD_LAW,
+    IMPACT,
+    IMPACT_LAW,
+    INVALID_RESTITUTION,
+    NO_LAW,
+    RELEASE,
+    RUNNING,
+    SLIDING,
+)
+
+
+# -- which guards are watched, and what is known of them -------------------------------------------
+@inner
+def is_watched(g, mode, m):
+    """True if a guard can act: a hold guard while its contact is held, others while it isn't."""
+    partner, holds = m.laws[g, PARTNER], m.laws[g, KIND] == HOLD_LAW
+    held = partner >= 0 and (mode >> (g if holds else partner)) & 1 == 1
+    return held == holds
+
+
+@inner
+def known_zeros(i, g, batch):
+    """Number of zeros that are known: of a gap, of its rate, of its acceleration."""
+    twice, thrice = int(batch.carry[i, TWICE]), int(batch.carry[i, THRICE])
+    return ((batch.fresh[i] >> g) & 1) + ((twice >> g) & 1) + ((thrice >> g) & 1)
+
+
+@inner
+def know_zeros(i, g, count, batch):
+    """Note the number of zeros that are known of a gap."""
+    rest = ~(1 << g)
+    twice, thrice = int(batch.carry[i, TWICE]) & rest, int(batch.carry[i, THRICE]) & rest
+    batch.fresh[i] = (batch.fresh[i] & rest) | ((1 if count > 0 else 0) << g)
+    batch.carry[i, TWICE] = float(twice | ((1 if count > 1 else 0) << g))
+    batch.carry[i, THRICE] = float(thrice | ((1 if count > 2 else 0) << g))
+
+
+@inner
+def know_nothing(i, batch):
+    """Time has passed: no gap is known to be zero, and the start is over."""
+    batch.fresh[i] = 0
+    batch.carry[i, TWICE], batch.carry[i, THRICE], batch.carry[i, STARTS] = 0.0, 0.0, 0.0
+
+
+# -- linear functions of the state -----------------------------------------------------------------
+@inner
+def value_of(table, row, first, m):
+    """A linear function of the state in `state` and of the drives in `angle`."""
+    states = m.sizes[STATES]
+    total = table[row, first + states]
+    for j in range(states):
+        total += table[row, first + j] * m.state[j // LANES, j % LANES]
+    for d in range(m.sizes[DRIVES]):
+        total += table[row, first + states + 1 + d] * m.angle[d, 1]
+    return total
+
+
+@inner
+def size_of(table, row, first, m):
+    """The size of the terms of such a function."""
+    states = m.sizes[STATES]
+    total = abs(table[row, first + states])
+    for j in range(states):
+        total += abs(table[row, first + j] * m.state[j // LANES, j % LANES])
+    for d in range(m.sizes[DRIVES]):
+        total += abs(table[row, first + states + 1 + d] * m.angle[d, 1])
+    return total
+
+
+@inner
+def law_row(i, g, batch, m):
+    """Row of a guard in `acts`."""
+    return int(batch.carry[i, SET]) * m.sizes[GUARDS] + g
+
+
+@inner
+def closing_of(i, g, batch, m):
+    """Velocity at which a contact closes; zero, if it is the rounding of its terms."""
+    row, first = law_row(i, g, batch, m), m.sizes[STATES] + m.sizes[DRIVES] + 1
+    velocity = value_of(m.acts, row, first, m)
+    return velocity if abs(velocity) > ROUNDED * size_of(m.acts, row, first, m) else 0.0
+
+
+@inner
+def pressing_of(i, g, batch, m):
+    """Acceleration at which a contact would close without its force."""
+    return value_of(m.presses, int(batch.carry[i, AT]) * m.sizes[GUARDS] + g, 0, m)
+
+
+@inner
+def restitution_of(i, g, batch, m):
+    """Coefficient of restitution of a contact."""
+    states = m.sizes[STATES]
+    return m.acts[law_row(i, g, batch, m), 3 * states + 2 * m.sizes[DRIVES] + 2]
+
+
+@inner
+def push(i, g, change, batch, m):
+    """Change the velocity at which a contact closes by an impulse."""
+    states, row = m.sizes[STATES], law_row(i, g, batch, m)
+    first = 2 * (states + m.sizes[DRIVES] + 1)
+    for j in range(states):
+        m.state[j // LANES, j % LANES] += change * m.acts[row, first + j]
+
+
+@inner
+def snap(i, g, batch, m):
+    """Put the state on the boundary of a guard, if that is a level of a state."""
+    j, row = m.laws[g, LEVEL], law_row(i, g, batch, m)
+    if j >= 0:
+        m.state[j // LANES, j % LANES] = -m.acts[row, m.sizes[STATES]] / m.acts[row, j]
+
+
+# -- landing on a contact with a law ---------------------------------------------------------------
+@kernel
+def first_law(hits, m):
+    """The guard whose law acts first, of those that are met: impacts before releases; -1: none."""
+    first = -1
+    for g in range(m.sizes[GUARDS]):
+        if (hits >> g) & 1 and m.laws[g, KIND] == IMPACT_LAW:
+            return g
+        if (hits >> g) & 1 and m.laws[g, KIND] != NO_LAW and first < 0:
+            first = g
+    return first
+
+
+@kernel
+def act(i, g, tau, d, hits, modes, steady, batch, m):
+    """Let the law of a guard act a time d after tau. Returns the status."""
+    state_after(i, tau, d, modes, steady, batch, m)
+    if d > 0.0:
+        know_nothing(i, batch)
+    elif has_just_landed(i, tau, batch):
+        for j in range(m.sizes[STATES]):
+            m.state[j // LANES, j % LANES] = batch.state[i, j]
+    for other in range(m.sizes[GUARDS]):
+        if (hits >> other) & 1:
+            know_zeros(i, other, max(1, known_zeros(i, other, batch)), batch)
+    before, status = batch.mode[i], RUNNING
+    if m.laws[g, KIND] == HOLD_LAW:
+        release(i, g, tau + d, 3 if d > 0.0 else 2, batch, m)
+    else:
+        status = impacts(i, g, tau + d, hits, modes, steady, batch, m)
+    slides = leave(i, tau + d, before, batch, m)
+    return slides if status == RUNNING else status
+
+
+@inner
+def has_just_landed(i, tau, batch):
+    """True if the trajectory has landed, or begun, at this time: its state is known to the bit."""
+    return time_of(i, tau, batch) == batch.carry[i, LANDED_AT]
+
+
+@kernel
+def leave(i, now, before, batch, m):
+    """Store the state in `state` and look up the contact state of the mode, which was another.
+    Returns the status: sliding, if there were too many landings at this instant.
+    """
+    for j in range(m.sizes[STATES]):
+        batch.state[i, j] = m.state[j // LANES, j % LANES]
+    at, changed = int(batch.carry[i, AT]), before ^ batch.mode[i]
+    for g in range(m.sizes[GUARDS]):
+        if (changed >> g) & 1 and at >= 0:
+            at = m.links[at, BEHIND + g]
+    batch.carry[i, AT], batch.carry[i, ENTERS] = at, 1.0
+    time = time_of(i, now, batch)
+    again = time == batch.carry[i, LANDED_AT]
+    batch.carry[i, LANDINGS] = batch.carry[i, LANDINGS] + 1.0 if again else 0.0
+    batch.carry[i, LANDED_AT] = time
+    return SLIDING if batch.carry[i, LANDINGS] >= MOST_LANDINGS else RUNNING
+
+
+@kernel
+def note(i, g, now, kind, direction, velocity, after, error, batch, m):
+    """Count and record what a law did, and set the mode. At the start of a run it is an initial
+    condition, and no event.
+    """
+    if batch.carry[i, STARTS] > 0.5:
+        for k in range(max(batch.cursor[i], 0)):
+            batch.sample_mode[i, k] = after
+    else:
+        batch.counters[i, EVENTS] += 1
+        record(i, g, now, kind, direction, velocity, after, error, batch, m)
+    batch.mode[i] = after
+
+
+@inner
+def clock_error(i, now, batch):
+    """Rounding of a time."""
+    return 2.0e-16 * (now + abs(batch.origin[i] + batch.count[i] * batch.period[i]))
+
+
+# -- impacts ---------------------------------------------------------------------------------------
+@kernel
+def impacts(i, g, now, hits, modes, steady, batch, m):
+    """Apply an impact, after the test that the order of several doesn't matter. Returns the
+    status.
+    """
+    stops = 0
+    for other in range(m.sizes[GUARDS]):
+        held = (batch.mode[i] >> max(m.laws[other, PARTNER], 0)) & 1 == 1
+        stands = m.laws[other, KIND] == IMPACT_LAW
+        if stands and (held or known_zeros(i, other, batch) > 0):
+            stops |= 1 << other
+    if stops & (stops - 1) != 0 and known_zeros(i, g, batch) < 2:
+        status = order_of_impacts(i, stops, batch, m)
+        if status != RUNNING:
+            return status
+        if batch.carry[i, LANDINGS] >= MOST_STRIKES and end_impacts(i, stops, batch, m):
+            return RUNNING
+    return strike(i, g, now, modes, steady, batch, m)
+
+
+@kernel
+def strike(i, g, now, modes, steady, batch, m):
+    """Apply the impact of a contact. Rebounds too small to be followed end at rest. Returns the
+    status.
+    """
+    which, mode, side = int(batch.carry[i, SET]), batch.mode[i], side_of(g, batch.mode[i])
+    _, rate = gap_of_moved(m.row_of[g], modes, steady, which, m)
+    rate *= m.sign_of[g]
+    snap(i, g, batch, m)
+    slow = known_zeros(i, g, batch) > 1
+    closing = 0.0 if slow else closing_of(i, g, batch, m)
+    restitution = restitution_of(i, g, batch, m)
+    if closing > 0.0:
+        if not -PART <= restitution <= 1.0 + PART:
+            return INVALID_RESTITUTION
+        push(i, g, -(1.0 + restitution) * closing, batch, m)
+        starts = batch.carry[i, STARTS] > 0.5
+        slowest = batch.minima[i, CONTACT_SPEED]
+        batch.minima[i, CONTACT_SPEED] = slowest if starts else min(slowest, abs(rate))
+        size = m.errors[m.row_of[g], 2] + abs(m.offset[which, g])
+        error = ROUNDED * size / abs(rate) if rate != 0.0 else math.inf
+        error += clock_error(i, now, batch)
+        note(i, g, now, IMPACT, int(-side), rate, mode, error, batch, m)
+        turn_over(i, g, now, batch, m)
+        loosen(i, g, now, closing, batch, m)
+    rebound = restitution * max(closing, 0.0)
+    know_zeros(i, g, 1 if rebound > 0.0 else 2, batch)
+    if batch.mode[i] != mode:
+        return RUNNING  # another contact state: it is asked again there
+    pressing = pressing_of(i, g, batch, m)
+    if pressing > 0.0:
+        later = 0.0
+        if rebound > 0.0:
+            later = math.inf
+            if restitution < 1.0:
+                later = 2.0 * rebound / (pressing * (1.0 - restitution))
+        shortest = too_short(i, g, now, restitution, modes, steady, batch, m)
+        if later <= shortest or is_hidden(i, g, rebound, pressing, batch, m):
+            hold(i, g, now, later, batch, m)
+    return RUNNING
+
+
+@kernel
+def too_short(i, g, now, restitution, modes, steady, batch, m):
+    """Duration of a chatter [s] below which it is completed: the remainder changes the acceleration
+    by less than 1e-8, so the time of its end is accurate to rounding. See taylor_laws.py.
+    """
+    second, third, fourth = bends_of_gap(m.row_of[g], modes, steady, int(batch.carry[i, SET]), m)
+    scale = end_of(i, batch)
+    if second < scale * third:
+        scale = second / third
+    if second < scale * scale * fourth:
+        scale = math.sqrt(second / fourth)
+    since = now + abs(batch.origin[i] + batch.count[i] * batch.period[i])
+    return max(CHATTER * (1.0 - restitution) * scale, 4.0e-16 * since)
+
+
+@kernel
+def bends_of_gap(r, modes, steady, which, m):
+    """Sizes of terms 2, 3 and 4 of a row of gaps, by the amplitudes in `moved` and the drives in
+    `angle`.
+    """
+    groups, drives = m.sizes[MODE_GROUPS], m.sizes[DRIVES]
+    row = modes + groups * (3 + 4 * LANES * m.sizes[STATE_GROUPS]) + 3 * groups * r
+    second, third, fourth = 0.0, 0.0, 0.0
+    for j in range(groups * LANES):
+        a, b = number(m.modes, row, j), number(m.modes, row + groups, j)
+        x, y = number(m.moved, 0, j), number(m.moved, groups, j)
+        real, imaginary = a * x - b * y, a * y + b * x
+        a, b = number(m.modes, modes, j), number(m.modes, modes + groups, j)
+        real, imaginary = a * real - b * imaginary, a * imaginary + b * real
+        real, imaginary = a * real - b * imaginary, a * imaginary + b * real
+        second += real
+        real, imaginary = a * real - b * imaginary, a * imaginary + b * real
+        third += real
+        fourth += a * real - b * imaginary
+    first, at = steady + (1 + 2 * drives) * m.sizes[STATE_GROUPS], r * (1 + 2 * drives)
+    for d in range(drives):
+        a, b = number(m.steady, first, at + 1 + 2 * d), number(m.steady, first, at + 2 + 2 * d)
+        cosine, sine = m.angle[d, 1], m.angle[d, 2]
+        real, imaginary = a * cosine - b * sine, a * sine + b * cosine
+        w = m.rate[which, d]
+        second += -w * w * real
+        third += w * w * w * imaginary
+        fourth += w * w * w * w * real
+    return abs(second) / 2.0, abs(third) / 6.0, abs(fourth) / 24.0
+
+
+@inner
+def is_hidden(i, g, rebound, pressing, batch, m):
+    """True if a flight stays within the rounding of its gap, which counts in two steps, where
+    another boundary may put a node into the flight. See taylor_laws.py.
+    """
+    height = 0.5 * rebound * rebound / pressing
+    size = 2.0 * size_of(m.acts, law_row(i, g, batch, m), 0, m)
+    return m.sizes[GUARDS] > 2 and height <= ROUNDING * size
+
+
+@kernel
+def turn_over(i, struck, now, batch, m):
+    """Change the sides of the guards over whose boundaries an impact has carried the state."""
+    for g in range(m.sizes[GUARDS]):
+        asked = g != struck and m.laws[g, KIND] == NO_LAW and known_zeros(i, g, batch) == 0
+        gap = value_of(m.acts, law_row(i, g, batch, m), 0, m) if asked else 0.0
+        if gap * side_of(g, batch.mode[i]) < 0.0:
+            after = batch.mode[i] ^ (1 << g)
+            error, side = clock_error(i, now, batch), 1 if (after >> g) & 1 == 1 else -1
+            note(i, g, now, CROSSING, side, 0.0, after, error, batch, m)
+
+
+@kernel
+def loosen(i, struck, now, closing, batch, m):
+    """Release the contacts at rest that feel the impact of another. A free one whose gap and rate
+    were known to be zero closes or opens now.
+    """
+    for g in range(m.sizes[GUARDS]):
+        asked, h = g != struck and m.laws[g, KIND] == IMPACT_LAW, m.laws[g, PARTNER]
+        feels = asked and abs(closing_of(i, g, batch, m)) > FELT * closing
+        if feels and (batch.mode[i] >> h) & 1 == 1:
+            release(i, h, now, 1, batch, m)
+        elif feels:
+            know_zeros(i, g, min(1, known_zeros(i, g, batch)), batch)
+
+
+# -- contacts at rest ------------------------------------------------------------------------------
+@kernel
+def hold(i, g, now, later, batch, m):
+    """Begin to hold a contact, at most `later` [s] after now: the state goes onto its
+    constraint.
+    """
+    h = m.laws[g, PARTNER]
+    row, first = law_row(i, g, batch, m), m.sizes[STATES] + m.sizes[DRIVES] + 1
+    push(i, g, -value_of(m.acts, row, first, m), batch, m)
+    know_zeros(i, g, 0, batch)
+    know_zeros(i, h, 0, batch)
+    error = CHATTER * later + clock_error(i, now, batch)
+    note(i, h, now + later, HOLD, 1, 0.0, batch.mode[i] | (1 << h), error, batch, m)
+
+
+@kernel
+def release(i, h, now, zeros, batch, m):
+    """Release a contact. If its force vanishes continuously, gap, rate and acceleration are known
+    to be zero; if it jumps, gap and rate; if it was struck, the gap.
+    """
+    know_zeros(i, m.laws[h, PARTNER], zeros, batch)
+    after = batch.mode[i] & ~(1 << h)
+    note(i, h, now, RELEASE, -1, 0.0, after, clock_error(i, now, batch), batch, m)
+
+
+# -- several impacts at one instant ----------------------------------------------------------------
+@inner
+def fastest_of(i, stops, batch, m):
+    """The largest velocity at which one of some stops closes."""
+    fastest = 0.0
+    for g in range(m.sizes[GUARDS]):
+        if (stops >> g) & 1:
+            fastest = max(fastest, closing_of(i, g, batch, m))
+    return fastest
+
+
+@inner
+def exchange(row, m):
+    """Exchange the state with a row of `struck`."""
+    for j in range(m.sizes[STATES]):
+        other = m.struck[row, j]
+        m.struck[row, j] = m.state[j // LANES, j % LANES]
+        m.state[j // LANES, j % LANES] = other
+
+
+@kernel
+def take_impacts(i, stops, backwards, least, batch, m):
+    """Take all impacts of this instant, in the order of the guards or against it, until none closes
+    faster than `least`. Returns RUNNING, or the status that ends the motion; impacts without end
+    have no order.
+    """
+    guards, first = m.sizes[GUARDS], 2 * (m.sizes[STATES] + m.sizes[DRIVES] + 1)
+    for _ in range(MOST_IMPACTS):
+        struck = False
+        for place in range(guards):
+            g = guards - 1 - place if backwards else place
+            if not struck and (stops >> g) & 1 == 1:
+                closing, e = closing_of(i, g, batch, m), restitution_of(i, g, batch, m)
+                struck = closing > least
+                if struck and not -PART <= e <= 1.0 + PART:
+                    return INVALID_RESTITUTION
+                if struck:
+                    push(i, g, -(1.0 + e) * closing, batch, m)
+                    for j in range(m.sizes[STATES]):
+                        by = (1.0 + e) * closing * m.acts[law_row(i, g, batch, m), first + j]
+                        m.struck[WAY, j] += abs(by)
+        if not struck:
+            return RUNNING
+    return AMBIGUOUS_IMPACT
+
+
+@kernel
+def order_of_impacts(i, stops, batch, m):
+    """Test that the impacts of this instant lead to one state, in the order of the guards and
+    against it: RUNNING, or the status that ends the motion. Leaves the state as it was.
+    """
+    fastest, closing = fastest_of(i, stops, batch, m), 0
+    for g in range(m.sizes[GUARDS]):
+        if (stops >> g) & 1 and closing_of(i, g, batch, m) > FELT * fastest:
+            closing += 1
+    if closing < 2:
+        return RUNNING
+    states = m.sizes[STATES]
+    for j in range(states):
+        m.struck[AT_FIRST, j], m.struck[WAY, j] = m.state[j // LANES, j % LANES], 0.0
+        m.struck[BY_GUARDS, j] = m.struck[AT_FIRST, j]
+    status = take_impacts(i, stops, False, ENDED * fastest, batch, m)
+    exchange(BY_GUARDS, m)
+    if status == RUNNING:
+        status = take_impacts(i, stops, True, ENDED * fastest, batch, m)
+    for j in range(states):
+        least = FELT * (m.struck[WAY, j] + abs(m.struck[AT_FIRST, j]))
+        apart = abs(m.state[j // LANES, j % LANES] - m.struck[BY_GUARDS, j])
+        if status == RUNNING and not apart <= least:
+            status = AMBIGUOUS_IMPACT
+        m.state[j // LANES, j % LANES] = m.struck[AT_FIRST, j]
+    return status
+
+
+@kernel
+def end_impacts(i, stops, batch, m):
+    """Complete impacts that cause each other without end at one instant; what neither closes nor
+    opens then is known to stand. True if one closed.
+    """
+    fastest = fastest_of(i, stops, batch, m)
+    if fastest <= 0.0:
+        return False
+    take_impacts(i, stops, False, CLOSED * fastest, batch, m)
+    for g in range(m.sizes[GUARDS]):
+        if (stops >> g) & 1 and (batch.mode[i] >> m.laws[g, PARTNER]) & 1 == 0:
+            snap(i, g, batch, m)
+            stands = abs(closing_of(i, g, batch, m)) <= FELT * fastest
+            know_zeros(i, g, 2 if stands else 1, batch)
+    return True
