@@ -2,14 +2,16 @@
 
 A contact at rest has a guard of its own, the hold guard (docs/decisions/0040): its bit names the
 contact state in which the contact is held, and its gap there is the acceleration with which the
-contact would close. One law acts in a landing. What else happens at that instant is found by the
-next step, of no length: boundaries that the state stands on are known to be zero, so the side to
-which it leaves them is that of the first rate that isn't.
+contact would close. One law acts in a landing, and whether a contact that was struck comes to rest
+is asked in the contact state behind it. What else happens at that instant is found by the next
+step, of no length: boundaries that the state stands on are known to be zero, so the side to which
+it leaves them is that of the first rate that isn't.
 """
 
 import math
 
 from saltus.kernels.isolation import ROUNDING
+from saltus.kernels.lanes import load, store
 from saltus.kernels.status import (
     AMBIGUOUS_IMPACT,
     CONTACT_SPEED,
@@ -159,7 +161,8 @@ def act(i, g, tau, d, hits, modes, steady, batch, m):
         release(i, g, tau + d, 3 if d > 0.0 else 2, batch, m)
     else:
         status = impacts(i, g, tau + d, hits, modes, steady, batch, m)
-    slides = leave(i, tau + d, before, batch, m)
+    leave(i, before, batch, m)
+    slides = count_landing(i, tau + d, batch)
     return slides if status == RUNNING else status
 
 
@@ -170,10 +173,8 @@ def has_just_landed(i, tau, batch):
 
 
 @kernel
-def leave(i, now, before, batch, m):
-    """Store the state in `state` and look up the contact state of the mode, which was another.
-    Returns the status: sliding, if there were too many landings at this instant.
-    """
+def leave(i, before, batch, m):
+    """Store the state in `state` and look up the contact state of the mode, which was another."""
     for j in range(m.sizes[STATES]):
         batch.state[i, j] = m.state[j // LANES, j % LANES]
     at, changed = int(batch.carry[i, AT]), before ^ batch.mode[i]
@@ -181,6 +182,11 @@ def leave(i, now, before, batch, m):
         if (changed >> g) & 1 and at >= 0:
             at = m.links[at, BEHIND + g]
     batch.carry[i, AT], batch.carry[i, ENTERS] = at, 1.0
+
+
+@inner
+def count_landing(i, now, batch):
+    """Count the landings at one instant. Returns the status: sliding, if they are too many."""
     time = time_of(i, now, batch)
     again = time == batch.carry[i, LANDED_AT]
     batch.carry[i, LANDINGS] = batch.carry[i, LANDINGS] + 1.0 if again else 0.0
@@ -231,9 +237,7 @@ def impacts(i, g, now, hits, modes, steady, batch, m):
 
 @kernel
 def strike(i, g, now, modes, steady, batch, m):
-    """Apply the impact of a contact. Rebounds too small to be followed end at rest. Returns the
-    status.
-    """
+    """Apply the impact of a contact; whether it comes to rest is asked next. Returns the status."""
     which, mode, side = int(batch.carry[i, SET]), batch.mode[i], side_of(g, batch.mode[i])
     _, rate = gap_of_moved(m.row_of[g], modes, steady, which, m)
     rate *= m.sign_of[g]
@@ -254,21 +258,34 @@ def strike(i, g, now, modes, steady, batch, m):
         note(i, g, now, IMPACT, int(-side), rate, mode, error, batch, m)
         turn_over(i, g, now, batch, m)
         loosen(i, g, now, closing, batch, m)
-    rebound = restitution * max(closing, 0.0)
-    know_zeros(i, g, 1 if rebound > 0.0 else 2, batch)
-    if batch.mode[i] != mode:
-        return RUNNING  # another contact state: it is asked again there
-    pressing = pressing_of(i, g, batch, m)
-    if pressing > 0.0:
-        later = 0.0
-        if rebound > 0.0:
-            later = math.inf
-            if restitution < 1.0:
-                later = 2.0 * rebound / (pressing * (1.0 - restitution))
-        shortest = too_short(i, g, now, restitution, modes, steady, batch, m)
-        if later <= shortest or is_hidden(i, g, rebound, pressing, batch, m):
-            hold(i, g, now, later, batch, m)
+    know_zeros(i, g, 1 if restitution * closing > 0.0 else 2, batch)
+    batch.carry[i, ASKS] = g + 1.0
     return RUNNING
+
+
+@kernel
+def rest_or_go(i, now, modes, steady, batch, m):
+    """Hold the contact that was struck if its rebounds are too small to be followed."""
+    g, before = int(batch.carry[i, ASKS]) - 1, batch.mode[i]
+    batch.carry[i, ASKS] = 0.0
+    for j in range(m.sizes[STATES]):
+        m.state[j // LANES, j % LANES] = batch.state[i, j]
+    for row in range(2 * m.sizes[MODE_GROUPS]):
+        store(m.moved, row, load(m.y, row, LANES))
+    drive(i, now, batch, m)
+    restitution, pressing = restitution_of(i, g, batch, m), pressing_of(i, g, batch, m)
+    rebound = -closing_of(i, g, batch, m) if known_zeros(i, g, batch) < 2 else 0.0
+    if pressing <= 0.0 or rebound < 0.0:
+        return
+    later = 0.0
+    if rebound > 0.0:
+        later = math.inf
+        if restitution < 1.0:
+            later = 2.0 * rebound / (pressing * (1.0 - restitution))
+    shortest = too_short(i, g, now, restitution, modes, steady, batch, m)
+    if later <= shortest or is_hidden(i, g, rebound, pressing, batch, m):
+        hold(i, g, now, later, batch, m)
+        leave(i, before, batch, m)
 
 
 @kernel

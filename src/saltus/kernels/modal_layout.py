@@ -28,10 +28,9 @@ MODES, STEADY, BEHIND = range(3)
 # of the state, the next step [s], the time of the last landing, landings there since, guards that
 # the state has ridden from its start on (bits), the set of parameter values; gaps whose rate is
 # known to be zero too, and those whose acceleration is (bits), whether no time has passed since the
-# start; then the amplitudes.
-AT, ENTERS, NEXT_STEP, LANDED_AT, LANDINGS, RIDES, SET, TWICE, THRICE, STARTS, AMPLITUDES = range(
-    11
-)
+# start, the contact that was struck (one more than its number; 0: none); then the amplitudes.
+AT, ENTERS, NEXT_STEP, LANDED_AT, LANDINGS, RIDES, SET = range(7)
+TWICE, THRICE, STARTS, ASKS, AMPLITUDES = range(7, 12)
 # Columns of `laws`, for each guard: the kind of its law (status.py), its hold guard (of a hold
 # guard: its contact's), the state that its gap is a level of; -1 where there is none.
 KIND, PARTNER, LEVEL = range(3)

@@ -347,7 +347,8 @@ def land(i, tau, d, hits, modes, steady, batch, m):
         if (hits >> g) & 1:
             know_zeros(i, g, 1, batch)
     batch.mode[i] = before ^ hits
-    return leave(i, tau + d, before, batch, m)
+    leave(i, before, batch, m)
+    return count_landing(i, tau + d, batch)
 
 
 @inner
@@ -406,6 +407,11 @@ def advance(i, budget, batch, m):
     while status == RUNNING and budget > 0 and batch.carry[i, AT] >= 0.0 and has_room(batch, m):
         at = int(batch.carry[i, AT])
         modes, steady = m.links[at, MODES], m.links[at, STEADY]
+        if batch.carry[i, ASKS] > 0.5:
+            rest_or_go(i, tau, modes, steady, batch, m)
+            if batch.carry[i, ENTERS] > 0.5 and batch.carry[i, AT] >= 0.0:
+                enter(i, tau, batch, m)
+            continue
         write_samples(i, tau, tau, modes, steady, batch, m)
         end = end_of(i, batch)
         if tau >= end:
