@@ -183,6 +183,21 @@ def modal_flow(system: System) -> ModalFlow:
     return ModalFlow(linear)
 
 
+@functools.lru_cache(maxsize=64)
+def _has_modes(system: System) -> bool:
+    """False if a contact of a system has a law, and modes don't carry its motion before it: bodies
+    without springs.
+    """
+    flow = modal_flow(system)
+    if flow.tables.plain.all():
+        return True
+    try:
+        flow.tables.state_of(flow.tables.set_of(np.array([*system.values.values()], float)), 0)
+    except ParameterError:
+        return False
+    return True
+
+
 @explain_unknown_options
 @dataclass(frozen=True)
 class Modal(Method):
@@ -190,9 +205,10 @@ class Modal(Method):
     go their own ways, and no step is as short as the fastest of them would ask.
 
     A gap is followed by the modes that matter and bounded by the others, so that no contact is
-    missed; the instant of a contact is a zero of all modes, to rounding. Systems that it doesn't
-    serve - nonlinear forces, laws of contact, drives that aren't harmonic - are moved by
-    :class:`saltus.Taylor`.
+    missed; the instant of a contact is a zero of all modes, to rounding. At a rigid stop
+    (:func:`saltus.impact`) impacts, rest and release follow the rules of :class:`saltus.Taylor`.
+    Systems that it doesn't serve - nonlinear forces, friction, jumps, drives that aren't harmonic -
+    are moved by :class:`saltus.Taylor`.
 
     Parameters
     ----------
@@ -212,7 +228,7 @@ class Modal(Method):
 
     def serving(self, system: System) -> Method:
         """Taylor's method for a system that has no modal flow."""
-        if isinstance(linear_pieces(system), str):
+        if isinstance(linear_pieces(system), str) or not _has_modes(system):
             return Taylor(max_steps=self.max_steps, max_events=self.max_events)
         return self
 

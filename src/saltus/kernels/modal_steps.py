@@ -146,6 +146,7 @@ def place_of(i, g, tau, h, modes, steady, batch, m):
     which, side = int(batch.carry[i, SET]), side_of(g, batch.mode[i])
     sign, away = side * m.sign_of[g], side * m.offset[which, g]
     low, high, d = 0.0, h, m.found[g, 0] * h
+    size = m.errors[m.row_of[g], 2] + abs(away)
     for _ in range(60):
         move(modes, d, m)
         drive(i, tau + d, batch, m)
@@ -160,9 +161,9 @@ def place_of(i, g, tau, h, modes, steady, batch, m):
         new = d - value / rate if rate < 0.0 else 0.5 * (low + high)
         if not low <= new <= high:
             new = 0.5 * (low + high)
-        if abs(new - d) <= 2.3e-16 * (tau + d):
+        change, d = abs(new - d), new
+        if change <= 2.3e-16 * d or change * abs(rate) <= 2.3e-16 * size:
             break
-        d = new
     return d
 
 
