@@ -143,10 +143,10 @@ def test_a_velocity_that_jumps_changes_the_side_of_a_damper():
     modal, taylor = runs(damped, (0.0, 0.0), periods=4)
     assert same_rows(modal, taylor, 2 * math.pi / 0.4) > 100
     crossings = times(modal, "crossing")
-    assert set(times(modal, "impact")[:40]) <= set(crossings[:80])
+    assert set(times(modal, "impact")[:20]) <= set(crossings)
     for kind in ("hold", "release"):
         found, known = times(modal, kind), times(taylor, kind)
-        assert len(found) == len(known) >= 4
+        assert len(found) == len(known) >= 3
         assert found == pytest.approx(known, abs=1e-6)
 
 

@@ -1,4 +1,4 @@
-"""Template, 1 of 3 of the modal flow: amplitudes on their way, and what they say of gaps."""
+"""Template, 1 of 4 of the modal flow: amplitudes on their way, and what they say of gaps."""
 
 import math
 

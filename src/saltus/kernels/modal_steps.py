@@ -1,4 +1,4 @@
-"""Template, 3 of 3 of the modal flow: steps that are proven to cross no boundary, or just one, and
+"""Template, 4 of 4 of the modal flow: steps that are proven to cross no boundary, or just one, and
 the life of a trajectory.
 
 A step is tried and halved until every gap is decided. Modes that are too fast for it are bounded:
