@@ -241,9 +241,11 @@ def strike(i, g, now, modes, steady, batch, m):
     _, rate = gap_of_moved(m.row_of[g], modes, steady, which, m)
     rate *= m.sign_of[g]
     snap(i, g, batch, m)
-    slow = known_zeros(i, g, batch) > 1
-    closing = 0.0 if slow else closing_of(i, g, batch, m)
-    restitution = restitution_of(i, g, batch, m)
+    closing, restitution = closing_of(i, g, batch, m), restitution_of(i, g, batch, m)
+    first, _, _, _ = terms_of_gap(m.row_of[g], modes, steady, which, m)
+    if known_zeros(i, g, batch) > 1 or abs(closing) <= ROUNDED * first:
+        push(i, g, -closing, batch, m)  # it is the rounding of the modes
+        closing = 0.0
     if closing > 0.0:
         if not -PART <= restitution <= 1.0 + PART:
             return INVALID_RESTITUTION
@@ -264,7 +266,9 @@ def strike(i, g, now, modes, steady, batch, m):
 
 @kernel
 def rest_or_go(i, now, modes, steady, batch, m):
-    """Hold the contact that was struck if its rebounds are too small to be followed."""
+    """Hold the contact that was struck if its rebounds are too small to be followed, or to be told
+    from the rounding of its modes.
+    """
     g, before = int(batch.carry[i, ASKS]) - 1, batch.mode[i]
     batch.carry[i, ASKS] = 0.0
     for j in range(m.sizes[STATES]):
@@ -281,18 +285,20 @@ def rest_or_go(i, now, modes, steady, batch, m):
         later = math.inf
         if restitution < 1.0:
             later = 2.0 * rebound / (pressing * (1.0 - restitution))
-    shortest = too_short(i, g, now, restitution, modes, steady, batch, m)
-    if later <= shortest or is_hidden(i, g, rebound, pressing, batch, m):
+    which = int(batch.carry[i, SET])
+    first, second, third, fourth = terms_of_gap(m.row_of[g], modes, steady, which, m)
+    shortest = too_short(i, now, restitution, second, third, fourth, batch)
+    hidden = rebound <= ROUNDED * first or is_hidden(i, g, rebound, pressing, batch, m)
+    if later <= shortest or hidden:
         hold(i, g, now, later, batch, m)
         leave(i, before, batch, m)
 
 
-@kernel
-def too_short(i, g, now, restitution, modes, steady, batch, m):
+@inner
+def too_short(i, now, restitution, second, third, fourth, batch):
     """Duration of a chatter [s] below which it is completed: the remainder changes the acceleration
     by less than 1e-8, so the time of its end is accurate to rounding. See taylor_laws.py.
     """
-    second, third, fourth = bends_of_gap(m.row_of[g], modes, steady, int(batch.carry[i, SET]), m)
     scale = end_of(i, batch)
     if second < scale * third:
         scale = second / third
@@ -303,19 +309,20 @@ def too_short(i, g, now, restitution, modes, steady, batch, m):
 
 
 @kernel
-def bends_of_gap(r, modes, steady, which, m):
-    """Sizes of terms 2, 3 and 4 of a row of gaps, by the amplitudes in `moved` and the drives in
-    `angle`.
+def terms_of_gap(r, modes, steady, which, m):
+    """The size of what makes the rate of a row of gaps, and sizes of its terms 2, 3 and 4, by the
+    amplitudes in `moved` and the drives in `angle`.
     """
     groups, drives = m.sizes[MODE_GROUPS], m.sizes[DRIVES]
     row = modes + groups * (3 + 4 * LANES * m.sizes[STATE_GROUPS]) + 3 * groups * r
-    second, third, fourth = 0.0, 0.0, 0.0
+    rate, second, third, fourth = 0.0, 0.0, 0.0, 0.0
     for j in range(groups * LANES):
         a, b = number(m.modes, row, j), number(m.modes, row + groups, j)
         x, y = number(m.moved, 0, j), number(m.moved, groups, j)
         real, imaginary = a * x - b * y, a * y + b * x
         a, b = number(m.modes, modes, j), number(m.modes, modes + groups, j)
         real, imaginary = a * real - b * imaginary, a * imaginary + b * real
+        rate += abs(real) + abs(imaginary)
         real, imaginary = a * real - b * imaginary, a * imaginary + b * real
         second += real
         real, imaginary = a * real - b * imaginary, a * imaginary + b * real
@@ -327,10 +334,11 @@ def bends_of_gap(r, modes, steady, which, m):
         cosine, sine = m.angle[d, 1], m.angle[d, 2]
         real, imaginary = a * cosine - b * sine, a * sine + b * cosine
         w = m.rate[which, d]
+        rate += abs(w) * (abs(real) + abs(imaginary))
         second += -w * w * real
         third += w * w * w * imaginary
         fourth += w * w * w * w * real
-    return abs(second) / 2.0, abs(third) / 6.0, abs(fourth) / 24.0
+    return rate, abs(second) / 2.0, abs(third) / 6.0, abs(fourth) / 24.0
 
 
 @inner
