@@ -229,7 +229,8 @@ def impacts(i, g, now, hits, modes, steady, batch, m):
         status = order_of_impacts(i, stops, batch, m)
         if status != RUNNING:
             return status
-        if batch.carry[i, LANDINGS] >= MOST_STRIKES and end_impacts(i, stops, batch, m):
+        endless = has_just_landed(i, now, batch) and batch.carry[i, LANDINGS] >= MOST_STRIKES
+        if endless and end_impacts(i, stops, batch, m):
             return RUNNING
     return strike(i, g, now, modes, steady, batch, m)
 
