@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,7 +14,7 @@ from saltus.codegen.module import Flow, modal_module
 from saltus.errors import ParameterError
 from saltus.flow.counts import whole
 from saltus.flow.method import Method, explain_unknown_options, step_budget
-from saltus.flow.modal_tables import Tables
+from saltus.flow.modal_tables import Tables, ValueSet
 from saltus.flow.taylor import Taylor
 from saltus.kernels import modal_layout as layout
 from saltus.kernels import status as st
@@ -50,7 +49,7 @@ class ModalFlow:
         self._states, self._sizes = size, tables.sizes.copy()
         self._sizes[layout.TANGENTS] = tangents
         self.CARRY = layout.AMPLITUDES + rows * self._lanes + tangents * (size + guards)
-        self.STEP_RECORDS = guards + MOST_TOUCHES
+        self.STEP_RECORDS = 2 * guards + MOST_TOUCHES
 
     def workspace(self) -> tuple[np.ndarray, ...]:
         """None that the engine must keep."""
@@ -106,6 +105,7 @@ class ModalFlow:
                 empty(((terms + 2) * self.tables.block_groups, lanes)),
                 empty((max(courses, 1), layout.VALUE + layout.COURSE_TERMS)),
                 empty((2 * groups, lanes)), empty((amplitudes, lanes)), empty((columns, columns)),
+                empty((3, size)),
             )  # fmt: skip
         arrays: tuple[np.ndarray, ...] = self._memory.arrays
         return arrays
@@ -140,17 +140,37 @@ class ModalFlow:
         gap = parts[0] + parts[1] + parts[2]
         size = np.abs(state) @ np.abs(given.gaps.matrix.T)
         zero = np.abs(gap) <= layout.ROUNDED * (size + np.abs(parts[1]) + np.abs(parts[2]))
-        bits = 1 << np.arange(gap.shape[1])
-        mode = ((gap > 0) & ~zero) @ bits if gap.shape[1] else np.zeros(len(who), np.int64)
+        bits, allowed, plain = 1 << np.arange(gap.shape[1]), self.tables.allowed, self.tables.plain
+        zero &= plain | (allowed != 0)
+        up = np.where(zero, allowed > 0, gap > 0) & ~self.tables.holds
+        mode = up @ bits if gap.shape[1] else np.zeros(len(who), np.int64)
         fresh = zero @ bits if gap.shape[1] else mode
-        for i in np.flatnonzero(fresh).tolist():
+        zero &= plain
+        for i in np.flatnonzero(zero.any(axis=1)).tolist():
             mode[i] |= self._ways(which, int(mode[i]), zero[i], state[i], time[i])
         batch.mode[who], batch.fresh[who] = mode, fresh
         carry = np.zeros((len(who), layout.AMPLITUDES))
-        carry[:, layout.AT], carry[:, layout.ENTERS] = -1.0, 1.0
+        carry[:, layout.AT], carry[:, layout.ENTERS], carry[:, layout.STARTS] = -1.0, 1.0, 1.0
         carry[:, layout.NEXT_STEP] = FIRST_STEP * batch.period[who]
-        carry[:, layout.LANDED_AT], carry[:, layout.RIDES] = -math.inf, fresh
+        carry[:, layout.TWICE] = self._at_rest(given, state, drives, fresh)
+        carry[:, layout.LANDED_AT] = time
+        carry[:, layout.RIDES] = zero @ bits if gap.shape[1] else 0.0
         batch.carry[who, : layout.AMPLITUDES] = carry
+
+    def _at_rest(
+        self, given: ValueSet, states: np.ndarray, drives: np.ndarray, fresh: np.ndarray
+    ) -> np.ndarray:
+        """Bits of the stops among those in `fresh` that neither close nor open."""
+        closing = given.impacts.closing
+        parts = states @ closing.matrix.T, drives @ closing.driven.T
+        size = np.abs(states) @ np.abs(closing.matrix.T) + np.abs(parts[1])
+        slow = np.abs(parts[0] + parts[1] + closing.constant) <= layout.ROUNDED * (
+            size + np.abs(closing.constant)
+        )
+        bits = 1 << np.arange(slow.shape[1])
+        stops = (self.tables.allowed != 0) & ((fresh[:, None] & bits) != 0)
+        found: np.ndarray = (slow & stops) @ bits if slow.shape[1] else fresh
+        return found
 
     def _ways(self, which: int, mode: int, zero: np.ndarray, state: np.ndarray, time: float) -> int:
         """Bits of the guards at zero whose gaps open upwards: by the first derivative that isn't
@@ -203,6 +223,11 @@ def modal_flow(system: System) -> ModalFlow:
     return ModalFlow(Tables(linear))
 
 
+def _has_laws(system: System) -> bool:
+    """True if a contact of a system has a law."""
+    return any(guard.law is not None for guard in system.guards)
+
+
 @explain_unknown_options
 @dataclass(frozen=True)
 class Modal(Method):
@@ -210,9 +235,11 @@ class Modal(Method):
     go their own ways, and no step is as short as the fastest of them would ask.
 
     A gap is followed by the modes that matter and bounded by the others, so that no contact is
-    missed; the instant of a contact is a zero of all modes, to rounding. Systems that it doesn't
-    serve - nonlinear forces, laws of contact, drives that aren't harmonic - are moved by
-    :class:`saltus.Taylor`.
+    missed; the instant of a contact is a zero of all modes, to rounding. At a rigid stop
+    (:func:`saltus.impact`) impacts, rest and release follow the rules of :class:`saltus.Taylor`.
+    Systems that it doesn't serve - nonlinear forces, friction, jumps, drives that are neither
+    harmonic nor records -
+    are moved by :class:`saltus.Taylor`.
 
     Parameters
     ----------
@@ -232,7 +259,9 @@ class Modal(Method):
 
     def serving(self, system: System) -> Method:
         """Taylor's method for a system that has no modal flow."""
-        if isinstance(linear_pieces((system.tangent_of or system).origin), str):
+        origin = (system.tangent_of or system).origin
+        unmoved = isinstance(linear_pieces(origin), str)
+        if unmoved or (system.tangent_of is not None and _has_laws(origin)):
             return Taylor(max_steps=self.max_steps, max_events=self.max_events)
         return self
 
@@ -241,8 +270,10 @@ class Modal(Method):
         return modal_flow(system)
 
     def tangents(self, system: System) -> System | None:
-        """The states alone: the modes of a contact state move the derivative too."""
-        if self.serving(system.origin) is not self:
+        """The states alone: the modes of a contact state move the derivative too. Where a contact
+        has a law, the derivative is moved by :class:`saltus.Taylor`.
+        """
+        if self.serving(system.origin) is not self or _has_laws(system):
             return super().tangents(system)
         return tangent_states(system)
 

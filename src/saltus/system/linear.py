@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from saltus.contact.guards import Guard, is_hold
 from saltus.language import expression as ex
 from saltus.language.evaluate import evaluate
 from saltus.language.expression import Expr
@@ -111,9 +112,17 @@ class LinearSystem:
         bits = [bool(mode >> i & 1) for i in range(len(self.system.guards))]
         return LinearPiece(*self._coefficients(self._field, values, bits))
 
-    def gaps(self, values: Mapping[str, float]) -> LinearPiece:
-        """a, c and e of all guards, float64[guards, N], float64[guards], float64[guards, D]."""
-        return LinearPiece(*self._coefficients(self._gaps, values, []))
+    def gaps(self, values: Mapping[str, float], mode: int = 0) -> LinearPiece:
+        """a, c and e of all guards in a contact state, float64[guards, N], float64[guards],
+        float64[guards, D]; only those of hold guards depend on it.
+        """
+        bits = [bool(mode >> i & 1) for i in range(len(self.system.guards))]
+        return LinearPiece(*self._coefficients(self._gaps, values, bits))
+
+    def pieces_of(self, entries: Sequence[Expr], values: Mapping[str, float]) -> LinearPiece:
+        """Coefficients of other linear functions of the states and drives of the system."""
+        known = tuple(ex.substituted(one, self._names) for one in entries)
+        return LinearPiece(*self._coefficients(known, values, []))
 
     def rates(self, values: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
         """Rates [rad/s] and phases [rad] of the drives as cosines."""
@@ -150,11 +159,14 @@ def linear_pieces(system: System) -> LinearSystem | str:
     """The system as one that is linear between its contacts, or the reason why it isn't."""
     if system.tangent_of is not None:
         return "it carries its own derivatives"
-    if any(guard.law for guard in system.guards):
-        return "a contact of it has a law: an impact, a jump, friction"
+    missing = _missing_law(system.guards)
+    if missing is not None:
+        return missing
+    stops = [guard.law for guard in system.guards if guard.law and guard.law.kind == "impact"]
+    laws = tuple(one for law in stops for one in (law.constraint, *law.settled) if one is not None)
     gaps = tuple(guard.gap for guard in system.guards)
     drives, courses = dict[Expr, Drive](), dict[Expr, None]()
-    for node in _driving(*system.field, *gaps):
+    for node in _driving(*system.field, *gaps, *laws):
         if node.op in ("sin", "cos"):
             rate = rate_of(node.args[0])
             if rate is None:
@@ -167,14 +179,17 @@ def linear_pieces(system: System) -> LinearSystem | str:
             return reason
         else:
             courses[node] = None
-    if any(node.op != "table" for node in courses.keys() & set(_driving(*gaps))):
+    plain = [i for i, guard in enumerate(system.guards) if not is_hold(guard)]
+    moving = courses.keys() & set(_driving(*(gaps[i] for i in plain), *laws))
+    if any(node.op != "table" or node.payload.degree == 0 for node in moving):
         return "a boundary of it moves by a drive that may jump"
     names = {node: ex.parameter(_name(i)) for i, node in enumerate((*drives, *courses))}
-    field = tuple(ex.substituted(entry, names) for entry in system.field)
-    gaps = tuple(ex.substituted(gap, names) for gap in gaps)
-    if any(ex.depends_on(gap, ("select",)) for gap in gaps):
+    field, gaps, laws = (
+        tuple(ex.substituted(one, names) for one in given) for given in (system.field, gaps, laws)
+    )
+    if any(ex.depends_on(one, ("select",)) for one in (*(gaps[i] for i in plain), *laws)):
         return "a boundary of it moves when another is crossed"
-    if not all(_is_affine(entry, len(names)) for entry in (*field, *gaps)):
+    if not all(_is_affine(entry, len(names)) for entry in (*field, *gaps, *laws)):
         return "it isn't linear between its contacts"
     return LinearSystem(system, tuple(drives.values()), tuple(courses), field, gaps, names)
 
@@ -198,6 +213,18 @@ def _driving(*roots: Expr) -> Iterator[Expr]:
             yield node
         else:
             waiting += reversed(node.args)
+
+
+def _missing_law(guards: Sequence[Guard]) -> str | None:
+    """The reason why the laws of some guards aren't carried; None if they are."""
+    for law in [guard.law for guard in guards if guard.law]:
+        if law.kind == "jump":
+            return "a contact of it makes its state jump"
+        if law.kind == "surface" or law.friction is not None:
+            return "a contact of it has friction, or a force that jumps"
+        if law.restitution is not None and ex.varies(law.restitution):
+            return "a restitution of it isn't a number"
+    return None
 
 
 def _is_affine(root: Expr, drives: int) -> bool:
