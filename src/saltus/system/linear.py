@@ -181,7 +181,7 @@ def linear_pieces(system: System) -> LinearSystem | str:
             courses[node] = None
     plain = [i for i, guard in enumerate(system.guards) if not is_hold(guard)]
     moving = courses.keys() & set(_driving(*(gaps[i] for i in plain), *laws))
-    if any(node.op != "table" or node.payload.degree == 0 for node in moving):
+    if any(node.op != "table" for node in moving):
         return "a boundary of it moves by a drive that may jump"
     names = {node: ex.parameter(_name(i)) for i, node in enumerate((*drives, *courses))}
     field, gaps, laws = (
