@@ -223,11 +223,6 @@ def modal_flow(system: System) -> ModalFlow:
     return ModalFlow(Tables(linear))
 
 
-def _has_laws(system: System) -> bool:
-    """True if a contact of a system has a law."""
-    return any(guard.law is not None for guard in system.guards)
-
-
 @explain_unknown_options
 @dataclass(frozen=True)
 class Modal(Method):
@@ -259,9 +254,7 @@ class Modal(Method):
 
     def serving(self, system: System) -> Method:
         """Taylor's method for a system that has no modal flow."""
-        origin = (system.tangent_of or system).origin
-        unmoved = isinstance(linear_pieces(origin), str)
-        if unmoved or (system.tangent_of is not None and _has_laws(origin)):
+        if isinstance(linear_pieces((system.tangent_of or system).origin), str):
             return Taylor(max_steps=self.max_steps, max_events=self.max_events)
         return self
 
@@ -270,10 +263,8 @@ class Modal(Method):
         return modal_flow(system)
 
     def tangents(self, system: System) -> System | None:
-        """The states alone: the modes of a contact state move the derivative too. Where a contact
-        has a law, the derivative is moved by :class:`saltus.Taylor`.
-        """
-        if self.serving(system.origin) is not self or _has_laws(system):
+        """The states alone: the modes of a contact state move the derivative too."""
+        if self.serving(system.origin) is not self:
             return super().tangents(system)
         return tangent_states(system)
 

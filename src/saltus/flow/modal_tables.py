@@ -242,7 +242,7 @@ class Tables:
             links.append(behind)
             if behind >= 0:
                 self._links.table[behind, layout.BEHIND + g] = number
-                if self.plain.all() and self._is_smooth(known, self.made[behind][0], given.gaps, g):
+                if self.plain[g] and self._is_smooth(known, self.made[behind][0], given.gaps, g):
                     links[layout.SMOOTH] |= 1 << g
                     self._links.table[behind, layout.SMOOTH] |= 1 << g
         self._links.add(np.array(links))

@@ -170,6 +170,12 @@ def act(i, g, tau, d, hits, modes, steady, batch, m):
     else:
         status = impacts(i, g, tau + d, hits, modes, steady, batch, m)
     leave(i, before, batch, m)
+    if m.sizes[TANGENTS] != 0:
+        batch.carry[i, WAITED] += d
+        struck = int(batch.carry[i, CROSSED])
+        leave_columns(i, struck, modes, steady, batch, m)
+        if struck != 0:
+            strike_columns(i, g, batch, m)
     slides = count_landing(i, tau + d, batch)
     return slides if status == RUNNING else status
 
@@ -260,6 +266,7 @@ def strike(i, g, now, modes, steady, batch, m):
         if not -PART <= restitution <= 1.0 + PART:
             return INVALID_RESTITUTION
         push(i, g, -(1.0 + restitution) * closing, batch, m)
+        batch.carry[i, CROSSED] = float(1 << g)
         starts = batch.carry[i, STARTS] > 0.5
         slowest = batch.minima[i, CONTACT_SPEED]
         batch.minima[i, CONTACT_SPEED] = slowest if starts else min(slowest, abs(rate))
@@ -302,6 +309,8 @@ def rest_or_go(i, now, modes, steady, batch, m):
     if later <= shortest or hidden:
         hold(i, g, now, later, batch, m)
         leave(i, before, batch, m)
+        if m.sizes[TANGENTS] != 0:
+            settle_columns(i, g, batch, m)
 
 
 @inner
