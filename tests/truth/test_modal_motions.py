@@ -50,7 +50,7 @@ def test_derivative_of_the_state(modes, damping):
 
 
 def test_derivative_where_a_drive_resonates():
-    """Its force belongs to the rates on both sides of a boundary at which a damper's force jumps."""
+    """Its force is one on both sides of a boundary at which that of a damper jumps."""
 
     @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
     def driven(t, x, v, *, w=1.0, gap=0.4):
