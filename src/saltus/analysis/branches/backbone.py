@@ -98,7 +98,8 @@ def backbone(
     points : int
         Most points.
     method : Method
-        Default :class:`saltus.Taylor`; another one must be exact.
+        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` where it serves and the states are
+        many; another one must be exact.
     threads : int, optional
         Default all processors.
     progress : bool or callable
@@ -136,7 +137,7 @@ def backbone(
     '11.420668320 Hz'
     """
     check_system(system)
-    method, system = exact_method(method, "sl.backbone"), at_values(system, values)
+    method, system = exact_method(method, system, "sl.backbone"), at_values(system, values)
     state = system.states[0] if state is None else state
     if not among(state, system.states):
         raise unknown(f"{system.name} has no state", state, system.states)
