@@ -11,6 +11,7 @@ import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 
@@ -95,9 +96,7 @@ def run(
     data, due = tables_of(system.origin), method.due(periods)
     arrays["options"] = options_of(method, periods, len(request.start), request.checks)
     check_steps(system, method, request.period)
-    chunks = [
-        _cut(request, arrays, first, data, due) for first in range(0, len(request.start), CHUNK)
-    ]
+    chunks = [_cut(request, arrays, rows, data, due) for rows in _rows_of_chunks(request)]
     workers = threads or usable_processors()
     stop, room = Stop(), Contacts(len(system.states))
     try:
@@ -152,7 +151,7 @@ def allocate(
     request: Request, system: System, module: Flow
 ) -> tuple[Outcome, dict[str, np.ndarray]]:
     """Allocate the arrays that all chunks write to, and the outcome that shows them."""
-    n, m, states = len(request.start), len(request.schedule.count), len(system.states)
+    n, m, states = len(request.start), request.sample_count, len(system.states)
     sampled = n - request.checks
     finite = np.isfinite(request.start).all(axis=1) & np.isfinite(request.parameters).all(axis=1)
     start, beyond = on_allowed_sides(
@@ -192,21 +191,31 @@ def allocate(
 ARGUMENTS = Batch._fields
 
 
+def _rows_of_chunks(request: Request) -> list[slice]:
+    """The trajectories of each chunk; those whose samples have given times share one period."""
+    cuts = {*range(0, len(request.start), CHUNK), len(request.start)}
+    if request.times is not None:
+        cuts |= set((1 + np.flatnonzero(np.diff(request.period))).tolist())
+    return [slice(*ends) for ends in pairwise(sorted(cuts))]
+
+
 def _cut(
     request: Request,
     all_arrays: dict[str, np.ndarray],
-    first: int,
+    rows: slice,
     data: np.ndarray,
     due: float | None,
 ) -> _Chunk:
     """The arrays of one chunk: views of the shared arrays, and tables of its own."""
-    rows = slice(first, min(first + CHUNK, len(request.start)))
+    schedule = request.schedule
+    if request.times is not None:
+        schedule = Schedule.at(request.times, float(request.period[rows.start]))
     parameters = request.parameters if len(request.parameters) == 1 else request.parameters[rows]
     arrays = {name: array[rows] for name, array in all_arrays.items()} | shared_arrays(
-        rows.stop - first, parameters, request.schedule, data
+        rows.stop - rows.start, parameters, schedule, data
     )
     arrays["rec_first"] += request.record_from or 0
-    return _Chunk(first, arrays, request.record_from is not None, due)
+    return _Chunk(rows.start, arrays, request.record_from is not None, due)
 
 
 def shared_arrays(

@@ -29,6 +29,18 @@ class Schedule:
         return cls(np.zeros(0, np.int64), np.zeros(0))
 
     @classmethod
+    def at(cls, elapsed: np.ndarray, period: float) -> Schedule:
+        """A schedule of times since the start [s], ascending; none is later than its own time by
+        rounding, so a sample at the end is taken.
+        """
+        count = np.floor(elapsed / period)
+        count -= count * period > elapsed
+        rest = elapsed - count * period
+        fraction = rest / period
+        fraction = np.where(fraction * period > rest, np.nextafter(fraction, 0.0), fraction)
+        return cls(count.astype(np.int64), fraction)
+
+    @classmethod
     def even(cls, periods: int, per_period: int, first: int = 0, beyond: int = 0) -> Schedule:
         """``per_period`` equidistant samples in each of ``periods`` from ``first`` on, and
         ``beyond`` more after them.
@@ -57,6 +69,9 @@ class Request:
         and the time after them [s].
     schedule : Schedule
         When samples are taken.
+    times : float64[M], optional
+        Times of the samples since the start [s], ascending, the same for all trajectories, in place
+        of the schedule.
     record_from : int or None
         First period since the start whose contacts are recorded; None records none.
     t_end : float
@@ -73,9 +88,19 @@ class Request:
     end_phase: np.ndarray
     origin: float = 0.0
     schedule: Schedule = field(default_factory=Schedule.none)
+    times: np.ndarray | None = None
     record_from: int | None = None
     t_end: float = np.inf
     checks: int = 0
+
+    @property
+    def sample_count(self) -> int:
+        """Number of samples of each trajectory."""
+        return len(self.schedule.count) if self.times is None else len(self.times)
+
+    def unsampled(self, **more: Any) -> Request:
+        """The request without samples; ``more`` are other changes."""
+        return replace(self, schedule=Schedule.none(), times=None, **more)
 
     @classmethod
     def periods(

@@ -474,3 +474,13 @@ def test_a_system_without_forcing_is_looked_at_every_so_often(tmp_path):
     assert question.arguments["every"] == 0.25
     (question,) = questions_of(parse(text), None, Inputs(tmp_path))
     assert question.arguments.get("every") is None  # about once a turn
+
+
+def test_a_motion_at_given_times_has_a_row_for_each(tmp_path):
+    text = HEAD + '[simulate]\nstart = { x = "1 mm", v = "0 m/s" }\nat = ["20 ms", "5 ms"]\n'
+    Run(tmp_path, text)
+    run = load(next(tmp_path.rglob("run.nc")))
+    np.testing.assert_array_equal(run.time, [0.02, 0.005])
+    assert run.end_time == 0.02
+    with pytest.raises(StudyError, match="not both"):
+        Run(tmp_path / "both", text + "samples = 3\n")

@@ -30,9 +30,8 @@ _ELSEWHERE: Mapping[str, str] = {
         ("tend", "tfinal", "t_final", "tf", "t_max", "tmax", "duration", "t_span", "tspan"),
         "t_end=",
     ),
-    **dict.fromkeys(
-        ("t_eval", "teval", "n_samples", "nsamples", "dt", "step"), "samples= (per period)"
-    ),
+    **dict.fromkeys(("t_eval", "teval", "times", "saveat"), "at= (times)"),
+    **dict.fromkeys(("n_samples", "nsamples", "dt", "step"), "samples= (per period)"),
     **dict.fromkeys(("y0", "x0", "u0", "initial", "initial_state", "ic"), "start="),
     **dict.fromkeys(
         ("rtol", "atol", "tol", "tolerance", "reltol", "abstol"),
@@ -65,7 +64,7 @@ _MISSING: Mapping[str, str] = {
     ),
     **dict.fromkeys(("max_step", "first_step", "min_step", "hmax", "h0", "options"), _STEPS),
     **dict.fromkeys(("jac", "jacobian", "vectorized", "mass_matrix"), _NOT_NEEDED),
-    "dense_output": "Write samples= for more samples; run.x.interp(time=...) reads between them.",
+    "dense_output": "Write at=[...] for the states at given times, or samples= for more samples.",
     **dict.fromkeys(
         ("transient", "discard", "settle", "skip"),
         "Write keep=, how many of the last periods are kept.",
@@ -175,7 +174,7 @@ def _by_name(
     ):
         raise ParameterError(
             f"sl.{name}: samples is a number: how many in a forcing period, or in the whole run of "
-            f"a system without forcing. run.x.interp(time=[...]) reads a state at given times."
+            f"a system without forcing. Write at=[...] for the states at given times."
         )
     return given
 

@@ -151,6 +151,17 @@ def rows(
     return [table(title, columns, (*left_out(total, "trajectories"), *early))]
 
 
+def sample_rows(run: xr.Dataset) -> TextTable:
+    """A row for each given time, of each trajectory: the states there."""
+    columns = {name: values for name, (_, values) in sample_columns(run).items()}
+    shown = [words("", columns["trajectory"], "trajectory")] if "trajectory" in columns else []
+    shown += [
+        quantity(name, columns[name], unit_of(run[name]), 6) for name in ("time", *states_of(run))
+    ]
+    total = len(columns["time"])
+    return table("states at the given times", shown, left_out(total, "times"))
+
+
 # -- all of it -------------------------------------------------------------------------------------
 #: Columns by name, each with the name and the values of its variable.
 Columns = dict[str, tuple[str, np.ndarray]]
