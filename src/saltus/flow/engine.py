@@ -10,7 +10,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import pairwise
 
 import numpy as np
@@ -57,6 +57,7 @@ class _Chunk:
     arrays: dict[str, np.ndarray]
     keeps_contacts: bool
     due: float | None
+    until: Callable[[], bool] | None
     contacts: list[ContactTable] = field(default_factory=list)
 
 
@@ -95,8 +96,14 @@ def run(
     periods = float(np.max(request.end_count + request.end_phase / request.period, initial=0.0))
     data, due = tables_of(system.origin), method.due(periods)
     arrays["options"] = options_of(method, periods, len(request.start), request.checks)
+    most = float(arrays["options"][0, method.EVENT_BUDGET])
+    if request.until is not None:
+        arrays["options"][:, method.EVENT_BUDGET] = 0.5
     check_steps(system, method, request.period)
-    chunks = [_cut(request, arrays, rows, data, due) for rows in _rows_of_chunks(request)]
+    chunks = [
+        _cut(request, arrays, rows, data, due, method.EVENT_BUDGET, most)
+        for rows in _rows_of_chunks(request)
+    ]
     workers = threads or usable_processors()
     stop, room = Stop(), Contacts(len(system.states))
     try:
@@ -205,6 +212,8 @@ def _cut(
     rows: slice,
     data: np.ndarray,
     due: float | None,
+    budget: int,
+    most: float,
 ) -> _Chunk:
     """The arrays of one chunk: views of the shared arrays, and tables of its own."""
     schedule = request.schedule
@@ -215,7 +224,12 @@ def _cut(
         rows.stop - rows.start, parameters, schedule, data
     )
     arrays["rec_first"] += request.record_from or 0
-    return _Chunk(rows.start, arrays, request.record_from is not None, due)
+    go_on = None
+    if request.until is not None:
+        until = request.until.of(rows)
+        until.begin(arrays)
+        go_on = partial(until.go_on, arrays, budget, most)
+    return _Chunk(rows.start, arrays, request.record_from is not None, due, go_on)
 
 
 def shared_arrays(
@@ -329,6 +343,8 @@ def _advance(
         outcome = module.propagate(*(arrays[name] for name in ARGUMENTS), steps, *workspace)
         _empty_table(chunk, room)
         went_on = chunk.due is not None and resume(arrays, chunk.due)
+        if chunk.until is not None:
+            went_on |= chunk.until()
         if show is not None:
             show(_share_done([chunk]))
         if outcome == st.FINISHED and not went_on:

@@ -48,6 +48,7 @@ def mark_growth(outcome: Outcome, request: Request, exactly: Callable[[Request],
             **{
                 name: getattr(request, name)[large] for name in ("period", "end_count", "end_phase")
             },
+            until=request.until and request.until.of(large),
             record_from=None,
             checks=0,
         )

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from saltus.flow.contact_table import ContactTable
+from saltus.flow.until import Until
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,8 @@ class Request:
     times : float64[M], optional
         Times of the samples since the start [s], ascending, the same for all trajectories, in place
         of the schedule.
+    until : Until, optional
+        Condition at which trajectories end, with the status of it.
     record_from : int or None
         First period since the start whose contacts are recorded; None records none.
     t_end : float
@@ -89,6 +92,7 @@ class Request:
     origin: float = 0.0
     schedule: Schedule = field(default_factory=Schedule.none)
     times: np.ndarray | None = None
+    until: Until | None = None
     record_from: int | None = None
     t_end: float = np.inf
     checks: int = 0

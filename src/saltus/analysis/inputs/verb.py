@@ -37,6 +37,7 @@ _ELSEWHERE: Mapping[str, str] = {
         ("rtol", "atol", "tol", "tolerance", "reltol", "abstol"),
         "method=sl.ODE45(rtol=..., atol=...), or sl.Taylor(), which needs none",
     ),
+    **dict.fromkeys(("terminal", "stop", "stop_at", "stop_condition"), 'until="x > 2 mm"'),
     **dict.fromkeys(("params", "parameters", "args", "p"), "values="),
     **dict.fromkeys(("n_jobs", "workers", "cores"), "threads="),
     **dict.fromkeys(("n", "n_periods", "nperiods", "cycles"), "periods="),
@@ -55,8 +56,8 @@ _RECORDS = (
 _MISSING: Mapping[str, str] = {
     **dict.fromkeys(("events", "event", "callback"), _RECORDS),
     **dict.fromkeys(
-        ("terminal", "stop", "stop_at", "until"),
-        "To stop at an event isn't possible: run on, and cut the result at run.contact_time.",
+        ("until", "terminal", "stop", "stop_at"),
+        'sl.simulate ends at a condition: sl.simulate(system, start, t_end=10, until="x > 2 mm").',
     ),
     "outputs": (
         "sl.frequency_response, sl.bifurcation_diagram and sl.branches know outputs; of a run "

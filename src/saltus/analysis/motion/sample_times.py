@@ -82,6 +82,10 @@ class SampleTimes:
         return time, count + fraction
 
 
+#: No samples at all, and all contacts.
+NO_SAMPLES = SampleTimes(Schedule.none(), 0)
+
+
 def planned(
     system: System, group: Ensemble, length: Span, samples: Any, keep: Any, states: int
 ) -> SampleTimes:
@@ -100,6 +104,16 @@ def planned(
         ),
         first,
     )
+
+
+def evenly(
+    system: System, group: Ensemble, t_start: float, elapsed: float, samples: Any
+) -> SampleTimes:
+    """Equal parts of a stretch from the start on, as of the span of an unforced system."""
+    per = _whole(samples, "samples", _per_span(group.size))
+    check_samples(system, group.size, per + 1)
+    times = np.unique(t_start + np.linspace(0.0, elapsed, per + 1))
+    return SampleTimes(Schedule.none(), 0, times)
 
 
 def last_of(given: np.ndarray, t_start: Any) -> float:

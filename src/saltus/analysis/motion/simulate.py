@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -15,6 +15,7 @@ from saltus.analysis.inputs.starts import Ensemble, Span, check_system, ensemble
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion import time_errors as measure
 from saltus.analysis.motion.sample_times import (
+    NO_SAMPLES,
     SampleTimes,
     at_times,
     check_samples,
@@ -36,6 +37,9 @@ from saltus.results.dataset import schema
 from saltus.system import System
 from saltus.system.quantity import remembering
 
+if TYPE_CHECKING:
+    from saltus.analysis.motion.ending import Ending
+
 
 @verb
 def simulate(
@@ -48,6 +52,7 @@ def simulate(
     method: Method | None = None,
     samples: int | None = None,
     at: Any = None,
+    until: Any = None,
     keep: int | None = None,
     values: Mapping[str, Any] | None = None,
     time_errors: str = "measured",
@@ -78,6 +83,12 @@ def simulate(
         Times at which the states are wanted [s], in any order, in place of ``samples``; text has a
         unit: ``["10 ms", "25 ms"]``. The result has these times in this order, each state with the
         flow's own precision. Without ``periods`` and ``t_end`` the run ends at the last of them.
+    until : str or callable, optional
+        Condition at which a trajectory ends, at the instant at which it becomes true:
+        ``"x > 2 mm"``, ``"x > 2 mm and v < 0"``, or a function of (t, states, parameters) by their
+        names, ``lambda x: x > 2e-3``. A number, such as ``lambda x: x - 2e-3``, ends it where it
+        crosses zero. Its status is then ``until``; ``periods`` or ``t_end`` are the end of those
+        for which it never does. Samples reach as far as the last end.
     keep : int
         Number of periods at the end whose samples and contacts are kept (default all); with ``at``
         whose contacts.
@@ -128,38 +139,50 @@ def simulate(
     check_system(system)
     many = trajectories(start, values)
     times = None if at is None else _given_times(system, many, at, samples)
-    if times is None:
-        check_samples(system, many, least_samples(system, many, periods, samples, keep))
-    elif periods is None and t_end is None:
+    if times is not None and periods is None and t_end is None:
         t_end = last_of(times, t_start)
+    if times is None and until is None:
+        check_samples(system, many, least_samples(system, many, periods, samples, keep))
     group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
     length = span(system, group, periods, t_end, t_start)
-    flown = remembering(system)
-    if times is None:
-        plan = planned(system, group, length, samples, keep, len(flown.states))
-    else:
-        plan = at_times(length, first_kept(system, length, keep), times)
+    end = None if until is None else _ending(system, method, group, length, until, keep)
+    flown = remembering(system if end is None else end.condition.system)
     if not among(time_errors, ("measured", "local")):
         raise must_be("time_errors", '"measured" or "local"', time_errors)
+    plan = NO_SAMPLES
+    if times is not None:
+        plan = at_times(length, first_kept(system, length, keep), times)
+    elif end is None:
+        plan = planned(system, group, length, samples, keep, len(flown.states))
+    asked = _Asked(system, method, group, length, plan, times is not None, end)
 
     def so_far(outcome: Outcome) -> xr.Dataset:
-        return _dataset(system, method, group, length, plan, outcome, measure.local(outcome))
+        return _dataset(asked, outcome, measure.local(outcome))
 
-    outcome, request = None, plan.request(group, length, len(flown.states))
+    outcome = None
     with reporting(progress) as show:
         try:
-            if time_errors == "measured" and system.guards and method.records_contacts:
-                outcome, errors = measure.measured(flown, method, request, threads, show)
-            else:
-                outcome = engine.run(flown, method.suited_to(group.size), request, threads, show)
-                errors = measure.local(outcome)
-            result = _dataset(system, method, group, length, plan, outcome, errors)
+            if end is not None and times is None:
+                plan = end.plan(system, method, group, length, samples, threads, show)
+                asked, show = replace(asked, plan=plan), end.afterwards(show)
+            outcome, errors = asked.run(flown, time_errors == "measured", threads, show)
+            result = _dataset(asked, outcome, errors)
         except KeyboardInterrupt as stop:
             if outcome is not None:
                 raise Interrupted(partial(so_far, outcome)) from None
             raise stop.then(so_far) if isinstance(stop, engine.RunInterrupted) else stop from None
+    if end is not None:
+        end.warn_of_starts()
     warn(result, length, system)
     return result
+
+
+def _ending(
+    system: System, method: Method, group: Ensemble, length: Span, until: Any, keep: Any
+) -> Ending:
+    from saltus.analysis.motion.ending import ending  # few runs need it
+
+    return ending(system, method, group, length, until, keep)
 
 
 def _given_times(system: System, trajectories: int, at: Any, samples: Any) -> np.ndarray:
@@ -174,34 +197,62 @@ def _given_times(system: System, trajectories: int, at: Any, samples: Any) -> np
     return times_of(system, trajectories, at)
 
 
-def _dataset(
-    system: System,
-    method: Method,
-    group: Ensemble,
-    length: Span,
-    plan: SampleTimes,
-    outcome: Outcome,
-    errors: np.ndarray,
-) -> xr.Dataset:
+@dataclass(frozen=True)
+class _Asked:
+    """The arguments of a run, as they were read."""
+
+    system: System
+    method: Method
+    group: Ensemble
+    length: Span
+    plan: SampleTimes
+    given: bool
+    end: Ending | None
+
+    def run(
+        self,
+        flown: System,
+        measured: bool,
+        threads: int | None,
+        show: Callable[[float], None] | None,
+    ) -> tuple[Outcome, np.ndarray]:
+        """The outcome of the system ``flown``, and the errors of its contact times [s]."""
+        request = self.plan.request(self.group, self.length, len(flown.states))
+        if self.end is not None:
+            request = self.end.asked(request)
+        if measured and flown.guards and self.method.records_contacts:
+            return measure.measured(flown, self.method, request, threads, show)
+        method = self.method.suited_to(self.group.size)
+        outcome = engine.run(flown, method, request, threads, show)
+        return outcome, measure.local(outcome)
+
+
+def _dataset(asked: _Asked, outcome: Outcome, errors: np.ndarray) -> xr.Dataset:
     """The Dataset of a run."""
+    system, group, length, plan = asked.system, asked.group, asked.length, asked.plan
     forced = system.forced_at is not None
     own_periods = forced and bool(np.ptp(length.period) > 0)
     time, period = plan.of_result(outcome, length, forced)
     kept = plan.kept(outcome)
+    samples, modes = outcome.samples[:, kept, : len(system.states)], outcome.sample_mode[:, kept]
+    attrs: dict[str, Any] = {"sample_times": "given"} if asked.given else {}
+    if asked.end is not None:
+        outcome, errors = asked.end.of_the_user(outcome, errors)
+        samples, modes = asked.end.with_ends(outcome, samples, modes, time)
+        attrs["until"] = asked.end.condition.text
     subject = dataset_parts.trajectories(
         system,
-        method,
+        asked.method,
         group,
         (length.period if own_periods else float(length.period[0])) if forced else None,
     )
-    if plan.given is not None:
-        subject = replace(subject, attrs={**subject.attrs, "sample_times": "given"})
+    subject = replace(subject, attrs={**subject.attrs, **attrs})
     values = {
         "trajectory": np.arange(group.size),
         **({"period": period} if forced and period is not None else {}),
         "time": time,
-        "<state>": outcome.samples[:, kept, : len(system.states)],
-        "mode": outcome.sample_mode[:, kept],
+        "<state>": samples,
+        "mode": modes,
         **dataset_parts.contacts(system, outcome, errors),
         **dataset_parts.endings(outcome),
         **dataset_parts.minima(outcome),

@@ -29,7 +29,7 @@ _OPTIONAL = ("friction",)
 
 _BASE: Any = (OfLength, Asked)
 _STATES = Field(None, min_length=1, description="Which states; all by default.", examples=[["x"]])
-_LEFT_OUT = ("state", "at", "keep", "time_errors", "surface", "direction")
+_LEFT_OUT = ("state", "at", "until", "keep", "time_errors", "surface", "direction")
 
 
 class OfMotions(OneVerb):

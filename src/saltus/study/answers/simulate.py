@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from saltus.analysis.motion.settled import settled
 from saltus.errors import ParameterError, StudyError
-from saltus.kernels.status import STATUS
+from saltus.flow.until import STATUS
 from saltus.results.kinds.settled import responses
 from saltus.results.kinds.trajectory import rows, sample_rows
 from saltus.study.answers.compare import contact_table, exact_times, printed_rows
@@ -17,6 +17,7 @@ from saltus.study.setting import quantities
 from saltus.study.tables.kinds import OF_MOTION
 from saltus.study.tables.signature import OfLength
 from saltus.study.tables.signature import table as asking
+from saltus.system.condition import end_condition
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -69,6 +70,11 @@ class Motion(OneVerb):
         """Refuse forcing periods for an unforced system."""
         if table.at is not None and table.samples is not None:
             raise StudyError("[simulate] give at (times) or samples (how many), not both.")
+        if table.until is not None and table.keep is not None:
+            raise StudyError(
+                "[simulate] keep counts periods before an end that is known, and until finds it. "
+                "Leave one of them out."
+            )
         if table.periods is not None and self.system.forced_at is None:
             raise StudyError(
                 f"[simulate] periods: {self.system.name} has no forcing period. Write "
@@ -77,6 +83,8 @@ class Motion(OneVerb):
 
     def check(self, table: Any, setting: Setting) -> None:
         """Read the files of [compare] now: errors come before anything is computed."""
+        if table.until is not None:
+            end_condition(self.system, table.until)
         self.compare = setting.study.compare
         if self.compare is None:
             return
@@ -98,7 +106,8 @@ class Motion(OneVerb):
     def rows(self, ds: xr.Dataset, found: Answers) -> list[TextTable]:
         """A row for each trajectory, or for each contact that was printed."""
         if self.compare is None:
-            tables = rows(self.title, ds, response_texts(ds), dict(STATUS.values()))
+            repeats = [] if self.arguments["until"] else response_texts(ds)
+            tables = rows(self.title, ds, repeats, dict(STATUS.values()))
             return [*tables, sample_rows(ds)] if self.arguments["at"] else tables
         return [contact_table(self.title, ds, self.printed, self.exact, found.get(REFERENCE))]
 

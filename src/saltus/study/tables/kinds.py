@@ -150,6 +150,13 @@ OF_MOTION = KINDS | {
         None,
         convert="times",
     ),
+    "until": WrittenAs(
+        str,
+        ("x > 2 mm", "x > 2 mm and v < 0 m/s"),
+        "Condition at which a motion ends, at the instant at which it becomes true: a comparison, "
+        "or several joined by and, or; numbers may have units.",
+        None,
+    ),
 }
 #: Starts of the analyses that follow many, and values that are the same for all of them.
 OF_RESPONSES = KINDS | {
