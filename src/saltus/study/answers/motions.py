@@ -183,6 +183,13 @@ class Statistics(OfMotions):
 
     picture = "impacts"
 
+    def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
+        """The histogram of speeds, and the contacts in time."""
+        from saltus import plot
+
+        contacts = {"forces": first_figure(plot.contact_forces(ds))} if ds.sizes["contact"] else {}
+        return {**super().pictures(ds), **contacts}
+
     def check_more(self, table: Any, setting: Setting) -> None:
         """Sides and forces."""
         self.needs_contacts()

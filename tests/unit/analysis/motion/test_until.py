@@ -142,7 +142,7 @@ def test_those_for_which_it_never_holds_run_to_the_end():
 def test_nothing_behind_the_end_is_computed():
     ask = {"until": "x > 22 mm", "progress": False, "time_errors": "local"}
     short = sl.simulate(shaken, (0.0, 2.0), t_end=2.0, **ask)
-    long = sl.simulate(shaken, (0.0, 2.0), t_end=1e9, **ask)
+    long = sl.simulate(shaken, (0.0, 2.0), t_end=1e5, **ask)
     assert long.steps == short.steps
     assert (long.end_time, long.end_x) == (short.end_time, short.end_x)
     assert long.steps < 20
