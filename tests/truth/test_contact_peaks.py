@@ -199,3 +199,18 @@ def test_the_picture_has_a_stem_for_each_contact():
     assert drawn == np.isfinite(found.contact_peak_force).sum()
     assert "N" in axes.get_ylabel()
     assert "peak force" in sl.describe(found)
+
+
+def test_a_floor_at_zero_touches_where_it_pushes():
+    """Of a ball that falls from h the first contact begins at sqrt(2 h/g)."""
+
+    @sl.system(states="x v", units={"x": "m", "v": "m/s"})
+    def ball(t, x, v, *, m="1 kg", k="10 kN/m", g="9.81 m/s^2"):
+        return v, sl.piecewise((-k * x, x < 0), otherwise=0) / m - g
+
+    found = contacts(ball, (1.0, 0.0), 2.0)
+    assert found.contact_side[0] == -1
+    np.testing.assert_allclose(found.contact_time[0], sqrt(2 / 9.81), rtol=1e-14)
+    depth = 9.81e-4 + sqrt(9.81e-4**2 + 2 * 9.81e-4)  # energy: k d^2/2 = m g (h + d)
+    np.testing.assert_allclose(found.contact_depth[0], depth, rtol=1e-12)
+    np.testing.assert_allclose(found.contact_peak_force[0], 1e4 * depth, rtol=1e-12)

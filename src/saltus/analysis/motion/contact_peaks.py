@@ -135,12 +135,27 @@ def _terms(roots: tuple[Expr, ...], guard: int) -> list[Expr]:
     return found
 
 
+def side_that_pushes(system: System, guard: int) -> int:
+    """Sign of the gap on which the one term of the equations that depends on a guard's side alone
+    isn't zero; 0 if there is no such term, or it is on both.
+    """
+    terms = dict.fromkeys(_terms(free_field(system.field, system.guards), guard))
+    if len(terms) != 1 or (term := next(iter(terms))).bits != 1 << guard:
+        return 0
+    below, above = (_is_zero(assuming(term, guard, side)) for side in (False, True))
+    return int(below) - int(above)
+
+
+def _is_zero(term: Expr) -> bool:
+    return term.op == "const" and term.payload == 0.0
+
+
 def _is_zero_apart(term: Expr, sides: np.ndarray) -> bool:
     """True if a term is zero while none of its guards is in contact."""
     for guard in range(term.bits.bit_length()):
         if term.bits >> guard & 1:
             term = assuming(term, guard, bool(sides[guard] < 0))
-    return term.op == "const" and term.payload == 0.0
+    return _is_zero(term)
 
 
 def force_unit(system: System, formulas: Mapping[int, Expr]) -> str:

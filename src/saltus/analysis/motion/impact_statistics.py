@@ -78,7 +78,8 @@ def impact_statistics(
         from those without.
     contact_side : mapping of str to int, optional
         For guards by name: the sign of the gap in contact. By default it is the side on which the
-        state of rest (all states zero, t = 0) does not lie; a gap of zero counts as a tiny one.
+        state of rest (all states zero, t = 0) does not lie; a gap of zero counts as a tiny one,
+        and a boundary at rest itself touches where the equations push.
     peaks : bool, optional
         Whether to find the peak force and the depth of every contact, from the series of the
         motion in it: by default of 10 000 contacts at most.
@@ -212,6 +213,8 @@ def contact_sides(system: System, given: Mapping[int, Any]) -> np.ndarray:
         gap = evaluate([guard.gap], states=rest, values=system.values, bits=bits)[0]
         if gap == 0:
             gap = evaluate([guard.gap], states=rest, values=values, bits=bits)[0]
+        if gap == 0:  # no gap can open: contact is where the equations push
+            gap = -contact_peaks.side_that_pushes(system, len(bits))
         bits.append(bool(gap > 0))
     return np.array(
         [given.get(i, -1 if positive else 1) for i, positive in enumerate(bits)], dtype=np.int8
