@@ -131,6 +131,8 @@ def test_a_structure_has_the_forces_of_its_stops():
         contacts=[sl.Contact("x3", stiffness="1 MN/m", gap="0.1 mm", side="both")],
     )  # fmt: skip
     found = contacts(beam, (1e-3, 0, 0, 0, 0, 0), 0.2)
+    assert found.contact_peak_force.attrs["units"] == "N"
+    assert found.contact_impulse.attrs["units"] == "N*s"
     modal = contacts(beam, (1e-3, 0, 0, 0, 0, 0), 0.2, method=sl.Modal())
     np.testing.assert_allclose(modal.contact_peak_force, found.contact_peak_force, rtol=1e-8)
     assert found.sizes["contact"] > 10

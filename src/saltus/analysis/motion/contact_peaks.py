@@ -162,7 +162,20 @@ def force_unit(system: System, formulas: Mapping[int, Expr]) -> str:
     """The unit that all these forces share, ``""`` if it isn't known."""
     rates = free_field(system.field, system.guards)
     units = set(units_of(system.states, system.units, rates, list(formulas.values())))
+    if units == {""} and all(_is_of_springs(system, one) for one in formulas.values()):
+        return "N"  # depths of structures are sums of modes, whose units aren't known
     return units.pop() if len(units) == 1 else ""
+
+
+def _is_of_springs(system: System, term: Expr) -> bool:
+    """True if every piece of a force is zero, or a sum with a stiffness [N/m] times something."""
+    if term.op == "select":
+        return all(_is_of_springs(system, piece) for piece in term.args)
+    if term.op in ("add", "sub", "neg"):
+        return any(_is_of_springs(system, part) and not _is_zero(part) for part in term.args)
+    factors = term.args if term.op == "mul" else ()
+    springs = [one for one in factors if one.op == "param" and system.units[one.payload] == "N/m"]
+    return _is_zero(term) or bool(springs)
 
 
 def forces_of(system: System, given: Mapping[int, Quantity], sides: np.ndarray) -> ContactForces:

@@ -220,7 +220,7 @@ class _Asked:
         request = self.plan.request(self.group, self.length, len(flown.states))
         if self.end is not None:
             request = self.end.asked(request)
-        if measured and flown.guards and self.method.records_contacts:
+        if measured and self.system.guards and self.method.records_contacts:
             return measure.measured(flown, self.method, request, threads, show)
         method = self.method.suited_to(self.group.size)
         outcome = engine.run(flown, method, request, threads, show)
