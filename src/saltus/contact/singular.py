@@ -203,7 +203,6 @@ class _Boundaries:
 
     def __init__(self, guards: Sequence[Guard]) -> None:
         self._canonical = Canonical()
-        self._gaps = [self._canonical.polynomial(guard.gap) for guard in guards]
         self._guards = tuple(guards)
         self._states: dict[Expr, int] = {}
         self._one_more = (1 << place for place in count())
@@ -311,7 +310,8 @@ class _Boundaries:
 
     def _is_gap(self, node: Expr, number: int) -> bool:
         """True if a node is the gap of a guard times a factor."""
-        return is_multiple(self._canonical.polynomial(node), self._gaps[number])
+        gap = self._canonical.polynomial(self._guards[number].gap)
+        return is_multiple(self._canonical.polynomial(node), gap)
 
     def lifted(self, node: Expr) -> Expr:
         """A function of a piece as a piece of functions, if that shows a zero on a boundary."""
@@ -321,7 +321,7 @@ class _Boundaries:
             return _one_by_one(node)
         if new is node:
             return node
-        for number in range(len(self._gaps)):
+        for number in range(len(self._guards)):
             orders = self.orders([new], number)
             if any(
                 below.op == node.op and orders[below.args[0]].order > 0
@@ -342,7 +342,7 @@ class _Boundaries:
         if next(branches) > _MOST_BRANCHES:
             raise _TooManyError
         operand = node.args[0]
-        if any(self._is_gap(operand, number) for number in range(len(self._gaps))):
+        if any(self._is_gap(operand, number) for number in range(len(self._guards))):
             return node
         outer = _outermost_bit(operand)
         if outer is None:

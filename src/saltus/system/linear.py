@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -136,22 +136,22 @@ def linear_pieces(system: System) -> LinearSystem | str:
                 return "the phase of a sine in it depends on the state"
             drives[node] = Drive(rate, phase, -math.pi / 2 if node.op == "sin" else 0.0)
     names = {node: ex.parameter(_name(i)) for i, node in enumerate(drives)}
-    field = tuple(ex.substituted(entry, names) for entry in system.field)
-    gaps = tuple(ex.substituted(guard.gap, names) for guard in system.guards)
+    field = ex.all_substituted(system.field, names)
+    gaps = ex.all_substituted([guard.gap for guard in system.guards], names)
     if any(ex.depends_on(gap, ("select",)) for gap in gaps):
         return "a boundary of it moves when another is crossed"
-    if not all(_is_affine(entry, len(drives)) for entry in (*field, *gaps)):
+    if not _are_affine((*field, *gaps), len(drives)):
         return "it isn't linear between its contacts"
     return LinearSystem(system, tuple(drives.values()), field, gaps)
 
 
-def _is_affine(root: Expr, drives: int) -> bool:
-    """True if an expression is linear in the states and drives, whichever sides its conditions
+def _are_affine(roots: Sequence[Expr], drives: int) -> bool:
+    """True if expressions are linear in the states and drives, whichever sides their conditions
     choose.
     """
     moving = {_name(i) for i in range(drives)}
     degree: dict[Expr, float] = {}
-    for node in ex.walk(root):
+    for node in ex.walk(*roots):
         below = [degree[one] for one in node.args]
         match node.op:
             case "state":
@@ -171,4 +171,4 @@ def _is_affine(root: Expr, drives: int) -> bool:
                 degree[node] = max(below) if asks_bits else math.inf
             case _:
                 degree[node] = 0 if node.args and not any(below) else math.inf
-    return degree[root] <= 1
+    return all(degree[root] <= 1 for root in roots)
