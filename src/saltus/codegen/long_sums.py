@@ -146,7 +146,7 @@ class _Splitter:
         tops = {*parts, *gaps}
         nodes = list(ex.walk(*parts, *gaps, conditions=False))
         for node in nodes:
-            if node.op not in ("add", "sub") and _without_number(node)[0] is node:
+            if node.op not in ("add", "sub"):
                 tops.update(node.args)
         for node in nodes:
             args = tuple(self._new[child] for child in node.args)

@@ -168,14 +168,16 @@ def is_multiple(a: Polynomial, b: Polynomial) -> bool:
     """
     if len(a) != len(b) or not a:
         return False
+    apart: dict[int, int] = {}  # exponents in all of a, less those in all of b: len(a) times m
+    for polynomial, sign in ((a, 1), (b, -1)):
+        for monomial in polynomial:
+            for atom, exponent in monomial:
+                apart[atom] = apart.get(atom, 0) + sign * exponent
+    if any(exponent % len(a) for exponent in apart.values()):
+        return False
+    factor = frozenset((atom, total // len(a)) for atom, total in apart.items() if total)
     atoms = {atom for monomial in b for atom, _ in monomial}
-    first = next(iter(b))
-    inverse = frozenset((atom, -exponent) for atom, exponent in first)
-    for candidate in a:
-        factor = _merged(candidate, inverse)
-        multiple = {_merged(monomial, factor): coefficient for monomial, coefficient in b.items()}
-        if all(exponent > 0 or atom not in atoms for atom, exponent in factor) and proportion(
-            a, multiple
-        ):
-            return True
-    return False
+    if not all(exponent > 0 or atom not in atoms for atom, exponent in factor):
+        return False
+    multiple = {_merged(monomial, factor): coefficient for monomial, coefficient in b.items()}
+    return proportion(a, multiple) != 0
