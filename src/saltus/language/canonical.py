@@ -35,6 +35,8 @@ class Canonical:
 
     def polynomial(self, root: Expr) -> Polynomial:
         """The normal form of ``root``."""
+        if root in self._memo:
+            return self._memo[root]
         for node in walk(root, known=self._memo):
             self._memo[node] = self._normal(node)
         return self._memo[root]
@@ -155,8 +157,8 @@ def proportion(a: Polynomial, b: Polynomial) -> int:
     """The sign of the number c with ``a = c b``; 0 if there is none."""
     if a.keys() != b.keys() or not a:
         return 0
-    ratios = [a[monomial] / b[monomial] for monomial in a]
-    first = ratios[0]
+    ratios = (a[monomial] / b[monomial] for monomial in a)
+    first = next(ratios)
     if any(abs(ratio - first) > _SAME * abs(first) for ratio in ratios):
         return 0
     return 1 if first > 0 else -1
