@@ -102,11 +102,12 @@ class _Splitter:
         terms = [self._terms(entry) for entry in self._field]
         leaves = list(dict.fromkeys(leaf for row in terms for leaf in row))
         self._rewrite([leaf for leaf in leaves if leaf not in self._numbers], self._gaps)
+        others = [leaf for leaf in leaves if leaf not in self._numbers]
+        gaps = tuple(self._new[gap] for gap in self._gaps)
+        self._keep(set(ex.walk(*(self._new[leaf] for leaf in others), *gaps)))
         numbers, parts = dict(self._numbers), list[Expr]()
         first = len(self._numbers) + len(self._sums)
-        for leaf in leaves:
-            if leaf in numbers:
-                continue
+        for leaf in others:
             new = self._new[leaf]
             if new.op == "state":
                 numbers[leaf] = self._names[new.payload]
@@ -117,8 +118,14 @@ class _Splitter:
         products = sum(map(len, self._sums)) + sum(map(len, rows))
         if products < LEAST_PRODUCTS * (len(self._sums) + len(parts)):
             return None
-        gaps = tuple(self._new[gap] for gap in self._gaps)
         return LongSums(len(self._numbers), self._names, self._sums, tuple(parts), rows, gaps)
+
+    def _keep(self, nodes: set[Expr]) -> None:
+        """Forget the sums that aren't among some nodes, and number the others."""
+        size, sums = len(self._numbers), self._sums
+        kept = [name for name, i in self._names.items() if i < size or ex.state(name) in nodes]
+        self._sums = [sums[self._names[name] - size] for name in kept[size:]]
+        self._names = {name: i for i, name in enumerate(kept)}
 
     def _terms(self, root: Expr) -> dict[Expr, float]:
         """A node as numbers times other nodes, which are no sums or serve several."""
