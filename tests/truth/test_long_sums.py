@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 import saltus as sl
 from saltus.codegen import long_sums as ls
 from saltus.codegen import module, plain_series
+from saltus.codegen.taylor_head import taylor_head
 
 MODES = 16
 
@@ -31,6 +32,10 @@ def structure(law, seed):
             return sl.piecewise((k * (d - gap) ** 1.5 * (1 + 0.05 * rate), d > gap), otherwise=0)
         if law == "stops":
             return sl.freeplay(d, stiffness=k, lower_gap=gap, upper_gap=gap) + 0.01 * d**3
+        if law == "rigid":
+            return 0.1 * k * d**3
+        if law == "dry":
+            return sl.friction(rate, slip=0.01) + sl.freeplay(d, stiffness=k, upper_gap=gap)
         return k * sl.tanh(20 * rate) / 20 + sl.freeplay(d, stiffness=k, upper_gap=gap)
 
     @sl.system(states=names, forced_at="frequency", name=law)
@@ -40,12 +45,15 @@ def structure(law, seed):
         load = [a * drive for a in shapes[-1]]
         for at in (shapes[-1], shapes[-9]):
             d, rate = (sum(a * one for a, one in zip(at, of, strict=True)) for of in (q, w))
-            load = [x - a * push(d, rate, k, gap) for x, a in zip(load, at, strict=True)]
+            force = push(d, rate, k, gap)
+            load = [x - a * force for x, a in zip(load, at, strict=True)]
         rates = [
             one - square * x - 0.02 * v
             for one, square, x, v in zip(load, squares, q, w, strict=True)
         ]
-        return (*w, *rates)
+        masses = dict.fromkeys(names[MODES:], 1.0)
+        stop = sl.impact(d < gap, rate, restitution=0.6, inertia=masses) if law == "rigid" else None
+        return (*w, *rates, *([stop] if stop is not None else []))
 
     return chain
 
@@ -58,10 +66,19 @@ def motions(system, method):
 
 
 @pytest.mark.parametrize(
-    ("law", "lanes"), [("hertz", None), ("hertz", 16), ("stops", None), ("rubbing", None)]
+    ("law", "lanes"),
+    [
+        ("hertz", None),
+        ("hertz", 16),
+        ("stops", None),
+        ("rubbing", None),
+        ("rigid", None),
+        ("dry", None),
+    ],
 )
 def test_loops_and_plain_code_give_the_same_motion(law, lanes, monkeypatch):
     system, method = structure(law, 11), sl.Taylor(lanes=lanes)
+    assert "add_up" in taylor_head(system, 20, 4).functions
     looped = motions(system, method)
     monkeypatch.setattr(ls, "LEAST_STATES", 1000)
     module.taylor_module.cache_clear()
@@ -86,7 +103,7 @@ def test_a_motion_is_that_of_scipy():
     run = sl.simulate(system, start, periods=1, samples=8, progress=False)
     period = 1.0 / system.values["frequency"]
     other = solve_ivp(
-        system.rhs, (0, period), start, "DOP853", rtol=1e-11, atol=1e-13, max_step=period / 400,
+        system.rhs, (0, period), start, "DOP853", rtol=1e-11, atol=1e-13,
         t_eval=np.minimum(run.time.values, period),
     )  # fmt: skip
     assert len(run.contact) > 0

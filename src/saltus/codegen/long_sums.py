@@ -25,6 +25,10 @@ LEAST_STATES = 32
 LEAST_PRODUCTS = 8
 #: Fewest states in a sum within a part.
 LONG = 8
+#: Most uses of a sum that is written out where it is used; with more it is a part.
+FEW_USES = 4
+#: Most terms that the two sides of a condition don't share, for the others to be taken out of it.
+MOST_APART = 8
 _ONE = ex.constant(1.0)
 
 
@@ -89,9 +93,13 @@ class _Splitter:
     def __init__(self, field: Sequence[Expr], gaps: Sequence[Expr], states: Sequence[str]) -> None:
         self._field, self._gaps = field, gaps
         self._numbers = {ex.state(name): i for i, name in enumerate(states)}
-        self._uses = Counter(field)
-        for node in ex.walk(*field, *gaps):
+        self._uses = Counter((*field, *gaps))
+        nodes = list(ex.walk(*field, *gaps))
+        for node in nodes:
             self._uses.update(ex.operands(node))
+        self._terms: dict[Expr, dict[Expr, float]] = {}
+        for node in nodes:
+            self._terms[node] = self._flatten(node)
         self._names = {name: i for i, name in enumerate(states)}
         self._sums: list[dict[int, float]] = []
         self._known: dict[tuple[tuple[int, float], ...], Expr] = {}
@@ -99,7 +107,7 @@ class _Splitter:
 
     def split(self) -> LongSums | None:
         """The equation split, or None."""
-        terms = [self._terms(entry) for entry in self._field]
+        terms = [self._terms[entry] for entry in self._field]
         leaves = list(dict.fromkeys(leaf for row in terms for leaf in row))
         self._rewrite([leaf for leaf in leaves if leaf not in self._numbers], self._gaps)
         others = [leaf for leaf in leaves if leaf not in self._numbers]
@@ -127,26 +135,31 @@ class _Splitter:
         self._sums = [sums[self._names[name] - size] for name in kept[size:]]
         self._names = {name: i for i, name in enumerate(kept)}
 
-    def _terms(self, root: Expr) -> dict[Expr, float]:
-        """A node as numbers times other nodes, which are no sums or serve several."""
-        terms: dict[Expr, float] = {}
-        stack = [(root, 1.0)]
-        while stack:
-            node, weight = stack.pop()
-            inner, factor = _without_number(node)
-            if node.op == "const":
-                terms[_ONE] = terms.get(_ONE, 0.0) + weight * node.payload
-            elif inner is not node and (self._is_inside(node, root) or inner.op == "state"):
-                stack.append((inner, weight * factor))
-            elif node.op in ("add", "sub") and self._is_inside(node, root):
-                left, right = node.args
-                stack += [(right, weight if node.op == "add" else -weight), (left, weight)]
-            else:
-                terms[node] = terms.get(node, 0.0) + weight
-        return terms
+    def _flatten(self, node: Expr) -> dict[Expr, float]:
+        """A node as numbers times other nodes, which are no sums or serve many; those that it is
+        made of are known.
+        """
+        below = [self._below(child) for child in node.args]
+        inner, factor = _without_number(node)
+        if node.op == "const":
+            return {_ONE: node.payload}
+        if inner is not node:
+            return {leaf: factor * weight for leaf, weight in self._below(inner).items()}
+        if node.op in ("add", "sub"):
+            left = node.args[0]
+            # nobody else asks for the terms of a left side that is used once
+            terms = below[0] if self._uses[left] == 1 else dict(below[0])
+            for leaf, weight in below[1].items():
+                terms[leaf] = terms.get(leaf, 0.0) + (weight if node.op == "add" else -weight)
+            return terms
+        if node.op == "select":
+            return _apart(node, *below)
+        return {node: 1.0}
 
-    def _is_inside(self, node: Expr, root: Expr) -> bool:
-        return node is root or self._uses[node] == 1
+    def _below(self, child: Expr) -> dict[Expr, float]:
+        """The terms of an operand; itself if it serves many."""
+        serves_many = self._uses[child] > FEW_USES and not _is_state(_without_number(child)[0])
+        return {child: 1.0} if serves_many and child.op != "const" else self._terms[child]
 
     def _rewrite(self, parts: Sequence[Expr], gaps: Sequence[Expr]) -> None:
         """Put a name in place of every long sum over states below the parts and gaps."""
@@ -159,7 +172,7 @@ class _Splitter:
             args = tuple(self._new[child] for child in node.args)
             named = None
             if node.op in ("add", "sub") and (node in tops or self._uses[node] > 1):
-                named = self._named(self._terms(node))
+                named = self._named(self._terms[node])
             self._new[node] = ex.rebuild(node, args, node.payload) if named is None else named
 
     def _named(self, terms: Mapping[Expr, float]) -> Expr | None:
@@ -167,22 +180,53 @@ class _Splitter:
         long = {self._numbers[leaf]: w for leaf, w in terms.items() if leaf in self._numbers}
         if len(long) < LONG:
             return None
-        key = tuple(sorted(long.items()))
+        sign = 1.0 if next(iter(sorted(long.items())))[1] > 0 else -1.0
+        key = tuple(sorted((i, sign * weight) for i, weight in long.items()))
         if key not in self._known:
             name = f"\0sum {len(self._sums)}"
             self._names[name] = len(self._numbers) + len(self._sums)
             self._sums.append(dict(key))
             self._known[key] = ex.state(name)
-        total = self._known[key]
+        total = self._known[key] if sign > 0 else ex.neg(self._known[key])
         for leaf, weight in terms.items():
             if leaf not in self._numbers:
-                other = leaf if leaf is _ONE else self._new[leaf]
+                other = self._renamed(leaf)
                 total = (
                     ex.sub(total, ex.mul(-weight, other))
                     if weight < 0
                     else ex.add(total, ex.mul(weight, other))
                 )
         return total
+
+    def _renamed(self, leaf: Expr) -> Expr:
+        """A term in states and sums, which :func:`_apart` may have made."""
+        if leaf.op == "const":
+            return leaf
+        if leaf not in self._new:
+            args = tuple(map(self._renamed, leaf.args))
+            self._new[leaf] = ex.rebuild(leaf, args, leaf.payload)
+        return self._new[leaf]
+
+
+def _is_state(node: Expr) -> bool:
+    return node.op == "state"
+
+
+def _apart(node: Expr, where: dict[Expr, float], otherwise: dict[Expr, float]) -> dict[Expr, float]:
+    """The terms of a condition's value: those that both of its sides have, and a condition for each
+    other, if these are few.
+    """
+    both = {**where, **otherwise}
+    apart = [leaf for leaf in both if where.get(leaf, 0.0) != otherwise.get(leaf, 0.0)]
+    if len(apart) > MOST_APART or len(apart) == len(both):
+        return {node: 1.0}
+    terms = {leaf: weight for leaf, weight in both.items() if leaf not in set(apart)}
+    for leaf in apart:
+        if leaf in where:
+            terms[ex.select(node.payload, leaf, 0.0)] = where[leaf]
+        if leaf in otherwise:
+            terms[ex.select(node.payload, 0.0, leaf)] = otherwise[leaf]
+    return terms
 
 
 def _without_number(node: Expr) -> tuple[Expr, float]:

@@ -227,7 +227,7 @@ def taylor_head(system: System, order: int, lanes: int) -> Head:
         levels_function(system, clocks),
         settle_function(system, clocks),
         _turns_function(system, code),
-        loops_of(sums) if sums else "",
+        *([loops_of(sums)] if sums else []),
         _jets_functions(code, len(column), handed_row, order + 1),
         f"@inner\ndef rates(y, side, c, clock, work):\n{indented(rates)}\n",
     ]
