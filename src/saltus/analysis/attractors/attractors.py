@@ -65,8 +65,8 @@ def attractors(
     start : sequence, mapping or array
         Starts, as for :func:`saltus.simulate`; one or many.
     method : Method
-        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` where it serves and the states are
-        many.
+        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
+        it serves.
     periods : int
         Forcing periods after which a trajectory that hasn't settled is looked at for chaos.
     every : float or str, optional

@@ -61,8 +61,8 @@ def edge_orbit(
     a, b : sequence or mapping
         Two starts, as for :func:`saltus.simulate`, that lead to different attractors.
     method : Method
-        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` where it serves and the states are
-        many; another one has errors that keep unstable orbits from
+        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
+        it serves; another one has errors that keep unstable orbits from
         closing.
     periods : int
         Forcing periods after which a trajectory that hasn't settled is looked at for chaos.

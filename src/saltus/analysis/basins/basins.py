@@ -61,8 +61,8 @@ def basins(
     at : mapping, optional
         Starts of the other states; default zero.
     method : Method
-        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` where it serves and the states are
-        many.
+        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
+        it serves.
     periods : int
         Forcing periods that a trajectory is followed at most.
     every : float or str, optional

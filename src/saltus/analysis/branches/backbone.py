@@ -98,8 +98,8 @@ def backbone(
     points : int
         Most points.
     method : Method
-        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` where it serves and the states are
-        many; another one must be exact.
+        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
+        it serves; another one must be exact.
     threads : int, optional
         Default all processors.
     progress : bool or callable

@@ -76,8 +76,8 @@ def bifurcation_curve(
     points : int
         Most points in each direction.
     method : Method
-        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` where it serves and the states are
-        many; another one must be exact.
+        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
+        it serves; another one must be exact.
     threads : int, optional
         Default all processors.
     progress : bool or callable
@@ -251,8 +251,8 @@ def _equations(
         return SingularOrbits.of(orbits, start.kind, z, start.multiplier)
     if not has_legs(orbits.parametric.system):
         raise ParameterError(
-            f"{start.system.name} switches at instants, has a remainder or a table of time, or more "
-            f"than {MOST_STATES - 2} states: its grazes can't be followed in two parameters."
+            f"{start.system.name} switches at instants, has a remainder or a table of time, or "
+            f"more than {MOST_STATES - 2} states: its grazes can't be followed in two parameters."
         )
     found = GrazingOrbits.of(orbits, z, start.guard, start.phase)
     if found is None:

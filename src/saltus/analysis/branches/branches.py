@@ -114,8 +114,8 @@ def branches(
     every : float or str, optional
         For starts of a system without forcing: time between two samples [s].
     method : Method
-        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` where it serves and the states are
-        many; another one must be exact.
+        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
+        it serves; another one must be exact.
     periods : int
         For starts: forcing periods after which a trajectory hasn't settled.
     seed : int

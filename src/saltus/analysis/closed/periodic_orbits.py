@@ -89,8 +89,8 @@ def periodic_orbits(
         Of a system without forcing, in place of ``periods``: the range of periods looked for,
         ``("1 s", "5 s")``, or a first guess, which stands for half to twice of it.
     method : Method
-        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` where it serves and the states are
-        many; another one has errors that keep unstable orbits from
+        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
+        it serves; another one has errors that keep unstable orbits from
         closing. Its budgets, ``max_steps`` and ``max_events``, are those of each motion that is
         followed; default: 10 000 steps and 1000 contacts for each forcing period or turn, 12 of
         which a start may be followed before the search begins. Starts that need more, as those

@@ -91,8 +91,8 @@ def lyapunov(
         states and the phase of the forcing, 32 in a block; an evolution is one block. It is the
         largest exponent of the flow, so never below zero: neighbours on an orbit stay neighbours.
     flow : Method
-        The method of integration. Default :class:`saltus.Taylor`, or :class:`saltus.Modal` where it serves and the states are
-        many. With
+        The method of integration. Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from
+        eight states on where it serves. With
         ``sl.ODE45(events="ignore")`` jumps of the tangent are left out, as contacts aren't known.
     periods : int
         Blocks that growth is measured over, at least 64. The error falls with the square root of

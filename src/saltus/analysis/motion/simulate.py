@@ -75,8 +75,8 @@ def simulate(
     t_start : float or str
         Time at the start [s]; the phase of the forcing is that of this time.
     method : Method
-        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` where it serves and the states are
-        many; :class:`saltus.ODE45` for MATLAB's.
+        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
+        it serves; :class:`saltus.ODE45` for MATLAB's.
     samples : int
         Samples per forcing period (default 200), or over the whole span if the system isn't forced
         (default 10 000, and down to 2000 for many trajectories).
