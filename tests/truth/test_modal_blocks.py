@@ -135,7 +135,7 @@ def test_an_oscillator_meets_its_stop_where_matrix_exponentials_say(case):
     system = struck.with_values(**CASES[case])
     run = moved(system, (0.0, 0.0), periods=40)
     assert str(run.status.values) == "ok"
-    assert check_contacts(system, (0.0, 0.0), run, 16, 1e-12 * 2 * np.pi) > 5
+    assert check_contacts(system, (0.0, 0.0), run, 10, 1e-12 * 2 * np.pi) > 5
 
 
 def test_tables_that_are_dropped_and_made_anew_give_the_same_bits(monkeypatch):
@@ -239,4 +239,17 @@ def test_bodies_that_are_shaken_meet_a_stop_where_matrix_exponentials_say(drive,
     assert len(linear_pieces(system).courses) == 1
     run = moved(system, np.zeros(4), t_end=3.0, samples=3)
     assert str(run.status.values) == "ok"
-    assert check_contacts(system, np.zeros(4), run, 5, 1e-12, [course]) > 1
+    assert check_contacts(system, np.zeros(4), run, 3, 1e-12, [course]) > 1
+
+
+@pytest.mark.nojit
+def test_a_body_under_its_weight_that_is_shaken_needs_no_compiler():
+    """Small enough to run as plain Python: a block with a constant and a course in it."""
+
+    @sl.system(states="x v")
+    def body(t, x, v, *, weight=3.0, stiffness=900.0):
+        stop = sl.where(x > 0.02, stiffness * (x - 0.02), 0.0)
+        return v, weight + RECORDS["spline"](t) - stop
+
+    run = moved(body, np.zeros(2), t_end=0.6, samples=2)
+    assert check_contacts(body, np.zeros(2), run, 2, 1e-12, [DRIVES["a spline"][1]]) == 2
