@@ -253,3 +253,23 @@ def test_a_body_under_its_weight_that_is_shaken_needs_no_compiler():
 
     run = moved(body, np.zeros(2), t_end=0.6, samples=2)
     assert check_contacts(body, np.zeros(2), run, 2, 1e-12, [DRIVES["a spline"][1]]) == 2
+
+
+def test_two_free_bodies_that_bounce_keep_their_energy():
+    """Joined by a spring, under their weight, over ten thousand contacts: rounding of each."""
+
+    @sl.system(states="x y v w")
+    def pair(t, x, y, v, w, *, stiffness=5e4, weight=9.81):
+        pull = 200.0 * (y - x)
+        return v, w, pull - weight - sl.where(x < 0, stiffness * x, 0.0), -pull - weight
+
+    def energy(x, y, v, w):
+        springs = 0.5 * 200 * (y - x) ** 2 + 0.5 * 5e4 * min(x, 0.0) ** 2
+        return 0.5 * (v * v + w * w) + 9.81 * (x + y) + springs
+
+    start = (0.5, 0.55, 0.0, 0.0)
+    run = moved(pair, start, t_end=1700.0, samples=1)
+    assert run.sizes["contact"] > 10_000
+    end = [float(run[f"end_{name}"]) for name in "xyvw"]
+    allowed = 4 * 2.2e-16 * run.sizes["contact"]
+    assert energy(*end) == pytest.approx(energy(*start), rel=allowed)
