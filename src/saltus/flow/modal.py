@@ -22,7 +22,8 @@ from saltus.kernels import status as st
 from saltus.kernels.batch import Batch
 from saltus.kernels.isolation import DEEPEST, MOST_TOUCHES
 from saltus.system import System
-from saltus.system.linear import LinearSystem, linear_pieces
+from saltus.system.linear import linear_pieces
+from saltus.system.tangent import tangent_states
 
 #: Share of a period, or of an unforced span, that is tried as the first step.
 FIRST_STEP = 1.0 / 64
@@ -35,15 +36,21 @@ class ModalFlow:
 
     Parameters
     ----------
-    linear : LinearSystem
-        The system.
+    tables : Tables
+        Its contact states.
+    tangents : bool
+        Whether the states are followed by the derivative of the state with respect to the state at
+        the start, row by row.
     """
 
-    def __init__(self, linear: LinearSystem) -> None:
-        self.tables, self._kernel = Tables(linear), modal_module()
+    def __init__(self, tables: Tables, tangents: bool = False) -> None:
+        self.tables, self._kernel, self._tangents = tables, modal_module(), tangents
         self._lanes, self._memory = self.tables.modes.table.shape[1], threading.local()
-        self.CARRY = layout.AMPLITUDES + self.tables.rows * self._lanes
-        self.STEP_RECORDS = len(linear.system.guards) + MOST_TOUCHES
+        size, _, _, _, guards, _, rows, _, _ = tables.sizes.tolist()
+        self._states, self._sizes = size, tables.sizes.copy()
+        self._sizes[layout.TANGENTS] = tangents
+        self.CARRY = layout.AMPLITUDES + rows * self._lanes + tangents * (size + guards)
+        self.STEP_RECORDS = guards + MOST_TOUCHES
 
     def workspace(self) -> tuple[np.ndarray, ...]:
         """None that the engine must keep."""
@@ -60,7 +67,7 @@ class ModalFlow:
         with self.tables.lock:
             self._begin(batch)
             self._look_up(batch)
-            tables = self.tables.arrays()
+            tables = self._sizes, *self.tables.arrays()
         answer: int = self._kernel.propagate(*batch, budget, *tables, *self._work())
         return answer
 
@@ -84,20 +91,21 @@ class ModalFlow:
     def _work(self) -> tuple[np.ndarray, ...]:
         """Work arrays of this thread, in the order in which the kernel takes them."""
         if not hasattr(self._memory, "arrays"):
-            _, groups, states, rows, guards, drives, amplitudes, courses = (
-                self.tables.sizes.tolist()
-            )
-            terms, lanes = layout.ORDER + 1, self._lanes
-            empty = np.zeros
+            (
+                size, groups, states, rows, guards, drives, amplitudes, courses, _,
+            ) = self._sizes.tolist()  # fmt: skip
+            terms, lanes, empty = layout.ORDER + 1, self._lanes, np.zeros
+            columns = size if self._tangents else 1
             self._memory.arrays = (
                 empty((amplitudes, lanes)), empty((amplitudes, lanes)), empty((groups, lanes)),
                 empty((terms + 3, lanes)),
                 empty((max(rows, 1), terms)), empty((max(rows, 1), 3)), empty(terms),
                 empty((DEEPEST + 2, terms)), empty((DEEPEST + 2, 2)), empty(terms), empty(2),
                 empty((MOST_TOUCHES, 2)), empty((states, lanes)), empty((states, lanes)),
-                empty((max(drives, 1), 3)), empty((max(guards, 1), 4)),
+                empty((max(drives, 1), 4)), empty((max(guards, 1), 4)),
                 empty(((terms + 2) * self.tables.block_groups, lanes)),
                 empty((max(courses, 1), layout.VALUE + layout.COURSE_TERMS)),
+                empty((2 * groups, lanes)), empty((amplitudes, lanes)), empty((columns, columns)),
             )  # fmt: skip
         arrays: tuple[np.ndarray, ...] = self._memory.arrays
         return arrays
@@ -116,7 +124,7 @@ class ModalFlow:
 
     def _begin_set(self, batch: Any, who: np.ndarray, which: int) -> None:
         """The same for trajectories with one set of parameter values."""
-        given = self.tables.sets[which]
+        given, state = self.tables.sets[which], batch.state[who, : self._states]
         time = batch.origin[who] + batch.count[who] * batch.period[who] + batch.phase[who]
         drives = np.column_stack(
             [
@@ -125,18 +133,18 @@ class ModalFlow:
             ]
         )
         parts = [
-            batch.state[who] @ given.gaps.matrix.T,
+            state @ given.gaps.matrix.T,
             np.broadcast_to(given.gaps.constant, (len(who), len(given.gaps.constant))),
             drives @ given.gaps.driven.T,
         ]
         gap = parts[0] + parts[1] + parts[2]
-        size = np.abs(batch.state[who]) @ np.abs(given.gaps.matrix.T)
+        size = np.abs(state) @ np.abs(given.gaps.matrix.T)
         zero = np.abs(gap) <= layout.ROUNDED * (size + np.abs(parts[1]) + np.abs(parts[2]))
         bits = 1 << np.arange(gap.shape[1])
         mode = ((gap > 0) & ~zero) @ bits if gap.shape[1] else np.zeros(len(who), np.int64)
         fresh = zero @ bits if gap.shape[1] else mode
         for i in np.flatnonzero(fresh).tolist():
-            mode[i] |= self._ways(which, int(mode[i]), zero[i], batch.state[who[i]], time[i])
+            mode[i] |= self._ways(which, int(mode[i]), zero[i], state[i], time[i])
         batch.mode[who], batch.fresh[who] = mode, fresh
         carry = np.zeros((len(who), layout.AMPLITUDES))
         carry[:, layout.AT], carry[:, layout.ENTERS] = -1.0, 1.0
@@ -187,10 +195,12 @@ class ModalFlow:
 @functools.lru_cache(maxsize=64)
 def modal_flow(system: System) -> ModalFlow:
     """The modal flow of a system. Raises ParameterError, with the reason, if it has none."""
+    if system.tangent_of is not None:
+        return ModalFlow(modal_flow(system.tangent_of.origin).tables, tangents=True)
     linear = linear_pieces(system)
     if isinstance(linear, str):
         raise ParameterError(f"sl.Modal doesn't serve {system.name}: {linear}.")
-    return ModalFlow(linear)
+    return ModalFlow(Tables(linear))
 
 
 @explain_unknown_options
@@ -226,13 +236,19 @@ class Modal(Method):
 
     def serving(self, system: System) -> Method:
         """Taylor's method for a system that has no modal flow."""
-        if isinstance(linear_pieces(system), str):
+        if isinstance(linear_pieces((system.tangent_of or system).origin), str):
             return Taylor(max_steps=self.max_steps, max_events=self.max_events)
         return self
 
     def kernels(self, system: System) -> Flow:
         """The modal flow."""
         return modal_flow(system)
+
+    def tangents(self, system: System) -> System | None:
+        """The states alone: the modes of a contact state move the derivative too."""
+        if self.serving(system.origin) is not self:
+            return super().tangents(system)
+        return tangent_states(system)
 
     def numbers(self, periods: float) -> np.ndarray:
         """Step budget, event budget."""

@@ -12,6 +12,7 @@ import numpy as np
 from saltus.codegen.module import MODAL_LANES as LANES
 from saltus.flow.modal_blocks import table_of
 from saltus.flow.modal_modes import Eigen, StateModes, eigen_of, modes_of, slots_of
+from saltus.kernels import modal_layout as layout
 from saltus.language.expression import Expr, walk
 from saltus.system.courses import TERMS, Course, course_of
 from saltus.system.linear import LinearPiece, LinearSystem
@@ -21,29 +22,38 @@ from saltus.system.linear import LinearPiece, LinearSystem
 MOST_BYTES = 2**28
 #: Memory of a set of parameter values besides its arrays [bytes].
 SET_BYTES = 4096
+#: Rounding of a coefficient of the equations, relative to it.
+ROUNDED = 16 * np.finfo(float).eps
 
 
 class _Rows:
-    """A table that grows: float64[rows, LANES]."""
+    """A table that grows: [rows, width]."""
 
-    def __init__(self) -> None:
-        self.used, self._memory = 0, np.zeros((256, LANES))
-
-    @property
-    def table(self) -> np.ndarray:
-        """All of it, with room behind."""
-        return self._memory
+    def __init__(self, width: int = LANES, kind: type = float) -> None:
+        self.used = 0
+        self.table: np.ndarray = np.zeros((64, width), kind)
 
     def add(self, numbers: np.ndarray) -> int:
         """Append rows; returns the first."""
-        first, rows = self.used, numbers.reshape(-1, LANES)
-        if first + len(rows) > len(self._memory):
-            grown = np.zeros((2 * (first + len(rows)), LANES))
-            grown[:first] = self._memory[:first]
-            self._memory = grown
-        self._memory[first : first + len(rows)] = rows
+        first, rows = self.used, numbers.reshape(-1, self.table.shape[1])
+        if first + len(rows) > len(self.table):
+            grown = np.zeros((2 * (first + len(rows)), self.table.shape[1]), self.table.dtype)
+            grown[:first] = self.table[:first]
+            self.table = grown
         self.used += len(rows)
+        self.table[first : self.used] = rows
         return first
+
+
+@dataclass(frozen=True)
+class _Equations:
+    """The equations of a contact state, the eigenvalues and -vectors of their matrix, and the
+    fastest eigenvalue of other states [1/s]: the same for all rates of the drives.
+    """
+
+    piece: LinearPiece
+    eigen: Eigen
+    fastest: float
 
 
 @dataclass(frozen=True)
@@ -55,7 +65,6 @@ class _Set:
     rates: np.ndarray
     lags: np.ndarray
     courses: tuple[Course, ...]
-    course_rows: np.ndarray
 
 
 class Tables:
@@ -88,7 +97,8 @@ class Tables:
         self.block_groups = -(-(n + 1 + 2 * drives + TERMS * courses) // LANES)
         self.rows = 2 * self.groups + self.block_groups
         self.sizes = np.array(
-            [n, self.groups, self.state_groups, rows, guards, drives, self.rows, courses], np.int64
+            [n, self.groups, self.state_groups, rows, guards, drives, self.rows, courses, 0],
+            np.int64,
         )
 
     def clear(self) -> None:
@@ -100,11 +110,16 @@ class Tables:
         self._courses: dict[tuple[Expr, bytes], tuple[Course, list[float]]] = {}
         self._sets: dict[bytes, int] = {}
         self.sets: list[_Set] = []
-        self._eigen: dict[bytes, Eigen] = {}
-        self._known: dict[tuple[bytes, bytes], int] = {}
+        self._equations: dict[tuple[object, ...], _Equations] = {}
+        self._smooth: dict[tuple[object, ...], bool] = {}
+        self._known: dict[tuple[int, bytes], int] = {}
         self._states: dict[tuple[int, int], int] = {}
-        self._links: list[list[int]] = []
-        self._arrays: tuple[np.ndarray, ...] | None = None
+        #: Equations and modes of each contact state.
+        self.made: list[tuple[_Equations, StateModes]] = []
+        drives, guards = max(len(self.linear.drives), 1), len(self.linear.system.guards)
+        self._offset, self._rate, self._lag = _Rows(max(guards, 1)), _Rows(drives), _Rows(drives)
+        self._links = _Rows(layout.BEHIND + guards, int)
+        self._course = _Rows(max(4 * len(self.linear.courses), 1))
         self._held = 0
 
     @property
@@ -137,19 +152,12 @@ class Tables:
 
     # -- what the kernel reads ---------------------------------------------------------------------
     def arrays(self) -> tuple[np.ndarray, ...]:
-        """The tables, in the order in which the kernel takes them."""
-        if self._arrays is None:
-            count = len(self.sets)
-            offset = np.array([one.gaps.constant for one in self.sets]).reshape(count, -1)
-            rate = np.array([one.rates for one in self.sets]).reshape(count, -1)
-            lag = np.array([one.lags for one in self.sets]).reshape(count, -1)
-            course = np.array([one.course_rows for one in self.sets]).reshape(count, -1)
-            self._arrays = (
-                self.sizes, self.row_of, self.sign_of, offset, rate, lag, self.modes.table,
-                self.steady.table, np.array(self._links, np.int64).reshape(len(self._links), -1),
-                course, self.pieces.table,
-            )  # fmt: skip
-        return self._arrays
+        """The tables, in the order in which the kernel takes them after the sizes."""
+        links = self._links.table[: self._links.used].copy()  # others change while a kernel reads
+        return (
+            self.row_of, self.sign_of, self._offset.table, self._rate.table, self._lag.table,
+            self.modes.table, self.steady.table, links, self._course.table, self.pieces.table,
+        )  # fmt: skip
 
     def set_of(self, row: np.ndarray) -> int:
         """Number of a set of parameter values."""
@@ -158,11 +166,15 @@ class Tables:
             values = dict(zip(self.linear.system.values, row.tolist(), strict=True))
             rates, lags = self.linear.rates(values)
             found = [self._course_of(node, values) for node in self.linear.courses]
-            rows = np.array([row for _, row in found], float)
-            courses = tuple(course for course, _ in found)
-            gaps = self.linear.gaps(values)
-            self.sets.append(_Set(values, gaps, rates, lags, courses, rows))
-            self._sets[key], self._arrays = len(self.sets) - 1, None
+            rows = np.array([row for _, row in found], float).ravel()
+            courses, gaps = tuple(course for course, _ in found), self.linear.gaps(values)
+            for table, numbers in (
+                (self._offset, gaps.constant), (self._rate, rates), (self._lag, lags),
+                (self._course, rows),
+            ):  # fmt: skip
+                table.add(np.append(numbers, np.zeros(table.table.shape[1] - len(numbers))))
+            self.sets.append(_Set(values, gaps, rates, lags, courses))
+            self._sets[key] = len(self.sets) - 1
             self._held += SET_BYTES + self.sets[-1].gaps.matrix.nbytes
         return self._sets[key]
 
@@ -188,39 +200,51 @@ class Tables:
         return self._states[which, mode]
 
     def _make(self, which: int, mode: int) -> None:
-        given = self.sets[which]
-        piece = self.linear.piece(given.values, mode)
-        number, guards = len(self._links), len(self.linear.system.guards)
-        others = (0, (1 << guards) - 1) if piece.constant.any() else ()
-        matrices = [self.linear.piece(given.values, one).matrix for one in others]
-        fastest = max((np.abs(self._eigen_of(one)[0]).max() for one in matrices), default=0.0)
-        eigen, most = self._eigen_of(piece.matrix), LANES * self.groups
+        given, known = self.sets[which], self._equations_of(self.sets[which], mode)
         speeds = np.array([one.speeds for one in given.courses]).reshape(-1, TERMS)
-        modes = modes_of(piece, given.gaps, given.rates, speeds, most, eigen, float(fastest))
-        key = piece.matrix.tobytes()
-        links = [self._modes_of(key, modes, given), self._steady_of(modes, given)]
+        modes = modes_of(
+            known.piece, given.gaps, given.rates, speeds, LANES * self.groups, known.eigen,
+            known.fastest,
+        )  # fmt: skip
+        number, guards = len(self.made), len(self.linear.system.guards)
+        links = [self._modes_of(known, modes, given), self._steady_of(modes, given), 0]
         for g in range(guards):
             behind = self._states.get((which, mode ^ 1 << g), -1)
             links.append(behind)
             if behind >= 0:
-                self._links[behind][2 + g] = number
-        self._links.append(links)
-        self._states[which, mode], self._arrays = number, None
+                self._links.table[behind, layout.BEHIND + g] = number
+                if self._is_smooth(known, self.made[behind][0], given.gaps, g):
+                    links[layout.SMOOTH] |= 1 << g
+                    self._links.table[behind, layout.SMOOTH] |= 1 << g
+        self._links.add(np.array(links))
+        self.made.append((known, modes))
+        self._states[which, mode] = number
 
     # -- one contact state -------------------------------------------------------------------------
-    def _eigen_of(self, matrix: np.ndarray) -> Eigen:
-        """Modes of a matrix, computed once."""
-        key = matrix.tobytes()
-        if key not in self._eigen:
-            self._eigen[key] = eigen_of(matrix)
-            self._held += sum(part.nbytes for part in self._eigen[key])
-        return self._eigen[key]
+    def _equations_of(self, given: _Set, mode: int) -> _Equations:
+        """The equations of a contact state, read off once for all rates of the drives."""
+        used = tuple(given.values[name] for name in self.linear.parameters)
+        if (mode, used) not in self._equations:
+            piece, fastest = self.linear.piece(given.values, mode), 0.0
+            every = (1 << len(self.linear.system.guards)) - 1
+            if piece.constant.any():
+                others = [self.linear.piece(given.values, one).matrix for one in (0, every)]
+                fastest = max(float(np.abs(np.linalg.eigvals(one)).max()) for one in others)
+            self._equations[mode, used] = _Equations(piece, eigen_of(piece.matrix), fastest)
+            self._held += 8 * piece.matrix.nbytes
+        return self._equations[mode, used]
 
-    def _modes_of(self, matrix: bytes, modes: StateModes, given: _Set) -> int:
-        """First row of the table of some modes; those of equal matrices share one, but for blocks,
+    def _is_smooth(self, one: _Equations, other: _Equations, gaps: LinearPiece, g: int) -> bool:
+        key = id(one), id(other), g, gaps.constant[g], gaps.matrix[g].tobytes()
+        if key not in self._smooth:
+            self._smooth[key] = _is_smooth(one.piece, other.piece, gaps, g)
+        return self._smooth[key]
+
+    def _modes_of(self, known: _Equations, modes: StateModes, given: _Set) -> int:
+        """First row of the table of some modes; those of equal equations share one, but for blocks,
         which hold drives.
         """
-        key = (matrix, given.gaps.matrix.tobytes())
+        key = id(known), given.gaps.matrix.tobytes()
         if modes.block is not None:
             return self.modes.add(self._table(modes, given.gaps.matrix))
         if key not in self._known:
@@ -276,3 +300,17 @@ class Tables:
         flat = np.array(numbers).T.ravel()
         flat = np.concatenate([flat, np.zeros(-len(flat) % LANES)])
         return self.steady.add(np.concatenate([*states, flat]))
+
+
+def _is_smooth(one: LinearPiece, other: LinearPiece, gaps: LinearPiece, g: int) -> bool:
+    """True if the rates in two contact states agree where the gap of a guard is zero: their
+    difference is a multiple of the gap, to rounding.
+    """
+    first, second, rows = (
+        np.column_stack([piece.matrix, piece.constant, piece.driven])
+        for piece in (one, other, gaps)
+    )
+    gap, jump = rows[g] / np.linalg.norm(rows[g]), first - second
+    noise = ROUNDED * (np.abs(first) + np.abs(second))
+    left = jump - np.outer(jump @ gap, gap)
+    return bool((np.abs(left) <= noise + np.outer(noise @ np.abs(gap), np.abs(gap))).all())

@@ -1,4 +1,4 @@
-"""Template, 2 of 4 of the modal flow: modes that don't go their own ways go together, in a block.
+"""Template, 2 of 5 of the modal flow: modes that don't go their own ways go together, in a block.
 
 The block of a contact state is v' = T v: amplitudes of an invariant subspace, and of the drives
 that it resonates with. Its table: a row (groups, alpha, drives); T, column by column; L and V; for
@@ -80,22 +80,22 @@ def times_block(modes, groups, source, h, target, m):
 
 
 @kernel
-def move_block(modes, h, m):
-    """The amplitudes of a block after a time h, to `moved`: exp(T h) v."""
+def move_block(modes, h, y, to, m):
+    """The amplitudes y of a block after a time h: exp(T h) v."""
     groups, first = block_groups(modes, m), 2 * m.sizes[MODE_GROUPS]
     parts = int(block_limit(modes, m) * h) + 1
     for g in range(groups):
-        store(m.moved, first + g, load(m.y, first + g, LANES))
+        store(to, first + g, load(y, first + g, LANES))
     here = (ORDER + 1) * groups
     for _ in range(parts):
         for g in range(groups):
-            store(m.chain, here + g, load(m.moved, first + g, LANES))
+            store(m.chain, here + g, load(to, first + g, LANES))
         for k in range(1, BLOCK_TERMS + 1):
             source, target = here + groups * ((k - 1) % 2), here + groups * (k % 2)
             times_block(modes, groups, source, h / (parts * k), target, m)
             for g in range(groups):
-                total = load(m.moved, first + g, LANES) + load(m.chain, target + g, LANES)
-                store(m.moved, first + g, total)
+                total = load(to, first + g, LANES) + load(m.chain, target + g, LANES)
+                store(to, first + g, total)
 
 
 @kernel
@@ -139,14 +139,39 @@ def add_block_series(r, modes, h, m):
 
 
 @kernel
-def block_amplitudes(modes, m):
-    """Amplitudes of a block from the state less the steady answer in `state`, to `y`."""
+def block_amplitudes(modes, y, m):
+    """Amplitudes of a block from what is in `state`, to y."""
     groups, first = block_groups(modes, m), 2 * m.sizes[MODE_GROUPS]
     for g in range(groups):
         row, a = block_left(modes, groups, m) + g, splat(0.0, LANES)
         for i in range(LANES * m.sizes[STATE_GROUPS]):
             a = fma(load(m.modes, row + i * groups, LANES), number(m.state, 0, i), a)
-        store(m.y, first + g, a)
+        store(y, first + g, a)
+
+
+@kernel
+def block_rates(modes, y, to, m):
+    """The rates of the amplitudes y of a block: T v."""
+    groups, first = block_groups(modes, m), 2 * m.sizes[MODE_GROUPS]
+    if groups == 0:
+        return
+    for g in range(groups):
+        store(m.chain, g, load(y, first + g, LANES))
+    times_block(modes, groups, 0, 1.0, groups, m)
+    for g in range(groups):
+        store(to, first + g, load(m.chain, groups + g, LANES))
+
+
+@kernel
+def block_gap(r, modes, y, m):
+    """A block's part of a row of gaps by its amplitudes y: a lane whose numbers add up to it."""
+    groups, first = block_groups(modes, m), 2 * m.sizes[MODE_GROUPS]
+    total = splat(0.0, LANES)
+    if groups > 0:
+        row = block_waves(modes, groups, m) + groups * r
+        for g in range(groups):
+            total = fma(load(m.modes, row + g, LANES), load(y, first + g, LANES), total)
+    return total
 
 
 @kernel

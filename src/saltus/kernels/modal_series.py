@@ -1,4 +1,4 @@
-"""Template, 3 of 4 of the modal flow: amplitudes on their way, and what they say of gaps."""
+"""Template, 3 of 5 of the modal flow: amplitudes on their way, and what they say of gaps."""
 
 import math
 
@@ -112,12 +112,17 @@ def numbers_of_gap(r, steady, m):
 
 
 # -- states and amplitudes -------------------------------------------------------------------------
-@kernel
-def amplitudes_of(modes, m):
-    """Amplitudes of the state in `state`, to `y`: L (z - z_p). Needs `answer`."""
-    width, count = 2 * m.sizes[MODE_GROUPS], LANES * m.sizes[STATE_GROUPS]
+@inner
+def less_answer(m):
+    """Subtract the answer from `state`."""
     for s in range(m.sizes[STATE_GROUPS]):
         store(m.state, s, load(m.state, s, LANES) - load(m.answer, s, LANES))
+
+
+@kernel
+def amplitudes_of(modes, y, m):
+    """Amplitudes of what is in `state`, to y: L z."""
+    width, count = 2 * m.sizes[MODE_GROUPS], LANES * m.sizes[STATE_GROUPS]
     for g in range(width):
         row = modes + 3 * m.sizes[MODE_GROUPS] + g * count
         a, b = splat(0.0, LANES), splat(0.0, LANES)
@@ -127,8 +132,8 @@ def amplitudes_of(modes, m):
             b = fma(load(m.modes, row + i + 1, LANES), number(m.state, 0, i + 1), b)
             c = fma(load(m.modes, row + i + 2, LANES), number(m.state, 0, i + 2), c)
             d = fma(load(m.modes, row + i + 3, LANES), number(m.state, 0, i + 3), d)
-        store(m.y, g, (a + b) + (c + d))
-    block_amplitudes(modes, m)
+        store(y, g, (a + b) + (c + d))
+    block_amplitudes(modes, y, m)
 
 
 @kernel
@@ -150,18 +155,30 @@ def state_of(modes, y, m):
     add_block_state(modes, y, m)
 
 
+@inner
+def factor_of(modes, g, h, m):
+    """e^{lambda h} of a group of modes: its real and its imaginary part."""
+    decay = exponential(load(m.modes, modes + g, LANES) * h)
+    sine, cosine = sincos(load(m.modes, modes + m.sizes[MODE_GROUPS] + g, LANES) * h)
+    return cosine * decay, sine * decay
+
+
+@inner
+def turn(y, g, a, b, to, m):
+    """Write (a + i b) y of a group of modes."""
+    groups = m.sizes[MODE_GROUPS]
+    real, imaginary = load(y, g, LANES), load(y, groups + g, LANES)
+    store(to, g, fma(-imaginary, b, real * a))
+    store(to, groups + g, fma(imaginary, a, real * b))
+
+
 @kernel
 def move(modes, h, m):
     """The amplitudes after a time h, to `moved`."""
-    groups = m.sizes[MODE_GROUPS]
-    for g in range(groups):
-        decay = exponential(load(m.modes, modes + g, LANES) * h)
-        sine, cosine = sincos(load(m.modes, modes + groups + g, LANES) * h)
-        real, imaginary = load(m.y, g, LANES), load(m.y, groups + g, LANES)
-        cosine, sine = cosine * decay, sine * decay
-        store(m.moved, g, fma(-imaginary, sine, real * cosine))
-        store(m.moved, groups + g, fma(imaginary, cosine, real * sine))
-    move_block(modes, h, m)
+    for g in range(m.sizes[MODE_GROUPS]):
+        a, b = factor_of(modes, g, h, m)
+        turn(m.y, g, a, b, m.moved, m)
+    move_block(modes, h, m.y, m.moved, m)
 
 
 @inner

@@ -1,4 +1,4 @@
-"""Template, 4 of 4 of the modal flow: steps that are proven to cross no boundary, or just one, and
+"""Template, 5 of 5 of the modal flow: steps that are proven to cross no boundary, or just one, and
 the life of a trajectory.
 
 A step is tried and halved until every gap is decided. Modes that are too fast for it are bounded:
@@ -258,10 +258,9 @@ def record(i, g, tau, kind, direction, velocity, after, error, batch, m):
     batch.rec_i[r, REC_MODE_BEFORE], batch.rec_i[r, REC_MODE_AFTER] = batch.mode[i], after
     batch.rec_f[r, REC_PHASE], batch.rec_f[r, REC_VELOCITY] = tau, velocity
     batch.rec_f[r, REC_TIME_ERROR] = error
-    states = m.sizes[STATES]
-    for j in range(states):
+    for j in range(m.sizes[STATES]):
         batch.rec_f[r, RECORD_FLOATS + j] = m.state[j // LANES, j % LANES]
-    batch.rec_f[r, RECORD_FLOATS + states] = time_of(i, tau, batch)
+    batch.rec_f[r, RECORD_FLOATS + batch.state.shape[1]] = time_of(i, tau, batch)
 
 
 @kernel
@@ -299,8 +298,13 @@ def write_samples(i, tau, until, modes, steady, batch, m):
         if due > until:
             break
         state_after(i, tau, due - tau, modes, steady, batch, m)
-        for j in range(m.sizes[STATES]):
+        states = m.sizes[STATES]
+        for j in range(states):
             batch.samples[i, k, j] = m.state[j // LANES, j % LANES]
+        if m.sizes[TANGENTS] != 0:
+            columns_after(i, modes, batch.carry[i, WAITED] + (due - tau), batch, m)
+            for j in range(states * states):
+                batch.samples[i, k, states + j] = m.columns[j // states, j % states]
         batch.sample_mode[i, k] = batch.mode[i]
         k += 1
     batch.cursor[i] = k
@@ -315,7 +319,10 @@ def enter(i, tau, batch, m):
         m.state[j // LANES, j % LANES] = batch.state[i, j]
     drive(i, tau, batch, m)
     answer_now(m.links[at, STEADY], m)
-    amplitudes_of(m.links[at, MODES], m)
+    less_answer(m)
+    amplitudes_of(m.links[at, MODES], m.y, m)
+    if m.sizes[TANGENTS] != 0:
+        enter_columns(i, at, batch, m)
     batch.carry[i, ENTERS] = 0.0
 
 
@@ -359,6 +366,9 @@ def land(i, tau, d, hits, modes, steady, batch, m):
             record(i, g, tau + d, CROSSING, direction, rate, after, error, batch, m)
     for j in range(m.sizes[STATES]):
         batch.state[i, j] = m.state[j // LANES, j % LANES]
+    if m.sizes[TANGENTS] != 0:
+        batch.carry[i, WAITED] += d
+        leave_columns(i, hits, modes, steady, batch, m)
     at = int(batch.carry[i, AT])
     for g in range(m.sizes[GUARDS]):
         if (hits >> g) & 1 and at >= 0:
@@ -460,6 +470,7 @@ def advance(i, budget, batch, m):
                 move(modes, h, m)
                 keep_moved(m)
                 keep_on(i, h, batch, m)
+                batch.carry[i, WAITED] += h
                 if h == following - tau:
                     batch.carry[i, NEXT_STEP] = max(wanted, 2.0 * h)
                     tau = following
@@ -495,6 +506,7 @@ def put_back(i, tau, status, batch, m):
         state_of(m.links[at, MODES], m.y, m)
         for j in range(m.sizes[STATES]):
             batch.state[i, j] = m.state[j // LANES, j % LANES]
+        move_columns(i, m.links[at, MODES], batch, m)
     batch.phase[i], batch.status[i] = tau, status
 
 
@@ -504,7 +516,7 @@ def propagate(
     end_phase, counters, minima, sample_count, sample_fraction, cursor, samples, sample_mode,
     rec_first, rec_i, rec_f, rec_used, options, data, budget, sizes, row_of, sign_of, offset, rate,
     lag, modes, steady, links, course, pieces, y, moved, size, sums, q, errors, p, bern, bounds,
-    slopes, out, touches, place, answer, angle, found, chain, follows,
+    slopes, out, touches, place, answer, angle, found, chain, follows, factor, column, columns,
 ):  # fmt: skip
     """Move every trajectory whose status is RUNNING and whose contact state has been made, `budget`
     steps at most. See kernels/batch.py for the arrays.
@@ -517,7 +529,7 @@ def propagate(
     m = Modal(
         sizes, row_of, sign_of, offset, rate, lag, modes, steady, links, course, pieces, y, moved,
         size, sums, q, errors, p, bern, bounds, slopes, out, touches, place, answer, angle, found,
-        chain, follows,
+        chain, follows, factor, column, columns,
     )  # fmt: skip
     waits = False
     for i in range(status.shape[0]):

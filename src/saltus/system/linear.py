@@ -82,6 +82,29 @@ class LinearSystem:
     courses: tuple[Expr, ...]
     _field: tuple[Expr, ...]
     _gaps: tuple[Expr, ...]
+    _names: Mapping[Expr, Expr]
+
+    @functools.cached_property
+    def parameters(self) -> tuple[str, ...]:
+        """The parameters of the equations between contacts, those of the drives' rates left
+        out.
+        """
+        nodes = ex.walk(*self._field)
+        used = {node.payload for node in nodes if node.op == "param"}
+        return tuple(name for name in self.system.values if name in used)
+
+    def of(self, quantities: tuple[Expr, ...]) -> tuple[Expr, ...] | None:
+        """Quantities as functions of the states and the drives; None if one isn't linear."""
+        found = tuple(ex.substituted(entry, self._names) for entry in quantities)
+        linear = all(_is_affine(entry, len(self._names)) for entry in found)
+        return found if linear else None
+
+    def rows(
+        self, quantities: tuple[Expr, ...], values: Mapping[str, float], mode: int
+    ) -> LinearPiece:
+        """Coefficients of quantities that :meth:`of` has given, in a contact state."""
+        bits = [bool(mode >> i & 1) for i in range(len(self.system.guards))]
+        return LinearPiece(*self._coefficients(quantities, values, bits))
 
     def piece(self, values: Mapping[str, float], mode: int) -> LinearPiece:
         """The equations of a contact state, bit i the side of guard i."""
@@ -113,7 +136,7 @@ class LinearSystem:
                 np.broadcast_to(one, probes.shape[1])
                 for one in evaluate(entries, states=states, values=known, bits=bits)
             ]
-        ).reshape(len(entries), -1)
+        ).reshape(len(entries), probes.shape[1])
         slopes = (found[:, 1 : 1 + n + m] - found[:, 1 + n + m :]) / (2 * PROBE)
         return slopes[:, :n], found[:, 0], slopes[:, n:]
 
@@ -153,7 +176,7 @@ def linear_pieces(system: System) -> LinearSystem | str:
         return "a boundary of it moves when another is crossed"
     if not all(_is_affine(entry, len(names)) for entry in (*field, *gaps)):
         return "it isn't linear between its contacts"
-    return LinearSystem(system, tuple(drives.values()), tuple(courses), field, gaps)
+    return LinearSystem(system, tuple(drives.values()), tuple(courses), field, gaps, names)
 
 
 def _driving(*roots: Expr) -> Iterator[Expr]:

@@ -72,11 +72,12 @@ class Asked(Generated, Named):
 
 
 class OfLength(Generated):
-    """A table that says how long to go on."""
+    """A table that says how long to go on; given times are enough."""
 
     @model_validator(mode="after")
     def _one_length(self) -> OfLength:
-        if (getattr(self, "periods", None) is None) == (getattr(self, "t_end", None) is None):
+        lengths = [getattr(self, name, None) is not None for name in ("periods", "t_end")]
+        if sum(lengths) != 1 and (any(lengths) or getattr(self, "at", None) is None):
             raise ValueError(
                 "give the length once: periods = 60, or, of a system without forcing, "
                 't_end = "20 s"'
@@ -133,7 +134,8 @@ def table(
         else ""
     )
     fields: dict[str, Any] = {name: key for name, (key, _) in found.items()} | own
-    title, text = place.title().replace("_", ""), f"[{place}]: {_plain(summary)}{several}"
+    title = place.title().replace("_", "").replace(".", "")
+    text = f"[{place}]: {_plain(summary)}{several}"
     made = create_model(title, __base__=base, __module__=__name__, __doc__=text, **fields)
     for name, value in {
         "place": place,
@@ -208,9 +210,9 @@ def documented(function: Callable[..., Any]) -> dict[str, tuple[str, str]]:
     """Type and meaning of each parameter, from the docstring. "As for" another function stands for
     the parameters of that function.
     """
-    part = (
-        (inspect.getdoc(function) or "").partition("Parameters\n----------\n")[2].split("\n\n")[0]
-    )
+    text = inspect.getdoc(function) or ""
+    title = "Parameters" if "Parameters\n---" in text else "Attributes"
+    part = text.partition(f"{title}\n----------\n")[2].split("\n\n")[0]
     found: dict[str, tuple[str, str]] = {}
     for heading, body in _ENTRY.findall(part + "\n"):
         names, _, written = heading.partition(" : ")
