@@ -11,10 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 
+from saltus.analysis.branches.equations import CurveEquations
 from saltus.analysis.solve.newton import Zeros, newton
 from saltus.flow.polynomials import between
 
@@ -50,31 +51,6 @@ LEAST_CLOSED, AGAIN = 8, 0.9
 #: Farthest that a step lies from a point that it passes, and from the line between its ends, in
 #: steps.
 PASSED, BENDS = 0.02, 0.1
-
-
-class CurveEquations(Protocol):
-    """m equations F(z) = 0 in m + 1 unknowns, for k curves.
-
-    Attributes
-    ----------
-    scale : float64[k, m + 1]
-        Unit of each unknown.
-    """
-
-    scale: np.ndarray
-
-    def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """F float64[r, m] and its derivative float64[r, m, m + 1], both in units of the scale, at
-        float64[r, m + 1] of the curves int64[r]; NaN where there is none.
-        """
-
-    def accepted(self, z: np.ndarray, rows: np.ndarray) -> None:
-        """Points float64[r, m + 1] of the curves int64[r] were accepted."""
-
-    def alike(self, z: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """Other unknowns that mean the same points float64[r, m + 1], float64[r, s, m + 1]; the
-        first are these. The last unknown of them all is the same.
-        """
 
 
 @dataclass
@@ -115,6 +91,27 @@ class Arc:
         )
 
 
+class Way(Protocol):
+    """What is followed in one direction from a start."""
+
+    @property
+    def end(self) -> str:
+        """Why it ends, as :attr:`Arc.end`."""
+
+
+W = TypeVar("W", bound=Way)
+
+
+def both_sides(ways: list[W]) -> tuple[list[W], tuple[str, str]]:
+    """What makes one curve of what was followed ahead, and back, from a start: one that is closed
+    alone, or both; and why the curve ends at its first and at its last point.
+    """
+    for way in ways:
+        if way.end == "closed":
+            return [way], ("closed", "closed")
+    return ways, (ways[1].end if len(ways) > 1 else "branch", ways[0].end)
+
+
 def correct(
     equations: CurveEquations,
     guess: np.ndarray,
@@ -127,7 +124,7 @@ def correct(
 
     Parameters
     ----------
-    equations : Equations
+    equations : CurveEquations
         The curves.
     guess, normal
         Where to begin, and the normals of the planes in units of the scale.
@@ -173,7 +170,7 @@ def follow(
 
     Parameters
     ----------
-    equations : Equations
+    equations : CurveEquations
         Row i is curve i.
     start, along : float64[k, m + 1]
         Points, and on which side of them to go, in units of the scale.

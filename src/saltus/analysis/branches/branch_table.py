@@ -26,6 +26,7 @@ from saltus.results.dataset import schema
 from saltus.results.dataset.attractors import padded
 from saltus.system import System
 
+Orbits = PeriodicOrbits | Rests
 #: Samples of a period by which branches are resolved.
 SAMPLES = 64
 #: Multipliers nearer to the unit circle than this don't count as inside: the orbit may not attract.
@@ -182,7 +183,7 @@ def _sampled_peaks(system: System, method: Method, branch: Branch, z: np.ndarray
     to say where more orbits are needed.
     """
     if isinstance(branch.orbits, Rests):
-        return np.abs(z[:, 0])
+        return np.asarray(np.abs(z[:, 0]))
     n = branch.orbits.n if system.forced_at is not None else 1
     map_ = _map_of(system, method, [(branch.orbits, one) for one in z])
     starts = branch.orbits.points(z)[:, 0]
@@ -191,7 +192,7 @@ def _sampled_peaks(system: System, method: Method, branch: Branch, z: np.ndarray
 
 
 def _map_of(
-    system: System, method: Method, points: Sequence[tuple[PeriodicOrbits, np.ndarray]]
+    system: System, method: Method, points: Sequence[tuple[Orbits, np.ndarray]]
 ) -> Stroboscope:
     """A map for each orbit: over its forcing period, or its own period."""
     rows = np.tile(np.array(list(system.values.values())), (len(points), 1))
@@ -205,13 +206,13 @@ def _map_of(
 
 def _with_equations(
     points: Sequence[tuple[Branch, np.ndarray]],
-) -> list[tuple[PeriodicOrbits, np.ndarray]]:
+) -> list[tuple[Orbits, np.ndarray]]:
     return [(branch.orbits, z) for branch, z in points]
 
 
 def numbers_of(
     system: System,
-    points: Sequence[tuple[PeriodicOrbits, np.ndarray]],
+    points: Sequence[tuple[Orbits, np.ndarray]],
     outputs: Outputs,
     method: Method,
 ) -> Measures:

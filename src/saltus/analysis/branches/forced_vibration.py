@@ -173,7 +173,7 @@ class QuadratureOrbits(PeriodicOrbits):
         )  # fmt: skip
 
     def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """See :class:`saltus.analysis.branches.arclength.Equations`."""
+        """See :class:`saltus.analysis.branches.equations.CurveEquations`."""
         whole = np.insert(z, self.size, 0.0, axis=1)
         residual, derivative = self._extended.evaluate(whole, rows)
         return residual, np.delete(derivative, self.size, axis=2)

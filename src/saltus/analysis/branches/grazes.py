@@ -27,7 +27,7 @@ LOOKS = 200
 
 
 @dataclass(frozen=True)
-class ContactEvent:
+class ContactChange:
     """An orbit at which a contact sequence changes.
 
     Attributes
@@ -109,7 +109,7 @@ def _entries(system: System, guard: int, mode: int) -> tuple[Expr, ...]:
     )
 
 
-def graze(legs: Legs, z: np.ndarray, guard: int, phase: float) -> ContactEvent | None:
+def graze(legs: Legs, z: np.ndarray, guard: int, phase: float) -> ContactChange | None:
     """The orbit that touches a boundary, by Newton's method from another one.
 
     Parameters
@@ -145,7 +145,7 @@ def graze(legs: Legs, z: np.ndarray, guard: int, phase: float) -> ContactEvent |
         return None
     z, phase = found.z[0, :-1], float(found.z[0, -1]) % legs.n  # the last step was rounding
     derivative = found.derivative[0, :-2, :-1]
-    return ContactEvent("graze", (guard,), phase, legs, z, place, state, slope, derivative)
+    return ContactChange("graze", (guard,), phase, legs, z, place, state, slope, derivative)
 
 
 def touch(
@@ -195,7 +195,7 @@ def nearest_turn(legs: Legs, z: np.ndarray, place: int, gap: Gap, since: float) 
     return float(middle[np.abs(middle - since).argmin()])
 
 
-def corner(legs: Legs, z: np.ndarray, place: int) -> ContactEvent | None:
+def corner(legs: Legs, z: np.ndarray, place: int) -> ContactChange | None:
     """The orbit that meets two boundaries at once, by Newton's method from another one.
 
     Parameters
@@ -228,4 +228,4 @@ def corner(legs: Legs, z: np.ndarray, place: int) -> ContactEvent | None:
     slope[after * width], slope[place * width] = 1.0, -1.0
     state = legs.nodes(u)[1][0, place]
     own = found.derivative[0, :-1]
-    return ContactEvent("corner", guards, phase, legs, u[0], place, state, slope, own)
+    return ContactChange("corner", guards, phase, legs, u[0], place, state, slope, own)

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from saltus.analysis.branches.contact_sequences import sequences, shift, without
-from saltus.analysis.branches.grazes import ContactEvent, Gap, nearest_turn, touch, touching
+from saltus.analysis.branches.grazes import ContactChange, Gap, nearest_turn, touch, touching
 from saltus.analysis.branches.legs import Legs, product
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.solve.newton import newton
@@ -35,7 +35,7 @@ CONTINUOUS = 1e-9
 
 
 class GrazingOrbits:
-    """Curves of orbits that graze one boundary; an arclength ``Equations``.
+    """Curves of orbits that graze one boundary; a ``CurveEquations``.
 
     Unknowns z: those of :class:`Legs` over two parameters, without the contact that grazes, and the
     time at which the boundary is touched, in periods since the orbit's first point.
@@ -118,7 +118,7 @@ class GrazingOrbits:
 
     # -- equations ---------------------------------------------------------------------------------
     def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """See :class:`saltus.analysis.branches.arclength.Equations`."""
+        """See :class:`saltus.analysis.branches.equations.CurveEquations`."""
         (residual, derivative), _, value, slopes = touching(
             self.legs, self.place, self.gap, z, rows
         )
@@ -136,11 +136,11 @@ class GrazingOrbits:
         self.accepted(z, rows)
 
     def accepted(self, z: np.ndarray, rows: np.ndarray) -> None:
-        """See :class:`saltus.analysis.branches.arclength.Equations`."""
+        """See :class:`saltus.analysis.branches.equations.CurveEquations`."""
         self.legs.accepted(z[:, :-1], rows)
 
     def alike(self, z: np.ndarray, rows: np.ndarray) -> np.ndarray:  # noqa: ARG002
-        """See :class:`saltus.analysis.branches.arclength.Equations`."""
+        """See :class:`saltus.analysis.branches.equations.CurveEquations`."""
         return z[:, None]
 
     def multipliers(self, z: np.ndarray, derivative: np.ndarray, rows: np.ndarray) -> np.ndarray:
@@ -214,7 +214,7 @@ class GrazingOrbits:
         return found.z[0, :-1] if found.found[0] and near else None
 
     # -- normal form -------------------------------------------------------------------------------
-    def is_smooth(self, event: ContactEvent) -> bool:
+    def is_smooth(self, event: ContactChange) -> bool:
         """True if a graze has no square root, since the force begins at zero."""
         own = self.legs.orbits.own(self.legs.nodes(event.z[None])[2])[0]
         full, when = np.append(event.state, own[0]), event.phase * self.legs.unit
@@ -267,7 +267,7 @@ def returned(
     return result
 
 
-def sqrt_coefficient(event: ContactEvent) -> float:
+def sqrt_coefficient(event: ContactChange) -> float:
     """The coefficient of the square root at an event, see above; NaN unless it is a graze."""
     if event.kind != "graze":
         return np.nan

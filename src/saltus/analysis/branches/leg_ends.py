@@ -13,7 +13,7 @@ from saltus.analysis.branches.contact_sequences import (
     shift,
     without,
 )
-from saltus.analysis.branches.grazes import ContactEvent, corner, graze
+from saltus.analysis.branches.grazes import ContactChange, corner, graze
 from saltus.analysis.branches.legs import Legs
 from saltus.kernels import status as st
 
@@ -29,12 +29,13 @@ _ROW = np.zeros(1, np.int64)
 
 
 @dataclass(frozen=True)
-class End:
-    """The event at which a branch of orbits with one contact sequence ends.
+class Passage:
+    """The change at which a branch of orbits with one contact sequence ends, and goes on with
+    another.
 
     Attributes
     ----------
-    event : ContactEvent
+    change : ContactChange
         It.
     z : float64[z]
         The orbit in the unknowns of the branch that ends.
@@ -44,7 +45,7 @@ class End:
         In them: the orbit at the event, and the way to go, in units of the scale.
     """
 
-    event: ContactEvent
+    change: ContactChange
     z: np.ndarray
     onto: Legs | None
     start: np.ndarray
@@ -56,7 +57,7 @@ class End:
         return own if own @ tangent > 0 else -own
 
 
-def end_of(legs: Legs, z: np.ndarray, beyond: np.ndarray, tangent: np.ndarray) -> End | None:
+def end_of(legs: Legs, z: np.ndarray, beyond: np.ndarray, tangent: np.ndarray) -> Passage | None:
     """Locate the end of a branch between an orbit of the free flow and a virtual one; None if it
     isn't found.
 
@@ -88,7 +89,7 @@ def end_of(legs: Legs, z: np.ndarray, beyond: np.ndarray, tangent: np.ndarray) -
     return None
 
 
-def _reason(legs: Legs, z: np.ndarray, beyond: np.ndarray, tangent: np.ndarray) -> End | None:
+def _reason(legs: Legs, z: np.ndarray, beyond: np.ndarray, tangent: np.ndarray) -> Passage | None:
     """The event that makes an orbit virtual, if it is a single one."""
     speeds = legs.speeds(beyond[None])[0] if legs.contacts else np.ones(1)
     impacts = [int(i) for i in np.flatnonzero(speeds <= 0) if legs.jumps_at(int(i))]
@@ -102,7 +103,7 @@ def _reason(legs: Legs, z: np.ndarray, beyond: np.ndarray, tangent: np.ndarray) 
 
 
 # -- contacts that vanish --------------------------------------------------------------------------
-def _impact_vanishes(legs: Legs, z: np.ndarray, place: int) -> End | None:
+def _impact_vanishes(legs: Legs, z: np.ndarray, place: int) -> Passage | None:
     """An impact without speed: beyond, the orbit touches the stop no more."""
     event = _without(legs, z, (place,))
     if event is None:
@@ -113,10 +114,10 @@ def _impact_vanishes(legs: Legs, z: np.ndarray, place: int) -> End | None:
     along = event.legs.tangent(event.z)
     away = _touching(event) @ along
     side = -contact.direction  # of the gap where the stop isn't met
-    return End(event, start, event.legs, event.z, along if away * side > 0 else -along)
+    return Passage(event, start, event.legs, event.z, along if away * side > 0 else -along)
 
 
-def _without(legs: Legs, z: np.ndarray, places: tuple[int, ...]) -> ContactEvent | None:
+def _without(legs: Legs, z: np.ndarray, places: tuple[int, ...]) -> ContactChange | None:
     """The graze at which some contacts of an orbit vanish."""
     phase = legs.nodes(z[None])[0][0]
     fewer = without(legs.sequence_at(z), places)
@@ -125,13 +126,13 @@ def _without(legs: Legs, z: np.ndarray, places: tuple[int, ...]) -> ContactEvent
     return graze(shorter, near, legs.contacts[places[0]].guard, 0.5 * (phase[places[0]] + last))
 
 
-def _touching(event: ContactEvent) -> np.ndarray:
+def _touching(event: ContactChange) -> np.ndarray:
     """Derivative of the gap that grazes with respect to the orbit, in units of the scale."""
     return np.asarray(event.slope * event.legs.scale[0])
 
 
 def with_impact(
-    event: ContactEvent, contact: SequenceContact, like: Legs | None
+    event: ContactChange, contact: SequenceContact, like: Legs | None
 ) -> tuple[np.ndarray, Legs]:
     """The orbit of a graze with the impact without speed among its contacts, float64[z], and its
     equations: those of another orbit if they are given.
@@ -164,7 +165,7 @@ def with_impact(
     return np.append(nodes.ravel(), rest[0]), like
 
 
-def _leg_vanishes(legs: Legs, z: np.ndarray, place: int, tangent: np.ndarray) -> End | None:
+def _leg_vanishes(legs: Legs, z: np.ndarray, place: int, tangent: np.ndarray) -> Passage | None:
     """Two contacts at once: a guard that is left as it is met, or two guards."""
     after = (place + 1) % legs.count
     first, second = legs.contacts[place], legs.contacts[after]
@@ -176,7 +177,7 @@ def _leg_vanishes(legs: Legs, z: np.ndarray, place: int, tangent: np.ndarray) ->
         onto, start = event.legs, event.z
         away, side = _touching(event) @ onto.tangent(start), -first.direction
         along = onto.tangent(start) * (1.0 if away * side > 0 else -1.0)
-        return End(event, own, onto, start, along)
+        return Passage(event, own, onto, start, along)
     event = corner(legs, z, place)
     return None if event is None else _by_free_flow(event, event.z, tangent)
 
@@ -201,7 +202,7 @@ def _appears(
     beyond: np.ndarray,
     extra: tuple[SequenceContact, float],
     tangent: np.ndarray,
-) -> End | None:
+) -> Passage | None:
     """A boundary that is met beyond an orbit that touches it."""
     contact, phase = extra
     event = graze(legs, beyond, contact.guard, phase) or graze(legs, z, contact.guard, phase)
@@ -214,10 +215,10 @@ def _appears(
     place = event.place + 1 if legs.contacts else 0
     step = 1e-6 * along * onto.scale[0]
     faster = onto.speeds(np.array([start + step, start - step]))[:, place]
-    return End(event, event.z, onto, start, along if faster[0] > faster[1] else -along)
+    return Passage(event, event.z, onto, start, along if faster[0] > faster[1] else -along)
 
 
-def _by_free_flow(event: ContactEvent, z: np.ndarray, tangent: np.ndarray) -> End:
+def _by_free_flow(event: ContactChange, z: np.ndarray, tangent: np.ndarray) -> Passage:
     """The end of a branch beyond which the free flow finds the contacts of its orbits."""
     legs = event.legs
     for beyond in BEYOND:
@@ -235,5 +236,5 @@ def _by_free_flow(event: ContactEvent, z: np.ndarray, tangent: np.ndarray) -> En
         onto.accepted(near[None], _ROW)
         point = correct(onto, near[None], sign * along[None], _ROW, 10 * beyond)
         if point.found[0] and onto.admissible(point.z)[0]:
-            return End(event, z, onto, point.z[0], sign * along)
-    return End(event, z, None, z, tangent)
+            return Passage(event, z, onto, point.z[0], sign * along)
+    return Passage(event, z, None, z, tangent)

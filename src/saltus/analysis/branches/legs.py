@@ -32,7 +32,7 @@ AT_ONCE = 1e-14
 
 
 class Legs:
-    """Curves of periodic orbits of n periods with one contact sequence; an arclength ``Equations``.
+    """Curves of periodic orbits of n periods with one contact sequence; a ``CurveEquations``.
 
     Unknowns z: the time of each contact in periods since the orbit's first point and the state
     before it, one contact after the other; the period [s] of a system without forcing; the
@@ -228,7 +228,7 @@ class Legs:
 
     # -- equations ---------------------------------------------------------------------------------
     def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """See :class:`saltus.analysis.branches.arclength.Equations`."""
+        """See :class:`saltus.analysis.branches.equations.CurveEquations`."""
         at, spans = self.at(z), self.spans(self.nodes(z)[0])
         return self.closed(z, rows, at, *self.along(z, at, spans))
 
@@ -326,7 +326,7 @@ class Legs:
         return result
 
     def accepted(self, z: np.ndarray, rows: np.ndarray) -> None:
-        """See :class:`saltus.analysis.branches.arclength.Equations`."""
+        """See :class:`saltus.analysis.branches.equations.CurveEquations`."""
         if self.free and not self.contacts:
             self.phase[rows, 0] = self.nodes(z)[1][:, 0]
             flow = self.at(z).rate[:, 0] / self.scale[rows, 1 : self.size + 1]

@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 
 from saltus.analysis.branches.arclength import Arc, tangents
-from saltus.analysis.branches.branch import Branch, refine
+from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.criticality import criticality
 from saltus.analysis.branches.events import Event
+from saltus.analysis.branches.piece import refine
 from saltus.analysis.branches.rests import Rests
 from saltus.analysis.branches.switching import Seed, crossing
 from saltus.analysis.branches.tracing import Plan, both_ways, trace
@@ -48,7 +49,7 @@ class RestBranch(Branch):
         The direction in which the branch in the mode behind each begins, in units of the scale.
     """
 
-    orbits: Rests  # type: ignore[assignment]
+    orbits: Rests
     borders: list[Event | None] = field(default_factory=lambda: [None, None])
     beyond: list[np.ndarray | None] = field(default_factory=lambda: [None, None])
 

@@ -29,7 +29,7 @@ SLOWEST = 1e-3
 
 
 class Rests:
-    """Curves of equilibria over one parameter; an arclength ``Equations``, and what a branch asks
+    """Curves of equilibria over one parameter; a ``CurveEquations``, and what a branch asks
     of the equations of its orbits.
 
     Unknowns z: the state, and the parameter [SI]. The mode of a curve is that of the first point
@@ -47,7 +47,7 @@ class Rests:
 
     def __init__(self, system: System, name: str, scale: np.ndarray) -> None:
         self.system, self.names, self.scale = system, (name,), scale
-        self.n, self.size, self.free, self.symmetric = 1, len(system.states), False, False
+        self.n, self.size, self.free = 1, len(system.states), False
         self._whole = parametric(system, self.names).system
         size = self.size
         self._columns = [*range(size), len(self._whole.states) - 1]
@@ -136,8 +136,8 @@ class Rests:
 
     # -- equations ---------------------------------------------------------------------------------
     def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """See :class:`saltus.analysis.branches.arclength.Equations`; each rate is divided by its
-        largest derivative where the curve begins.
+        """See :class:`saltus.analysis.branches.equations.CurveEquations`; each rate is divided by
+        its largest derivative where the curve begins.
         """
         modes, weight = self.modes[rows], self._weight[rows]
         derivative = self.jacobian(z, modes) * self.scale[rows][:, None]
@@ -145,7 +145,7 @@ class Rests:
         return residual / weight, derivative / weight[:, :, None]
 
     def accepted(self, z: np.ndarray, rows: np.ndarray) -> None:
-        """See :class:`saltus.analysis.branches.arclength.Equations`."""
+        """See :class:`saltus.analysis.branches.equations.CurveEquations`."""
         new = np.isnan(self._weight[rows, 0])
         if new.any():
             z, rows = z[new], rows[new]

@@ -36,7 +36,7 @@ GUESSED = 1e9
 
 
 class PeriodicOrbits:
-    """Curves of periodic orbits of n periods over one parameter; an arclength ``Equations``.
+    """Curves of periodic orbits of n periods over one parameter; a ``CurveEquations``.
 
     Unknowns z: the n points, one after the other; the time from one to the next [s] in a system
     without forcing; the parameters [SI].
@@ -130,7 +130,7 @@ class PeriodicOrbits:
 
     # -- equations ---------------------------------------------------------------------------------
     def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """See :class:`saltus.analysis.branches.arclength.Equations`."""
+        """See :class:`saltus.analysis.branches.equations.CurveEquations`."""
         r, n, size = len(z), self.n, self.size
         own, slopes, order = self.own(z[:, n * size :])
         points, start = self.points(z), self._with_own(z, own).reshape(r * n, -1)
@@ -159,7 +159,7 @@ class PeriodicOrbits:
         return np.append(residual, where[:, None], axis=1), np.append(derivative, row, axis=1)
 
     def accepted(self, z: np.ndarray, rows: np.ndarray) -> None:
-        """See :class:`saltus.analysis.branches.arclength.Equations`."""
+        """See :class:`saltus.analysis.branches.equations.CurveEquations`."""
         if self.free:
             self.phase[rows, 0] = z[:, : self.size]
             self.phase[rows, 1] = self._flow(z) / self.scale[rows, : self.size]

@@ -25,7 +25,7 @@ COSINES = (-1.0 + 1e-9, 1.0 - 1e-9)
 
 
 class SingularOrbits:
-    """Curves of bifurcations of one kind; an arclength ``Equations``.
+    """Curves of bifurcations of one kind; a ``CurveEquations``.
 
     Unknowns z: those of :class:`PeriodicOrbits` over two parameters, and for a torus the cosine of
     the angle of its multipliers.
@@ -122,7 +122,7 @@ class SingularOrbits:
 
     # -- equations ---------------------------------------------------------------------------------
     def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """See :class:`saltus.analysis.branches.arclength.Equations`."""
+        """See :class:`saltus.analysis.branches.equations.CurveEquations`."""
         width, size = self.orbits.width, self.size
         residual, derivative = self.orbits.evaluate(z[:, :width], rows)
         mu = self._multipliers(z)
@@ -187,13 +187,13 @@ class SingularOrbits:
         return bend
 
     def accepted(self, z: np.ndarray, rows: np.ndarray) -> None:
-        """See :class:`saltus.analysis.branches.arclength.Equations`."""
+        """See :class:`saltus.analysis.branches.equations.CurveEquations`."""
         self.orbits.accepted(z[:, : self.orbits.width], rows)
         good = np.isfinite(self._latest[:, rows]).all(axis=(0, 2))
         self._border[:, rows[good]] = self._latest[:, rows[good]]
 
     def alike(self, z: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """See :class:`saltus.analysis.branches.arclength.Equations`."""
+        """See :class:`saltus.analysis.branches.equations.CurveEquations`."""
         width = self.orbits.width
         same = self.orbits.alike(z[:, :width], rows)
         rest = np.repeat(z[:, None, width:], same.shape[1], axis=1)

@@ -16,8 +16,8 @@ import numpy as np
 from scipy.optimize import elementwise
 
 from saltus.analysis.branches.arclength import correct, tangents
+from saltus.analysis.branches.equations import OrbitEquations
 from saltus.analysis.branches.events import Event
-from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.solve.newton import newton
 from saltus.flow.polynomials import between
 
@@ -69,7 +69,7 @@ def tests(
 
 
 def locate(
-    orbits: PeriodicOrbits,
+    orbits: OrbitEquations,
     rows: np.ndarray,
     z: np.ndarray,
     tangent: np.ndarray,
@@ -79,7 +79,7 @@ def locate(
 
     Parameters
     ----------
-    orbits : PeriodicOrbits
+    orbits : OrbitEquations
         The equations.
     rows : int64[e]
         Which of its curves.
@@ -152,7 +152,7 @@ def zeros(at: Callable[[np.ndarray, np.ndarray], np.ndarray], length: np.ndarray
 
 
 def _branch_point(
-    orbits: PeriodicOrbits, row: int, start: np.ndarray, along: np.ndarray
+    orbits: OrbitEquations, row: int, start: np.ndarray, along: np.ndarray
 ) -> Event | None:
     """The point near another at which two branches cross; None if none is found.
 
