@@ -15,7 +15,7 @@ import numpy as np
 
 from saltus.announce import silent
 from saltus.arguments import Kinds
-from saltus.errors import ParameterError, nearest, shown
+from saltus.errors import ParameterError, closest, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.engine import MOST_THREADS, RunInterrupted
 from saltus.interrupt import Interrupted, no_ctrl_c_is_lost
@@ -195,8 +195,8 @@ def _misspelt(
         and isinstance(system, System)
         and word not in system.values
         and word not in system.states
-        and nearest(word, [*known, *system.states]) == nearest(word, known)
-        and nearest(word, known).startswith("Did you mean")
+        and (meant := closest(word, known)) is not None
+        and closest(word, [*known, *system.states]) == meant
     )
 
 
