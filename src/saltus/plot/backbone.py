@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -15,7 +13,7 @@ from saltus.plot.style import OKABE_ITO, display_scale
 
 
 @picture()
-def backbone(ds: xr.Dataset, *, output: str | None = None, ax: Any = None) -> Axes:
+def backbone(ds: xr.Dataset, *, output: str | None = None, ax: Axes | None = None) -> Axes:
     """Largest magnitude of a state in free vibration, or in phase quadrature, over the frequency;
     where it is unstable, dashed.
 

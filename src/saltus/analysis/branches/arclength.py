@@ -92,7 +92,7 @@ class Arc:
 
 
 class Way(Protocol):
-    """What is followed in one direction from a start."""
+    """Part of a curve that was followed in one direction from a start."""
 
     @property
     def end(self) -> str:
@@ -103,8 +103,8 @@ W = TypeVar("W", bound=Way)
 
 
 def both_sides(ways: list[W]) -> tuple[list[W], tuple[str, str]]:
-    """What makes one curve of what was followed ahead, and back, from a start: one that is closed
-    alone, or both; and why the curve ends at its first and at its last point.
+    """Choose the ways, ahead and back from a start, that make one curve: one that is closed alone,
+    or both. Also why the curve ends at its first and at its last point.
     """
     for way in ways:
         if way.end == "closed":

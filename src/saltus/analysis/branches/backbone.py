@@ -20,6 +20,7 @@ from saltus.analysis.branches.free_vibration import (
 )
 from saltus.analysis.branches.special_points import zeros
 from saltus.analysis.dataset_parts import provenance, subject
+from saltus.analysis.inputs.given import Range, Value
 from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.inputs.starts import at_values, check_system
 from saltus.analysis.inputs.verb import verb
@@ -50,13 +51,13 @@ BEHIND = 0.02
 @verb
 def backbone(
     system: System,
-    amplitude: Any,
+    amplitude: Range,
     *,
     state: str | None = None,
     mode: int = 1,
     phase: str = "free",
     force: str = "force",
-    values: Mapping[str, Any] | None = None,
+    values: Mapping[str, Value] | None = None,
     points: int = 400,
     method: Method | None = None,
     threads: int | None = None,

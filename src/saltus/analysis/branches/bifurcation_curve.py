@@ -18,6 +18,7 @@ from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.singular_orbits import MULTIPLIER, SingularOrbits
 from saltus.analysis.closed.cycles import units
 from saltus.analysis.dataset_parts import provenance, subject
+from saltus.analysis.inputs.given import Range
 from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.inputs.starts import check_system, range_of
 from saltus.analysis.inputs.verb import verb
@@ -38,7 +39,7 @@ from saltus.system.leg import has_legs
 def bifurcation_curve(
     system: System,
     event: xr.Dataset,
-    vary: Mapping[str, Any],
+    vary: Mapping[str, Range],
     *,
     points: int = 400,
     method: Method | None = None,

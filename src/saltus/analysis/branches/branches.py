@@ -27,6 +27,7 @@ from saltus.analysis.branches.seeds import (
 from saltus.analysis.branches.switching import Seed
 from saltus.analysis.branches.tracing import trace
 from saltus.analysis.closed.field_zeros import autonomous
+from saltus.analysis.inputs.given import Range, Reading, Starts, Value
 from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.inputs.starts import at_values, check_system, range_of
 from saltus.analysis.inputs.verb import verb
@@ -42,16 +43,16 @@ from saltus.system import System
 @verb
 def branches(
     system: System,
-    vary: Mapping[str, Any],
-    start: Any = None,
+    vary: Mapping[str, Range],
+    start: xr.Dataset | Starts | None = None,
     *,
-    box: Mapping[str, Any] | None = None,
+    box: Mapping[str, Range] | None = None,
     at: int = 12,
     switch: Sequence[str] = SWITCHES,
     longest: int = LONGEST_DOUBLED,
     points: int = POINTS,
-    values: Mapping[str, Any] | None = None,
-    outputs: Mapping[str, Any] | None = None,
+    values: Mapping[str, Value] | None = None,
+    outputs: Mapping[str, Reading] | None = None,
     every: float | str | None = None,
     method: Method | None = None,
     periods: int = 2000,

@@ -142,8 +142,8 @@ def _branch(
 
 
 def _parts(ways: list[LegWay]) -> list[LegPiece | Event]:
-    """What was followed ahead, and back, in the order of the branch: the two arcs from the start
-    are one piece.
+    """Pieces and events of the ways ahead and back, in the order of the branch: the two arcs from
+    the start are one piece.
     """
     arcs = [[arc for arc in way.arcs if arc.curve.z] for way in ways]
     ahead, back = arcs if len(arcs) > 1 else (arcs[0], [])

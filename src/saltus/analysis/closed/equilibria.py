@@ -12,6 +12,7 @@ from saltus.analysis.closed.all_equilibria import Equilibrium, all_equilibria
 from saltus.analysis.closed.field_zeros import autonomous
 from saltus.analysis.dataset_parts import gap_unit
 from saltus.analysis.inputs.box import box_ranges, draw
+from saltus.analysis.inputs.given import Range, Starts, Value
 from saltus.analysis.inputs.halton import halton
 from saltus.analysis.inputs.starts import check_system, ensemble, fill, fixed_states
 from saltus.analysis.inputs.verb import verb
@@ -31,11 +32,11 @@ MOST_STARTS = 100_000
 @verb
 def equilibria(
     system: System,
-    start: Any = None,
+    start: Starts | None = None,
     *,
     starts: int = 256,
-    at: Mapping[str, Any] | None = None,
-    **box: Any,
+    at: Mapping[str, Value] | None = None,
+    **box: Range,
 ) -> xr.Dataset:
     """All equilibria of a system without forcing: in each region, on boundaries, and held by
     contacts; stable ones and unstable ones.

@@ -18,6 +18,7 @@ from saltus.analysis.closed.search import AGES, Search
 from saltus.analysis.closed.spread import spread
 from saltus.analysis.closed.turns import looks_every
 from saltus.analysis.dataset_parts import provenance, subject
+from saltus.analysis.inputs.given import Range, Starts, Value
 from saltus.analysis.inputs.random_starts import random_count, random_starts
 from saltus.analysis.inputs.starts import check_system, ensemble, trajectories
 from saltus.analysis.inputs.verb import verb
@@ -44,11 +45,11 @@ STEPS, CONTACTS = 10_000, 1000
 @verb
 def periodic_orbits(
     system: System,
-    start: Any = "random 1000",
+    start: Starts = "random 1000",
     *,
-    box: Mapping[str, Any] | None = None,
+    box: Mapping[str, Range] | None = None,
     periods: int = 3,
-    period: Any = None,
+    period: Value | Range | None = None,
     method: Method | None = None,
     seed: int = 1,
     threads: int | None = None,

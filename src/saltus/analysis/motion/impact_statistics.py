@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from saltus.analysis.inputs.given import Starts, Values
 from saltus.analysis.inputs.starts import check_system
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion import touchdowns
@@ -35,7 +36,7 @@ BINS = 20
 @verb
 def impact_statistics(
     system: System,
-    start: Any = None,
+    start: Starts | None = None,
     *,
     periods: int | None = None,
     t_end: float | str | None = None,
@@ -45,7 +46,7 @@ def impact_statistics(
     contact_side: Mapping[str, int] | None = None,
     bins: int | Sequence[float] = BINS,
     method: Method | None = None,
-    values: Mapping[str, Any] | None = None,
+    values: Mapping[str, Values] | None = None,
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
 ) -> xr.Dataset:
