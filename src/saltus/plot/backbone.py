@@ -45,10 +45,14 @@ def backbone(ds: xr.Dataset, *, output: str | None = None, ax: Axes | None = Non
         for solid in (True, False):
             x, y = curves.lines(every, branch, ds["point_stable"].values == solid, frequency, peak)
             panel.plot(
-                x * across.factor, y * up.factor, ls="-" if solid else curves.DASHES,
-                color=OKABE_ITO["black"], lw=1.2, zorder=4,
+                x * across.factor,
+                y * up.factor,
+                ls="-" if solid else curves.DASHES,
+                color=OKABE_ITO["black"],
+                lw=1.2,
+                zorder=4,
                 gid="backbone" if solid else "backbone unstable",
-            )  # fmt: skip
+            )
         if not panel.get_xlabel():
             panel.set_xlabel(across.label("frequency"))
             curves.height_axis(panel, "peak", name, up)

@@ -289,7 +289,7 @@ def _survey(
 
 def _watch(
     travel: Travel, going: np.ndarray, found: AttractorSet, owner: Owners, settled: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:  # fmt: skip
+) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
     """Trajectories that don't settle for SURVEY_ITERATES more, int64[k], their iterates, and those
     of the ones that do.
     """

@@ -338,10 +338,8 @@ def _table(
         "point_<state>": orbits.points(z)[:, 0],
         "output": list(outputs.names),
         "output_units": list(outputs.units),
-        **{
-            f"point_output_{key}": by_name[key] for key in ("maximum", "minimum", "peak", "rms")
-        },
-    }  # fmt: skip
+        **{f"point_output_{key}": by_name[key] for key in ("maximum", "minimum", "peak", "rms")},
+    }
     if isinstance(orbits, FreeOrbits):
         data["fictitious_damping"] = _conserved(system, z[:, -1], period)
         about, when = (

@@ -311,9 +311,12 @@ def _table(
     }
     fixed = {key: value for key, value in system.values.items() if key not in names}
     attrs = provenance(system, method, fixed, names) | {
-        "bifurcation": start.kind, "periods": orbits.n, "begin": curve.ends[0],
-        "end": curve.ends[1], "guard": system.guards[start.guard].name if grazes else "",
-    }  # fmt: skip
+        "bifurcation": start.kind,
+        "periods": orbits.n,
+        "begin": curve.ends[0],
+        "end": curve.ends[1],
+        "guard": system.guards[start.guard].name if grazes else "",
+    }
     for axis, name, (low, high) in zip("xy", names, limits, strict=True):
         attrs |= {f"parameter_{axis}": name, f"{axis}_low": low, f"{axis}_high": high}
     when = "at whole forcing periods" if system.forced_at else "in equal steps of time"

@@ -90,14 +90,15 @@ class Branch(Piece):
         mine = [e for e in self.events if low - int(begin is not None) <= e.after < kept.stop]
         mine = mine[mine.index(begin) if begin else 0 : mine.index(end) + 1 if end else None]
         return replace(
-            self, **new,
+            self,
+            **new,
             events=[replace(one, after=one.after - shift) for one in mine],
             unexplained=[i - shift for i in self.unexplained if low <= i < kept.stop - 1],
             ends=(
                 "unstable" if first else self.ends[0],
                 "unstable" if behind < len(self.z) else self.ends[1],
             ),
-        )  # fmt: skip
+        )
 
     def _loss(self, after: int, which: int) -> Event | None:
         """The event behind a point at which stability is lost, the first (0) or the last (-1)."""

@@ -60,9 +60,11 @@ def attributes_of(
     changes that are not explained.
     """
     return {
-        "parameter": name, "parameter_low": limits[0], "parameter_high": limits[1],
+        "parameter": name,
+        "parameter_low": limits[0],
+        "parameter_high": limits[1],
         "unexplained_changes": sum(len(branch.unexplained) for branch in branches),
-    }  # fmt: skip
+    }
 
 
 def values_of(

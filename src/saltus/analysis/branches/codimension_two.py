@@ -102,9 +102,7 @@ def _same_side(vectors: np.ndarray, side: np.ndarray | None) -> np.ndarray:
 def _derivative_at(multipliers: np.ndarray, mu: float) -> np.ndarray:
     """The derivative of the characteristic polynomial: zero where ``mu`` is a double root."""
     factors = mu - multipliers
-    parts = [
-        np.prod(np.delete(factors, i, axis=1), axis=1) for i in range(multipliers.shape[1])
-    ]  # fmt: skip
+    parts = [np.prod(np.delete(factors, i, axis=1), axis=1) for i in range(multipliers.shape[1])]
     return np.asarray(np.sum(parts, axis=0).real)
 
 
@@ -130,7 +128,7 @@ def _cubic(
     bend = (8.0 * (ahead - behind) - (far_ahead - far_behind)) / (12.0 * WIDE)
     second = (
         16.0 * (ahead + behind) - (far_ahead + far_behind) - 30.0 * derivative[:, :, :width]
-    ) / (12.0 * WIDE**2)  # fmt: skip
+    ) / (12.0 * WIDE**2)
     whole = derivative.shape[1]
     right = -0.5 * np.einsum("pij,pj->pi", bend[:, :, :size], v)
     h = np.linalg.solve(derivative[:, :, :whole], right[:, :, None])[:, :, 0]
@@ -166,9 +164,8 @@ def find(
         way = tangents(point.derivative[good], tangent[begin[good]])
         own = local.multipliers(point.z[good], point.derivative[good], event[good])
         tested, _ = tests(
-            local, event[good], point.z[good], way, point.derivative[good], own,
-            sides[begin[good]],
-        )  # fmt: skip
+            local, event[good], point.z[good], way, point.derivative[good], own, sides[begin[good]]
+        )
         result[good] = tested[which[event[good]], np.arange(len(good))]
         for place, i in enumerate(good):
             kind = int(which[event[i]])

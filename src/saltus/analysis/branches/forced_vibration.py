@@ -92,10 +92,11 @@ class Forcing:
             if amplitude in set(ex.walk(entry))
         }
         if not rates or any(
-            ex.depends_on(rate, ("state", "select")) or amplitude in set(ex.walk(rate))
+            ex.depends_on(rate, ("state", "select"))
+            or amplitude in set(ex.walk(rate))
             or not ex.depends_on(rate, ("time",))
             for rate in rates.values()
-        ):  # fmt: skip
+        ):
             raise ParameterError(
                 lambda say: (
                     f"{name} isn't the amplitude of a force on {system.name}: it must multiply "
@@ -168,9 +169,13 @@ class QuadratureOrbits(PeriodicOrbits):
         rate = ex.mul(x, force.rates[force.row])
         self.rest = rest
         self._extended = PeriodicOrbits(
-            with_states(system, {INTEGRAL: rate}), names, 1,
-            np.insert(scale, self.size, unit, axis=1), method, threads,
-        )  # fmt: skip
+            with_states(system, {INTEGRAL: rate}),
+            names,
+            1,
+            np.insert(scale, self.size, unit, axis=1),
+            method,
+            threads,
+        )
 
     def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See :class:`saltus.analysis.branches.equations.CurveEquations`."""

@@ -61,10 +61,13 @@ def free_system(system: System) -> tuple[System, str]:
         if state in speeds:
             field[i] = ex.sub(field[i], ex.mul(drag, ex.state(state)))
     made = replace(
-        system, field=tuple(field), guards=tuple(_guard(guard, zeros) for guard in system.guards),
-        forced_at=None, values={**system.values, name: 0.0},
+        system,
+        field=tuple(field),
+        guards=tuple(_guard(guard, zeros) for guard in system.guards),
+        forced_at=None,
+        values={**system.values, name: 0.0},
         units={**system.units, name: "1/s"},
-    )  # fmt: skip
+    )
     if not autonomous(made):
         raise ParameterError(
             lambda say: (

@@ -79,9 +79,10 @@ class GrazingOrbits:
         apart = np.abs((sequence.phase - phase + 0.5 * n) % n - 0.5 * n)
         slow = SLOW * np.abs(sequence.velocity).max(initial=0.0)
         grazing = [
-            i for i, one in enumerate(sequence.contacts)
+            i
+            for i, one in enumerate(sequence.contacts)
             if (one.guard == guard and apart[i] < TOUCHES) or abs(sequence.velocity[i]) < slow
-        ]  # fmt: skip
+        ]
         legs, z = Legs.of(orbits, without(sequence, grazing), z, orbits.scale[0])
         place = legs.leg_at(z, phase)
         first = legs.nodes(z[None])[0][0, place]

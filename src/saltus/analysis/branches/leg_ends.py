@@ -157,9 +157,8 @@ def with_impact(
         like = Legs(legs.orbits, sequence, np.append(np.tile(each, len(nodes)), unit)[None])
     else:  # in the order in which its contacts are numbered
         order = next(
-            by for by in range(len(contacts))
-            if (*contacts[by:], *contacts[:by]) == like.contacts
-        )  # fmt: skip
+            by for by in range(len(contacts)) if (*contacts[by:], *contacts[:by]) == like.contacts
+        )
         nodes[:order, 0] += legs.n
         nodes = np.roll(nodes, -order, axis=0)
     return np.append(nodes.ravel(), rest[0]), like

@@ -61,11 +61,13 @@ class Legs:
         self.unit = float(orbits.map.period[0])  # of the time, in those of the parametric system
         self._maps = {
             mode: Stroboscope(
-                leg(orbits.parametric.system, mode), orbits.map.method, every=1.0,
+                leg(orbits.parametric.system, mode),
+                orbits.map.method,
+                every=1.0,
                 threads=orbits.map.threads,
             )
             for mode in set(self._modes)
-        }  # fmt: skip
+        }
         self.phase = np.full((len(scale), 2, self.size), np.nan)  # point and direction
 
     @classmethod
@@ -447,9 +449,12 @@ class Legs:
         phase = self.nodes(z)[0]
         for i, free in zip(which, self.free_flow(z[which]), strict=True):
             own = ContactSequence(
-                self.contacts, phase[i], self.sequence.after, self.sequence.velocity,
+                self.contacts,
+                phase[i],
+                self.sequence.after,
+                self.sequence.velocity,
                 self.sequence.mode,
-            )  # fmt: skip
+            )
             result[i] = free is not None and shift(own, free, self.n) is not None
         return result
 

@@ -44,7 +44,10 @@ def plan_of(
     symmetric = not twins and is_symmetric(system, {name: limits})
     return Plan(
         lambda n, scale: PeriodicOrbits(system, (name,), n, scale, method, threads, symmetric),
-        limits, points, longest, frozenset(switch),
+        limits,
+        points,
+        longest,
+        frozenset(switch),
         leg_branches if jumps and has_legs(system) else both_ways,
         stable=stable,
-    )  # fmt: skip
+    )

@@ -85,9 +85,7 @@ class Rests:
         states = {name: np.ones(len(z)) for name in self._whole.states}
         for column, values in zip(self._columns, z.T, strict=True):
             states[self._whole.states[column]] = values
-        found = evaluate(
-            entries, states=states, values=self._whole.values, bits=list(modes.T)
-        )  # fmt: skip
+        found = evaluate(entries, states=states, values=self._whole.values, bits=list(modes.T))
         return np.stack([np.broadcast_to(one, len(z)) for one in found], axis=1).astype(float)
 
     def jacobian(self, z: np.ndarray, modes: np.ndarray) -> np.ndarray:

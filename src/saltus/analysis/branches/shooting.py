@@ -74,9 +74,11 @@ class PeriodicOrbits:
         self._turns = system.period({system.forced_at: 1.0}) if system.forced_at else 1.0
         few = method.suited_to(1)  # tangents make many states: wide lanes don't pay
         self.map = Stroboscope(
-            self.parametric.system, few, every=1.0 if self.parametric.timed else None,
+            self.parametric.system,
+            few,
+            every=1.0 if self.parametric.timed else None,
             threads=threads,
-        )  # fmt: skip
+        )
         self.phase = np.full((len(scale), 2, self.size), np.nan)  # point and direction
         self._stops = any(
             guard.law is not None and guard.law.kind == "impact" for guard in system.guards
@@ -136,9 +138,13 @@ class PeriodicOrbits:
         points, start = self.points(z), self._with_own(z, own).reshape(r * n, -1)
         if self._stops:
             start, _ = on_allowed_sides(
-                self.map.system, start, self.map.parameters, 0.0,
-                np.broadcast_to(self.map.period, r * n), GUESSED,
-            )  # fmt: skip
+                self.map.system,
+                start,
+                self.map.parameters,
+                0.0,
+                np.broadcast_to(self.map.period, r * n),
+                GUESSED,
+            )
         ends, matrices = self.map.tangent(start, 1)
         ends = ends[:, :size].reshape(r, n, size)
         matrices = matrices[:, :size].reshape(r, n, size, -1)

@@ -142,10 +142,13 @@ class SingularOrbits:
         column = np.zeros((len(z), derivative.shape[1], 1))
         odd = by_cosine.imag / sine + g.imag * cosine / sine**3
         pair = np.stack([g.real, g.imag / sine], axis=1)
-        two = np.stack([
-            np.append(-slope.real, by_cosine.real[:, None], axis=1),
-            np.append(-slope.imag / sine[:, None], odd[:, None], axis=1),
-        ], axis=1)  # fmt: skip
+        two = np.stack(
+            [
+                np.append(-slope.real, by_cosine.real[:, None], axis=1),
+                np.append(-slope.imag / sine[:, None], odd[:, None], axis=1),
+            ],
+            axis=1,
+        )
         whole = np.concatenate([np.concatenate([derivative, column], axis=2), two], axis=1)
         return np.concatenate([residual, pair], axis=1), whole
 
@@ -177,9 +180,9 @@ class SingularOrbits:
         size = np.linalg.norm(along, axis=1)
         share = BESIDE / np.where(size > 0, size, 1.0)
         step = np.zeros_like(z)
-        step[:, : along.shape[1]] = share[:, None] * along * self.orbits.scale[rows][
-            :, : along.shape[1]
-        ]  # fmt: skip
+        step[:, : along.shape[1]] = (
+            share[:, None] * along * self.orbits.scale[rows][:, : along.shape[1]]
+        )
         beside = np.concatenate([z + step, z - step])
         _, derivative = self.orbits.evaluate(beside, np.concatenate([rows, rows]))
         ahead, behind = np.split(derivative, 2)

@@ -60,12 +60,14 @@ def tests(
     for i in range(count):
         for j in range(i + 1, count):
             pairs = pairs * (multipliers[:, i] * multipliers[:, j] - 1.0)
-    return np.stack([
-        tangent[:, column],
-        sign * np.exp(size / width),
-        np.prod(1.0 + multipliers, axis=1).real,
-        pairs.real if count > 1 else ones,
-    ])  # fmt: skip
+    return np.stack(
+        [
+            tangent[:, column],
+            sign * np.exp(size / width),
+            np.prod(1.0 + multipliers, axis=1).real,
+            pairs.real if count > 1 else ones,
+        ]
+    )
 
 
 def locate(
@@ -144,9 +146,12 @@ def zeros(at: Callable[[np.ndarray, np.ndarray], np.ndarray], length: np.ndarray
         return at(step.ravel(), event.astype(np.int64).ravel()).reshape(step.shape)
 
     root = elementwise.find_root(
-        values, (np.zeros(len(length)), length), args=(which.astype(float),),
-        tolerances={"xrtol": 1e-14, "xatol": 1e-15, "fatol": 0.0, "frtol": 0.0}, maxiter=60,
-    )  # fmt: skip
+        values,
+        (np.zeros(len(length)), length),
+        args=(which.astype(float),),
+        tolerances={"xrtol": 1e-14, "xatol": 1e-15, "fatol": 0.0, "frtol": 0.0},
+        maxiter=60,
+    )
     at(root.x, which)
     return np.asarray(root.x)
 
@@ -182,9 +187,12 @@ def _branch_point(
 
     null = np.linalg.svd(derivative[0])[0][:, -1]
     zeros = newton(
-        equations, np.concatenate([start, [0.0], null])[None],
-        np.concatenate([unit, np.ones(size)])[None], enough=CONVERGED, longest_step=np.inf,
-    )  # fmt: skip
+        equations,
+        np.concatenate([start, [0.0], null])[None],
+        np.concatenate([unit, np.ones(size)])[None],
+        enough=CONVERGED,
+        longest_step=np.inf,
+    )
     z = zeros.z[0, :size]
     if not zeros.found[0]:
         return None
@@ -204,11 +212,14 @@ def outside(multipliers: np.ndarray) -> np.ndarray:
     """
     size, real = np.abs(multipliers), np.abs(multipliers.imag) <= COMPLEX * np.abs(multipliers)
     far = size > 1.0 + ON_CIRCLE
-    return np.stack([
-        (far & real & (multipliers.real > 0)).sum(axis=1),
-        (far & real & (multipliers.real < 0)).sum(axis=1),
-        (far & ~real).sum(axis=1),
-    ], axis=1)  # fmt: skip
+    return np.stack(
+        [
+            (far & real & (multipliers.real > 0)).sum(axis=1),
+            (far & real & (multipliers.real < 0)).sum(axis=1),
+            (far & ~real).sum(axis=1),
+        ],
+        axis=1,
+    )
 
 
 def unstable(

@@ -66,9 +66,12 @@ def children(branch: Branch, number: int, switch: frozenset[str], longest: int) 
         unit = branch.scale[:size]
         if event.kind == "period_doubling" and 2 * branch.orbits.n <= longest:
             yield Seed(
-                np.concatenate([points, points]), own, unit,
-                _doubled(branch, event), (number, index),
-            )  # fmt: skip
+                np.concatenate([points, points]),
+                own,
+                unit,
+                _doubled(branch, event),
+                (number, index),
+            )
         elif event.kind == "branch_point":
             aside = crossing(event)
             for sign in (1.0, -1.0):

@@ -102,9 +102,12 @@ class ModeEquations:
         return found
 
     def _solve(
-        self, entries: Sequence[Expr], slopes: Sequence[Sequence[Expr]], start: np.ndarray,
+        self,
+        entries: Sequence[Expr],
+        slopes: Sequence[Sequence[Expr]],
+        start: np.ndarray,
         known: Sequence[np.ndarray] = (),
-    ) -> np.ndarray:  # fmt: skip
+    ) -> np.ndarray:
         """Zeros float64[m, D] of expressions by Newton's method from float64[k, D], those that are
         known deflated.
         """
@@ -113,9 +116,13 @@ class ModeEquations:
             return self._equilibrated(entries, slopes, x)
 
         zeros = newton(
-            equations, start, np.broadcast_to(self.scale, start.shape), longest_step=LONGEST_STEP,
-            least_squares=True, known=np.array(known) if len(known) else None,
-        )  # fmt: skip
+            equations,
+            start,
+            np.broadcast_to(self.scale, start.shape),
+            longest_step=LONGEST_STEP,
+            least_squares=True,
+            known=np.array(known) if len(known) else None,
+        )
         x = zeros.z[zeros.found]
         residual, derivative = self._equilibrated(entries, slopes, x)
         with np.errstate(invalid="ignore", over="ignore"):

@@ -249,10 +249,10 @@ def _length(known: Mapping[str, inspect.Parameter]) -> str:
     """The arguments of a verb for the length of its run."""
     ways = {
         "t_end": "t_end= [s]",
-        "periods": "periods= (forcing periods)" if "every" not in known else "periods= (forcing "
-            "periods, or samples every= seconds of "
-        "a system without forcing)",
-    }  # fmt: skip
+        "periods": "periods= (forcing periods)"
+        if "every" not in known
+        else "periods= (forcing periods, or samples every= seconds of a system without forcing)",
+    }
     return (
         f"The length of the run is "
         f"{' or '.join(text for name, text in ways.items() if name in known)}."

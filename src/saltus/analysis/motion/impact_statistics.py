@@ -134,9 +134,10 @@ def impact_statistics(
     forces = _by_guard(system, force or {}, "force")
     sides = contact_sides(system, _by_guard(system, contact_side or {}, "contact_side"))
     stops = [
-        number for number, guard in enumerate(system.guards)
+        number
+        for number, guard in enumerate(system.guards)
         if guard.law and guard.law.mass is not None and number not in forces
-    ]  # fmt: skip
+    ]
     extended = with_integrals(
         system, {f"impulse_{guard}_": function for guard, function in forces.items()}
     )
@@ -231,11 +232,13 @@ def _dataset(
             put(name, i, g, value)
     names = np.array([guard.name for guard in system.guards], dtype=np.str_)
     columns = {
-        "contact_time": found.begin, "contact_guard": names[found.guard],
+        "contact_time": found.begin,
+        "contact_guard": names[found.guard],
         "contact_speed": found.speed,
-        "contact_exit_speed": found.exit_speed, "contact_duration": found.end - found.begin,
+        "contact_exit_speed": found.exit_speed,
+        "contact_duration": found.end - found.begin,
         "contact_trajectory": found.trajectory,
-    }  # fmt: skip
+    }
     if found.impacts.any():
         columns["contact_impacts"], columns["contact_impulse_of_impacts"] = (
             found.impacts,
@@ -321,11 +324,15 @@ def _sizes(found: Touchdowns, rows: np.ndarray) -> dict[str, float]:
     speed, duration = found.speed[rows], (found.end - found.begin)[rows]
     duration = duration[np.isfinite(duration)]
     result = {
-        "speed_mean": _mean(speed), "speed_mean_error": _error_of_row(speed),
-        "speed_rms": _mean(speed**2) ** 0.5, "speed_max": _largest(speed),
-        "duration_mean": _mean(duration), "duration_mean_error": _error_of_row(duration),
-        "duration_min": -_largest(-duration), "duration_max": _largest(duration),
-    }  # fmt: skip
+        "speed_mean": _mean(speed),
+        "speed_mean_error": _error_of_row(speed),
+        "speed_rms": _mean(speed**2) ** 0.5,
+        "speed_max": _largest(speed),
+        "duration_mean": _mean(duration),
+        "duration_mean_error": _error_of_row(duration),
+        "duration_min": -_largest(-duration),
+        "duration_max": _largest(duration),
+    }
     if found.impulse is not None:
         impulse = found.impulse[rows]
         impulse = impulse[np.isfinite(impulse)]
