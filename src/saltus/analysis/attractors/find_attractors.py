@@ -34,8 +34,10 @@ Owners = list[ClosedMotion | SampledMotion | None]
 MAX_CANDIDATES = 12
 #: Trajectories that never recur whose motion is surveyed.
 MAX_SURVEYED = 24
-#: Iterates of the survey; recurrence below which its survivor is periodic after all.
-WATCHING_ITERATES, ARRIVED = 32 * 1024, 1e-5
+#: Iterates of the survey.
+WATCHING_ITERATES = 32 * 1024
+#: Recurrence below which its survivor is periodic after all.
+ARRIVED = 1e-5
 
 
 def find_attractors(

@@ -31,26 +31,38 @@ CONTRACTS = 0.5
 #: Longest step over which the derivative and the tangent together change the sign of their
 #: determinant, in units of the scale: it passes a branch point, or leads to the branch beside.
 PASSING = 1e-3
-#: Farthest that a point lies from where it was predicted, in steps; more halves a step that is
-#: longer than this, in units of the scale: it may have passed over a loop of the curve.
-PREDICTED, SHORT = 0.05, 0.002
-#: Steps are doubled where so few evaluations sufficed and the tangent turned by less.
-EASY, STRAIGHT = 3, 0.995
-#: First, longest and shortest step, in units of the scale.
-FIRST, LONGEST, SHORTEST = 0.02, 0.12, 1e-7
-#: Distance from where a curve began, in units of the scale, at which steps may be longer than the
-#: longest; the least share of a tangent.
-FAR, TINY = 10.0, 1e-3
+#: Farthest that a point lies from where it was predicted, in steps: beyond, the step may have
+#: passed over a loop of the curve.
+PREDICTED = 0.05
+#: Steps shorter than this, in units of the scale, aren't halved for it.
+SHORT = 0.002
+#: Evaluations of a step behind which steps are doubled, at most.
+EASY = 3
+#: Cosine of the tangent's turn above which they are.
+STRAIGHT = 0.995
+#: First step, in units of the scale.
+FIRST = 0.02
+#: Longest step, in units of the scale.
+LONGEST = 0.12
+#: Shortest step, in units of the scale.
+SHORTEST = 1e-7
+#: Distance from where a curve began at which steps may be longer than the longest, in units of the
+#: scale.
+FAR = 10.0
+#: Least share of a tangent.
+TINY = 1e-3
 #: Distance from where a curve ends within which its last point lies, in units of the scale.
 ENDING = 0.0005
 #: Farthest that the corrector moves from the predicted point, in steps.
 ASTRAY = 0.6
-#: Points after which a curve may be found to be closed, and the cosine of the angle at which it
-#: then passes its start.
-LEAST_CLOSED, AGAIN = 8, 0.9
-#: Farthest that a step lies from a point that it passes, and from the line between its ends, in
-#: steps.
-PASSED, BENDS = 0.02, 0.1
+#: Points after which a curve may be found to be closed.
+LEAST_CLOSED = 8
+#: Cosine of the angle at which it passes its start then.
+AGAIN = 0.9
+#: Farthest that a step lies from a point that it passes, in steps.
+PASSED = 0.02
+#: Farthest that a step lies from the line between its ends, in steps.
+BENDS = 0.1
 
 
 @dataclass
@@ -96,7 +108,7 @@ class Way(Protocol):
 
     @property
     def end(self) -> str:
-        """Why it ends, as :attr:`Arc.end`."""
+        """Reason why it ends, as :attr:`Arc.end`."""
 
 
 W = TypeVar("W", bound=Way)

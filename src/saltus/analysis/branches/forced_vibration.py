@@ -34,8 +34,10 @@ from saltus.system.quantity import with_states
 
 #: Instants of a period at which a force is looked at.
 SAMPLES = 256
-#: Frequencies about that of a mode among which quadrature is looked for, and how far it may be.
-LOOKS, FAR = 401, 0.5
+#: Frequencies about that of a mode among which quadrature is looked for.
+LOOKS = 401
+#: Distance of the farthest of them, as a share of that frequency.
+FAR = 0.5
 #: Name of the state that is the integral.
 INTEGRAL = "displacement_on_force"
 

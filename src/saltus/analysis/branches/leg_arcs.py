@@ -22,9 +22,10 @@ from saltus.analysis.branches.tracing import halved
 MOST_PIECES = 40
 #: How far a branch may pass its start sideways, over the step that passes it.
 SIDEWAYS = 0.3
-#: Where before an event the last point of an arc lies, in steps, and the shortest such step in
-#: units of the scale.
-NEXT_TO, LEAST = 1e-3, 1e-7
+#: Distance of the last point of an arc from the event behind it, in steps.
+NEXT_TO = 1e-3
+#: Shortest last step for which such a point is added, in units of the scale.
+LEAST = 1e-7
 #: First step behind an event, in units of the scale.
 AFTER = 1e-4
 _ROW = np.zeros(1, np.int64)

@@ -25,8 +25,10 @@ from saltus.flow.request import Schedule
 from saltus.kernels import status as st
 from saltus.system.leg import leg
 
-#: Legs that last less are flown by a detour that lasts so long, in periods.
-BRIEF, DETOUR = 1e-3, 1e-2
+#: Legs that last less take a detour, in periods.
+BRIEF = 1e-3
+#: Time that the detour takes, in periods.
+DETOUR = 1e-2
 #: Shorter times are rounding, in periods.
 AT_ONCE = 1e-14
 

@@ -14,23 +14,31 @@ from saltus.analysis.branches.equations import OrbitEquations
 from saltus.analysis.branches.events import Event
 from saltus.analysis.branches.special_points import COMPLEX, locate, outside, tests
 
-#: A fold so near to a branch point is none, in units of the scale: it is located less well there.
+#: Drop folds closer than this to a branch point (units of the scale): the branch point is located
+#: better.
 VERTEX = 1e-4
 #: Shortest interval that is halved, in units of the scale.
 LEAST = 1e-9
 #: What is smaller at the zero of a test vanishes there.
 VANISHES = 1e-6
-#: The parameter's share of a tangent that is nothing but rounding.
+#: Below this the parameter's entry in the unit tangent is rounding: the branch is vertical.
 STILL = 1e-8
-#: A test that comes down to less than this share of what it is beside may vanish twice there; so
-#: often points are put where it may.
-DIP, DIVES = 0.5, 4
-#: How often an interval is halved in which changes of stability don't add up; how often it is then
-#: followed anew, with how many times shorter steps, and to how many points at most.
-HALVINGS, RETRACED, SHORTER, MOST_POINTS = 6, 3, 16, 400
-#: A way between two points that is longer than the step by this factor is another one; it isn't
-#: looked for in a step shorter than this, in units of the scale.
-LONGER, NARROW = 1.02, 1e-4
+#: Two zeros of a test may hide where it dips below this share of its neighbours.
+DIP = 0.5
+#: Rounds in which points are inserted there, at most.
+DIVES = 4
+#: Halvings of an interval in which a change of stability is unexplained.
+HALVINGS = 6
+#: Retries of it with shorter steps.
+RETRACED = 3
+#: Ratio of these steps.
+SHORTER = 16
+#: Most points of a retry.
+MOST_POINTS = 400
+#: A way between two points that is longer than the step by this factor is another one.
+LONGER = 1.02
+#: It isn't looked for in a step shorter than this, in units of the scale.
+NARROW = 1e-4
 
 
 @dataclass

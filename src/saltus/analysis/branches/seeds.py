@@ -19,8 +19,10 @@ from saltus.flow.methods import Method
 from saltus.results.dataset import schema
 from saltus.system import System
 
-#: Values of a parameter at which equilibria are looked for, and random starts at each.
-RESTING_VALUES, RESTING_STARTS = 3, 64
+#: Values of a parameter at which equilibria are looked for.
+RESTING_VALUES = 3
+#: Random starts at each of these values.
+RESTING_STARTS = 64
 #: An equilibrium so near to zero is there, in units of the starts.
 NOTHING = 1e-8
 #: Names of what a Dataset knows of its orbits: points, period, limit cycles' time.

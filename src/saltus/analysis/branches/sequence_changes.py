@@ -26,9 +26,10 @@ from saltus.system.leg import has_legs
 #: How often an interval is halved in which the change isn't one graze, one corner, or several
 #: grazes at once.
 HALVINGS = 24
-#: Grazes at one interval of a branch that are told apart without halving it, and the shortest
-#: contacts among which they are sought.
-MOST_AT_ONCE, SHORTEST = 4, 16
+#: Grazes at one interval of a branch that are told apart without halving it.
+MOST_AT_ONCE = 4
+#: Shortest contacts among which they are sought.
+SHORTEST = 16
 #: How far outside of its interval an event may lie, in intervals.
 OUTSIDE = 0.02
 #: Grazes nearer than this, in units of the scale, come at once.

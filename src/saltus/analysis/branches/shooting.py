@@ -26,8 +26,10 @@ from saltus.flow.stops import on_allowed_sides
 from saltus.system import System
 from saltus.system.parametric import parametric
 
-#: Samples of a limit cycle in which the nearest to a point is looked for, and steps that locate it.
-SAMPLES, LOCATED = 400, 3
+#: Samples of a limit cycle in which the nearest to a point is looked for.
+SAMPLES = 400
+#: Steps that locate it.
+LOCATED = 3
 #: Radius of a limit cycle that is small, in units of the scale.
 SMALL = 0.3
 #: A guess so many roundings beyond a rigid stop, 2e-7 of the size of the states, lies on it: orbits

@@ -28,9 +28,10 @@ KINDS = ("fold", "branch_point", "period_doubling", "neimark_sacker")
 COMPLEX = 1e-7
 #: Distance of a multiplier from the unit circle within which it isn't counted.
 ON_CIRCLE = 1e-9
-#: Newton's method at branch points: length of the last step, and distance of two derivatives whose
-#: difference is their slope, in units of the scale.
-CONVERGED, ASIDE = 1e-11, 1e-5
+#: Length of the last step of Newton's method at a branch point, in units of the scale.
+CONVERGED = 1e-11
+#: Distance of two derivatives whose difference is their slope, in units of the scale.
+ASIDE = 1e-5
 #: Farthest that a branch point lies from where it was seen, in units of the scale.
 FARTHEST = 0.3
 

@@ -38,10 +38,14 @@ from saltus.flow.request import Schedule
 WINDOWS = 3
 #: Starts whose motions are held at a time.
 TOGETHER = 64
-#: Points of a cycle that are unknowns: at least, at most; one for each turn between.
-FEWEST, MOST = 4, 16
-#: Looks at a cycle for each of them to see whether it repeats, and the largest difference.
-FINER, FAR = 8, 1e-2
+#: Fewest points of a cycle that are unknowns; one for each rotation otherwise.
+FEWEST = 4
+#: Most points of a cycle that are unknowns.
+MOST = 16
+#: Places between two points at which a cycle is looked at to see whether it repeats.
+FINER = 8
+#: Largest difference there.
+FAR = 1e-2
 #: Farthest that points go from the guess, in units of its range.
 FARTHEST = 3.0
 #: Sample points of a cycle by which duplicates of it are recognised.

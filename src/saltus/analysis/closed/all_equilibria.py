@@ -27,8 +27,10 @@ from saltus.system import System
 
 #: Modes that are looked at; each boundary doubles them.
 MOST_MODES = 1024
-#: A gap that is zero to so small a share of its terms, and of those that the scale would make.
-ON, ON_SCALE = 1e-10, 1e-13
+#: Share of its terms below which a gap is zero.
+ON = 1e-10
+#: Share of the terms that the scale would make, likewise.
+ON_SCALE = 1e-13
 #: Parts of eigenvalues below this share of the largest eigenvalue are zero.
 NEUTRAL = 1e-12
 

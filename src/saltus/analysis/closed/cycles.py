@@ -36,16 +36,20 @@ from saltus.flow.request import Schedule
 
 #: A state that stays smaller than this is zero [SI].
 ZERO = 1e-15
-#: Samples of the motion in which a return is searched; ratio of the lengths of two windows.
-SAMPLES, ZOOM = 4096, 8
+#: Samples of the motion in which a return is searched.
+SAMPLES = 4096
+#: Ratio of the lengths of two windows.
+ZOOM = 8
 #: Most windows that are tried, from that of the samples on.
 MOST_WINDOWS = 6
-#: Samples follow the motion where its direction turns by less than 18 degrees from one to the next,
-#: for so large a share of them.
-TURN, FOLLOWED = 0.95, 0.9
-#: A return farther than this, in units of the scale, may be none: a longer window is searched,
-#: unless this one holds this number of turns.
-FAR, ENOUGH = 0.05, 8
+#: Cosine of the turn between two samples that follow the motion: 18 degrees.
+TURN = 0.95
+#: Share of the samples for which that must hold.
+FOLLOWED = 0.9
+#: A return farther than this, in units of the scale, may be none: a longer window is searched.
+FAR = 0.05
+#: Rotations in a window after which none is.
+ENOUGH = 8
 #: Returns that samples can't tell apart: the error of the cubic between them, in units of the
 #: scale.
 SAMPLED = 1e-6

@@ -22,8 +22,10 @@ from saltus.language.evaluate import evaluate
 from saltus.language.expression import Expr, depends_on
 from saltus.system import System
 
-#: Rounds of deflation, and starts of each but the first.
-ROUNDS, DEFLATED_STARTS = 8, 64
+#: Rounds of deflation.
+ROUNDS = 8
+#: Starts of each round but the first.
+DEFLATED_STARTS = 64
 #: Zeros of one mode from which deflation finds more at its own pace only: a field may have no end
 #: of them.
 MANY = 32
@@ -31,9 +33,10 @@ MANY = 32
 ASIDE = 0.1
 #: Longest step of Newton's method, in units of the scale.
 LONGEST_STEP = 1e8
-#: Distance of equal zeros, relative to the states and to the scale; size of a residual, relative to
-#: the terms of its linear part.
-SAME, RESIDUAL = 1e-7, 1e-9
+#: Distance of equal zeros, relative to the states and to the scale.
+SAME = 1e-7
+#: Size of a residual that vanishes, relative to the terms of its linear part.
+RESIDUAL = 1e-9
 #: States below this share of the scale may be zeros but for rounding.
 ROUNDED = 1e-12
 

@@ -20,12 +20,18 @@ from saltus.flow.taylor import Taylor
 from saltus.system import System
 from saltus.units import to_si
 
-#: Motions that are asked, and fastest times of the linear part after which they are.
-ASKED, SETTLING = 8, 64
-#: Windows that are tried, the next so many times longer or shorter.
-WINDOWS, ZOOM = 8, 8.0
-#: Turns that a window must hold, and the angle between two samples that they can follow [rad].
-TURNS, FOLLOWED = 2.0, 0.3
+#: Motions that are asked.
+ASKED = 8
+#: Fastest times of the linear part after which they are.
+SETTLING = 64
+#: Windows that are tried.
+WINDOWS = 8
+#: Ratio of the lengths of two windows.
+ZOOM = 8.0
+#: Rotations that a window must hold.
+TURNS = 2.0
+#: Angle between two samples that they can follow [rad].
+FOLLOWED = 0.3
 #: Share of the steps from sample to sample that must be followed: impacts turn a motion at once.
 SHARE = 0.9
 

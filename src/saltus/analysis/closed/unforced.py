@@ -14,9 +14,10 @@ from saltus.contact.guards import is_hold
 from saltus.flow.maps import Stroboscope
 from saltus.language.evaluate import evaluate
 
-#: Parts of a motion that must each be larger than the one before, and how much the last must be
-#: larger than the first, to run away.
-EIGHTHS, GROWN = 8, 3.0
+#: Parts of a motion that must each be larger than the one before, to run away.
+EIGHTHS = 8
+#: Ratio of the last of them to the first, at least.
+GROWN = 3.0
 #: Returns farther than this, in units of the range, are no sign of a limit cycle.
 TORUS = 1e-2
 
