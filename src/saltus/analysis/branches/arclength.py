@@ -272,15 +272,15 @@ class _Fronts:
         moved = np.linalg.norm(step, axis=1)
         chord = step / np.maximum(moved, np.finfo(float).tiny)[:, None]
         sides = ((tangent, self.tangent[going]), (chord, tangent), (chord, self.tangent[going]))
-        turn = np.min([np.einsum("ki,ki->k", *both) for both in sides], axis=0)
+        cosine = np.min([np.einsum("ki,ki->k", *both) for both in sides], axis=0)
         side = _orientation(trial.derivative, tangent)
         stays = (side * self.side[going] >= 0) | (length < PASSING)
         off = np.linalg.norm((trial.z - guess) / scale, axis=1)
         foreseen = (off < PREDICTED * length) | (length < SHORT)
         converges = trial.found & (trial.contraction < CONTRACTS)
-        smooth = (turn > TURN) & stays & foreseen
+        smooth = (cosine > TURN) & stays & foreseen
         counts = converges & (smooth | (length < 100 * SHORTEST))  # a short one may turn a corner
-        easy = counts & (trial.evaluations <= EASY) & (turn > STRAIGHT)
+        easy = counts & (trial.evaluations <= EASY) & (cosine > STRAIGHT)
         there = counts & outside & (moved < SHORTEST)  # it began at that end of the range
         for i in going[there]:
             self.curves[i].end = "range"

@@ -82,10 +82,10 @@ def values_of(
     begins = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
     multipliers = stacked([branch.multipliers for branch in branches], size)
     event_multipliers = stacked([event.multipliers[None] for _, event in events], size)
-    rests = np.array([isinstance(branch.orbits, Rests) for branch, _ in points], bool)
-    event_rests = np.array([isinstance(branch.orbits, Rests) for branch, _ in at_events], bool)
-    own = _eigenvalues(points, size)
-    event_own = _eigenvalues(at_events, size)
+    at_rest = np.array([isinstance(branch.orbits, Rests) for branch, _ in points], bool)
+    event_at_rest = np.array([isinstance(branch.orbits, Rests) for branch, _ in at_events], bool)
+    eigenvalues = _eigenvalues(points, size)
+    event_eigenvalues = _eigenvalues(at_events, size)
     periods = np.array([branch.orbits.n for branch, _ in points], np.int64)
     states = padded([branch.orbits.points(z) for branch, z in [*points, *at_events]], size)
     return {
@@ -98,7 +98,7 @@ def values_of(
         "point_period": np.array(
             [
                 np.nan if rest else float(branch.orbits.period(z))
-                for (branch, z), rest in zip(points, rests, strict=True)
+                for (branch, z), rest in zip(points, at_rest, strict=True)
             ],
             float,
         ),
@@ -107,8 +107,8 @@ def values_of(
         "point_contacts": numbers.contacts * (1 if system.forced_at is None else periods),
         "point_itinerary": list(numbers.itinerary),
         "point_margin": numbers.margin,
-        **_complex("point_multiplier", np.where(rests[:, None], np.nan, multipliers)),
-        **_complex("point_eigenvalue", own),
+        **_complex("point_multiplier", np.where(at_rest[:, None], np.nan, multipliers)),
+        **_complex("point_eigenvalue", eigenvalues),
         "point_<state>": states[: len(points)],
         **{f"point_output_{key}": column for key, column in numbers.by_name().items()},
         **_branches(branches),
@@ -123,8 +123,8 @@ def values_of(
         "event_<parameter>": {name: _parameter(at_events)},
         "event_peak": event_numbers.peak[:, 0],
         "event_rms": event_numbers.rms[:, 0],
-        **_complex("event_multiplier", np.where(event_rests[:, None], np.nan, event_multipliers)),
-        **_complex("event_eigenvalue", event_own),
+        **_complex("event_multiplier", np.where(event_at_rest[:, None], np.nan, event_multipliers)),
+        **_complex("event_eigenvalue", event_eigenvalues),
         "event_<state>": states[len(points) :],
     }
 

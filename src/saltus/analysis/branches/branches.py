@@ -183,20 +183,20 @@ def branches(
     done = list[Branch]()
     with reporting(progress) as show:
         try:
-            rests: list[Seed] = []
+            equilibria: list[Seed] = []
             if isinstance(start, xr.Dataset):
                 begins = seeds_of(system, name, start)
-                rests = [] if system.forced_at else resting_seeds(system, name, start)
+                equilibria = [] if system.forced_at else resting_seeds(system, name, start)
             else:
                 check_grid(system, whole(at, "at", 1), start)
                 places = np.linspace(*limits, int(at) + 2)[1:-1]
                 grid = grid_of(system, {name: places}, start, box, None, seed, None, every)
                 if autonomous(system):
-                    rests = resting_between(system, name, limits, grid.starts)
+                    equilibria = resting_between(system, name, limits, grid.starts)
                 begins = _found_in(grid, method, periods, threads)
             begins = scaled(system, name, _inside(begins, limits), method)
-            rests = _inside(rests, limits)
-            if not begins and not rests:
+            equilibria = _inside(equilibria, limits)
+            if not begins and not equilibria:
                 raise ParameterError(
                     lambda say: (
                         f"no periodic orbit of {system.name} is known between "
@@ -206,7 +206,7 @@ def branches(
                     )
                 )
             plan = plan_of(system, name, limits, method, threads, points, longest, chosen)
-            born = trace_rests(plan, system, name, rests, done) if rests else []
+            born = trace_rests(plan, system, name, equilibria, done) if equilibria else []
             born = born if "hopf" in chosen else []
             trace(plan, [*born, *begins], done, stage(show, 0.0, 0.9))
         except KeyboardInterrupt:

@@ -121,15 +121,15 @@ def _joined(equations: Equations, curves: list[Arc]) -> BifurcationCurve:
     whole = whole.behind(back[0]) if back else whole
     z, tangent, derivative = (np.array(part) for part in (whole.z, whole.tangent, whole.derivative))
     length = np.array(whole.length) - whole.length[0]
-    own = equations.multipliers(z, derivative, np.zeros(len(z), np.int64))
+    multipliers = equations.multipliers(z, derivative, np.zeros(len(z), np.int64))
     special = find(equations, 0, z, tangent, derivative)
     doubles = [
-        Event("double_graze", place, z[place], own[place])
+        Event("double_graze", place, z[place], multipliers[place])
         for place, end in zip((0, len(z) - 1), ends, strict=True)
         if end == "double_graze"
     ]
     special = sorted([*special, *doubles], key=lambda point: point.after)
-    return BifurcationCurve(equations, z, length, own, ends, special)
+    return BifurcationCurve(equations, z, length, multipliers, ends, special)
 
 
 def _end(equations: Equations, curve: Arc) -> str:

@@ -164,14 +164,14 @@ def touching(
     last entry is a time: all flights are computed in one call.
     """
     z, when, size = u[:, :-1], u[:, -1], legs.size
-    first, _, rest = legs.nodes(z)
+    first, _, others = legs.nodes(z)
     at, until = legs.at(z), when[:, None] - first[:, [place]]
     spans = np.concatenate([legs.spans(first), until], axis=1)
     state, by_z, by_time = legs.along(z, at, spans, [place])
     closed = legs.closed(z, rows, at, state[:, :-1], by_z[:, :-1], by_time[:, :-1])
     state, by_z, by_time = state[:, -1], by_z[:, -1], by_time[:, -1]
-    own, slopes, order = legs.orbits.own(rest)
-    found = gap.at(when * legs.unit, np.concatenate([state, own], axis=1))
+    carried, slopes, order = legs.orbits.parameter_states(others)
+    found = gap.at(when * legs.unit, np.concatenate([state, carried], axis=1))
     value, normal, by_clock = found[..., 0], found[..., 1:-1], found[..., -1] * legs.unit
     entries = normal[..., :size] @ by_z
     entries[..., legs.count * (size + 1) + order] += normal[..., size:] * slopes[:, None]
@@ -183,10 +183,10 @@ def nearest_turn(legs: Legs, z: np.ndarray, place: int, gap: Gap, since: float) 
     """Time after a contact [periods] at which the motion turns away from the boundary: the one
     nearest to the time ``since``, or ``since`` itself if there is none.
     """
-    first, _, rest = legs.nodes(z[None])
+    first, _, others = legs.nodes(z[None])
     spans, state = legs.flight(z, place, LOOKS)
-    own = np.repeat(legs.orbits.own(rest)[0], len(spans), axis=0)
-    found = gap.at((first[0, place] + spans) * legs.unit, np.concatenate([state, own], axis=1))
+    carried = np.repeat(legs.orbits.parameter_states(others)[0], len(spans), axis=0)
+    found = gap.at((first[0, place] + spans) * legs.unit, np.concatenate([state, carried], axis=1))
     rate = found[:, 1, 0] * gap.side
     turns = np.flatnonzero((rate[:-1] <= 0) & (rate[1:] > 0))
     if not len(turns):
@@ -227,5 +227,5 @@ def corner(legs: Legs, z: np.ndarray, place: int) -> ContactChange | None:
     slope = np.zeros(len(z))
     slope[after * width], slope[place * width] = 1.0, -1.0
     state = legs.nodes(u)[1][0, place]
-    own = found.derivative[0, :-1]
-    return ContactChange("corner", guards, phase, legs, u[0], place, state, slope, own)
+    derivative = found.derivative[0, :-1]
+    return ContactChange("corner", guards, phase, legs, u[0], place, state, slope, derivative)

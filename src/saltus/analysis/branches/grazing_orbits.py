@@ -175,10 +175,10 @@ class GrazingOrbits:
             return None
         rise = touch(legs, self.place, self.gap, z[None])[2][0, 1, -1]
         keep = without(free, list(np.flatnonzero(np.abs(free.velocity) < SLOW * abs(rise))))
-        own = legs.sequence_at(z[:-1])
-        if (not keep.contacts and not legs.contacts) or shift(own, keep, legs.n) is not None:
+        sequence = legs.sequence_at(z[:-1])
+        if (not keep.contacts and not legs.contacts) or shift(sequence, keep, legs.n) is not None:
             return []
-        known = own.phase % legs.n
+        known = sequence.phase % legs.n
         return [
             (one.guard, float(when))
             for one, when in zip(keep.contacts, keep.phase, strict=True)
@@ -217,8 +217,8 @@ class GrazingOrbits:
     # -- normal form -------------------------------------------------------------------------------
     def is_smooth(self, event: ContactChange) -> bool:
         """True if a graze has no square root, since the force begins at zero."""
-        own = self.legs.orbits.own(self.legs.nodes(event.z[None])[2])[0]
-        full, when = np.append(event.state, own[0]), event.phase * self.legs.unit
+        carried = self.legs.orbits.parameter_states(self.legs.nodes(event.z[None])[2])[0]
+        full, when = np.append(event.state, carried[0]), event.phase * self.legs.unit
         return self._law.is_continuous(np.array([when]), full[None])
 
     def coefficients(self, z: np.ndarray) -> np.ndarray:
@@ -226,10 +226,10 @@ class GrazingOrbits:
         legs, place = self.legs, self.place
         state, _, slopes = touch(legs, place, self.gap, z)
         rise = slopes[:, 1, -1] * self.gap.side / legs.unit
-        _, _, rest = legs.nodes(z[:, :-1])
-        own = legs.orbits.own(rest)[0]
+        _, _, others = legs.nodes(z[:, :-1])
+        carried = legs.orbits.parameter_states(others)[0]
         when = z[:, -1] * legs.unit
-        full = np.concatenate([state, own], axis=1)
+        full = np.concatenate([state, carried], axis=1)
         normals = self.gap.at(when, full)[..., 1 : 1 + legs.size]
         kick = self._law.kick(when, full, normals, rise)
         with np.errstate(invalid="ignore"):
@@ -246,12 +246,12 @@ def returned(
     and states float64[r, D], to itself, all periods later, float64[r, D, D].
     """
     size, rows = legs.size, np.zeros(len(z), np.int64)
-    at, (phase, _, rest) = legs.at(z), legs.nodes(z)
+    at, (phase, _, others) = legs.at(z), legs.nodes(z)
     first, after, span = phase.copy(), at.after.copy(), np.zeros_like(phase)
     first[:, place], after[:, place], span[:, place] = when, state, legs.n
     if legs.contacts:
         span[:, place] = legs.spans(phase)[:, place] - (when - phase[:, place])
-    onwards = legs.fly(after, rest, first, span)[1][:, place, :, :size]
+    onwards = legs.fly(after, others, first, span)[1][:, place, :, :size]
     if not legs.contacts:
         return onwards
     span = np.zeros_like(phase)

@@ -179,5 +179,5 @@ def _piece(arc: SequenceArc, backwards: bool = False) -> LegPiece:
     z, tangent, derivative, length = (column[skip:] for column in columns)
     if backwards:
         z, tangent, derivative, length = z[::-1], -tangent[::-1], derivative[::-1], -length[::-1]
-    own = legs.multipliers(z, derivative, np.zeros(len(z), np.int64))
-    return LegPiece(legs, 0, z, tangent, derivative, length, own)
+    multipliers = legs.multipliers(z, derivative, np.zeros(len(z), np.int64))
+    return LegPiece(legs, 0, z, tangent, derivative, length, multipliers)

@@ -53,8 +53,8 @@ class Passage:
 
     def into(self, legs: Legs, tangent: np.ndarray) -> np.ndarray:
         """The way in which the branch that ends reaches the event, on the side of another."""
-        own = legs.tangent(self.z)
-        return own if own @ tangent > 0 else -own
+        way = legs.tangent(self.z)
+        return way if way @ tangent > 0 else -way
 
 
 def end_of(legs: Legs, z: np.ndarray, beyond: np.ndarray, tangent: np.ndarray) -> Passage | None:
@@ -109,8 +109,7 @@ def _impact_vanishes(legs: Legs, z: np.ndarray, place: int) -> Passage | None:
     if event is None:
         return None
     contact = legs.contacts[place]
-    own, _ = with_impact(event, contact, legs)
-    start = own
+    start, _ = with_impact(event, contact, legs)
     along = event.legs.tangent(event.z)
     away = _touching(event) @ along
     side = -contact.direction  # of the gap where the stop isn't met
@@ -138,7 +137,7 @@ def with_impact(
     equations: those of another orbit if they are given.
     """
     legs, z = event.legs, event.z
-    phase, before, rest = legs.nodes(z[None])
+    phase, before, others = legs.nodes(z[None])
     place = event.place
     when = phase[0, place] + (event.phase - phase[0, place]) % legs.n
     nodes = np.concatenate([phase[0][:, None], before[0]], axis=1)
@@ -161,7 +160,7 @@ def with_impact(
         )
         nodes[:order, 0] += legs.n
         nodes = np.roll(nodes, -order, axis=0)
-    return np.append(nodes.ravel(), rest[0]), like
+    return np.append(nodes.ravel(), others[0]), like
 
 
 def _leg_vanishes(legs: Legs, z: np.ndarray, place: int, tangent: np.ndarray) -> Passage | None:
@@ -172,11 +171,11 @@ def _leg_vanishes(legs: Legs, z: np.ndarray, place: int, tangent: np.ndarray) ->
         event = _without(legs, z, (place, after))
         if event is None:
             return None
-        own = z  # where the leg vanishes, these equations are singular
         onto, start = event.legs, event.z
         away, side = _touching(event) @ onto.tangent(start), -first.direction
         along = onto.tangent(start) * (1.0 if away * side > 0 else -1.0)
-        return Passage(event, own, onto, start, along)
+        # in its own unknowns at z: where the leg vanishes, these equations are singular
+        return Passage(event, z, onto, start, along)
     event = corner(legs, z, place)
     return None if event is None else _by_free_flow(event, event.z, tangent)
 
@@ -187,8 +186,8 @@ def _first_extra(legs: Legs, z: np.ndarray) -> tuple[SequenceContact, float] | N
     free, begin = legs.free_flow(z[None])[0], legs.begin(z[None])[0]
     if free is None:
         return None
-    own = legs.nodes(z[None])[0][0] if legs.contacts else np.zeros(0)
-    phase = np.sort((own - begin) % legs.n) + begin
+    known = legs.nodes(z[None])[0][0] if legs.contacts else np.zeros(0)
+    phase = np.sort((known - begin) % legs.n) + begin
     for i, contact in enumerate(free.contacts):
         if i == len(phase) or free.phase[i] < phase[i] - SAME_TIME:
             return contact, float(free.phase[i])

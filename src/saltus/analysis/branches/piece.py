@@ -180,14 +180,14 @@ def _is_real(point: Event) -> bool:
     """True if the test of a bifurcation vanishes at a point. A test may also change its sign by a
     jump, between branches that run alongside or at two real multipliers whose product is one.
     """
-    own = point.multipliers
+    multipliers = point.multipliers
     if point.kind == "fold":
         return bool(abs(point.tangent[-1]) < VANISHES)
     if point.kind == "period_doubling":
-        return bool(np.abs(own + 1.0).min() < VANISHES)
+        return bool(np.abs(multipliers + 1.0).min() < VANISHES)
     if point.kind == "neimark_sacker":
-        on = np.abs(np.abs(own) - 1.0) < VANISHES
-        return bool((on & (np.abs(own.imag) > COMPLEX)).sum() >= 2)
+        on = np.abs(np.abs(multipliers) - 1.0) < VANISHES
+        return bool((on & (np.abs(multipliers.imag) > COMPLEX)).sum() >= 2)
     return True
 
 
@@ -244,9 +244,9 @@ def refine(piece: Piece, places: Sequence[int], shares: np.ndarray | float = 0.5
         return good
     derivative = point.derivative[good]
     tangent = tangents(derivative, piece.tangent[after[good]])
-    own = orbits.multipliers(point.z[good], derivative, rows[good])
+    multipliers = orbits.multipliers(point.z[good], derivative, rows[good])
     between = piece.length[after] + shares * (piece.length[after + 1] - piece.length[after])
-    return _put(piece, after[good], point.z[good], tangent, derivative, own, between[good])
+    return _put(piece, after[good], point.z[good], tangent, derivative, multipliers, between[good])
 
 
 def _put(
@@ -290,8 +290,8 @@ def retrace(piece: Piece, places: Sequence[int]) -> bool:
         length = piece.length[after] + np.array(curve.length[1:])
         end = length[-1] + np.linalg.norm((ahead - z[-1]) / unit)
         piece.length[after + 1 :] += end - piece.length[after + 1]
-        own = orbits.multipliers(z, derivative, np.zeros(len(z), np.int64))
-        _put(piece, np.full(len(z), after), z, tangent, derivative, own, length)
+        multipliers = orbits.multipliers(z, derivative, np.zeros(len(z), np.int64))
+        _put(piece, np.full(len(z), after), z, tangent, derivative, multipliers, length)
         found = True
     return found
 

@@ -177,15 +177,15 @@ class Rests:
         complex128[r, D].
         """
         matrices = self.jacobian(z, self.modes[rows])[:, :, : self.size]
-        own = leading_first(matrices)
-        order = np.lexsort((-own.imag, -own.real), axis=1)
-        return np.take_along_axis(own, order, axis=1)
+        values = leading_first(matrices)
+        order = np.lexsort((-values.imag, -values.real), axis=1)
+        return np.take_along_axis(values, order, axis=1)
 
     def multipliers(self, z: np.ndarray, derivative: np.ndarray, rows: np.ndarray) -> np.ndarray:  # noqa: ARG002
         """Those of the linear flow over :meth:`period`: exponentials of the eigenvalues, of which
         as many lie outside the unit circle as eigenvalues to the right of the imaginary axis;
         complex128[r, D].
         """
-        own = self.eigenvalues(z, rows) * self.period(z)[:, None]
-        multipliers: np.ndarray = np.exp(np.minimum(own.real, STEEP) + 1j * own.imag)
+        exponents = self.eigenvalues(z, rows) * self.period(z)[:, None]
+        multipliers: np.ndarray = np.exp(np.minimum(exponents.real, STEEP) + 1j * exponents.imag)
         return multipliers

@@ -142,9 +142,9 @@ def resting_between(
             found = all_equilibria(system.with_values(**{name: float(value)}), begin, unit)
         except ParameterError:  # too many modes
             return []
-        rests = [one.state for one in found if one.place == "region" and not one.dimension]
-        places += rests
-        values += [float(value)] * len(rests)
+        equilibria = [one.state for one in found if one.place == "region" and not one.dimension]
+        places += equilibria
+        values += [float(value)] * len(equilibria)
     return rests_at(np.reshape(places, (-1, len(system.states))), np.array(values), starts)
 
 

@@ -153,8 +153,8 @@ def _at_once(orbits: PeriodicOrbits, row: int, one: _Point, other: _Point) -> li
                 return [event] if event is not None else []
         return []
     for contacts in _removals(long, len(long.contacts) - len(short.contacts), orbits.n):
-        rest = without(long, [place for contact in contacts for place in contact])
-        if shift(rest, short, orbits.n) is None:
+        fewer_contacts = without(long, [place for contact in contacts for place in contact])
+        if shift(fewer_contacts, short, orbits.n) is None:
             continue
         legs, z = Legs.of(orbits, short, fewer.z, scale)
         events = [

@@ -199,8 +199,8 @@ class SingularOrbits:
         """See :class:`saltus.analysis.branches.equations.CurveEquations`."""
         width = self.orbits.width
         same = self.orbits.alike(z[:, :width], rows)
-        rest = np.repeat(z[:, None, width:], same.shape[1], axis=1)
-        return np.concatenate([same, rest], axis=2)
+        others = np.repeat(z[:, None, width:], same.shape[1], axis=1)
+        return np.concatenate([same, others], axis=2)
 
 
 def _real(vectors: np.ndarray) -> np.ndarray:

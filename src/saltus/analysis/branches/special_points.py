@@ -114,12 +114,17 @@ def locate(
         values = np.full(len(flat), np.nan)
         good = np.flatnonzero(point.found)
         if len(good):
-            own = orbits.multipliers(point.z[good], derivative[good], mine[good])
-            tested = tests(direction[good], derivative[good], own, column)
+            multipliers = orbits.multipliers(point.z[good], derivative[good], mine[good])
+            tested = tests(direction[good], derivative[good], multipliers, column)
             values[good] = tested[kind[which[good]], np.arange(len(good))]
             for place, i in enumerate(good):
                 known[int(which[i])] = Event(
-                    KINDS[kind[which[i]]], -1, point.z[i], own[place], direction[i], derivative[i]
+                    KINDS[kind[which[i]]],
+                    -1,
+                    point.z[i],
+                    multipliers[place],
+                    direction[i],
+                    derivative[i],
                 )
         return values
 
@@ -203,8 +208,8 @@ def _branch_point(
     spans = np.linalg.svd(derivative[0])[2][-2:]
     direction = spans.T @ (spans @ along)
     direction /= np.linalg.norm(direction)
-    own = orbits.multipliers(z[None], derivative, one)[0]
-    return Event("branch_point", -1, z, own, direction, derivative[0])
+    multipliers = orbits.multipliers(z[None], derivative, one)[0]
+    return Event("branch_point", -1, z, multipliers, direction, derivative[0])
 
 
 def outside(multipliers: np.ndarray) -> np.ndarray:

@@ -105,8 +105,8 @@ def _doubled(branch: Branch, event: Event) -> np.ndarray:
 def crossing(event: Event) -> np.ndarray:
     """The direction of the branch that crosses at a branch point."""
     null = np.linalg.svd(event.derivative)[2][-2:]
-    rest = null - np.outer(null @ event.tangent, event.tangent)
-    longest = rest[np.argmax(np.linalg.norm(rest, axis=1))]
+    across = null - np.outer(null @ event.tangent, event.tangent)
+    longest = across[np.argmax(np.linalg.norm(across, axis=1))]
     return np.asarray(longest / np.linalg.norm(longest))
 
 

@@ -292,8 +292,8 @@ def both_ways(
         if any(way.end == "met" for way in ways):
             result.append(None)
             continue
-        own = orbits.near(z[mine], mine) if len(starts) > 1 else orbits
-        result.append(_joined(own, [way for way in ways if way.z], kind))
+        equations = orbits.near(z[mine], mine) if len(starts) > 1 else orbits
+        result.append(_joined(equations, [way for way in ways if way.z], kind))
     return result
 
 
@@ -314,5 +314,5 @@ def _of(orbits: PeriodicOrbits, curve: Arc, ends: tuple[str, str], kind: type[Br
     good = point.found
     z[good], derivative[good] = point.z[good], point.derivative[good]
     tangent[good] = tangents(derivative[good], tangent[good])
-    own = here.multipliers(z, derivative, rows)
-    return kind(orbits, 0, z, tangent, derivative, length, own, ends)
+    multipliers = here.multipliers(z, derivative, rows)
+    return kind(orbits, 0, z, tangent, derivative, length, multipliers, ends)

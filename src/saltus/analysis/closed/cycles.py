@@ -102,11 +102,11 @@ def returns(map_: Stroboscope, start: np.ndarray, window: float) -> Returns:
     result = Returns(np.full(k, np.nan), np.full(k, np.inf), np.ones((k, size)))
     length, rows, refined = np.full(k, float(window)), np.arange(k), np.zeros(k, bool)
     for _ in range(MOST_WINDOWS):
-        time, apart, scale, followed, turns = _seen(map_.rows(rows), start[rows], length[rows])
+        time, apart, scale, followed, count = _seen(map_.rows(rows), start[rows], length[rows])
         result.scale[rows] = scale
         done = followed & np.isfinite(apart)
         result.time[rows[done]], result.apart[rows[done]] = time[done], apart[done]
-        longer = followed & ((turns == 0) | (turns < ENOUGH) & (apart > FAR)) & ~refined[rows]
+        longer = followed & ((count == 0) | (count < ENOUGH) & (apart > FAR)) & ~refined[rows]
         refined[rows[~followed]] = True
         length[rows] *= np.where(followed, ZOOM, 1.0 / ZOOM)
         rows = rows[~followed | longer]
@@ -189,8 +189,8 @@ def _seen(map_: Stroboscope, start: np.ndarray, length: np.ndarray) -> tuple[np.
     across, scale, (samples, rates) = directions(map_, start, length)
     step = (length / SAMPLES)[:, None, None]
     with np.errstate(all="ignore"):
-        turns = np.einsum("kij,kij->ki", across[:, 1:], across[:, :-1])
-        followed = (turns > TURN).mean(axis=1) >= FOLLOWED
+        cosines = np.einsum("kij,kij->ki", across[:, 1:], across[:, :-1])
+        followed = (cosines > TURN).mean(axis=1) >= FOLLOWED
         time, apart, rises = _crossings(start, across, scale, samples, step * rates)
     time, apart = _first_of_the_nearest(time, apart)
     return time * length / SAMPLES, apart, scale, followed, rises.sum(axis=1)

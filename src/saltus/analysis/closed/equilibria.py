@@ -155,7 +155,7 @@ def _starts(
 def _columns(system: System, found: list[Equilibrium]) -> dict[str, Any]:
     """The variables of the result."""
     size, names = len(system.states), [guard.name for guard in system.guards]
-    own = np.array([one.eigenvalues for one in found], complex).reshape(-1, size)
+    eigenvalues = np.array([one.eigenvalues for one in found], complex).reshape(-1, size)
     ends = np.array([one.ends for one in found]).reshape(-1, 2, size)
     return {
         "equilibrium": np.arange(len(found)),
@@ -166,8 +166,8 @@ def _columns(system: System, found: list[Equilibrium]) -> dict[str, Any]:
         "equilibrium_mode": np.array([mode_number(one.mode) for one in found], "i8"),
         "equilibrium_margin": np.array([one.margin for one in found]),
         "equilibrium_dimension": np.array([one.dimension for one in found], "i8"),
-        "equilibrium_eigenvalue_real": own.real,
-        "equilibrium_eigenvalue_imag": np.where(np.isnan(own), np.nan, own.imag),
+        "equilibrium_eigenvalue_real": eigenvalues.real,
+        "equilibrium_eigenvalue_imag": np.where(np.isnan(eigenvalues), np.nan, eigenvalues.imag),
         "equilibrium_<state>": np.array([one.state for one in found]).reshape(-1, size),
         "equilibrium_<state>_from": ends[:, 0],
         "equilibrium_<state>_to": ends[:, 1],

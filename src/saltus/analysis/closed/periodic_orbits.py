@@ -159,12 +159,12 @@ def periodic_orbits(
     method = exact_method(method)
     attrs = provenance(system, method, system.values) | {"starts": len(states), "seed": seed}
     if system.forced_at is None:
-        turn = _turn(system, states)
-        limits, guess = _range(period, (0.0, (periods + 0.5) * turn))
-        method = _with_budget(method, max(AGES[-1], limits[1] / turn))
-        looks = Stroboscope(system, method, every=turn, threads=threads)
+        rotation = _turn(system, states)
+        limits, guess = _range(period, (0.0, (periods + 0.5) * rotation))
+        method = _with_budget(method, max(AGES[-1], limits[1] / rotation))
+        looks = Stroboscope(system, method, every=rotation, threads=threads)
         with reporting(progress) as show:
-            cycles = all_cycles(looks, states, limits, guess or turn, show)
+            cycles = all_cycles(looks, states, limits, guess or rotation, show)
             table = table_of(looks, cycles.motions, cycles.found)
         attrs |= {"shortest_period": limits[0], "longest_period": limits[1]}
         return orbits_dataset(system, attrs, table, searches(cycles.searches))

@@ -88,11 +88,11 @@ def _turn(system: System, start: np.ndarray, parameters: np.ndarray | None) -> f
     flight = map_.with_period(fastest).launch(begin, SETTLING)
     state = flight.advance(SETTLING)[:, -1]
     kept = np.isfinite(state).all(axis=1)
-    turn = np.where(np.isfinite(fastest), fastest, 1.0)
+    rotation = np.where(np.isfinite(fastest), fastest, 1.0)
     if kept.any():
         rows_kept = np.flatnonzero(kept)
-        turn[rows_kept] = _turning(map_.rows(rows_kept), state[kept], fastest[kept])
-    return float(f"{float(np.median(turn)):.1e}")
+        rotation[rows_kept] = _turning(map_.rows(rows_kept), state[kept], fastest[kept])
+    return float(f"{float(np.median(rotation)):.1e}")
 
 
 def _fastest(map_: Stroboscope, start: np.ndarray) -> np.ndarray:
@@ -116,9 +116,9 @@ def _turning(map_: Stroboscope, state: np.ndarray, first: np.ndarray) -> np.ndar
         angle = np.arccos(np.clip(np.einsum("kij,kij->ki", toward[:, 1:], toward[:, :-1]), -1, 1))
         with np.errstate(invalid="ignore"):
             followed = (angle < FOLLOWED).mean(axis=1) >= SHARE
-            turns = np.nansum(angle, axis=1) / (2.0 * np.pi)
-        done = followed & (turns >= TURNS)
-        result[rows[done]] = length[rows[done]] / turns[done]
+            rotations = np.nansum(angle, axis=1) / (2.0 * np.pi)
+        done = followed & (rotations >= TURNS)
+        result[rows[done]] = length[rows[done]] / rotations[done]
         length[rows] *= np.where(followed, ZOOM, 1.0 / ZOOM)
         rows = rows[~done]
         if not len(rows):

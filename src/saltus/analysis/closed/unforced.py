@@ -49,10 +49,10 @@ def attracted(
         Range of each state on the limit cycle; of an equilibrium that which was given.
     """
     result, size = ClosedMotions.none(*state.shape), scale.copy()
-    rests = find_equilibria(map_, state, scale)
-    here = np.flatnonzero(captured(map_, rests, state, scale))
-    result.put(here, rests.rows(here))
-    size[here] = np.maximum(scale[here], np.abs(rests.points[here, 0]))
+    equilibria = find_equilibria(map_, state, scale)
+    here = np.flatnonzero(captured(map_, equilibria, state, scale))
+    result.put(here, equilibria.rows(here))
+    size[here] = np.maximum(scale[here], np.abs(equilibria.points[here, 0]))
     rows = np.flatnonzero(result.period == 0)
     if len(rows):
         cycles, beside, own = attracting_cycles(map_.rows(rows), state[rows], window, near)
