@@ -17,6 +17,7 @@ import numpy as np
 from saltus.codegen.module import Flow
 from saltus.errors import ParameterError, must_be, nearest, shown
 from saltus.system import System
+from saltus.system.tangent import tangent_system
 
 #: Default step budget per period; a healthy trajectory takes ten to a hundred steps.
 STEPS_PER_PERIOD = 10_000
@@ -113,6 +114,12 @@ class Method:
     def serving(self, system: System) -> Method:  # noqa: ARG002  (most methods serve all)
         """The method that moves a system: this one, or the one that stands in for it."""
         return self
+
+    def tangents(self, system: System) -> System | None:
+        """The system whose flow carries the derivative of the state with respect to the state at
+        the start; None if only differences give it.
+        """
+        return None if system.is_steep else tangent_system(system)
 
     def suited_to(self, count: int) -> Method:  # noqa: ARG002  (unused by most methods)
         """The fastest variant of the method for ``count`` trajectories; its results are the same to

@@ -103,7 +103,7 @@ class Arc:
         )
 
 
-class Way(Protocol):
+class OneWay(Protocol):
     """Part of a curve that was followed in one direction from a start."""
 
     @property
@@ -111,7 +111,7 @@ class Way(Protocol):
         """Reason why it ends, as :attr:`Arc.end`."""
 
 
-W = TypeVar("W", bound=Way)
+W = TypeVar("W", bound=OneWay)
 
 
 def both_sides(ways: list[W]) -> tuple[list[W], tuple[str, str]]:
