@@ -9,6 +9,8 @@ ANYTHING = {
     ("compare_methods", "arguments"): "those of the analysis that is compared",
     ("simulate", "start"): "to be written as in the other verbs",
     ("simulate", "values"): "the same",
+    ("simulate", "at"): "the same",
+    ("simulate", "until"): "the same",
     ("structure_modes", "mass"): "a matrix of NumPy or SciPy, or its entries",
     ("structure_modes", "stiffness"): "the same",
     ("structure_modes", "at"): "a name, names, or pairs of them",
