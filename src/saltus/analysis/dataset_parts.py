@@ -65,11 +65,14 @@ def trajectories(
 ) -> Subject:
     """The subject of Datasets of some trajectories."""
     return Subject(
-        states=system.states, units=system.units, guards=guards(system, group), varied=group.varied,
+        states=system.states,
+        units=system.units,
+        guards=guards(system, group),
+        varied=group.varied,
         batch=group.batch,
         forcing_period=forcing_period,
         attrs=provenance(system, method, shared_values(system, group), group.varied),
-    )  # fmt: skip
+    )
 
 
 def endings(outcome: Outcome, counters: Iterable[str] = st.COUNTERS) -> dict[str, Any]:

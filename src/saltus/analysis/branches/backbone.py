@@ -20,6 +20,7 @@ from saltus.analysis.branches.free_vibration import (
 )
 from saltus.analysis.branches.special_points import zeros
 from saltus.analysis.dataset_parts import provenance, subject
+from saltus.analysis.inputs.given import Range, Value
 from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.inputs.starts import at_values, check_system
 from saltus.analysis.inputs.verb import verb
@@ -50,13 +51,13 @@ BEHIND = 0.02
 @verb
 def backbone(
     system: System,
-    amplitude: Any,
+    amplitude: Range,
     *,
     state: str | None = None,
     mode: int = 1,
     phase: str = "free",
     force: str = "force",
-    values: Mapping[str, Any] | None = None,
+    values: Mapping[str, Value] | None = None,
     points: int = 400,
     method: Method | None = None,
     threads: int | None = None,
@@ -172,14 +173,14 @@ def _free_start(
     """The undamped system, the equations of its vibrations, and a small one float64[1, z]."""
     low, high = limits
     free, name = free_system(system)
-    rest = place_of_rest(free)
-    period, shape, column = linear_mode(free, rest, mode)
+    equilibrium = place_of_rest(free)
+    period, shape, column = linear_mode(free, equilibrium, mode)
     sizes = _relative(system, shape, measured, mode)
     scale = np.array([[*high * sizes, period, 1 / period]])
-    orbits = FreeOrbits(free, name, scale, method, rest, column, threads)
-    begin = rest + BEFORE * low * shape.real / np.abs(shape[measured])
+    orbits = FreeOrbits(free, name, scale, method, equilibrium, column, threads)
+    begin = equilibrium + BEFORE * low * shape.real / np.abs(shape[measured])
     _, swing = orbits.first_return(begin, LONGEST * period)
-    begin = rest + (begin - rest) * BEFORE * low / swing[measured]
+    begin = equilibrium + (begin - equilibrium) * BEFORE * low / swing[measured]
     z = np.array([[*begin, orbits.first_return(begin, LONGEST * period)[0], 0.0]])
     if not np.isfinite(z).all():
         raise ParameterError(
@@ -203,13 +204,13 @@ def _forced_start(
 ) -> tuple[System, QuadratureOrbits, np.ndarray]:
     """The system, the equations of its vibrations in quadrature, and a small one float64[1, z]."""
     low, high = limits
-    rest, shape, z = small_vibration(system, force, mode, measured, BEFORE * low, method)
-    own = z[-2:]
+    equilibrium, shape, z = small_vibration(system, force, mode, measured, BEFORE * low, method)
+    frequency, amplitude = z[-2:]
     sizes = high * _relative(system, shape, measured, mode)
-    scale = np.array([[*sizes, own[0], own[1] * high / (BEFORE * low)]])
-    drive = np.abs(force.harmonics(system, own[0])[force.row])
-    unit = sizes[force.displacement] * drive * system.period({str(system.forced_at): own[0]})
-    orbits = QuadratureOrbits(system, force, scale, unit, rest, method, threads)
+    scale = np.array([[*sizes, frequency, amplitude * high / (BEFORE * low)]])
+    drive = np.abs(force.harmonics(system, frequency)[force.row])
+    unit = sizes[force.displacement] * drive * system.period({str(system.forced_at): frequency})
+    orbits = QuadratureOrbits(system, force, scale, unit, equilibrium, method, threads)
     return system, orbits, z[None]
 
 
@@ -325,23 +326,21 @@ def _table(
     period, outputs = orbits.period(z), outputs_of(moving, None)
     numbers = numbers_of(moving, [(orbits, one) for one in z], outputs, method)
     rows = np.zeros(len(z), np.int64)
-    own = stacked([orbits.multipliers(z, orbits.evaluate(z, rows)[1], rows)], orbits.size)
+    multipliers = stacked([orbits.multipliers(z, orbits.evaluate(z, rows)[1], rows)], orbits.size)
     by_name = numbers.by_name()
     data: dict[str, Any] = {
         "point": np.arange(len(z)),
         "backbone_frequency": 1 / period,
         "point_period": period,
-        "point_stable": np.nanmax(np.abs(own), axis=1) < STABLE,
+        "point_stable": np.nanmax(np.abs(multipliers), axis=1) < STABLE,
         "point_itinerary": list(numbers.itinerary),
-        "point_multiplier_real": own.real,
-        "point_multiplier_imag": own.imag,
+        "point_multiplier_real": multipliers.real,
+        "point_multiplier_imag": multipliers.imag,
         "point_<state>": orbits.points(z)[:, 0],
         "output": list(outputs.names),
         "output_units": list(outputs.units),
-        **{
-            f"point_output_{key}": by_name[key] for key in ("maximum", "minimum", "peak", "rms")
-        },
-    }  # fmt: skip
+        **{f"point_output_{key}": by_name[key] for key in ("maximum", "minimum", "peak", "rms")},
+    }
     if isinstance(orbits, FreeOrbits):
         data["fictitious_damping"] = _conserved(system, z[:, -1], period)
         about, when = (
