@@ -111,6 +111,7 @@ class Tables:
         self._sets: dict[bytes, int] = {}
         self.sets: list[_Set] = []
         self._equations: dict[tuple[object, ...], _Equations] = {}
+        self._fast: dict[tuple[float, ...], float] = {}
         self._smooth: dict[tuple[object, ...], bool] = {}
         self._known: dict[tuple[int, bytes], int] = {}
         self._states: dict[tuple[int, int], int] = {}
@@ -225,14 +226,19 @@ class Tables:
         """The equations of a contact state, read off once for all rates of the drives."""
         used = tuple(given.values[name] for name in self.linear.parameters)
         if (mode, used) not in self._equations:
-            piece, fastest = self.linear.piece(given.values, mode), 0.0
-            every = (1 << len(self.linear.system.guards)) - 1
-            if piece.constant.any():
-                others = [self.linear.piece(given.values, one).matrix for one in (0, every)]
-                fastest = max(float(np.abs(np.linalg.eigvals(one)).max()) for one in others)
+            piece = self.linear.piece(given.values, mode)
+            fastest = self._fastest(given, used) if piece.constant.any() else 0.0
             self._equations[mode, used] = _Equations(piece, eigen_of(piece.matrix), fastest)
             self._held += 8 * piece.matrix.nbytes
         return self._equations[mode, used]
+
+    def _fastest(self, given: _Set, used: tuple[float, ...]) -> float:
+        """Size of the fastest eigenvalue where all gaps have one sign [1/s]."""
+        if used not in self._fast:
+            every = (1 << len(self.linear.system.guards)) - 1
+            matrices = [self.linear.piece(given.values, mode).matrix for mode in (0, every)]
+            self._fast[used] = max(float(np.abs(np.linalg.eigvals(one)).max()) for one in matrices)
+        return self._fast[used]
 
     def _is_smooth(self, one: _Equations, other: _Equations, gaps: LinearPiece, g: int) -> bool:
         key = id(one), id(other), g, gaps.constant[g], gaps.matrix[g].tobytes()

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from saltus.contact.guards import bits_in, join_guards
-from saltus.errors import ParameterError, SaltusError, TraceError, UnitError, nearest, shown
+from saltus.errors import ParameterError, TraceError, UnitError, nearest, shown
 from saltus.language.dimensions import DimensionCheck
 from saltus.language.expression import (
     Bit,
@@ -26,7 +26,7 @@ from saltus.language.expression import (
 from saltus.system.formula import Formula, Formulas
 from saltus.system.quantity import called, with_surface
 from saltus.system.system import System
-from saltus.units import coherent_unit, to_si
+from saltus.units import coherent_unit, is_unit, to_si
 
 #: A number and what may be its unit, in a formula.
 _QUANTITY = re.compile(
@@ -177,7 +177,7 @@ def _unit(match: re.Match[str], text: str, system: System) -> str:
         If a factor of it could be a state or a parameter as well.
     """
     unit = match["unit"]
-    while unit and not _is_unit(unit):
+    while unit and not is_unit(unit):
         cut = max(unit.rfind("*"), unit.rfind("/"), 0)
         unit = unit[:cut]
     if not unit and match["unit"] not in _WORDS:
@@ -195,11 +195,3 @@ def _unit(match: re.Match[str], text: str, system: System) -> str:
             f"{system.name}. Put a number with its unit into brackets: ({match['number']} {unit})."
         )
     return unit
-
-
-def _is_unit(text: str) -> bool:
-    try:
-        coherent_unit(f"1 {text}", "until")
-    except SaltusError as error:
-        return isinstance(error, UnitError) and "can't be read" not in str(error)
-    return True

@@ -23,7 +23,7 @@ from saltus.flow.motion_series import Pieces
 from saltus.flow.pieces import nodes_of, pieces
 from saltus.flow.request import Outcome
 from saltus.flow.threads import on_threads
-from saltus.flow.waves import Legs, deviations, harmonics, largest, least_turn, means, turns
+from saltus.flow.waves import WaveLegs, deviations, harmonics, largest, least_turn, means, turns
 from saltus.kernels import status as st
 
 #: Forcing periods of a motion that never repeats from which its numbers are taken, where there are
@@ -220,7 +220,7 @@ def _count_contacts(
 
 def _measured_by_waves(
     map_: Stroboscope,
-    motions: list[list[Legs]],
+    motions: list[list[WaveLegs]],
     outcome: Outcome,
     span: int,
     closed: bool,
@@ -252,7 +252,7 @@ def _measured_by_waves(
     return result
 
 
-def _turning_states(parts: list[Legs], size: int, closed: bool) -> np.ndarray:
+def _turning_states(parts: list[WaveLegs], size: int, closed: bool) -> np.ndarray:
     """The states where the first one turns, float64[n, D], in the order of time: inside legs, and
     where one ends and the next begins.
     """

@@ -27,6 +27,7 @@ from saltus.language.evaluate import evaluate
 from saltus.language.expression import walk
 from saltus.results.dataset import schema
 from saltus.system import System
+from saltus.system.contact_forces import side_that_pushes
 from saltus.system.quantity import Quantity, with_impulses, with_integrals
 
 #: Blocks whose scatter gives a standard error: consecutive contacts are not independent, blocks
@@ -216,7 +217,7 @@ def contact_sides(system: System, given: Mapping[int, Any]) -> np.ndarray:
         if gap == 0:
             gap = evaluate([guard.gap], states=rest, values=values, bits=bits)[0]
         if gap == 0:  # no gap can open: contact is where the equations push
-            gap = -contact_peaks.side_that_pushes(system, len(bits))
+            gap = -side_that_pushes(system, len(bits))
         bits.append(bool(gap > 0))
     return np.array(
         [given.get(i, -1 if positive else 1) for i, positive in enumerate(bits)], dtype=np.int8
