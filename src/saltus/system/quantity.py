@@ -1,30 +1,21 @@
-"""Quantities: functions of time, states and parameters that a user adds to a system - a surface to
-cross, a power to integrate.
+"""What is added to a system: a surface to cross, a power to integrate.
 
-A quantity is traced as an equation is. Comparisons in it that mean a guard of the system read that
-guard's side; others become guards of their own, behind those of the system. The sign of friction
-that sticks is the one that holds it. With it the flow needs nothing new: a surface is one more
-guard, an integral one more state, and both come with the flow's own precision.
+The flow needs nothing new for it: a surface is one more guard, an integral one more state, and both
+come with the flow's own precision.
 """
 
 from __future__ import annotations
 
 import functools
-import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
-from saltus.contact.guards import Guard, Law, bits_in, expressions_of, join_guards, surface_guard
-from saltus.contact.singular import lifted
-from saltus.contact.surfaces import with_held_signs
-from saltus.errors import ParameterError, TraceError, nearest, shown
+from saltus.contact.guards import Guard, Law, bits_in, expressions_of, surface_guard
+from saltus.errors import ParameterError, shown
 from saltus.language.expression import (
-    TIME,
     Bit,
     Expr,
     add,
-    as_expr,
     constant,
     div,
     mul,
@@ -36,121 +27,12 @@ from saltus.language.expression import (
     substituted,
 )
 from saltus.language.names import why_no_name
-from saltus.system.explained import explained, place
+from saltus.system.read_off import Quantity, quantity
 from saltus.system.system import System
 from saltus.units import check_declared, to_si
 
 #: Suffix of a remembered state's name, which no user can write.
 _REMEMBERED = " before a jump"
-#: A function of (t, states, parameters), each argument by its name.
-Quantity = Callable[..., Any]
-
-
-def quantity(
-    system: System, function: Quantity, what: str = "a quantity"
-) -> tuple[Expr, tuple[Guard, ...]]:
-    """Trace a function of time, states and parameters of a system.
-
-    Parameters
-    ----------
-    system : System
-        Whose states and parameters the arguments are.
-    function : callable
-        Its arguments are found by name: ``t`` (the time), states, parameters, as many as it needs,
-        in any order; ``**rest`` takes all other parameters. So the signature of the equation itself
-        will do. Default values aren't used. It returns one number.
-    what : str
-        Words for the function in messages: ``"the surface"``.
-
-    Returns
-    -------
-    Expr, tuple of Guard
-        The expression, with bits in its conditions; the guards that these number: those of the
-        system, then new ones.
-
-    Raises
-    ------
-    TraceError
-        If an argument is neither time, state nor parameter, or the function can't be traced.
-    """
-    returned = called(system, function, what)
-    title = f"{what} of {system.name}"
-    try:
-        expression = as_expr(returned)
-    except Exception as error:
-        raise TraceError(*explained(error, function, title)) from error
-    try:
-        (root,), guards = join_guards([expression], system.guards)
-        (root,) = lifted([root], guards)
-        root = with_held_signs(root, guards, system.states)
-    except TraceError as error:
-        raise TraceError(f"{title} ({place(function)}): ", error) from error
-    return root, guards
-
-
-def called(system: System, function: Quantity, what: str) -> Any:
-    """The result of a user's function of time, states and parameters for symbols. Raises as
-    :func:`quantity` does.
-    """
-    if not callable(function) or isinstance(function, System):
-        names = ", ".join(("t", *_own_states(system)))
-        raise TraceError(
-            f"{what} must be a function such as `lambda {names}: ...`, not {shown(function)}. "
-            f"Parameters are further arguments, by name."
-        )
-    title = f"{what} of {system.name}"
-    positional, named = _arguments(system, function, title)
-    try:
-        returned = function(*positional, **named)
-        if returned is None:
-            raise TraceError("it returns nothing. End it with: return ...")
-    except Exception as error:
-        raise TraceError(*explained(error, function, title)) from error
-    return returned
-
-
-def _own_states(system: System) -> tuple[str, ...]:
-    """The states that a user knows: those of a tangent aren't named in functions."""
-    return (system.tangent_of or system).states
-
-
-def _arguments(
-    system: System, function: Quantity, title: str
-) -> tuple[list[Expr], dict[str, Expr]]:
-    """Symbols for the arguments of a function, by name."""
-    states = _own_states(system)
-    known = {
-        "t": TIME,
-        **{name: parameter(name) for name in system.values},
-        **{name: state(name) for name in states},
-    }
-    try:
-        arguments = list(inspect.signature(function).parameters.values())
-    except ValueError:  # of a class or function of C
-        raise TraceError(
-            f"{title}: Python doesn't know the arguments of {function!r:.80}. Write a "
-            f"function of names, such as x."
-        ) from None
-    plain = [a.name for a in arguments if a.kind in (a.POSITIONAL_ONLY, a.POSITIONAL_OR_KEYWORD)]
-    if tuple(plain[1:]) == states:
-        known[plain[0]] = TIME  # written as an equation: its first argument is the time
-    positional: list[Expr] = []
-    named: dict[str, Expr] = {}
-    for argument in arguments:
-        if argument.kind == argument.VAR_KEYWORD:
-            rest = set(system.values) - {a.name for a in arguments}
-            named.update((name, known[name]) for name in system.values if name in rest)
-        elif argument.kind == argument.VAR_POSITIONAL or argument.name not in known:
-            raise TraceError(
-                f"{title} ({place(function)}) asks for {argument.name!r}, which is neither t nor a "
-                f"state or parameter of {system.name}. "
-                f"{nearest(argument.name, known)} Constants of its own belong in its body."
-            )
-        elif argument.kind == argument.KEYWORD_ONLY:
-            named[argument.name] = known[argument.name]
-        else:
-            positional.append(known[argument.name])
-    return positional, named
 
 
 # -- surfaces --------------------------------------------------------------------------------------

@@ -9,13 +9,13 @@ from saltus.errors import ParameterError, TraceError, UnitError
 from saltus.language.expression import Bit, Not
 from saltus.language.text import to_text
 from saltus.system.quantity import (
-    quantity,
     remembering,
     turning_surface,
     with_integrals,
     with_level,
     with_surface,
 )
+from saltus.system.read_off import quantity
 from saltus.system.tangent import tangent_system
 
 

@@ -63,7 +63,7 @@ def free_system(system: System) -> tuple[System, str]:
     made = replace(
         system, field=tuple(field), guards=tuple(_guard(guard, zeros) for guard in system.guards),
         forced_at=None, values={**system.values, name: 0.0},
-        units={**system.units, name: "1/s"},
+        units={**system.units, name: "1/s"}, outputs=system.outputs.substituted(zeros),
     )  # fmt: skip
     if not autonomous(made):
         raise ParameterError(

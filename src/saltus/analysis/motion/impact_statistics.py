@@ -23,7 +23,8 @@ from saltus.language.evaluate import evaluate
 from saltus.language.expression import walk
 from saltus.results.dataset import schema
 from saltus.system import System
-from saltus.system.quantity import Quantity, with_impulses, with_integrals
+from saltus.system.quantity import with_impulses, with_integrals
+from saltus.system.read_off import Quantity
 
 #: Blocks whose scatter gives a standard error: consecutive contacts are not independent, blocks
 #: nearly are.

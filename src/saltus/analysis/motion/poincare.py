@@ -22,12 +22,12 @@ from saltus.kernels import status as st
 from saltus.results.dataset import schema
 from saltus.system import System
 from saltus.system.quantity import (
-    Quantity,
     acting_guards,
     turning_surface,
     with_level,
     with_surface,
 )
+from saltus.system.read_off import Quantity
 
 #: Touches closer than this are one [forcing periods; the span if unforced]: where a gap is flat its
 #: minimum is that uncertain.

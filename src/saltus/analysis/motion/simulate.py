@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis import dataset_parts
+from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.inputs.starts import Ensemble, Span, check_system, ensemble, span, trajectories
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion import time_errors as measure
@@ -121,6 +122,7 @@ def simulate(
     check_system(system)
     many = trajectories(start, values)
     _check_room(system, many, _least_samples(system, many, periods, samples, keep))
+    outputs_of(system)
     group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
     length = span(system, group, periods, t_end, t_start)
     flown = remembering(system)
@@ -209,7 +211,9 @@ def _least_samples(system: System, trajectories: int, periods: Any, samples: Any
 def _check_room(system: System, trajectories: int, samples: int, states: int | None = None) -> None:
     """Raise a ParameterError if samples of so many trajectories don't fit into memory."""
     check_room(
-        samples * trajectories * (16.0 * (states or len(system.states)) + 16.0),
+        samples
+        * trajectories
+        * (16.0 * ((states or len(system.states)) + len(system.outputs)) + 16.0),
         f"{trajectories} trajectories with {samples} samples each",
         lambda say: (
             f"Give {say.key('keep')} (last periods) or fewer {say.key('samples')}, or use "
@@ -255,13 +259,17 @@ def _dataset(
         "trajectory": np.arange(group.size),
         **({"period": count + fraction} if forced else {}),
         "time": time,
-        "<state>": outcome.samples[:, reached, : len(system.states)],
+        "<state>": dataset_parts.motion_values(
+            system, group, time, outcome.samples[:, reached], outcome.sample_mode[:, reached]
+        ),
         "mode": outcome.sample_mode[:, reached],
-        **dataset_parts.contacts(system, outcome, errors),
+        **dataset_parts.contacts(system, group, outcome, errors),
         **dataset_parts.endings(outcome),
         **dataset_parts.minima(outcome),
         "end_time": outcome.time,
-        "end_<state>": outcome.state[:, : len(system.states)],
+        "end_<state>": dataset_parts.motion_values(
+            system, group, outcome.time, outcome.state, outcome.mode
+        ),
     }
     return build(
         schema.TRAJECTORY, subject, values, along={"time": "period"} if own_periods else {}

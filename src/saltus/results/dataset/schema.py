@@ -6,6 +6,7 @@ account. :func:`saltus.results.dataset.build.build` makes Datasets by them.
 
 from __future__ import annotations
 
+import functools
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -196,6 +197,31 @@ def states_of(ds: xr.Dataset) -> tuple[str, ...]:
             "returned it, or a selection of it."
         )
     return tuple(ds.attrs["states"].split())
+
+
+def outputs_in(ds: xr.Dataset) -> tuple[str, ...]:
+    """Names of what a result tells of its motions, the usual one first: the states in the order of
+    the system, and its named outputs. Those of a structure whose states are coordinates of modes
+    stand before the states.
+    """
+    outputs = tuple(json.loads(ds.attrs.get("outputs", "[]")))
+    states = states_of(ds)
+    return (*outputs, *states) if ds.attrs.get("outputs_first") else (*states, *outputs)
+
+
+def first_of(ds: xr.Dataset) -> str:
+    """The state or output that is shown of a result where none is asked for."""
+    return outputs_in(ds)[0]
+
+
+@functools.cache
+def reserved_names() -> frozenset[str]:
+    """Names of variables and dims of results that hold outputs beside them, which no output can
+    have.
+    """
+    tables = [kind.variables for kind in KINDS.values() if "<state>" in kind.variables]
+    dims = {dim.rstrip("?") for table in tables for row in table.values() for dim in row.dims}
+    return frozenset(dims.union(*tables))
 
 
 def equations_of(ds: xr.Dataset) -> list[str]:

@@ -12,7 +12,7 @@ from saltus.study.code import code_hash
 from saltus.study.setting import quantities
 from saltus.study.tables.kinds import KINDS, whole
 from saltus.study.tables.signature import Asked, OfLength, table, verb
-from saltus.system.quantity import quantity
+from saltus.system.read_off import quantity
 
 if TYPE_CHECKING:
     import xarray as xr
