@@ -182,10 +182,10 @@ def contacts(
         every = motion_values(
             system, group, table.time, before, table.mode_before, table.trajectory
         )
-        names = (*system.states, *system.outputs.names)
+        known = (*system.states, *system.outputs.names)
         values["contact_<state>_before"] = {
             name: column
-            for name, column in zip(names, every.T, strict=True)
+            for name, column in zip(known, every.T, strict=True)
             if jumps or name in system.outputs.names
         }
     return values

@@ -59,9 +59,9 @@ def with_formula(
     system: EquationsOfMotion, found: NamedOutputs, name: str, formula: Expr,
     guards: tuple[Guard, ...], unit: str,
 ) -> NamedOutputs:  # fmt: skip
-    """The outputs and one more: a formula with the guards that its bits number (those of the system,
-    of the outputs before it, then its own), and its declared unit. Raises UnitError if the formula
-    is in another one.
+    """The outputs and one more: a formula with the guards that its bits number, and its declared
+    unit. The guards are those of the system, of the outputs before it, then its own. Raises
+    UnitError if the formula is in another one.
     """
     after = len(system.guards)
     known, _ = found.behind(system.guards)

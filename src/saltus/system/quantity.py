@@ -11,7 +11,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from saltus.contact.guards import Guard, Law, bits_in, expressions_of, surface_guard
-from saltus.errors import ParameterError, shown
+from saltus.errors import ParameterError, among, shown, unknown
+from saltus.language.derivatives import gradient, time_derivative
 from saltus.language.expression import (
     Bit,
     Expr,
@@ -27,6 +28,7 @@ from saltus.language.expression import (
     substituted,
 )
 from saltus.language.names import why_no_name
+from saltus.language.sums import total
 from saltus.system.read_off import Quantity, quantity
 from saltus.system.system import System
 from saltus.units import check_declared, to_si
@@ -46,7 +48,7 @@ def with_surface(system: System, surface: Quantity | str, name: str = "surface")
         The equations and values.
     surface : callable or str
         The motion is on the surface where this function of (t, states, parameters) is zero (see
-        :func:`quantity`); or the name of a state, for the surface on which that state is zero.
+        :func:`quantity`); or the name of a state or an output, for the surface on which it is zero.
     name : str
         Name of the guard; it gets primes if the system has one of that name.
 
@@ -65,22 +67,21 @@ def with_surface(system: System, surface: Quantity | str, name: str = "surface")
         If there is no such state.
     """
     if isinstance(surface, str):
-        system.state_unit(surface)
-        return _with_guard(system, state(surface), system.guards, name)
+        return _with_guard(system, *formula_of(system, surface), name)
     gap, guards = quantity(system, surface, "the surface")
     return _with_guard(system, gap, guards, name)
 
 
 def with_level(system: System, name: str, level: float | str) -> System:
-    """The system with a surface at a level of one state. The level is a new parameter, so another
-    one recompiles nothing.
+    """The system with a surface at a level of a state or an output. The level is a new parameter, so
+    another one recompiles nothing.
 
     Parameters
     ----------
     system : System
         The equations and values.
     name : str
-        A state.
+        A state or an output.
     level : float or str
         Its value on the surface: a number in SI, or text with a unit. It becomes the parameter
         ``surface_level``.
@@ -95,41 +96,72 @@ def with_level(system: System, name: str, level: float | str) -> System:
     ParameterError, UnitError
         If there is no such state, or the level isn't a finite number in its unit.
     """
-    unit, key = system.state_unit(name), _free("surface_level", system)
+    formula, guards = formula_of(system, name)
+    unit, key = unit_of(system, name), _free("surface_level", system)
     value = to_si(level, unit, f"the level of {name}")
     extended = replace(
         system, values={**system.values, key: value}, units={**system.units, key: unit}
     )
-    return _with_guard(extended, sub(state(name), parameter(key)), system.guards, key)
+    return _with_guard(extended, sub(formula, parameter(key)), guards, key)
 
 
 def turning_surface(system: System, name: str) -> System:
-    """The system with a surface on which a state turns: its rate is zero, from + to - (direction
-    -1) at a maximum.
+    """The system with a surface on which a state or an output turns: its rate is zero, from + to -
+    (direction -1) at a maximum.
 
     Parameters
     ----------
     system : System
         The equations and values.
     name : str
-        A state.
+        A state or an output.
 
     Returns
     -------
     System
-        The last guard is the surface; its gap is the rate of the state.
+        The last guard is the surface; its gap is the rate.
 
     Raises
     ------
     ParameterError
-        If there is no such state.
+        If there is no such state or output.
     TraceError
-        If the rate depends on no state, so that the state turns at given times.
+        If the rate depends on no state, so that it turns at given times.
     """
-    system.state_unit(name)
-    return _with_guard(
-        system, system.field[system.states.index(name)], system.guards, f"{name} turns"
-    )
+    formula, guards = formula_of(system, name)
+    return _with_guard(system, rate_of(system, formula), guards, f"{name} turns")
+
+
+def formula_of(system: System, name: str) -> tuple[Expr, tuple[Guard, ...]]:
+    """A state or an output of a system, and the guards that its bits number: those of the system, and
+    where it needs more, those of the outputs. Raises ParameterError if there is none of this name.
+    """
+    if not among(name, system.outputs.names):
+        unit_of(system, name)
+        return state(name), system.guards
+    formulas, guards = system.outputs.behind(system.guards)
+    formula = formulas[system.outputs.names.index(name)]
+    more = bits_in([formula]) - set(range(len(system.guards)))
+    return formula, guards if more else system.guards
+
+
+def rate_of(system: System, formula: Expr) -> Expr:
+    """The time derivative of a function of the states and the time, in a frozen mode."""
+    slopes = gradient(formula, system.states)
+    moved = [mul(slope, rate) for slope, rate in zip(slopes, system.field, strict=True)]
+    return total([one for one in (*moved, time_derivative(formula)) if one is not constant(0.0)])
+
+
+def unit_of(system: System, name: Any) -> str:
+    """Unit of a state or an output; ``""`` if it isn't known. Raises ParameterError for any other
+    name.
+    """
+    units = {one: system.units[one] for one in system.states}
+    units |= dict(zip(system.outputs.names, system.outputs.units, strict=True))
+    if not among(name, units):
+        what = "state or output" if len(system.outputs) else "state"
+        raise unknown(f"{system.name} has no {what}", name, units)
+    return units[name]
 
 
 def acting_guards(system: System) -> tuple[int, ...]:

@@ -289,9 +289,7 @@ def _read(data: Mapping[str, Any]) -> dict[str, Any]:
         "field": field,
         "guards": guards,
         "made": made,
-        "outputs": _outputs(data["outputs"], names, len(guards))
-        if "outputs" in data
-        else NO_OUTPUTS,
+        "outputs": _outputs(data.get("outputs"), names, len(guards)),
     }
 
 
@@ -306,8 +304,12 @@ def _read_nodes(data: Any, names: Mapping[str, set[str]]) -> list[Expr]:
     return nodes
 
 
-def _outputs(data: Mapping[str, Any], names: Mapping[str, set[str]], after: int) -> NamedOutputs:
+def _outputs(
+    data: Mapping[str, Any] | None, names: Mapping[str, set[str]], after: int
+) -> NamedOutputs:
     """The outputs from their data, checked; they stand behind the guards of the system."""
+    if data is None:
+        return NO_OUTPUTS
     titles, nodes = tuple(data["names"]), _read_nodes(data["nodes"], names)
     for name in titles:
         _require(why_no_output(name) is None, f"{shown(name)} is no name of an output")

@@ -113,8 +113,9 @@ class System(EquationsOfMotion):
         return origin
 
     def with_outputs(self, outputs: Mapping[str, Any]) -> System:
-        """The same equations with named outputs: sensors, forces, accelerations, whatever is read off
-        the motion. Every function then gives them besides the states. Nothing is compiled again.
+        """The same equations with named outputs: sensors, forces, accelerations, whatever is read
+        off the motion. Every function then gives them besides the states. Nothing is compiled
+        again.
 
         Parameters
         ----------

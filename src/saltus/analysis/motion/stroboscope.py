@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis import dataset_parts
+from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.inputs.starts import check_system, ensemble, span, trajectories
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion.window import computed
@@ -79,6 +80,7 @@ def stroboscope(
     """
     method = check_method(method)
     check_system(system)
+    outputs_of(system)
     if system.forced_at is None:
         raise ParameterError(
             f"{system.name} has no forcing period to be seen once in. Take "
@@ -109,7 +111,13 @@ def stroboscope(
         values = {
             "trajectory": np.arange(group.size),
             "period": periods_kept[reached],
-            "<state>": outcome.samples[:, reached, : len(system.states)],
+            "<state>": dataset_parts.motion_values(
+                system,
+                group,
+                length.t_start + periods_kept[reached] * length.period[:, None],
+                outcome.samples[:, reached],
+                outcome.sample_mode[:, reached],
+            ),
             **dataset_parts.endings(outcome),
             **dataset_parts.minima(outcome),
         }

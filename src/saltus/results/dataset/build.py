@@ -124,6 +124,25 @@ class Subject:
     outputs_first: bool = False
 
 
+def subject_of(
+    ds: xr.Dataset, names: Sequence[str], attrs: Mapping[str, Any], batch: bool = True,
+    varied: Mapping[str, Any] | None = None, forcing_period: Any = None,
+) -> Subject:  # fmt: skip
+    """The subject of a result that is made of another one, with some of its states and outputs."""
+    states = [name for name in names if name in schema.states_of(ds)]
+    known = [name for name in (*names, *(varied or {})) if name in ds]
+    return Subject(
+        states=states,
+        units={name: ds[name].attrs.get("units", "") for name in known},
+        attrs=attrs,
+        varied=varied or {},
+        forcing_period=forcing_period,
+        batch=batch,
+        outputs=[name for name in names if name not in states],
+        outputs_first=bool(ds.attrs.get("outputs_first")),
+    )
+
+
 def build(
     kind: str,
     subject: Subject,
@@ -178,7 +197,7 @@ def build(
     }
     attrs = {name: one for name, one in attrs.items() if name not in _ABOUT_OUTPUTS}
     if subject.outputs:
-        attrs |= dict(zip(_ABOUT_OUTPUTS, (list(subject.outputs), int(subject.outputs_first))))
+        attrs |= {"outputs": list(subject.outputs), "outputs_first": int(subject.outputs_first)}
     period = subject.forcing_period
     if period is not None and subject.batch and np.ndim(period):
         given.append(("forcing_period", period))

@@ -209,6 +209,19 @@ def outputs_in(ds: xr.Dataset) -> tuple[str, ...]:
     return (*outputs, *states) if ds.attrs.get("outputs_first") else (*states, *outputs)
 
 
+def told_of(ds: xr.Dataset) -> tuple[str, ...]:
+    """Names of what tables tell of the motions: the states and the outputs; the outputs alone where
+    they stand before the states.
+    """
+    names = outputs_in(ds)
+    return names[: len(names) - len(states_of(ds))] if ds.attrs.get("outputs_first") else names
+
+
+def output_word(ds: xr.Dataset) -> str:
+    """``state``, or ``state or output`` where there are outputs: what messages call one of them."""
+    return "state or output" if len(outputs_in(ds)) > len(states_of(ds)) else "state"
+
+
 def first_of(ds: xr.Dataset) -> str:
     """The state or output that is shown of a result where none is asked for."""
     return outputs_in(ds)[0]
