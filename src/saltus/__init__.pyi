@@ -76,6 +76,7 @@ from saltus.language import sin as sin
 from saltus.language import sinh as sinh
 from saltus.language import sqrt as sqrt
 from saltus.language import square as square
+from saltus.language import sweep as sweep
 from saltus.language import table as table
 from saltus.language import tan as tan
 from saltus.language import tanh as tanh
@@ -87,6 +88,7 @@ from saltus.results import save as save
 from saltus.results import to_csv as to_csv
 from saltus.results import to_mat as to_mat
 from saltus.results.describe import describe as describe
+from saltus.system import Base as Base
 from saltus.system import Contact as Contact
 from saltus.system import Force as Force
 from saltus.system import System as System

@@ -19,14 +19,21 @@ ODD = [
 RIG = sl.models.delangre("a", force="4 N", frequency="17 Hz")
 MATRICES = {"mass": np.eye(2), "stiffness": np.eye(2)}
 CONTACT = {"at": "x1", "stiffness": 1.0, "gap": 1.0}
+RIGID = {"at": "x1", "restitution": 0.0, "gap": 1.0, "friction": 0.2, "sliding": "x2"}
+BASE = {"direction": "x", "amplitude": 1.0}
 FORCE = {"at": "x1", "amplitude": 1.0}
 STRUCTURE = {**MATRICES, "contacts": [CONTACT], "forces": [FORCE], "frequency": 1.0}
 #: What is called, its usual arguments, and those that are made odd.
 CALLS = {
-    "structure": (sl.structure, STRUCTURE, "mass stiffness damping contacts forces frequency "
-        "damping_ratio modes names unit name source"),
+    "structure": (sl.structure, STRUCTURE, "mass stiffness damping contacts forces base "
+        "frequency damping_ratio modes names unit name source"),
     "contact": (lambda **part: sl.structure(**{**STRUCTURE, "contacts": [part]}), CONTACT,
-        "at stiffness gap to side damping name"),
+        "at stiffness gap to side damping name restitution power preload friction sliding"),
+    "rigid": (lambda **part: sl.structure(**{**STRUCTURE, "contacts": [part]}), RIGID,
+        "at stiffness gap to side damping name restitution power preload friction sliding"),
+    "base": (lambda **part: sl.structure(**{**STRUCTURE, "base": [part]}), BASE,
+        "direction amplitude phase harmonic name"),
+    "sweep": (sl.sweep, {"first": 1.0, "last": 2.0, "rate": 1.0}, "first last rate amplitude"),
     "force": (lambda **part: sl.structure(**{**STRUCTURE, "forces": [part]}), FORCE,
         "at amplitude phase harmonic name"),
     "structure_modes": (sl.structure_modes, MATRICES, "mass stiffness modes at names"),

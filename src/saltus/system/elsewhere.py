@@ -81,7 +81,7 @@ _ADVICE: dict[str, str] = {
         "There are no animations; matplotlib.animation.FuncAnimation can draw run.x and run.v, "
         "the samples of a run."),
     **dict.fromkeys(("fft", "psd", "periodogram", "welch"), "Write sl.spectrum(run)."),
-    **dict.fromkeys(("frf", "bode", "sweep", "resonance", "nonlinearfrf"),
+    **dict.fromkeys(("frf", "bode", "resonance", "nonlinearfrf"),
         "Write sl.frequency_response(system, (first, last, number))."),
     **dict.fromkeys(("orbitdiagram", "bifurcation"),
         "Write sl.bifurcation_diagram(system, {name: (low, high, number)})."),
@@ -91,8 +91,10 @@ _ADVICE: dict[str, str] = {
         "Write sl.transmissibility(response, output, input)."),
     **dict.fromkeys(("eigenvalues", "eig", "modes", "modal", "modeshapes", "eigenmodes"), _SHAPES),
     **dict.fromkeys(("base", "baseexcitation"),
-        "Of a structure give the forces of a moving base, -mass @ direction * acceleration, by "
-        "sl.Force; of an equation write the acceleration into it."),
+        "Write base=sl.Base(direction, acceleration) of sl.structure; of an equation write the "
+        "acceleration into it."),
+    **dict.fromkeys(("chirp", "sinesweep", "sweptsine"),
+        "Write sl.sweep(first, last, rate), a function of the time."),
     **dict.fromkeys(("sensor", "output", "outputs", "observer"),
         "Outputs are formulas: outputs={name: lambda x: ...} of sl.frequency_response and "
         "sl.bifurcation_diagram; of a run compute them from its states, such as 1e3*run.x."),

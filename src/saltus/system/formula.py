@@ -24,6 +24,7 @@ from saltus.language.clocks import mod
 from saltus.language.expression import Condition
 from saltus.language.inputs import pulse, sawtooth, square
 from saltus.language.names import why_no_name
+from saltus.language.sweeps import sweep
 from saltus.language.tables import Table, look_up
 
 #: Longest formula [characters].
@@ -37,6 +38,7 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "lankarani_nikravesh": lankarani_nikravesh, "flores": flores, "mod": mod, "play": play,
     "slider": slider,
     "square": square, "sawtooth": sawtooth, "pulse": pulse,
+    "sweep": lambda t, first, last, rate: sweep(first, last, rate)(t),
 }  # fmt: skip
 _CONSTANTS = {"pi": functions.pi}
 _BINARY: dict[type[ast.AST], Callable[[Any, Any], Any]] = {

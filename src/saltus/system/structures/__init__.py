@@ -1,6 +1,6 @@
 """Structures: systems made of matrices of mass, damping and stiffness, and contacts as data."""
 
-from saltus.system.structures.parts import Contact, Force
+from saltus.system.structures.parts import Base, Contact, Force
 from saltus.system.structures.structure import structure
 
-__all__ = ["Contact", "Force", "structure"]
+__all__ = ["Base", "Contact", "Force", "structure"]

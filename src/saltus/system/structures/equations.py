@@ -9,23 +9,23 @@ from typing import Any
 
 import numpy as np
 
-from saltus.contact.forces import freeplay
+from saltus.contact.declared import Impact
 from saltus.errors import ParameterError
-from saltus.language.expression import Expr, Relation, as_expr
-from saltus.language.functions import cos, pi
-from saltus.system.structures import matrices
-from saltus.system.structures.parts import Contact, Force, direction
+from saltus.language.expression import Relation
+from saltus.system.structures import drives, laws, matrices
+from saltus.system.structures.drives import FREQUENCY
+from saltus.system.structures.parts import Base, Contact, Force, direction, vector_of
 from saltus.system.system import System
 from saltus.system.trace import system
 
 #: An entry of the mode shapes below this share of the largest is rounding: the mode doesn't move
 #: that degree of freedom.
 NOTHING = 1e-13
-#: Unit of a deflection: those of its rate, a force, a stiffness and a damper.
+#: Unit of a deflection: those of its rate, a force, a stiffness, a damper and an acceleration.
 UNITS = {
-    "m": ("m/s", "N", "N/m", "N*s/m"),
-    "rad": ("rad/s", "N*m", "N*m/rad", "N*m*s/rad"),
-    "": ("", "", "", ""),
+    "m": ("m/s", "N", "N/m", "N*s/m", "m/s^2"),
+    "rad": ("rad/s", "N*m", "N*m/rad", "N*m*s/rad", "rad/s^2"),
+    "": ("", "", "", "", ""),
 }
 #: Of coordinates of modes of unit modal mass, and of their rates.
 MODAL = ("kg^0.5*m", "kg^0.5*m/s")
@@ -49,14 +49,31 @@ class Coordinates:
         if self.transform is None:
             return vector
         found = vector @ self.transform
-        return np.where(np.abs(found) <= NOTHING * np.abs(self.transform).max(), 0.0, found)
+        largest = np.abs(self.transform).max() * np.abs(vector).max()
+        return np.where(np.abs(found) <= NOTHING * largest, 0.0, found)
+
+
+@dataclass(frozen=True)
+class Loads:
+    """What acts on a structure, each with its name.
+
+    Attributes
+    ----------
+    contacts : list of (str, Contact)
+    drives : list of (str, Force or Base)
+    along : list of float64[n]
+        The force of each drive on the degrees of freedom, for a value of 1.
+    """
+
+    contacts: list[tuple[str, Contact]]
+    drives: list[tuple[str, Force | Base]]
+    along: list[np.ndarray]
 
 
 def traced(
     moving: Coordinates,
     degrees: list[str],
-    contacts: list[tuple[str, Contact]],
-    forces: list[tuple[str, Force]],
+    loads: Loads,
     frequency: Any,
     *,
     unit: str,
@@ -64,15 +81,13 @@ def traced(
     source: str,
 ) -> tuple[System, dict[str, Relation]]:
     """The system, and the boundary of each contact by its name."""
-    forced = any(drive.harmonic for _, drive in forces)
-    if forced and frequency is None:
-        raise ParameterError("the forces oscillate: give frequency=, such as frequency='15 Hz'.")
-    for label, contact in contacts:
-        if not moving.along(direction(contact, degrees)).any():
-            raise ParameterError(f"no mode that is kept moves {label}. Keep more by modes=.")
-    defaults, units = _parameters(contacts, forces, unit)
-    if forced:
-        defaults["frequency"] = frequency
+    needs, repeats = drives.forcing(loads.drives, frequency)
+    ways = [_way(moving, degrees, label, contact) for label, contact in loads.contacts]
+    along = [moving.along(one) for one in loads.along]
+    defaults, units = _parameters(loads, unit)
+    if needs:
+        defaults[FREQUENCY] = frequency
+        units |= {} if isinstance(frequency, str) else {FREQUENCY: "Hz"}
     own = (unit, UNITS[unit][0]) if moving.transform is None or not unit else MODAL
     units |= dict.fromkeys(moving.names, own[0]) | dict.fromkeys(moving.rates, own[1])
     sides: dict[str, Relation] = {}
@@ -81,24 +96,36 @@ def traced(
     def rates(t: Any, *states: Any, **values: Any) -> tuple[Any, ...]:
         z, w = states[:k], states[k:]
         load: list[Any] = [0.0] * k
-        for label, drive in forces:
-            _add(load, moving.along(direction(drive, degrees)), _force(t, label, drive, values))
-        for label, contact in contacts:
-            along = moving.along(direction(contact, degrees))
-            pushed = _contact(label, contact, _sum(along, z), _sum(along, w), values, sides)
-            _add(load, -along, pushed)
+        stops: list[Impact] = []
+        for (label, drive), place in zip(loads.drives, along, strict=True):
+            _add(load, place, drives.value(t, label, drive, values))
+        for (label, contact), way in zip(loads.contacts, ways, strict=True):
+            at = way.moving(z, w)
+            for side in laws.sides(contact):
+                both = f"{label} {side}" if contact.side == "both" else label
+                sides[both] = laws.relation(label, side, at, values)
+            pushed, rubbed = laws.forces(label, contact, at, values)
+            if contact.preload is not None:
+                pressing = values[f"{label}_preload"]
+                _add(load, way.pushed if contact.side == "upper" else -way.pushed, pressing)
+            if pushed is None:
+                stops += laws.impacts(label, contact, at, values, way.inertia)
+                continue
+            _add(load, -way.pushed, pushed)
+            if rubbed is not None:
+                _add(load, -way.rubbed, rubbed)
         for matrix, of in ((moving.stiffness, z), (moving.damping, w)):
             if matrix is not None:
                 rows = matrices.dense(matrix)
                 load = [one - _sum(row, of) for one, row in zip(load, rows, strict=True)]
         if moving.inverse is not None:
             load = [_sum(row, load) for row in moving.inverse]
-        return (*w, *load)
+        return (*w, *load, *stops)
 
     rates.__signature__ = _signature((*moving.names, *moving.rates), defaults)  # type: ignore[attr-defined]
     made: Callable[..., System] = system(
         (*moving.names, *moving.rates),
-        forced_at="frequency" if forced else None,
+        forced_at=FREQUENCY if repeats else None,
         units=units,
         name=name,
         source=source,
@@ -107,20 +134,61 @@ def traced(
     return made(rates), sides
 
 
-def _parameters(
-    contacts: list[tuple[str, Contact]], forces: list[tuple[str, Force]], unit: str
-) -> tuple[dict[str, Any], dict[str, str]]:
-    """Values and units of the parameters of contacts and forces."""
-    _, force, spring, damper = UNITS[unit]
+@dataclass(frozen=True)
+class Way:
+    """How a contact moves, in the coordinates of the structure: its deflection is ``pushed.z``, its
+    slip ``rubbed.z'``; ``inertia`` is that of the rates which a rigid stop changes.
+    """
+
+    pushed: np.ndarray
+    rubbed: np.ndarray
+    inertia: dict[str, float]
+
+    def moving(self, z: Sequence[Any], w: Sequence[Any]) -> laws.Moving:
+        """The motion at the contact."""
+        slip = _sum(self.rubbed, w) if self.rubbed.any() else None
+        return laws.Moving(_sum(self.pushed, z), _sum(self.pushed, w), slip)
+
+
+def _way(moving: Coordinates, degrees: list[str], label: str, contact: Contact) -> Way:
+    """The way of a contact. Raises ParameterError if the structure can't move so."""
+    pushed = moving.along(direction(contact, degrees))
+    rubbed = np.zeros(len(pushed))
+    if contact.sliding is not None:
+        pair = [contact.sliding] if isinstance(contact.sliding, str) else contact.sliding
+        rubbed = moving.along(vector_of(pair, degrees))
+    if not pushed.any() or (contact.sliding is not None and not rubbed.any()):
+        raise ParameterError(f"no mode that is kept moves {label}. Keep more by modes=.")
+    inertia = {}
+    if contact.restitution is not None:
+        masses = _masses(moving, label)
+        moved = np.flatnonzero((pushed != 0) | (rubbed != 0)).tolist()
+        inertia = {moving.rates[i]: float(masses[i]) for i in moved}
+    return Way(pushed, rubbed, inertia)
+
+
+def _masses(moving: Coordinates, label: str) -> np.ndarray:
+    """The mass of each coordinate. Raises ParameterError if a blow on one would move others."""
+    if moving.inverse is None:
+        return np.ones(len(moving.names))
+    diagonal = np.diag(moving.inverse)
+    if np.count_nonzero(moving.inverse) > len(diagonal):
+        raise ParameterError(
+            f"{label}: a blow on a rigid stop moves all degrees of freedom that the mass matrix "
+            f"joins. Give modes=, such as modes={len(diagonal)}, which loses nothing: among modes "
+            f"the mass is diagonal."
+        )
+    return np.asarray(1.0 / diagonal)
+
+
+def _parameters(loads: Loads, unit: str) -> tuple[dict[str, Any], dict[str, str]]:
+    """Values and units of the parameters of contacts and drives."""
+    _, force, spring, damper, acceleration = UNITS[unit]
     entries = []
-    for label, contact in contacts:
-        entries += [
-            (f"{label}_gap", contact.gap, unit),
-            (f"{label}_stiffness", contact.stiffness, spring),
-            (f"{label}_damping", contact.damping, damper),
-        ]
-    for label, drive in forces:
-        entries += [(label, drive.amplitude, force), (f"{label}_phase", drive.phase, "rad")]
+    for label, contact in loads.contacts:
+        entries += laws.entries(label, contact, (unit, force, spring, damper))
+    for label, drive in loads.drives:
+        entries += drives.entries(label, drive, acceleration if isinstance(drive, Base) else force)
     given = [entry for entry in entries if entry[1] is not None]
     keys = [key for key, _, _ in given]
     twice = [key for key in keys if keys.count(key) > 1]
@@ -155,35 +223,3 @@ def _add(load: list[Any], along: np.ndarray, force: Any) -> None:
     for i in np.flatnonzero(along).tolist():
         part = abs(float(along[i])) * force
         load[i] = load[i] + part if along[i] > 0 else load[i] - part
-
-
-def _force(t: Any, label: str, drive: Force, values: dict[str, Any]) -> Any:
-    phase: Any = values[f"{label}_phase"] if drive.phase is not None else 0.0
-    angle = 2 * pi * drive.harmonic * values["frequency"] * t + phase if drive.harmonic else phase
-    return values[label] * cos(angle)
-
-
-def _contact(
-    label: str,
-    contact: Contact,
-    deflection: Expr,
-    rate: Expr,
-    values: dict[str, Any],
-    sides: dict[str, Relation],
-) -> Any:
-    """The force of a contact on its degree of freedom, against the deflection."""
-    gap = values[f"{label}_gap"]
-    names = ("upper", "lower") if contact.side == "both" else (contact.side,)
-    for side in names:
-        relation = deflection > gap if side == "upper" else deflection < -gap
-        sides[f"{label} {side}" if len(names) > 1 else label] = relation
-    damped = contact.damping is not None
-    return as_expr(
-        freeplay(
-            deflection,
-            stiffness=values[f"{label}_stiffness"],
-            damping=values[f"{label}_damping"] if damped else 0.0,
-            velocity=rate if damped else None,
-            **{f"{side}_gap": gap for side in names},
-        )
-    )

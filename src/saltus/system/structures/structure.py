@@ -7,7 +7,7 @@ from __future__ import annotations
 import functools
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -18,9 +18,9 @@ from saltus.contact.guards import number_of
 from saltus.errors import ParameterError, SaltusWarning, among, must_be, shown
 from saltus.system.display import STRUCTURE
 from saltus.system.structures import matrices
-from saltus.system.structures.equations import UNITS, Coordinates, traced
+from saltus.system.structures.equations import UNITS, Coordinates, Loads, traced
 from saltus.system.structures.matrices import ASYMMETRY
-from saltus.system.structures.parts import BY_HAND, Contact, Force, direction, parts
+from saltus.system.structures.parts import Base, Contact, Force, direction, parts
 from saltus.system.structures.reduction import Modes, flexibility, modal_damping, modes_of
 from saltus.system.system import System
 from saltus.units import to_si
@@ -38,10 +38,8 @@ _ELSEWHERE = {
     **dict.fromkeys(("m", "M"), "Write mass=."),
     **dict.fromkeys(("dofs", "dof", "nodes", "labels", "states"), "Write names=."),
     **dict.fromkeys(("freq", "f", "forcing", "forced_at"), "Write frequency=."),
-    **dict.fromkeys(("base", "support", "ground", "excitation"),
-        "Of a base that shakes harmonically the forces are -mass @ direction times its "
-        "acceleration: one sl.Force for each degree of freedom. " + BY_HAND.replace(
-        "Write", "For a record, sl.recorded, write")),
+    **dict.fromkeys(("support", "ground", "excitation", "quake"),
+        "Write base=sl.Base(direction, acceleration)."),
     **dict.fromkeys(("outputs", "sensors", "output"), "An output is a formula of "
         "the coordinates: outputs= of sl.frequency_response and others, with the mode shapes of "
         "sl.structure_modes."),
@@ -60,6 +58,7 @@ def structure(
     *,
     contacts: Sequence[Any] = (),
     forces: Sequence[Any] = (),
+    base: Base | Sequence[Any] | Mapping[str, Any] | None = None,
     frequency: float | str | None = None,
     damping_ratio: Any = None,
     modes: int | None = None,
@@ -70,7 +69,7 @@ def structure(
 ) -> System:
     """A system of n degrees of freedom, from its matrices, with contacts and forces given as data::
 
-        mass x'' + damping x' + stiffness x = forces - contacts
+        mass x'' + damping x' + stiffness x = forces - contacts - mass direction acceleration
 
     Parameters
     ----------
@@ -81,11 +80,17 @@ def structure(
     damping : array or sparse matrix, shape (n, n), optional
         [N*s/m] Default: none.
     contacts : sequence of Contact, or of mappings of its arguments
-        Springs behind gaps, such as ``sl.Contact("x3", stiffness="1 MN/m", gap="1 mm")``.
+        Stops behind gaps, such as ``sl.Contact("x3", stiffness="1 MN/m", gap="1 mm")``, or
+        ``sl.Contact("x3", restitution=0.7, gap="1 mm")`` of a rigid one.
     forces : sequence of Force, or of mappings of its arguments
-        Harmonic forces, such as ``sl.Force("x1", "2 N", phase="90 deg")``.
+        Harmonic forces, such as ``sl.Force("x1", "2 N", phase="90 deg")``, and functions of the
+        time, ``sl.Force("x1", sl.recorded(times, values, "N"))``.
+    base : Base, or a sequence of them, optional
+        Acceleration of the base, such as ``sl.Base("z", sl.recorded(times, values, "g0"))``. The
+        deflections are then relative to the base.
     frequency : float or str, optional
-        Forcing frequency [Hz]; needed with forces that oscillate.
+        Forcing frequency [Hz]; needed with forces that oscillate. A structure with a force or a
+        base that doesn't repeat has no forcing frequency: ``t_end=`` ends its motion.
     damping_ratio : float, str or sequence, optional
         In place of ``damping``: the ratio of every mode, such as 0.02 or ``"2 %"``, or one each for
         the lowest of them.
@@ -146,6 +151,13 @@ def structure(
     degrees = degree_names(names, size)
     touching = parts(Contact, contacts, "stop", degrees)
     driving = parts(Force, forces, "force", degrees)
+    bases = base if isinstance(base, list | tuple) else [base] if base is not None else []
+    shaking = parts(Base, bases, "base", degrees)
+    loads = Loads(
+        touching, [*driving, *shaking],
+        [direction(one, degrees) for _, one in driving]
+        + [-(mass @ direction(one, degrees)) for _, one in shaking],
+    )  # fmt: skip
     count = _count(modes, size)
     known = modes_of(mass, stiffness, count) if reduced else None
     if known is not None and damping_ratio is not None:
@@ -162,9 +174,7 @@ def structure(
         moving = _modal(known.kept(count), damping)
         words = _words(stiffness, known, count, degrees, touching)
     _doubt_swapped(known.angular if known is not None else _angular(moving, stiffness))
-    made, sides = traced(
-        moving, degrees, touching, driving, frequency, unit=unit, name=name, source=source
-    )
+    made, sides = traced(moving, degrees, loads, frequency, unit=unit, name=name, source=source)
     guards = list(made.guards)
     for label, side in sides.items():
         number = number_of(side, made.guards)
