@@ -115,7 +115,8 @@ def motion_values(
         return states
     own = group.parameters if rows is None else group.parameters[rows]
     shape = (len(own), *(1,) * (states.ndim - 2))
-    values = dict(zip(system.values, (one.reshape(shape) for one in own.T), strict=True))
+    # a level of a section stands behind the parameters of the system
+    values = dict(zip(system.values, (one.reshape(shape) for one in own.T), strict=False))
     return outputs_of(system).values(time, states, values, mode)
 
 

@@ -36,7 +36,7 @@ def section(
     units: Mapping[str, str] | None = None,
     legend: bool = True,
 ) -> Axes:
-    """Points of a Poincare section: one state or output against another, or against the phase of the forcing.
+    """Points of a Poincare section: a state or output against another, or the phase of the forcing.
 
     A colour for each direction of crossing; of several trajectories one for each. Crossings too
     shallow to be sure of are hollow.

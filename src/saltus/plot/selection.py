@@ -265,7 +265,7 @@ def path(ds: xr.Dataset, states: tuple[str, ...], begin: float, end: float) -> P
         {sample_dim(ds): np.flatnonzero((axis >= begin - slack) & (axis <= end + slack))}
     )
     table = contacts_in(ds, begin, end)
-    sides = [(contact_name, "contact_mode_after")]
+    sides: list[tuple[Callable[[str], str], str]] = [(contact_name, "contact_mode_after")]
     if any(before_name(name) in table for name in states):
         sides.insert(0, (_before(table), "contact_mode_before"))
 

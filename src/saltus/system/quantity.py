@@ -73,8 +73,8 @@ def with_surface(system: System, surface: Quantity | str, name: str = "surface")
 
 
 def with_level(system: System, name: str, level: float | str) -> System:
-    """The system with a surface at a level of a state or an output. The level is a new parameter, so
-    another one recompiles nothing.
+    """The system with a surface at a level of a state or an output. The level is a new parameter,
+    so another one recompiles nothing.
 
     Parameters
     ----------
@@ -133,8 +133,8 @@ def turning_surface(system: System, name: str) -> System:
 
 
 def formula_of(system: System, name: str) -> tuple[Expr, tuple[Guard, ...]]:
-    """A state or an output of a system, and the guards that its bits number: those of the system, and
-    where it needs more, those of the outputs. Raises ParameterError if there is none of this name.
+    """A state or an output of a system, and the guards that its bits number: those of the system,
+    and where it needs more, those of the outputs. Raises ParameterError for any other name.
     """
     if not among(name, system.outputs.names):
         unit_of(system, name)
@@ -152,7 +152,7 @@ def rate_of(system: System, formula: Expr) -> Expr:
     return total([one for one in (*moved, time_derivative(formula)) if one is not constant(0.0)])
 
 
-def unit_of(system: System, name: Any) -> str:
+def unit_of(system: System, name: str) -> str:
     """Unit of a state or an output; ``""`` if it isn't known. Raises ParameterError for any other
     name.
     """

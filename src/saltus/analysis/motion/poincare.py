@@ -82,7 +82,8 @@ def poincare(
     Dataset
         Dims ``crossing`` (one table for all trajectories, sorted by trajectory and time), ``guard``
         (of the system itself), and ``trajectory`` for many. Each state and output
-        at the crossings, ``crossing_time``, ``crossing_phase`` (t/T mod 1, NaN if unforced), ``crossing_period``,
+        at the crossings, ``crossing_time``, ``crossing_phase`` (t/T mod 1, NaN if unforced),
+        ``crossing_period``,
         ``crossing_direction``, ``crossing_rate`` of the function (zero: a tangency),
         ``crossing_kind`` (``graze_unresolved``: too shallow to be sure of),
         ``crossing_trajectory``; per trajectory ``crossings``, ``tangencies``, ``contacts``,

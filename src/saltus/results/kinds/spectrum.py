@@ -62,8 +62,8 @@ def account(ds: xr.Dataset) -> list[str]:
 
 
 def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
-    """A row for each line; on the screen the largest ones of the first state or output, in the order of the
-    file.
+    """A row for each line; on the screen the largest ones of the first state or output, in the
+    order of the file.
     """
     amplitudes = [ds[f"{name}_amplitude"] for name in told_of(ds)]
     like = amplitudes[0]

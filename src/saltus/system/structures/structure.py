@@ -22,6 +22,7 @@ from saltus.system.structures.equations import UNITS, Coordinates, Loads, traced
 from saltus.system.structures.matrices import ASYMMETRY
 from saltus.system.structures.parts import Base, Contact, Force, direction, parts
 from saltus.system.structures.reduction import Modes, flexibility, modal_damping, modes_of
+from saltus.system.structures.sensors import with_sensors
 from saltus.system.system import System
 from saltus.units import to_si
 
@@ -40,9 +41,8 @@ _ELSEWHERE = {
     **dict.fromkeys(("freq", "f", "forcing", "forced_at"), "Write frequency=."),
     **dict.fromkeys(("support", "ground", "excitation", "quake"),
         "Write base=sl.Base(direction, acceleration)."),
-    **dict.fromkeys(("outputs", "sensors", "output"), "An output is a formula of "
-        "the coordinates: outputs= of sl.frequency_response and others, with the mode shapes of "
-        "sl.structure_modes."),
+    **dict.fromkeys(("outputs", "output", "observers", "probes"),
+        "Write sensors={\"tip\": \"x3\"}."),
 }  # fmt: skip
 #: Natural frequency [Hz] below which mass and stiffness may be swapped.
 _ABSURD = 3e-2
@@ -66,6 +66,7 @@ def structure(
     unit: str = "m",
     name: str = "structure",
     source: str = "",
+    sensors: Mapping[str, Any] | None = None,
 ) -> System:
     """A system of n degrees of freedom, from its matrices, with contacts and forces given as data::
 
@@ -105,6 +106,11 @@ def structure(
         Unit of all degrees of freedom; ``""`` if they differ.
     name, source : str
         As of :func:`saltus.system`.
+    sensors : mapping, optional
+        Named outputs, which every result holds and every picture shows: a degree of freedom for its
+        deflection, a pair of them for a stretch, ``sl.velocity("x3")``, ``sl.acceleration("x3")``,
+        ``sl.contact_force("stop")``, or a function of the states as of
+        :meth:`saltus.System.with_outputs`.
 
     Returns
     -------
@@ -119,7 +125,8 @@ def structure(
     ------
     ParameterError, UnitError
         If a matrix has a wrong shape, isn't finite, or the mass matrix isn't symmetric and positive
-        definite; if a contact or force can't be used, or there are too many degrees of freedom.
+        definite; if a contact, force or sensor can't be used, or there are too many degrees of
+        freedom.
 
     Notes
     -----
@@ -180,7 +187,8 @@ def structure(
         number = number_of(side, made.guards)
         if number is not None:
             guards[number] = replace(guards[number], name=label)
-    return replace(made, guards=tuple(guards), description=words)
+    made = replace(made, guards=tuple(guards), description=words)
+    return made if sensors is None else with_sensors(made, sensors, moving, degrees, loads, unit)
 
 
 # -- coordinates -----------------------------------------------------------------------------------
