@@ -115,7 +115,8 @@ def _along(one: points.Shown, dots: np.ndarray, state: str) -> list[np.ndarray]:
     points at whole periods.
     """
     ds = one.ds
-    if one.name or "point_branch" not in ds:
+    known = _sample(ds, state) == "turning_points" or point_name(state) in ds
+    if one.name or "point_branch" not in ds or not known:
         return []
     if _sample(ds, state) == "turning_points":
         along = [ds[f"point_output_{end}"].sel(output=state).values for end in _EXTREMES]

@@ -23,6 +23,8 @@ def identity(system: System, method: Any, arguments: Mapping[str, Any]) -> dict[
         "method options": to_json(method.options()), "saltus": version("saltus"),
         "code": code_hash(),
     }  # fmt: skip
+    if len(system.outputs):
+        fixed["outputs"] = to_json(system.to_dict()["outputs"])
     asked = {
         f"{name} of the question" if name in fixed else name: value
         for name, value in arguments.items()

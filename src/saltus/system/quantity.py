@@ -183,7 +183,7 @@ def _with_guard(system: System, gap: Expr, guards: tuple[Guard, ...], name: str)
 
 # -- integrals -------------------------------------------------------------------------------------
 def with_integrals(
-    system: System, integrands: Mapping[str, Quantity], units: Mapping[str, str] | None = None
+    system: System, integrands: Mapping[str, Quantity | str], units: Mapping[str, str] | None = None
 ) -> System:
     """The system with more states, each the integral of a function along the motion; their starts
     are given, as a rule zero.
@@ -192,9 +192,9 @@ def with_integrals(
     ----------
     system : System
         The equations and values.
-    integrands : mapping of str to callable
+    integrands : mapping of str to callable or str
         Integrands by the name of the new state: functions of (t, states, parameters), see
-        :func:`quantity`. They can't use the other integrals.
+        :func:`quantity`, or names of states or outputs. They can't use the other integrals.
     units : mapping of str to str, optional
         Coherent SI unit of each integral.
 
@@ -220,7 +220,10 @@ def with_integrals(
                 f"an integral of {system.name} can't be called {shown(name)}: use letters, digits "
                 f"and _, and no name it has."
             )
-        rate, guards = quantity(extended, function, f"the integrand {shown(name)}")
+        if isinstance(function, str):
+            rate, guards = formula_of(extended, function)
+        else:
+            rate, guards = quantity(extended, function, f"the integrand {shown(name)}")
         extended = replace(extended, guards=guards)
         rates.append(rate)
     return with_states(extended, dict(zip(integrands, rates, strict=True)), new_units)

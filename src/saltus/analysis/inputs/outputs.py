@@ -82,6 +82,12 @@ class Outputs:
         return np.concatenate([states, np.stack(columns, axis=-1)], axis=-1)
 
 
+def states_alone(system: System) -> Outputs:
+    """The states of a system as outputs, and no functions."""
+    units = tuple(system.units[name] for name in system.states)
+    return Outputs(system.states, units, (), system.guards, len(system.guards))
+
+
 def outputs_of(system: System, given: Mapping[str, Any] | None = None) -> Outputs:
     """The outputs of a system: its states, those that it has by name, then the user's functions.
 

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from saltus.analysis.dataset_parts import motion_values
+from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.inputs.starts import check_system
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion import touchdowns
@@ -42,7 +44,7 @@ def impact_statistics(
     t_end: float | str | None = None,
     t_start: float | str = 0.0,
     transient: int | float | str = 0,
-    force: Mapping[str, Quantity] | None = None,
+    force: Mapping[str, Quantity | str] | None = None,
     contact_side: Mapping[str, int] | None = None,
     bins: int | Sequence[float] = BINS,
     method: Method | None = None,
@@ -65,9 +67,10 @@ def impact_statistics(
         Time at the end [s], in place of periods.
     transient : int, or float or str
         Whole forcing periods before; of an unforced system a time [s].
-    force : mapping of str to callable, optional
+    force : mapping of str to callable or str, optional
         For guards by name: the force of that contact [N] as a function of (t, states, parameters),
-        arguments found by name; it needs to be right in contact only. Its integral from the
+        arguments found by name, or the name of an output, such as that of a sensor
+        ``sl.contact_force``; it needs to be right in contact only. Its integral from the
         beginning of a contact to its end is the impulse. Rigid stops need none: theirs is that of
         their law. ``ODE45`` controls the error of the
         integral too, so its steps may differ from those without.
@@ -95,7 +98,8 @@ def impact_statistics(
         shorter than the one before it, ``contact_impacts`` is how many were met before the
         infinitely many that are left were summed up (the error is below 1e-8 of their own part),
         ``contact_impulse_of_impacts`` is that of all of them, and ``contact_impulse`` has that of
-        the force at rest too, which is also the impulse of the guard ``... at rest``. Impulses of a
+        the force at rest too, which is also the impulse of the guard ``... at rest``. Of a system
+        with outputs ``touchdown_<output>``, their values where each contact begins. Impulses of a
         stop are relative to the mass if ``sl.impact`` has no ``inertia``.
 
     Raises
@@ -122,6 +126,7 @@ def impact_statistics(
     40
     """
     check_system(system)
+    outputs_of(system)
     method = check_method(method)
     if not method.records_contacts:
         raise ParameterError(
@@ -243,6 +248,14 @@ def _dataset(
         )
     if found.impulse is not None:
         columns["contact_impulse"] = found.impulse
+    if len(system.outputs):
+        table, size = outcome.contacts.rows(found.row), len(system.states)
+        known = motion_values(
+            system, seen.group, table.time, table.state, table.mode_after, table.trajectory
+        )
+        columns["touchdown_<state>"] = dict(
+            zip(system.outputs.names, known[:, size:].T, strict=True)
+        )
     columns |= {"contact_side": sides, "speed_low": edges[:-1], "speed_high": edges[1:]}
     words = {"<impulse>": _impulse_unit(system)}
     return dataset(schema.IMPACTS, seen, system, method, outcome, columns, each, words=words)

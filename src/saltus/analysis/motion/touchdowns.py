@@ -24,6 +24,8 @@ class Touchdowns:
     ----------
     trajectory, guard : int64[k]
         Which one.
+    row : int64[k]
+        Of the table of contacts, where it begins.
     begin, end : float64[k]
         Times [s]; the end is NaN where the stretch ends first.
     speed, exit_speed : float64[k]
@@ -41,6 +43,7 @@ class Touchdowns:
 
     trajectory: np.ndarray
     guard: np.ndarray
+    row: np.ndarray
     begin: np.ndarray
     end: np.ndarray
     speed: np.ndarray
@@ -109,6 +112,7 @@ def find(
     return Touchdowns(
         trajectory=who[first],
         guard=guard[first],
+        row=first,
         begin=time[first],
         end=np.where(ended, time[final], np.nan),
         speed=speed[first],

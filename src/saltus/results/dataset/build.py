@@ -236,7 +236,7 @@ class _Building:
         first = subject.units.get(subject.states[0], "") if subject.states else ""
         self.words = {
             "<gap>": gap, "<gap rate>": schema.rate_unit(gap), "<root gap>": schema.root_unit(gap),
-            "<first>": first, **words,
+            "<first>": first, "<output>": "", **words,
         }  # fmt: skip
         self.data: dict[str, xr.Variable] = {}
         self.coords: dict[str, xr.Variable] = {}

@@ -227,6 +227,17 @@ def first_of(ds: xr.Dataset) -> str:
     return outputs_in(ds)[0]
 
 
+def first_size(ds: xr.Dataset, own: str, of_output: str) -> tuple[str, xr.DataArray]:
+    """The size of the state or output that is shown first, and its name: the variable ``own`` of
+    the first state, or that of ``of_output`` which is of the output.
+    """
+    name = first_of(ds)
+    if name == states_of(ds)[0] or of_output not in ds:
+        return states_of(ds)[0], ds[own]
+    chosen = ds[of_output].sel(output=name)
+    return name, chosen.assign_attrs(units=str(chosen["output_units"].item()))
+
+
 @functools.cache
 def reserved_names() -> frozenset[str]:
     """Names of variables and dims of results that hold outputs beside them, which no output can

@@ -38,6 +38,7 @@ VARIABLES = {
     "contact_impulse_of_impacts": Variable(
         _CONTACT, "<impulse>", "impulse of the impacts of the contact, without that at rest"
     ),
+    "touchdown_<state>": Variable(_CONTACT, "<state>", "<state> where the contact begins"),
     "contact_impulse": Variable(_CONTACT, "<impulse>", "impulse of the contact force"),
     "contact_trajectory": Variable(_CONTACT, "1", "trajectory that the contact belongs to", "i8"),
     "contact_side": Variable(("guard",), "1", "sign of the gap in contact", "i1"),
