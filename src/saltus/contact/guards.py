@@ -308,6 +308,8 @@ class _Finder:
     def _condition(self, condition: Condition) -> Condition | bool:
         """The condition in terms of bits, or its value where that is certain."""
         match condition:
+            case Bit():  # of a known guard: an expression of the system itself
+                return condition
             case Relation():
                 return self.outcome[condition]
             case Not(inner):

@@ -82,6 +82,16 @@ class Outputs:
         return np.concatenate([states, np.stack(columns, axis=-1)], axis=-1)
 
 
+def check_outputs(system: System) -> None:
+    """Raise a ParameterError for an output that has the name of another variable of results."""
+    for name in system.outputs.names:
+        if name in reserved_names():
+            raise ParameterError(
+                f"the output {shown(name)} has the name of something else in results. Give it "
+                f"another one."
+            )
+
+
 def states_alone(system: System) -> Outputs:
     """The states of a system as outputs, and no functions."""
     units = tuple(system.units[name] for name in system.states)
@@ -105,12 +115,6 @@ def outputs_of(system: System, given: Mapping[str, Any] | None = None) -> Output
         If a name is taken, a unit can't be read, or a function can't be traced or doesn't repeat
         with the forcing.
     """
-    for name in system.outputs.names:
-        if name in reserved_names():
-            raise ParameterError(
-                f"the output {shown(name)} has the name of something else in results. Give it "
-                f"another one."
-            )
     found = system.outputs if given is None else with_more(system, given, variables=False)
     formulas, guards = found.behind(system.guards)
     units = (*(system.units[name] for name in system.states), *found.units)

@@ -9,7 +9,6 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.dataset_parts import motion_values
-from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.inputs.starts import check_system
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion import touchdowns
@@ -126,7 +125,6 @@ def impact_statistics(
     40
     """
     check_system(system)
-    outputs_of(system)
     method = check_method(method)
     if not method.records_contacts:
         raise ParameterError(

@@ -11,7 +11,6 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.dataset_parts import motion_values
-from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.inputs.starts import check_system
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion.window import Stretch, computed, dataset, stretch
@@ -113,7 +112,6 @@ def poincare(
     6
     """
     check_system(system)
-    outputs_of(system)
     method = check_method(method)
     if not method.records_contacts:
         raise ParameterError(

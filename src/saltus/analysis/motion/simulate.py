@@ -11,7 +11,6 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis import dataset_parts
-from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.inputs.starts import Ensemble, Span, check_system, ensemble, span, trajectories
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion import time_errors as measure
@@ -122,7 +121,6 @@ def simulate(
     check_system(system)
     many = trajectories(start, values)
     _check_room(system, many, _least_samples(system, many, periods, samples, keep))
-    outputs_of(system)
     group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
     length = span(system, group, periods, t_end, t_start)
     flown = remembering(system)

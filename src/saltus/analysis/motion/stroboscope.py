@@ -10,7 +10,6 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis import dataset_parts
-from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.inputs.starts import check_system, ensemble, span, trajectories
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion.window import computed
@@ -80,7 +79,6 @@ def stroboscope(
     """
     method = check_method(method)
     check_system(system)
-    outputs_of(system)
     if system.forced_at is None:
         raise ParameterError(
             f"{system.name} has no forcing period to be seen once in. Take "

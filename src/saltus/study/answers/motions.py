@@ -28,7 +28,9 @@ _OPTIONAL = ("friction",)
 
 
 _BASE: Any = (OfLength, Asked)
-_STATES = Field(None, min_length=1, description="Which states and outputs; all by default.", examples=[["x"]])
+_STATES = Field(
+    None, min_length=1, description="Which states and outputs; all by default.", examples=[["x"]]
+)
 _LEFT_OUT = ("state", "keep", "time_errors", "surface", "direction")
 
 

@@ -43,8 +43,8 @@ _STARTS = (
     "At rest by default."
 )
 _FORMULAS_OF_GUARDS = (
-    "For guards by name: the force of that contact, right in contact only, or the name of an output. "
-    "Its integral is the impulse."
+    "For guards by name: the force of that contact, right in contact only, or the name of an "
+    "output. Its integral is the impulse."
 )
 KINDS = {
     "start": WrittenAs(
