@@ -249,12 +249,15 @@ def test_impacts_take_the_force_of_a_sensor():
     np.testing.assert_allclose(found["touchdown_tip speed"], found["contact_speed"], rtol=1e-12)
 
 
-def test_a_backbone_tells_the_numbers_of_outputs():
+@pytest.mark.parametrize("state", [None, "tip", "stretch"])
+def test_a_backbone_tells_the_numbers_of_outputs(state):
     free = sl.structure(
         MASS, STIFFNESS, modes=3, contacts=[sl.Contact("x3", stiffness=STOP, gap=GAP)],
-        sensors={name: SENSORS[name] for name in ("tip", "stop force", "tip acceleration")},
+        sensors={name: SENSORS[name] for name in SENSORS if name != "beyond"},
     )  # fmt: skip
-    spine = sl.backbone(free, (1e-3, 4e-3), progress=False)
+    spine = sl.backbone(free, (1e-3, 4e-3), state=state, progress=False)
+    ends = spine["point_output_peak"].sel(output=state or "q1").values[[0, -1]]
+    np.testing.assert_allclose(ends, [1e-3, 4e-3], rtol=1e-9)
     rows = [0, spine.sizes["point"] // 2, -1]
     for row in rows:
         point = spine.isel(point=row)
