@@ -144,7 +144,7 @@ def test_what_is_advised_exists():
     [
         ({"events": abs}, r"comparisons in the equation.*sl\.poincare"),
         ({"terminal": True}, r"isn't possible.*run\.contact_time"),
-        ({"outputs": {"a": lambda x: x}}, r"sl\.frequency_response.*know outputs.*run\.x"),
+        ({"outputs": {"a": lambda x: x}}, r"system\.with_outputs"),
         ({"max_step": 0.1}, r"chooses its steps.*sl\.RK4\(step\)"),
         ({"jac": None}, "isn't needed"),
         ({"dense_output": True}, "samples="),

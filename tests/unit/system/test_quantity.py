@@ -79,7 +79,6 @@ def _branches(x):
             r"asks for 'stifness', which is neither t nor a state or parameter "
             r"of rig. Did you mean 'stiffness'\?",
         ),
-        (lambda *args: args, "asks for 'args'"),
         (lambda x: None, "returns nothing"),
         (_branches, r"if x > 0"),
         (lambda x: (x, x), "neither a number nor a traced value"),

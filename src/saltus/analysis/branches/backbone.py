@@ -112,8 +112,9 @@ def backbone(
     -------
     Dataset
         Dims ``point``, ``output`` (the states and outputs), ``multiplier``.
-        ``backbone_frequency`` [Hz], ``point_period`` [s], ``point_output_peak`` and so on of each state, ``point_<state>`` where
-        the vibration passes its rest (in quadrature: at whole forcing periods),
+        ``backbone_frequency`` [Hz], ``point_period`` [s], ``point_output_peak`` and so on of each
+        output, ``point_<state>`` where the vibration passes its rest (in quadrature: at whole
+        forcing periods),
         ``point_itinerary``, ``point_stable``, multipliers, and ``fictitious_damping`` [1/s], which
         is rounding; in quadrature ``point_<parameter>`` of the frequency and the force. The first
         and the last point have the amplitudes asked for; attribute ``end`` says ``points`` or

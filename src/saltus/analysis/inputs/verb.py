@@ -59,10 +59,7 @@ _MISSING: Mapping[str, str] = {
         ("terminal", "stop", "stop_at", "until"),
         "To stop at an event isn't possible: run on, and cut the result at run.contact_time.",
     ),
-    "outputs": (
-        "sl.frequency_response, sl.bifurcation_diagram and sl.branches know outputs; of a run "
-        "compute them from its states, such as 1e3*run.x."
-    ),
+    "outputs": "The system has them: system.with_outputs({'tip': lambda x: ...}).",
     **dict.fromkeys(("max_step", "first_step", "min_step", "hmax", "h0", "options"), _STEPS),
     **dict.fromkeys(("jac", "jacobian", "vectorized", "mass_matrix"), _NOT_NEEDED),
     "dense_output": "Write samples= for more samples; run.x.interp(time=...) reads between them.",
