@@ -77,7 +77,7 @@ def set_item(mapping, name):
         ("eig", r"sl\.structure_modes\("),
         ("base_excitation", r"base=sl\.Base"),
         ("chirp", r"sl\.sweep\("),
-        ("Sensor", "outputs="),
+        ("Sensor", r"with_outputs\("),
         ("limit_cycle", r"sl\.periodic_orbits\("),
         ("cell_mapping", r"sl\.basins\("),
         ("bouc_wen", "one more state"),

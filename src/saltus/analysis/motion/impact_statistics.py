@@ -25,7 +25,6 @@ from saltus.language.expression import walk
 from saltus.results.dataset import schema
 from saltus.system import System
 from saltus.system.quantity import with_impulses, with_integrals
-from saltus.system.read_off import Quantity
 
 #: Blocks whose scatter gives a standard error: consecutive contacts are not independent, blocks
 #: nearly are.
@@ -43,7 +42,7 @@ def impact_statistics(
     t_end: float | str | None = None,
     t_start: float | str = 0.0,
     transient: int | float | str = 0,
-    force: Mapping[str, Quantity | str] | None = None,
+    force: Mapping[str, Any] | None = None,
     contact_side: Mapping[str, int] | None = None,
     bins: int | Sequence[float] = BINS,
     method: Method | None = None,

@@ -41,6 +41,11 @@ class Sensor:
     at: str
     to: str | None = None
 
+    def __post_init__(self) -> None:
+        for key, name in (("at", self.at), ("to", self.to)):
+            if not isinstance(name, str) and (key == "at" or name is not None):
+                raise must_be(key, "a name, such as 'x3'", name)
+
 
 def velocity(at: str, to: str | None = None) -> Sensor:
     """A sensor of the velocity of a degree of freedom of a structure.
@@ -51,6 +56,27 @@ def velocity(at: str, to: str | None = None) -> Sensor:
         Its name. Where the base moves, the velocity is relative to the base.
     to : str, optional
         Another one: the velocity is that of ``at`` minus that of ``to``.
+
+    Returns
+    -------
+    Sensor
+        For ``sensors=`` of :func:`saltus.structure`. Its unit is that of the degrees of freedom per
+        second.
+
+    Raises
+    ------
+    ParameterError
+        If a name isn't text.
+
+    Examples
+    --------
+    >>> import numpy as np, saltus as sl
+    >>> pair = sl.structure(
+    ...     np.eye(2), 1e3 * np.array([[2, -1], [-1, 1]]), modes=2,
+    ...     sensors={"tip speed": sl.velocity("x2")},
+    ... )
+    >>> pair.outputs.names, pair.outputs.units
+    (('tip speed',), ('m/s',))
     """
     return Sensor("velocity", at, to)
 
@@ -65,6 +91,27 @@ def acceleration(at: str, to: str | None = None) -> Sensor:
         Its name. Where the base moves, the acceleration is absolute: that of the base is added.
     to : str, optional
         Another one: the acceleration is that of ``at`` minus that of ``to``.
+
+    Returns
+    -------
+    Sensor
+        For ``sensors=`` of :func:`saltus.structure`. Its unit is that of the degrees of freedom per
+        square second.
+
+    Raises
+    ------
+    ParameterError
+        If a name isn't text.
+
+    Examples
+    --------
+    >>> import numpy as np, saltus as sl
+    >>> pair = sl.structure(
+    ...     np.eye(2), 1e3 * np.array([[2, -1], [-1, 1]]), modes=2,
+    ...     sensors={"tip acceleration": sl.acceleration("x2")},
+    ... )
+    >>> pair.outputs.names, pair.outputs.units
+    (('tip acceleration',), ('m/s^2',))
     """
     return Sensor("acceleration", at, to)
 
@@ -77,6 +124,28 @@ def contact_force(at: str) -> Sensor:
     ----------
     at : str
         The name of the contact; or its degree of freedom, for the sum of all contacts there.
+
+    Returns
+    -------
+    Sensor
+        For ``sensors=`` of :func:`saltus.structure`. A force [N], of a structure in angles a torque
+        [N*m].
+
+    Raises
+    ------
+    ParameterError
+        If a name isn't text.
+
+    Examples
+    --------
+    >>> import numpy as np, saltus as sl
+    >>> pair = sl.structure(
+    ...     np.eye(2), 1e3 * np.array([[2, -1], [-1, 1]]), modes=2,
+    ...     contacts=[sl.Contact("x2", stiffness="50 kN/m", gap="1 mm")],
+    ...     sensors={"stop force": sl.contact_force("x2")},
+    ... )
+    >>> pair.outputs.names, pair.outputs.units
+    (('stop force',), ('N',))
     """
     return Sensor("contact force", at)
 
