@@ -17,6 +17,7 @@ import saltus as sl
 from saltus.analysis.basins import pipeline
 from saltus.cli.commands import app
 
+PLATE = Path(__file__).parents[1] / "examples" / "plate"
 BEAM = Path(__file__).parents[1] / "examples" / "beam"
 EXAMPLE = Path(__file__).parents[1] / "examples" / "two_masses"
 
@@ -111,6 +112,46 @@ def test_the_beam_is_that_of_the_textbook(tmp_path):
     saltus("run", tmp_path / "study.toml", "--system", f"{BEAM / 'beam.py'}:beam",
            "--out", tmp_path / "out")  # fmt: skip
     assert sl.load(tmp_path / "out" / "run.nc").sizes["contact"] == 6 * 12  # of those that are kept
+
+
+def test_the_plate_is_that_of_the_textbook():
+    """Square cantilevers of Poisson's ratio 0.3: omega a^2 sqrt(rho h/D) of Leissa, The free
+    vibration of rectangular plates, J. Sound Vib. 31 (1973) 257-293, table C13 (by Ritz's method).
+    """
+    plate = runpy.run_path(str(PLATE / "plate.py"))["plate"]
+    plate.__globals__.update(LENGTH=0.5, WIDTH=0.5, POISSON=0.3, THICKNESS=2e-3)
+    mass, stiffness, names = plate(12, 12)
+    young, density = plate.__globals__["YOUNG"], plate.__globals__["DENSITY"]
+    rigidity = young * 2e-3**3 / 12 / (1 - 0.3**2)
+    table = sl.structure_modes(mass, stiffness, 5, names=names)
+    angular = 2 * np.pi * table.frequency.values
+    found = angular * 0.5**2 * np.sqrt(density * 2e-3 / rigidity)
+    assert found == pytest.approx([3.4917, 8.5246, 21.429, 27.331, 31.111], rel=6e-3)
+
+
+def test_the_plate_in_a_study_is_that_in_python(tmp_path):
+    """The quake of the study, its first stretch, and the contacts there."""
+    example = runpy.run_path(str(PLATE / "plate.py"))
+    example["write"](tmp_path)
+    text = (PLATE / "study.toml").read_text(encoding="utf-8").replace('"2 s"', '"0.7 s"')
+    (tmp_path / "study.toml").write_text(text, encoding="utf-8")
+    saltus("run", tmp_path / "study.toml", "--out", tmp_path / "out")
+    run = sl.load(tmp_path / "out" / "run.nc")
+    stops = [
+        sl.Contact(f"w_9_{edge}", "100 kN/m", "0.5 mm", side="both", name=name)
+        for edge, name in ((0, "left"), (7, "right"))
+    ]
+    times, values = np.loadtxt(tmp_path / "quake.csv", delimiter=",", skiprows=1).T
+    plate = sl.structure(
+        tmp_path / "plate.npz", modes=8, damping_ratio=0.01, contacts=stops,
+        base=sl.Base("w", sl.recorded(times, values, "m/s^2")),
+    )  # fmt: skip
+    truth = sl.simulate(plate, np.zeros(16), t_end=0.7, progress=False)
+    assert run.sizes["contact"] == truth.sizes["contact"] > 20
+    names = {f"{name} {side}" for name in ("left", "right") for side in ("lower", "upper")}
+    assert set(run["contact_guard"].values) == names
+    for name in plate.states:
+        assert abs(run[f"end_{name}"] - truth[f"end_{name}"]) < 1e-9 * abs(truth[name]).max()
 
 
 def test_a_buckled_beam_rests_on_either_side(tmp_path):

@@ -86,12 +86,23 @@ _LONGEST = {
     "printed": 400,
     "exact": 400,
     "measured": 400,
+    **dict.fromkeys(("mass", "stiffness", "damping"), 400),
     "description": 20_000,
     "source": 20_000,
 }
 _WORD = 100
 #: Tables whose texts are formulas.
-_FORMULAS = ("rates", "terms", "guards", "outputs", "energy", "friction", "force", "surface")
+_FORMULAS = (
+    "rates",
+    "terms",
+    "guards",
+    "outputs",
+    "energy",
+    "friction",
+    "force",
+    "surface",
+    "amplitude",
+)
 
 
 def _short(data: Any, key: str = "", most: int = _WORD) -> None:

@@ -16,6 +16,7 @@ from saltus.flow.counts import whole
 from saltus.results import Subject, build, made_by
 from saltus.results.dataset.schema import MODES
 from saltus.system.structures import matrices
+from saltus.system.structures.files import matrices_of
 from saltus.system.structures.parts import Contact, direction, parts
 from saltus.system.structures.reduction import flexibility, modes_of
 from saltus.system.structures.structure import degree_names
@@ -24,7 +25,7 @@ from saltus.system.structures.structure import degree_names
 @verb
 def structure_modes(
     mass: Any,
-    stiffness: Any,
+    stiffness: Any = None,
     modes: int | None = None,
     *,
     at: Any = None,
@@ -38,7 +39,7 @@ def structure_modes(
 
     Parameters
     ----------
-    mass, stiffness : array or SciPy sparse matrix, shape (n, n)
+    mass, stiffness : array or SciPy sparse matrix, shape (n, n), or path
         As of :func:`saltus.structure`; both symmetric.
     modes : int, optional
         How many are kept; default all.
@@ -69,11 +70,12 @@ def structure_modes(
     >>> round(float(table["frequency"][0]), 3), round(float(table["flexibility_share"][0]), 3)
     (3.111, 0.947)
     """
-    mass = matrices.checked(mass, "mass", symmetric=True)
+    given = matrices_of(mass, stiffness, None)
+    mass = matrices.checked(given["mass"], "mass", symmetric=True)
     size = matrices.len_of(mass)
-    stiffness = matrices.checked(stiffness, "stiffness", size, symmetric=True)
+    stiffness = matrices.checked(given["stiffness"], "stiffness", size, symmetric=True)
     count = size if modes is None else whole(modes, "modes", 1, size)
-    degrees = degree_names(names, size)
+    degrees = degree_names(given.get("names") if names is None else names, size)
     known = modes_of(mass, stiffness, count)
     places, vectors = _directions(at, degrees if known.shapes.shape[1] == size else [], degrees)
     total, residual = flexibility(stiffness, known, count, vectors)

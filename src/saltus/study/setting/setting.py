@@ -11,13 +11,15 @@ from saltus import flow
 from saltus.errors import ParameterError, SaltusError, StudyError, nearest
 from saltus.study.setting import quantities
 from saltus.study.setting.curves import curve_of
+from saltus.study.setting.structures import structure_of
 from saltus.study.tables.toml import fault
 from saltus.system.formula import Equations, Formula, Formulas
 
 if TYPE_CHECKING:
     from saltus.study.setting.inputs import Inputs
-    from saltus.study.tables.parts import Header, Output, Quantity, StudyTable, SystemTable
+    from saltus.study.tables.parts import Header, Output, Quantity, StudyTable
     from saltus.study.tables.study import Study
+    from saltus.study.tables.system import SystemTable
     from saltus.system import System
 
 
@@ -84,7 +86,8 @@ def setting_of(study: Study, own: System | None, inputs: Inputs) -> Setting:
         If the system can't be made, or a file can't be read.
     """
     formulas = formulas_of(study.system, inputs)
-    return Setting(study, system_of(study.system, own, formulas, study.study), inputs, formulas)
+    system = system_of(study.system, own, formulas, study.study, inputs)
+    return Setting(study, system, inputs, formulas)
 
 
 def formulas_of(table: SystemTable, inputs: Inputs) -> Formulas:
@@ -104,8 +107,10 @@ def system_of(
     own: System | None = None,
     formulas: Formulas | None = None,
     header: Header | None = None,
+    inputs: Inputs | None = None,
 ) -> System:
-    """The system that [system] names or writes out, with its values.
+    """The system that [system] names or writes out, with its values; ``inputs`` are the files that
+    it may name.
 
     Raises
     ------
@@ -116,7 +121,10 @@ def system_of(
     """
     from saltus import models
 
-    kinds = {"a model": table.model or table.case, "rates": table.rates, "--system": own}
+    kinds = {
+        "a model": table.model or table.case, "rates": table.rates, "structure": table.structure,
+        "--system": own,
+    }  # fmt: skip
     if len(given := [kind for kind, one in kinds.items() if one]) > 1:
         raise StudyError(f"[system] {' and '.join(given)}: these are several systems. Keep one.")
     own_keys = [
@@ -133,10 +141,13 @@ def system_of(
         base = own
     elif table.rates:
         base = _written(table, formulas or Formulas(), header)
+    elif table.structure is not None:
+        assert inputs is not None, "a structure names files"
+        base = structure_of(table.structure, inputs, formulas or Formulas(), header)
     elif table.model is None:
         raise StudyError(
             '[system] names no model. Write model = "delangre" (`saltus models` lists them), give '
-            "rates, or --system my_rig.py:rig."
+            "rates or a structure, or --system my_rig.py:rig."
         )
     else:
         try:

@@ -133,7 +133,8 @@ def table(
         else ""
     )
     fields: dict[str, Any] = {name: key for name, (key, _) in found.items()} | own
-    title, text = place.title().replace("_", ""), f"[{place}]: {_plain(summary)}{several}"
+    title = place.title().replace("_", "").replace(".", "")
+    text = f"[{place}]: {_plain(summary)}{several}"
     made = create_model(title, __base__=base, __module__=__name__, __doc__=text, **fields)
     for name, value in {
         "place": place,
@@ -208,9 +209,9 @@ def documented(function: Callable[..., Any]) -> dict[str, tuple[str, str]]:
     """Type and meaning of each parameter, from the docstring. "As for" another function stands for
     the parameters of that function.
     """
-    part = (
-        (inspect.getdoc(function) or "").partition("Parameters\n----------\n")[2].split("\n\n")[0]
-    )
+    text = inspect.getdoc(function) or ""
+    title = "Parameters" if "Parameters\n---" in text else "Attributes"
+    part = text.partition(f"{title}\n----------\n")[2].split("\n\n")[0]
     found: dict[str, tuple[str, str]] = {}
     for heading, body in _ENTRY.findall(part + "\n"):
         names, _, written = heading.partition(" : ")

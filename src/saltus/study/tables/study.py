@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from pydantic import Field
 
 from saltus.study.tables.methods import METHODS, Method
-from saltus.study.tables.parts import Header, StudyTable, SystemTable
+from saltus.study.tables.parts import Header, StudyTable
+from saltus.study.tables.system import SystemTable
 
 
 class Compare(StudyTable):

@@ -40,7 +40,7 @@ def _what(drive: Force | Base) -> str:
 
 
 def forcing(drives: Sequence[tuple[str, Force | Base]], frequency: Any) -> tuple[bool, bool]:
-    """Whether the drives need a frequency, and whether all of them have its period.
+    """Two truths: the drives need a frequency, and all of them have its period.
 
     Raises
     ------

@@ -21,6 +21,8 @@ from saltus.system.trace import system
 #: An entry of the mode shapes below this share of the largest is rounding: the mode doesn't move
 #: that degree of freedom.
 NOTHING = 1e-13
+#: A modal force below this share of the largest is rounding of a sum over all degrees of freedom.
+ROUNDING = 1e-12
 #: Unit of a deflection: those of its rate, a force, a stiffness, a damper and an acceleration.
 UNITS = {
     "m": ("m/s", "N", "N/m", "N*s/m", "m/s^2"),
@@ -49,13 +51,23 @@ class Coordinates:
         if self.transform is None:
             return vector
         found = vector @ self.transform
-        largest = np.abs(self.transform).max() * np.abs(vector).max()
-        return np.where(np.abs(found) <= NOTHING * largest, 0.0, found)
+        return np.where(np.abs(found) <= NOTHING * np.abs(self.transform).max(), 0.0, found)
+
+    def compliance(self, along: np.ndarray) -> float:
+        """1/mass of the structure along a direction of its coordinates [1/kg]."""
+        return float(along @ (along if self.inverse is None else self.inverse @ along))
+
+    def load(self, vector: np.ndarray) -> np.ndarray:
+        """A force on the degrees of freedom in these coordinates."""
+        if self.transform is None:
+            return vector
+        found = vector @ self.transform
+        return np.where(np.abs(found) <= ROUNDING * np.abs(found).max(), 0.0, found)
 
 
 @dataclass(frozen=True)
 class Loads:
-    """What acts on a structure, each with its name.
+    """Contacts and drives of a structure, each with its name.
 
     Attributes
     ----------
@@ -83,7 +95,7 @@ def traced(
     """The system, and the boundary of each contact by its name."""
     needs, repeats = drives.forcing(loads.drives, frequency)
     ways = [way_of(moving, degrees, label, contact) for label, contact in loads.contacts]
-    along = [moving.along(one) for one in loads.along]
+    along = [moving.load(one) for one in loads.along]
     defaults, units = _parameters(loads, unit)
     if needs:
         defaults[FREQUENCY] = frequency
@@ -101,19 +113,10 @@ def traced(
             _add(load, place, drives.value(t, label, drive, values))
         for (label, contact), way in zip(loads.contacts, ways, strict=True):
             at = way.moving(z, w)
-            for side in laws.sides(contact):
-                both = f"{label} {side}" if contact.side == "both" else label
-                sides[both] = laws.relation(label, side, at, values)
-            pushed, rubbed = laws.forces(label, contact, at, values)
-            if contact.preload is not None:
-                pressing = values[f"{label}_preload"]
-                _add(load, way.pushed if contact.side == "upper" else -way.pushed, pressing)
-            if pushed is None:
+            sides.update(laws.boundaries(label, contact, at, values))
+            if contact.restitution is not None:
                 stops += laws.impacts(label, contact, at, values, way.inertia)
-                continue
-            _add(load, -way.pushed, pushed)
-            if rubbed is not None:
-                _add(load, -way.rubbed, rubbed)
+            _press(load, label, contact, way, at, values)
         for matrix, of in ((moving.stiffness, z), (moving.damping, w)):
             if matrix is not None:
                 rows = matrices.dense(matrix)
@@ -134,10 +137,25 @@ def traced(
     return made(rates), sides
 
 
+def _press(
+    load: list[Any], label: str, contact: Contact, way: Way, at: laws.Moving, values: dict[str, Any]
+) -> None:
+    """Add the forces of a contact to the loads: preload, spring and damper, friction."""
+    if contact.preload is not None:
+        towards = way.pushed if contact.side == "upper" else -way.pushed
+        _add(load, towards, values[f"{label}_preload"])
+    pushed, rubbed = laws.forces(label, contact, at, values)
+    if pushed is not None:
+        _add(load, -way.pushed, pushed)
+    if rubbed is not None:
+        _add(load, -way.rubbed, rubbed)
+
+
 @dataclass(frozen=True)
 class Way:
-    """How a contact moves, in the coordinates of the structure: its deflection is ``pushed.z``, its
-    slip ``rubbed.z'``; ``inertia`` is that of the rates which a rigid stop changes.
+    """The motion of a contact in the coordinates of the structure: its deflection is
+    ``pushed.z``, its slip ``rubbed.z'``; ``inertia`` is that of the rates which a rigid stop
+    changes.
     """
 
     pushed: np.ndarray

@@ -54,10 +54,18 @@ def sides(contact: Contact) -> tuple[str, ...]:
     return ("upper", "lower") if contact.side == "both" else (contact.side,)
 
 
-def relation(label: str, side: str, at: Moving, values: Mapping[str, Any]) -> Relation:
-    """The comparison that holds in contact on a side."""
-    gap = values[f"{label}_gap"]
-    found: Relation = at.deflection > gap if side == "upper" else at.deflection < -gap
+def boundaries(
+    label: str, contact: Contact, at: Moving, values: Mapping[str, Any]
+) -> dict[str, Relation]:
+    """The boundaries of a contact by their names, each with the comparison that holds in contact,
+    or while it slides forwards.
+    """
+    gap, found = values[f"{label}_gap"], {}
+    for side in sides(contact):
+        name = f"{label} {side}" if contact.side == "both" else label
+        found[name] = at.deflection > gap if side == "upper" else at.deflection < -gap
+    if at.slip is not None:
+        found[f"{label} slides"] = at.slip > 0
     return found
 
 

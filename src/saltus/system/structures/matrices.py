@@ -10,6 +10,8 @@ from saltus.errors import ParameterError, must_be
 
 #: Largest asymmetry of a symmetric matrix, as a share of its largest entry: rounding of a sum.
 ASYMMETRY = 1e-10
+#: Most degrees of freedom of sparse matrices.
+MOST_DEGREES = 10_000_000
 
 
 def is_sparse(matrix: Any) -> bool:
@@ -27,6 +29,11 @@ def checked(matrix: Any, name: str, size: int | None = None, symmetric: bool = F
         not symmetric where it must be.
     """
     if is_sparse(matrix):
+        if max(matrix.shape) > MOST_DEGREES:
+            raise ParameterError(
+                f"{name} has the shape {matrix.shape}, and at most {MOST_DEGREES} degrees of "
+                f"freedom can be reduced."
+            )
         square: Any = matrix.tocsr()
         entries = square.data
     else:

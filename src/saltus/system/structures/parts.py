@@ -169,8 +169,8 @@ class Base:
     ----------
     direction : str, sequence or mapping
         How the structure moves when the base moves by 1: names of the degrees of freedom that move
-        with it, where ``"z"`` stands for z, z1, z_2, ... and ``"w_*"`` for all that begin so; or
-        the motion of each, as a vector or by name.
+        with it, where ``"z"`` stands for z, z1, z_2, z_1_2, ... and ``"w_*"`` for all that begin
+        so; or the motion of each, as a vector or by name.
     amplitude : float, str or callable
         Its acceleration [m/s^2]: the amplitude of a harmonic one, or a function of the time as of
         :class:`Force`.
@@ -381,5 +381,5 @@ def _moved(given: Any, names: list[str]) -> np.ndarray:
 
 
 def _matches(name: str, pattern: str) -> bool:
-    """True if a name is that of a pattern, with a number behind it or without."""
-    return fnmatch.fnmatchcase(name, pattern) or name.rstrip("0123456789").rstrip("_") == pattern
+    """True if a name is that of a pattern, with numbers behind it or without."""
+    return fnmatch.fnmatchcase(name, pattern) or name.rstrip("_0123456789") == pattern

@@ -14,6 +14,8 @@ from saltus.system.structures.matrices import check_positive, dense, len_of
 MOST_DENSE = 1500
 #: A frequency below this share of the next is that of a rigid body.
 RIGID = 1e-7
+#: Roundings of the largest term that an eigenvalue may be off.
+_FEW = 16
 
 
 @dataclass(frozen=True)
@@ -54,14 +56,21 @@ def modes_of(mass: Any, stiffness: Any, count: int) -> Modes:
             check_positive(False, dense(mass))
     else:
         squares, shapes = _lowest(mass, stiffness, count)
-    scale = abs(squares).max()
-    if squares[0] < -1e-9 * scale:
+    noise = _rounding(stiffness, shapes)
+    if (squares < -np.maximum(noise, 1e-9 * abs(squares).max())).any():
         raise ParameterError(
             f"stiffness has a negative eigenvalue, {squares[0]:.3g} 1/s^2 with respect to mass: "
             f"its modes don't vibrate. Leave modes= out."
         )
+    squares = np.where(np.abs(squares) <= noise, 0.0, squares)
     signs = np.sign(shapes[np.abs(shapes).argmax(axis=0), np.arange(shapes.shape[1])])
     return Modes(np.sqrt(np.maximum(squares, 0.0)), shapes * signs)
+
+
+def _rounding(stiffness: Any, shapes: np.ndarray) -> np.ndarray:
+    """Rounding of the square of each angular frequency: a smaller one is that of a rigid body."""
+    sizes = (np.abs(shapes) * (abs(stiffness) @ np.abs(shapes))).sum(axis=0)
+    return np.asarray(_FEW * np.finfo(float).eps * sizes)
 
 
 def _lowest(mass: Any, stiffness: Any, count: int) -> tuple[np.ndarray, np.ndarray]:

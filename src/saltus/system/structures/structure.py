@@ -5,7 +5,6 @@ given as data.
 from __future__ import annotations
 
 import functools
-import math
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -14,14 +13,15 @@ from typing import Any
 import numpy as np
 
 from saltus.arguments import checked
+from saltus.contact.contacts import renamed
 from saltus.contact.guards import number_of
 from saltus.errors import ParameterError, SaltusWarning, among, must_be, shown
-from saltus.system.display import STRUCTURE
-from saltus.system.structures import matrices
+from saltus.system.structures import matrices, told
 from saltus.system.structures.equations import UNITS, Coordinates, Loads, traced
+from saltus.system.structures.files import matrices_of
 from saltus.system.structures.matrices import ASYMMETRY
 from saltus.system.structures.parts import Base, Contact, Force, direction, parts
-from saltus.system.structures.reduction import Modes, flexibility, modal_damping, modes_of
+from saltus.system.structures.reduction import Modes, modal_damping, modes_of
 from saltus.system.structures.sensors import with_sensors
 from saltus.system.system import System
 from saltus.units import to_si
@@ -44,16 +44,12 @@ _ELSEWHERE = {
     **dict.fromkeys(("outputs", "output", "observers", "probes"),
         "Write sensors={\"tip\": \"x3\"}."),
 }  # fmt: skip
-#: Natural frequency [Hz] below which mass and stiffness may be swapped.
-_ABSURD = 3e-2
-#: Natural frequencies that the description lists.
-_TOLD = 6
 
 
 @functools.partial(checked, elsewhere=_ELSEWHERE)
 def structure(
     mass: Any,
-    stiffness: Any,
+    stiffness: Any = None,
     damping: Any = None,
     *,
     contacts: Sequence[Any] = (),
@@ -68,17 +64,22 @@ def structure(
     source: str = "",
     sensors: Mapping[str, Any] | None = None,
 ) -> System:
-    """A system of n degrees of freedom, from its matrices, with contacts and forces given as data::
+    """A system of n degrees of freedom, from its matrices, with contacts and forces given as data.
+
+    Its equation of motion is::
 
         mass x'' + damping x' + stiffness x = forces - contacts - mass direction acceleration
 
     Parameters
     ----------
-    mass : array or SciPy sparse matrix, shape (n, n)
-        Symmetric and positive definite [kg]. It is inverted once.
-    stiffness : array or sparse matrix, shape (n, n)
-        [N/m]
-    damping : array or sparse matrix, shape (n, n), optional
+    mass : array or SciPy sparse matrix, shape (n, n), or path
+        Symmetric and positive definite [kg]. It is inverted once. Alone, the path of a file that
+        holds all matrices: a ``.npz`` of NumPy or a ``.mat`` of MATLAB with M, K and, if you like,
+        C (or mass, stiffness, damping) and ``names``.
+    stiffness : array or sparse matrix, shape (n, n), or path
+        [N/m] Each matrix may be a file of its own: Matrix Market's ``.mtx``, ``.npy``, or a
+        ``.npz`` of SciPy's sparse matrices.
+    damping : array or sparse matrix, shape (n, n), or path, optional
         [N*s/m] Default: none.
     contacts : sequence of Contact, or of mappings of its arguments
         Stops behind gaps, such as ``sl.Contact("x3", stiffness="1 MN/m", gap="1 mm")``, or
@@ -148,14 +149,18 @@ def structure(
     if not among(unit, UNITS):
         raise must_be("unit", "'m', 'rad' or ''", unit)
     reduced = modes is not None or damping_ratio is not None
-    mass = matrices.checked(mass, "mass", symmetric=True)
+    given = matrices_of(mass, stiffness, damping)
+    mass = matrices.checked(given["mass"], "mass", symmetric=True)
     size = matrices.len_of(mass)
-    stiffness = matrices.checked(stiffness, "stiffness", size, symmetric=reduced)
+    stiffness = matrices.checked(given["stiffness"], "stiffness", size, symmetric=reduced)
+    damping = given.get("damping")
     if damping is not None:
         damping = matrices.checked(damping, "damping", size)
         if damping_ratio is not None:
-            raise ParameterError("give damping= or damping_ratio=, not both.")
-    degrees = degree_names(names, size)
+            raise ParameterError(
+                "give a damping matrix, damping= or that of a file, or damping_ratio=, not both."
+            )
+    degrees = degree_names(given.get("names") if names is None else names, size)
     touching = parts(Contact, contacts, "stop", degrees)
     driving = parts(Force, forces, "force", degrees)
     bases = base if isinstance(base, list | tuple) else [base] if base is not None else []
@@ -174,20 +179,23 @@ def structure(
             shapes = matrices.dense(mass) @ known.shapes
             damping = shapes @ damping @ shapes.T
         moving = _physical(mass, stiffness, damping, degrees)
-        words = f"{STRUCTURE} {size} degrees of freedom{_told(_angular(moving, stiffness))}."
+        words = told.unreduced(size, _angular(moving, stiffness))
     else:
         if damping is not None and damping_ratio is None:
             damping = modal_damping(damping, known, count)
         moving = _modal(known.kept(count), damping)
-        words = _words(stiffness, known, count, degrees, touching)
-    _doubt_swapped(known.angular if known is not None else _angular(moving, stiffness))
+        words = told.reduced(mass, stiffness, known, count, degrees, loads)
+    angular = known.angular if known is not None else _angular(moving, stiffness)
+    told.doubt(angular)
     made, sides = traced(moving, degrees, loads, frequency, unit=unit, name=name, source=source)
-    guards = list(made.guards)
-    for label, side in sides.items():
-        number = number_of(side, made.guards)
-        if number is not None:
-            guards[number] = replace(guards[number], name=label)
-    made = replace(made, guards=tuple(guards), description=words)
+    for label, contact in touching:
+        spring = made.values.get(f"{label}_stiffness")
+        if spring is not None and contact.power in (None, 1):
+            compliance = moving.compliance(moving.along(direction(contact, degrees)))
+            told.doubt_stiff(label, spring, compliance, angular[:count].max(initial=0.0))
+    numbers = {label: number_of(side, made.guards) for label, side in sides.items()}
+    named = {number: label for label, number in numbers.items() if number is not None}
+    made = replace(made, guards=renamed(made.guards, named), description=words)
     return made if sensors is None else with_sensors(made, sensors, moving, degrees, loads, unit)
 
 
@@ -253,27 +261,6 @@ def _angular(moving: Coordinates, stiffness: Any) -> np.ndarray:
     return np.asarray(np.sqrt(np.sort(np.maximum(squares, 0.0))))
 
 
-def _told(angular: np.ndarray) -> str:
-    """The lowest natural frequencies, as the end of a sentence."""
-    if not len(angular):
-        return ""
-    lowest = ", ".join(f"{one:.4g}" for one in angular[:_TOLD] / (2 * math.pi))
-    return f"; natural frequencies {lowest}{', ...' if len(angular) > _TOLD else ''} Hz"
-
-
-def _doubt_swapped(angular: np.ndarray) -> None:
-    """Warn of natural frequencies that no structure has."""
-    highest = angular.max(initial=0.0) / (2 * math.pi)
-    if 0 < highest < _ABSURD:
-        warnings.warn(
-            f"the highest natural frequency of this structure is {highest:.3g} Hz. The mass comes "
-            f"first, sl.structure(mass, stiffness, ...): with the two swapped the lowest would be "
-            f"{1 / (4 * math.pi**2 * highest):.4g} Hz.",
-            SaltusWarning,
-            stacklevel=4,
-        )
-
-
 def _ratio(ratio: Any, modes: Modes, count: int) -> np.ndarray:
     """The damping matrix of modes with given damping ratios."""
     try:
@@ -297,22 +284,3 @@ def _ratio(ratio: Any, modes: Modes, count: int) -> np.ndarray:
 def _share(ratio: Any) -> Any:
     """A ratio as a number; the unit of a text such as ``"2 %"`` is removed."""
     return to_si(ratio, "1", "damping_ratio") if isinstance(ratio, str) else ratio
-
-
-def _words(
-    stiffness: Any, modes: Modes, count: int, degrees: list[str],
-    contacts: list[tuple[str, Contact]],
-) -> str:  # fmt: skip
-    """The description of a reduced structure."""
-    words = (
-        f"{STRUCTURE} {len(degrees)} degrees of freedom, by its lowest {count} modes, up to "
-        f"{modes.angular[count - 1] / (2 * math.pi):.6g} Hz{_told(modes.angular)}."
-    )
-    if not contacts:
-        return words
-    at = np.array([direction(one, degrees) for _, one in contacts])
-    totals, residuals = flexibility(stiffness, modes, count, at)
-    for (name, _), total, residual in zip(contacts, totals, residuals, strict=True):
-        share = f", {100 * (1 - residual / total):.4g} % of it kept" if 0 < total < np.inf else ""
-        words += f" Static flexibility at {name}: {residual:.3g} m/N left out{share}."
-    return words

@@ -1,0 +1,130 @@
+"""Descriptions of structures, and doubts about their matrices."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from typing import Any
+
+import numpy as np
+
+from saltus.errors import SaltusWarning
+from saltus.system.display import STRUCTURE
+from saltus.system.structures.parts import Base, direction
+from saltus.system.structures.reduction import RIGID, Modes, flexibility
+
+#: Natural frequency [Hz] below which mass and stiffness may be swapped.
+_SWAPPED = 3e-2
+#: Natural frequencies [Hz] outside of which the units may be wrong.
+_USUAL = (1e-3, 1e6)
+#: A spring on which the structure vibrates more quickly than its highest mode by this factor is
+#: doubted.
+_STIFF = 1e3
+#: Natural frequencies that the description lists, and modes of which it says what mass they move.
+_TOLD = 6
+
+
+def unreduced(size: int, angular: np.ndarray) -> str:
+    """The description of a structure whose states are its degrees of freedom."""
+    return f"{STRUCTURE} {size} degrees of freedom{_frequencies(angular)}."
+
+
+def reduced(
+    mass: Any, stiffness: Any, modes: Modes, count: int, degrees: list[str], loads: Any
+) -> str:
+    """The description of a structure by its lowest modes.
+
+    It says what they carry of the static flexibility at each contact, and of the mass that moves
+    with each base.
+    """
+    words = (
+        f"{STRUCTURE} {len(degrees)} degrees of freedom, by its lowest {count} modes, up to "
+        f"{modes.angular[count - 1] / (2 * math.pi):.6g} Hz{_frequencies(modes.angular)}."
+    )
+    words += _kept_at_contacts(stiffness, modes, count, degrees, loads.contacts)
+    for label, drive in loads.drives:
+        if isinstance(drive, Base):
+            words += _moved(label, mass, modes.kept(count), direction(drive, degrees))
+    return words
+
+
+def _kept_at_contacts(
+    stiffness: Any, modes: Modes, count: int, degrees: list[str], contacts: list[tuple[str, Any]]
+) -> str:
+    if not contacts:
+        return ""
+    at = np.array([direction(one, degrees) for _, one in contacts])
+    totals, residuals = flexibility(stiffness, modes, count, at)
+    words = ""
+    for (name, _), total, residual in zip(contacts, totals, residuals, strict=True):
+        if math.isnan(residual):
+            words += f" The flexibility left out at {name} isn't known: a rigid body moves there."
+            continue
+        share = f", {100 * (1 - residual / total):.4g} % of it kept" if 0 < total < np.inf else ""
+        words += f" Static flexibility at {name}: {residual:.3g} m/N left out{share}."
+    return words
+
+
+def _moved(label: str, mass: Any, kept: Modes, moved: np.ndarray) -> str:
+    """The mass that moves with a base, in all and by mode."""
+    load = mass @ moved
+    total, masses = float(moved @ load), (kept.shapes.T @ load) ** 2
+    largest = [i for i in np.argsort(-masses)[:_TOLD].tolist() if masses[i] > 5e-3 * total]
+    parts = ", ".join(f"{100 * masses[i] / total:.3g} % in mode {i + 1}" for i in sorted(largest))
+    return (
+        f" Of the {total:.4g} kg that move with {label}, the modes hold "
+        f"{100 * masses.sum() / total:.4g} %{': ' if parts else ''}{parts}."
+    )
+
+
+def _frequencies(angular: np.ndarray) -> str:
+    """The lowest natural frequencies, as the end of a sentence."""
+    if not len(angular):
+        return ""
+    lowest = ", ".join(f"{one:.4g}" for one in angular[:_TOLD] / (2 * math.pi))
+    return f"; natural frequencies {lowest}{', ...' if len(angular) > _TOLD else ''} Hz"
+
+
+def doubt(angular: np.ndarray) -> None:
+    """Warn of natural frequencies that no structure has."""
+    highest = angular.max(initial=0.0) / (2 * math.pi)
+    elastic = angular[angular > RIGID * angular.max(initial=0.0)] / (2 * math.pi)
+    if 0 < highest < _SWAPPED:
+        _warn(
+            f"the highest natural frequency of this structure is {highest:.3g} Hz. The mass comes "
+            f"first, sl.structure(mass, stiffness, ...): with the two swapped the lowest would be "
+            f"{1 / (4 * math.pi**2 * highest):.4g} Hz."
+        )
+    elif len(elastic) and not _USUAL[0] <= elastic.min() <= _USUAL[1]:
+        _warn(
+            f"the lowest natural frequency of this structure is {elastic.min():.3g} Hz. Are its "
+            f"matrices in kg and N/m, or in other units that fit together?"
+        )
+
+
+def doubt_stiff(label: str, stiffness: float, compliance: float, highest: float) -> None:
+    """Warn of a spring that is rigid beside the structure.
+
+    Parameters
+    ----------
+    label : str
+        Of the contact.
+    stiffness : float
+        [N/m]
+    compliance : float
+        1/mass of the structure at the contact [1/kg].
+    highest : float
+        Highest angular frequency of the structure [rad/s].
+    """
+    angular = math.sqrt(max(stiffness * compliance, 0.0))
+    if angular > _STIFF * highest > 0:
+        _warn(
+            f"{label}_stiffness = {stiffness:.3g} N/m: in contact the structure vibrates at "
+            f"{angular / (2 * math.pi):.3g} Hz there, {angular / highest:.2g} times its highest "
+            f"mode, so the force follows the modes that are kept. For a rigid stop write "
+            f"restitution= in place of stiffness=."
+        )
+
+
+def _warn(words: str) -> None:
+    warnings.warn(words, SaltusWarning, stacklevel=5)

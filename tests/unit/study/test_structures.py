@@ -1,0 +1,164 @@
+"""[system.structure]: what a study file writes is what Python writes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.io
+
+import saltus as sl
+from saltus.errors import StudyError
+from saltus.study.read import parse
+from saltus.study.setting.inputs import Inputs
+from saltus.study.setting.setting import setting_of
+
+M, K = np.diag([1.0, 2.0, 3.0]), 900.0 * (2 * np.eye(3) - np.eye(3, k=1) - np.eye(3, k=-1))
+NAMES = ["w_1", "w_2", "u_1"]
+TIMES, VALUES = np.linspace(0, 1, 5), np.array([0.0, 2.0, -1.0, 3.0, 0.0])
+HEAD = """
+[study]
+name = "a frame"
+
+[simulate]
+t_end = "1 s"
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    np.savez(tmp_path / "frame.npz", M=M, K=K, names=NAMES)
+    scipy.io.mmwrite(tmp_path / "M.mtx", M)
+    scipy.io.mmwrite(tmp_path / "K.mtx", K)
+    np.savetxt(tmp_path / "quake.csv", np.column_stack([TIMES, VALUES]), delimiter=",",
+        header="time [s],acceleration [m/s^2]", comments="")  # fmt: skip
+    return tmp_path
+
+
+def system_in(folder, text):
+    return setting_of(parse(HEAD + text), None, Inputs(folder)).base
+
+
+def test_it_is_the_structure_that_python_makes(folder):
+    written = system_in(
+        folder,
+        """
+[system]
+stop_gap = "2 mm"
+structure.mass = "frame.npz"
+structure.modes = 2
+structure.damping_ratio = ["1 %", "2 %"]
+structure.frequency = "3 Hz"
+structure.base = { direction = "w", amplitude = "2*quake(t)" }
+tables.quake = { file = "quake.csv", kind = "spline" }
+
+[[system.structure.forces]]
+at = "u_1"
+amplitude = "3 N"
+phase = "90 deg"
+harmonic = 2
+
+[[system.structure.contacts]]
+at = "w_2"
+to = "u_1"
+stiffness = "5 kN/m"
+gap = "1 mm"
+side = "both"
+damping = "2 N*s/m"
+
+[[system.structure.contacts]]
+name = "wall"
+at = "w_1"
+gap = "3 mm"
+restitution = 0
+friction = 0.3
+sliding = "u_1"
+""",
+    )
+    record = sl.recorded(TIMES, VALUES, name="quake")
+    made = sl.structure(
+        M, K, names=NAMES, modes=2, damping_ratio=[0.01, 0.02], frequency="3 Hz", name="a frame",
+        base=sl.Base("w", lambda t: 2 * record(t)),
+        forces=[sl.Force("u_1", "3 N", "90 deg", 2)],
+        contacts=[
+            sl.Contact("w_2", "5 kN/m", "2 mm", "u_1", "both", "2 N*s/m"),
+            sl.Contact("w_1", gap="3 mm", restitution=0, friction=0.3, sliding="u_1", name="wall"),
+        ],
+    )  # fmt: skip
+    assert written.fingerprint() == made.fingerprint()
+    assert dict(written.values) == dict(made.values)
+    assert dict(written.units) == dict(made.units)
+    assert [one.name for one in written.guards] == [one.name for one in made.guards]
+    assert written.description == made.description
+
+
+def test_one_file_a_matrix(folder):
+    written = system_in(
+        folder,
+        """
+[system.structure]
+mass = "M.mtx"
+stiffness = "K.mtx"
+frequency = "2 Hz"
+contacts = { at = "x3", stiffness = "1 kN/m", gap = "1 mm" }
+forces = { at = "x1", amplitude = "4*square(2*pi*frequency*t)" }
+""",
+    )
+    made = sl.structure(
+        M, K, frequency="2 Hz", contacts=[sl.Contact("x3", "1 kN/m", "1 mm")],
+        forces=[sl.Force("x1", lambda t, frequency: 4 * sl.square(2 * sl.pi * frequency * t))],
+    )  # fmt: skip
+    assert written.fingerprint() == made.fingerprint()
+    assert written.forced_at == "frequency"
+
+
+def test_a_sweep(folder):
+    written = system_in(
+        folder,
+        '[system]\nstructure = { mass = "frame.npz", base = { direction = [1, 1, 0], amplitude = '
+        '"3*sweep(t, 2, 9, 4)" } }',
+    )
+    made = sl.structure(M, K, names=NAMES,
+        base=sl.Base([1, 1, 0], lambda t: 3 * sl.sweep(2, 9, "4 Hz/s")(t)))  # fmt: skip
+    for t in (0.3, 1.7, 3.0):
+        assert np.allclose(written.rhs(t, np.zeros(6)), made.rhs(t, np.zeros(6)), atol=1e-12)
+
+
+CONTACT = 'contacts = {{ at = "w_2", {} }}\n'
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ('mass = "gone.npz"', "gone.npz can't be read"),
+        ('mass = "../frame.npz"', "outside the study's folder"),
+        ('mass = "quake.csv"', "no file of matrices"),
+        ("modes = 2", "mass"),
+        ('mass = "frame.npz"\nmodez = 2', "modes"),
+        ('mass = "frame.npz"\nmodes = 5', "at most 3"),
+        (CONTACT.format('stiffness = 5, gap = "1 mm"'), r"stiffness = 5 has no unit.*5 N/m"),
+        (CONTACT.format('stiffness = "5 N/m", gap = 1'), "gap = 1 has no unit"),
+        (CONTACT.format('stiffness = "5 N/m"'), "needs gap"),
+        (CONTACT.format('stiffness = "5 N/m", gap = "1 N"'), "wrong unit"),
+        (CONTACT.format('stiffness = "5 N/m", gap = "1 mm", rebound = 1'), "rebound"),
+        (CONTACT.format('gap = "1 mm"'), "Give one of the two"),
+        (CONTACT.format('gap = "1 mm", restitution = 2'), r"outside \[0, 1\]"),
+        ('forces = { at = "w_9", amplitude = "2 N" }', "w_9"),
+        ('forces = { at = "w_2", amplitude = 2 }', "amplitude = 2 has no unit"),
+        ('forces = { at = "w_2", amplitude = "2 N" }', "give frequency"),
+        ('forces = { at = "w_2", amplitude = "2 N" }\nfrequency = 2', "frequency = 2 has no unit"),
+        ('base = { direction = "w", amplitude = "quke(t)" }', "quke"),
+        ('base = { direction = "w", amplitude = "quake(w_1)" }', "the time t, frequency"),
+        ('base = { direction = "z", amplitude = "t" }', "names no degree of freedom"),
+    ],
+)
+def test_refusals(keys, message, folder):
+    first = "" if keys.startswith(("mass", "modes")) else 'mass = "frame.npz"\n'
+    with pytest.raises(StudyError, match=message):
+        system_in(folder, f"[system.structure]\n{first}{keys}\n[system.tables]\n"
+            'quake = { file = "quake.csv" }\n')  # fmt: skip
+
+
+def test_it_is_the_only_system(folder):
+    text = '[system]\nmodel = "delangre"\nstructure.mass = "frame.npz"\n'
+    with pytest.raises(StudyError, match="a model and structure: these are several systems"):
+        system_in(folder, text)
