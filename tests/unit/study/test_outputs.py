@@ -131,6 +131,59 @@ def test_the_sensors_of_a_structure_are_in_its_study(tmp_path):
     np.testing.assert_allclose(section["tip"], 1e-4, rtol=1e-10)
 
 
+STRUCTURE = """
+[study]
+name = "a frame"
+[system.structure]
+mass = "frame.npz"
+modes = 2
+[[system.structure.contacts]]
+at = "w_2"
+stiffness = "5 kN/m"
+gap = "1 mm"
+[simulate]
+t_end = "1 s"
+start = { q1 = "1 kg^0.5*m", q2 = "0 kg^0.5*m", q1_rate = "0 kg^0.5*m/s", q2_rate = "0 kg^0.5*m/s" }
+[system.structure.sensors]
+"""
+
+
+@pytest.fixture
+def frame(tmp_path):
+    stiffness = 900.0 * np.array([[2, -1], [-1, 1.0]])
+    np.savez(tmp_path / "frame.npz", M=np.eye(2), K=stiffness, names=["w_1", "w_2"])
+    return tmp_path, stiffness
+
+
+def test_a_structure_of_a_study_has_sensors(frame):
+    folder, stiffness = frame
+    written = {
+        "tip": "w_2", "stretch": "w_2 - w_1", "speed": "velocity(w_2)",
+        "slip": "velocity( w_2 - w_1 )", "tip acceleration": "acceleration(w_2)",
+        "force": "contact_force(stop)",
+    }  # fmt: skip
+    text = STRUCTURE + "".join(f'"{name}" = "{one}"\n' for name, one in written.items())
+    (question,) = questions_of(parse(text), None, Inputs(folder))
+    made = sl.structure(
+        np.eye(2), stiffness, modes=2, names="w_1 w_2",
+        contacts=[sl.Contact("w_2", stiffness="5 kN/m", gap="1 mm")],
+        sensors={
+            "tip": "w_2", "stretch": ("w_2", "w_1"), "speed": sl.velocity("w_2"),
+            "slip": sl.velocity("w_2", "w_1"), "tip acceleration": sl.acceleration("w_2"),
+            "force": sl.contact_force("w_2"),
+        },
+    )  # fmt: skip
+    assert question.system.outputs.formulas == made.outputs.formulas
+    assert question.system.outputs.units == made.outputs.units
+
+
+@pytest.mark.parametrize("text", ["speed(w_2)", "w_2 - w_1 - w_2", "contact_force(w_1 - w_2)",
+    "w_7", "acceleration(w_7)", "contact_force(wall)"])  # fmt: skip
+def test_a_sensor_that_cant_be_read_is_said(frame, text):
+    with pytest.raises(SaltusError, match=r"is no sensor|no degree of freedom|no contact at"):
+        questions_of(parse(STRUCTURE + f'tip = "{text}"\n'), None, Inputs(frame[0]))
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
