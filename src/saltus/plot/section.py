@@ -111,7 +111,11 @@ def _axes(ds: xr.Dataset, x: str | None, y: str | None) -> tuple[str, str]:
             raise ParameterError(
                 f"this section has no {shown(name)} to draw. {nearest(name, known)}"
             )
-    sides = {side.strip() for side in str(ds.attrs["surface"]).split("=")}
+    surface = str(ds.attrs["surface"])
+    sides = {side.strip() for side in surface.split("=")}
+    turning = surface.removesuffix(" turns")
+    if turning in outputs_in(ds) and turning != surface:
+        sides.add(selection.rate_of(ds, turning))  # rounding is left of it there
     moving = [name for name in told_of(ds) if name not in sides]
     if ds.sizes["crossing"] and len(moving) == len(told_of(ds)):  # the surface fixes no state
         moving = [name for name in moving if np.ptp(ds[name].values) > 0]

@@ -8,6 +8,7 @@ import pytest
 
 import saltus as sl
 from saltus.errors import ParameterError
+from saltus.plot.style import display_scale
 
 STIFFNESS = 1e3 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1.0]])
 
@@ -92,3 +93,13 @@ def test_a_structure_without_modes_shows_its_states():
     assert labels(sl.plot.history(whole))[1] == "x1 [mm]"
     assert labels(sl.plot.phase(whole)) == ("x1 [mm]", "v1 [mm/s]")
     assert labels(sl.plot.history(whole, state="tip"))[1] == "tip [mm]"
+
+
+def test_a_large_acceleration_stays_in_metres():
+    assert display_scale("m/s^2", 2e3).unit == "m/s^2"
+    assert display_scale("N", 2e3).unit == "kN"
+
+
+def test_a_section_where_a_sensor_turns_leaves_its_rate_out():
+    section = sl.poincare(structure(), None, "tip turns", periods=9, progress=False)
+    assert labels(sl.plot.section(section)) == ("tip [mm]", "stop force [N]")
