@@ -32,6 +32,7 @@ from saltus.language.evaluate import evaluate
 from saltus.results import build
 from saltus.results.dataset import schema
 from saltus.system import System
+from saltus.system.modes import sides
 from saltus.system.quantity import formula_of, unit_of
 from saltus.units import to_si
 
@@ -229,8 +230,8 @@ def _slopes(system: System, name: str, rest: np.ndarray) -> np.ndarray:
     about: dict[str, Any] = {
         "states": dict(zip(system.states, rest, strict=True)), "values": system.values,
     }  # fmt: skip
-    bits: list[Any] = []
-    for guard in guards:
+    bits = sides(system, 0.0, rest)
+    for guard in guards[len(bits) :]:
         bits.append(evaluate([guard.gap], **about, bits=bits)[0] > 0)
     return np.array(evaluate(gradient(formula, system.states), **about, bits=bits), float)
 
