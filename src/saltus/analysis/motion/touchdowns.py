@@ -24,8 +24,6 @@ class Touchdowns:
     ----------
     trajectory, guard : int64[k]
         Which one.
-    row : int64[k]
-        Of the table of contacts, where it begins.
     begin, end : float64[k]
         Times [s]; the end is NaN where the stretch ends first.
     speed, exit_speed : float64[k]
@@ -39,11 +37,12 @@ class Touchdowns:
         Impacts that were met one by one: none for a contact with a force.
     spells : mapping of (trajectory, guard) to float64[m, 2]
         Begin and end of all times in contact, cut at the ends of the stretch [s].
+    row : int64[k]
+        Row of the table of contacts at which it begins.
     """
 
     trajectory: np.ndarray
     guard: np.ndarray
-    row: np.ndarray
     begin: np.ndarray
     end: np.ndarray
     speed: np.ndarray
@@ -52,6 +51,7 @@ class Touchdowns:
     struck: np.ndarray
     impacts: np.ndarray
     spells: Mapping[tuple[int, int], np.ndarray]
+    row: np.ndarray
 
     def covered(self, trajectory: int, guard: int, borders: np.ndarray) -> np.ndarray:
         """Time in contact in each of the blocks between borders float64[b + 1] [s]."""
@@ -112,7 +112,6 @@ def find(
     return Touchdowns(
         trajectory=who[first],
         guard=guard[first],
-        row=first,
         begin=time[first],
         end=np.where(ended, time[final], np.nan),
         speed=speed[first],
@@ -121,6 +120,7 @@ def find(
         struck=_impulses(seen, outcome, first, last, integrals) + summed[last],
         impacts=impacts,
         spells=spells,
+        row=first,
     )
 
 
