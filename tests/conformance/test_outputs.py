@@ -35,7 +35,7 @@ def test_an_output_changes_nothing_else(name, outputs, tmp_path):
         else:
             # a mean may be zero: what it rounds with is the motion's size
             size = plain[key.replace("output_mean", "output_rms")].values
-            atol = 1e-12 * np.nanmax(np.abs(size), initial=0.0)
+            atol = 1e-12 * np.abs(size[np.isfinite(size)]).max(initial=0.0)
             np.testing.assert_allclose(one.values, other.values, rtol=1e-12, atol=atol, err_msg=key)
     assert "outputs" not in plain.attrs
     file = sl.save(more, tmp_path / "more.nc")
