@@ -11,7 +11,7 @@ import pytest
 
 import saltus as sl
 
-SEED = 20261125
+SEED = 7919
 
 
 def pushed(contact, d, w, values, label):

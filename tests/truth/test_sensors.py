@@ -249,6 +249,18 @@ def test_impacts_take_the_force_of_a_sensor():
     np.testing.assert_allclose(found["touchdown_tip speed"], found["contact_speed"], rtol=1e-12)
 
 
+def test_a_run_gives_outputs_at_given_times_and_ends_at_one():
+    plain = sl.simulate(STRUCTURE, periods=10, samples=50, progress=False)
+    times = plain["time"].values[[30, 7, 400]]
+    some = sl.simulate(STRUCTURE, at=times, progress=False)
+    q, w = coordinates(some)
+    compare(some, by_hand(q, w, times, (q @ SHAPES[2]) > GAP))
+    ended = sl.simulate(STRUCTURE, t_end=10, until="tip > 2.5 mm", progress=False)
+    assert ended["status"].item() == "until"
+    assert float(ended["end_tip"]) == pytest.approx(2.5e-3, rel=1e-10)
+    assert float(ended["tip"].max()) <= 2.5e-3 + 1e-12
+
+
 @pytest.mark.parametrize("state", [None, "tip", "stretch"])
 def test_a_backbone_tells_the_numbers_of_outputs(state):
     free = sl.structure(

@@ -15,6 +15,7 @@ from saltus.analysis.inputs.starts import Ensemble
 from saltus.flow.contact_table import ContactTable
 from saltus.flow.methods import Method
 from saltus.flow.request import Outcome
+from saltus.flow.until import STATUS
 from saltus.kernels import status as st
 from saltus.language.evaluate import evaluate
 from saltus.results import Guards, Subject, attributes
@@ -122,7 +123,7 @@ def motion_values(
 
 def endings(outcome: Outcome, counters: Iterable[str] = st.COUNTERS) -> dict[str, Any]:
     """The end of each trajectory, and the counters on its way."""
-    status = {"status": [st.STATUS[int(code)][0] for code in outcome.status]}
+    status = {"status": [STATUS[int(code)][0] for code in outcome.status]}
     return status | {name: outcome.counters[:, st.COUNTERS.index(name)] for name in counters}
 
 

@@ -187,15 +187,21 @@ CAPTURE = Interface(
     truths=(),
 )
 
-_MODAL_TABLES = (_I1, _I1, _F1, _F2, _F2, _F2, _F2, _F2, _I2)
-_MODAL_WORK = (_F2,) * 6 + (_F1, _F2, _F2, _F1, _F1) + (_F2,) * 5
+_MODAL_TABLES = (_I1, _I1, _F1, _F2, _F2, _F2, _F2, _F2, _I2, _F2, _F2)
+_MODAL_WORK = (_F2,) * 6 + (_F1, _F2, _F2, _F1, _F1) + (_F2,) * 10
 
 #: The modal flow: what it needs of an equation are tables, which it is given.
 MODAL = Interface(
     entry="propagate",
     arguments=(*BATCH, *_MODAL_TABLES, *_MODAL_WORK),
     layout="modal_layout",
-    templates=("modal_series", "modal_steps"),
+    templates=(
+        "modal_records",
+        "modal_blocks",
+        "modal_series",
+        "modal_tangents",
+        "modal_steps",
+    ),
     sizes=(),
     flags=(),
     tables=MappingProxyType({}),

@@ -21,7 +21,6 @@ from saltus.flow.shots import Shots
 from saltus.kernels import status as st
 from saltus.sentences import Dialect
 from saltus.system import System, check_values
-from saltus.system.tangent import tangent_system
 
 #: Step of differences, relative to the range of a state. Errors of rounding and of the fourth order
 #: are both about 1e-11 where a contact is a hundredth as deep as the motion is wide.
@@ -219,6 +218,12 @@ class Stroboscope:
             threads=threads or self.threads,
         )
 
+    def with_parameters(self, parameters: np.ndarray, which: np.ndarray) -> Stroboscope:
+        """The rows int64[m] with other parameter values float64[m, P] and the same time of an
+        iterate, whatever the forcing's period is.
+        """
+        return self._with(parameters=parameters, period=self.period[which])
+
     def with_period(self, time: np.ndarray) -> Stroboscope:
         """The same rows with other times between two samples [s], float64[k]: for systems without
         forcing.
@@ -292,10 +297,10 @@ class Stroboscope:
         self, start: np.ndarray, count: np.ndarray | int, directions: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """See :class:`Map`."""
-        if self.system.is_steep:
+        map_, (k, size) = self._tangent_map, start.shape
+        if map_ is None:
             return self._by_differences(start, count, directions)
-        k, size = start.shape
-        state, status = self._tangent_map.ends(_with_tangent(start, directions), count)
+        state, status = map_.ends(_with_tangent(start, directions), count)
         stopped = (status != st.OK) & (status != st.GRAZE_UNRESOLVED)
         if stopped.any():
             state[stopped] = np.nan
@@ -339,13 +344,16 @@ class Stroboscope:
         """States at the times of a schedule, float64[k, M, D], by the flow that :meth:`tangent`
         runs, so that no other flow is compiled.
         """
-        outcome = self._tangent_map.run(_with_tangent(start, None), count, schedule)
+        map_ = self._tangent_map
+        assert map_ is not None
+        outcome = map_.run(_with_tangent(start, None), count, schedule)
         return outcome.samples[:, :, : start.shape[1]]
 
     @functools.cached_property
-    def _tangent_map(self) -> Stroboscope:
-        """The same rows of the system with its tangents."""
-        return self.of_system(tangent_system(self.system))
+    def _tangent_map(self) -> Stroboscope | None:
+        """The same rows of the system with its tangents; None if only differences give these."""
+        system = self.method.tangents(self.system)
+        return None if system is None else self.of_system(system)
 
     def sequences(self, start: np.ndarray, count: int) -> tuple[np.ndarray, list[np.ndarray]]:
         """See :class:`Map`."""

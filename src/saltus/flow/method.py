@@ -10,13 +10,14 @@ import math
 import sys
 from collections.abc import Mapping
 from dataclasses import fields
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
 from saltus.codegen.module import Flow
 from saltus.errors import ParameterError, must_be, nearest, shown
 from saltus.system import System
+from saltus.system.tangent import tangent_system
 
 #: Default step budget per period; a healthy trajectory takes ten to a hundred steps.
 STEPS_PER_PERIOD = 10_000
@@ -84,6 +85,9 @@ def explain_unknown_options(cls: type[_M]) -> type[_M]:
 class Method:
     """Interface of every method to the engine."""
 
+    #: Column of the numbers that holds the budget of events.
+    EVENT_BUDGET: ClassVar[int] = -1
+
     @property
     def name(self) -> str:
         """Name as users write it."""
@@ -113,6 +117,12 @@ class Method:
     def serving(self, system: System) -> Method:  # noqa: ARG002  (most methods serve all)
         """The method that moves a system: this one, or the one that stands in for it."""
         return self
+
+    def tangents(self, system: System) -> System | None:
+        """The system whose flow carries the derivative of the state with respect to the state at
+        the start; None if only differences give it.
+        """
+        return None if system.is_steep else tangent_system(system)
 
     def suited_to(self, count: int) -> Method:  # noqa: ARG002  (unused by most methods)
         """The fastest variant of the method for ``count`` trajectories; its results are the same to

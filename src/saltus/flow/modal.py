@@ -22,7 +22,8 @@ from saltus.kernels import status as st
 from saltus.kernels.batch import Batch
 from saltus.kernels.isolation import DEEPEST, MOST_TOUCHES
 from saltus.system import System
-from saltus.system.linear import LinearSystem, linear_pieces
+from saltus.system.linear import linear_pieces
+from saltus.system.tangent import tangent_states
 
 #: Share of a period, or of an unforced span, that is tried as the first step.
 FIRST_STEP = 1.0 / 64
@@ -35,15 +36,21 @@ class ModalFlow:
 
     Parameters
     ----------
-    linear : LinearSystem
-        The system.
+    tables : Tables
+        Its contact states.
+    tangents : bool
+        Whether the states are followed by the derivative of the state with respect to the state at
+        the start, row by row.
     """
 
-    def __init__(self, linear: LinearSystem) -> None:
-        self.tables, self._kernel = Tables(linear), modal_module()
+    def __init__(self, tables: Tables, tangents: bool = False) -> None:
+        self.tables, self._kernel, self._tangents = tables, modal_module(), tangents
         self._lanes, self._memory = self.tables.modes.table.shape[1], threading.local()
-        self.CARRY = layout.AMPLITUDES + 2 * self.tables.groups * self._lanes
-        self.STEP_RECORDS = len(linear.system.guards) + MOST_TOUCHES
+        size, _, _, _, guards, _, rows, _, _ = tables.sizes.tolist()
+        self._states, self._sizes = size, tables.sizes.copy()
+        self._sizes[layout.TANGENTS] = tangents
+        self.CARRY = layout.AMPLITUDES + rows * self._lanes + tangents * (size + guards)
+        self.STEP_RECORDS = guards + MOST_TOUCHES
 
     def workspace(self) -> tuple[np.ndarray, ...]:
         """None that the engine must keep."""
@@ -54,74 +61,93 @@ class ModalFlow:
         return functools.partial(self.propagate, *values)
 
     def propagate(self, *values: Any) -> int:
-        """Move the trajectories of a batch; contact states that they come to are made meanwhile."""
+        """Move the trajectories of a batch, until contact states that haven't been made must be."""
         batch = Batch(*values[:-1])
         budget = values[-1] * max(batch.state.shape[1] // 4, 1)
-        self._begin(batch)
-        while True:
-            with self.tables.lock:
-                tables = self.tables.arrays()
-            answer: int = self._kernel.propagate(*batch, budget, *tables, *self._work())
-            lost = (batch.status == st.RUNNING) & (batch.carry[:, layout.AT] < 0)
-            if answer == st.FINISHED or not lost.any():
-                return answer
-            with self.tables.lock:
-                for i in np.flatnonzero(lost).tolist():
-                    which = int(batch.carry[i, layout.SET])
-                    batch.carry[i, layout.AT] = self.tables.state_of(which, int(batch.mode[i]))
+        with self.tables.lock:
+            self._begin(batch)
+            self._look_up(batch)
+            tables = self._sizes, *self.tables.arrays()
+        answer: int = self._kernel.propagate(*batch, budget, *tables, *self._work())
+        return answer
+
+    def _look_up(self, batch: Batch) -> None:
+        """Find the contact states that trajectories have come to: as many as the tables have room
+        for. The others wait until these trajectories have ended.
+        """
+        running, tables = batch.status == st.RUNNING, self.tables
+        dropped = running & (batch.carry[:, layout.TABLES] != tables.generation)
+        batch.carry[dropped, layout.AT] = -1.0
+        lost = running & (batch.carry[:, layout.AT] < 0)
+        if (lost == running).all() and tables.full:
+            tables.clear()
+        for i in np.flatnonzero(lost).tolist():
+            if tables.full:
+                return
+            which = tables.set_of(batch.param[i if batch.stride else 0])
+            at = tables.state_of(which, int(batch.mode[i]))
+            batch.carry[i, [layout.AT, layout.SET, layout.TABLES]] = at, which, tables.generation
 
     def _work(self) -> tuple[np.ndarray, ...]:
         """Work arrays of this thread, in the order in which the kernel takes them."""
         if not hasattr(self._memory, "arrays"):
-            _, groups, states, rows, guards, drives = self.tables.sizes.tolist()
-            terms, lanes = layout.ORDER + 1, self._lanes
-            empty = np.zeros
+            (
+                size, groups, states, rows, guards, drives, amplitudes, courses, _,
+            ) = self._sizes.tolist()  # fmt: skip
+            terms, lanes, empty = layout.ORDER + 1, self._lanes, np.zeros
+            columns = size if self._tangents else 1
             self._memory.arrays = (
-                empty((2 * groups, lanes)), empty((2 * groups, lanes)), empty((groups, lanes)),
+                empty((amplitudes, lanes)), empty((amplitudes, lanes)), empty((groups, lanes)),
                 empty((terms + 3, lanes)),
                 empty((max(rows, 1), terms)), empty((max(rows, 1), 3)), empty(terms),
                 empty((DEEPEST + 2, terms)), empty((DEEPEST + 2, 2)), empty(terms), empty(2),
                 empty((MOST_TOUCHES, 2)), empty((states, lanes)), empty((states, lanes)),
-                empty((max(drives, 1), 3)), empty((max(guards, 1), 4)),
+                empty((max(drives, 1), 4)), empty((max(guards, 1), 4)),
+                empty(((terms + 2) * self.tables.block_groups, lanes)),
+                empty((max(courses, 1), layout.VALUE + layout.COURSE_TERMS)),
+                empty((2 * groups, lanes)), empty((amplitudes, lanes)), empty((columns, columns)),
             )  # fmt: skip
         arrays: tuple[np.ndarray, ...] = self._memory.arrays
         return arrays
 
     # -- starts ------------------------------------------------------------------------------------
     def _begin(self, batch: Any) -> None:
-        """Find the contact states of trajectories that haven't begun."""
+        """Find the sides of trajectories that haven't begun."""
         new = np.flatnonzero((batch.mode < 0) & (batch.status == st.RUNNING))
         if not len(new):
             return
-        with self.tables.lock:
-            rows = batch.param[new] if batch.stride else batch.param[:1]
-            sets = np.array([self.tables.set_of(row) for row in rows], np.int64)
-            sets = np.broadcast_to(sets, len(new))
-            for which in np.unique(sets).tolist():
-                self._begin_set(batch, new[sets == which], which)
+        rows = batch.param[new] if batch.stride else batch.param[:1]
+        sets = np.array([self.tables.set_of(row) for row in rows], np.int64)
+        sets = np.broadcast_to(sets, len(new))
+        for which in np.unique(sets).tolist():
+            self._begin_set(batch, new[sets == which], which)
 
     def _begin_set(self, batch: Any, who: np.ndarray, which: int) -> None:
         """The same for trajectories with one set of parameter values."""
-        given = self.tables.sets[which]
+        given, state = self.tables.sets[which], batch.state[who, : self._states]
         time = batch.origin[who] + batch.count[who] * batch.period[who] + batch.phase[who]
-        drives = np.cos(given.rates * time[:, None] + given.lags)
+        drives = np.column_stack(
+            [
+                np.cos(given.rates * time[:, None] + given.lags),
+                *(course.at(time)[0] for course in given.courses),
+            ]
+        )
         parts = [
-            batch.state[who] @ given.gaps.matrix.T,
+            state @ given.gaps.matrix.T,
             np.broadcast_to(given.gaps.constant, (len(who), len(given.gaps.constant))),
             drives @ given.gaps.driven.T,
         ]
         gap = parts[0] + parts[1] + parts[2]
-        size = np.abs(batch.state[who]) @ np.abs(given.gaps.matrix.T)
+        size = np.abs(state) @ np.abs(given.gaps.matrix.T)
         zero = np.abs(gap) <= layout.ROUNDED * (size + np.abs(parts[1]) + np.abs(parts[2]))
         bits = 1 << np.arange(gap.shape[1])
         mode = ((gap > 0) & ~zero) @ bits if gap.shape[1] else np.zeros(len(who), np.int64)
         fresh = zero @ bits if gap.shape[1] else mode
         for i in np.flatnonzero(fresh).tolist():
-            mode[i] |= self._ways(which, int(mode[i]), zero[i], batch.state[who[i]], time[i])
+            mode[i] |= self._ways(which, int(mode[i]), zero[i], state[i], time[i])
         batch.mode[who], batch.fresh[who] = mode, fresh
         carry = np.zeros((len(who), layout.AMPLITUDES))
-        carry[:, layout.AT] = [self.tables.state_of(which, int(one)) for one in mode]
-        carry[:, layout.ENTERS], carry[:, layout.SET] = 1.0, which
+        carry[:, layout.AT], carry[:, layout.ENTERS] = -1.0, 1.0
         carry[:, layout.NEXT_STEP] = FIRST_STEP * batch.period[who]
         carry[:, layout.LANDED_AT], carry[:, layout.RIDES] = -math.inf, fresh
         batch.carry[who, : layout.AMPLITUDES] = carry
@@ -132,17 +158,17 @@ class ModalFlow:
         """
         given = self.tables.sets[which]
         piece = self.tables.linear.piece(given.values, mode)
-        wave, bits = np.exp(1j * (given.rates * time + given.lags)), 0
+        values, sizes = self._drives_at(which, time)
         rate, size, steady = state, np.abs(state), piece.constant
-        open_ = set(np.flatnonzero(zero).tolist())
+        open_, bits = set(np.flatnonzero(zero).tolist()), 0
         for order in range(1, WAYS + 1):
-            forced = (piece.driven @ wave).real
-            rate = piece.matrix @ rate + forced + steady
+            rate = piece.matrix @ rate + piece.driven @ values[order - 1] + steady
             size = (
-                np.abs(piece.matrix) @ size + np.abs(piece.driven) @ np.abs(wave) + np.abs(steady)
+                np.abs(piece.matrix) @ size
+                + np.abs(piece.driven) @ sizes[order - 1]
+                + np.abs(steady)
             )
-            steady, wave = 0.0 * steady, wave * (1j * given.rates)
-            drive = (given.gaps.driven @ wave).real
+            steady, drive = 0.0 * steady, given.gaps.driven @ values[order]
             for g in sorted(open_):
                 value = float(given.gaps.matrix[g] @ rate + drive[g])
                 least = layout.ROUNDED * float(
@@ -153,14 +179,28 @@ class ModalFlow:
                     bits |= (1 << g) if value > 0 else 0
         return bits
 
+    def _drives_at(self, which: int, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """The drives and their derivatives at a time, and what their sizes are at most:
+        float64[1 + WAYS, drives].
+        """
+        given = self.tables.sets[which]
+        orders = np.arange(WAYS + 1)[:, None]
+        waves = np.exp(1j * (given.rates * time + given.lags)) * (1j * given.rates) ** orders
+        courses = np.zeros((WAYS + 1, len(given.courses)))
+        for p, course in enumerate(given.courses):
+            courses[: layout.COURSE_TERMS, p] = course.at(np.array(time))
+        return np.hstack([waves.real, courses]), np.hstack([np.abs(waves), np.abs(courses)])
+
 
 @functools.lru_cache(maxsize=64)
 def modal_flow(system: System) -> ModalFlow:
     """The modal flow of a system. Raises ParameterError, with the reason, if it has none."""
+    if system.tangent_of is not None:
+        return ModalFlow(modal_flow(system.tangent_of.origin).tables, tangents=True)
     linear = linear_pieces(system)
     if isinstance(linear, str):
         raise ParameterError(f"sl.Modal doesn't serve {system.name}: {linear}.")
-    return ModalFlow(linear)
+    return ModalFlow(Tables(linear))
 
 
 @explain_unknown_options
@@ -192,13 +232,19 @@ class Modal(Method):
 
     def serving(self, system: System) -> Method:
         """Taylor's method for a system that has no modal flow."""
-        if isinstance(linear_pieces(system), str):
+        if isinstance(linear_pieces((system.tangent_of or system).origin), str):
             return Taylor(max_steps=self.max_steps, max_events=self.max_events)
         return self
 
     def kernels(self, system: System) -> Flow:
         """The modal flow."""
         return modal_flow(system)
+
+    def tangents(self, system: System) -> System | None:
+        """The states alone: the modes of a contact state move the derivative too."""
+        if self.serving(system.origin) is not self:
+            return super().tangents(system)
+        return tangent_states(system)
 
     def numbers(self, periods: float) -> np.ndarray:
         """Step budget, event budget."""

@@ -10,46 +10,50 @@ from dataclasses import dataclass
 import numpy as np
 
 from saltus.codegen.module import MODAL_LANES as LANES
-from saltus.errors import ParameterError
+from saltus.flow.modal_blocks import table_of
+from saltus.flow.modal_modes import Eigen, StateModes, eigen_of, modes_of, slots_of
+from saltus.kernels import modal_layout as layout
+from saltus.language.expression import Expr, walk
+from saltus.system.courses import TERMS, Course, course_of
 from saltus.system.linear import LinearPiece, LinearSystem
 
-#: Condition of the eigenvectors of a contact state above which its modes don't carry its motion.
-MOST_CONDITION = 1e9
-#: Distance of a drive from an eigenvalue, relative to its rate, below which it is in resonance.
-RESONANCE = 1e-9
+#: Memory of the tables of one system [bytes]. Beyond it all are dropped, as soon as no trajectory
+#: that a call moves needs them; those still to be moved make theirs anew.
+MOST_BYTES = 2**28
+#: Memory of a set of parameter values besides its arrays [bytes].
+SET_BYTES = 4096
+#: Rounding of a coefficient of the equations, relative to it.
+ROUNDED = 16 * np.finfo(float).eps
 
 
 class _Rows:
-    """A table that grows: float64[rows, LANES]."""
+    """A table that grows: [rows, width]."""
 
-    def __init__(self) -> None:
-        self.used, self._memory = 0, np.zeros((256, LANES))
-
-    @property
-    def table(self) -> np.ndarray:
-        """All of it, with room behind."""
-        return self._memory
+    def __init__(self, width: int = LANES, kind: type = float) -> None:
+        self.used = 0
+        self.table: np.ndarray = np.zeros((64, width), kind)
 
     def add(self, numbers: np.ndarray) -> int:
         """Append rows; returns the first."""
-        first, rows = self.used, numbers.reshape(-1, LANES)
-        if first + len(rows) > len(self._memory):
-            grown = np.zeros((2 * (first + len(rows)), LANES))
-            grown[:first] = self._memory[:first]
-            self._memory = grown
-        self._memory[first : first + len(rows)] = rows
+        first, rows = self.used, numbers.reshape(-1, self.table.shape[1])
+        if first + len(rows) > len(self.table):
+            grown = np.zeros((2 * (first + len(rows)), self.table.shape[1]), self.table.dtype)
+            grown[:first] = self.table[:first]
+            self.table = grown
         self.used += len(rows)
+        self.table[first : self.used] = rows
         return first
 
 
 @dataclass(frozen=True)
-class _Modes:
-    """Modes of one contact state: z = V y, y = L z; all of them, and the row of their table."""
+class _Equations:
+    """The equations of a contact state, the eigenvalues and -vectors of their matrix, and the
+    fastest eigenvalue of other states [1/s]: the same for all rates of the drives.
+    """
 
-    values: np.ndarray
-    vectors: np.ndarray
-    inverse: np.ndarray
-    row: int
+    piece: LinearPiece
+    eigen: Eigen
+    fastest: float
 
 
 @dataclass(frozen=True)
@@ -60,6 +64,7 @@ class _Set:
     gaps: LinearPiece
     rates: np.ndarray
     lags: np.ndarray
+    courses: tuple[Course, ...]
 
 
 class Tables:
@@ -69,27 +74,59 @@ class Tables:
     ----------
     linear : LinearSystem
         The system.
+
+    Notes
+    -----
+    They take MOST_BYTES, 256 MB, at most, and what one more contact state needs.
     """
 
     def __init__(self, linear: LinearSystem) -> None:
         self.linear = linear
         self.lock = threading.Lock()
-        self.modes, self.steady = _Rows(), _Rows()
-        self._sets: dict[bytes, int] = {}
-        self.sets: list[_Set] = []
-        self._known: dict[tuple[bytes, bytes], _Modes] = {}
-        self._states: dict[tuple[int, int], int] = {}
-        self._links: list[list[int]] = []
+        self.generation = 0
+        self.clear()
         n, guards = len(linear.system.states), len(linear.system.guards)
         self.row_of, self.sign_of = self._rows_of_gaps()
         rows = int(self.row_of.max(initial=-1)) + 1
         self.first_guard = [int(np.flatnonzero(self.row_of == r)[0]) for r in range(rows)]
         values = dict(linear.system.values)
-        slots = len(_slots(np.linalg.eigvals(linear.piece(values, 0).matrix))) + rows
+        slots = len(slots_of(np.linalg.eigvals(linear.piece(values, 0).matrix))) + rows
         self.groups, self.state_groups = -(-slots // LANES), -(-n // LANES)
+        drives = len(linear.drives)
+        courses = len(linear.courses)
+        self.block_groups = -(-(n + 1 + 2 * drives + TERMS * courses) // LANES)
+        self.rows = 2 * self.groups + self.block_groups
         self.sizes = np.array(
-            [n, self.groups, self.state_groups, rows, guards, len(linear.drives)], np.int64
+            [n, self.groups, self.state_groups, rows, guards, drives, self.rows, courses, 0],
+            np.int64,
         )
+
+    def clear(self) -> None:
+        """Drop all sets and contact states: their numbers are of a new generation. Arrays that
+        kernels hold stay as they are.
+        """
+        self.generation += 1
+        self.modes, self.steady, self.pieces = _Rows(), _Rows(), _Rows()
+        self._courses: dict[tuple[Expr, bytes], tuple[Course, list[float]]] = {}
+        self._sets: dict[bytes, int] = {}
+        self.sets: list[_Set] = []
+        self._equations: dict[tuple[object, ...], _Equations] = {}
+        self._smooth: dict[tuple[object, ...], bool] = {}
+        self._known: dict[tuple[int, bytes], int] = {}
+        self._states: dict[tuple[int, int], int] = {}
+        #: Equations and modes of each contact state.
+        self.made: list[tuple[_Equations, StateModes]] = []
+        drives, guards = max(len(self.linear.drives), 1), len(self.linear.system.guards)
+        self._offset, self._rate, self._lag = _Rows(max(guards, 1)), _Rows(drives), _Rows(drives)
+        self._links = _Rows(layout.BEHIND + guards, int)
+        self._course = _Rows(max(4 * len(self.linear.courses), 1))
+        self._held = 0
+
+    @property
+    def full(self) -> bool:
+        """True if the tables hold MOST_BYTES or more."""
+        rows = sum(one.table.nbytes for one in (self.modes, self.steady, self.pieces))
+        return self._held + rows >= MOST_BYTES
 
     def _rows_of_gaps(self) -> tuple[np.ndarray, np.ndarray]:
         """Row and sign of each guard's gap: guards whose gaps differ by a number only share one."""
@@ -115,13 +152,11 @@ class Tables:
 
     # -- what the kernel reads ---------------------------------------------------------------------
     def arrays(self) -> tuple[np.ndarray, ...]:
-        """The tables, in the order in which the kernel takes them."""
-        offset = np.array([one.gaps.constant for one in self.sets]).reshape(len(self.sets), -1)
-        rate = np.array([one.rates for one in self.sets]).reshape(len(self.sets), -1)
-        lag = np.array([one.lags for one in self.sets]).reshape(len(self.sets), -1)
+        """The tables, in the order in which the kernel takes them after the sizes."""
+        links = self._links.table[: self._links.used].copy()  # others change while a kernel reads
         return (
-            self.sizes, self.row_of, self.sign_of, offset, rate, lag, self.modes.table,
-            self.steady.table, np.array(self._links, np.int64),
+            self.row_of, self.sign_of, self._offset.table, self._rate.table, self._lag.table,
+            self.modes.table, self.steady.table, links, self._course.table, self.pieces.table,
         )  # fmt: skip
 
     def set_of(self, row: np.ndarray) -> int:
@@ -130,9 +165,33 @@ class Tables:
         if key not in self._sets:
             values = dict(zip(self.linear.system.values, row.tolist(), strict=True))
             rates, lags = self.linear.rates(values)
-            self.sets.append(_Set(values, self.linear.gaps(values), rates, lags))
+            found = [self._course_of(node, values) for node in self.linear.courses]
+            rows = np.array([row for _, row in found], float).ravel()
+            courses, gaps = tuple(course for course, _ in found), self.linear.gaps(values)
+            for table, numbers in (
+                (self._offset, gaps.constant), (self._rate, rates), (self._lag, lags),
+                (self._course, rows),
+            ):  # fmt: skip
+                table.add(np.append(numbers, np.zeros(table.table.shape[1] - len(numbers))))
+            self.sets.append(_Set(values, gaps, rates, lags, courses))
             self._sets[key] = len(self.sets) - 1
+            self._held += SET_BYTES + self.sets[-1].gaps.matrix.nbytes
         return self._sets[key]
+
+    def _course_of(self, node: Expr, values: dict[str, float]) -> tuple[Course, list[float]]:
+        """A course and its row of numbers for the kernel: one for all values that it doesn't ask
+        for.
+        """
+        asked = [one.payload for one in walk(node) if one.op == "param"]
+        key = (node, np.array([values[name] for name in asked]).tobytes())
+        if key not in self._courses:
+            course = course_of(node, values)
+            begins = np.concatenate([course.begins, np.zeros(-len(course.begins) % LANES)])
+            first = self.pieces.add(np.concatenate([begins, course.terms.ravel()]))
+            row = [first, len(course.begins), course.cycle, len(begins) // LANES]
+            self._courses[key] = course, row
+            self._held += course.begins.nbytes + course.terms.nbytes
+        return self._courses[key]
 
     def state_of(self, which: int, mode: int) -> int:
         """Number of a contact state, made if it isn't known."""
@@ -141,101 +200,117 @@ class Tables:
         return self._states[which, mode]
 
     def _make(self, which: int, mode: int) -> None:
-        given = self.sets[which]
-        piece = self.linear.piece(given.values, mode)
-        modes = self._modes_of(piece.matrix, given.gaps.matrix)
-        number, guards = len(self._links), len(self.linear.system.guards)
-        links = [modes.row, self._steady_of(modes, piece, given)]
+        given, known = self.sets[which], self._equations_of(self.sets[which], mode)
+        speeds = np.array([one.speeds for one in given.courses]).reshape(-1, TERMS)
+        modes = modes_of(
+            known.piece, given.gaps, given.rates, speeds, LANES * self.groups, known.eigen,
+            known.fastest,
+        )  # fmt: skip
+        number, guards = len(self.made), len(self.linear.system.guards)
+        links = [self._modes_of(known, modes, given), self._steady_of(modes, given), 0]
         for g in range(guards):
             behind = self._states.get((which, mode ^ 1 << g), -1)
             links.append(behind)
             if behind >= 0:
-                self._links[behind][2 + g] = number
-        self._links.append(links)
+                self._links.table[behind, layout.BEHIND + g] = number
+                if self._is_smooth(known, self.made[behind][0], given.gaps, g):
+                    links[layout.SMOOTH] |= 1 << g
+                    self._links.table[behind, layout.SMOOTH] |= 1 << g
+        self._links.add(np.array(links))
+        self.made.append((known, modes))
         self._states[which, mode] = number
 
     # -- one contact state -------------------------------------------------------------------------
-    def _modes_of(self, matrix: np.ndarray, gaps: np.ndarray) -> _Modes:
-        """Modes of a matrix and their table."""
-        key = (matrix.tobytes(), gaps.tobytes())
+    def _equations_of(self, given: _Set, mode: int) -> _Equations:
+        """The equations of a contact state, read off once for all rates of the drives."""
+        used = tuple(given.values[name] for name in self.linear.parameters)
+        if (mode, used) not in self._equations:
+            piece, fastest = self.linear.piece(given.values, mode), 0.0
+            every = (1 << len(self.linear.system.guards)) - 1
+            if piece.constant.any():
+                others = [self.linear.piece(given.values, one).matrix for one in (0, every)]
+                fastest = max(float(np.abs(np.linalg.eigvals(one)).max()) for one in others)
+            self._equations[mode, used] = _Equations(piece, eigen_of(piece.matrix), fastest)
+            self._held += 8 * piece.matrix.nbytes
+        return self._equations[mode, used]
+
+    def _is_smooth(self, one: _Equations, other: _Equations, gaps: LinearPiece, g: int) -> bool:
+        key = id(one), id(other), g, gaps.constant[g], gaps.matrix[g].tobytes()
+        if key not in self._smooth:
+            self._smooth[key] = _is_smooth(one.piece, other.piece, gaps, g)
+        return self._smooth[key]
+
+    def _modes_of(self, known: _Equations, modes: StateModes, given: _Set) -> int:
+        """First row of the table of some modes; those of equal equations share one, but for blocks,
+        which hold drives.
+        """
+        key = id(known), given.gaps.matrix.tobytes()
+        if modes.block is not None:
+            return self.modes.add(self._table(modes, given.gaps.matrix))
         if key not in self._known:
-            values, vectors = np.linalg.eig(matrix)
-            if not np.linalg.cond(vectors) < MOST_CONDITION:
-                raise ParameterError(
-                    f"a contact state of {self.linear.system.name} has modes that coincide, as at "
-                    "critical damping: they don't carry its motion. Use method=sl.Taylor()."
-                )
-            inverse = np.linalg.inv(vectors)
-            inverse += inverse @ (np.eye(len(matrix)) - vectors @ inverse)
-            row = self.modes.add(self._table(values, vectors, inverse, gaps))
-            self._known[key] = _Modes(values, vectors, inverse, row)
+            self._known[key] = self.modes.add(self._table(modes, given.gaps.matrix))
         return self._known[key]
 
-    def _table(
-        self, values: np.ndarray, vectors: np.ndarray, inverse: np.ndarray, gaps: np.ndarray
-    ) -> np.ndarray:
-        """The table of some modes: lambda, its size, L, V, amplitudes of the gaps."""
-        slots = _slots(values)
+    def _table(self, modes: StateModes, gaps: np.ndarray) -> np.ndarray:
+        """The table of some modes: lambda, its size, L, V, amplitudes of the gaps; the block."""
+        values, vectors, inverse = modes.values, modes.vectors, modes.inverse
+        slots, states = slots_of(values), len(vectors)
         width, count = LANES * self.groups, LANES * self.state_groups
-        if len(slots) > width:
-            raise ParameterError(
-                f"{len(slots) - width} more modes of {self.linear.system.name} are overdamped in a "
-                "contact state than its contacts can explain. Use method=sl.Taylor()."
-            )
         weight = np.where(values[slots].imag > 0, 2.0, 1.0)
         lam, size = np.zeros(width, complex), np.zeros(width)
         lam[: len(slots)] = values[slots]
         size[: len(slots)] = np.abs(values[slots])
-        size[len(slots) :] = size[: len(slots)].max()
+        size[len(slots) :] = size[: len(slots)].max(initial=0.0)
         to_modes, to_states = np.zeros((width, count), complex), np.zeros((count, width), complex)
-        to_modes[: len(slots), : len(values)] = inverse[slots]
-        to_states[: len(values), : len(slots)] = vectors[:, slots] * weight
+        to_modes[: len(slots), :states] = inverse[slots]
+        to_states[:states, : len(slots)] = vectors[:, slots] * weight
         # L: by groups of modes, real parts then imaginary ones, each for all states
         left = to_modes.reshape(self.groups, LANES, count).transpose(0, 2, 1)
         left = np.concatenate([left.real, left.imag])
         # V: by groups of states, for each mode the real part and minus the imaginary one
         right = to_states.reshape(self.state_groups, LANES, width).transpose(0, 2, 1)
         right = np.stack([right.real, -right.imag], axis=2)
-        rows = gaps[self.first_guard] @ to_states[: len(values)]
+        gaps = gaps[self.first_guard]
+        rows = gaps @ to_states[:states]
         waves = np.stack([rows.real, rows.imag, np.abs(rows)], axis=1)
+        block = table_of(modes.block, gaps, LANES, self.state_groups)
         return np.concatenate(
-            [one.ravel() for one in (lam.real, lam.imag, size, left, right, waves)]
+            [one.ravel() for one in (lam.real, lam.imag, size, left, right, waves, *block)]
         )
 
-    def _steady_of(self, modes: _Modes, piece: LinearPiece, given: _Set) -> int:
-        """First row of the table of the steady answer to the drives."""
-        rates = np.concatenate([[0.0], given.rates])
-        far = 1j * rates[:, None] - modes.values[None]
-        loads = np.column_stack([piece.constant, piece.driven])
-        parts = modes.inverse @ loads
-        least = np.abs(far).min(axis=1)
-        near = (least < RESONANCE * np.maximum(rates, np.abs(modes.values).max() * 1e-6)) & (
-            np.abs(loads).max(axis=0) > 0
-        )
-        if near.any():
-            raise ParameterError(
-                f"{self.linear.system.name}: a drive, or a constant force, is in resonance with an "
-                "undamped mode. Use method=sl.Taylor()."
-            )
-        with np.errstate(all="ignore"):
-            answers = modes.vectors @ np.where(parts == 0, 0, parts / far.T)
-        answers = answers.T  # float64[1 + drives, N]
-        padded = np.zeros((len(rates), LANES * self.state_groups), complex)
+    def _steady_of(self, modes: StateModes, given: _Set) -> int:
+        """First row of the table of the steady answer: to the constant, to cosine and sine of each
+        harmonic drive, to each derivative of each course.
+        """
+        harmonic, first = 1 + len(given.rates), self.first_guard
+        answers = modes.answers.T  # [1 + drives + TERMS * courses, N]
+        padded = np.zeros((len(answers), LANES * self.state_groups), complex)
         padded[:, : answers.shape[1]] = answers
-        waves = np.stack([padded.real, padded.imag], axis=1).reshape(-1, padded.shape[1])
-        states = np.delete(waves, 1, axis=0)  # the constant has no imaginary part
-        first = self.first_guard
-        gaps = given.gaps.matrix[first] @ answers.T  # [rows, 1 + drives]
-        gaps[:, 1:] += given.gaps.driven[first]
-        pairs = np.stack([gaps.real, gaps.imag], axis=2).reshape(len(first), -1)
-        numbers = np.delete(pairs, 1, axis=1).ravel()
-        numbers = np.concatenate([numbers, np.zeros(-len(numbers) % LANES)])
-        return self.steady.add(np.concatenate([states.ravel(), numbers]))
+        gaps = given.gaps.matrix[first] @ answers.T
+        gaps[:, 1:harmonic] += given.gaps.driven[first, : harmonic - 1]
+        gaps[:, harmonic::TERMS] += given.gaps.driven[first, harmonic - 1 :]
+        # only the harmonic ones have an imaginary part
+        states = [padded[0].real]
+        numbers = [gaps[:, 0].real]
+        for d in range(1, harmonic):
+            states += [padded[d].real, padded[d].imag]
+            numbers += [gaps[:, d].real, gaps[:, d].imag]
+        states += list(padded[harmonic:].real)
+        numbers += list(gaps[:, harmonic:].T.real)
+        flat = np.array(numbers).T.ravel()
+        flat = np.concatenate([flat, np.zeros(-len(flat) % LANES)])
+        return self.steady.add(np.concatenate([*states, flat]))
 
 
-def _slots(values: np.ndarray) -> np.ndarray:
-    """Indices of one of each pair of complex eigenvalues and of all real ones, ascending by
-    size.
+def _is_smooth(one: LinearPiece, other: LinearPiece, gaps: LinearPiece, g: int) -> bool:
+    """True if the rates in two contact states agree where the gap of a guard is zero: their
+    difference is a multiple of the gap, to rounding.
     """
-    kept = np.flatnonzero(values.imag >= 0)
-    return kept[np.argsort(np.abs(values[kept]), kind="stable")]
+    first, second, rows = (
+        np.column_stack([piece.matrix, piece.constant, piece.driven])
+        for piece in (one, other, gaps)
+    )
+    gap, jump = rows[g] / np.linalg.norm(rows[g]), first - second
+    noise = ROUNDED * (np.abs(first) + np.abs(second))
+    left = jump - np.outer(jump @ gap, gap)
+    return bool((np.abs(left) <= noise + np.outer(noise @ np.abs(gap), np.abs(gap))).all())

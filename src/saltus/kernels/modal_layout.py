@@ -3,12 +3,15 @@
 One trajectory after the other; the lanes of a step hold its modes. A contact state is linear: z' =
 A z + b + drives. Its modes y = L (z - z_p(t)), z_p the steady answer to the drives, go their own
 ways: y_j(t) = y_j e^{lambda_j t}. Of a pair of complex modes one is kept, and z = z_p + Re(V y).
-A gap is a row of amplitudes: g(t) = c + Re(sum_j w_j y_j(t)) + drives.
+A gap is a row of amplitudes: g(t) = c + Re(sum_j w_j y_j(t)) + drives. The derivative of the state
+with respect to the state at the start, if it is carried, is moved from contact to contact at once.
 
 Symbols
 -------
 N states; G groups of LANES modes, ascending by |lambda|; S groups of LANES states; R rows of gaps,
-of which guards are plus or minus one, and an offset; H drives Re(e^{i (rate t + phase)}).
+of which guards are plus or minus one, and an offset; H drives Re(e^{i (rate t + phase)}). Modes
+that don't go their own ways go together in a block: see modal_blocks.py. Drives that are
+polynomials between breaks are courses: see modal_records.py.
 """
 
 from collections import namedtuple
@@ -19,15 +22,27 @@ FACTORIAL = 20922789888000.0
 #: A mode is followed in the series of a gap while |lambda| h is at most this; what is left out of
 #: its own series is at most its amplitude there.
 FOLLOWED = 6.0
-# Columns of `sizes`.
-STATES, MODE_GROUPS, STATE_GROUPS, GAP_ROWS, GUARDS, DRIVES = range(6)
-# Columns of `links`: first row of the modes' table, first row of the drives' table; then for each
-# guard the contact state behind its boundary, -1 where it hasn't been made yet.
-MODES, STEADY, BEHIND = range(3)
+# Columns of `sizes`; ROWS are the rows of amplitudes: those of the modes, real parts then imaginary
+# ones, then those of a block; TANGENTS is 1 where the derivative of the state is carried.
+STATES, MODE_GROUPS, STATE_GROUPS, GAP_ROWS, GUARDS, DRIVES, ROWS, COURSES, TANGENTS = range(9)
+# Columns of `record`: the time of a course at the beginning of the period, the times of the period
+# at which its piece begins and ends [s], the row of that piece, its value and derivatives.
+BASE, SINCE, UNTIL, PIECE, VALUE = range(5)
+#: Value and derivatives of a course.
+COURSE_TERMS = 4
+# Columns of `links`: first row of the modes' table, first row of the drives' table, guards where
+# the rates don't jump (bits); then for each guard the contact state behind its boundary, -1 where
+# it hasn't been made yet.
+MODES, STEADY, SMOOTH, BEHIND = range(4)
 # Columns of `carry`: the contact state (-1: to be looked up), whether its amplitudes must be made
 # of the state, the next step [s], the time of the last landing, landings there since, guards that
-# the state has ridden from its start on (bits), the set of parameter values; then the amplitudes.
-AT, ENTERS, NEXT_STEP, LANDED_AT, LANDINGS, RIDES, SET, AMPLITUDES = range(8)
+# the state has ridden from its start on (bits), the set of parameter values, the generation of the
+# tables in which these numbers stand; with tangents the time for which they haven't been moved [s]
+# and the boundaries just crossed (bits); then the amplitudes, and with tangents the rates of the
+# states and the gaps before these boundaries.
+(
+    AT, ENTERS, NEXT_STEP, LANDED_AT, LANDINGS, RIDES, SET, TABLES, WAITED, CROSSED, AMPLITUDES,
+) = range(11)  # fmt: skip
 # Columns of `options`.
 MOST_STEPS, MOST_CONTACTS = range(2)
 # What is known of a guard in a step.
@@ -42,6 +57,7 @@ HUGE = 1.0e300
 
 Modal = namedtuple(
     "Modal",
-    "sizes row_of sign_of offset rate lag modes steady links y moved size sums q errors p bern "
-    "bounds slopes out touches state answer angle found",
+    "sizes row_of sign_of offset rate lag modes steady links course pieces y moved size sums q "
+    "errors p bern bounds slopes out touches state answer angle found chain record factor column "
+    "columns",
 )

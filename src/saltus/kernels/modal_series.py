@@ -1,4 +1,4 @@
-"""Template, 1 of 2 of the modal flow: amplitudes on their way, and what they say of gaps."""
+"""Template, 3 of 5 of the modal flow: amplitudes on their way, and what they say of gaps."""
 
 import math
 
@@ -55,15 +55,17 @@ def begin_period(i, batch, m):
             + turned(rate, batch.origin[i], 1)
             + turned(rate, batch.period[i], batch.count[i])
         )
+    begin_courses(i, batch, m)
 
 
 @kernel
 def drive(i, tau, batch, m):
-    """Cosine and sine of each drive at a time of the period, to `angle`."""
+    """Cosine and sine of each drive at a time of the period, to `angle`; the courses there."""
     which = int(batch.carry[i, SET])
     for d in range(m.sizes[DRIVES]):
         at = m.angle[d, 0] + m.rate[which, d] * tau
         m.angle[d, 1], m.angle[d, 2] = math.cos(at), math.sin(at)
+    courses_at(tau, m)
 
 
 @kernel
@@ -76,16 +78,51 @@ def answer_now(steady, m):
             row = steady + (1 + 2 * d) * groups + s
             total = fma(load(m.steady, row, LANES), m.angle[d, 1], total)
             total = fma(load(m.steady, row + groups, LANES), -m.angle[d, 2], total)
+        for p in range(m.sizes[COURSES]):
+            row = steady + (1 + 2 * m.sizes[DRIVES] + COURSE_TERMS * p) * groups + s
+            for k in range(COURSE_TERMS):
+                part = load(m.steady, row + k * groups, LANES)
+                total = fma(part, m.record[p, VALUE + k], total)
         store(m.answer, s, total)
 
 
-# -- states and amplitudes -------------------------------------------------------------------------
 @kernel
-def amplitudes_of(modes, m):
-    """Amplitudes of the state in `state`, to `y`: L (z - z_p). Needs `answer`."""
-    width, count = 2 * m.sizes[MODE_GROUPS], LANES * m.sizes[STATE_GROUPS]
+def answer_rate(steady, which, m):
+    """The rate of the steady answer, whose phases are in `angle`, to `answer`."""
+    groups = m.sizes[STATE_GROUPS]
+    for s in range(groups):
+        total = splat(0.0, LANES)
+        for d in range(m.sizes[DRIVES]):
+            row, rate = steady + (1 + 2 * d) * groups + s, m.rate[which, d]
+            total = fma(load(m.steady, row, LANES), -rate * m.angle[d, 2], total)
+            total = fma(load(m.steady, row + groups, LANES), -rate * m.angle[d, 1], total)
+        for p in range(m.sizes[COURSES]):
+            row = steady + (1 + 2 * m.sizes[DRIVES] + COURSE_TERMS * p) * groups + s
+            for k in range(COURSE_TERMS - 1):
+                part = load(m.steady, row + k * groups, LANES)
+                total = fma(part, m.record[p, VALUE + k + 1], total)
+        store(m.answer, s, total)
+
+
+@inner
+def numbers_of_gap(r, steady, m):
+    """Place of the steady answer of a row of gaps: the first row of numbers, the first of them."""
+    numbers = 1 + 2 * m.sizes[DRIVES] + COURSE_TERMS * m.sizes[COURSES]
+    return steady + numbers * m.sizes[STATE_GROUPS], r * numbers
+
+
+# -- states and amplitudes -------------------------------------------------------------------------
+@inner
+def less_answer(m):
+    """Subtract the answer from `state`."""
     for s in range(m.sizes[STATE_GROUPS]):
         store(m.state, s, load(m.state, s, LANES) - load(m.answer, s, LANES))
+
+
+@kernel
+def amplitudes_of(modes, y, m):
+    """Amplitudes of what is in `state`, to y: L z."""
+    width, count = 2 * m.sizes[MODE_GROUPS], LANES * m.sizes[STATE_GROUPS]
     for g in range(width):
         row = modes + 3 * m.sizes[MODE_GROUPS] + g * count
         a, b = splat(0.0, LANES), splat(0.0, LANES)
@@ -95,7 +132,8 @@ def amplitudes_of(modes, m):
             b = fma(load(m.modes, row + i + 1, LANES), number(m.state, 0, i + 1), b)
             c = fma(load(m.modes, row + i + 2, LANES), number(m.state, 0, i + 2), c)
             d = fma(load(m.modes, row + i + 3, LANES), number(m.state, 0, i + 3), d)
-        store(m.y, g, (a + b) + (c + d))
+        store(y, g, (a + b) + (c + d))
+    block_amplitudes(modes, y, m)
 
 
 @kernel
@@ -114,25 +152,39 @@ def state_of(modes, y, m):
             c = fma(load(m.modes, row + 2 * j + 2, LANES), number(y, 0, j + 1), c)
             d = fma(load(m.modes, row + 2 * j + 3, LANES), number(y, groups, j + 1), d)
         store(m.state, s, (a + b) + (c + d))
+    add_block_state(modes, y, m)
+
+
+@inner
+def factor_of(modes, g, h, m):
+    """e^{lambda h} of a group of modes: its real and its imaginary part."""
+    decay = exponential(load(m.modes, modes + g, LANES) * h)
+    sine, cosine = sincos(load(m.modes, modes + m.sizes[MODE_GROUPS] + g, LANES) * h)
+    return cosine * decay, sine * decay
+
+
+@inner
+def turn(y, g, a, b, to, m):
+    """Write (a + i b) y of a group of modes."""
+    groups = m.sizes[MODE_GROUPS]
+    real, imaginary = load(y, g, LANES), load(y, groups + g, LANES)
+    store(to, g, fma(-imaginary, b, real * a))
+    store(to, groups + g, fma(imaginary, a, real * b))
 
 
 @kernel
 def move(modes, h, m):
     """The amplitudes after a time h, to `moved`."""
-    groups = m.sizes[MODE_GROUPS]
-    for g in range(groups):
-        decay = exponential(load(m.modes, modes + g, LANES) * h)
-        sine, cosine = sincos(load(m.modes, modes + groups + g, LANES) * h)
-        real, imaginary = load(m.y, g, LANES), load(m.y, groups + g, LANES)
-        cosine, sine = cosine * decay, sine * decay
-        store(m.moved, g, fma(-imaginary, sine, real * cosine))
-        store(m.moved, groups + g, fma(imaginary, cosine, real * sine))
+    for g in range(m.sizes[MODE_GROUPS]):
+        a, b = factor_of(modes, g, h, m)
+        turn(m.y, g, a, b, m.moved, m)
+    move_block(modes, h, m.y, m.moved, m)
 
 
 @inner
 def keep_moved(m):
     """Make `moved` the amplitudes."""
-    for g in range(2 * m.sizes[MODE_GROUPS]):
+    for g in range(m.sizes[ROWS]):
         store(m.y, g, load(m.moved, g, LANES))
 
 
@@ -188,6 +240,7 @@ def series_of(r, modes, steady, which, h, m):
     store(m.sums, ORDER + 1, left)
     store(m.sums, ORDER + 2, slope)
     store(m.sums, ORDER + 3, size)
+    add_block_series(r, modes, h, m)
     for k in range(ORDER + 1):
         m.q[r, k] = total_of(m.sums, k)
     e0, e1, scale = (
@@ -195,8 +248,7 @@ def series_of(r, modes, steady, which, h, m):
         total_of(m.sums, ORDER + 2),
         total_of(m.sums, ORDER + 3),
     )
-    first = steady + (1 + 2 * drives) * m.sizes[STATE_GROUPS]
-    at = r * (1 + 2 * drives)
+    first, at = numbers_of_gap(r, steady, m)
     m.q[r, 0] += number(m.steady, first, at)
     scale += abs(number(m.steady, first, at))
     for d in range(drives):
@@ -213,6 +265,7 @@ def series_of(r, modes, steady, which, h, m):
         for k in range(ORDER + 1):
             m.q[r, k] += real
             real, imaginary = -imaginary * reach, real * reach
+    scale += add_course_series(r, first, at + 1 + 2 * drives, h, m)
     share = 1.0
     for k in range(2, ORDER + 1):
         share /= k
@@ -236,12 +289,13 @@ def gap_of_moved(r, modes, steady, which, m):
         rate = fma(-load(m.modes, modes + groups + g, LANES), imaginary, rate)
     store(m.sums, 0, value)
     store(m.sums, 1, rate)
+    add_block_gap(r, modes, m)
     v, w = total_of(m.sums, 0), total_of(m.sums, 1)
-    first = steady + (1 + 2 * drives) * m.sizes[STATE_GROUPS]
-    at = r * (1 + 2 * drives)
+    first, at = numbers_of_gap(r, steady, m)
     v += number(m.steady, first, at)
     for d in range(drives):
         a, b = number(m.steady, first, at + 1 + 2 * d), number(m.steady, first, at + 2 + 2 * d)
         v += a * m.angle[d, 1] - b * m.angle[d, 2]
         w -= (a * m.angle[d, 2] + b * m.angle[d, 1]) * m.rate[which, d]
-    return v, w
+    value_of, rate_of = course_gap(first, at + 1 + 2 * drives, m)
+    return v + value_of, w + rate_of

@@ -1,4 +1,4 @@
-"""Template, 2 of 2 of the modal flow: steps that are proven to cross no boundary, or just one, and
+"""Template, 5 of 5 of the modal flow: steps that are proven to cross no boundary, or just one, and
 the life of a trajectory.
 
 A step is tried and halved until every gap is decided. Modes that are too fast for it are bounded:
@@ -174,6 +174,8 @@ def reach(i, tau, h, modes, steady, batch, m):
         store(m.moved, g, real)
         store(m.moved, groups + g, imaginary)
         store(m.size, g, root(fma(real, real, imaginary * imaginary)))
+    for g in range(2 * groups, m.sizes[ROWS]):
+        store(m.moved, g, load(m.y, g, LANES))
     waves = modes + groups * (3 + 4 * LANES * m.sizes[STATE_GROUPS])
     for g in range(m.sizes[GUARDS]):
         r, side = m.row_of[g], side_of(g, batch.mode[i])
@@ -194,6 +196,7 @@ def reach(i, tau, h, modes, steady, batch, m):
             near -= 1
         most = max(most, near)
     fastest = m.modes[modes + 2 * groups + most - 1, LANES - 1] if most > 0 else 0.0
+    fastest = max(fastest, block_limit(modes, m))
     return FOLLOWED / fastest if h * fastest > FOLLOWED else h
 
 
@@ -204,6 +207,7 @@ def look(i, tau, h, modes, steady, batch, m):
     """
     which = int(batch.carry[i, SET])
     drive(i, tau, batch, m)
+    follow_block(modes, h, m)
     for r in range(m.sizes[GAP_ROWS]):
         series_of(r, modes, steady, which, h, m)
     m.out[MARGIN], m.found[0, 3] = batch.minima[i, GAP_MARGIN], 0.0
@@ -254,10 +258,9 @@ def record(i, g, tau, kind, direction, velocity, after, error, batch, m):
     batch.rec_i[r, REC_MODE_BEFORE], batch.rec_i[r, REC_MODE_AFTER] = batch.mode[i], after
     batch.rec_f[r, REC_PHASE], batch.rec_f[r, REC_VELOCITY] = tau, velocity
     batch.rec_f[r, REC_TIME_ERROR] = error
-    states = m.sizes[STATES]
-    for j in range(states):
+    for j in range(m.sizes[STATES]):
         batch.rec_f[r, RECORD_FLOATS + j] = m.state[j // LANES, j % LANES]
-    batch.rec_f[r, RECORD_FLOATS + states] = time_of(i, tau, batch)
+    batch.rec_f[r, RECORD_FLOATS + batch.state.shape[1]] = time_of(i, tau, batch)
 
 
 @kernel
@@ -295,8 +298,13 @@ def write_samples(i, tau, until, modes, steady, batch, m):
         if due > until:
             break
         state_after(i, tau, due - tau, modes, steady, batch, m)
-        for j in range(m.sizes[STATES]):
+        states = m.sizes[STATES]
+        for j in range(states):
             batch.samples[i, k, j] = m.state[j // LANES, j % LANES]
+        if m.sizes[TANGENTS] != 0:
+            columns_after(i, modes, batch.carry[i, WAITED] + (due - tau), batch, m)
+            for j in range(states * states):
+                batch.samples[i, k, states + j] = m.columns[j // states, j % states]
         batch.sample_mode[i, k] = batch.mode[i]
         k += 1
     batch.cursor[i] = k
@@ -311,8 +319,31 @@ def enter(i, tau, batch, m):
         m.state[j // LANES, j % LANES] = batch.state[i, j]
     drive(i, tau, batch, m)
     answer_now(m.links[at, STEADY], m)
-    amplitudes_of(m.links[at, MODES], m)
+    less_answer(m)
+    amplitudes_of(m.links[at, MODES], m.y, m)
+    if m.sizes[TANGENTS] != 0:
+        enter_columns(i, at, batch, m)
     batch.carry[i, ENTERS] = 0.0
+
+
+@kernel
+def leave(i, tau, batch, m):
+    """Make the state of the amplitudes before a course changes its piece; nothing without one."""
+    if m.sizes[COURSES] > 0:
+        at = int(batch.carry[i, AT])
+        drive(i, tau, batch, m)
+        answer_now(m.links[at, STEADY], m)
+        state_of(m.links[at, MODES], m.y, m)
+        for j in range(m.sizes[STATES]):
+            batch.state[i, j] = m.state[j // LANES, j % LANES]
+
+
+@kernel
+def take_up(i, tau, batch, m):
+    """Make the amplitudes anew of the state that :func:`leave` has left."""
+    if m.sizes[COURSES] > 0:
+        follow_courses(i, tau, batch, m)
+        enter(i, tau, batch, m)
 
 
 @kernel
@@ -335,6 +366,9 @@ def land(i, tau, d, hits, modes, steady, batch, m):
             record(i, g, tau + d, CROSSING, direction, rate, after, error, batch, m)
     for j in range(m.sizes[STATES]):
         batch.state[i, j] = m.state[j // LANES, j % LANES]
+    if m.sizes[TANGENTS] != 0:
+        batch.carry[i, WAITED] += d
+        leave_columns(i, hits, modes, steady, batch, m)
     at = int(batch.carry[i, AT])
     for g in range(m.sizes[GUARDS]):
         if (hits >> g) & 1 and at >= 0:
@@ -380,7 +414,7 @@ def at_the_end(i, batch):
 def is_lost(i, batch, m):
     """True if the amplitudes are no numbers any more."""
     total = 0.0
-    for g in range(2 * m.sizes[MODE_GROUPS]):
+    for g in range(m.sizes[ROWS]):
         for k in range(LANES):
             total += abs(m.y[g, k])
     return not total < HUGE
@@ -391,12 +425,13 @@ def advance(i, budget, batch, m):
     """Move a trajectory to its end, until the budget of steps is used up, the table of contacts is
     full, or it comes to a contact state that hasn't been made. Returns the budget left.
     """
-    tau, groups = batch.phase[i], 2 * m.sizes[MODE_GROUPS]
+    tau, rows = batch.phase[i], m.sizes[ROWS]
     begin_period(i, batch, m)
+    follow_courses(i, tau, batch, m)
     if batch.carry[i, ENTERS] > 0.5:
         enter(i, tau, batch, m)
     else:
-        for k in range(groups * LANES):
+        for k in range(rows * LANES):
             m.y[k // LANES, k % LANES] = batch.carry[i, AMPLITUDES + k]
     status = RUNNING
     while status == RUNNING and budget > 0 and batch.carry[i, AT] >= 0.0 and has_room(batch, m):
@@ -406,16 +441,20 @@ def advance(i, budget, batch, m):
         end = end_of(i, batch)
         if tau >= end:
             if batch.count[i] < batch.end_count[i]:
+                leave(i, tau, batch, m)
                 batch.count[i] += 1
                 tau = 0.0
                 begin_period(i, batch, m)
+                take_up(i, tau, batch, m)
                 write_samples(i, tau, tau, modes, steady, batch, m)
             if batch.count[i] >= batch.end_count[i] and tau >= batch.end_phase[i]:
                 status = at_the_end(i, batch)
             continue
         budget -= 1
-        h = min(batch.carry[i, NEXT_STEP], end - tau)
+        following, wanted = next_break(m), batch.carry[i, NEXT_STEP]
+        h = min(wanted, end - tau, following - tau)
         drive(i, tau, batch, m)
+        set_block_drives(modes, m)
         h = reach(i, tau, h, modes, steady, batch, m)
         answer, d, hits = look(i, tau, h, modes, steady, batch, m)
         if batch.status[i] != RUNNING:
@@ -431,12 +470,21 @@ def advance(i, budget, batch, m):
                 move(modes, h, m)
                 keep_moved(m)
                 keep_on(i, h, batch, m)
-                tau = end if h == end - tau else tau + h
+                batch.carry[i, WAITED] += h
+                if h == following - tau:
+                    batch.carry[i, NEXT_STEP] = max(wanted, 2.0 * h)
+                    tau = following
+                else:
+                    tau = end if h == end - tau else tau + h
+                if is_break(i, tau, batch, m):
+                    leave(i, tau, batch, m)
+                    take_up(i, tau, batch, m)
                 status = NONFINITE if is_lost(i, batch, m) else RUNNING
             else:
                 status = land(i, tau, d, hits, modes, steady, batch, m)
                 tau += d
                 if batch.carry[i, AT] >= 0.0:
+                    follow_courses(i, tau, batch, m)
                     enter(i, tau, batch, m)
         if status == RUNNING and batch.counters[i, EVENTS] >= batch.options[i, MOST_CONTACTS]:
             status = BUDGET_EVENTS
@@ -451,13 +499,14 @@ def put_back(i, tau, status, batch, m):
     """Store a trajectory that has ended or is paused."""
     if batch.carry[i, ENTERS] < 0.5:
         at = int(batch.carry[i, AT])
-        for k in range(2 * m.sizes[MODE_GROUPS] * LANES):
+        for k in range(m.sizes[ROWS] * LANES):
             batch.carry[i, AMPLITUDES + k] = m.y[k // LANES, k % LANES]
         drive(i, tau, batch, m)
         answer_now(m.links[at, STEADY], m)
         state_of(m.links[at, MODES], m.y, m)
         for j in range(m.sizes[STATES]):
             batch.state[i, j] = m.state[j // LANES, j % LANES]
+        move_columns(i, m.links[at, MODES], batch, m)
     batch.phase[i], batch.status[i] = tau, status
 
 
@@ -466,8 +515,8 @@ def propagate(
     period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count,
     end_phase, counters, minima, sample_count, sample_fraction, cursor, samples, sample_mode,
     rec_first, rec_i, rec_f, rec_used, options, data, budget, sizes, row_of, sign_of, offset, rate,
-    lag, modes, steady, links, y, moved, size, sums, q, errors, p, bern, bounds, slopes, out,
-    touches, place, answer, angle, found,
+    lag, modes, steady, links, course, pieces, y, moved, size, sums, q, errors, p, bern, bounds,
+    slopes, out, touches, place, answer, angle, found, chain, follows, factor, column, columns,
 ):  # fmt: skip
     """Move every trajectory whose status is RUNNING and whose contact state has been made, `budget`
     steps at most. See kernels/batch.py for the arrays.
@@ -478,8 +527,9 @@ def propagate(
         rec_first, rec_i, rec_f, rec_used, options, data,
     )  # fmt: skip
     m = Modal(
-        sizes, row_of, sign_of, offset, rate, lag, modes, steady, links, y, moved, size, sums, q,
-        errors, p, bern, bounds, slopes, out, touches, place, answer, angle, found,
+        sizes, row_of, sign_of, offset, rate, lag, modes, steady, links, course, pieces, y, moved,
+        size, sums, q, errors, p, bern, bounds, slopes, out, touches, place, answer, angle, found,
+        chain, follows, factor, column, columns,
     )  # fmt: skip
     waits = False
     for i in range(status.shape[0]):

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.errors import ParameterError, must_be
+from saltus.errors import ParameterError, UnitError, must_be, shown
 from saltus.language.compositions import where
 from saltus.language.expression import Expr, Operand, with_own_unit
 from saltus.language.functions import exp, log, sin
@@ -121,7 +121,12 @@ def sweep(
     """
     octaves = isinstance(rate, str) and _OCTAVES.search(rate) is not None
     if octaves:
-        pace = _positive("rate", _OCTAVES.sub("1", str(rate)), "1/s")
+        try:
+            pace = _positive("rate", _OCTAVES.sub("1", str(rate)), "1/s")
+        except UnitError:
+            raise UnitError(
+                f"rate = {shown(rate)} is no rate of octaves. Write it like '1 oct/min'."
+            ) from None
     else:
         pace = _positive("rate", rate, "Hz/s")
     begin, end = _positive("first", first, "Hz"), _positive("last", last, "Hz")

@@ -79,8 +79,10 @@ def _span(known: list[int]) -> str:
 
 
 def single(run: xr.Dataset, label: int | None) -> xr.Dataset:
-    """Select one trajectory of a run, with its contacts only."""
+    """Select one trajectory of a run, its samples in the order of time, with its contacts only."""
     ds = run if label is None else run.sel(trajectory=label)
+    if sample_dim(ds) in ds.dims and "sample_times" in ds.attrs:
+        ds = ds.sortby(sample_dim(ds))
     if "contact_trajectory" in ds and "trajectory" in ds.coords:
         ds = ds.isel(
             contact=np.flatnonzero(ds["contact_trajectory"].values == int(ds["trajectory"]))
@@ -114,8 +116,10 @@ def _start_that_differs(run: xr.Dataset, trajectory: xr.Dataset) -> list[xr.Data
     """
     dim = sample_dim(run)
     sampled = dim in run.dims and all(name in run for name in told_of(run))
-    if not sampled or (
-        "period" in run.coords and float(run["period"].values.min(initial=0.0)) != 0.0
+    if (
+        not sampled
+        or "sample_times" in run.attrs
+        or ("period" in run.coords and float(run["period"].values.min(initial=0.0)) != 0.0)
     ):
         return []
     first = {name: run[name].isel({dim: 0}).values for name in told_of(run)}

@@ -3,14 +3,14 @@ equations.
 
 In a contact state s the equations are ``z' = A_s z + b_s + sum_d B_s[:, d] u_d(t)`` and the gap of
 guard g is ``a_g z + c_g + sum_d e_g[d] u_d(t)``, where a drive ``u_d`` is a sine or cosine of
-``rate*t + phase``.
+``rate*t + phase``, or a polynomial of the time between breaks.
 """
 
 from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,7 @@ import numpy as np
 from saltus.language import expression as ex
 from saltus.language.evaluate import evaluate
 from saltus.language.expression import Expr
+from saltus.system.courses import reason_against
 from saltus.system.periodic import rate_of
 from saltus.system.system import System
 
@@ -54,7 +55,7 @@ class LinearPiece:
     constant : float64[N]
         b.
     driven : float64[N, D]
-        B.
+        B: the harmonic drives, then the courses.
     """
 
     matrix: np.ndarray
@@ -72,12 +73,38 @@ class LinearSystem:
         The system.
     drives : tuple of Drive
         The sines and cosines of time in it.
+    courses : tuple of Expr
+        The drives in it that are polynomials of the time between breaks.
     """
 
     system: System
     drives: tuple[Drive, ...]
+    courses: tuple[Expr, ...]
     _field: tuple[Expr, ...]
     _gaps: tuple[Expr, ...]
+    _names: Mapping[Expr, Expr]
+
+    @functools.cached_property
+    def parameters(self) -> tuple[str, ...]:
+        """The parameters of the equations between contacts, those of the drives' rates left
+        out.
+        """
+        nodes = ex.walk(*self._field)
+        used = {node.payload for node in nodes if node.op == "param"}
+        return tuple(name for name in self.system.values if name in used)
+
+    def of(self, quantities: tuple[Expr, ...]) -> tuple[Expr, ...] | None:
+        """Quantities as functions of the states and the drives; None if one isn't linear."""
+        found = tuple(ex.substituted(entry, self._names) for entry in quantities)
+        linear = all(_is_affine(entry, len(self._names)) for entry in found)
+        return found if linear else None
+
+    def rows(
+        self, quantities: tuple[Expr, ...], values: Mapping[str, float], mode: int
+    ) -> LinearPiece:
+        """Coefficients of quantities that :meth:`of` has given, in a contact state."""
+        bits = [bool(mode >> i & 1) for i in range(len(self.system.guards))]
+        return LinearPiece(*self._coefficients(quantities, values, bits))
 
     def piece(self, values: Mapping[str, float], mode: int) -> LinearPiece:
         """The equations of a contact state, bit i the side of guard i."""
@@ -98,7 +125,7 @@ class LinearSystem:
         self, entries: tuple[Expr, ...], values: Mapping[str, float], bits: list[bool]
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Coefficients of the states, constants, and coefficients of the drives."""
-        n, m = len(self.system.states), len(self.drives)
+        n, m = len(self.system.states), len(self.drives) + len(self.courses)
         probes = np.zeros((n + m, 1 + 2 * (n + m)))
         probes[:, 1 : 1 + n + m] = PROBE * np.eye(n + m)
         probes[:, 1 + n + m :] = -PROBE * np.eye(n + m)
@@ -109,7 +136,7 @@ class LinearSystem:
                 np.broadcast_to(one, probes.shape[1])
                 for one in evaluate(entries, states=states, values=known, bits=bits)
             ]
-        ).reshape(len(entries), -1)
+        ).reshape(len(entries), probes.shape[1])
         slopes = (found[:, 1 : 1 + n + m] - found[:, 1 + n + m :]) / (2 * PROBE)
         return slopes[:, :n], found[:, 0], slopes[:, n:]
 
@@ -125,9 +152,10 @@ def linear_pieces(system: System) -> LinearSystem | str:
         return "it carries its own derivatives"
     if any(guard.law for guard in system.guards):
         return "a contact of it has a law: an impact, a jump, friction"
-    drives: dict[Expr, Drive] = {}
-    for node in ex.walk(*system.field, *(guard.gap for guard in system.guards)):
-        if node.op in ("sin", "cos") and ex.depends_on(node, ("time",)):
+    gaps = tuple(guard.gap for guard in system.guards)
+    drives, courses = dict[Expr, Drive](), dict[Expr, None]()
+    for node in _driving(*system.field, *gaps):
+        if node.op in ("sin", "cos"):
             rate = rate_of(node.args[0])
             if rate is None:
                 return "a sine in it isn't one of a rate times the time"
@@ -135,14 +163,41 @@ def linear_pieces(system: System) -> LinearSystem | str:
             if ex.depends_on(phase, ("state",)):
                 return "the phase of a sine in it depends on the state"
             drives[node] = Drive(rate, phase, -math.pi / 2 if node.op == "sin" else 0.0)
-    names = {node: ex.parameter(_name(i)) for i, node in enumerate(drives)}
+        elif reason := reason_against(node):
+            return reason
+        else:
+            courses[node] = None
+    if any(node.op != "table" for node in courses.keys() & set(_driving(*gaps))):
+        return "a boundary of it moves by a drive that may jump"
+    names = {node: ex.parameter(_name(i)) for i, node in enumerate((*drives, *courses))}
     field = tuple(ex.substituted(entry, names) for entry in system.field)
-    gaps = tuple(ex.substituted(guard.gap, names) for guard in system.guards)
+    gaps = tuple(ex.substituted(gap, names) for gap in gaps)
     if any(ex.depends_on(gap, ("select",)) for gap in gaps):
         return "a boundary of it moves when another is crossed"
-    if not all(_is_affine(entry, len(drives)) for entry in (*field, *gaps)):
+    if not all(_is_affine(entry, len(names)) for entry in (*field, *gaps)):
         return "it isn't linear between its contacts"
-    return LinearSystem(system, tuple(drives.values()), field, gaps)
+    return LinearSystem(system, tuple(drives.values()), tuple(courses), field, gaps, names)
+
+
+def _driving(*roots: Expr) -> Iterator[Expr]:
+    """The drives in some expressions: functions of the time alone, but for sums of them and factors
+    without time.
+    """
+    waiting, seen = list(roots), set[Expr]()
+    while waiting:
+        node = waiting.pop()
+        if node in seen or not ex.depends_on(node, ("time",)):
+            continue
+        seen.add(node)
+        timed = [one for one in node.args if ex.depends_on(one, ("time",))]
+        apart = node.op in ("add", "sub", "neg", "mul", "div") and (
+            len(timed) == 1 or node.op in ("add", "sub")
+        )
+        alone = not ex.depends_on(node, ("state",)) and not node.bits
+        if node.op in ("sin", "cos") or (alone and not apart):
+            yield node
+        else:
+            waiting += reversed(node.args)
 
 
 def _is_affine(root: Expr, drives: int) -> bool:

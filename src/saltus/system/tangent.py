@@ -54,6 +54,22 @@ def tangent_system(system: System) -> System:
 
 
 @functools.lru_cache(maxsize=256)
+def tangent_states(system: System) -> System:
+    """The tangent system with the equations of the D states only, for a flow that needs no others;
+    cached.
+    """
+    if system.origin is not system:
+        return tangent_states(system.origin).with_values(**system.values)
+    names = tuple(derivative_name(a, b) for a in system.states for b in system.states)
+    return replace(
+        system,
+        states=(*system.states, *names),
+        units={**system.units, **dict.fromkeys(names, "")},
+        tangent_of=system,
+    )
+
+
+@functools.lru_cache(maxsize=256)
 def _extension(
     states: tuple[str, ...],
     jacobian: tuple[tuple[Expr, ...], ...],

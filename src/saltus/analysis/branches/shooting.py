@@ -16,10 +16,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from saltus.analysis.branches.parametric_map import parametric_map
 from saltus.analysis.closed.field_zeros import field_of
 from saltus.analysis.closed.shooting import less_next
 from saltus.analysis.solve.floquet import across, multipliers
-from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.flow.request import Schedule
 from saltus.flow.stops import on_allowed_sides
@@ -73,10 +73,7 @@ class PeriodicOrbits:
         self._order = np.array(sorted(range(len(names) + self.free), key=lambda i: i != first))
         self._turns = system.period({system.forced_at: 1.0}) if system.forced_at else 1.0
         few = method.suited_to(1)  # tangents make many states: wide lanes don't pay
-        self.map = Stroboscope(
-            self.parametric.system, few, every=1.0 if self.parametric.timed else None,
-            threads=threads,
-        )  # fmt: skip
+        self.map = parametric_map(system, self.parametric, few, threads)
         self.phase = np.full((len(scale), 2, self.size), np.nan)  # point and direction
         self._stops = any(
             guard.law is not None and guard.law.kind == "impact" for guard in system.guards

@@ -10,7 +10,7 @@ at its samples and by the cubics between them.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -18,10 +18,12 @@ import numpy as np
 from saltus.analysis.inputs.outputs import Outputs, states_alone
 from saltus.flow import polynomials
 from saltus.flow.maps import Stroboscope
+from saltus.flow.modal_motions import wave_motions
 from saltus.flow.motion_series import Pieces
 from saltus.flow.pieces import nodes_of, pieces
 from saltus.flow.request import Outcome
 from saltus.flow.threads import on_threads
+from saltus.flow.waves import Legs, deviations, harmonics, largest, least_turn, means, turns
 from saltus.kernels import status as st
 
 #: Forcing periods of a motion that never repeats from which its numbers are taken, where there are
@@ -33,6 +35,8 @@ HELD = 8192
 PLACES = 21
 #: Turning points closer than this are one [forcing periods].
 SAME = 1e-9
+#: A gap that turns within this share of its range is looked for first.
+NEAR = 1e-3
 #: A gap that closes at more than this share of its largest rate is struck, not grazed.
 STRUCK = 1e-6
 
@@ -175,15 +179,14 @@ def _measured(
     map_: Stroboscope, start: np.ndarray, span: int, closed: bool, outputs: Outputs
 ) -> Measures:
     """The numbers of some motions over ``periods`` periods, after which they repeat or don't."""
+    waves = wave_motions(map_, start, span, outputs.formulas, outputs.guards)
+    if waves is not None:
+        return _measured_by_waves(map_, *waves, span, closed, len(outputs))
     size, wide = start.shape[1], len(outputs)
     whole, outcome = pieces(map_, start, span, outputs.formulas, outputs.guards)
     result = unknown(len(start), size, wide)
     if map_.method.records_contacts:
-        result.contacts[:] = outcome.counters[:, st.EVENTS] / span
-        if closed:
-            result.itinerary[:] = _itineraries(
-                [guard.name for guard in map_.system.guards], outcome
-            )
+        _count_contacts(map_, outcome, span, closed, result)
     known = np.unique(whole.motion)
     if len(known):
         first = np.flatnonzero(np.diff(whole.motion, prepend=-1))
@@ -204,6 +207,70 @@ def _measured(
         for motion, points in zip(known, shown.states(map_, whole, first, wide), strict=True):
             result.turning[motion] = points
     return result
+
+
+def _count_contacts(
+    map_: Stroboscope, outcome: Outcome, span: int, closed: bool, result: Measures
+) -> None:
+    result.contacts[:] = outcome.counters[:, st.EVENTS] / span
+    if closed:
+        result.itinerary[:] = _itineraries([guard.name for guard in map_.system.guards], outcome)
+
+
+def _measured_by_waves(
+    map_: Stroboscope,
+    motions: list[list[Legs]],
+    outcome: Outcome,
+    span: int,
+    closed: bool,
+    outputs: int,
+) -> Measures:
+    """The numbers of motions that are sums of waves between their contacts."""
+    size = outcome.state.shape[1]
+    result = unknown(len(motions), size, outputs)
+    _count_contacts(map_, outcome, span, closed, result)
+    own, gaps = slice(0, outputs), slice(outputs, None)
+    for i, parts in enumerate(motions):
+        if not parts:
+            continue
+        both = [replace(part, rows=np.vstack([part.rows, -part.rows])) for part in parts]
+        high, low = np.split(largest(both), 2)
+        wanted = [replace(part, rows=part.rows[own]) for part in parts]
+        mean = means(wanted)
+        result.maximum[i], result.minimum[i], result.mean[i] = high[own], -low[own], mean
+        result.deviation[i] = deviations(wanted, mean)
+        if map_.system.forced_at is not None:
+            rate = 2.0 * np.pi / float(map_.period[i])
+            result.harmonic[i] = harmonics(wanted, rate)
+        spans = (high + low)[gaps]
+        margins = [
+            least_turn(parts, outputs + g, NEAR * span) for g, span in enumerate(spans.tolist())
+        ]
+        result.margin[i], result.span[i] = min(margins, default=np.inf), spans.max(initial=0.0)
+        result.turning[i] = _turning_states(parts, size, closed)
+    return result
+
+
+def _turning_states(parts: list[Legs], size: int, closed: bool) -> np.ndarray:
+    """The states where the first one turns, float64[n, D], in the order of time: inside legs, and
+    where one ends and the next begins.
+    """
+    times, states, ends = [], [], []
+    for part in parts:
+        leg, time = turns(part, 0)
+        times.append(part.begin[leg] + time)
+        states.append(part.values(leg, time)[:, :size])
+        legs, moving = np.arange(len(part.length)), replace(part, rows=part.rows[:1] * part.rates)
+        first, last = (moving.values(legs, at)[:, 0] for at in (0.0 * part.length, part.length))
+        ends.append(np.column_stack([part.begin, first, last, part.values(legs, 0.0 * first)]))
+    order = np.concatenate(ends)
+    order = order[np.argsort(order[:, 0])]
+    before = np.roll(order[:, 2], 1)
+    before[0] = before[0] if closed else 0.0
+    joints = order[before * order[:, 1] < 0.0]
+    when = np.concatenate([*times, joints[:, 0]])
+    points = np.concatenate([*states, joints[:, 3 : 3 + size]])
+    return points[np.argsort(when, kind="stable")]
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,9 @@
-"""`impact_statistics`: rate, speed and duration of contacts."""
+"""`impact_statistics`: rate, speed, duration, peak force and impulse of contacts."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,8 @@ import xarray as xr
 from saltus.analysis.dataset_parts import motion_values
 from saltus.analysis.inputs.starts import check_system
 from saltus.analysis.inputs.verb import verb
-from saltus.analysis.motion import touchdowns
+from saltus.analysis.motion import contact_peaks, touchdowns
+from saltus.analysis.motion.contact_peaks import ContactForces, Peaks
 from saltus.analysis.motion.touchdowns import Touchdowns
 from saltus.analysis.motion.window import Stretch, computed, dataset, stretch
 from saltus.analysis.outcome_messages import warn
@@ -20,6 +22,7 @@ from saltus.flow.counts import whole
 from saltus.flow.methods import Method, check_method
 from saltus.flow.request import Outcome, Schedule
 from saltus.flow.room import check_room
+from saltus.interrupt import Interrupted
 from saltus.language.evaluate import evaluate
 from saltus.language.expression import walk
 from saltus.results.dataset import schema
@@ -44,13 +47,14 @@ def impact_statistics(
     transient: int | float | str = 0,
     force: Mapping[str, Any] | None = None,
     contact_side: Mapping[str, int] | None = None,
+    peaks: bool | None = None,
     bins: int | Sequence[float] = BINS,
     method: Method | None = None,
     values: Mapping[str, Any] | None = None,
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
 ) -> xr.Dataset:
-    """Rate, speed, duration and impulse of the contacts, guard by guard.
+    """Rate, speed, duration, peak force and impulse of the contacts, guard by guard and one by one.
 
     Runs the motion itself, since the impulse of a contact is an integral along it; no samples are
     kept, so runs may be long.
@@ -68,13 +72,19 @@ def impact_statistics(
     force : mapping of str to callable or str, optional
         For guards by name: the force of that contact [N] as a function of (t, states, parameters),
         arguments found by name, or the name of an output, such as that of a sensor
-        ``sl.contact_force``; it needs to be right in contact only. Its integral from the
-        beginning of a contact to its end is the impulse. Rigid stops need none: theirs is that of
-        their law. ``ODE45`` controls the error of the
-        integral too, so its steps may differ from those without.
+        ``sl.contact_force``; it needs to be right in contact only. Its integral from the beginning
+        of a contact to its end is the impulse. Forces that stand in the equations as
+        terms that are zero out of contact, as those of :func:`saltus.freeplay` and
+        :func:`saltus.hertz`, are found there. Rigid stops need none: theirs is that of their law.
+        ``ODE45`` controls the error of the integral of a given force too, so its steps may differ
+        from those without.
     contact_side : mapping of str to int, optional
         For guards by name: the sign of the gap in contact. By default it is the side on which the
-        state of rest (all states zero, t = 0) does not lie; a gap of zero counts as a tiny one.
+        state of rest (all states zero, t = 0) does not lie; a gap of zero counts as a tiny one,
+        and a boundary at rest itself touches where the equations push.
+    peaks : bool, optional
+        Whether to find the peak force and the depth of every contact, from the series of the
+        motion in it: by default of 10 000 contacts at most.
     bins : int or sequence of float
         Bins of the histogram of speeds: how many between zero and the largest one, or their edges
         [unit of the gap per second].
@@ -86,7 +96,10 @@ def impact_statistics(
         ``speed_bin``, and ``trajectory`` for many. For each guard ``contacts``,
         ``contacts_per_second``, ``contacts_per_period`` (if forced), ``speed_mean``, ``speed_rms``,
         ``speed_max``, ``speed_histogram``, ``duration_mean``, ``duration_min``, ``duration_max``,
-        ``share_in_contact``, with ``force=`` or a rigid stop ``impulse_mean``, ``impulse_max``;
+        ``share_in_contact``, with a force or a rigid stop ``impulse_mean``, ``impulse_max``, with
+        a force ``peak_force``, the largest; for each contact ``contact_time``,
+        ``contact_duration``, ``contact_speed``, ``contact_exit_speed``, ``contact_impulse``,
+        ``contact_peak_force`` and ``contact_depth``;
         ``<...>_error`` is
         the standard error by the means of 20 blocks (NaN where there are too few; zero for a
         periodic response whose blocks hold whole responses). A contact whose beginning or end isn't
@@ -139,6 +152,7 @@ def impact_statistics(
         number for number, guard in enumerate(system.guards)
         if guard.law and guard.law.mass is not None and number not in forces
     ]  # fmt: skip
+    own = contact_peaks.forces_of(system, forces, sides)
     extended = with_integrals(
         system, {f"impulse_{guard}_": function for guard, function in forces.items()}
     )
@@ -156,7 +170,14 @@ def impact_statistics(
 
     def answer(outcome: Outcome) -> xr.Dataset:
         found = touchdowns.find(seen, outcome, sides, columns)
-        return _dataset(system, method, seen, sides, found, bins, outcome)
+        ask = partial(_dataset, system, method, seen, sides, found, bins, outcome)
+        if not (len(found.guard) <= contact_peaks.MOST_CONTACTS if peaks is None else peaks):
+            return ask()
+        try:
+            tops = contact_peaks.peaks(seen, method, sides, own, outcome, found)
+        except KeyboardInterrupt:
+            raise Interrupted(ask) from None
+        return ask(own, tops)
 
     result = computed(
         extended, method, seen.request(extended, begin, record=True), answer, threads, progress
@@ -195,6 +216,8 @@ def contact_sides(system: System, given: Mapping[int, Any]) -> np.ndarray:
         gap = evaluate([guard.gap], states=rest, values=system.values, bits=bits)[0]
         if gap == 0:
             gap = evaluate([guard.gap], states=rest, values=values, bits=bits)[0]
+        if gap == 0:  # no gap can open: contact is where the equations push
+            gap = -contact_peaks.side_that_pushes(system, len(bits))
         bits.append(bool(gap > 0))
     return np.array(
         [given.get(i, -1 if positive else 1) for i, positive in enumerate(bits)], dtype=np.int8
@@ -210,9 +233,14 @@ def _dataset(
     found: Touchdowns,
     bins: Any,
     outcome: Outcome,
+    forces: ContactForces | None = None,
+    tops: Peaks | None = None,
 ) -> xr.Dataset:
     """The contacts and their statistics, by name."""
     size, guards = seen.group.size, len(system.guards)
+    words = {"<impulse>": _impulse_unit(system), "<force>": "N"}
+    if forces is not None and tops is not None:
+        found, words = contact_peaks.with_found(system, found, forces, tops, words)
     ends = np.searchsorted(found.trajectory, np.arange(size + 1))
     cells = [
         (i, g, ends[i] + np.flatnonzero(found.guard[ends[i] : ends[i + 1]] == g))
@@ -231,6 +259,8 @@ def _dataset(
         put("speed_histogram", i, g, np.histogram(found.speed[rows], edges)[0])
         for name, value in {**_rates(seen, found, i, g, rows), **_sizes(found, rows)}.items():
             put(name, i, g, value)
+        if tops is not None and forces is not None and forces.formulas:
+            put("peak_force", i, g, _largest(np.abs(tops.force[rows])))
     names = np.array([guard.name for guard in system.guards], dtype=np.str_)
     columns = {
         "contact_time": found.begin, "contact_guard": names[found.guard],
@@ -246,15 +276,18 @@ def _dataset(
     if found.impulse is not None:
         columns["contact_impulse"] = found.impulse
     if len(system.outputs):
-        table, size = outcome.contacts.rows(found.row), len(system.states)
+        table, size = outcome.contacts.rows(found.first), len(system.states)
         known = motion_values(
             system, seen.group, table.time, table.state, table.mode_after, table.trajectory
         )
         columns["touchdown_<state>"] = dict(
             zip(system.outputs.names, known[:, size:].T, strict=True)
         )
+    if tops is not None:
+        if forces is not None and forces.formulas:
+            columns["contact_peak_force"] = tops.force
+        columns["contact_depth"] = tops.depth
     columns |= {"contact_side": sides, "speed_low": edges[:-1], "speed_high": edges[1:]}
-    words = {"<impulse>": _impulse_unit(system)}
     return dataset(schema.IMPACTS, seen, system, method, outcome, columns, each, words=words)
 
 

@@ -100,6 +100,11 @@ def settled(
     check_positive("tolerance", tolerance)
     phases = _phases(run)
     whole_periods = np.flatnonzero(phases == np.round(phases))
+    if not (np.diff(phases[whole_periods]) == 1.0).all():
+        raise ParameterError(
+            "settled compares whole forcing periods one after the other, and this run has some of "
+            "them at times of its own (at=). Run it with samples= instead."
+        )
     available = max(whole_periods.size - 1, 0)
     last = min(LAST, available) if last is None else whole_number(last, "last")
     if not 2 <= last <= available:

@@ -69,6 +69,8 @@ VARIABLES = {
 def account(ds: xr.Dataset) -> list[str]:
     """Extent, status and contacts."""
     lines = [f"extent   {_extent(ds)}", f"status   {told(ds['status'].values)}"]
+    if "until" in ds.attrs:
+        lines.append(f"until    {ds.attrs['until']}")
     if "contact_kind" in ds:
         kinds = told(ds["contact_kind"].values) if ds.sizes["contact"] else "none"
         lines.append(f"contacts {kinds}")
@@ -149,6 +151,17 @@ def rows(
         for word, count in ended_early(batch).items()
     ]
     return [table(title, columns, (*left_out(total, "trajectories"), *early))]
+
+
+def sample_rows(run: xr.Dataset) -> TextTable:
+    """A row for each given time, of each trajectory: the states there."""
+    columns = {name: values for name, (_, values) in sample_columns(run).items()}
+    shown = [words("", columns["trajectory"], "trajectory")] if "trajectory" in columns else []
+    shown += [
+        quantity(name, columns[name], unit_of(run[name]), 6) for name in ("time", *told_of(run))
+    ]
+    total = len(columns["time"])
+    return table("states at the given times", shown, left_out(total, "times"))
 
 
 # -- all of it -------------------------------------------------------------------------------------

@@ -31,7 +31,7 @@ _BASE: Any = (OfLength, Asked)
 _STATES = Field(
     None, min_length=1, description="Which states and outputs; all by default.", examples=[["x"]]
 )
-_LEFT_OUT = ("state", "keep", "time_errors", "surface", "direction")
+_LEFT_OUT = ("state", "at", "until", "keep", "time_errors", "surface", "direction")
 
 
 class OfMotions(OneVerb):
@@ -185,6 +185,13 @@ class Statistics(OfMotions):
     """[impacts]: number, speeds and durations of contacts."""
 
     picture = "impacts"
+
+    def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
+        """The histogram of speeds, and the contacts in time."""
+        from saltus import plot
+
+        contacts = {"forces": first_figure(plot.contact_forces(ds))} if ds.sizes["contact"] else {}
+        return {**super().pictures(ds), **contacts}
 
     def check_more(self, table: Any, setting: Setting) -> None:
         """Sides and forces."""

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from saltus.errors import ParameterError, UnitError, shown
-from saltus.language.expression import Expr
+from saltus.language.expression import TIME, Expr, parameter
 from saltus.language.functions import cos, pi
 from saltus.system.structures.parts import Base, Force
 from saltus.units import dimension
@@ -49,6 +49,8 @@ def forcing(drives: Sequence[tuple[str, Force | Base]], frequency: Any) -> tuple
     """
     functions = [(label, one) for label, one in drives if callable(one.amplitude)]
     repeats = [_takes_frequency(label, one) for label, one in functions]
+    for label, one in functions:
+        _check_gives(label, one)
     harmonic = any(one.harmonic for _, one in drives if not callable(one.amplitude))
     needs = harmonic or any(repeats)
     if needs and frequency is None:
@@ -75,17 +77,25 @@ def _takes_frequency(label: str, drive: Force | Base) -> bool:
     )
 
 
+def _check_gives(label: str, drive: Force | Base) -> None:
+    """Raise a ParameterError for a function of the time that gives no number."""
+    try:
+        found = value(TIME, label, drive, {f"{label}_scale": None, FREQUENCY: parameter(FREQUENCY)})
+    except Exception:  # explained where it is traced, with the line of the function
+        return
+    if isinstance(found, bool) or not isinstance(found, Expr | int | float):
+        raise ParameterError(
+            f"{label}: the function of the time gives {shown(found)}, which isn't {_what(drive)}."
+        )
+
+
 def value(t: Any, label: str, drive: Force | Base, values: dict[str, Any]) -> Any:
-    """The force or acceleration at a time. Raises ParameterError if a function gives no number."""
+    """The force or acceleration at a time; of a function without its factor where that is None."""
     if callable(drive.amplitude):
         given = (t, values[FREQUENCY]) if _takes_frequency(label, drive) else (t,)
+        scale = values[f"{label}_scale"]
         found = drive.amplitude(*given)
-        if isinstance(found, bool) or not isinstance(found, Expr | int | float):
-            raise ParameterError(
-                f"{label}: the function of the time gives {shown(found)}, which isn't "
-                f"{_what(drive)}."
-            )
-        return values[f"{label}_scale"] * found
+        return found if scale is None else scale * found
     phase: Any = values[f"{label}_phase"] if drive.phase is not None else 0.0
     turns = drive.harmonic * values[FREQUENCY] * t if drive.harmonic else None
     return values[label] * cos(phase if turns is None else 2 * pi * turns + phase)

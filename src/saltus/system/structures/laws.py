@@ -9,9 +9,11 @@ from typing import Any
 from saltus.contact.declared import Impact, impact
 from saltus.contact.dry_friction import friction
 from saltus.contact.forces import freeplay, hertz
+from saltus.errors import ParameterError
 from saltus.language.expression import Expr, Relation, as_expr
 from saltus.language.functions import piecewise
 from saltus.system.structures.parts import Contact
+from saltus.units import to_si
 
 
 @dataclass(frozen=True)
@@ -34,8 +36,18 @@ class Moving:
 def entries(label: str, contact: Contact, units: tuple[str, ...]) -> list[tuple[str, Any, str]]:
     """Name, value and unit of each parameter of a contact; ``units`` are those of a deflection, a
     force, a stiffness and a damper.
+
+    Raises
+    ------
+    ParameterError
+        If the gap of both sides is negative.
     """
     length, force, spring, damper = units
+    if contact.side == "both" and to_si(contact.gap, length, f"{label}_gap") < 0:
+        raise ParameterError(
+            f"{label}: both sides can't touch at once with one gap. Give two contacts, one of "
+            f"side='upper' and one of side='lower'."
+        )
     if contact.power is not None and contact.power != 1 and length:
         spring = f"{force}/{length}^{contact.power:g}"
     rebounds = contact.restitution if contact.friction is None else None

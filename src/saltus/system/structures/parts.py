@@ -65,7 +65,8 @@ def _check_names(kind: type[Any], given: Mapping[Any, Any], places: int = 0) -> 
     needed = [
         one.name for one in fields(kind) if one.default is MISSING or "needed" in one.metadata
     ]
-    if missing := [name for name in needed[places:] if name not in given]:
+    given_by_place = allowed[:places]
+    if missing := [name for name in needed if name not in (*given, *given_by_place)]:
         raise ParameterError(f"a {kind.__name__} needs {', '.join(missing)}.")
 
 
@@ -258,10 +259,22 @@ def _check(name: str, part: Contact | Force | Base, known: list[str]) -> None:
         or part.harmonic < 0
     ):
         raise ParameterError(f"{name}: harmonic must be a whole number, 0 or more.")
-    elif callable(part.amplitude) and (part.phase is not None or part.harmonic != 1):
+    else:
+        _check_amplitude(name, part)
+
+
+def _check_amplitude(name: str, part: Force | Base) -> None:
+    kind, unit = ("acceleration", "m/s^2") if isinstance(part, Base) else ("force", "N")
+    amplitude: Any = part.amplitude
+    if callable(amplitude) and (part.phase is not None or part.harmonic != 1):
         raise ParameterError(
-            f"{name}: phase= and harmonic= are those of a harmonic drive, and this is a function "
+            f"{name}: phase= and harmonic= are those of a harmonic {kind}, and this is a function "
             f"of the time."
+        )
+    if isinstance(amplitude, list | tuple | Mapping) or np.ndim(amplitude):
+        raise ParameterError(
+            f"{name}: the {kind} is a value, such as '2 {unit}', or a function of the time. Of a "
+            f"measured series write sl.recorded(times, values, '{unit}')."
         )
 
 
@@ -279,6 +292,8 @@ def _check_contact(name: str, part: Contact, known: list[str]) -> None:
     one_of(SIDES, f"{name}: ", side=part.side)
     if part.to is not None:
         _check_places(name, [part.at, part.to], known)
+    if part.gap is None:
+        raise ParameterError(f"{name}: a Contact needs gap, such as gap='1 mm'.")
     if (part.stiffness is None) == (part.restitution is None):
         raise ParameterError(
             f"{name}: a stop is a spring, by stiffness= and damping=, or rigid, by restitution=. "
@@ -319,6 +334,8 @@ def _check_friction(name: str, part: Contact, known: list[str]) -> None:
             f"{name}: it slides along {shown(part.sliding)}, along which it is pressed too. Give "
             f"another sliding=."
         )
+    if to_si(part.friction, "1", f"{name}_friction") < 0:
+        raise must_be(f"{name}: friction", "0 or more", part.friction)
     if part.restitution is not None and to_si(part.restitution, "1", f"{name}_restitution") != 0:
         raise ParameterError(
             f"{name}: a rigid stop with friction has no rebound, restitution=0: how a blow rubs "

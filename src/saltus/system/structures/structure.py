@@ -184,7 +184,7 @@ def structure(
         if damping is not None and damping_ratio is None:
             damping = modal_damping(damping, known, count)
         moving = _modal(known.kept(count), damping)
-        words = told.reduced(mass, stiffness, known, count, degrees, loads)
+        words = told.reduced(mass, stiffness, known, count, degrees, loads, unit)
     angular = known.angular if known is not None else _angular(moving, stiffness)
     told.doubt(angular)
     made, sides = traced(moving, degrees, loads, frequency, unit=unit, name=name, source=source)

@@ -22,6 +22,8 @@ _USUAL = (1e-3, 1e6)
 _STIFF = 1e3
 #: Natural frequencies that the description lists, and modes of which it says what mass they move.
 _TOLD = 6
+#: Units of a flexibility and of an inertia, by that of a deflection.
+_UNITS = {"m": (" m/N", " kg"), "rad": (" rad/(N*m)", " kg*m^2"), "": ("", "")}
 
 
 def unreduced(size: int, angular: np.ndarray) -> str:
@@ -30,7 +32,7 @@ def unreduced(size: int, angular: np.ndarray) -> str:
 
 
 def reduced(
-    mass: Any, stiffness: Any, modes: Modes, count: int, degrees: list[str], loads: Any
+    mass: Any, stiffness: Any, modes: Modes, count: int, degrees: list[str], loads: Any, unit: str
 ) -> str:
     """The description of a structure by its lowest modes.
 
@@ -41,15 +43,21 @@ def reduced(
         f"{STRUCTURE} {len(degrees)} degrees of freedom, by its lowest {count} modes, up to "
         f"{modes.angular[count - 1] / (2 * math.pi):.6g} Hz{_frequencies(modes.angular)}."
     )
-    words += _kept_at_contacts(stiffness, modes, count, degrees, loads.contacts)
+    compliance, inertia = _UNITS[unit]
+    words += _kept_at_contacts(stiffness, modes, count, degrees, loads.contacts, compliance)
     for label, drive in loads.drives:
         if isinstance(drive, Base):
-            words += _moved(label, mass, modes.kept(count), direction(drive, degrees))
+            words += _moved(label, mass, modes.kept(count), direction(drive, degrees), inertia)
     return words
 
 
 def _kept_at_contacts(
-    stiffness: Any, modes: Modes, count: int, degrees: list[str], contacts: list[tuple[str, Any]]
+    stiffness: Any,
+    modes: Modes,
+    count: int,
+    degrees: list[str],
+    contacts: list[tuple[str, Any]],
+    unit: str,
 ) -> str:
     if not contacts:
         return ""
@@ -61,18 +69,18 @@ def _kept_at_contacts(
             words += f" The flexibility left out at {name} isn't known: a rigid body moves there."
             continue
         share = f", {100 * (1 - residual / total):.4g} % of it kept" if 0 < total < np.inf else ""
-        words += f" Static flexibility at {name}: {residual:.3g} m/N left out{share}."
+        words += f" Static flexibility at {name}: {residual:.3g}{unit} left out{share}."
     return words
 
 
-def _moved(label: str, mass: Any, kept: Modes, moved: np.ndarray) -> str:
+def _moved(label: str, mass: Any, kept: Modes, moved: np.ndarray, unit: str) -> str:
     """The mass that moves with a base, in all and by mode."""
     load = mass @ moved
     total, masses = float(moved @ load), (kept.shapes.T @ load) ** 2
     largest = [i for i in np.argsort(-masses)[:_TOLD].tolist() if masses[i] > 5e-3 * total]
     parts = ", ".join(f"{100 * masses[i] / total:.3g} % in mode {i + 1}" for i in sorted(largest))
     return (
-        f" Of the {total:.4g} kg that move with {label}, the modes hold "
+        f" Of the {total:.4g}{unit} that move with {label}, the modes hold "
         f"{100 * masses.sum() / total:.4g} %{': ' if parts else ''}{parts}."
     )
 

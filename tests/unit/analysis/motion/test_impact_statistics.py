@@ -46,7 +46,7 @@ def test_time_in_contact_is_cut_at_the_borders_of_blocks():
     spells = _spells(time, enters, True, 0.0, 5.0)
     assert spells.tolist() == [[0.0, 1.0], [2.0, 2.5], [4.5, 5.0]]
     none = np.zeros(0)
-    found = Touchdowns(none, none, none, none, none, none, None, None, none, {(0, 0): spells}, none)
+    found = Touchdowns(none, none, none, none, none, none, None, None, none, {(0, 0): spells})
     assert found.covered(0, 0, np.array([0.0, 0.5, 2.25, 4.75, 5.0])) == pytest.approx(
         [0.5, 0.75, 0.5, 0.25]
     )

@@ -93,6 +93,30 @@ def changed(matrix, place, value):
         ({"contacts": [{"at": "x1", "stifness": 1.0}]}, "stiffness"),
         ({"contacts": [sl.Contact("x1", 1, 1, name="a"), sl.Contact("x2", 1, 1, name="a")]},
             "two stops"),
+        ({"contacts": [sl.Contact("x1", 1.0, -1.0, side="both")]}, "Give two contacts"),
+        ({"contacts": [sl.Contact("x1", gap=-1.0, restitution=0, side="both")]}, "two contacts"),
+        ({"contacts": [sl.Contact("x1", 1.0, 1.0, restitution=0.5)]}, "Give one of the two"),
+        ({"contacts": [sl.Contact("x1", gap=1.0)]}, "Give one of the two"),
+        ({"contacts": [sl.Contact("x1", gap=1.0, restitution=2)]}, r"outside \[0, 1\]"),
+        ({"contacts": [sl.Contact("x1", gap=1.0, restitution=1, damping=1.0)]}, "a rigid stop has"),
+        ({"contacts": [sl.Contact("x1", 1.0, 1.0, power=0.5)]}, "power must be"),
+        ({"contacts": [sl.Contact("x1", 1.0, 1.0, side="both", preload=1.0)]}, "onto one side"),
+        ({"contacts": [sl.Contact("x1", 1.0, 1.0, friction=0.1)]}, "come together"),
+        ({"contacts": [sl.Contact("x1", 1.0, 1.0, friction=0.1, sliding="u1")]}, "'u1' is no"),
+        ({"contacts": [sl.Contact("x1", 1.0, 1.0, friction=0.1, sliding="x1")]}, "pressed too"),
+        ({"contacts": [sl.Contact("x1", 1.0, 1.0, friction=-0.1, sliding="x2")]}, "0 or more"),
+        ({"contacts": [sl.Contact("x1", gap=1.0, restitution=1, friction=0.1, sliding="x2")]},
+            "no rebound"),
+        ({"mass": M + 0.1, "contacts": [sl.Contact("x1", gap=1.0, restitution=1)]}, "Give modes="),
+        ({"base": sl.Base("y", 1.0)}, "names no degree of freedom"),
+        ({"base": sl.Base([1.0, 2.0], 1.0)}, "a vector of 3 finite numbers"),
+        ({"base": sl.Base([0, 0, 0], 1.0)}, "not all zero"),
+        ({"base": sl.Base({"y": 1.0}, 1.0)}, "'y' is no degree"),
+        ({"base": sl.Base("x", lambda t: "a")}, "gives 'a', which isn't an acceleration"),
+        ({"base": sl.Base("x", ([0, 1], [0, 1]))}, r"sl\.recorded\(times, values, 'm/s\^2'\)"),
+        ({"base": sl.Base("x", lambda t: t, phase=1.0)}, "those of a harmonic acceleration"),
+        ({"base": "x"}, r"sl\.Base\(direction, amplitude"),
+        ({"forces": [sl.Force("x1", lambda t, x: x)]}, "of the time and the forcing frequency"),
         ({"forces": [sl.Force("x1", 1.0, harmonic=-1)]}, "harmonic"),
         ({"forces": [sl.Force("x1", 1.0, name="stop_gap")]}, "two parameters"),
         ({"forces": [3.0]}, "sl.Force"),
@@ -131,6 +155,31 @@ def test_a_contact_that_no_mode_moves():
     between = sl.Contact("x2", 1e3, 0.1, to="x1")
     with pytest.raises(ParameterError, match="no mode that is kept moves stop"):
         sl.structure(np.eye(2), free, modes=1, contacts=[between])
+
+
+@pytest.mark.parametrize("first", [-1, 0, float("nan"), "5 m"])
+def test_sweeps_refuse(first):
+    with pytest.raises((ParameterError, UnitError), match="first"):
+        sl.sweep(first, 50.0, 1.0)
+    with pytest.raises(UnitError, match="'1 oct/min'"):
+        sl.sweep(5.0, 50.0, "1 oct")
+    with pytest.raises(ParameterError, match="no change of frequency"):
+        sl.sweep(5.0, "5 Hz", 1.0)
+
+
+def test_a_record_of_something_else():
+    with pytest.raises(UnitError, match="values are in m, and an acceleration is in m/s"):
+        sl.structure(M, K, base=sl.Base("x", sl.recorded([0, 1], [0, 1], "mm")))
+
+
+def test_guards_of_stops_have_their_names():
+    rough = sl.Contact("x1", gap=1.0, restitution=0, friction=0.2, sliding="x2", name="rough")
+    walls = sl.Contact("x3", gap=1.0, restitution=0.5, side="both", name="wall")
+    made = sl.structure(M, K, contacts=[rough, walls], base=sl.Base("x", lambda t: 1.0))
+    assert {guard.name for guard in made.guards} == {
+        "rough", "rough slides", "wall upper", "wall lower", "rough at rest",
+        "rough slides held", "wall upper at rest", "wall lower at rest",
+    }  # fmt: skip
 
 
 def test_units_of_its_values():

@@ -43,6 +43,18 @@ def test_each_of_several_bases():
     assert "Of the 1.5 kg that move with up," in made.description
 
 
+@pytest.mark.parametrize(
+    ("unit", "words"), [("rad", r"of the 4\.5 kg\*m\^2 that"), ("", r"of the 4\.5 that")]
+)
+def test_units_of_what_is_told(unit, words):
+    stop = sl.Contact("x2", stiffness=1e3, gap=0.1)
+    made = sl.structure(MASS, CHAIN, modes=2, unit=unit, contacts=[stop],
+        base=sl.Base("x", lambda t: 1.0))  # fmt: skip
+    assert re.search(words, made.description.lower())
+    assert ("rad/(N*m) left out" in made.description) == (unit == "rad")
+    assert "m/N" not in made.description
+
+
 @pytest.mark.parametrize("size", [6, 1600])
 def test_rigid_bodies_move_and_are_no_error(size):
     """A free chain: its first frequency is exactly 0, the next that of a closed form; of a large

@@ -1,0 +1,275 @@
+"""Modes of one contact state: those that go their own ways, and those that go together in a block.
+
+Modes go together if taking them apart loses digits: eigenvectors that nearly coincide (critical
+damping, a rigid body), or a drive near the eigenvalue of a mode. What is lost is a factor, by which
+rounding is multiplied; a block keeps it below MOST_LOSS. Modes that grow go into it too: a step
+never bounds a block, it follows it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from saltus.flow.modal_blocks import (
+    MOST_LOSS,
+    MOST_LOSS_OF_TWO,
+    MOST_SPREAD,
+    ROUNDING,
+    Block,
+    Loads,
+    Subspace,
+    block_of,
+    loss_of,
+)
+from saltus.system.linear import LinearPiece
+
+#: Rate of growth that is none, in units of the largest eigenvalue.
+NO_GROWTH = 1e-12
+#: Eigenvalues, eigenvectors, and the inverse of these.
+Eigen = tuple[np.ndarray, np.ndarray, np.ndarray]
+
+
+@dataclass(frozen=True)
+class StateModes:
+    """Modes of one contact state, z = V y and y = L z, and its block.
+
+    Attributes
+    ----------
+    values, vectors, inverse : complex128[M], complex128[N, M], complex128[M, N]
+        Eigenvalues [1/s], V and L of the modes that go their own ways.
+    block : Block or None
+        Those that don't.
+    answers : complex128[N, 1 + D + 4 * C]
+        Steady answers to the constant, to each harmonic drive, and to each derivative of each
+        course, as far as they aren't in the block.
+    """
+
+    values: np.ndarray
+    vectors: np.ndarray
+    inverse: np.ndarray
+    block: Block | None
+    answers: np.ndarray
+
+
+def modes_of(
+    piece: LinearPiece,
+    gaps: LinearPiece,
+    rates: np.ndarray,
+    speeds: np.ndarray,
+    most: int,
+    eigen: Eigen,
+    fastest: float = 0.0,
+) -> StateModes:
+    """Modes of a contact state.
+
+    Parameters
+    ----------
+    piece, gaps : LinearPiece
+        Its equations; the gaps.
+    rates : float64[D]
+        Rates of the harmonic drives [rad/s].
+    speeds : float64[C, 4]
+        Derivatives of the courses, in units of their values [1/s^k].
+    most : int
+        Modes that may go their own ways; of a pair one counts.
+    eigen : tuple
+        :func:`eigen_of` the matrix.
+    fastest : float
+        Size of the largest eigenvalue of other contact states [1/s]: they tell how slow a mode is.
+    """
+    values, vectors, inverse = eigen
+    every = np.concatenate([[0.0], rates])
+    acts = Loads(
+        every,
+        speeds,
+        np.column_stack([piece.constant, piece.driven]),
+        gaps.matrix,
+        gaps.constant,
+        float(max(np.abs(values).max(), np.abs(every).max())),
+        fastest,
+    )
+    if not _together(values, vectors, inverse, acts).any() and len(slots_of(values)) <= most:
+        return StateModes(values, vectors, inverse, None, _answers(values, vectors, inverse, acts))
+    spaces, values, vectors, inverse = _parted(piece.matrix, acts, most)
+    answers = _answers(values, vectors, inverse, acts)
+    block, answers = block_of(spaces, acts, answers)
+    return StateModes(values, vectors, inverse, block, answers)
+
+
+def slots_of(values: np.ndarray) -> np.ndarray:
+    """Indices of one of each pair of complex eigenvalues and of all real ones, ascending by
+    size.
+    """
+    kept = np.flatnonzero(values.imag >= 0)
+    return kept[np.argsort(np.abs(values[kept]), kind="stable")]
+
+
+def eigen_of(matrix: np.ndarray) -> Eigen:
+    """Eigenvalues, eigenvectors and the inverse of these, large where they coincide."""
+    values, vectors = np.linalg.eig(matrix)
+    if np.linalg.cond(vectors) < 1 / ROUNDING:
+        inverse = np.linalg.inv(vectors)
+        inverse += inverse @ (np.eye(len(matrix)) - vectors @ inverse)
+        return values, vectors, inverse
+    size = np.maximum(np.abs(vectors).max(axis=1, keepdims=True), ROUNDING)
+    left, parts, right = np.linalg.svd(vectors / size)
+    least = np.maximum(parts, ROUNDING * parts[0])
+    return values, vectors, (right.conj().T / least) @ left.conj().T / size.T
+
+
+def _together(
+    values: np.ndarray, vectors: np.ndarray, inverse: np.ndarray, acts: Loads
+) -> np.ndarray:
+    """True for modes that don't go their own ways: bool[M]."""
+    # sum_i |L_ji V_ij|: what rounding of the states is multiplied by, in any units of theirs
+    found: np.ndarray = ~((np.abs(inverse.T) * np.abs(vectors)).sum(axis=0) <= MOST_LOSS)
+    found |= values.real > NO_GROWTH * acts.scale
+    parts, sizes = inverse @ acts.loads, np.abs(values)
+    slow = MOST_SPREAD * sizes <= acts.scale
+    found |= slow & (slow.sum() > 1)
+    for rate, part in zip(acts.rates[1:], parts.T[1:], strict=False):
+        far = np.minimum(np.abs(1j * rate - values), np.abs(1j * rate + values))
+        found |= (part != 0) & (MOST_LOSS * far <= np.maximum(abs(rate), sizes))
+    for course, part in zip(acts.speeds, parts.T[len(acts.rates) :], strict=True):
+        found |= (part != 0) & (loss_of(course, sizes, acts.scale) >= MOST_LOSS)
+    # a force that is constant moves a slow mode far before it is balanced
+    with np.errstate(all="ignore"):
+        static = np.abs(acts.gaps @ vectors * (parts[:, 0] / values))
+    known = np.where(np.isfinite(static), static, 0.0)
+    others = known @ (sizes[:, None] > 1.5 * sizes) + np.abs(acts.offsets)[:, None]
+    zero = sizes <= ROUNDING * acts.scale
+    far_off = (static > MOST_LOSS * others).any(axis=0) | zero
+    slow = sizes < max(acts.scale / MOST_LOSS_OF_TWO, acts.fastest / MOST_LOSS)
+    found |= (parts[:, 0] != 0) & far_off & slow
+    return found
+
+
+def _answers(
+    values: np.ndarray, vectors: np.ndarray, inverse: np.ndarray, acts: Loads
+) -> np.ndarray:
+    """Steady answers of modes that go their own ways: complex128[N, 1 + D + 4 * C]."""
+    harmonic = len(acts.rates)
+    far = 1j * acts.rates[:, None] - values[None]
+    parts = inverse @ acts.loads
+    with np.errstate(all="ignore"):
+        answers: np.ndarray = vectors @ np.where(
+            parts[:, :harmonic] == 0, 0, parts[:, :harmonic] / far.T
+        )
+        # -A^-(k+1) B of the k-th derivative
+        powers = -((1 / values[:, None]) ** np.arange(1, 5))
+        courses = [
+            vectors @ np.where(part[:, None] == 0, 0, part[:, None] * powers)
+            for part in parts.T[harmonic:]
+        ]
+    return np.concatenate([answers, *courses], axis=1)
+
+
+# -- parting -----------------------------------------------------------------------------------
+def _parted(
+    matrix: np.ndarray, acts: Loads, most: int
+) -> tuple[list[Subspace], np.ndarray, np.ndarray, np.ndarray]:
+    """Subspaces whose modes go together, and the other modes. States that the equations keep apart
+    stay apart: a rigid body isn't rounded by the stiffest mode.
+    """
+    from scipy.sparse.csgraph import connected_components
+
+    count, part = connected_components(matrix != 0, directed=False)
+    size, spaces, found = len(matrix), list[Subspace](), list[Eigen]()
+    members = [np.flatnonzero(part == one) for one in range(count)]
+    eigen = [eigen_of(matrix[np.ix_(one, one)]) for one in members]
+    joined = [_together(*e, acts.of(one)) for e, one in zip(eigen, members, strict=True)]
+    _make_room([e[0] for e in eigen], joined, most)
+    for one, (values, *_), go in zip(members, eigen, joined, strict=True):
+        space, modes = _split(matrix[np.ix_(one, one)], values, go, acts.of(one))
+        if space is not None:
+            right, left = np.zeros((size, len(space.matrix))), np.zeros((len(space.matrix), size))
+            right[one], left[:, one] = space.right, space.left
+            spaces.append(Subspace(space.matrix, right, left))
+        vectors = np.zeros((size, len(modes[0])), complex)
+        inverse = np.zeros((len(modes[0]), size), complex)
+        vectors[one], inverse[:, one] = modes[1], modes[2]
+        found.append((modes[0], vectors, inverse))
+    return (
+        spaces,
+        np.concatenate([one[0] for one in found]),
+        np.concatenate([one[1] for one in found], axis=1),
+        np.concatenate([one[2] for one in found]),
+    )
+
+
+def _make_room(values: list[np.ndarray], joined: list[np.ndarray], most: int) -> None:
+    """Let the slowest modes go together if there are more than the lanes hold."""
+    left = sum(len(slots_of(v[~go])) for v, go in zip(values, joined, strict=True)) - most
+    order = sorted(
+        (abs(v[j]), c, j)
+        for c, (v, go) in enumerate(zip(values, joined, strict=True))
+        for j in slots_of(v)
+        if not go[j]
+    )
+    for _, c, j in order[: max(left, 0)]:
+        joined[c][j] = True
+
+
+def _split(
+    matrix: np.ndarray, values: np.ndarray, joined: np.ndarray, acts: Loads
+) -> tuple[Subspace | None, Eigen]:
+    """A matrix as a subspace whose modes go together and the other modes."""
+    while True:
+        joined = _closed(values, joined)
+        space, modes = _separated(matrix, values, joined)
+        again = _together(*modes, acts)
+        if not again.any():
+            return space, modes
+        for value in modes[0][again]:
+            free = np.flatnonzero(~joined)
+            joined[free[np.argmin(np.abs(values[free] - value))]] = True
+
+
+def _closed(values: np.ndarray, joined: np.ndarray) -> np.ndarray:
+    """With each mode its complex partner, and those whose eigenvalues nearly coincide with it."""
+    sizes = np.maximum(np.abs(values)[:, None], np.abs(values))
+    apart = np.abs(values[:, None] - values)
+    near = MOST_LOSS * np.minimum(apart, np.abs(values[:, None] - values.conj())) <= sizes
+    while True:
+        grown: np.ndarray = joined | near[:, joined].any(axis=1)
+        if (grown == joined).all():
+            return grown
+        joined = grown
+
+
+def _separated(
+    matrix: np.ndarray, values: np.ndarray, joined: np.ndarray
+) -> tuple[Subspace | None, Eigen]:
+    """The invariant subspace of some eigenvalues, and the modes of the others, by an ordered Schur
+    form and a Sylvester equation (Bavely & Stewart, SIAM J. Numer. Anal. 16 (1979) 359).
+    """
+    from scipy import linalg
+
+    size = len(matrix)
+    none = (np.zeros(0, complex), np.zeros((size, 0), complex), np.zeros((0, size), complex))
+    if not joined.any():
+        return None, eigen_of(matrix)
+    even, (scale, _) = linalg.matrix_balance(matrix, permute=False, separate=True)
+    if joined.all():
+        return Subspace(even, np.diag(scale), np.diag(1 / scale)), none
+
+    def chosen(real: float, imaginary: float = 0.0) -> bool:
+        return bool(joined[np.argmin(np.abs(values - (real + 1j * imaginary)))])
+
+    try:
+        schur, turn, k = linalg.schur(even, output="real", sort=chosen)
+    except linalg.LinAlgError:  # rounding brought an eigenvalue to the other side
+        return Subspace(even, np.diag(scale), np.diag(1 / scale)), none
+    if not 0 < k < size:
+        return Subspace(even, np.diag(scale), np.diag(1 / scale)), none
+    mixed = linalg.solve_sylvester(schur[:k, :k], -schur[k:, k:], -schur[:k, k:])
+    own, within, back = eigen_of(schur[k:, k:])
+    right = scale[:, None] * turn[:, :k]
+    left = (turn[:, :k].T - mixed @ turn[:, k:].T) / scale
+    vectors = scale[:, None] * (turn[:, :k] @ mixed + turn[:, k:]) @ within
+    inverse = back @ turn[:, k:].T / scale
+    every, lefts = np.hstack([right, vectors]), np.vstack([left, inverse])
+    lefts = lefts + lefts @ (np.eye(size) - every @ lefts)
+    return Subspace(schur[:k, :k], right, lefts[:k].real), (own, vectors, lefts[k:])

@@ -1,0 +1,162 @@
+"""Motions of the modal flow, leg by leg, as sums of waves (flow/waves.py)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from saltus.contact.guards import Guard
+from saltus.flow.maps import Stroboscope
+from saltus.flow.modal import Modal, modal_flow
+from saltus.flow.modal_modes import slots_of
+from saltus.flow.modal_tables import Tables
+from saltus.flow.request import Outcome
+from saltus.flow.waves import Legs
+from saltus.language.expression import Expr
+
+#: Turns of a drive in a period that are whole to so much are whole [relative].
+WHOLE = 1e-12
+
+
+def wave_motions(
+    map_: Stroboscope,
+    start: np.ndarray,
+    periods: int,
+    quantities: Sequence[Expr],
+    guards: Sequence[Guard],
+) -> tuple[list[list[Legs]], Outcome] | None:
+    """The motions from float64[k, D] over ``periods``, row i by row i of the map, as legs of waves.
+
+    Parameters
+    ----------
+    map_, start, periods, quantities, guards
+        As for :func:`saltus.flow.pieces.pieces`.
+
+    Returns
+    -------
+    list of list of Legs, Outcome
+        The legs of each motion, none of one that didn't reach the end; their quantities are the
+        states, then those asked for, then the gaps. None if another method moves this system, a
+        quantity isn't linear, a drive is a record, or modes go together in a block.
+    """
+    system = map_.system
+    method = map_.method.serving(system.origin)
+    if not isinstance(method, Modal) or system.tangent_of is not None:
+        return None
+    if len(guards) != len(system.guards):
+        return None
+    tables = modal_flow(system.origin).tables
+    asked = tables.linear.of(tuple(quantities))
+    if asked is None or tables.linear.courses:
+        return None
+    outcome = map_.run(start, periods, record=0)
+    begins, motions = outcome.contacts.begins(len(start)), []
+    for i in range(len(start)):
+        mine = slice(begins[i], begins[i + 1])
+        legs = _legs(map_, tables, asked, start[i], periods, outcome, i, mine)
+        if legs is None:
+            return None
+        motions.append(legs)
+    return motions, outcome
+
+
+def _legs(
+    map_: Stroboscope,
+    tables: Tables,
+    asked: tuple[Expr, ...],
+    start: np.ndarray,
+    periods: int,
+    outcome: Outcome,
+    i: int,
+    mine: slice,
+) -> list[Legs] | None:
+    """The legs of one motion, by contact state; None if modes go together in a block."""
+    if not np.isfinite(outcome.state[i]).all() or outcome.time[i] < periods * map_.period[i]:
+        return []
+    contacts, period = outcome.contacts.rows(mine), float(map_.period[i])
+    first = int(contacts.mode_before[0]) if len(contacts) else int(outcome.mode[i])
+    modes = np.append(first, contacts.mode_after)
+    states = np.vstack([start, contacts.state])
+    counts, phases = np.append(0, contacts.period), np.append(0.0, contacts.phase)
+    length = np.diff(counts, append=periods) * period + np.diff(phases, append=0.0)
+    parts = []
+    for mode in np.unique(modes).tolist():
+        own = np.flatnonzero((modes == mode) & (length > 0.0))
+        waves = _waves_of(tables, map_.parameters[i if len(map_) > 1 else 0], mode, asked)
+        if waves is None:
+            return None
+        amplitudes = waves.amplitudes(states[own], counts[own], period, phases[own])
+        begin = counts[own] * period + phases[own]
+        parts.append(Legs(waves.rates, waves.rows, amplitudes, begin, length[own]))
+    return parts
+
+
+@dataclass(frozen=True)
+class _Waves:
+    """The waves of a contact state: its modes, a constant and the drives; see flow/waves.py.
+
+    Attributes
+    ----------
+    rates : complex128[E]
+        [1/s].
+    rows : complex128[R, E]
+        What each adds to each quantity.
+    inverse : complex128[M, N]
+        Amplitudes of modes by states.
+    answers : complex128[N, 1 + D]
+        Steady answers to the constant and the drives.
+    drives, lags : float64[D]
+        Rates [rad/s] and phases [rad] of the drives.
+    """
+
+    rates: np.ndarray
+    rows: np.ndarray
+    inverse: np.ndarray
+    answers: np.ndarray
+    drives: np.ndarray
+    lags: np.ndarray
+
+    def amplitudes(
+        self, states: np.ndarray, count: np.ndarray, period: float, phase: np.ndarray
+    ) -> np.ndarray:
+        """Amplitudes complex128[p, E] in states float64[p, N], ``phase`` [s] after whole
+        periods.
+        """
+        turns = self.drives * period / (2 * math.pi)
+        whole = np.abs(turns - np.round(turns)) <= WHOLE * np.abs(turns)
+        angle = self.lags + self.drives * phase[:, None]
+        angle = angle + np.where(whole, 0.0, count[:, None] * self.drives * period)
+        loads = np.column_stack([np.ones(len(states)), np.exp(1j * angle)])
+        modes = (states - (loads @ self.answers.T).real) @ self.inverse.T
+        return np.column_stack([modes, loads])
+
+
+def _waves_of(
+    tables: Tables, row: np.ndarray, mode: int, quantities: tuple[Expr, ...]
+) -> _Waves | None:
+    """The waves of a contact state, with the states, some quantities and the gaps; None if modes go
+    together in a block.
+    """
+    with tables.lock:
+        which = tables.set_of(row)
+        given, (_, modes) = tables.sets[which], tables.made[tables.state_of(which, mode)]
+    if modes.block is not None:
+        return None
+    asked = tables.linear.rows(quantities, given.values, mode)
+    kept, size = slots_of(modes.values), len(modes.vectors)
+    weight = np.where(modes.values[kept].imag > 0, 2.0, 1.0)
+    rows = np.vstack([np.eye(size), asked.matrix, given.gaps.matrix])
+    direct = np.zeros((len(rows), modes.answers.shape[1]))
+    direct[size:, 0] = np.append(asked.constant, given.gaps.constant)
+    direct[size:, 1:] = np.vstack([asked.driven, given.gaps.driven])
+    return _Waves(
+        np.concatenate([modes.values[kept], [0.0], 1j * given.rates]),
+        np.hstack([rows @ (modes.vectors[:, kept] * weight), rows @ modes.answers + direct]),
+        modes.inverse[kept],
+        modes.answers,
+        given.rates,
+        given.lags,
+    )

@@ -1,0 +1,127 @@
+"""Template, 1 of 5 of the modal flow: drives that are polynomials of the time between breaks.
+
+Each is a course: instants at which its pieces begin, and the coefficients of each piece in the time
+since then. A course that repeats holds one cycle. Steps end at breaks, so a step sees one piece of
+each. The piece is a function of the time alone: a run that is paused goes on with the same one.
+
+Columns of `course`: first row, number of pieces, cycle [s] (0: it doesn't repeat), rows of
+instants. Rows of `pieces`: the instants, a row of LANES of them after the other; then a row of
+coefficients for each piece.
+"""
+
+import math
+
+from saltus.kernels.trigonometry import turned
+
+#: Times within this many ulp are one break.
+SAME_BREAK = 10.0 * 2.220446049250313e-16
+#: 2 pi.
+TURN = 6.283185307179586
+
+
+@kernel
+def begin_courses(i, batch, m):
+    """Times of the courses at the beginning of the trajectory's period, to BASE."""
+    which = int(batch.carry[i, SET])
+    for p in range(m.sizes[COURSES]):
+        cycle = m.course[which, 4 * p + 2]
+        if cycle == 0.0:
+            place = batch.origin[i] + batch.count[i] * batch.period[i]
+        else:
+            rate = TURN / cycle
+            gained = turned(rate, batch.origin[i], 1)
+            gained += turned(rate, batch.period[i], batch.count[i])
+            place = gained / rate
+        m.record[p, BASE] = place
+
+
+@kernel
+def follow_courses(i, tau, batch, m):
+    """Bring every course to its piece at a time of the period: where it begins, to SINCE, and ends,
+    to UNTIL.
+    """
+    which = int(batch.carry[i, SET])
+    base = batch.origin[i] + batch.count[i] * batch.period[i]
+    until = tau + SAME_BREAK * (abs(tau) + abs(base))
+    for p in range(m.sizes[COURSES]):
+        first, count = int(m.course[which, 4 * p]), int(m.course[which, 4 * p + 1])
+        cycle, place = m.course[which, 4 * p + 2], m.record[p, BASE]
+        shift = -place
+        if cycle > 0.0:
+            shift += cycle * math.floor((place + until - m.pieces[first, 0]) / cycle)
+        low, high = 0, count - 1
+        while low < high:  # the last piece that has begun
+            middle = (low + high + 1) // 2
+            if number(m.pieces, first, middle) + shift <= until:
+                low = middle
+            else:
+                high = middle - 1
+        if low + 1 < count:
+            end = number(m.pieces, first, low + 1) + shift
+        else:
+            end = number(m.pieces, first, 0) + cycle + shift if cycle > 0.0 else math.inf
+        if end <= until:  # by rounding of the cycle
+            low, shift = 0, shift + cycle
+            end = number(m.pieces, first, 1 % count) + shift + (cycle if count == 1 else 0.0)
+        m.record[p, SINCE] = number(m.pieces, first, low) + shift
+        m.record[p, UNTIL] = end
+        m.record[p, PIECE] = first + m.course[which, 4 * p + 3] + low
+
+
+@kernel
+def next_break(m):
+    """The next break of a course, as a time of the period [s]."""
+    following = math.inf
+    for p in range(m.sizes[COURSES]):
+        following = min(following, m.record[p, UNTIL])
+    return following
+
+
+@kernel
+def is_break(i, tau, batch, m):
+    """True if a piece of a course has ended at a time of the period."""
+    base = batch.origin[i] + batch.count[i] * batch.period[i]
+    return next_break(m) <= tau + SAME_BREAK * (abs(tau) + abs(base))
+
+
+@kernel
+def courses_at(tau, m):
+    """Value and derivatives of each course at a time of the period, to VALUE and behind."""
+    for p in range(m.sizes[COURSES]):
+        row, since = int(m.record[p, PIECE]), tau - m.record[p, SINCE]
+        a, b = m.pieces[row, 0], m.pieces[row, 1]
+        c, d = m.pieces[row, 2], m.pieces[row, 3]
+        m.record[p, VALUE] = a + since * (b + since * (c + since * d))
+        m.record[p, VALUE + 1] = b + since * (2.0 * c + since * (3.0 * d))
+        m.record[p, VALUE + 2] = 2.0 * c + since * (6.0 * d)
+        m.record[p, VALUE + 3] = 6.0 * d
+
+
+@kernel
+def add_course_series(r, first, at, h, m):
+    """Add the courses' part of a row of gaps to its terms in q[r], each times the factorial of its
+    order; returns its size. Its numbers
+    stand in the rows from `first` on, from `at` on.
+    """
+    size = 0.0
+    for p in range(m.sizes[COURSES]):
+        for k in range(COURSE_TERMS):
+            factor, power = number(m.steady, first, at + COURSE_TERMS * p + k), 1.0
+            size += abs(factor * m.record[p, VALUE + k])
+            for j in range(COURSE_TERMS - k):
+                m.q[r, j] += factor * m.record[p, VALUE + k + j] * power
+                power *= h
+    return size
+
+
+@kernel
+def course_gap(first, at, m):
+    """The courses' part of a gap and of its rate."""
+    value, rate = 0.0, 0.0
+    for p in range(m.sizes[COURSES]):
+        for k in range(COURSE_TERMS):
+            factor = number(m.steady, first, at + COURSE_TERMS * p + k)
+            value += factor * m.record[p, VALUE + k]
+            if k + 1 < COURSE_TERMS:
+                rate += factor * m.record[p, VALUE + k + 1]
+    return value, rate

@@ -1,0 +1,242 @@
+"""Contact states whose modes don't go their own ways, by the modal flow, against exponentials of
+matrices to 50 digits.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.interpolate
+
+import saltus as sl
+from saltus.system.linear import linear_pieces
+
+mpmath = pytest.importorskip("mpmath")
+mp = mpmath.mp
+
+
+class Exact:
+    """z(t) from a state at a time in one contact state: the exponential of the equations and their
+    drives in one matrix. A course is given by its breaks and, between them, by coefficients of the
+    time since the break.
+    """
+
+    def __init__(self, piece, rates, lags, courses=()):
+        n, d, size = len(piece.matrix), len(rates), 1 + 2 * len(rates) + 4 * len(courses)
+        self.matrix, self.lags, self.rates = mp.zeros(n + size), lags, rates
+        self.courses = courses
+        for i in range(n):
+            for j in range(n):
+                self.matrix[i, j] = mp.mpf(float(piece.matrix[i, j]))
+            self.matrix[i, n] = mp.mpf(float(piece.constant[i]))
+            for k in range(d):
+                self.matrix[i, n + 1 + 2 * k] = mp.mpf(float(piece.driven[i, k]))
+            for k in range(len(courses)):
+                self.matrix[i, n + 1 + 2 * d + 4 * k] = mp.mpf(float(piece.driven[i, d + k]))
+        for k in range(d):
+            at, rate = n + 1 + 2 * k, mp.mpf(float(rates[k]))
+            self.matrix[at, at + 1], self.matrix[at + 1, at] = -rate, rate
+        for k in range(len(courses)):
+            for j in range(3):
+                at = n + 1 + 2 * d + 4 * k + j
+                self.matrix[at, at + 1] = 1
+
+    def motion(self, state, begin):
+        def at(t):
+            now, z = begin, state
+            for end in [*self.breaks(begin, t), t]:
+                z = (mp.expm(self.matrix * (end - now)) * self.whole(z, now, end))[: len(state), 0]
+                now = end
+            return z
+
+        return at
+
+    def breaks(self, begin, end):
+        every = [one for breaks, _ in self.courses for one in breaks]
+        return sorted({one for one in every if begin < one < end})
+
+    def whole(self, z, now, end):
+        parts = [*z, mp.mpf(1)]
+        for rate, lag in zip(self.rates, self.lags, strict=True):
+            angle = mp.mpf(float(rate)) * now + mp.mpf(float(lag))
+            parts += [mp.cos(angle), mp.sin(angle)]
+        for breaks, terms in self.courses:
+            piece = max(sum(one <= (now + end) / 2 for one in breaks) - 1, 0)
+            since = now - breaks[piece]
+            for k in range(4):
+                parts.append(
+                    mp.fsum(terms[piece][j] * mp.ff(j, k) * since ** (j - k) for j in range(k, 4))
+                )
+        return mp.matrix(parts)
+
+
+def check_contacts(system, start, run, most, tolerance, courses=()):
+    """Each contact is a zero of its gap on the exact motion from the exact contact before it, and
+    no other gap is beyond its boundary on the way. Returns how many there were.
+    """
+    linear, values = linear_pieces(system), dict(system.values)
+    names = [guard.name for guard in system.guards]
+    gaps, (rates, lags), known = linear.gaps(values), linear.rates(values), {}
+    count = min(run.sizes["contact"], most)
+    with mp.workdps(50):
+        state = mp.matrix([mp.mpf(float(one)) for one in start])
+        mode, now = int(run.contact_mode_before[0]), mp.mpf(0)
+        for k in range(count):
+            if mode not in known:
+                known[mode] = Exact(linear.piece(values, mode), rates, lags, courses)
+            motion = known[mode].motion(state, now)
+            g = names.index(str(run.contact_guard.values[k]))
+            row = mp.matrix([[mp.mpf(float(one)) for one in gaps.matrix[g]]])
+            away = mp.mpf(float(gaps.constant[g]))
+            claimed = mp.mpf(float(run.contact_time[k]))
+            gap = lambda t, r=row, a=away, m=motion: (r * m(t))[0] + a  # noqa: E731
+            found = mp.findroot(gap, (claimed, claimed * (1 + mp.mpf("1e-12"))), solver="secant")
+            assert abs(found - claimed) < tolerance, (k, float(found - claimed))
+            for part in (0.1, 0.5, 0.9):
+                there = np.array([float(one) for one in motion(now + (found - now) * part)])
+                others = gaps.matrix @ there + gaps.constant
+                sides = np.where(mode >> np.arange(len(names)) & 1, 1.0, -1.0)
+                assert (others * sides > -1e-12).all()
+            state, now, mode = motion(found), found, int(run.contact_mode_after[k])
+    return count
+
+
+def moved(system, start, **kw):
+    return sl.simulate(system, start, method=sl.Modal(), progress=False, time_errors="local", **kw)
+
+
+@sl.system(states="x v", forced_at="frequency")
+def struck(
+    t, x, v, *, frequency=1 / (2 * np.pi), force=0.1, dead=0.0, gap=1.0, spring=1.0, damper=0.0,
+    stiffness=50.0, loss=0.0,
+):  # fmt: skip
+    """An oscillator of frequency 1 with a stop."""
+    stop = sl.where(x > gap, stiffness * (x - gap) + loss * v, 0.0)
+    return v, force * sl.cos(2 * sl.pi * frequency * t) + dead - spring * x - damper * v - stop
+
+
+CASES = {
+    "exact resonance": {},
+    "near resonance": {"spring": 1 + 1e-9},
+    "resonance and a dead load": {"dead": 0.05},
+    "critical in the stop": {"stiffness": 24.0, "loss": 10.0, "force": 0.3},
+    "nearly critical in the stop": {"stiffness": 24.0, "loss": 10.0 * (1 - 1e-12), "force": 0.3},
+    "critical everywhere": {"damper": 2.0, "force": 3.0},
+    "overdamped": {"damper": 20.0, "force": 30.0, "loss": 50.0},
+    "growing": {"damper": -0.05},
+    "a body under its weight": {"spring": 0.0, "dead": 1.0, "stiffness": 1e6},
+    "a weak spring under a weight": {"spring": 1e-9, "dead": 1.0, "stiffness": 1e6},
+    "a body with a damper": {"spring": 0.0, "damper": 0.1, "dead": 1.0, "stiffness": 1e3},
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_an_oscillator_meets_its_stop_where_matrix_exponentials_say(case):
+    system = struck.with_values(**CASES[case])
+    run = moved(system, (0.0, 0.0), periods=40)
+    assert str(run.status.values) == "ok"
+    assert check_contacts(system, (0.0, 0.0), run, 16, 1e-12 * 2 * np.pi) > 5
+
+
+def test_tables_that_are_dropped_and_made_anew_give_the_same_bits(monkeypatch):
+    """Many sets of parameter values in memory for a few contact states only, on two threads."""
+    from saltus.flow import modal, modal_tables
+
+    start, values = np.zeros((60, 2)), {"gap": np.linspace(0.2, 1.2, 60)}
+
+    def run():
+        modal.modal_flow.cache_clear()
+        return sl.stroboscope(
+            struck.with_values(damper=0.1), start, 30, values=values, keep=1, progress=False,
+            method=sl.Modal(), threads=2,
+        )  # fmt: skip
+
+    whole = run()
+    monkeypatch.setattr(modal_tables, "MOST_BYTES", 2**16)
+    few = run()
+    tables = modal.modal_flow(struck.origin).tables
+    assert tables.generation > 5
+    assert tables.modes.table.nbytes + tables.steady.table.nbytes < 2**18
+    for name in ("x", "v"):
+        assert np.isfinite(whole[name]).all()
+        assert (whole[name].values == few[name].values).all()
+
+
+TIMES = np.linspace(0.0, 3.0, 13)
+HEIGHTS = np.random.default_rng(64).normal(size=13)
+RECORDS = {kind: sl.recorded(TIMES, HEIGHTS, kind=kind) for kind in ("linear", "spline")}
+
+
+def exact_record(kind):
+    """Breaks and coefficients of a record by scipy, to the last bit of its own numbers."""
+    if kind == "linear":
+        terms = np.column_stack([HEIGHTS[:-1], np.diff(HEIGHTS) / np.diff(TIMES)])
+        terms = np.pad(terms, ((0, 0), (0, 2)))
+    else:
+        terms = scipy.interpolate.CubicSpline(TIMES, HEIGHTS).c[::-1].T
+    last = [HEIGHTS[-1], 0.0, 0.0, 0.0]
+    return [mp.mpf(float(one)) for one in TIMES], [
+        [mp.mpf(float(one)) for one in row] for row in [*terms, last]
+    ]
+
+
+def exact_square(frequency, share):
+    """The same of a square wave, by its formula."""
+    period = 1 / mp.mpf(frequency)
+    breaks = [period * (k // 2) + (period * share if k % 2 else 0) for k in range(6)]
+    return breaks, [[mp.mpf(1 - 2 * (k % 2)), mp.mpf(0), mp.mpf(0), mp.mpf(0)] for k in range(6)]
+
+
+def exact_triangle(frequency):
+    period = 1 / mp.mpf(frequency)
+    breaks = [period * k / 2 for k in range(6)]
+    sign = [1 - 2 * (k % 2) for k in range(6)]
+    return breaks, [[mp.mpf(-s), 4 * s / period, mp.mpf(0), mp.mpf(0)] for s in sign]
+
+
+def shaken(drive):
+    """Two bodies on springs, the second one behind a stop."""
+
+    @sl.system(states="x y v w")
+    def pair(
+        t, x, y, v, w, *, spring=20.0, coupling=30.0, damper=0.0, stiffness=900.0, loss=0.0,
+        gap=0.02, dead=0.0,
+    ):  # fmt: skip
+        u = drive(t)
+        stop = sl.where(y > gap, stiffness * (y - gap) + loss * w, 0.0)
+        pull = coupling * (y - x)
+        return v, w, pull - spring * x - damper * v + u, dead - pull - damper * w - stop
+
+    return pair
+
+
+DRIVES = {
+    "a linear record": (RECORDS["linear"], exact_record("linear")),
+    "a spline": (RECORDS["spline"], exact_record("spline")),
+    "a square wave": (
+        lambda t: sl.square(2 * sl.pi * 0.75 * t, duty=0.25),
+        exact_square(0.75, mp.mpf(1) / 4),
+    ),
+    "triangles": (
+        lambda t: sl.sawtooth(2 * sl.pi * 0.75 * t, width=0.5),
+        exact_triangle(0.75),
+    ),
+}
+BODIES = {
+    "undamped": {},
+    "damped": {"damper": 1.0, "loss": 3.0},
+    "overdamped": {"damper": 30.0, "stiffness": 1e5, "gap": 0.001},
+    "free, stiff": {"spring": 0.0, "stiffness": 1e6, "dead": 3.0},
+    "slow beside the record": {"spring": 1e-3, "coupling": 1e4, "dead": 3.0},
+}
+
+
+@pytest.mark.parametrize("bodies", BODIES)
+@pytest.mark.parametrize("drive", DRIVES)
+def test_bodies_that_are_shaken_meet_a_stop_where_matrix_exponentials_say(drive, bodies):
+    of_time, course = DRIVES[drive]
+    system = shaken(of_time).with_values(**BODIES[bodies])
+    assert len(linear_pieces(system).courses) == 1
+    run = moved(system, np.zeros(4), t_end=3.0, samples=3)
+    assert str(run.status.values) == "ok"
+    assert check_contacts(system, np.zeros(4), run, 5, 1e-12, [course]) > 1

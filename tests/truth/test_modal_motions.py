@@ -1,0 +1,122 @@
+"""Derivatives and numbers of motions by the modal flow, against Taylor's method and matrix
+exponentials.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+import saltus as sl
+from saltus.analysis.branches.parametric_map import ParametricStroboscope
+from saltus.analysis.branches.shooting import PeriodicOrbits
+from saltus.analysis.closed.measures import measure
+from saltus.flow.maps import Stroboscope
+
+
+def chain(modes, *, damping=None, side="both", gap=0.01):
+    """A chain of masses with two stops, driven at its end."""
+    stiffness = 400.0 * (2 * np.eye(modes) - np.eye(modes, k=1) - np.eye(modes, k=-1))
+    stops = [
+        sl.Contact(f"x{place}", stiffness=900.0, gap=gap, side=side, damping=damping, name=name)
+        for place, name in ((1, "first"), (modes, "last"))
+    ]
+    return sl.structure(
+        np.eye(modes), stiffness, damping_ratio=0.02, modes=modes, contacts=stops,
+        forces=[sl.Force(f"x{modes}", 20.0, phase=0.3, name="drive")], frequency=2.3,
+    )  # fmt: skip
+
+
+def starts(system, count, seed):
+    """Random states of the size of its motion."""
+    rng = np.random.default_rng(seed)
+    run = sl.simulate(system, periods=8, samples=16, progress=False)
+    sizes = [float(np.abs(run[name]).max()) for name in system.states]
+    return rng.uniform(-1, 1, (count, len(sizes))) * sizes
+
+
+@pytest.mark.parametrize("damping", [None, 15.0])
+@pytest.mark.parametrize("modes", [2, 5])
+def test_derivative_of_the_state(modes, damping):
+    """Also where the force of a damper jumps at the contact."""
+    system = chain(modes, damping=damping)
+    start = starts(system, 6, modes)
+    (ends, exact), (others, found) = (
+        Stroboscope(system, method).tangent(start, 2) for method in (sl.Taylor(), sl.Modal())
+    )
+    np.testing.assert_allclose(others, ends, rtol=0, atol=1e-10 * np.abs(ends).max())
+    assert np.abs(found - exact).max() < 1e-9 * np.abs(exact).max()
+
+
+def test_derivative_without_contacts_is_a_matrix_exponential():
+    stiffness = 400.0 * (2 * np.eye(3) - np.eye(3, k=1) - np.eye(3, k=-1))
+    squares = np.linalg.eigvalsh(stiffness)
+    matrix = np.block(
+        [[np.zeros((3, 3)), np.eye(3)], [-np.diag(squares), -0.04 * np.diag(np.sqrt(squares))]]
+    )
+    _, found = Stroboscope(chain(3, gap=1e3), sl.Modal()).tangent(np.zeros((1, 6)), 3)
+    expected = expm(matrix * 3 / 2.3)
+    np.testing.assert_allclose(found[0], expected, atol=1e-11 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("names", [("frequency",), ("drive",), ("first_stiffness", "frequency")])
+def test_derivatives_by_parameters(names):
+    """Differences along the modal flow beside Taylor's method, whose states they are."""
+    system = chain(3)
+    z = np.append(starts(system, 1, 5)[0], [system.values[name] for name in names])[None]
+    evaluated = [
+        PeriodicOrbits(system, names, 1, np.ones_like(z), method).evaluate(z, np.array([0]))
+        for method in (sl.Taylor(), sl.Modal())
+    ]
+    (residual, exact), (other, found) = evaluated
+    np.testing.assert_allclose(other, residual, atol=1e-10 * np.abs(residual).max())
+    for column, expected in zip(found[0].T, exact[0].T, strict=True):
+        np.testing.assert_allclose(column, expected, atol=1e-7 * np.abs(expected).max())
+
+
+def test_gap_is_a_state_that_modal_serves():
+    """A parameter that leaves the equations linear needs no differences."""
+    system = chain(3)
+    z = np.append(starts(system, 1, 5)[0], system.values["last_gap"])[None]
+    by_modes, by_series = (
+        PeriodicOrbits(system, ("last_gap",), 1, np.ones_like(z), method)
+        for method in (sl.Modal(), sl.Taylor())
+    )
+    assert not isinstance(by_modes.map, ParametricStroboscope)
+    found, exact = (one.evaluate(z, np.array([0]))[1] for one in (by_modes, by_series))
+    np.testing.assert_allclose(found, exact, atol=1e-9 * np.abs(exact).max())
+
+
+def test_orbits_and_branches_are_those_of_taylor():
+    system = chain(4, damping=15.0)
+    both = [
+        sl.branches(system, {"frequency": (2.0, 2.4)}, np.zeros(8), method=method, progress=False)
+        for method in (sl.Taylor(), sl.Modal())
+    ]
+    one, other = both
+    assert one.sizes["branch"] == other.sizes["branch"]
+    assert list(one.event_kind.values) == list(other.event_kind.values)
+    np.testing.assert_allclose(other.event_frequency.values, one.event_frequency.values, rtol=1e-8)
+
+
+@pytest.mark.parametrize("modes", [1, 2, 4])
+def test_numbers_of_a_motion_are_those_of_its_polynomials(modes):
+    system = chain(modes)
+    start = starts(system, 1, modes)
+    for _ in range(60):
+        start, _ = Stroboscope(system, sl.Modal()).ends(start, 1)
+    one, other = (
+        measure(Stroboscope(system, method), start, np.array([2]))
+        for method in (sl.Taylor(), sl.Modal())
+    )
+    for name in ("maximum", "minimum", "mean", "deviation", "harmonic", "span", "contacts"):
+        expected = getattr(one, name)
+        np.testing.assert_allclose(
+            getattr(other, name), expected, atol=1e-9 * np.abs(one.maximum).max(), err_msg=name
+        )
+    np.testing.assert_allclose(other.margin, one.margin, rtol=1e-6)
+    assert other.itinerary == one.itinerary
+    np.testing.assert_allclose(
+        other.turning[0], one.turning[0], atol=1e-8 * np.abs(one.maximum).max()
+    )
