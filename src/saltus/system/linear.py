@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -95,9 +95,8 @@ class LinearSystem:
 
     def of(self, quantities: tuple[Expr, ...]) -> tuple[Expr, ...] | None:
         """Quantities as functions of the states and the drives; None if one isn't linear."""
-        found = tuple(ex.substituted(entry, self._names) for entry in quantities)
-        linear = all(_is_affine(entry, len(self._names)) for entry in found)
-        return found if linear else None
+        found = ex.all_substituted(quantities, self._names)
+        return found if _are_affine(found, len(self._names)) else None
 
     def rows(
         self, quantities: tuple[Expr, ...], values: Mapping[str, float], mode: int
@@ -170,11 +169,10 @@ def linear_pieces(system: System) -> LinearSystem | str:
     if any(node.op != "table" for node in courses.keys() & set(_driving(*gaps))):
         return "a boundary of it moves by a drive that may jump"
     names = {node: ex.parameter(_name(i)) for i, node in enumerate((*drives, *courses))}
-    field = tuple(ex.substituted(entry, names) for entry in system.field)
-    gaps = tuple(ex.substituted(gap, names) for gap in gaps)
+    field, gaps = ex.all_substituted(system.field, names), ex.all_substituted(gaps, names)
     if any(ex.depends_on(gap, ("select",)) for gap in gaps):
         return "a boundary of it moves when another is crossed"
-    if not all(_is_affine(entry, len(names)) for entry in (*field, *gaps)):
+    if not _are_affine((*field, *gaps), len(names)):
         return "it isn't linear between its contacts"
     return LinearSystem(system, tuple(drives.values()), tuple(courses), field, gaps, names)
 
@@ -200,13 +198,13 @@ def _driving(*roots: Expr) -> Iterator[Expr]:
             waiting += reversed(node.args)
 
 
-def _is_affine(root: Expr, drives: int) -> bool:
-    """True if an expression is linear in the states and drives, whichever sides its conditions
+def _are_affine(roots: Sequence[Expr], drives: int) -> bool:
+    """True if expressions are linear in the states and drives, whichever sides their conditions
     choose.
     """
     moving = {_name(i) for i in range(drives)}
     degree: dict[Expr, float] = {}
-    for node in ex.walk(root):
+    for node in ex.walk(*roots):
         below = [degree[one] for one in node.args]
         match node.op:
             case "state":
@@ -226,4 +224,4 @@ def _is_affine(root: Expr, drives: int) -> bool:
                 degree[node] = max(below) if asks_bits else math.inf
             case _:
                 degree[node] = 0 if node.args and not any(below) else math.inf
-    return degree[root] <= 1
+    return all(degree[root] <= 1 for root in roots)

@@ -22,9 +22,7 @@ from saltus.language.expression import (
     constant,
     depends_on,
     div,
-    operands,
     relations_in,
-    walk,
 )
 from saltus.sentences import Text
 from saltus.system.equations_of_motion import EquationsOfMotion
@@ -62,16 +60,12 @@ class Timing:
 @functools.lru_cache(maxsize=1024)
 def timing_of(entry: Expr) -> Timing:
     """Find the ways in which time enters an expression; cached."""
-    timed: set[Expr] = set()
-    for node in walk(entry):
-        if node.op == "time" or not timed.isdisjoint(operands(node)):
-            timed.add(node)
     clocks: dict[Expr, tuple[Expr, bool]] = {}
     phases: dict[Expr, Expr] = {}
     complete, waiting, seen = True, [entry], set()
     while waiting:
         node = waiting.pop()
-        if node in seen or node not in timed:
+        if node in seen or not depends_on(node, ("time",)):
             continue
         seen.add(node)
         below = list(node.args)

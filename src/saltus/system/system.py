@@ -11,7 +11,7 @@ import numpy as np
 
 from saltus.contact.singular import is_steep
 from saltus.errors import ParameterError, among, nearest, shown, unknown
-from saltus.language.derivatives import gradient
+from saltus.language.derivatives import gradients
 from saltus.language.expression import Expr
 from saltus.system import checks, serial
 from saltus.system.display import equation_lines, system_html, system_text
@@ -169,7 +169,7 @@ class System(EquationsOfMotion):
         """Derivative of each entry of the field (row) with respect to each state (column), in a
         frozen mode.
         """
-        return tuple(gradient(entry, self.states) for entry in self.field)
+        return gradients(self.field, self.states)
 
     @functools.cached_property
     def is_steep(self) -> bool:
@@ -183,7 +183,7 @@ class System(EquationsOfMotion):
     @functools.cached_property
     def guard_gradients(self) -> tuple[tuple[Expr, ...], ...]:
         """Derivative of each gap (row) with respect to each state (column), in a frozen mode."""
-        return tuple(gradient(guard.gap, self.states) for guard in self.guards)
+        return gradients([guard.gap for guard in self.guards], self.states)
 
     def rhs(self, t: Any, y: Any) -> np.ndarray:
         """The right-hand side as a plain function: time derivatives of the states, by NumPy.
