@@ -65,7 +65,8 @@ def attractors(
     start : sequence, mapping or array
         Starts, as for :func:`saltus.simulate`; one or many.
     method : Method
-        Default :class:`saltus.Taylor`.
+        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
+        it serves.
     periods : int
         Forcing periods after which a trajectory that hasn't settled is looked at for chaos.
     every : float or str, optional
@@ -108,7 +109,7 @@ def attractors(
     group, periods = ensemble(system, start, None), whole(periods, "periods")
     map_ = Stroboscope(
         system,
-        check_method(method),
+        check_method(method, system),
         every=looks_every(system, every, group.start),
         threads=threads,
     )

@@ -61,7 +61,8 @@ def edge_orbit(
     a, b : sequence or mapping
         Two starts, as for :func:`saltus.simulate`, that lead to different attractors.
     method : Method
-        Default :class:`saltus.Taylor`; another one has errors that keep unstable orbits from
+        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
+        it serves; another one has errors that keep unstable orbits from
         closing.
     periods : int
         Forcing periods after which a trajectory that hasn't settled is looked at for chaos.
@@ -101,7 +102,7 @@ def edge_orbit(
     """
     check_system(system)
     ends = np.concatenate([_one(system, "a", a), _one(system, "b", b)])
-    periods, method = whole(periods, "periods"), exact_method(method)
+    periods, method = whole(periods, "periods"), exact_method(method, system)
     _check_forced(system)
     map_ = Stroboscope(system, method, threads=threads)
     scale = spread(map_, ends)

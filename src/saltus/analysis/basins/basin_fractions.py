@@ -110,7 +110,7 @@ def basin_fractions(
     )
     map_ = Stroboscope(
         system,
-        check_method(method),
+        check_method(method, system),
         every=looks_every(system, every, start),
         threads=threads,
     )

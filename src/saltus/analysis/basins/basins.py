@@ -61,7 +61,8 @@ def basins(
     at : mapping, optional
         Starts of the other states; default zero.
     method : Method
-        Default :class:`saltus.Taylor`.
+        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
+        it serves.
     periods : int
         Forcing periods that a trajectory is followed at most.
     every : float or str, optional
@@ -101,7 +102,9 @@ def basins(
     ((20, 20), [1, 1, 3, 9])
     """
     return map_of(
-        basin_plan(system, axes, at, check_method(method), periods, every), threads, progress
+        basin_plan(system, axes, at, check_method(method, system), periods, every),
+        threads,
+        progress,
     )
 
 

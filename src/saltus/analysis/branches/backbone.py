@@ -103,7 +103,8 @@ def backbone(
     points : int
         Most points.
     method : Method
-        Default :class:`saltus.Taylor`; another one must be exact.
+        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
+        it serves; another one must be exact.
     threads : int, optional
         Default all processors.
     progress : bool or callable
@@ -142,7 +143,7 @@ def backbone(
     '11.420668320 Hz'
     """
     check_system(system)
-    method, system = exact_method(method, "sl.backbone"), at_values(system, values)
+    method, system = exact_method(method, system, "sl.backbone"), at_values(system, values)
     state = system.states[0] if state is None else state
     low, high = _range(unit_of(system, state), amplitude)
     measured = outputs_of(system).names.index(state)

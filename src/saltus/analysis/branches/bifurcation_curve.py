@@ -31,7 +31,7 @@ from saltus.results.dataset.attractors import padded
 from saltus.results.dataset.schema import event_name, point_name
 from saltus.sentences import Word
 from saltus.system import System
-from saltus.system.leg import has_legs
+from saltus.system.leg import MOST_STATES, has_legs
 
 
 @verb
@@ -76,7 +76,8 @@ def bifurcation_curve(
     points : int
         Most points in each direction.
     method : Method
-        Default :class:`saltus.Taylor`; another one must be exact.
+        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
+        it serves; another one must be exact.
     threads : int, optional
         Default all processors.
     progress : bool or callable
@@ -122,7 +123,7 @@ def bifurcation_curve(
     ('fold', 'range')
     """
     check_system(system)
-    method = exact_method(method, "sl.bifurcation_curve")
+    method = exact_method(method, system, "sl.bifurcation_curve")
     names, limits = _ranges(system, vary)
     points = whole(points, "points", 2)
     start = _start(system, event)
@@ -250,8 +251,8 @@ def _equations(
         return SingularOrbits.of(orbits, start.kind, z, start.multiplier)
     if not has_legs(orbits.parametric.system):
         raise ParameterError(
-            f"{start.system.name} switches at instants, or has a remainder or a table of time: its "
-            "grazes can't be followed in two parameters."
+            f"{start.system.name} switches at instants, has a remainder or a table of time, or "
+            f"more than {MOST_STATES - 2} states: its grazes can't be followed in two parameters."
         )
     found = GrazingOrbits.of(orbits, z, start.guard, start.phase)
     if found is None:

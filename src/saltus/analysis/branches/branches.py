@@ -74,7 +74,8 @@ def branches(
        impact appears or vanishes, because the map over a period isn't smooth there.
     5. Events are located to rounding where a test function changes its sign. Where the number of
        multipliers outside the unit circle changes otherwise, the step is refined; what stays
-       unexplained is counted in ``branch_unexplained``.
+       unexplained is counted in ``branch_unexplained``. Grazes and corners are left out of systems
+       with more than 13 states.
     6. The branches that leave at the events in ``switch`` are seeds of their own, begun beside the
        event.
 
@@ -113,7 +114,8 @@ def branches(
     every : float or str, optional
         For starts of a system without forcing: time between two samples [s].
     method : Method
-        Default :class:`saltus.Taylor`; another one must be exact.
+        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
+        it serves; another one must be exact.
     periods : int
         For starts: forcing periods after which a trajectory hasn't settled.
     seed : int
@@ -174,7 +176,7 @@ def branches(
     ['fold at 17.734087 Hz']
     """
     check_system(system)
-    method, system = exact_method(method, "sl.branches"), at_values(system, values)
+    method, system = exact_method(method, system, "sl.branches"), at_values(system, values)
     name, limits = _range(system, vary)
     chosen = frozenset(_kinds(switch))
     wanted = outputs_of(system, outputs)

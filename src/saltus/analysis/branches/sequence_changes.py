@@ -47,7 +47,7 @@ def contact_points(
     orbits: PeriodicOrbits, row: int, z: np.ndarray, tangent: np.ndarray
 ) -> list[Event]:
     """All changes of the contact sequence between the points of a branch and the next ones; none
-    where contacts are held, or equations switch by the time.
+    where contacts are held, equations switch by the time, or the states are many.
 
     Parameters
     ----------

@@ -89,7 +89,8 @@ def periodic_orbits(
         Of a system without forcing, in place of ``periods``: the range of periods looked for,
         ``("1 s", "5 s")``, or a first guess, which stands for half to twice of it.
     method : Method
-        Default :class:`saltus.Taylor`; another one has errors that keep unstable orbits from
+        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
+        it serves; another one has errors that keep unstable orbits from
         closing. Its budgets, ``max_steps`` and ``max_events``, are those of each motion that is
         followed; default: 10 000 steps and 1000 contacts for each forcing period or turn, 12 of
         which a start may be followed before the search begins. Starts that need more, as those
@@ -153,7 +154,7 @@ def periodic_orbits(
         if isinstance(start, str)
         else _given(system, start, box)
     )
-    method = exact_method(method)
+    method = exact_method(method, system)
     attrs = provenance(system, method, system.values) | {"starts": len(states), "seed": seed}
     if system.forced_at is None:
         turn = _turn(system, states)
@@ -213,9 +214,9 @@ def _range(period: Any, default: tuple[float, float]) -> tuple[tuple[float, floa
     return (0.5 * ends[0], 2.0 * ends[0]), ends[0]
 
 
-def exact_method(method: Method | None) -> Method:
+def exact_method(method: Method | None, system: System) -> Method:
     """The method. Raises ParameterError for one whose errors are more than rounding."""
-    method = check_method(method)
+    method = check_method(method, system)
     if not method.exact:
         raise ParameterError(
             lambda say: (

@@ -91,7 +91,8 @@ def lyapunov(
         states and the phase of the forcing, 32 in a block; an evolution is one block. It is the
         largest exponent of the flow, so never below zero: neighbours on an orbit stay neighbours.
     flow : Method
-        The method of integration. Default :class:`saltus.Taylor`. With
+        The method of integration. Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from
+        eight states on where it serves. With
         ``sl.ODE45(events="ignore")`` jumps of the tangent are left out, as contacts aren't known.
     periods : int
         Blocks that growth is measured over, at least 64. The error falls with the square root of
@@ -157,7 +158,7 @@ def lyapunov(
     """
     check_system(system)
     _check_words(method, unit, system)
-    flow = check_method(flow)
+    flow = check_method(flow, system)
     group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
     periods, transient = whole(periods, "periods", LEAST_PERIODS), whole(transient, "transient", 0)
     rows = np.broadcast_to(group.parameters, (group.size, len(system.values)))

@@ -120,7 +120,7 @@ def compare_methods(
     if "method" in arguments:
         raise ParameterError("give the methods as methods=[...]; method= is for a single analysis.")
     everything = list(
-        dict.fromkeys([check_method(reference or Taylor()), *map(check_method, methods)])
+        dict.fromkeys(check_method(one, system) for one in (reference or Taylor(), *methods))
     )
     if len(everything) < 2:
         raise ParameterError(

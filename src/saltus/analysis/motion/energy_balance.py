@@ -122,7 +122,7 @@ def energy_balance(
     True
     """
     check_system(system)
-    method = check_method(method)
+    method = check_method(method, system)
     stored, guards = quantity(system, energy, "the energy")
     powers = {"supplied": supplied, "dissipated": dissipated, "friction": friction}
     parts = {name: power for name, power in powers.items() if power is not None}

@@ -137,7 +137,7 @@ def impact_statistics(
     40
     """
     check_system(system)
-    method = check_method(method)
+    method = check_method(method, system)
     if not method.records_contacts:
         raise ParameterError(
             f"impact_statistics needs a method that locates contacts, and "

@@ -112,7 +112,7 @@ def poincare(
     6
     """
     check_system(system)
-    method = check_method(method)
+    method = check_method(method, system)
     if not method.records_contacts:
         raise ParameterError(
             f'poincare needs a method that locates contacts, and {method.name}(events="ignore") '

@@ -75,7 +75,8 @@ def simulate(
     t_start : float or str
         Time at the start [s]; the phase of the forcing is that of this time.
     method : Method
-        Default :class:`saltus.Taylor`; :class:`saltus.ODE45` for MATLAB's.
+        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
+        it serves; :class:`saltus.ODE45` for MATLAB's.
     samples : int
         Samples per forcing period (default 200), or over the whole span if the system isn't forced
         (default 10 000, and down to 2000 for many trajectories).
@@ -135,7 +136,7 @@ def simulate(
     >>> run.sizes["contact"], bool(run["contact_time_error"].max() < 1e-12)
     (21, True)
     """
-    method = check_method(method)
+    method = check_method(method, system)
     check_system(system)
     many = trajectories(start, values)
     times = None if at is None else _given_times(system, many, at, samples)

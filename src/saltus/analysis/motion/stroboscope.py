@@ -77,7 +77,7 @@ def stroboscope(
     >>> bool(abs(x[300] - x[297]) < 1e-6 < abs(x[300] - x[299]))  # it repeats after three periods
     True
     """
-    method = check_method(method)
+    method = check_method(method, system)
     check_system(system)
     if system.forced_at is None:
         raise ParameterError(

@@ -82,7 +82,7 @@ def check_unstable(unstable: bool, grid: Grid, method: Method) -> None:
             )
         )
     if unstable:
-        exact_method(method, "unstable=True")
+        exact_method(method, grid.system, "unstable=True")
 
 
 def follow_arcs(

@@ -102,7 +102,7 @@ def bifurcation_diagram(
                 f"{say.key(vary={'contact_stiffness': ('1e3 N/m', '1e9 N/m', 200, 'log')})}."
             )
         )
-    method = check_method(method)
+    method = check_method(method, system)
     check_sample(sample, method)
     grid = grid_of(system, vary, start, box, values, seed, follow, every)
     check_unforced_sample(sample, grid.system)

@@ -71,7 +71,8 @@ def frequency_response(
         their arguments found by name, such as ``{"acceleration": (lambda x, v, k, c, m: -(k*x +
         c*v)/m, "m/s^2")}``. Comparisons that are contacts of the system read their sides.
     method : Method
-        Default :class:`saltus.Taylor`.
+        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
+        it serves.
     periods : int
         Forcing periods after which a trajectory that hasn't settled is looked at for chaos. It
         bounds the work: closing orbits and measuring exponents may each cost ten times as many

@@ -39,7 +39,7 @@ def respond(
     """The Dataset of a grid's responses, with the branches that they lie on if it has one axis.
     Raises Interrupted, with the Dataset of what is known, on Ctrl-C.
     """
-    method, periods = check_method(method), whole(periods, "periods")
+    method, periods = check_method(method, grid.system), whole(periods, "periods")
     check_unstable(unstable, grid, method)
     arcs = Arcs(unstable=unstable)
     part = functools.partial(
