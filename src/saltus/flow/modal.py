@@ -209,9 +209,13 @@ class Modal(Method):
     """The exact flow in each contact state of a system that is linear between its contacts: modes
     go their own ways, and no step is as short as the fastest of them would ask.
 
+    Drives are harmonic, or polynomials of time between breaks: records, square waves, saw-teeth,
+    pulses. Modes that don't go their own ways - critical damping, rigid bodies, resonance - go
+    together. The modes of one system take 256 MB at most.
+
     A gap is followed by the modes that matter and bounded by the others, so that no contact is
     missed; the instant of a contact is a zero of all modes, to rounding. Systems that it doesn't
-    serve - nonlinear forces, laws of contact, drives that aren't harmonic - are moved by
+    serve - nonlinear forces, laws of contact, swept drives - are moved by
     :class:`saltus.Taylor`.
 
     Parameters

@@ -134,7 +134,7 @@ def block_of(spaces: list[Subspace], acts: Loads, answers: np.ndarray) -> tuple[
 
 
 def _generator(drive: int, speed: float, acts: Loads) -> np.ndarray:
-    """How a drive goes on: the constant; cosine and sine; a value and its derivatives."""
+    """Rates of a drive by itself: the constant; cosine and sine; a value and its derivatives."""
     if drive == 0:
         return np.zeros((1, 1))
     if drive < len(acts.rates):

@@ -133,7 +133,7 @@ def _together(
         far = np.minimum(np.abs(1j * rate - values), np.abs(1j * rate + values))
         found |= (part != 0) & (MOST_LOSS * far <= np.maximum(abs(rate), sizes))
     for course, part in zip(acts.speeds, parts.T[len(acts.rates) :], strict=True):
-        found |= (part != 0) & (loss_of(course, sizes, acts.scale) >= MOST_LOSS)
+        found |= (part != 0) & (loss_of(course, sizes, acts.scale) >= MOST_LOSS_OF_TWO)
     # a force that is constant moves a slow mode far before it is balanced
     with np.errstate(all="ignore"):
         static = np.abs(acts.gaps @ vectors * (parts[:, 0] / values))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -43,7 +42,7 @@ def bifurcation_diagram(
     state: str | None = None,
     events: bool = True,
     legend: bool = True,
-    ax: Any = None,
+    ax: Axes | None = None,
 ) -> Axes:
     """Sampled values of every response against a parameter: a colour for each period, chaos in
     small dark dots, gaps dashed.

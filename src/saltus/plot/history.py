@@ -39,7 +39,7 @@ def history(
     trajectory: int | Sequence[int] | None = None,
     state: str | None = None,
     periods: selection.Periods = None,
-    ax: Any = None,
+    ax: draw.Panels | None = None,
     *,
     time: Literal["s", "T", "both"] = "both",
     units: Mapping[str, str] | None = None,

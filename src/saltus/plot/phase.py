@@ -28,7 +28,7 @@ def phase(
     trajectory: int | Sequence[int] | None = None,
     states: tuple[str, str] | None = None,
     periods: selection.Periods = None,
-    ax: Any = None,
+    ax: Axes | None = None,
     *,
     poincare: bool = True,
     units: Mapping[str, str] | None = None,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -31,7 +30,7 @@ def section(
     x: str | None = None,
     y: str | None = None,
     trajectory: int | Sequence[int] | None = None,
-    ax: Any = None,
+    ax: Axes | None = None,
     *,
     units: Mapping[str, str] | None = None,
     legend: bool = True,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -28,7 +27,7 @@ def spectrum(
     ds: xr.Dataset,
     state: str | None = None,
     trajectory: int | Sequence[int] | None = None,
-    ax: Any = None,
+    ax: Axes | None = None,
     *,
     highest: float | None = None,
     units: Mapping[str, str] | None = None,

@@ -14,6 +14,7 @@ from saltus.analysis.attractors.portrait import portraits
 from saltus.analysis.closed.spread import spread
 from saltus.analysis.closed.turns import looks_every
 from saltus.analysis.dataset_parts import provenance, subject
+from saltus.analysis.inputs.given import Starts
 from saltus.analysis.inputs.starts import ensemble
 from saltus.analysis.inputs.verb import verb
 from saltus.flow.counts import whole
@@ -31,7 +32,7 @@ from saltus.system import System
 @verb
 def attractors(
     system: System,
-    start: Any,
+    start: Starts,
     *,
     method: Method | None = None,
     periods: int = 2000,

@@ -15,6 +15,7 @@ from saltus.analysis.closed.orbit_table import table_of
 from saltus.analysis.closed.periodic_orbits import exact_method, orbits_dataset
 from saltus.analysis.closed.spread import spread
 from saltus.analysis.dataset_parts import provenance
+from saltus.analysis.inputs.given import Starts
 from saltus.analysis.inputs.starts import check_system, ensemble
 from saltus.analysis.inputs.verb import verb
 from saltus.errors import ParameterError
@@ -30,8 +31,8 @@ from saltus.units import from_si
 @verb
 def edge_orbit(
     system: System,
-    a: Any,
-    b: Any,
+    a: Starts,
+    b: Starts,
     *,
     method: Method | None = None,
     periods: int = 2000,

@@ -20,6 +20,7 @@ from saltus.analysis.branches.free_vibration import (
 )
 from saltus.analysis.branches.special_points import zeros
 from saltus.analysis.dataset_parts import provenance, subject
+from saltus.analysis.inputs.given import Range, Value
 from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.inputs.starts import at_values, check_system
 from saltus.analysis.inputs.verb import verb
@@ -54,13 +55,13 @@ BEHIND = 0.02
 @verb
 def backbone(
     system: System,
-    amplitude: Any,
+    amplitude: Range,
     *,
     state: str | None = None,
     mode: int = 1,
     phase: str = "free",
     force: str = "force",
-    values: Mapping[str, Any] | None = None,
+    values: Mapping[str, Value] | None = None,
     points: int = 400,
     method: Method | None = None,
     threads: int | None = None,
@@ -180,15 +181,21 @@ def _free_start(
     """The undamped system, the equations of its vibrations, and a small one float64[1, z]."""
     low, high = limits
     free, name = free_system(system)
-    rest = place_of_rest(free)
-    period, shape, column = linear_mode(free, rest, mode)
-    slopes = _slopes(free, state, rest)
+    equilibrium = place_of_rest(free)
+    period, shape, column = linear_mode(free, equilibrium, mode)
+    slopes = _slopes(free, state, equilibrium)
     sizes, size = _relative(shape, slopes, state, mode), np.abs(slopes @ shape)
     scale = np.array([[*high * sizes, period, 1 / period]])
-    orbits = FreeOrbits(free, name, scale, method, rest, column, threads)
-    begin, largest = rest + BEFORE * low * shape.real / size, np.argmax(np.abs(slopes * shape))
+    orbits = FreeOrbits(free, name, scale, method, equilibrium, column, threads)
+    begin, largest = (
+        equilibrium + BEFORE * low * shape.real / size,
+        np.argmax(np.abs(slopes * shape)),
+    )
     _, swing = orbits.first_return(begin, LONGEST * period)
-    begin = rest + (begin - rest) * BEFORE * low * np.abs(shape[largest]) / size / swing[largest]
+    begin = (
+        equilibrium
+        + (begin - equilibrium) * BEFORE * low * np.abs(shape[largest]) / size / swing[largest]
+    )
     z = np.array([[*begin, orbits.first_return(begin, LONGEST * period)[0], 0.0]])
     if not np.isfinite(z).all():
         raise ParameterError(
@@ -212,14 +219,14 @@ def _forced_start(
 ) -> tuple[System, QuadratureOrbits, np.ndarray]:
     """The system, the equations of its vibrations in quadrature, and a small one float64[1, z]."""
     low, high = limits
-    rest, shape, z = small_vibration(system, force, mode, measured, BEFORE * low, method)
+    equilibrium, shape, z = small_vibration(system, force, mode, measured, BEFORE * low, method)
     own = z[-2:]
     slopes = np.eye(len(shape))[measured]
     sizes = high * _relative(shape, slopes, system.states[measured], mode)
     scale = np.array([[*sizes, own[0], own[1] * high / (BEFORE * low)]])
     drive = np.abs(force.harmonics(system, own[0])[force.row])
     unit = sizes[force.displacement] * drive * system.period({str(system.forced_at): own[0]})
-    orbits = QuadratureOrbits(system, force, scale, unit, rest, method, threads)
+    orbits = QuadratureOrbits(system, force, scale, unit, equilibrium, method, threads)
     return system, orbits, z[None]
 
 
@@ -347,23 +354,21 @@ def _table(
     period, outputs = orbits.period(z), outputs_of(moving, None)
     numbers = numbers_of(moving, [(orbits, one) for one in z], outputs, method)
     rows = np.zeros(len(z), np.int64)
-    own = stacked([orbits.multipliers(z, orbits.evaluate(z, rows)[1], rows)], orbits.size)
+    multipliers = stacked([orbits.multipliers(z, orbits.evaluate(z, rows)[1], rows)], orbits.size)
     by_name = numbers.by_name()
     data: dict[str, Any] = {
         "point": np.arange(len(z)),
         "backbone_frequency": 1 / period,
         "point_period": period,
-        "point_stable": np.nanmax(np.abs(own), axis=1) < STABLE,
+        "point_stable": np.nanmax(np.abs(multipliers), axis=1) < STABLE,
         "point_itinerary": list(numbers.itinerary),
-        "point_multiplier_real": own.real,
-        "point_multiplier_imag": own.imag,
+        "point_multiplier_real": multipliers.real,
+        "point_multiplier_imag": multipliers.imag,
         "point_<state>": orbits.points(z)[:, 0],
         "output": list(outputs.names),
         "output_units": list(outputs.units),
-        **{
-            f"point_output_{key}": by_name[key] for key in ("maximum", "minimum", "peak", "rms")
-        },
-    }  # fmt: skip
+        **{f"point_output_{key}": by_name[key] for key in ("maximum", "minimum", "peak", "rms")},
+    }
     if isinstance(orbits, FreeOrbits):
         data["fictitious_damping"] = _conserved(system, z[:, -1], period)
         about, when = (

@@ -18,6 +18,7 @@ from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.singular_orbits import MULTIPLIER, SingularOrbits
 from saltus.analysis.closed.cycles import units
 from saltus.analysis.dataset_parts import provenance, subject
+from saltus.analysis.inputs.given import Range
 from saltus.analysis.inputs.outputs import states_alone
 from saltus.analysis.inputs.starts import check_system, range_of
 from saltus.analysis.inputs.verb import verb
@@ -38,7 +39,7 @@ from saltus.system.leg import MOST_STATES, has_legs
 def bifurcation_curve(
     system: System,
     event: xr.Dataset,
-    vary: Mapping[str, Any],
+    vary: Mapping[str, Range],
     *,
     points: int = 400,
     method: Method | None = None,
@@ -208,8 +209,8 @@ def _start(system: System, event: Any) -> _Start:
     known = json.loads(event.attrs["parameters"])
     values = {**known, name: float(event[event_name(name)])}
     orbit = np.stack([event[event_name(state)].values for state in system.states], axis=1)
-    own = event["event_multiplier_real"].values + 1j * event["event_multiplier_imag"].values
-    pairs = own[np.abs(own.imag) > 0]
+    multipliers = event["event_multiplier_real"].values + 1j * event["event_multiplier_imag"].values
+    pairs = multipliers[np.abs(multipliers.imag) > 0]
     multiplier = pairs[np.argmin(np.abs(np.abs(pairs) - 1.0))] if len(pairs) else 1.0 + 0j
     period = float(event["point_period"].values[int(event["event_point"])])
     mine = event["point_branch"].values == int(event["event_branch"])
@@ -283,7 +284,9 @@ def _table(
     states = padded([orbits.points(z) for z in every], size)
     grazes = curve.equations if isinstance(curve.equations, GrazingOrbits) else None
     values = orbits.values(every)
-    own = stacked([curve.multipliers, *(point.multipliers[None] for point in special)], size)
+    multipliers = stacked(
+        [curve.multipliers, *(point.multipliers[None] for point in special)], size
+    )
     data: dict[str, Any] = {
         "point": np.arange(count),
         "point_<parameter>": {name: values[:count, i] for i, name in enumerate(names)},
@@ -296,23 +299,26 @@ def _table(
         "point_sqrt_coefficient": (
             grazes.coefficients(curve.z) if grazes else np.full(count, np.nan)
         ),
-        "point_multiplier_real": own[:count].real,
-        "point_multiplier_imag": own[:count].imag,
+        "point_multiplier_real": multipliers[:count].real,
+        "point_multiplier_imag": multipliers[:count].imag,
         "point_<state>": states[:count],
         "codim2": np.arange(len(special)),
         "codim2_kind": [point.kind for point in special],
         "codim2_point": np.array([point.after for point in special], np.int64),
         "codim2_extremum": ["" if p.extremum < 0 else names[p.extremum] for p in special],
         "codim2_<parameter>": {name: values[count:, i] for i, name in enumerate(names)},
-        "codim2_multiplier_real": own[count:].real,
-        "codim2_multiplier_imag": own[count:].imag,
+        "codim2_multiplier_real": multipliers[count:].real,
+        "codim2_multiplier_imag": multipliers[count:].imag,
         "codim2_<state>": states[count:],
     }
     fixed = {key: value for key, value in system.values.items() if key not in names}
     attrs = provenance(system, method, fixed, names) | {
-        "bifurcation": start.kind, "periods": orbits.n, "begin": curve.ends[0],
-        "end": curve.ends[1], "guard": system.guards[start.guard].name if grazes else "",
-    }  # fmt: skip
+        "bifurcation": start.kind,
+        "periods": orbits.n,
+        "begin": curve.ends[0],
+        "end": curve.ends[1],
+        "guard": system.guards[start.guard].name if grazes else "",
+    }
     for axis, name, (low, high) in zip("xy", names, limits, strict=True):
         attrs |= {f"parameter_{axis}": name, f"{axis}_low": low, f"{axis}_high": high}
     when = "at whole forcing periods" if system.forced_at else "in equal steps of time"

@@ -27,6 +27,7 @@ from saltus.analysis.branches.seeds import (
 from saltus.analysis.branches.switching import Seed
 from saltus.analysis.branches.tracing import trace
 from saltus.analysis.closed.field_zeros import autonomous
+from saltus.analysis.inputs.given import Range, Reading, Starts, Value
 from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.inputs.starts import at_values, check_system, range_of
 from saltus.analysis.inputs.verb import verb
@@ -42,16 +43,16 @@ from saltus.system import System
 @verb
 def branches(
     system: System,
-    vary: Mapping[str, Any],
-    start: Any = None,
+    vary: Mapping[str, Range],
+    start: xr.Dataset | Starts | None = None,
     *,
-    box: Mapping[str, Any] | None = None,
+    box: Mapping[str, Range] | None = None,
     at: int = 12,
     switch: Sequence[str] = SWITCHES,
     longest: int = LONGEST_DOUBLED,
     points: int = POINTS,
-    values: Mapping[str, Any] | None = None,
-    outputs: Mapping[str, Any] | None = None,
+    values: Mapping[str, Value] | None = None,
+    outputs: Mapping[str, Reading] | None = None,
     every: float | str | None = None,
     method: Method | None = None,
     periods: int = 2000,
@@ -184,20 +185,20 @@ def branches(
     done = list[Branch]()
     with reporting(progress) as show:
         try:
-            rests: list[Seed] = []
+            equilibria: list[Seed] = []
             if isinstance(start, xr.Dataset):
                 begins = seeds_of(system, name, start)
-                rests = [] if system.forced_at else resting_seeds(system, name, start)
+                equilibria = [] if system.forced_at else resting_seeds(system, name, start)
             else:
                 check_grid(system, whole(at, "at", 1), start)
                 places = np.linspace(*limits, int(at) + 2)[1:-1]
                 grid = grid_of(system, {name: places}, start, box, None, seed, None, every)
                 if autonomous(system):
-                    rests = resting_between(system, name, limits, grid.starts)
+                    equilibria = resting_between(system, name, limits, grid.starts)
                 begins = _found_in(grid, method, periods, threads)
             begins = scaled(system, name, _inside(begins, limits), method)
-            rests = _inside(rests, limits)
-            if not begins and not rests:
+            equilibria = _inside(equilibria, limits)
+            if not begins and not equilibria:
                 raise ParameterError(
                     lambda say: (
                         f"no periodic orbit of {system.name} is known between "
@@ -207,7 +208,7 @@ def branches(
                     )
                 )
             plan = plan_of(system, name, limits, method, threads, points, longest, chosen)
-            born = trace_rests(plan, system, name, rests, done) if rests else []
+            born = trace_rests(plan, system, name, equilibria, done) if equilibria else []
             born = born if "hopf" in chosen else []
             trace(plan, [*born, *begins], done, stage(show, 0.0, 0.9))
         except KeyboardInterrupt:

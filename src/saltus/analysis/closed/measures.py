@@ -107,10 +107,13 @@ class Measures:
         contacts: of those in a whole period int64[m], in one forcing period where it is 0.
         """
         return {
-            "period": period, "contacts": self.contacts * np.maximum(period, 1),
-            "itinerary": self.itinerary, "peak": self.peak[:, 0], "rms": self.rms[:, 0],
+            "period": period,
+            "contacts": self.contacts * np.maximum(period, 1),
+            "itinerary": self.itinerary,
+            "peak": self.peak[:, 0],
+            "rms": self.rms[:, 0],
             "margin": self.margin,
-        }  # fmt: skip
+        }
 
     def rows(self, which: slice) -> Measures:
         """Those of some of the motions."""

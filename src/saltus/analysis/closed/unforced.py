@@ -16,9 +16,10 @@ from saltus.flow.maps import Stroboscope
 from saltus.language.evaluate import evaluate
 from saltus.system.modes import mode_number, sides
 
-#: Parts of a motion that must each be larger than the one before, and how much the last must be
-#: larger than the first, to run away.
-EIGHTHS, GROWN = 8, 3.0
+#: Parts of a motion that must each be larger than the one before, to run away.
+EIGHTHS = 8
+#: Ratio of the last of them to the first, at least.
+GROWN = 3.0
 #: Returns farther than this, in units of the range, are no sign of a limit cycle.
 TORUS = 1e-2
 
@@ -50,10 +51,10 @@ def attracted(
         Range of each state on the limit cycle; of an equilibrium that which was given.
     """
     result, size = ClosedMotions.none(*state.shape), scale.copy()
-    rests = find_equilibria(map_, state, scale)
-    here = np.flatnonzero(captured(map_, rests, state, scale))
-    result.put(here, rests.rows(here))
-    size[here] = np.maximum(scale[here], np.abs(rests.points[here, 0]))
+    equilibria = find_equilibria(map_, state, scale)
+    here = np.flatnonzero(captured(map_, equilibria, state, scale))
+    result.put(here, equilibria.rows(here))
+    size[here] = np.maximum(scale[here], np.abs(equilibria.points[here, 0]))
     rows = np.flatnonzero(result.period == 0)
     if len(rows):
         cycles, beside, own = attracting_cycles(map_.rows(rows), state[rows], window, near)

@@ -15,7 +15,7 @@ import numpy as np
 
 from saltus.announce import silent
 from saltus.arguments import Kinds
-from saltus.errors import ParameterError, nearest, shown
+from saltus.errors import ParameterError, closest, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.engine import MOST_THREADS, RunInterrupted
 from saltus.interrupt import Interrupted, no_ctrl_c_is_lost
@@ -192,8 +192,8 @@ def _misspelt(
         and isinstance(system, System)
         and word not in system.values
         and word not in system.states
-        and nearest(word, [*known, *system.states]) == nearest(word, known)
-        and nearest(word, known).startswith("Did you mean")
+        and (meant := closest(word, known)) is not None
+        and closest(word, [*known, *system.states]) == meant
     )
 
 
@@ -246,10 +246,10 @@ def _length(known: Mapping[str, inspect.Parameter]) -> str:
     """The arguments of a verb for the length of its run."""
     ways = {
         "t_end": "t_end= [s]",
-        "periods": "periods= (forcing periods)" if "every" not in known else "periods= (forcing "
-            "periods, or samples every= seconds of "
-        "a system without forcing)",
-    }  # fmt: skip
+        "periods": "periods= (forcing periods)"
+        if "every" not in known
+        else "periods= (forcing periods, or samples every= seconds of a system without forcing)",
+    }
     return (
         f"The length of the run is "
         f"{' or '.join(text for name, text in ways.items() if name in known)}."

@@ -11,6 +11,7 @@ import xarray as xr
 
 from saltus.analysis.closed.turns import looks_every
 from saltus.analysis.dataset_parts import provenance, shared_values, subject
+from saltus.analysis.inputs.given import Starts, Values
 from saltus.analysis.inputs.starts import Ensemble, check_system, ensemble
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.lyapunov.algorithm import Algorithm
@@ -43,14 +44,14 @@ LEAST_PERIODS = 64
 @verb
 def lyapunov(
     system: System,
-    start: Any = None,
+    start: Starts | None = None,
     *,
     method: str = "variational",
     flow: Method | None = None,
     periods: int = 2000,
     transient: int = 500,
     every: float | str | None = None,
-    values: Mapping[str, Any] | None = None,
+    values: Mapping[str, Values] | None = None,
     unit: str = "1/s",
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,

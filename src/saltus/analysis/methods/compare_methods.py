@@ -150,12 +150,15 @@ def compare_methods(
     return methods_dataset(
         base=results[0],
         labels=[method.label for method in everything],
-        columns={"method_cpu_seconds": np.array(costs), "method_agreement": agreeing / settled,
+        columns={
+            "method_cpu_seconds": np.array(costs),
+            "method_agreement": agreeing / settled,
             "method_agreement_low": low,
-                 "method_agreement_high": high},
+            "method_agreement_high": high,
+        },
         fields=parts,
         attrs=provenance(system, everything[0], system.values) | {"analysis": name},
-    )  # fmt: skip
+    )
 
 
 def methods_dataset(

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.dataset_parts import motion_values
+from saltus.analysis.inputs.given import Starts, Values
 from saltus.analysis.inputs.starts import check_system
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion import contact_peaks, touchdowns
@@ -39,7 +40,7 @@ BINS = 20
 @verb
 def impact_statistics(
     system: System,
-    start: Any = None,
+    start: Starts | None = None,
     *,
     periods: int | None = None,
     t_end: float | str | None = None,
@@ -50,7 +51,7 @@ def impact_statistics(
     peaks: bool | None = None,
     bins: int | Sequence[float] = BINS,
     method: Method | None = None,
-    values: Mapping[str, Any] | None = None,
+    values: Mapping[str, Values] | None = None,
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
 ) -> xr.Dataset:
@@ -149,9 +150,10 @@ def impact_statistics(
     forces = _by_guard(system, force or {}, "force")
     sides = contact_sides(system, _by_guard(system, contact_side or {}, "contact_side"))
     stops = [
-        number for number, guard in enumerate(system.guards)
+        number
+        for number, guard in enumerate(system.guards)
         if guard.law and guard.law.mass is not None and number not in forces
-    ]  # fmt: skip
+    ]
     own = contact_peaks.forces_of(system, forces, sides)
     extended = with_integrals(
         system, {f"impulse_{guard}_": function for guard, function in forces.items()}
@@ -263,11 +265,13 @@ def _dataset(
             put("peak_force", i, g, _largest(np.abs(tops.force[rows])))
     names = np.array([guard.name for guard in system.guards], dtype=np.str_)
     columns = {
-        "contact_time": found.begin, "contact_guard": names[found.guard],
+        "contact_time": found.begin,
+        "contact_guard": names[found.guard],
         "contact_speed": found.speed,
-        "contact_exit_speed": found.exit_speed, "contact_duration": found.end - found.begin,
+        "contact_exit_speed": found.exit_speed,
+        "contact_duration": found.end - found.begin,
         "contact_trajectory": found.trajectory,
-    }  # fmt: skip
+    }
     if found.impacts.any():
         columns["contact_impacts"], columns["contact_impulse_of_impacts"] = (
             found.impacts,
@@ -364,11 +368,15 @@ def _sizes(found: Touchdowns, rows: np.ndarray) -> dict[str, float]:
     speed, duration = found.speed[rows], (found.end - found.begin)[rows]
     duration = duration[np.isfinite(duration)]
     result = {
-        "speed_mean": _mean(speed), "speed_mean_error": _error_of_row(speed),
-        "speed_rms": _mean(speed**2) ** 0.5, "speed_max": _largest(speed),
-        "duration_mean": _mean(duration), "duration_mean_error": _error_of_row(duration),
-        "duration_min": -_largest(-duration), "duration_max": _largest(duration),
-    }  # fmt: skip
+        "speed_mean": _mean(speed),
+        "speed_mean_error": _error_of_row(speed),
+        "speed_rms": _mean(speed**2) ** 0.5,
+        "speed_max": _largest(speed),
+        "duration_mean": _mean(duration),
+        "duration_mean_error": _error_of_row(duration),
+        "duration_min": -_largest(-duration),
+        "duration_max": _largest(duration),
+    }
     if found.impulse is not None:
         impulse = found.impulse[rows]
         impulse = impulse[np.isfinite(impulse)]

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.dataset_parts import motion_values
+from saltus.analysis.inputs.given import Starts, Values
 from saltus.analysis.inputs.starts import check_system
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion.window import Stretch, computed, dataset, stretch
@@ -39,7 +40,7 @@ SAME_TOUCH = 1e-9
 @verb
 def poincare(
     system: System,
-    start: Any,
+    start: Starts,
     surface: Quantity | str | tuple[str, float | str],
     *,
     direction: int = 0,
@@ -48,7 +49,7 @@ def poincare(
     t_start: float | str = 0.0,
     transient: int | float | str = 0,
     method: Method | None = None,
-    values: Mapping[str, Any] | None = None,
+    values: Mapping[str, Values] | None = None,
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
 ) -> xr.Dataset:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from saltus.analysis import dataset_parts
+from saltus.analysis.inputs.given import Starts, Values
 from saltus.analysis.inputs.starts import check_system, ensemble, span, trajectories
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion.window import computed
@@ -27,13 +27,13 @@ from saltus.system import System
 @verb
 def stroboscope(
     system: System,
-    start: Any = None,
+    start: Starts | None = None,
     periods: int = 1,
     keep: int | None = None,
     *,
     t_start: float | str = 0.0,
     method: Method | None = None,
-    values: Mapping[str, Any] | None = None,
+    values: Mapping[str, Values] | None = None,
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
 ) -> xr.Dataset:

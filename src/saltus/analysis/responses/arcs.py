@@ -173,9 +173,12 @@ def _follow_orbits(
         rank = np.arange(len(left)) - np.repeat(first, np.diff(np.append(first, len(left))))
         some, left = left[rank < most], left[rank >= most]
         seeds = seeds_at(
-            grid.system, orbits.points[some], orbits.period[some], orbits.time[some],
+            grid.system,
+            orbits.points[some],
+            orbits.period[some],
+            orbits.time[some],
             values[found.place[some]],
-        )  # fmt: skip
+        )
         beginnings = scaled(grid.system, name, list(seeds), method)
         try:
             trace(plan, beginnings, arcs.branches, None if plan.stable else progress)

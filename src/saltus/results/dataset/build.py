@@ -78,9 +78,11 @@ class Guards:
     def values(self, states: Mapping[str, str]) -> dict[str, Any]:
         """Their variables, given the units of the states."""
         return {
-            "guard": list(self.names), "guard_state": [state or "" for state in self.states],
-            "guard_units": self.units_among(states), "guard_boundary": self.boundaries,
-        }  # fmt: skip
+            "guard": list(self.names),
+            "guard_state": [state or "" for state in self.states],
+            "guard_units": self.units_among(states),
+            "guard_boundary": self.boundaries,
+        }
 
 
 @dataclass(frozen=True)
@@ -235,9 +237,13 @@ class _Building:
         )
         first = subject.units.get(subject.states[0], "") if subject.states else ""
         self.words = {
-            "<gap>": gap, "<gap rate>": schema.rate_unit(gap), "<root gap>": schema.root_unit(gap),
-            "<first>": first, "<output>": "", **words,
-        }  # fmt: skip
+            "<gap>": gap,
+            "<gap rate>": schema.rate_unit(gap),
+            "<root gap>": schema.root_unit(gap),
+            "<first>": first,
+            "<output>": "",
+            **words,
+        }
         self.data: dict[str, xr.Variable] = {}
         self.coords: dict[str, xr.Variable] = {}
 

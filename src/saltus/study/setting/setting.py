@@ -196,10 +196,14 @@ def _written(table: SystemTable, formulas: Formulas, header: Header | None) -> S
         title, source = (header.name, header.source) if header else ("system", "")
         guards = {name: formulas.formula(text) for name, text in table.guards.items()}
         return system(
-            states=list(rates), units=table.units, forced_at=table.forced_at, guards=guards,
-            check_units=table.check_units, name=title,
+            states=list(rates),
+            units=table.units,
+            forced_at=table.forced_at,
+            guards=guards,
+            check_units=table.check_units,
+            name=title,
             source=source,
-        )(equations)  # fmt: skip
+        )(equations)
     except StudyError:
         raise
     except SaltusError as error:
