@@ -77,7 +77,7 @@ def set_item(mapping, name):
         ("eig", r"sl\.structure_modes\("),
         ("base_excitation", r"base=sl\.Base"),
         ("chirp", r"sl\.sweep\("),
-        ("Sensor", "outputs="),
+        ("Sensor", r"with_outputs\("),
         ("limit_cycle", r"sl\.periodic_orbits\("),
         ("cell_mapping", r"sl\.basins\("),
         ("bouc_wen", "one more state"),
@@ -144,7 +144,7 @@ def test_what_is_advised_exists():
     [
         ({"events": abs}, r"comparisons in the equation.*sl\.poincare"),
         ({"terminal": True}, r"Write until=.x > 2 mm"),
-        ({"outputs": {"a": lambda x: x}}, r"sl\.frequency_response.*know outputs.*run\.x"),
+        ({"outputs": {"a": lambda x: x}}, r"system\.with_outputs"),
         ({"max_step": 0.1}, r"chooses its steps.*sl\.RK4\(step\)"),
         ({"jac": None}, "isn't needed"),
         ({"dense_output": True}, "at="),

@@ -16,7 +16,7 @@ from saltus.language.derivatives import differentiate, time_derivative
 from saltus.language.evaluate import evaluate
 from saltus.language.expression import state
 from saltus.models import MODELS, energy, has_energy
-from saltus.system.quantity import quantity
+from saltus.system.read_off import quantity
 
 #: What the sums of a balance may lose: some hundred roundings of the largest part.
 ROUNDING = 1e-13

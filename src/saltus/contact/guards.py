@@ -317,6 +317,8 @@ class _Finder:
     def _condition(self, condition: Condition) -> Condition | bool:
         """The condition in terms of bits, or its value where that is certain."""
         match condition:
+            case Bit():  # of a known guard: an expression of the system itself
+                return condition
             case Relation():
                 return self.outcome[condition]
             case Not(inner):
@@ -422,9 +424,9 @@ def _used_only(
         if number in used:
             used |= bits_in([guards[number].gap])
     new = {old: number for number, old in enumerate(sorted(used))}
-    field = tuple(_renumbered(root, new) for root in field)
+    field = tuple(renumbered(root, new) for root in field)
     used_guards = [
-        guards[old] if old < known else replace(guards[old], gap=_renumbered(guards[old].gap, new))
+        guards[old] if old < known else replace(guards[old], gap=renumbered(guards[old].gap, new))
         for old in new
     ]
     return field, tuple(_with_names(used_guards, known))
@@ -436,7 +438,7 @@ def bits_in(roots: Iterable[Expr]) -> set[int]:
     return {number for number in range(bits.bit_length()) if bits >> number & 1}
 
 
-def _renumbered(root: Expr, new: Mapping[int, int]) -> Expr:
+def renumbered(root: Expr, new: Mapping[int, int]) -> Expr:
     """The expression with its bits renumbered."""
 
     def condition(old: Condition) -> Condition:

@@ -18,7 +18,7 @@ from saltus.plot import axes as draw
 from saltus.plot import motion_colors
 from saltus.plot import response_points as points
 from saltus.plot.style import QUIET, Scale, display_scale
-from saltus.results.dataset.schema import event_name, point_name, states_of
+from saltus.results.dataset.schema import event_name, first_of, point_name, states_of
 
 #: Quantities that both responses and points of branches have.
 Size = Literal[
@@ -122,10 +122,11 @@ def check_quantity(quantity: Any, known: Sequence[str]) -> None:
 def height(ds: xr.Dataset, quantity: str, output: str | None, prefix: str = "") -> Height:
     """A quantity of each response, or with the prefix ``point_`` of each point of the branches."""
     first = states_of(ds)[0]
+    output = first_of(ds) if output is None else output
     if quantity in ("period", "frequency"):
         period = ds[f"{prefix}period"].values
         return Height(period, "s", "") if quantity == "period" else Height(1.0 / period, "Hz", "")
-    name = first if output is None else output
+    name = output
     if not prefix and name == first and f"response_{quantity}" in ds:
         own = ds[f"response_{quantity}"]
         return Height(own.values, own.attrs.get("units", ""), first)

@@ -25,6 +25,8 @@ def identity(system: System, method: Any, arguments: Mapping[str, Any]) -> dict[
         "saltus": version("saltus"),
         "code": code_hash(),
     }
+    if len(system.outputs):
+        fixed["outputs"] = to_json(system.to_dict()["outputs"])
     asked = {
         f"{name} of the question" if name in fixed else name: value
         for name, value in arguments.items()

@@ -24,7 +24,8 @@ from saltus.language.expression import (
     select,
 )
 from saltus.system.formula import Formula, Formulas
-from saltus.system.quantity import called, with_surface
+from saltus.system.quantity import with_surface
+from saltus.system.read_off import called
 from saltus.system.system import System
 from saltus.units import coherent_unit, is_unit, to_si
 
@@ -75,7 +76,7 @@ def end_condition(system: System, given: Any) -> EndCondition:
         Whose states and parameters it is about.
     given : str or callable
         A formula, or a function of (t, states, parameters), each by its name; see
-        :func:`saltus.system.quantity.quantity`. A comparison, or several joined by ``and``, ``or``
+        :func:`saltus.system.read_off.quantity`. A comparison, or several joined by ``and``, ``or``
         (in Python ``&``, ``|``), ends where it becomes true; a number where it crosses zero.
 
     Raises
@@ -155,7 +156,7 @@ def _from_text(system: System, text: str) -> tuple[System, Callable[..., Any]]:
         raise TraceError(f"until = {shown(text)}: ", error) from error
     values = {name: value for name, (value, _) in levels.items()}
     units = {name: unit for name, (_, unit) in levels.items()}
-    known = ("t", *system.states, *system.values)
+    known = ("t", *system.states, *system.outputs.names, *system.values)
     for name in formula.names:
         if name not in known and name not in levels:
             raise ParameterError(

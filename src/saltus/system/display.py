@@ -19,6 +19,8 @@ from saltus.units import from_si
 
 #: First words of the description of a structure.
 STRUCTURE = "Structure of"
+#: Longest formula of an output that is shown [characters].
+_LONG = 80
 
 
 # -- text ------------------------------------------------------------------------------------------
@@ -64,6 +66,8 @@ def system_text(system: EquationsOfMotion) -> str:
     ]
     if system.guards:
         blocks.append(_labelled("guards", _aligned(_guard_rows(system))))
+    if len(system.outputs):
+        blocks.append(_labelled("outputs", _aligned(_output_rows(system))))
     if system.values:
         blocks.append(_labelled("parameters", _aligned(_parameter_rows(system))))
     if system.source:
@@ -80,6 +84,16 @@ def _about(system: EquationsOfMotion) -> list[str]:
 def _boundaries(system: EquationsOfMotion) -> int:
     """Number of boundaries, hold guards not counted."""
     return sum(not is_hold(guard) for guard in system.guards)
+
+
+def _output_rows(system: EquationsOfMotion) -> list[tuple[str, str]]:
+    """Name, unit and formula of each output; a long formula isn't shown."""
+    mine, rows = system.outputs, []
+    formulas, guards = mine.behind(system.guards)
+    for name, unit, formula in zip(mine.names, mine.units, formulas, strict=True):
+        text = Writer(guards, limit=_LONG).text(formula)
+        rows.append((f"{name} [{unit}]" if unit else name, "..." if "..." in text else text))
+    return rows
 
 
 def _forcing(system: EquationsOfMotion) -> str:
@@ -200,6 +214,8 @@ def system_html(system: EquationsOfMotion) -> str:
     parts.append(f"$$\\begin{{aligned}} {html.escape(formulas)} \\end{{aligned}}$$")
     if system.guards:
         parts.append(_table(("guard", "boundary"), _guard_rows(system)))
+    if len(system.outputs):
+        parts.append(_table(("output", "formula"), _output_rows(system)))
     if system.values:
         parts.append(_table(("parameter", "value"), _parameter_rows(system)))
     return "<div>" + "".join(parts) + "</div>"

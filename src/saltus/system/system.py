@@ -18,6 +18,7 @@ from saltus.system.display import equation_lines, system_html, system_text
 from saltus.system.equations_of_motion import EquationsOfMotion
 from saltus.system.fixed import Units, Values, no_change
 from saltus.system.modes import field
+from saltus.system.outputs import with_more
 from saltus.system.periodic import check_periodic
 from saltus.units import from_si
 
@@ -48,6 +49,9 @@ class System(EquationsOfMotion):
     tangent_of : System or None
         The system whose variational equations this one carries (see tangent.py); None for any
         other.
+    outputs : NamedOutputs
+        Named functions of the motion, which results hold besides the states (see
+        :meth:`with_outputs`).
     made : int
         How many of the last states elements with a memory have brought (see contact/memory.py); a
         start that doesn't give them is zero.
@@ -107,6 +111,30 @@ class System(EquationsOfMotion):
         """
         origin: System = vars(self).get("_origin", self)
         return origin
+
+    def with_outputs(self, outputs: Mapping[str, Any]) -> System:
+        """The same equations with named outputs: sensors, forces, accelerations, whatever is read
+        off the motion. Every function then gives them besides the states. Nothing is compiled
+        again.
+
+        Parameters
+        ----------
+        outputs : mapping of str to callable, or to (callable, unit)
+            Functions of (t, states, parameters), arguments found by name: ``{"tip": lambda q1, q2:
+            0.3 * q1 - 0.1 * q2, "spring force": (lambda x, k: k * x, "N")}``. ``*q`` takes the
+            states ``q1``, ``q2``, ...: ``lambda *q: row @ q``. One may use those before it. They
+            come behind the outputs that the system has.
+
+        Raises
+        ------
+        ParameterError
+            If a name is taken or can't be one, or there are too many.
+        UnitError
+            If a unit isn't that of its formula.
+        TraceError
+            If a function can't be traced, or doesn't repeat with the forcing.
+        """
+        return replace(self, outputs=with_more(self, outputs))
 
     def resolve(self, name: str, value: Any) -> Any:
         """A value for a parameter, in SI and checked; the system itself stays as it is.
@@ -271,6 +299,8 @@ class System(EquationsOfMotion):
             return (
                 f"{shown(name)} is a state. Its motion is sl.simulate({self.name}, ...)[{name!r}]."
             )
+        if among(name, self.outputs.names):
+            return f"{shown(name)} is an output: sl.simulate({self.name}, ...)[{name!r}]."
         if among(name, _DONE_ELSEWHERE):
             return f"write {_DONE_ELSEWHERE[name].format(self.name)}."
         return (

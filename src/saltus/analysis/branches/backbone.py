@@ -24,13 +24,17 @@ from saltus.analysis.inputs.given import Range, Value
 from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.inputs.starts import at_values, check_system
 from saltus.analysis.inputs.verb import verb
-from saltus.errors import ParameterError, UnitError, among, must_be, shown, unknown
+from saltus.errors import ParameterError, UnitError, must_be, shown
 from saltus.flow.counts import whole
 from saltus.flow.methods import Method, exact_method
 from saltus.flow.progress import reporting
+from saltus.language.derivatives import gradient
+from saltus.language.evaluate import evaluate
 from saltus.results import build
 from saltus.results.dataset import schema
 from saltus.system import System
+from saltus.system.modes import sides
+from saltus.system.quantity import formula_of, unit_of
 from saltus.units import to_si
 
 Orbits = FreeOrbits | QuadratureOrbits
@@ -86,7 +90,8 @@ def backbone(
     amplitude : (low, high)
         Range of the largest magnitude of ``state``: numbers [SI], or texts with a unit.
     state : str, optional
-        Default the first state. A velocity reaches beyond an amplitude that rigid stops bound.
+        A state, or of free vibrations an output; default the first state. A velocity reaches beyond
+        an amplitude that rigid stops bound.
     mode : int
         Which mode of small vibrations to begin with, the slowest first, from 1.
     phase : {"free", "quadrature"}
@@ -109,9 +114,10 @@ def backbone(
     Returns
     -------
     Dataset
-        Dims ``point``, ``output`` (the states), ``multiplier``. ``backbone_frequency`` [Hz],
-        ``point_period`` [s], ``point_output_peak`` and so on of each state, ``point_<state>`` where
-        the vibration passes its rest (in quadrature: at whole forcing periods),
+        Dims ``point``, ``output`` (the states and outputs), ``multiplier``.
+        ``backbone_frequency`` [Hz], ``point_period`` [s], ``point_output_peak`` and so on of each
+        output, ``point_<state>`` where the vibration passes its rest (in quadrature: at whole
+        forcing periods),
         ``point_itinerary``, ``point_stable``, multipliers, and ``fictitious_damping`` [1/s], which
         is rounding; in quadrature ``point_<parameter>`` of the frequency and the force. The first
         and the last point have the amplitudes asked for; attribute ``end`` says ``points`` or
@@ -140,19 +146,21 @@ def backbone(
     check_system(system)
     method, system = exact_method(method, system, "sl.backbone"), at_values(system, values)
     state = system.states[0] if state is None else state
-    if not among(state, system.states):
-        raise unknown(f"{system.name} has no state", state, system.states)
-    low, high = _range(system, state, amplitude)
+    low, high = _range(unit_of(system, state), amplitude)
+    measured = outputs_of(system).names.index(state)
+    if phase == "quadrature" and state not in system.states:
+        raise ParameterError(
+            lambda say: f"{say.key('state')} is a state in quadrature, and {state!r} is an output."
+        )
     points, mode = whole(points, "points", 2), whole(mode, "mode", 1)
     if phase not in ("free", "quadrature"):
         raise ParameterError(
             lambda say: f'{say.key("phase")} is "free" or "quadrature", not {shown(phase)}.'
         )
-    measured = system.states.index(state)
     about = Forcing.of(system, force, state) if phase == "quadrature" else None
     with reporting(progress) as show:
         moving, orbits, z = (
-            _free_start(system, (low, high), mode, measured, method, threads)
+            _free_start(system, (low, high), mode, state, method, threads)
             if about is None
             else _forced_start(system, about, (low, high), mode, measured, method, threads)
         )
@@ -166,7 +174,7 @@ def _free_start(
     system: System,
     limits: tuple[float, float],
     mode: int,
-    measured: int,
+    state: str,
     method: Method,
     threads: int | None,
 ) -> tuple[System, FreeOrbits, np.ndarray]:
@@ -175,12 +183,19 @@ def _free_start(
     free, name = free_system(system)
     equilibrium = place_of_rest(free)
     period, shape, column = linear_mode(free, equilibrium, mode)
-    sizes = _relative(system, shape, measured, mode)
+    slopes = _slopes(free, state, equilibrium)
+    sizes, size = _relative(shape, slopes, state, mode), np.abs(slopes @ shape)
     scale = np.array([[*high * sizes, period, 1 / period]])
     orbits = FreeOrbits(free, name, scale, method, equilibrium, column, threads)
-    begin = equilibrium + BEFORE * low * shape.real / np.abs(shape[measured])
+    begin, largest = (
+        equilibrium + BEFORE * low * shape.real / size,
+        np.argmax(np.abs(slopes * shape)),
+    )
     _, swing = orbits.first_return(begin, LONGEST * period)
-    begin = equilibrium + (begin - equilibrium) * BEFORE * low / swing[measured]
+    begin = (
+        equilibrium
+        + (begin - equilibrium) * BEFORE * low * np.abs(shape[largest]) / size / swing[largest]
+    )
     z = np.array([[*begin, orbits.first_return(begin, LONGEST * period)[0], 0.0]])
     if not np.isfinite(z).all():
         raise ParameterError(
@@ -205,32 +220,45 @@ def _forced_start(
     """The system, the equations of its vibrations in quadrature, and a small one float64[1, z]."""
     low, high = limits
     equilibrium, shape, z = small_vibration(system, force, mode, measured, BEFORE * low, method)
-    frequency, amplitude = z[-2:]
-    sizes = high * _relative(system, shape, measured, mode)
-    scale = np.array([[*sizes, frequency, amplitude * high / (BEFORE * low)]])
-    drive = np.abs(force.harmonics(system, frequency)[force.row])
-    unit = sizes[force.displacement] * drive * system.period({str(system.forced_at): frequency})
+    own = z[-2:]
+    slopes = np.eye(len(shape))[measured]
+    sizes = high * _relative(shape, slopes, system.states[measured], mode)
+    scale = np.array([[*sizes, own[0], own[1] * high / (BEFORE * low)]])
+    drive = np.abs(force.harmonics(system, own[0])[force.row])
+    unit = sizes[force.displacement] * drive * system.period({str(system.forced_at): own[0]})
     orbits = QuadratureOrbits(system, force, scale, unit, equilibrium, method, threads)
     return system, orbits, z[None]
 
 
-def _relative(system: System, shape: np.ndarray, measured: int, mode: int) -> np.ndarray:
-    """Amplitudes of the states in units of that of one of them; of those at rest the largest."""
-    sizes = np.abs(shape)
-    if not sizes[measured] > NODE * sizes.max():
+def _slopes(system: System, name: str, rest: np.ndarray) -> np.ndarray:
+    """Derivatives of a state or an output with respect to the states, where the system rests,
+    float64[D].
+    """
+    formula, guards = formula_of(system, name)
+    about: dict[str, Any] = {
+        "states": dict(zip(system.states, rest, strict=True)), "values": system.values,
+    }  # fmt: skip
+    bits = sides(system, 0.0, rest)
+    for guard in guards[len(bits) :]:
+        bits.append(evaluate([guard.gap], **about, bits=bits)[0] > 0)
+    return np.array(evaluate(gradient(formula, system.states), **about, bits=bits), float)
+
+
+def _relative(shape: np.ndarray, slopes: np.ndarray, name: str, mode: int) -> np.ndarray:
+    """Amplitudes of the states in units of that of a state or an output with these slopes; of those
+    at rest the largest.
+    """
+    sizes, size = np.abs(shape), np.abs(slopes @ shape)
+    if not size > NODE * sizes.max() * np.linalg.norm(slopes):
         raise ParameterError(
-            lambda say: (
-                f"{system.states[measured]} is at rest in mode {mode}. Choose another "
-                f"{say.key('state')}."
-            )
+            lambda say: f"{name} is at rest in mode {mode}. Choose another {say.key('state')}."
         )
-    sizes = np.where(sizes > NODE * sizes.max(), sizes, sizes.max()) / sizes[measured]
+    sizes = np.where(sizes > NODE * sizes.max(), sizes, sizes.max()) / size
     return np.asarray(sizes)
 
 
-def _range(system: System, state: str, given: Any) -> tuple[float, float]:
+def _range(unit: str, given: Any) -> tuple[float, float]:
     """The amplitudes [SI]."""
-    unit = system.units.get(state, "")
     try:
         low, high = (to_si(end, unit, "amplitude") for end in given)
     except UnitError:

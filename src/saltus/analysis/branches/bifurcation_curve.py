@@ -19,7 +19,7 @@ from saltus.analysis.branches.singular_orbits import MULTIPLIER, SingularOrbits
 from saltus.analysis.closed.cycles import units
 from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.inputs.given import Range
-from saltus.analysis.inputs.outputs import outputs_of
+from saltus.analysis.inputs.outputs import states_alone
 from saltus.analysis.inputs.starts import check_system, range_of
 from saltus.analysis.inputs.verb import verb
 from saltus.errors import ParameterError, nearest, shown
@@ -236,7 +236,7 @@ def _orbits(
     values = [system.values[name] for name in names]
     z = np.array([*start.orbit.ravel(), *period, *values])
     bare = PeriodicOrbits(system, names, n, np.ones((2, len(z))), method, threads)
-    numbers = numbers_of(system, [(bare, z)], outputs_of(system, None), method)
+    numbers = numbers_of(system, [(bare, z)], states_alone(system), method)
     states = np.fmax(units(numbers.maximum[0], numbers.minimum[0]), start.spread)
     spans = [high - low for low, high in limits]
     scale = np.array([*np.tile(np.where(np.isfinite(states), states, 1.0), n), *period, *spans])
@@ -280,8 +280,7 @@ def _table(
         len(curve.z),
     )
     every = curve.equations.orbit(np.array([*curve.z, *(point.z for point in special)]))
-    outputs = outputs_of(system, None)
-    numbers = numbers_of(system, [(orbits, z) for z in every[:count]], outputs, method)
+    numbers = numbers_of(system, [(orbits, z) for z in every[:count]], states_alone(system), method)
     states = padded([orbits.points(z) for z in every], size)
     grazes = curve.equations if isinstance(curve.equations, GrazingOrbits) else None
     values = orbits.values(every)

@@ -67,6 +67,7 @@ def free_system(system: System) -> tuple[System, str]:
         forced_at=None,
         values={**system.values, name: 0.0},
         units={**system.units, name: "1/s"},
+        outputs=system.outputs.substituted(zeros),
     )
     if not autonomous(made):
         raise ParameterError(

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.analysis.inputs.outputs import Outputs, outputs_of
+from saltus.analysis.inputs.outputs import Outputs, states_alone
 from saltus.flow import polynomials
 from saltus.flow.maps import Stroboscope
 from saltus.flow.modal_motions import wave_motions
@@ -65,8 +65,9 @@ class Measures:
     itinerary : list of str
         Guards met, with + where the gap becomes positive, in the order of time; empty for a motion
         that never repeats.
-    turning : list of float64[n, D]
-        States where the first one turns, in the order of time.
+    turning : list of float64[n, K]
+        The outputs where the first state turns, or the first output where these stand first, in the
+        order of time.
     """
 
     maximum: np.ndarray
@@ -134,7 +135,7 @@ def unknown(m: int, size: int, outputs: int | None = None) -> Measures:
     wide = size if outputs is None else outputs
     maximum, minimum, mean, deviation = np.full((4, m, wide), np.nan)
     margin, span, contacts = np.full((3, m), np.nan)
-    harmonic, turning = np.full((m, wide), np.nan + 0j), [np.zeros((0, size)) for _ in range(m)]
+    harmonic, turning = np.full((m, wide), np.nan + 0j), [np.zeros((0, wide)) for _ in range(m)]
     return Measures(
         maximum, minimum, mean, deviation, harmonic, margin, span, contacts, [""] * m, turning
     )
@@ -162,7 +163,7 @@ def measure(
     outputs : Outputs, optional
         What is asked about; default the states.
     """
-    wanted = outputs or outputs_of(map_.system)
+    wanted = outputs or states_alone(map_.system)
     result, parts = unknown(len(start), start.shape[1], len(wanted)), []
     for n in np.unique(periods):
         rows = np.flatnonzero(periods == n)
@@ -205,7 +206,8 @@ def _measured(
         ranges = [np.subtract(*_extremes(whole, first, turns[gap], gap)) for gap in gaps]
         result.margin[known] = np.min(margins, axis=0, initial=np.inf) if margins else np.inf
         result.span[known] = np.max(ranges, axis=0) if ranges else 0.0
-        for motion, points in zip(known, turns[0].states(map_, whole, first, size), strict=True):
+        shown = turns[size if map_.system.outputs.first and wide > size else 0]
+        for motion, points in zip(known, shown.states(map_, whole, first, wide), strict=True):
             result.turning[motion] = points
     return result
 
@@ -311,7 +313,7 @@ class _Turns:
     def states(
         self, map_: Stroboscope, whole: Pieces, first: np.ndarray, size: int
     ) -> list[np.ndarray]:
-        """All states there, float64[n, D] for each motion, each turn once."""
+        """The first ``size`` quantities there, float64[n, size] for each motion, each turn once."""
         period, motion = map_.period[whole.motion[self.piece]], whole.motion[self.piece]
         time = (
             whole.period[self.piece] * period

@@ -10,7 +10,7 @@ from typing import TypeAlias
 import numpy as np
 import xarray as xr
 
-from saltus.system.quantity import Quantity
+from saltus.system.read_off import Quantity
 
 #: A number [SI] or a text with a unit.
 Value: TypeAlias = float | str

@@ -59,10 +59,7 @@ _MISSING: Mapping[str, str] = {
         ("until", "terminal", "stop", "stop_at"),
         'sl.simulate ends at a condition: sl.simulate(system, start, t_end=10, until="x > 2 mm").',
     ),
-    "outputs": (
-        "sl.frequency_response, sl.bifurcation_diagram and sl.branches know outputs; of a run "
-        "compute them from its states, such as 1e3*run.x."
-    ),
+    "outputs": "The system has them: system.with_outputs({'tip': lambda x: ...}).",
     **dict.fromkeys(("max_step", "first_step", "min_step", "hmax", "h0", "options"), _STEPS),
     **dict.fromkeys(("jac", "jacobian", "vectorized", "mass_matrix"), _NOT_NEEDED),
     "dense_output": "Write at=[...] for the states at given times, or samples= for more samples.",

@@ -22,7 +22,8 @@ from saltus.interrupt import check_stop
 from saltus.language.expression import Expr
 from saltus.system import System
 from saltus.system.contact_forces import force_unit, forces_in_equations
-from saltus.system.quantity import Quantity, quantity
+from saltus.system.quantity import formula_of
+from saltus.system.read_off import Quantity, quantity
 
 #: Contacts whose peaks are found unless more are asked for: some seconds.
 MOST_CONTACTS = 10_000
@@ -71,14 +72,19 @@ class Peaks:
 
 
 # -- forces ----------------------------------------------------------------------------------------
-def forces_of(system: System, given: Mapping[int, Quantity], sides: np.ndarray) -> ContactForces:
+def forces_of(
+    system: System, given: Mapping[int, Quantity | str], sides: np.ndarray
+) -> ContactForces:
     """The forces of contacts that the user gave, and those in the equations."""
     found = forces_in_equations(system, sides)
     if given and force_unit(system, found) != "N":
         found = {}  # forces that are given are in newtons
     formulas, extended = dict(found), system
     for number, function in given.items():
-        formulas[number], guards = quantity(extended, function, "the force")
+        if isinstance(function, str):  # the name of an output
+            formulas[number], guards = formula_of(extended, function)
+        else:
+            formulas[number], guards = quantity(extended, function, "the force")
         extended = replace(extended, guards=guards)
     return ContactForces(formulas, extended.guards, frozenset(found.keys() - given.keys()))
 

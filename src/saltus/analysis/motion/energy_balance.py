@@ -23,7 +23,8 @@ from saltus.language.evaluate import evaluate
 from saltus.language.expression import Expr
 from saltus.results.dataset import schema
 from saltus.system import System
-from saltus.system.quantity import Quantity, quantity, with_integrals, with_losses
+from saltus.system.quantity import with_integrals, with_losses
+from saltus.system.read_off import Quantity, quantity
 
 #: Default number of intervals of an unforced system's span.
 INTERVALS = 100

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from saltus.analysis.dataset_parts import motion_values
 from saltus.analysis.inputs.given import Starts, Values
 from saltus.analysis.inputs.starts import check_system
 from saltus.analysis.inputs.verb import verb
@@ -28,7 +29,7 @@ from saltus.language.expression import walk
 from saltus.results.dataset import schema
 from saltus.system import System
 from saltus.system.contact_forces import side_that_pushes
-from saltus.system.quantity import Quantity, with_impulses, with_integrals
+from saltus.system.quantity import with_impulses, with_integrals
 
 #: Blocks whose scatter gives a standard error: consecutive contacts are not independent, blocks
 #: nearly are.
@@ -46,7 +47,7 @@ def impact_statistics(
     t_end: float | str | None = None,
     t_start: float | str = 0.0,
     transient: int | float | str = 0,
-    force: Mapping[str, Quantity] | None = None,
+    force: Mapping[str, Any] | None = None,
     contact_side: Mapping[str, int] | None = None,
     peaks: bool | None = None,
     bins: int | Sequence[float] = BINS,
@@ -70,10 +71,11 @@ def impact_statistics(
         Time at the end [s], in place of periods.
     transient : int, or float or str
         Whole forcing periods before; of an unforced system a time [s].
-    force : mapping of str to callable, optional
+    force : mapping of str to callable or str, optional
         For guards by name: the force of that contact [N] as a function of (t, states, parameters),
-        arguments found by name; it needs to be right in contact only. Its integral from the
-        beginning of a contact to its end is the impulse. Forces that stand in the equations as
+        arguments found by name, or the name of an output, such as that of a sensor
+        ``sl.contact_force``; it needs to be right in contact only. Its integral from the beginning
+        of a contact to its end is the impulse. Forces that stand in the equations as
         terms that are zero out of contact, as those of :func:`saltus.freeplay` and
         :func:`saltus.hertz`, are found there. Rigid stops need none: theirs is that of their law.
         ``ODE45`` controls the error of the integral of a given force too, so its steps may differ
@@ -109,7 +111,8 @@ def impact_statistics(
         shorter than the one before it, ``contact_impacts`` is how many were met before the
         infinitely many that are left were summed up (the error is below 1e-8 of their own part),
         ``contact_impulse_of_impacts`` is that of all of them, and ``contact_impulse`` has that of
-        the force at rest too, which is also the impulse of the guard ``... at rest``. Impulses of a
+        the force at rest too, which is also the impulse of the guard ``... at rest``. Of a system
+        with outputs ``touchdown_<output>``, their values where each contact begins. Impulses of a
         stop are relative to the mass if ``sl.impact`` has no ``inertia``.
 
     Raises
@@ -277,6 +280,14 @@ def _dataset(
         )
     if found.impulse is not None:
         columns["contact_impulse"] = found.impulse
+    if len(system.outputs):
+        table, size = outcome.contacts.rows(found.first), len(system.states)
+        known = motion_values(
+            system, seen.group, table.time, table.state, table.mode_after, table.trajectory
+        )
+        columns["touchdown_<state>"] = dict(
+            zip(system.outputs.names, known[:, size:].T, strict=True)
+        )
     if tops is not None:
         if forces is not None and forces.formulas:
             columns["contact_peak_force"] = tops.force

@@ -235,7 +235,9 @@ def check_samples(
 ) -> None:
     """Raise a ParameterError if samples of so many trajectories don't fit into memory."""
     check_room(
-        samples * trajectories * (16.0 * (states or len(system.states)) + 16.0),
+        samples
+        * trajectories
+        * (16.0 * ((states or len(system.states)) + len(system.outputs)) + 16.0),
         f"{trajectories} trajectories with {samples} {what} each",
         lambda say: (
             f"Give {say.key('keep')} (last periods) or fewer {say.key('samples')}, or use "

@@ -252,13 +252,15 @@ def _dataset(asked: _Asked, outcome: Outcome, errors: np.ndarray) -> xr.Dataset:
         "trajectory": np.arange(group.size),
         **({"period": period} if forced and period is not None else {}),
         "time": time,
-        "<state>": samples,
+        "<state>": dataset_parts.motion_values(system, group, time, samples, modes),
         "mode": modes,
-        **dataset_parts.contacts(system, outcome, errors),
+        **dataset_parts.contacts(system, group, outcome, errors),
         **dataset_parts.endings(outcome),
         **dataset_parts.minima(outcome),
         "end_time": outcome.time,
-        "end_<state>": outcome.state[:, : len(system.states)],
+        "end_<state>": dataset_parts.motion_values(
+            system, group, outcome.time, outcome.state, outcome.mode
+        ),
     }
     return build(
         schema.TRAJECTORY,

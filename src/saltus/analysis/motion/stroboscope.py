@@ -109,7 +109,13 @@ def stroboscope(
         values = {
             "trajectory": np.arange(group.size),
             "period": periods_kept[reached],
-            "<state>": outcome.samples[:, reached, : len(system.states)],
+            "<state>": dataset_parts.motion_values(
+                system,
+                group,
+                length.t_start + periods_kept[reached] * length.period[:, None],
+                outcome.samples[:, reached],
+                outcome.sample_mode[:, reached],
+            ),
             **dataset_parts.endings(outcome),
             **dataset_parts.minima(outcome),
         }

@@ -95,7 +95,12 @@ def _dataset(
         "output_units": list(outputs.units),
         **{f"output_{name}": column for name, column in numbers.by_name().items()},
         **(
-            {"sample_<state>": padded(sampled(sample, numbers, grid, method, found, threads), size)}
+            {
+                "sample_<state>": padded(
+                    sampled(sample, numbers, grid, method, found, outputs, threads),
+                    size + len(system.outputs),
+                )
+            }
             if sample
             else {}
         ),

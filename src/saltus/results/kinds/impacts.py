@@ -38,6 +38,7 @@ VARIABLES = {
     "contact_impulse_of_impacts": Variable(
         _CONTACT, "<impulse>", "impulse of the impacts of the contact, without that at rest"
     ),
+    "touchdown_<state>": Variable(_CONTACT, "<state>", "<state> where the contact begins"),
     "contact_impulse": Variable(_CONTACT, "<impulse>", "impulse of the contact force"),
     "contact_peak_force": Variable(
         _CONTACT, "<force>", "force of the largest magnitude in the contact, with its sign"

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.errors import counted
-from saltus.results.dataset.schema import ResultKind, end_name, sample_dim, states_of
+from saltus.results.dataset.schema import ResultKind, end_name, outputs_in, sample_dim, told_of
 from saltus.results.dataset.variable import (
     COUNTERS,
     END_STATES,
@@ -142,7 +142,7 @@ def rows(
     ]
     columns += [
         quantity(f"{name} at the end", batch[end_name(name)].values, unit_of(batch[name]), 5)
-        for name in states_of(run)
+        for name in told_of(run)
         if end_name(name) in batch
     ]
     columns += [words("response", responses)] * bool(responses)
@@ -158,7 +158,7 @@ def sample_rows(run: xr.Dataset) -> TextTable:
     columns = {name: values for name, (_, values) in sample_columns(run).items()}
     shown = [words("", columns["trajectory"], "trajectory")] if "trajectory" in columns else []
     shown += [
-        quantity(name, columns[name], unit_of(run[name]), 6) for name in ("time", *states_of(run))
+        quantity(name, columns[name], unit_of(run[name]), 6) for name in ("time", *told_of(run))
     ]
     total = len(columns["time"])
     return table("states at the given times", shown, left_out(total, "times"))
@@ -170,9 +170,9 @@ Columns = dict[str, tuple[str, np.ndarray]]
 
 
 def sample_columns(ds: xr.Dataset) -> Columns:
-    """One row a sample: trajectory (of a batch), time, period, states, mode."""
+    """One row a sample: trajectory (of a batch), time, period, states, outputs, mode."""
     names = [
-        name for name in ("trajectory", "time", "period", *states_of(ds), "mode") if name in ds
+        name for name in ("trajectory", "time", "period", *outputs_in(ds), "mode") if name in ds
     ]
     dims = [dim for dim in ("trajectory", sample_dim(ds)) if dim in ds.dims]
     shape = xr.Variable(dims, np.empty([ds.sizes[dim] for dim in dims]))

@@ -117,9 +117,9 @@ class Motion(OneVerb):
         """
         from saltus import plot
         from saltus.plot.selection import MOST
-        from saltus.results.dataset.schema import states_of
+        from saltus.results.dataset.schema import told_of
 
-        draw = plot.phase if len(states_of(ds)) > 1 else plot.history
+        draw = plot.phase if len(told_of(ds)) > 1 else plot.history
         some = (
             {"trajectory": ds["trajectory"].values[:MOST].tolist()}
             if "trajectory" in ds.dims

@@ -43,8 +43,8 @@ _STARTS = (
     "At rest by default."
 )
 _FORMULAS_OF_GUARDS = (
-    "For guards by name: the force of that contact, right in contact only. Its "
-    "integral is the impulse."
+    "For guards by name: the force of that contact, right in contact only, or the name of an "
+    "output. Its integral is the impulse."
 )
 KINDS = {
     "start": WrittenAs(
@@ -113,7 +113,7 @@ KINDS = {
     "surface": WrittenAs(
         Surface,
         ({"x": "0.3 mm"}, "x turns", {"formula": "x - 0.1*v"}),
-        'A level of a state; its turning points, "x turns"; a guard of the system by '
+        'A level of a state or an output; its turning points, "x turns"; a guard of the system by '
         "name; or where a formula is zero.",
     ),
     "contact_side": WrittenAs(dict[str, Literal[-1, 1]], ({"upper_gap": 1},), default={}),
