@@ -25,8 +25,10 @@ from saltus.system.contact_forces import force_unit, forces_in_equations
 from saltus.system.quantity import formula_of
 from saltus.system.read_off import Quantity, quantity
 
-#: Contacts whose peaks are found unless more are asked for: some seconds.
+#: Contacts whose peaks are found unless more are asked for: some seconds. Of systems of more than
+#: eight states they are fewer, by the square of the states.
 MOST_CONTACTS = 10_000
+FEW_STATES = 8
 #: Parts of contacts whose series are made at a time: some tens of megabytes.
 WIDTH = 256
 #: Share of a part of a contact that may be missing at its end: rounding.
@@ -105,6 +107,11 @@ def with_found(
     own = np.isin(found.guard, list(forces.found))
     impulse = np.where(own, tops.impulse, known)
     return replace(found, impulse=impulse), {"<impulse>": of_impulse, "<force>": unit}
+
+
+def are_few(system: System, contacts: int) -> bool:
+    """True if the peaks of so many contacts are found within seconds."""
+    return contacts * max(1.0, (len(system.states) / FEW_STATES) ** 2) <= MOST_CONTACTS
 
 
 # -- peaks -----------------------------------------------------------------------------------------

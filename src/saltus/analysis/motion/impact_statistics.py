@@ -86,7 +86,8 @@ def impact_statistics(
         and a boundary at rest itself touches where the equations push.
     peaks : bool, optional
         Whether to find the peak force and the depth of every contact, from the series of the
-        motion in it: by default of 10 000 contacts at most.
+        motion in it: by default of 10 000 contacts at most, of systems with N > 8 states of
+        640 000/N^2 at most.
     bins : int or sequence of float
         Bins of the histogram of speeds: how many between zero and the largest one, or their edges
         [unit of the gap per second].
@@ -174,7 +175,7 @@ def impact_statistics(
     def answer(outcome: Outcome) -> xr.Dataset:
         found = touchdowns.find(seen, outcome, sides, columns)
         ask = partial(_dataset, system, method, seen, sides, found, bins, outcome)
-        if not (len(found.guard) <= contact_peaks.MOST_CONTACTS if peaks is None else peaks):
+        if not (contact_peaks.are_few(system, len(found.guard)) if peaks is None else peaks):
             return ask()
         try:
             tops = contact_peaks.peaks(seen, method, sides, own, outcome, found)
