@@ -92,9 +92,12 @@ from saltus.system import Base as Base
 from saltus.system import Contact as Contact
 from saltus.system import Force as Force
 from saltus.system import System as System
+from saltus.system import acceleration as acceleration
+from saltus.system import contact_force as contact_force
 from saltus.system import regularise as regularise
 from saltus.system import structure as structure
 from saltus.system import system as system
+from saltus.system import velocity as velocity
 
 __version__: str
 _HOMES: dict[str, str]

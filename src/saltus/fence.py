@@ -16,6 +16,8 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+from saltus.sentences import shown
+
 #: Largest study, and largest table that it names [bytes].
 STUDY_BYTES, TABLE_BYTES = 1_000_000, 10_000_000
 #: Most bytes of a file of JSON in a store.
@@ -27,8 +29,6 @@ PARTS, LEVELS = 100, 20
 KEY = 100
 #: Largest whole numbers allowed: of periods, whose times keep some digits; of objects in memory.
 MOST_PERIODS, MOST_COUNT = 10**12, 2**31 - 1
-#: Characters of a value that a message repeats.
-SHOWN = 80
 
 #: What a terminal or a file would obey, not show: control characters but tab and line ends, and
 #: those that turn the direction of text.
@@ -128,12 +128,6 @@ def printable(value: str) -> str:
     return _CONTROL.sub("", value)
 
 
-def shown(value: object, most: int = SHOWN) -> str:
-    """A value as a message repeats it: its beginning, if it is long."""
-    whole = str(value)
-    return whole if len(whole) <= most else f"{whole[:most]}… ({len(whole)} characters)"
-
-
 def csv_cell(value: Any) -> Any:
     """A cell that no spreadsheet takes for a formula: one that begins like a formula gets an
     apostrophe.
@@ -191,7 +185,7 @@ def _plain(data: dict[str, Any]) -> None:
             for name, inner in value.items():
                 if has_control(name) or len(name) > KEY:
                     raise RefusedError(
-                        f"holds the key {shown(ascii(name), 40)}: keys are words of "
+                        f"holds the key {shown(name, 40)}: keys are words of "
                         f"at most {KEY} characters."
                     )
                 waiting.append((name, inner, level + 1))

@@ -12,6 +12,8 @@ from typing import Any, Protocol, TypeAlias
 
 #: Digits up to which a whole number is written out. Python refuses to write those of 4300 or more.
 _DIGITS = 60
+#: Characters of a value that a message repeats.
+SHOWN = 80
 
 
 class Dialect(Protocol):
@@ -133,7 +135,7 @@ class _Repr(reprlib.Repr):
         )
 
 
-def shown(value: object, limit: int = 80) -> str:
+def shown(value: object, limit: int = SHOWN) -> str:
     """Value for a message: on one line, cut if it is long."""
     try:
         text = _Repr().repr(value)

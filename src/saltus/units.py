@@ -105,6 +105,14 @@ def coherent_unit(text: str, name: str) -> str:
     return _join(unit.parts)
 
 
+def is_unit(text: str) -> bool:
+    """True if a text can be read as a unit, one with several meanings included."""
+    try:
+        return _split(f"1 {text}", "")[1] is not None
+    except UnitError:
+        return False
+
+
 def dimension(unit: str) -> dict[str, Fraction]:
     """Exponents of m, kg, s, A and K in a declared unit; the angle counts as a plain number.
     ``"N/m"`` gives ``{"kg": 1, "s": -2}``.

@@ -135,7 +135,7 @@ def test_an_oscillator_meets_its_stop_where_matrix_exponentials_say(case):
     system = struck.with_values(**CASES[case])
     run = moved(system, (0.0, 0.0), periods=40)
     assert str(run.status.values) == "ok"
-    assert check_contacts(system, (0.0, 0.0), run, 16, 1e-12 * 2 * np.pi) > 5
+    assert check_contacts(system, (0.0, 0.0), run, 10, 1e-12 * 2 * np.pi) > 5
 
 
 def test_tables_that_are_dropped_and_made_anew_give_the_same_bits(monkeypatch):
@@ -239,4 +239,37 @@ def test_bodies_that_are_shaken_meet_a_stop_where_matrix_exponentials_say(drive,
     assert len(linear_pieces(system).courses) == 1
     run = moved(system, np.zeros(4), t_end=3.0, samples=3)
     assert str(run.status.values) == "ok"
-    assert check_contacts(system, np.zeros(4), run, 5, 1e-12, [course]) > 1
+    assert check_contacts(system, np.zeros(4), run, 3, 1e-12, [course]) > 1
+
+
+@pytest.mark.nojit
+def test_a_body_under_its_weight_that_is_shaken_needs_no_compiler():
+    """Small enough to run as plain Python: a block with a constant and a course in it."""
+
+    @sl.system(states="x v")
+    def body(t, x, v, *, weight=3.0, stiffness=900.0):
+        stop = sl.where(x > 0.02, stiffness * (x - 0.02), 0.0)
+        return v, weight + RECORDS["spline"](t) - stop
+
+    run = moved(body, np.zeros(2), t_end=0.6, samples=2)
+    assert check_contacts(body, np.zeros(2), run, 2, 1e-12, [DRIVES["a spline"][1]]) == 2
+
+
+def test_two_free_bodies_that_bounce_keep_their_energy():
+    """Joined by a spring, under their weight, over ten thousand contacts: rounding of each."""
+
+    @sl.system(states="x y v w")
+    def pair(t, x, y, v, w, *, stiffness=5e4, weight=9.81):
+        pull = 200.0 * (y - x)
+        return v, w, pull - weight - sl.where(x < 0, stiffness * x, 0.0), -pull - weight
+
+    def energy(x, y, v, w):
+        springs = 0.5 * 200 * (y - x) ** 2 + 0.5 * 5e4 * min(x, 0.0) ** 2
+        return 0.5 * (v * v + w * w) + 9.81 * (x + y) + springs
+
+    start = (0.5, 0.55, 0.0, 0.0)
+    run = moved(pair, start, t_end=1700.0, samples=1)
+    assert run.sizes["contact"] > 10_000
+    end = [float(run[f"end_{name}"]) for name in "xyvw"]
+    allowed = 4 * 2.2e-16 * run.sizes["contact"]
+    assert energy(*end) == pytest.approx(energy(*start), rel=allowed)

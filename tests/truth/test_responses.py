@@ -262,7 +262,8 @@ def test_a_graze_of_a_linear_motion_is_where_the_closed_form_says():
     multipliers = ds.event_multiplier_real.values[lost] + 1j * ds.event_multiplier_imag.values[lost]
     assert np.abs(multipliers).max() == pytest.approx(1.0, abs=1e-4)
     assert graze < ds.event_force.values[lost] < graze + 1e-3
-    assert ds.event_guard.values[mine].tolist()[:2] == ["upper_gap", "lower_gap"]
+    # the motion is symmetric: which of the two comes first is rounding
+    assert sorted(ds.event_guard.values[mine][:2]) == ["lower_gap", "upper_gap"]
     np.testing.assert_allclose(ds.event_force.values[mine][:2], graze, rtol=1e-10)
     assert graze < ds.event_force.values[mine][2] < graze + 1e-3
 

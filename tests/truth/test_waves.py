@@ -7,11 +7,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from saltus.flow.waves import Legs, deviations, harmonics, largest, least_turn, means, turns
+from saltus.flow.waves import WaveLegs, deviations, harmonics, largest, least_turn, means, turns
 
 
 def legs(rng, waves, count):
-    """Legs of random waves, a constant among them, and one quantity of each sign."""
+    """WaveLegs of random waves, a constant among them, and one quantity of each sign."""
     rates = np.append(-rng.uniform(0, 3, waves) + 1j * 10 ** rng.uniform(0, 2.5, waves), 0.0)
     rows = rng.normal(size=(3, waves + 1)) + 1j * rng.normal(size=(3, waves + 1))
     rows[:, -1] = rows[:, -1].real
@@ -19,7 +19,7 @@ def legs(rng, waves, count):
     amplitudes = sizes * (rng.normal(size=(count, waves + 1)) + 1j * rng.normal(size=(count, 1)))
     amplitudes[:, -1] = 1.0
     length = rng.uniform(0.2, 1.5, count)
-    return Legs(rates, rows, amplitudes, np.cumsum(length) - length, length)
+    return WaveLegs(rates, rows, amplitudes, np.cumsum(length) - length, length)
 
 
 def sampled(one, number=40_001):
@@ -65,7 +65,7 @@ def test_sums_of_random_waves(seed):
 def test_a_cosine():
     """A cos(w t + phi) + c over whole periods."""
     w, phi = 7.0, 0.4
-    one = Legs(
+    one = WaveLegs(
         np.array([1j * w, 0.0]), np.array([[3.0 + 0j, 0.5]]),
         np.array([[np.exp(1j * phi), 1.0]]), np.zeros(1), np.array([2 * np.pi / w]),
     )  # fmt: skip

@@ -103,11 +103,6 @@ def test_a_number_stays(cell):
     assert fence.csv_cell(cell) == cell
 
 
-def test_long_values_are_cut():
-    assert fence.shown("a" * 80) == "a" * 80
-    assert fence.shown("a" * 5000) == "a" * 80 + "… (5000 characters)"
-
-
 def test_a_terminal_obeys_nothing(capsys):
     from saltus.cli import screen
     from saltus.results.table import TextTable

@@ -5,14 +5,17 @@ provenance, contacts and their errors.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.inputs.starts import Ensemble
 from saltus.flow.contact_table import ContactTable
 from saltus.flow.methods import Method
 from saltus.flow.request import Outcome
+from saltus.flow.until import STATUS
 from saltus.kernels import status as st
 from saltus.language.evaluate import evaluate
 from saltus.results import Guards, Subject, attributes
@@ -56,24 +59,71 @@ def subject(
     varied: Mapping[str, Any] | None = None,
 ) -> Subject:
     """The subject of a Dataset of this system."""
-    return Subject(system.states, system.units, attrs, guards, gap_unit(system), varied or {})
+    return with_outputs(
+        Subject(system.states, system.units, attrs, guards, gap_unit(system), varied or {}), system
+    )
+
+
+def with_outputs(subject: Subject, system: System) -> Subject:
+    """The subject with the outputs of its system."""
+    mine = system.outputs
+    if not len(mine):
+        return subject
+    units = {**subject.units, **dict(zip(mine.names, mine.units, strict=True))}
+    return replace(subject, units=units, outputs=mine.names, outputs_first=mine.first)
 
 
 def trajectories(
     system: System, method: Method, group: Ensemble, forcing_period: float | np.ndarray | None
 ) -> Subject:
     """The subject of Datasets of some trajectories."""
-    return Subject(
+    about = Subject(
         states=system.states, units=system.units, guards=guards(system, group), varied=group.varied,
         batch=group.batch,
         forcing_period=forcing_period,
         attrs=provenance(system, method, shared_values(system, group), group.varied),
     )  # fmt: skip
+    return with_outputs(about, system)
+
+
+def motion_values(
+    system: System, group: Ensemble, time: Any, states: np.ndarray, mode: np.ndarray,
+    rows: np.ndarray | None = None,
+) -> np.ndarray:  # fmt: skip
+    """The states of a system and its outputs at places of its trajectories.
+
+    Parameters
+    ----------
+    system : System
+        The equations and values.
+    group : Ensemble
+        The trajectories.
+    time : float64[...]
+        When [s].
+    states : float64[n, ..., D]
+        The states there, of each trajectory; more of them at the end are left out.
+    mode : int64[n, ...]
+        Sides of the guards there.
+    rows : int64[n], optional
+        The trajectory of each place; default all of them in turn.
+
+    Returns
+    -------
+    float64[n, ..., K]
+    """
+    states = states[..., : len(system.states)]
+    if not len(system.outputs):
+        return states
+    own = group.parameters if rows is None else group.parameters[rows]
+    shape = (len(own), *(1,) * (states.ndim - 2))
+    # a level of a section stands behind the parameters of the system
+    values = dict(zip(system.values, (one.reshape(shape) for one in own.T), strict=False))
+    return outputs_of(system).values(time, states, values, mode)
 
 
 def endings(outcome: Outcome, counters: Iterable[str] = st.COUNTERS) -> dict[str, Any]:
     """The end of each trajectory, and the counters on its way."""
-    status = {"status": [st.STATUS[int(code)][0] for code in outcome.status]}
+    status = {"status": [STATUS[int(code)][0] for code in outcome.status]}
     return status | {name: outcome.counters[:, st.COUNTERS.index(name)] for name in counters}
 
 
@@ -107,7 +157,9 @@ def gap_unit(system: System) -> str:
     return units.pop() if len(units) == 1 else ""
 
 
-def contacts(system: System, outcome: Outcome, time_error: np.ndarray) -> dict[str, Any]:
+def contacts(
+    system: System, group: Ensemble, outcome: Outcome, time_error: np.ndarray
+) -> dict[str, Any]:
     """The table of contacts; with the states before them, if the run has been that of the system
     that remembers what jumps.
     """
@@ -122,10 +174,22 @@ def contacts(system: System, outcome: Outcome, time_error: np.ndarray) -> dict[s
             f"contact_{name}": table.kind_name if name == "kind" else getattr(table, name)
             for name in columns
         },
-        "contact_<state>": table.state[:, : len(system.states)],
+        "contact_<state>": motion_values(
+            system, group, table.time, table.state, table.mode_after, table.trajectory
+        ),
     }
-    if jumping_states(system):
-        values["contact_<state>_before"] = before_jumps(system, table)
+    jumps = bool(jumping_states(system))
+    if jumps or len(system.outputs):  # an output may jump where no state does
+        before = before_jumps(system, table) if jumps else table.state
+        every = motion_values(
+            system, group, table.time, before, table.mode_before, table.trajectory
+        )
+        known = (*system.states, *system.outputs.names)
+        values["contact_<state>_before"] = {
+            name: column
+            for name, column in zip(known, every.T, strict=True)
+            if jumps or name in system.outputs.names
+        }
     return values
 
 

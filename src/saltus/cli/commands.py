@@ -46,6 +46,7 @@ class PictureKind(StrEnum):
     section = "section"
     spectrum = "spectrum"
     impacts = "impacts"
+    contact_forces = "contact_forces"
     energy = "energy"
     exponents = "exponents"
     methods = "methods"

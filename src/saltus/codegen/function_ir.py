@@ -17,14 +17,17 @@ from typing import NamedTuple
 from saltus.codegen.blocks import Line, in_blocks
 from saltus.codegen.interface import ARRAY, REAL, WHOLE
 
-# Kinds of values: a lane, a mask of lanes, a double, a truth value, a whole number.
+# Kinds of values: a lane, a mask of lanes, a double, a truth value, a whole number; a table of
+# doubles, of whole numbers.
 LANE, MASK, NUMBER, TRUTH, INTEGER = "lane", "mask", "number", "truth", "integer"
+TABLES = {"numbers": NUMBER, "integers": INTEGER}
 
 #: Functions of a head that its others call: their arguments, None before the first call.
 Helpers = dict[str, tuple[str, ...] | None]
 
 _ARITHMETIC = {ast.Add: "fadd", ast.Sub: "fsub", ast.Mult: "fmul", ast.Div: "fdiv"}
 _BITWISE = {ast.RShift: "ashr", ast.LShift: "shl", ast.BitAnd: "and", ast.BitOr: "or"}
+_WHOLE_ARITHMETIC = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul"}
 _COMPARE = {
     ast.Gt: "ogt",
     ast.Lt: "olt",
@@ -190,6 +193,13 @@ class _Body:
 
     def _subscript(self, node: ast.Subscript) -> Value:
         assert isinstance(node.value, ast.Name)
+        table = self.names.get(node.value.id)
+        if table is not None and table.kind in TABLES:
+            kind, index = TABLES[table.kind], self.value(node.slice)
+            place = self.new(
+                ARRAY, f"getelementptr {self.types[kind]}, ptr {table.text}, i64 {index.text}"
+            )
+            return self.new(kind, f"load {self.types[kind]}, ptr {place.text}, align 8")
         return self.new(
             NUMBER, f"load double, ptr {self._place(node.value.id, node.slice, 1)}, align 8"
         )
@@ -213,9 +223,7 @@ class _Body:
         if a.kind == b.kind and a.kind in (MASK, TRUTH, INTEGER) and op in _BITWISE:
             return self.new(a.kind, f"{_BITWISE[op]} {self.types[a.kind]} {a.text}, {b.text}")
         if a.kind == b.kind == INTEGER:
-            return self.new(
-                INTEGER, f"{ {ast.Add: 'add', ast.Mult: 'mul'}[op] } i64 {a.text}, {b.text}"
-            )
+            return self.new(INTEGER, f"{_WHOLE_ARITHMETIC[op]} i64 {a.text}, {b.text}")
         kind, a, b = self._alike(a, b)
         return self.new(kind, f"{_ARITHMETIC[op]} {self.types[kind]} {a.text}, {b.text}")
 
@@ -301,11 +309,13 @@ class _Body:
                     f"{8 * self.lanes * _whole(row, self.names)}",
                 )
                 return self.new(ARRAY, f"getelementptr double, ptr {start.text}, i64 %lane").text
-            case _:
+            case _ if (whole := _whole_or_none(index, self.names)) is not None:
                 return self.new(
-                    ARRAY,
-                    f"getelementptr i8, ptr %{array}, i64 {8 * width * _whole(index, self.names)}",
+                    ARRAY, f"getelementptr i8, ptr %{array}, i64 {8 * width * whole}"
                 ).text
+        computed = self.value(index)
+        far = self.new(INTEGER, f"mul i64 {computed.text}, {8 * width}")
+        return self.new(ARRAY, f"getelementptr i8, ptr %{array}, i64 {far.text}").text
 
     # -- statements --------------------------------------------------------------------------------
     def run(self, statements: list[ast.stmt]) -> None:
@@ -336,6 +346,12 @@ class _Body:
                     self._helper(function, arguments)
                 case ast.If(test=test, body=body, orelse=[]):
                     self._if(test, body)
+                case ast.For(
+                    target=ast.Name(id=name),
+                    iter=ast.Call(func=ast.Name(id="range"), args=[begin, end]),
+                    body=body,
+                ):
+                    self._for(name, self.value(begin), self.value(end), body)
                 case ast.Return(value=value):
                     self._leave(value)
                 case _:
@@ -393,6 +409,45 @@ class _Body:
                         self.names[name] = self.new(
                             NUMBER, f"select i1 {condition.text}, double {a.text}, double {b.text}"
                         )
+
+    def _for(self, index: str, first: Value, last: Value, body: list[ast.stmt]) -> None:
+        """A loop over whole numbers; names that its body assigns, and that stood before, go round
+        with it.
+        """
+        label = self._label()
+        assigned = {
+            name.id
+            for statement in body
+            for name in ast.walk(statement)
+            if isinstance(name, ast.Name) and isinstance(name.ctx, ast.Store)
+        }
+        carried = sorted(name for name in assigned if name in self.names and name != index)
+        self.do(f"br label %from{label}")
+        self.do(f"from{label}:")
+        self.do(f"br label %loop{label}")
+        self.do(f"loop{label}:")
+        places = len(self.lines)  # of the phis, completed when the body is known
+        before = {index: first, **{name: self.names[name] for name in carried}}
+        for name, value in before.items():
+            self.names[name] = self.new(value.kind, "phi")
+        round_ = {name: self.names[name] for name in before}
+        going = self.new(TRUTH, f"icmp slt i64 {round_[index].text}, {last.text}")
+        self.do(f"br i1 {going.text}, label %body{label}, label %done{label}")
+        self.do(f"body{label}:")
+        self.run(body)
+        after = {name: self.names[name] for name in carried}
+        after[index] = self.new(INTEGER, f"add i64 {round_[index].text}, 1")
+        self.do(f"br label %back{label}")
+        self.do(f"back{label}:")
+        self.do(f"br label %loop{label}")
+        self.do(f"done{label}:")
+        for i, (name, value) in enumerate(before.items()):
+            line = self.lines[places + i]
+            self.lines[places + i] = line._replace(
+                text=f"{line.name} = phi {line.type} [ {value.text}, %from{label} ], "
+                f"[ {after[name].text}, %back{label} ]"
+            )
+        self.names |= round_
 
     def _leave(self, value: ast.expr | None) -> None:
         match value:
@@ -461,6 +516,14 @@ class _Body:
                     old.kind,
                     f"phi {type_} [ {old.text}, %here{label} ], [ {new.text}, %some{label} ]",
                 )
+
+
+def _whole_or_none(node: ast.expr, names: Mapping[str, Value]) -> int | None:
+    """A row that is known; None for one that is computed."""
+    try:
+        return _whole(node, names)
+    except UntranslatableError:
+        return None
 
 
 def _whole(node: ast.expr, names: Mapping[str, Value]) -> int:

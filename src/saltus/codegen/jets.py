@@ -41,14 +41,20 @@ def held(row: int) -> str:
 
 
 class Constants:
-    """Parameter-only values, computed once per trajectory: each gets a row of the table ``c``."""
+    """Parameter-only values, computed once per trajectory: each gets a row of the table ``c``, the
+    first of which are for other use.
+    """
 
-    def __init__(self) -> None:
+    def __init__(self, first: int = 0) -> None:
         self.rows: dict[Expr, int] = {}
+        self._first = first
+
+    def __len__(self) -> int:
+        return self._first + len(self.rows)
 
     def index(self, node: Expr) -> int:
         """Row of a parameter-only expression."""
-        return self.rows.setdefault(node, len(self.rows))
+        return self.rows.setdefault(node, len(self))
 
 
 def _number(coefficient: Expr) -> float:
@@ -230,6 +236,10 @@ class JetCode:
         return None if plain is None else (plain, coefficient)
 
     # -- coefficients of series --------------------------------------------------------------------
+    def named(self, name: str, k: int) -> str | None:
+        """Coefficient k of the state of a name."""
+        return self.state(self._index[name], k)
+
     def state(self, i: int, k: int) -> str | None:
         """Coefficient k of state i."""
         key = ("state", i, k)
@@ -272,7 +282,7 @@ class JetCode:
         return self._sum([(a, b) for a, b in products if a is not None and b is not None])
 
     def _state(self, series: Series, k: int) -> str | None:
-        return self.state(self._index[str(series.payload)], k)
+        return self.named(str(series.payload), k)
 
     def _time(self, _series: Series, k: int) -> str | None:
         if k == 0:
@@ -554,11 +564,15 @@ class JetCode:
             f"magnitude({self._as_lane(self.coefficient(form.offset), form.offset)})"
         )
         for series, coefficient in form.terms.items():
-            product = self._zero(self.value(series, 0))
+            product = self._terms_of(series)
             if not is_constant(coefficient, 1.0) and not is_constant(coefficient, -1.0):
                 product = self._assign(f"{self.coefficient(coefficient)} * {product}")
             total = self._assign(f"{total} + magnitude({product})")
         return total
+
+    def _terms_of(self, series: Series) -> str:
+        """The value of a series, as a scale of its rounding error."""
+        return self._zero(self.value(series, 0))
 
     def rounding(self, form: Linear) -> str:
         """Scale of the rounding error of a linear form with the errors of its arguments: the cosine
@@ -582,7 +596,7 @@ class JetCode:
         return str(self._memo[key])
 
     def _rounding_code(self, series: Series) -> str:
-        own = f"magnitude({self._zero(self.value(series, 0))})"
+        own = f"magnitude({self._terms_of(series)})"
         match series.kind:
             case "linear":
                 assert isinstance(series.payload, Linear)

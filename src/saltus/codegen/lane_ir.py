@@ -122,12 +122,14 @@ def equation_ir(
         name: Value(INTEGER, str(int(v))) for name, v in constants.items() if isinstance(v, int)
     }
     needed = set(declared)
-    trees = {
-        node.name: node
-        for node in templates.tree_of(functions).body
-        if isinstance(node, ast.FunctionDef)
-    }
-    texts = []
+    body = templates.tree_of(functions).body
+    trees = {node.name: node for node in body if isinstance(node, ast.FunctionDef)}
+    texts, made = [], set[str]()
+    for node in body:
+        if isinstance(node, ast.Assign):
+            name, kind, text = _table_ir(node)
+            known[name] = Value(kind, f"@saltus_{name}")
+            texts.append(text)
     for name, arguments in interface.functions.items():
         of_lanes, tree = name in OF_LANES, trees[name]
         width, attributes = (part, "nounwind alignstack(64)") if of_lanes else (lanes, "nounwind")
@@ -142,10 +144,26 @@ def equation_ir(
         helpers: Helpers = {other: None for other in trees if other not in interface.functions}
         texts.append(function_ir(tree, signature, width, known, needed, helpers))
         for helper, given in helpers.items():
-            if given is not None:
-                signature = Signature(given, "void", attributes, signature.row)
-                texts.append(function_ir(trees[helper], signature, width, known, needed, {}))
+            if given is not None and helper not in made:
+                made.add(helper)
+                tree = trees[helper]
+                loops = any(isinstance(node, ast.For) for node in tree.body)
+                own = f"noinline {attributes}" if loops else attributes
+                signature = Signature(given, "void", own, signature.row)
+                texts.append(function_ir(tree, signature, width, known, needed, {}))
     return "\n".join([shared, *texts, *sorted(needed)]) + "\n"
+
+
+def _table_ir(node: ast.Assign) -> tuple[str, str, str]:
+    """Name, kind and LLVM constant of a table that stands between the functions of a head."""
+    (target,) = node.targets
+    assert isinstance(target, ast.Name)
+    entries = ast.literal_eval(node.value)
+    whole = all(isinstance(one, int) for one in entries)
+    kind, type_ = ("integers", WHOLE) if whole else ("numbers", REAL)
+    listed = ", ".join(f"{type_} {one if whole else literal(one)}" for one in entries)
+    text = f"@saltus_{target.id} = internal constant [{len(entries)} x {type_}] [{listed}]"
+    return target.id, kind, text
 
 
 def constants_ir(constants: Mapping[str, Constant], interface: Interface) -> str:

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from saltus.codegen.clocks import Clocks
 from saltus.codegen.head import Constant, Head
 from saltus.codegen.jets import MOVING, Constants, JetCode
+from saltus.codegen.long_sums import LongSums, long_sums
+from saltus.codegen.loops import LoopCode, loops_of
 from saltus.codegen.saltation import (
     jump_function,
     levels_function,
@@ -19,6 +21,7 @@ from saltus.codegen.series import Linear, SeriesBuilder, is_constant
 from saltus.contact.guards import Guard, is_hold
 from saltus.contact.singular import set_aside
 from saltus.kernels.status import LAW_KINDS, NO_LAW
+from saltus.language import assuming
 from saltus.language import expression as ex
 from saltus.language.expression import Expr
 from saltus.system import System
@@ -118,22 +121,26 @@ class _Guards:
         self.snap_const: list[int] = []
 
 
-def _state_boundary(form: Linear) -> tuple[str, float, Expr] | None:
+def _state_boundary(form: Linear, system: System) -> tuple[str, float, Expr] | None:
     """(state, sign, boundary) if the gap is ``sign * (state - boundary)`` with a boundary of
     parameters only.
     """
     if len(form.terms) != 1 or ex.depends_on(form.offset, MOVING):
         return None
     ((series, coefficient),) = form.terms.items()
-    if series.kind != "state" or not (
-        is_constant(coefficient, 1.0) or is_constant(coefficient, -1.0)
+    if (
+        series.kind != "state"
+        or series.payload not in system.states
+        or not (is_constant(coefficient, 1.0) or is_constant(coefficient, -1.0))
     ):
         return None
     sign = coefficient.payload
     return str(series.payload), sign, ex.neg(form.offset) if sign > 0 else form.offset
 
 
-def _gap_form(builder: SeriesBuilder, number: int, guard: Guard, gap: Expr) -> Linear:
+def _gap_form(
+    builder: SeriesBuilder, system: System, number: int, guard: Guard, gap: Expr
+) -> Linear:
     """The series of a gap. While the contact is held its gap is zero: a difference of states and
     times would leave rounding in its place, whose series allows no step. The margin to release of a
     contact that isn't held is zero too, as it may have poles.
@@ -144,7 +151,7 @@ def _gap_form(builder: SeriesBuilder, number: int, guard: Guard, gap: Expr) -> L
     if is_hold(guard):
         poles = any(node.op == "div" and ex.varies(node.args[1]) for node in ex.walk(gap))
         return builder.form(ex.select(ex.Bit(number), gap, 0.0)) if poles else form
-    if _state_boundary(form) is not None:
+    if _state_boundary(form, system) is not None:
         return form
     return builder.form(ex.select(ex.Bit(guard.law.partner), 0.0, gap))
 
@@ -152,42 +159,49 @@ def _gap_form(builder: SeriesBuilder, number: int, guard: Guard, gap: Expr) -> L
 def taylor_head(system: System, order: int, lanes: int) -> Head:
     """The head that kernels/taylor_*.py expect above them."""
     clocks = Clocks(system)
-    builder, constants = SeriesBuilder(clocks), Constants()
     aside = set_aside(system.field, system.guards)
-    own, column = (system.tangent_of or system).states, first_column(system)
-    moved = count_moved(system)
-    written = (*range(len(own)), *column)
-    fields = tuple(builder.form(aside.field[i]) for i in written)
-    code = JetCode(
-        {system.states[i]: i for i in written}, fields, builder, constants, shared=len(own)
+    sums = long_sums(aside.field, aside.gaps, system.states) if not system.tangent_of else None
+    builder, constants = SeriesBuilder(clocks), Constants(sums.count if sums else 0)
+    column, moved = first_column(system), count_moved(system)
+    code = (
+        _series(system, aside.field, builder, constants, order)
+        if sums is None
+        else _looped_series(sums, builder, constants, order)
     )
-    for i, row in enumerate(written):
-        for k in range(order + 1):
-            code.write(row * (order + 1) + k, code.state(i, k), of_column=row in column)
+    aside_gaps = sums.gaps if sums else aside.gaps
     gaps = [
-        _gap_form(builder, number, guard, gap)
-        for number, (guard, gap) in enumerate(zip(system.guards, aside.gaps, strict=True))
+        _gap_form(builder, system, number, guard, gap)
+        for number, (guard, gap) in enumerate(zip(system.guards, aside_gaps, strict=True))
     ]
     sizes = [
         form if is_hold(guard) else builder.form(gap)
-        for form, guard, gap in zip(gaps, system.guards, aside.gaps, strict=True)
+        for form, guard, gap in zip(gaps, system.guards, aside_gaps, strict=True)
     ]
-    guards, rows = _write_guards(system, code, gaps, sizes, constants, order)
+    first_row = (sums.count if sums else len(system.states)) * (order + 1)
+    guards, rows = _write_guards(system, code, gaps, sizes, constants, order, first_row)
     gap_row, scale_row, calm_row = rows, rows + len(system.guards), rows + 2 * len(system.guards)
+    if isinstance(code, LoopCode) and sums and aside.guards:
+        code.values()
     for j in range(len(aside.guards)):
+        if isinstance(code, LoopCode) and sums:
+            parts = [assuming(part, aside.first + j, True) for part in sums.parts]
+            code.without(parts, calm_row + j * moved, moved)
+            continue
         for i, entry in enumerate(aside.without(j, moved)):
             code.write(calm_row + j * moved + i, code.linear(builder.form(entry), 0))
     handed_row = calm_row + moved * len(aside.guards)
     probed = builder.may_hide()
     rates = (
-        _rates(system, aside.field, builder, constants, code.harmonics)
-        if probed or aside.guards
-        else []
+        []
+        if not (probed or aside.guards)
+        else _rates(system, aside.field, builder, constants, code.harmonics)
+        if sums is None
+        else _looped_rates(sums, builder, constants, code.harmonics)
     )
     series = sorted(set(guards.row))
     constants_of_head: dict[str, Constant] = dict(
         LANES=lanes, NSTATES=len(system.states), NGUARDS=len(system.guards), ORDER=order,
-        NCONST=len(constants.rows),
+        NCONST=len(constants),
         NTURNS=len(code.harmonics), CLOCK_ROW=FIRST_TURN + len(code.harmonics), GAP_ROW=gap_row,
         SCALE_ROW=scale_row, CALM_ROW=calm_row,
         ROWS=handed_row + len(code.lines.handed), NMOVED=moved, NSINGULAR=len(aside.guards),
@@ -213,10 +227,54 @@ def taylor_head(system: System, order: int, lanes: int) -> Head:
         levels_function(system, clocks),
         settle_function(system, clocks),
         _turns_function(system, code),
+        *([loops_of(sums)] if sums else []),
         _jets_functions(code, len(column), handed_row, order + 1),
         f"@inner\ndef rates(y, side, c, clock, work):\n{indented(rates)}\n",
     ]
     return Head(constants_of_head, "\n".join(functions))
+
+
+def _series(
+    system: System,
+    field: Sequence[Expr],
+    builder: SeriesBuilder,
+    constants: Constants,
+    order: int,
+) -> JetCode:
+    """Code for the series of all states, one statement for each operation."""
+    own, column = (system.tangent_of or system).states, first_column(system)
+    written = (*range(len(own)), *column)
+    fields = tuple(builder.form(field[i]) for i in written)
+    code = JetCode(
+        {system.states[i]: i for i in written}, fields, builder, constants, shared=len(own)
+    )
+    for i, row in enumerate(written):
+        for k in range(order + 1):
+            code.write(row * (order + 1) + k, code.state(i, k), of_column=row in column)
+    return code
+
+
+def _looped_series(
+    sums: LongSums, builder: SeriesBuilder, constants: Constants, order: int
+) -> LoopCode:
+    """Code for the series of all states, with loops over long sums."""
+    code = LoopCode(sums, builder, constants, order + 1)
+    code.series()
+    code.sizes()
+    return code
+
+
+def _looped_rates(
+    sums: LongSums,
+    builder: SeriesBuilder,
+    constants: Constants,
+    harmonics: dict[tuple[Expr, Expr], int],
+) -> list[str]:
+    """As :func:`_rates`, with loops over long sums."""
+    code = LoopCode(sums, builder, constants)
+    code.harmonics = harmonics
+    code.right_hand_side()
+    return list(code.lines.shared())
 
 
 def count_moved(system: System) -> int:
@@ -295,16 +353,17 @@ def _write_guards(
     sizes: list[Linear],
     constants: Constants,
     order: int,
+    first_row: int,
 ) -> tuple[_Guards, int]:
     """Write every gap, and the size of its terms, to the work rows, held or not; guards of one
     state share that state's rows.
     """
-    guards, rows = _Guards(), len(system.states) * (order + 1)
+    guards = _Guards()
     boundaries = [
-        None if guard.law and guard.law.kind == "hold" else _state_boundary(form)
+        None if guard.law and guard.law.kind == "hold" else _state_boundary(form, system)
         for guard, form in zip(system.guards, forms, strict=True)
     ]
-    own_rows = rows
+    own_rows = first_row
     for form, boundary in zip(forms, boundaries, strict=True):
         if boundary:
             state, sign, place = boundary
@@ -323,7 +382,7 @@ def _write_guards(
         own_rows += order + 1
     for i, (form, size, boundary) in enumerate(zip(forms, sizes, boundaries, strict=True)):
         if boundary:
-            x, c = code.state(guards.snap_state[i], 0), f"load(c, {guards.snap_const[i]}, LANES)"
+            x, c = code.named(boundary[0], 0), f"load(c, {guards.snap_const[i]}, LANES)"
             value: str | None = f"{x} - {c}" if boundary[1] > 0 else f"{c} - {x}"
         else:
             value = code.linear(form, 0)

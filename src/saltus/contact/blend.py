@@ -56,9 +56,12 @@ def blended(
     states: Sequence[str],
     step: Step,
     parameters: Mapping[int, str],
-) -> tuple[tuple[Expr, ...], tuple[Guard, ...]]:
-    """Return field and guards of a regularised system; ``parameters`` holds the width of each
-    blended guard, by number. Raises TraceError if the blends can't be equations.
+    outputs: tuple[Sequence[Expr], Sequence[Guard]] = ((), ()),
+) -> tuple[tuple[Expr, ...], tuple[Guard, ...], list[Expr]]:
+    """Return field and guards of a regularised system, and the formulas of its outputs, which are
+    given with the guards that only they need, with comparisons of the boundaries that stay.
+    ``parameters`` holds the width of each blended guard, by number. Raises TraceError if the blends
+    can't be equations.
     """
     blend = _Blend(step, parameters)
     for guard in guards:
@@ -68,7 +71,11 @@ def blended(
             blend.keep_friction(number, guard.law)
     rates = [blend.rewrite(entry) for entry in field]
     new, found = find_contacts(rates, (), states)
-    return new, _with_old_names(guards, blend.sides, found)
+    named = _with_old_names(guards, blend.sides, found)
+    formulas, more = outputs
+    for guard in more:
+        blend.add(guard)
+    return new, named, [blend.rewrite(one) for one in formulas]
 
 
 def _with_old_names(

@@ -8,10 +8,10 @@ change.
 
 from __future__ import annotations
 
+import functools
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
 from operator import or_
 
 from saltus.errors import TraceError
@@ -221,11 +221,9 @@ def number_of(condition: Relation, guards: Sequence[Guard]) -> int | None:
         return None
     if found.guard < len(guards):
         return found.guard
-    meant = finder.polynomials[found.guard]
+    meant = finder.polynomial(found.guard)
     multiples = [
-        number
-        for number, known in enumerate(finder.polynomials[: len(guards)])
-        if is_multiple(known, meant)
+        number for number in range(len(guards)) if is_multiple(finder.polynomial(number), meant)
     ]
     return multiples[0] if len(multiples) == 1 else None
 
@@ -254,9 +252,10 @@ class _Finder:
     def __init__(self, known: Sequence[Guard] = ()) -> None:
         self.guards: list[Guard] = list(known)
         self._canonical = Canonical()
-        self.polynomials: list[Polynomial] = [
-            {} if is_hold(guard) else self._canonical.polynomial(guard.gap) for guard in known
-        ]
+        self._numbers: dict[Expr, int] = {}
+        for number, guard in enumerate(known):
+            if not is_hold(guard):
+                self._numbers.setdefault(guard.gap, number)
         self.outcome: dict[Relation, Condition | bool] = {}
         self._rewritten: dict[Expr, Expr] = {}
 
@@ -269,6 +268,11 @@ class _Finder:
             self.outcome[relation] = switch(gap)
             return
         gap = without_root(gap)
+        same, positive = _oriented(gap)
+        if same in self._numbers:  # a quick answer for what is written as the guard itself
+            bit = Bit(self._numbers[same])
+            self.outcome[relation] = bit if positive else Not(bit)
+            return
         polynomial = self._canonical.polynomial(gap)
         if polynomial.keys() <= {ONE}:
             if not polynomial:
@@ -278,16 +282,21 @@ class _Finder:
                 )
             self.outcome[relation] = polynomial[ONE] > 0
             return
-        for number, known in enumerate(self.polynomials):
-            sign = proportion(polynomial, known)
+        for number in range(len(self.guards)):
+            sign = proportion(polynomial, self.polynomial(number))
             if sign:
                 self.outcome[relation] = Bit(number) if sign > 0 else Not(Bit(number))
                 return
         _check_moves(gap, self._canonical.kinds(polynomial))
         guard, positive = _guard(gap, self._canonical)
         self.outcome[relation] = Bit(len(self.guards)) if positive else Not(Bit(len(self.guards)))
-        self.polynomials.append(self._canonical.polynomial(guard.gap))
+        self._numbers.setdefault(guard.gap, len(self.guards))
         self.guards.append(guard)
+
+    def polynomial(self, number: int) -> Polynomial:
+        """The normal form of a guard's gap; empty for a hold guard."""
+        guard = self.guards[number]
+        return {} if is_hold(guard) else self._canonical.polynomial(guard.gap)
 
     def rewrite(self, root: Expr) -> Expr:
         """The expression with bits in place of relations, all of which must be known."""
@@ -308,6 +317,8 @@ class _Finder:
     def _condition(self, condition: Condition) -> Condition | bool:
         """The condition in terms of bits, or its value where that is certain."""
         match condition:
+            case Bit():  # of a known guard: an expression of the system itself
+                return condition
             case Relation():
                 return self.outcome[condition]
             case Not(inner):
@@ -355,9 +366,7 @@ def _check_moves(gap: Expr, kinds: frozenset[str]) -> None:
 # -- the form of a guard ---------------------------------------------------------------------------
 def _guard(gap: Expr, canonical: Canonical) -> tuple[Guard, bool]:
     """The guard of a gap, and True if both have the same sign. Guards get their names later."""
-    gap, positive = _without_factor(gap)
-    if gap.op == "sub" and not ex.varies(gap.args[0]):
-        gap, positive = ex.sub(gap.args[1], gap.args[0]), not positive
+    gap, positive = _oriented(gap)
     name, factor = canonical.level_of(gap)
     if name is None:
         return Guard("", gap), positive
@@ -366,6 +375,16 @@ def _guard(gap: Expr, canonical: Canonical) -> tuple[Guard, bool]:
     if ex.varies(boundary):
         return Guard("", gap), positive
     return Guard("", ex.sub(state, boundary), name, boundary), positive == (factor > 0)
+
+
+def _oriented(gap: Expr) -> tuple[Expr, bool]:
+    """The gap without a numeric factor, what varies first in a difference; True if the sign is that
+    of the gap.
+    """
+    gap, positive = _without_factor(gap)
+    if gap.op == "sub" and not ex.varies(gap.args[0]):
+        gap, positive = ex.sub(gap.args[1], gap.args[0]), not positive
+    return gap, positive
 
 
 def _without_factor(gap: Expr) -> tuple[Expr, bool]:
@@ -405,9 +424,9 @@ def _used_only(
         if number in used:
             used |= bits_in([guards[number].gap])
     new = {old: number for number, old in enumerate(sorted(used))}
-    field = tuple(_renumbered(root, new) for root in field)
+    field = tuple(renumbered(root, new) for root in field)
     used_guards = [
-        guards[old] if old < known else replace(guards[old], gap=_renumbered(guards[old].gap, new))
+        guards[old] if old < known else replace(guards[old], gap=renumbered(guards[old].gap, new))
         for old in new
     ]
     return field, tuple(_with_names(used_guards, known))
@@ -415,11 +434,11 @@ def _used_only(
 
 def bits_in(roots: Iterable[Expr]) -> set[int]:
     """Numbers of the guards whose bits stand in conditions below the roots."""
-    bits = reduce(or_, (root.bits for root in roots), 0)
+    bits = functools.reduce(or_, (root.bits for root in roots), 0)
     return {number for number in range(bits.bit_length()) if bits >> number & 1}
 
 
-def _renumbered(root: Expr, new: Mapping[int, int]) -> Expr:
+def renumbered(root: Expr, new: Mapping[int, int]) -> Expr:
     """The expression with its bits renumbered."""
 
     def condition(old: Condition) -> Condition:
@@ -469,10 +488,11 @@ def _with_names(guards: Sequence[Guard], known: int) -> list[Guard]:
         single.append(names.pop() if len(names) == 1 else None)
     count = Counter(single)
     named = list(guards[:known])
+    writer = functools.cache(lambda: Writer(guards, limit=100))
     taken = {guard.name for guard in named}
     for number, (guard, name) in list(enumerate(zip(guards, single, strict=True)))[known:]:
         if name is None or count[name] > 1:
-            name = equation_of(number, guards)
+            name = at_equality(writer().side(number))
         while name in taken:
             name += "'"
         taken.add(name)

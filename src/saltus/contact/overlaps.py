@@ -38,7 +38,8 @@ def overlapping(
     values : mapping of str to float or array
         Values of all parameters [SI]; arrays of one length, one for each trajectory.
     """
-    for first, second, width in _opposed(field, guards):
+    gaps = tuple((guard.gap, is_hold(guard)) for guard in guards)
+    for first, second, width in _opposed(field, gaps):
         # the states cancel in the width
         (overlap,) = evaluate([width], states=dict.fromkeys(states, 0.0), values=values)
         if not np.any(overlap > 0):
@@ -64,32 +65,30 @@ def overlapping(
 
 @functools.lru_cache(maxsize=256)
 def _opposed(
-    field: tuple[Expr, ...], guards: tuple[Guard, ...]
+    field: tuple[Expr, ...], gaps: tuple[tuple[Expr, bool], ...]
 ) -> tuple[tuple[int, int, Expr], ...]:
     """Guards of a piece and of the next one, and their overlap: the sum of their gaps, where it
-    depends on parameters only.
+    depends on parameters only. Hold guards are told from the others.
     """
-    return tuple(_pairs(field, guards))
+    return tuple(_pairs(field, gaps))
 
 
-def _pairs(field: tuple[Expr, ...], guards: tuple[Guard, ...]) -> Iterator[tuple[int, int, Expr]]:
+def _pairs(
+    field: tuple[Expr, ...], gaps: tuple[tuple[Expr, bool], ...]
+) -> Iterator[tuple[int, int, Expr]]:
     canonical, seen = Canonical(), set()
-    for node in walk(*field, *(guard.gap for guard in guards)):
+    for node in walk(*field, *(gap for gap, _ in gaps)):
         behind = node.args[1] if node.op == "select" else node
         if node.op != "select" or behind.op != "select":
             continue
         first, second = _side(node.payload), _side(behind.payload)
         if first is None or second is None or (first, second) in seen:
             continue
-        if is_hold(guards[first[0]]) or is_hold(guards[second[0]]):
+        (one, holds), (other, also) = gaps[first[0]], gaps[second[0]]
+        if holds or also:
             continue
         seen.add((first, second))
-        width = add(
-            *(
-                guards[number].gap if positive else neg(guards[number].gap)
-                for number, positive in (first, second)
-            )
-        )
+        width = add(one if first[1] else neg(one), other if second[1] else neg(other))
         if canonical.kinds(canonical.polynomial(width)) == {"param"}:
             yield first[0], second[0], width
 

@@ -28,6 +28,8 @@ from saltus.language.known_sides import assuming
 _ZERO = ex.constant(0.0)
 #: Order of a logarithm: below every power.
 _LOG = -1e-9
+#: Operations whose value has a series wherever their operands have one.
+_REGULAR = ("add", "sub", "neg", "mul", "select")
 #: Most branches of a function of pieces; a sum of k pieces has 2**k of them.
 _MOST_BRANCHES = 256
 
@@ -72,16 +74,17 @@ def set_aside(field: Sequence[Expr], guards: Sequence[Guard]) -> SetAside:
     roots = (*field, *(guard.gap for guard in guards))
     if not _may_break(roots):
         return SetAside(tuple(field), roots[len(field) :], (), len(guards))
+    functions = _functions(roots)
     broken = {
         number: nodes
         for number in range(len(guards))
-        if (nodes := boundaries.singular_terms(roots, number))
+        if (nodes := boundaries.singular_terms(functions, number))
     }
     terms: dict[Expr, list[int]] = {}
     for j, nodes in enumerate(broken.values()):
         for node in nodes:
             terms.setdefault(node, []).append(len(guards) + j)
-    switched = tuple(_switched(root, terms) for root in roots)
+    switched = _switched(roots, terms)
     return SetAside(switched[: len(field)], switched[len(field) :], tuple(broken), len(guards))
 
 
@@ -91,8 +94,11 @@ def check_finite(field: Sequence[Expr], guards: Sequence[Guard], states: Sequenc
     """
     if not _may_break(field):
         return
-    boundaries = _Boundaries(guards)
+    boundaries, functions = _Boundaries(guards), _functions(field)
     for number, guard in enumerate(guards):
+        orders = boundaries.orders(functions, number)
+        if not any(orders[node].order < 0 for node in functions):
+            continue
         orders = boundaries.orders(field, number)
         for name, entry in zip(states, field, strict=True):
             if orders[entry].singular and orders[entry].order < 0 and number in bits_in([entry]):
@@ -186,16 +192,21 @@ def _is_whole(exponent: Expr) -> bool:
     return exponent.op == "const" and exponent.payload >= 0 and exponent.payload % 1 == 0
 
 
-def _switched(root: Expr, terms: dict[Expr, list[int]]) -> Expr:
-    """The expression with zero in place of its singular terms where their bits are set."""
+def _switched(roots: Sequence[Expr], terms: dict[Expr, list[int]]) -> tuple[Expr, ...]:
+    """The expressions with zero in place of their singular terms where their bits are set."""
     memo: dict[Expr, Expr] = {}
-    for node in ex.walk(root):
+    for node in ex.walk(*roots):
         new = ex.rebuild(node, tuple(memo[child] for child in node.args), node.payload)
         if node in terms:
             bits: list[Condition] = [Bit(number) for number in terms[node]]
             new = ex.select(reduce(Or, bits), 0.0, new)
         memo[node] = new
-    return memo[root]
+    return tuple(memo[root] for root in roots)
+
+
+def _functions(roots: Iterable[Expr]) -> list[Expr]:
+    """The nodes below the roots that could have no Taylor series: all but sums and products."""
+    return [node for node in ex.walk(*roots) if node.args and node.op not in _REGULAR]
 
 
 class _Boundaries:
@@ -203,19 +214,18 @@ class _Boundaries:
 
     def __init__(self, guards: Sequence[Guard]) -> None:
         self._canonical = Canonical()
-        self._gaps = [self._canonical.polynomial(guard.gap) for guard in guards]
         self._guards = tuple(guards)
         self._states: dict[Expr, int] = {}
         self._one_more = (1 << place for place in count())
         self._orders: list[dict[Expr, VanishingOrder]] = [{} for _ in guards]
         self._there: list[dict[Expr, Expr | None]] = [{} for _ in guards]
 
-    def singular_terms(self, field: Sequence[Expr], number: int) -> list[Expr]:
-        """The nodes with no Taylor series on a boundary: powers, roots, logarithms and quotients of
-        something that vanishes there.
+    def singular_terms(self, functions: Sequence[Expr], number: int) -> list[Expr]:
+        """Those of some functions that have no Taylor series on a boundary: powers, roots,
+        logarithms and quotients of something that vanishes there.
         """
-        orders = self.orders(field, number)
-        return [node for node in ex.walk(*field) if self._breaks(node, orders)]
+        orders = self.orders(functions, number)
+        return [node for node in functions if self._breaks(node, orders)]
 
     @staticmethod
     def _breaks(node: Expr, orders: dict[Expr, VanishingOrder]) -> bool:
@@ -283,6 +293,8 @@ class _Boundaries:
     def _states_in(self, root: Expr) -> int:
         """The states below a node, as bits of a number."""
         known = self._states
+        if root in known:
+            return known[root]
         for node in ex.walk(root, known=known):
             own = next(self._one_more) if node.op == "state" else 0
             known[node] = reduce(or_, (known[one] for one in ex.operands(node)), own)
@@ -311,7 +323,8 @@ class _Boundaries:
 
     def _is_gap(self, node: Expr, number: int) -> bool:
         """True if a node is the gap of a guard times a factor."""
-        return is_multiple(self._canonical.polynomial(node), self._gaps[number])
+        gap = self._canonical.polynomial(self._guards[number].gap)
+        return is_multiple(self._canonical.polynomial(node), gap)
 
     def lifted(self, node: Expr) -> Expr:
         """A function of a piece as a piece of functions, if that shows a zero on a boundary."""
@@ -321,7 +334,7 @@ class _Boundaries:
             return _one_by_one(node)
         if new is node:
             return node
-        for number in range(len(self._gaps)):
+        for number in range(len(self._guards)):
             orders = self.orders([new], number)
             if any(
                 below.op == node.op and orders[below.args[0]].order > 0
@@ -342,7 +355,7 @@ class _Boundaries:
         if next(branches) > _MOST_BRANCHES:
             raise _TooManyError
         operand = node.args[0]
-        if any(self._is_gap(operand, number) for number in range(len(self._gaps))):
+        if any(self._is_gap(operand, number) for number in range(len(self._guards))):
             return node
         outer = _outermost_bit(operand)
         if outer is None:

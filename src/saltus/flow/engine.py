@@ -10,7 +10,8 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, partial
+from itertools import pairwise
 
 import numpy as np
 
@@ -56,6 +57,7 @@ class _Chunk:
     arrays: dict[str, np.ndarray]
     keeps_contacts: bool
     due: float | None
+    until: Callable[[], bool] | None
     contacts: list[ContactTable] = field(default_factory=list)
 
 
@@ -94,9 +96,13 @@ def run(
     periods = float(np.max(request.end_count + request.end_phase / request.period, initial=0.0))
     data, due = tables_of(system.origin), method.due(periods)
     arrays["options"] = options_of(method, periods, len(request.start), request.checks)
+    most = float(arrays["options"][0, method.EVENT_BUDGET])
+    if request.until is not None:
+        arrays["options"][:, method.EVENT_BUDGET] = 0.5
     check_steps(system, method, request.period)
     chunks = [
-        _cut(request, arrays, first, data, due) for first in range(0, len(request.start), CHUNK)
+        _cut(request, arrays, rows, data, due, method.EVENT_BUDGET, most)
+        for rows in _rows_of_chunks(request)
     ]
     workers = threads or usable_processors()
     stop, room = Stop(), Contacts(len(system.states))
@@ -152,7 +158,7 @@ def allocate(
     request: Request, system: System, module: Flow
 ) -> tuple[Outcome, dict[str, np.ndarray]]:
     """Allocate the arrays that all chunks write to, and the outcome that shows them."""
-    n, m, states = len(request.start), len(request.schedule.count), len(system.states)
+    n, m, states = len(request.start), request.sample_count, len(system.states)
     sampled = n - request.checks
     finite = np.isfinite(request.start).all(axis=1) & np.isfinite(request.parameters).all(axis=1)
     start, beyond = on_allowed_sides(
@@ -192,21 +198,38 @@ def allocate(
 ARGUMENTS = Batch._fields
 
 
+def _rows_of_chunks(request: Request) -> list[slice]:
+    """The trajectories of each chunk; those whose samples have given times share one period."""
+    cuts = {*range(0, len(request.start), CHUNK), len(request.start)}
+    if request.times is not None:
+        cuts |= set((1 + np.flatnonzero(np.diff(request.period))).tolist())
+    return [slice(*ends) for ends in pairwise(sorted(cuts))]
+
+
 def _cut(
     request: Request,
     all_arrays: dict[str, np.ndarray],
-    first: int,
+    rows: slice,
     data: np.ndarray,
     due: float | None,
+    budget: int,
+    most: float,
 ) -> _Chunk:
     """The arrays of one chunk: views of the shared arrays, and tables of its own."""
-    rows = slice(first, min(first + CHUNK, len(request.start)))
+    schedule = request.schedule
+    if request.times is not None:
+        schedule = Schedule.at(request.times, float(request.period[rows.start]))
     parameters = request.parameters if len(request.parameters) == 1 else request.parameters[rows]
     arrays = {name: array[rows] for name, array in all_arrays.items()} | shared_arrays(
-        rows.stop - first, parameters, request.schedule, data
+        rows.stop - rows.start, parameters, schedule, data
     )
     arrays["rec_first"] += request.record_from or 0
-    return _Chunk(first, arrays, request.record_from is not None, due)
+    go_on = None
+    if request.until is not None:
+        until = request.until.of(rows)
+        until.begin(arrays)
+        go_on = partial(until.go_on, arrays, budget, most)
+    return _Chunk(rows.start, arrays, request.record_from is not None, due, go_on)
 
 
 def shared_arrays(
@@ -320,6 +343,8 @@ def _advance(
         outcome = module.propagate(*(arrays[name] for name in ARGUMENTS), steps, *workspace)
         _empty_table(chunk, room)
         went_on = chunk.due is not None and resume(arrays, chunk.due)
+        if chunk.until is not None:
+            went_on |= chunk.until()
         if show is not None:
             show(_share_done([chunk]))
         if outcome == st.FINISHED and not went_on:

@@ -5,7 +5,6 @@ stability multiply their errors, and the end looks like any other number.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -43,14 +42,13 @@ def mark_growth(outcome: Outcome, request: Request, exactly: Callable[[Request],
         return
     shared = len(request.parameters) == 1
     exact = exactly(
-        replace(
-            request,
+        request.unsampled(
             start=request.start[large],
             parameters=request.parameters if shared else request.parameters[large],
             **{
                 name: getattr(request, name)[large] for name in ("period", "end_count", "end_phase")
             },
-            schedule=type(request.schedule).none(),
+            until=request.until and request.until.of(large),
             record_from=None,
             checks=0,
         )

@@ -10,7 +10,7 @@ import math
 import sys
 from collections.abc import Mapping
 from dataclasses import fields
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
@@ -84,6 +84,9 @@ def explain_unknown_options(cls: type[_M]) -> type[_M]:
 
 class Method:
     """Interface of every method to the engine."""
+
+    #: Column of the numbers that holds the budget of events.
+    EVENT_BUDGET: ClassVar[int] = -1
 
     @property
     def name(self) -> str:

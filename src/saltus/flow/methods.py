@@ -11,6 +11,7 @@ from saltus.flow.matlab import ODE23, ODE45, ODE113, ODE15s
 from saltus.flow.method import Method
 from saltus.flow.modal import Modal
 from saltus.flow.taylor import Taylor
+from saltus.system import System
 
 __all__ = [
     "METHODS",
@@ -25,18 +26,21 @@ __all__ = [
     "check_method",
 ]
 
+#: States from which on the modal flow is the default where it serves a system: it is faster than
+#: Taylor's method from some three modes on.
+MANY_STATES = 8
 #: Every method, as people write it.
 METHODS: Mapping[str, type[Method]] = {
     one.__name__: one for one in (Taylor, Modal, RK4, ODE23, ODE45, ODE113, ODE15s)
 }
 
 
-def check_method(method: Any) -> Method:
-    """Return the method, or the default for None. Raises ParameterError for anything that isn't a
-    method.
+def check_method(method: Any, system: Any) -> Method:
+    """Return the method, or the default of a system for None. Raises ParameterError for anything
+    that isn't a method.
     """
     if method is None:
-        return Taylor()
+        return default_method(system) if isinstance(system, System) else Taylor()
     if not isinstance(method, Method):
         what = method.__name__ + " itself" if isinstance(method, type) else shown(method)
         raise ParameterError(
@@ -45,11 +49,17 @@ def check_method(method: Any) -> Method:
     return method
 
 
-def exact_method(method: Any, asked: str) -> Method:
+def default_method(system: System) -> Method:
+    """The modal flow for systems that it serves and that have many states, Taylor's for others."""
+    many = len(system.states) >= MANY_STATES
+    return Modal() if many and Modal().serving(system.origin) == Modal() else Taylor()
+
+
+def exact_method(method: Any, system: Any, asked: str) -> Method:
     """Return the method for ``asked``, a verb that closes orbits by Newton's method. Raises
     ParameterError for methods with errors beyond rounding.
     """
-    checked = check_method(method)
+    checked = check_method(method, system)
     if not checked.exact:
         raise ParameterError(
             lambda say: say.either(f"{asked} needs", "needs"),

@@ -52,8 +52,8 @@ class Subspace:
 
 
 @dataclass(frozen=True)
-class Loads:
-    """Loads on the modes, and the gaps in which their answers matter.
+class ModalLoads:
+    """ModalLoads on the modes, and the gaps in which their answers matter.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class Loads:
     scale: float
     fastest: float
 
-    def of(self, states: np.ndarray) -> Loads:
+    def of(self, states: np.ndarray) -> ModalLoads:
         """The same for some states."""
         return replace(self, loads=self.loads[states], gaps=self.gaps[:, states])
 
@@ -96,7 +96,9 @@ def loss_of(speeds: np.ndarray, sizes: np.ndarray, scale: float) -> np.ndarray:
     return np.array(np.where(sizes > ROUNDING * scale, losses, np.inf))
 
 
-def block_of(spaces: list[Subspace], acts: Loads, answers: np.ndarray) -> tuple[Block, np.ndarray]:
+def block_of(
+    spaces: list[Subspace], acts: ModalLoads, answers: np.ndarray
+) -> tuple[Block, np.ndarray]:
     """The block of some subspaces and the drives near them; answers with those to the others."""
     first = np.cumsum([0, *(len(space.matrix) for space in spaces)])
     norm = max(np.abs(space.matrix).sum(axis=1).max() for space in spaces)
@@ -133,8 +135,8 @@ def block_of(spaces: list[Subspace], acts: Loads, answers: np.ndarray) -> tuple[
     return Block(matrix, right, left, tuple(drives), _limit(matrix)), answers
 
 
-def _generator(drive: int, speed: float, acts: Loads) -> np.ndarray:
-    """How a drive goes on: the constant; cosine and sine; a value and its derivatives."""
+def _generator(drive: int, speed: float, acts: ModalLoads) -> np.ndarray:
+    """Rates of a drive by itself: the constant; cosine and sine; a value and its derivatives."""
     if drive == 0:
         return np.zeros((1, 1))
     if drive < len(acts.rates):
@@ -147,7 +149,7 @@ def _speed(speeds: np.ndarray) -> float:
     return float(max(speeds[1], speeds[2] ** (1 / 2), speeds[3] ** (1 / 3)))
 
 
-def _is_near(drive: int, values: np.ndarray, acts: Loads) -> bool:
+def _is_near(drive: int, values: np.ndarray, acts: ModalLoads) -> bool:
     """True if a drive resonates with one of the modes of a subspace."""
     sizes, harmonic = np.abs(values), len(acts.rates)
     scale = max(acts.scale, acts.fastest)
@@ -160,7 +162,7 @@ def _is_near(drive: int, values: np.ndarray, acts: Loads) -> bool:
 
 
 def _answer(
-    drive: int, space: Subspace, load: np.ndarray, acts: Loads, answers: np.ndarray
+    drive: int, space: Subspace, load: np.ndarray, acts: ModalLoads, answers: np.ndarray
 ) -> None:
     """Add the steady answer of a subspace to a drive to `answers`."""
     harmonic = len(acts.rates)

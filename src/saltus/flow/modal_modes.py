@@ -18,7 +18,7 @@ from saltus.flow.modal_blocks import (
     MOST_SPREAD,
     ROUNDING,
     Block,
-    Loads,
+    ModalLoads,
     Subspace,
     block_of,
     loss_of,
@@ -85,7 +85,7 @@ def modes_of(
         answers = np.zeros((0, 1 + len(rates) + 4 * len(speeds)), complex)
         return StateModes(values, vectors, inverse, None, answers)
     every = np.concatenate([[0.0], rates])
-    acts = Loads(
+    acts = ModalLoads(
         every,
         speeds,
         np.column_stack([piece.constant, piece.driven]),
@@ -144,7 +144,7 @@ def eigen_of(matrix: np.ndarray) -> Eigen:
 
 
 def _together(
-    values: np.ndarray, vectors: np.ndarray, inverse: np.ndarray, acts: Loads
+    values: np.ndarray, vectors: np.ndarray, inverse: np.ndarray, acts: ModalLoads
 ) -> np.ndarray:
     """True for modes that don't go their own ways: bool[M]."""
     # sum_i |L_ji V_ij|: what rounding of the states is multiplied by, in any units of theirs
@@ -157,7 +157,7 @@ def _together(
         far = np.minimum(np.abs(1j * rate - values), np.abs(1j * rate + values))
         found |= (part != 0) & (MOST_LOSS * far <= np.maximum(abs(rate), sizes))
     for course, part in zip(acts.speeds, parts.T[len(acts.rates) :], strict=True):
-        found |= (part != 0) & (loss_of(course, sizes, acts.scale) >= MOST_LOSS)
+        found |= (part != 0) & (loss_of(course, sizes, acts.scale) >= MOST_LOSS_OF_TWO)
     # a force that is constant moves a slow mode far before it is balanced
     with np.errstate(all="ignore"):
         static = np.abs(acts.gaps @ vectors * (parts[:, 0] / values))
@@ -171,7 +171,7 @@ def _together(
 
 
 def _answers(
-    values: np.ndarray, vectors: np.ndarray, inverse: np.ndarray, acts: Loads
+    values: np.ndarray, vectors: np.ndarray, inverse: np.ndarray, acts: ModalLoads
 ) -> np.ndarray:
     """Steady answers of modes that go their own ways: complex128[N, 1 + D + 4 * C]."""
     harmonic = len(acts.rates)
@@ -192,7 +192,7 @@ def _answers(
 
 # -- parting -----------------------------------------------------------------------------------
 def _parted(
-    matrix: np.ndarray, acts: Loads, most: int
+    matrix: np.ndarray, acts: ModalLoads, most: int
 ) -> tuple[list[Subspace], np.ndarray, np.ndarray, np.ndarray]:
     """Subspaces whose modes go together, and the other modes. States that the equations keep apart
     stay apart: a rigid body isn't rounded by the stiffest mode.
@@ -237,7 +237,7 @@ def _make_room(values: list[np.ndarray], joined: list[np.ndarray], most: int) ->
 
 
 def _split(
-    matrix: np.ndarray, values: np.ndarray, joined: np.ndarray, acts: Loads
+    matrix: np.ndarray, values: np.ndarray, joined: np.ndarray, acts: ModalLoads
 ) -> tuple[Subspace | None, Eigen]:
     """A matrix as a subspace whose modes go together and the other modes."""
     while True:

@@ -14,7 +14,7 @@ from saltus.flow.modal import Modal, modal_flow
 from saltus.flow.modal_modes import slots_of
 from saltus.flow.modal_tables import Tables
 from saltus.flow.request import Outcome
-from saltus.flow.waves import Legs
+from saltus.flow.waves import WaveLegs
 from saltus.language.expression import Expr
 
 #: Turns of a drive in a period that are whole to so much are whole [relative].
@@ -27,7 +27,7 @@ def wave_motions(
     periods: int,
     quantities: Sequence[Expr],
     guards: Sequence[Guard],
-) -> tuple[list[list[Legs]], Outcome] | None:
+) -> tuple[list[list[WaveLegs]], Outcome] | None:
     """The motions from float64[k, D] over ``periods``, row i by row i of the map, as legs of waves.
 
     Parameters
@@ -37,7 +37,7 @@ def wave_motions(
 
     Returns
     -------
-    list of list of Legs, Outcome
+    list of list of WaveLegs, Outcome
         The legs of each motion, none of one that didn't reach the end; their quantities are the
         states, then those asked for, then the gaps. None if another method moves this system, a
         quantity isn't linear, a drive is a record, a contact has a law, or modes go together in a
@@ -73,7 +73,7 @@ def _legs(
     outcome: Outcome,
     i: int,
     mine: slice,
-) -> list[Legs] | None:
+) -> list[WaveLegs] | None:
     """The legs of one motion, by contact state; None if modes go together in a block."""
     if not np.isfinite(outcome.state[i]).all() or outcome.time[i] < periods * map_.period[i]:
         return []
@@ -91,7 +91,7 @@ def _legs(
             return None
         amplitudes = waves.amplitudes(states[own], counts[own], period, phases[own])
         begin = counts[own] * period + phases[own]
-        parts.append(Legs(waves.rates, waves.rows, amplitudes, begin, length[own]))
+        parts.append(WaveLegs(waves.rates, waves.rows, amplitudes, begin, length[own]))
     return parts
 
 

@@ -122,6 +122,7 @@ class Tables:
         self._sets: dict[bytes, int] = {}
         self.sets: list[ValueSet] = []
         self._equations: dict[tuple[object, ...], _Equations] = {}
+        self._fast: dict[tuple[float, ...], float] = {}
         self._smooth: dict[tuple[object, ...], bool] = {}
         self._known: dict[tuple[int, bytes], int] = {}
         self._states: dict[tuple[int, int], int] = {}
@@ -277,15 +278,22 @@ class Tables:
         used = tuple(given.values[name] for name in self.linear.parameters)
         key = mode, used, free.spread.tobytes()
         if key not in self._equations:
-            piece, fastest = self.linear.piece(given.values, mode), 0.0
-            every = int(np.sum((1 << np.arange(len(self.holds)))[~self.holds]))
-            if piece.constant.any():
-                others = [self.linear.piece(given.values, one).matrix for one in (0, every)]
-                fastest = max(float(np.abs(np.linalg.eigvals(one)).max()) for one in others)
+            piece = self.linear.piece(given.values, mode)
+            fastest = self._fastest(given, used) if piece.constant.any() else 0.0
             eigen = eigen_of(piece.matrix[free.kept] @ free.spread)
             self._equations[key] = _Equations(piece, eigen, fastest)
             self._held += 8 * piece.matrix.nbytes
         return self._equations[key]
+
+    def _fastest(self, given: ValueSet, used: tuple[float, ...]) -> float:
+        """Size of the fastest eigenvalue where all gaps have one sign, and no contact is at rest
+        [1/s].
+        """
+        if used not in self._fast:
+            every = int(np.sum((1 << np.arange(len(self.holds)))[~self.holds]))
+            matrices = [self.linear.piece(given.values, mode).matrix for mode in (0, every)]
+            self._fast[used] = max(float(np.abs(np.linalg.eigvals(one)).max()) for one in matrices)
+        return self._fast[used]
 
     def _is_smooth(self, one: _Equations, other: _Equations, gaps: LinearPiece, g: int) -> bool:
         key = id(one), id(other), g, gaps.constant[g], gaps.matrix[g].tobytes()

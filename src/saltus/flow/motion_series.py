@@ -223,10 +223,14 @@ class MotionSeries:
         module, width = self._module, len(h)
         period = self._map.period[nodes.motion]
         lanes = SimpleNamespace(
-            work=work, side=side, c=constants, clock=clock,
-            probe_y=np.zeros((module.NSTATES, width)), probe_clock=np.zeros_like(clock),
+            work=work,
+            side=side,
+            c=constants,
+            clock=clock,
+            probe_y=np.zeros((module.NSTATES, width)),
+            probe_clock=np.zeros_like(clock),
             probe_rate=np.zeros((3 * module.NSTATES, width)),
-        )  # fmt: skip
+        )
         result: np.ndarray = module.probed(
             lanes, np.minimum(h, module.LONGEST_SHARE * period), LOG2_TOLERANCE
         )

@@ -64,7 +64,7 @@ def pieces(
         The quantities are the states, then those asked for, then the gaps of the system. A motion
         that didn't reach the end has no pieces.
     """
-    watched = _watched(map_.system.origin, tuple(guards), tuple(quantities))
+    watched = watched_system(map_.system.origin, tuple(guards), tuple(quantities))
     found, outcome = _pieces(
         map_, start, periods, watched, len(guards), not map_.method.records_contacts
     )
@@ -82,7 +82,9 @@ def pieces(
 
 
 @lru_cache(maxsize=256)
-def _watched(system: System, guards: tuple[Guard, ...], quantities: tuple[Expr, ...]) -> System:
+def watched_system(
+    system: System, guards: tuple[Guard, ...], quantities: tuple[Expr, ...]
+) -> System:
     """The system with the quantities as its last guards; cached, since its series are costly."""
     asked = tuple(Guard(f"quantity {i}", quantity) for i, quantity in enumerate(quantities))
     return replace(system, guards=(*guards, *asked))

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from saltus.flow.contact_table import ContactTable
+from saltus.flow.until import Until
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,18 @@ class Schedule:
     def none(cls) -> Schedule:
         """A schedule without samples."""
         return cls(np.zeros(0, np.int64), np.zeros(0))
+
+    @classmethod
+    def at(cls, elapsed: np.ndarray, period: float) -> Schedule:
+        """A schedule of times since the start [s], ascending; none is later than its own time by
+        rounding, so a sample at the end is taken.
+        """
+        count = np.floor(elapsed / period)
+        count -= count * period > elapsed
+        rest = elapsed - count * period
+        fraction = rest / period
+        fraction = np.where(fraction * period > rest, np.nextafter(fraction, 0.0), fraction)
+        return cls(count.astype(np.int64), fraction)
 
     @classmethod
     def even(cls, periods: int, per_period: int, first: int = 0, beyond: int = 0) -> Schedule:
@@ -57,6 +70,11 @@ class Request:
         and the time after them [s].
     schedule : Schedule
         When samples are taken.
+    times : float64[M], optional
+        Times of the samples since the start [s], ascending, the same for all trajectories, in place
+        of the schedule.
+    until : Until, optional
+        Condition at which trajectories end, with the status of it.
     record_from : int or None
         First period since the start whose contacts are recorded; None records none.
     t_end : float
@@ -73,9 +91,20 @@ class Request:
     end_phase: np.ndarray
     origin: float = 0.0
     schedule: Schedule = field(default_factory=Schedule.none)
+    times: np.ndarray | None = None
+    until: Until | None = None
     record_from: int | None = None
     t_end: float = np.inf
     checks: int = 0
+
+    @property
+    def sample_count(self) -> int:
+        """Number of samples of each trajectory."""
+        return len(self.schedule.count) if self.times is None else len(self.times)
+
+    def unsampled(self, **more: Any) -> Request:
+        """The request without samples; ``more`` are other changes."""
+        return replace(self, schedule=Schedule.none(), times=None, **more)
 
     @classmethod
     def periods(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -50,6 +51,8 @@ class Taylor(Method):
     ----------
     Jorba & Zou, Experimental Mathematics 14 (2005) 99-117.
     """
+
+    EVENT_BUDGET: ClassVar[int] = 2
 
     order: int = 20
     tolerance: float = 2.0**-56

@@ -23,7 +23,7 @@ HELD = 2**22
 
 
 @dataclass(frozen=True)
-class Legs:
+class WaveLegs:
     """p legs of one motion in one contact state, with R quantities of E waves.
 
     Attributes
@@ -64,7 +64,7 @@ class Legs:
 
 
 # -- means -----------------------------------------------------------------------------------------
-def means(parts: Sequence[Legs]) -> np.ndarray:
+def means(parts: Sequence[WaveLegs]) -> np.ndarray:
     """Mean of each quantity, float64[R]."""
     total = sum(
         ((one.amplitudes * one.integrals(one.rates)).sum(axis=0) @ one.rows.T).real for one in parts
@@ -72,7 +72,7 @@ def means(parts: Sequence[Legs]) -> np.ndarray:
     return np.asarray(total / _duration(parts))
 
 
-def deviations(parts: Sequence[Legs], mean: np.ndarray) -> np.ndarray:
+def deviations(parts: Sequence[WaveLegs], mean: np.ndarray) -> np.ndarray:
     """Root mean square of each quantity about its mean, float64[R]."""
     total = np.zeros(len(mean))
     for one in parts:
@@ -96,7 +96,7 @@ def deviations(parts: Sequence[Legs], mean: np.ndarray) -> np.ndarray:
     return np.asarray(np.sqrt(np.maximum(total, 0.0) / _duration(parts)))
 
 
-def harmonics(parts: Sequence[Legs], rate: float) -> np.ndarray:
+def harmonics(parts: Sequence[WaveLegs], rate: float) -> np.ndarray:
     """Complex amplitude A e^{i phi} of A cos(rate t + phi) in each quantity, complex128[R]."""
     total: np.ndarray = np.zeros(1, complex)
     for one in parts:
@@ -109,12 +109,12 @@ def harmonics(parts: Sequence[Legs], rate: float) -> np.ndarray:
     return total / _duration(parts)
 
 
-def _duration(parts: Sequence[Legs]) -> float:
+def _duration(parts: Sequence[WaveLegs]) -> float:
     return float(sum(one.length.sum() for one in parts))
 
 
 # -- largest values --------------------------------------------------------------------------------
-def largest(parts: Sequence[Legs]) -> np.ndarray:
+def largest(parts: Sequence[WaveLegs]) -> np.ndarray:
     """Largest value of each quantity, float64[R]."""
     best = np.full(len(parts[0].rows), -np.inf)
     for one in parts:
@@ -126,7 +126,7 @@ def largest(parts: Sequence[Legs]) -> np.ndarray:
     return best
 
 
-def _raise(one: Legs, best: np.ndarray) -> None:
+def _raise(one: WaveLegs, best: np.ndarray) -> None:
     """Raise ``best`` to the largest values on some legs."""
     still, size = one.rates == 0.0, np.abs(one.amplitudes) * _growth(one.rates, one.length)
     most = (one.amplitudes[:, still] @ one.rows[:, still].T).real
@@ -151,7 +151,7 @@ def _raise(one: Legs, best: np.ndarray) -> None:
 
 
 def _bounds(
-    one: Legs, leg: np.ndarray, row: np.ndarray, middle: np.ndarray, half: np.ndarray
+    one: WaveLegs, leg: np.ndarray, row: np.ndarray, middle: np.ndarray, half: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Quantities int64[m] on legs int64[m] at times float64[m], and :func:`_room` there: what the
     quantities share is computed once.
@@ -200,12 +200,12 @@ def _halves(
     )  # fmt: skip
 
 
-def _block(one: Legs) -> int:
+def _block(one: WaveLegs) -> int:
     return max(1, HELD // (4 * len(one.rates)))
 
 
 # -- turning points --------------------------------------------------------------------------------
-def least_turn(parts: Sequence[Legs], row: int, near: float) -> float:
+def least_turn(parts: Sequence[WaveLegs], row: int, near: float) -> float:
     """Smallest magnitude of a quantity where it turns, inf if it never does. Those up to ``near``
     are looked for first.
     """
@@ -217,7 +217,7 @@ def least_turn(parts: Sequence[Legs], row: int, near: float) -> float:
     return float(least)
 
 
-def turns(one: Legs, row: int, below: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
+def turns(one: WaveLegs, row: int, below: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
     """Legs int64[r] and times float64[r] since their beginnings at which a quantity turns, between
     their ends; those where its magnitude is more than ``below`` may be left out.
     """

@@ -35,6 +35,8 @@ class Canonical:
 
     def polynomial(self, root: Expr) -> Polynomial:
         """The normal form of ``root``."""
+        if root in self._memo:
+            return self._memo[root]
         for node in walk(root, known=self._memo):
             self._memo[node] = self._normal(node)
         return self._memo[root]
@@ -155,8 +157,8 @@ def proportion(a: Polynomial, b: Polynomial) -> int:
     """The sign of the number c with ``a = c b``; 0 if there is none."""
     if a.keys() != b.keys() or not a:
         return 0
-    ratios = [a[monomial] / b[monomial] for monomial in a]
-    first = ratios[0]
+    ratios = (a[monomial] / b[monomial] for monomial in a)
+    first = next(ratios)
     if any(abs(ratio - first) > _SAME * abs(first) for ratio in ratios):
         return 0
     return 1 if first > 0 else -1
@@ -168,14 +170,16 @@ def is_multiple(a: Polynomial, b: Polynomial) -> bool:
     """
     if len(a) != len(b) or not a:
         return False
+    apart: dict[int, int] = {}  # exponents in all of a, less those in all of b: len(a) times m
+    for polynomial, sign in ((a, 1), (b, -1)):
+        for monomial in polynomial:
+            for atom, exponent in monomial:
+                apart[atom] = apart.get(atom, 0) + sign * exponent
+    if any(exponent % len(a) for exponent in apart.values()):
+        return False
+    factor = frozenset((atom, total // len(a)) for atom, total in apart.items() if total)
     atoms = {atom for monomial in b for atom, _ in monomial}
-    first = next(iter(b))
-    inverse = frozenset((atom, -exponent) for atom, exponent in first)
-    for candidate in a:
-        factor = _merged(candidate, inverse)
-        multiple = {_merged(monomial, factor): coefficient for monomial, coefficient in b.items()}
-        if all(exponent > 0 or atom not in atoms for atom, exponent in factor) and proportion(
-            a, multiple
-        ):
-            return True
-    return False
+    if not all(exponent > 0 or atom not in atoms for atom, exponent in factor):
+        return False
+    multiple = {_merged(monomial, factor): coefficient for monomial, coefficient in b.items()}
+    return proportion(a, multiple) != 0

@@ -6,6 +6,7 @@ the boundary itself (the saltation) is the business of whoever crosses it.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
 from saltus.language.expression import (
@@ -20,7 +21,6 @@ from saltus.language.expression import (
     neg,
     power,
     select,
-    state,
     sub,
     walk,
 )
@@ -97,10 +97,37 @@ def _rule(node: Expr, inner: list[Expr]) -> Expr:
 
 def gradient(expression: Expr, states: Sequence[str]) -> tuple[Expr, ...]:
     """Derivatives with respect to each state, in a frozen mode."""
-    present = {node.payload for node in walk(expression) if node.op == "state"}
-    return tuple(
-        differentiate(expression, state(name)) if name in present else _ZERO for name in states
-    )
+    return gradients([expression], states)[0]
+
+
+def gradients(expressions: Sequence[Expr], states: Sequence[str]) -> tuple[tuple[Expr, ...], ...]:
+    """Derivatives of several expressions, one row each, with respect to each state, in a frozen
+    mode: those of :func:`differentiate`.
+
+    One pass over all nodes, each with its derivatives that aren't zero. A sum goes on with those of
+    its left side where nothing else needs them, so a sum of n terms takes n steps.
+    """
+    nodes = list(walk(*expressions, conditions=False))
+    uses = Counter(expressions)
+    for node in nodes:
+        uses.update(node.args)
+    slopes: dict[Expr, dict[str, Expr]] = {}
+    for node in nodes:
+        below = [slopes[child] for child in node.args]
+        if node.op in ("add", "sub"):
+            names, found = below[1], below[0] if uses[node.args[0]] == 1 else dict(below[0])
+        else:
+            names, found = dict(pair for one in below for pair in one.items()), {}
+        if node.op == "state":
+            found[node.payload] = constant(1.0)
+        for name in names:
+            slope = _rule(node, [one.get(name, _ZERO) for one in below])
+            if slope is not _ZERO:
+                found[name] = slope
+            else:
+                found.pop(name, None)
+        slopes[node] = found
+    return tuple(tuple(slopes[one].get(name, _ZERO) for name in states) for one in expressions)
 
 
 def time_derivative(expression: Expr) -> Expr:

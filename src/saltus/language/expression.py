@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 import threading
 import weakref
-from collections.abc import Callable, Container, Iterator, Mapping
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -195,8 +195,7 @@ class Expr:
             "Write the two sides of the boundary with < or > inside sl.piecewise(...)."
         )
 
-    def __hash__(self) -> int:
-        return id(self)
+    __hash__ = object.__hash__  # equal nodes are one object
 
     # -- everything that would need a number -------------------------------------------------------
     def __and__(self, other: object) -> Expr:
@@ -674,9 +673,12 @@ def walk(
             yield node
         elif node not in seen and node not in known and (bits == -1 or node.bits & bits):
             seen.add(node)
-            stack.append((node, True))
             below = operands(node) if conditions else node.args
-            stack.extend((child, False) for child in reversed(below) if child not in seen)
+            if not below:
+                yield node
+                continue
+            stack.append((node, True))
+            stack.extend([(child, False) for child in reversed(below) if child not in seen])
 
 
 def rebuild(node: Expr, args: tuple[Expr, ...], payload: Any) -> Expr:
@@ -698,14 +700,19 @@ def rebuild(node: Expr, args: tuple[Expr, ...], payload: Any) -> Expr:
 
 def substituted(root: Expr, new: Mapping[Expr, Expr]) -> Expr:
     """The expression with some nodes replaced; conditions are kept."""
+    return all_substituted([root], new)[0]
+
+
+def all_substituted(roots: Sequence[Expr], new: Mapping[Expr, Expr]) -> tuple[Expr, ...]:
+    """Expressions with some nodes replaced; what they share is rebuilt once."""
     memo: dict[Expr, Expr] = {}
-    for node in walk(root):
+    for node in walk(*roots):
         memo[node] = (
             new[node]
             if node in new
             else rebuild(node, tuple(memo[child] for child in node.args), node.payload)
         )
-    return memo[root]
+    return tuple(memo[root] for root in roots)
 
 
 def depends_on(node: Expr, ops: tuple[str, ...]) -> bool:

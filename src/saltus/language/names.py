@@ -59,6 +59,19 @@ def why_no_title(title: Any) -> str | None:
     return f"at most {LONGEST} letters" if len(title) > LONGEST else None
 
 
+def why_no_output(name: Any) -> str | None:
+    """The reason why this can't be the name of an output, as the end of a sentence; None if it can.
+
+    It is that of a variable of results, in files too: netCDF takes no other signs.
+    """
+    why = why_no_title(name)
+    if why is None and (set("/'") & set(name) or name != name.strip()):
+        return "use no / and no ' in it, and no space at its ends"
+    if why is None and not (name[0].isalnum() or name[0] == "_"):
+        return "it must begin with a letter or a digit"
+    return why
+
+
 def why_no_text(text: Any) -> str | None:
     """The reason why this can't be a description or a source, as the end of a sentence; None if it
     can.

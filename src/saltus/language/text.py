@@ -101,9 +101,8 @@ class Writer:
     # -- asked from outside ------------------------------------------------------------------------
     def text(self, root: Expr) -> str:
         """The text of an expression."""
-        for node in walk(root):
-            if node not in self._texts:
-                self._texts[node] = self._named(node, *self._write(node))
+        for node in walk(root, known=self._texts):
+            self._texts[node] = self._named(node, *self._write(node))
         return self._texts[root][0]
 
     def condition(self, condition: Condition, positive: bool = True) -> str:

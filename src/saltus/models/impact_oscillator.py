@@ -29,9 +29,8 @@ CASES = {
     case="recipes",
 )
 def impact_oscillator(
-    t, x, v, *, stiffness=1.0, damping=0.1, force=1.0, gap=1.0, restitution=0.8,
-    frequency="1 rad/s",
-):  # fmt: skip
+    t, x, v, *, stiffness=1.0, damping=0.1, force=1.0, gap=1.0, restitution=0.8, frequency="1 rad/s"
+):
     r"""Oscillator with a rigid stop on one side (COCO; Thompson and Ghaffari; Budd and Dux).
 
     States are ``x`` and ``v``; all is dimensionless. It is forced at ``frequency``.

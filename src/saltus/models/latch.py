@@ -19,9 +19,8 @@ from saltus.models.model import model
     "chapter 4: the non-ideal relay.",
 )
 def latch(
-    t, x, v, m, *, damping=0.0, stiffness=3.0, upper=1.0, lower=0.5, force=0.0,
-    frequency="1 rad/s",
-):  # fmt: skip
+    t, x, v, m, *, damping=0.0, stiffness=3.0, upper=1.0, lower=0.5, force=0.0, frequency="1 rad/s"
+):
     r"""Oscillator with a latch (non-ideal relay): a memory of 0 and 1 by jumps.
 
     States are ``x``, ``v`` and ``m``, which is 1 while the latch holds; all is dimensionless. It is

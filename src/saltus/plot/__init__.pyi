@@ -6,6 +6,7 @@ from saltus.plot.basins import basins as basins
 from saltus.plot.bifurcation import bifurcation_diagram as bifurcation_diagram
 from saltus.plot.bifurcation_curves import bifurcation_curves as bifurcation_curves
 from saltus.plot.branches import branches as branches
+from saltus.plot.contact_forces import contact_forces as contact_forces
 from saltus.plot.exponents import exponents as exponents
 from saltus.plot.frequency_response import frequency_response as frequency_response
 from saltus.plot.gallery import gallery as gallery

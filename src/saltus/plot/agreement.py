@@ -15,6 +15,7 @@ from matplotlib.transforms import ScaledTranslation
 
 from saltus.errors import ParameterError
 from saltus.plot import cells
+from saltus.plot.axes import Panels
 from saltus.plot.palette import hues
 from saltus.plot.picture import picture
 from saltus.plot.style import OKABE_ITO, style
@@ -38,7 +39,7 @@ _NEEDS = ("agreement", "basin_a", "basin_b", "match_a", "match_b", "match_type",
 
 
 @picture(needs=_NEEDS)
-def agreement(ds: xr.Dataset, ax: Any = None) -> Any:
+def agreement(ds: xr.Dataset, ax: Panels | None = None) -> Any:
     """Two maps of basins side by side, and where they differ; with one Axes only where they differ.
 
     Both maps have the same hues. Titles name the maps (attributes ``name_a`` and ``name_b``, where

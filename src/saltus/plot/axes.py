@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -24,6 +24,8 @@ from saltus.plot.regions import Regions
 from saltus.plot.style import QUIET, RASTERISE_ABOVE, Scale, style, styled
 
 Direction = Literal["x", "y"]
+#: Axes of the user, one for each panel of a picture.
+Panels: TypeAlias = Axes | Sequence[Axes] | np.ndarray
 #: A gap is drawn into the limits if the axis grows by no more than this: an orbit far inside its
 #: gap must stay visible.
 _WIDEN = 2.0
@@ -36,7 +38,7 @@ _NAME = 0.45
 
 
 @contextmanager
-def panels(ax: Any, count: int, size: tuple[float, float]) -> Iterator[list[Axes]]:
+def panels(ax: Panels | None, count: int, size: tuple[float, float]) -> Iterator[list[Axes]]:
     """Axes to draw into: those of the user, or a new figure of panels, one above the other, in
     saltus's style.
     """

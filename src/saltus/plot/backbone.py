@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -15,7 +13,7 @@ from saltus.plot.style import OKABE_ITO, display_scale
 
 
 @picture()
-def backbone(ds: xr.Dataset, *, output: str | None = None, ax: Any = None) -> Axes:
+def backbone(ds: xr.Dataset, *, output: str | None = None, ax: Axes | None = None) -> Axes:
     """Largest magnitude of a state in free vibration, or in phase quadrature, over the frequency;
     where it is unstable, dashed.
 
@@ -47,10 +45,14 @@ def backbone(ds: xr.Dataset, *, output: str | None = None, ax: Any = None) -> Ax
         for solid in (True, False):
             x, y = curves.lines(every, branch, ds["point_stable"].values == solid, frequency, peak)
             panel.plot(
-                x * across.factor, y * up.factor, ls="-" if solid else curves.DASHES,
-                color=OKABE_ITO["black"], lw=1.2, zorder=4,
+                x * across.factor,
+                y * up.factor,
+                ls="-" if solid else curves.DASHES,
+                color=OKABE_ITO["black"],
+                lw=1.2,
+                zorder=4,
                 gid="backbone" if solid else "backbone unstable",
-            )  # fmt: skip
+            )
         if not panel.get_xlabel():
             panel.set_xlabel(across.label("frequency"))
             curves.height_axis(panel, "peak", name, up)

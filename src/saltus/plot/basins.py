@@ -36,7 +36,7 @@ _LONG_LEGEND = 14
 @picture(checks=False)
 def basins(
     ds: xr.Dataset,
-    ax: Any = None,
+    ax: Axes | None = None,
     legend: bool = True,
     order: Sequence[int] | None = None,
     points: bool = True,

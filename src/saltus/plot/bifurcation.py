@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -15,7 +14,13 @@ from saltus.plot import curves, regions
 from saltus.plot import response_points as points
 from saltus.plot.picture import PictureError, caller, picture
 from saltus.plot.style import QUIET, Scale
-from saltus.results.dataset.schema import point_name, response_name, sample_name, states_of
+from saltus.results.dataset.schema import (
+    output_word,
+    outputs_in,
+    point_name,
+    response_name,
+    sample_name,
+)
 
 #: What the vertical axis shows, by what was sampled.
 _SHOWN = {
@@ -37,7 +42,7 @@ def bifurcation_diagram(
     state: str | None = None,
     events: bool = True,
     legend: bool = True,
-    ax: Any = None,
+    ax: Axes | None = None,
 ) -> Axes:
     """Sampled values of every response against a parameter: a colour for each period, chaos in
     small dark dots, gaps dashed.
@@ -51,7 +56,8 @@ def bifurcation_diagram(
         at whole periods are drawn. Several by name are drawn over each other, a colour for each:
         ``{"located": a, "ignored": b}``.
     state : str, optional
-        State to show; by default the first.
+        State or output to show; by default the first state, of a structure by its modes the first
+        sensor.
     events : bool
         Whether to mark grazes, folds, period doublings and so on above the picture.
     legend : bool
@@ -69,10 +75,11 @@ def bifurcation_diagram(
         If ``ds`` holds no responses over one parameter, or has no such state.
     """
     datasets = points.shown(ds)
-    names = states_of(datasets[0].ds)
+    names = outputs_in(datasets[0].ds)
     state = names[0] if state is None else state
-    if any(state not in states_of(one.ds) for one in datasets):
-        raise ParameterError(f"there is no state {shown(state)}. {nearest(state, names)}")
+    if any(state not in outputs_in(one.ds) for one in datasets):
+        word = output_word(datasets[0].ds)
+        raise ParameterError(f"there is no {word} {shown(state)}. {nearest(state, names)}")
     sampled = [one.ds[_variable(one, state)] for one in datasets]
     drawn = [
         curves.Curves(one, of.values, _along(one, of.values, state))
@@ -107,7 +114,8 @@ def _along(one: points.Shown, dots: np.ndarray, state: str) -> list[np.ndarray]:
     points at whole periods.
     """
     ds = one.ds
-    if one.name or "point_branch" not in ds:
+    known = _sample(ds, state) == "turning_points" or point_name(state) in ds
+    if one.name or "point_branch" not in ds or not known:
         return []
     if _sample(ds, state) == "turning_points":
         along = [ds[f"point_output_{end}"].sel(output=state).values for end in _EXTREMES]

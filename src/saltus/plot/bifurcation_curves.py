@@ -38,7 +38,7 @@ _POINTS = {
 
 @picture(checks=False)
 def bifurcation_curves(
-    curves: Any, *, over: xr.Dataset | None = None, legend: bool = True, ax: Any = None
+    curves: Any, *, over: xr.Dataset | None = None, legend: bool = True, ax: Axes | None = None
 ) -> Axes:
     """Curves of bifurcations over two parameters, with their points of codimension two.
 

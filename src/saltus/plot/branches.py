@@ -4,7 +4,7 @@ bifurcations marked.
 
 from __future__ import annotations
 
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 import xarray as xr
@@ -25,7 +25,7 @@ def branches(
     output: str | None = None,
     events: bool = True,
     legend: bool = True,
-    ax: Any = None,
+    ax: Axes | None = None,
 ) -> Axes:
     """Size of the periodic orbits over the parameter: stable solid, unstable dashed, a colour for
     each period, bifurcations where they are.

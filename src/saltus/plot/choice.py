@@ -20,6 +20,7 @@ TAKES: dict[str, tuple[str, ...]] = {
     "section": (schema.SECTION,),
     "spectrum": (schema.SPECTRUM,),
     "impacts": (schema.IMPACTS,),
+    "contact_forces": (schema.IMPACTS,),
     "energy": (schema.ENERGY,),
     "methods": (schema.METHODS,),
     "exponents": (schema.EXPONENTS,),

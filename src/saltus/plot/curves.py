@@ -18,7 +18,7 @@ from saltus.plot import axes as draw
 from saltus.plot import motion_colors
 from saltus.plot import response_points as points
 from saltus.plot.style import QUIET, Scale, display_scale
-from saltus.results.dataset.schema import event_name, point_name, states_of
+from saltus.results.dataset.schema import event_name, first_of, point_name, states_of
 
 #: Quantities that both responses and points of branches have.
 Size = Literal[
@@ -33,9 +33,7 @@ LABELS = {
     "phase": "phase of {}", "transmissibility": "{}", "period": "period", "frequency": "frequency",
 }  # fmt: skip
 #: Quantities that begin at zero.
-SIZES = (
-    "rms", "peak", "peak_to_peak", "rms_about_mean", "amplitude", "transmissibility", "period",
-)  # fmt: skip
+SIZES = ("rms", "peak", "peak_to_peak", "rms_about_mean", "amplitude", "transmissibility", "period")
 #: Phases over more than this [deg] have ticks at parts of a right angle.
 _WIDE_PHASE = 20.0
 #: Dashes of unstable orbits.
@@ -124,10 +122,11 @@ def check_quantity(quantity: Any, known: Sequence[str]) -> None:
 def height(ds: xr.Dataset, quantity: str, output: str | None, prefix: str = "") -> Height:
     """A quantity of each response, or with the prefix ``point_`` of each point of the branches."""
     first = states_of(ds)[0]
+    output = first_of(ds) if output is None else output
     if quantity in ("period", "frequency"):
         period = ds[f"{prefix}period"].values
         return Height(period, "s", "") if quantity == "period" else Height(1.0 / period, "Hz", "")
-    name = first if output is None else output
+    name = output
     if not prefix and name == first and f"response_{quantity}" in ds:
         own = ds[f"response_{quantity}"]
         return Height(own.values, own.attrs.get("units", ""), first)
@@ -230,9 +229,13 @@ def _kinds(ax: Axes, drawn: Curves, look: Dots, across: Scale, up: Scale) -> dic
         if repeats and not drawn.along and dots.ndim == 1:
             x, y = points.branch_lines(shown, dots, mine)
             ax.plot(
-                x * across.factor, y * up.factor, color=color, lw=0.8, zorder=2,
+                x * across.factor,
+                y * up.factor,
+                color=color,
+                lw=0.8,
+                zorder=2,
                 gid=f"branches {code}",
-            )  # fmt: skip
+            )
         x, y = _flat(shown, dots, mine, across, up)
         draw.draw_points(
             ax, x, y, marker=motion_colors.marker(code) if look.marked else "o", mfc=color,
@@ -284,10 +287,13 @@ def draw_branches(
         mine = np.flatnonzero(codes[branch_of] == code)
         for solid in (False, True):
             ax.plot(
-                *lines(mine, branch_of, stable == solid, position, height), color=color,
-                lw=1.3 if solid else 0.9, ls="-" if solid else DASHES, zorder=3 if solid else 2,
+                *lines(mine, branch_of, stable == solid, position, height),
+                color=color,
+                lw=1.3 if solid else 0.9,
+                ls="-" if solid else DASHES,
+                zorder=3 if solid else 2,
                 gid=f"{'stable' if solid else 'unstable'} {code}",
-            )  # fmt: skip
+            )
         named[motion_colors.label(code, periods)] = Line2D([], [], color=color, lw=1.3)
     if (ds["point_unstable_multipliers"].values > 0).any():
         named["unstable"] = Line2D([], [], color=QUIET, lw=0.9, ls=DASHES)

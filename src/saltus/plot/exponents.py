@@ -24,7 +24,7 @@ _EARLY = 0.1
 def exponents(
     ds: xr.Dataset,
     trajectory: int | Sequence[int] | None = None,
-    ax: Any = None,
+    ax: draw.Panels | None = None,
     *,
     legend: bool = True,
 ) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 import xarray as xr
@@ -34,7 +34,7 @@ def frequency_response(
     log: bool = False,
     events: bool = True,
     legend: bool = True,
-    ax: Any = None,
+    ax: Axes | None = None,
 ) -> Axes:
     """Size of every steady response against the frequency (or any other parameter): a colour for
     each period, branches as lines.

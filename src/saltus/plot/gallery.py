@@ -82,10 +82,13 @@ def gallery(
     )
     with style():
         figure, grid = plt.subplots(
-            len(ids), columns, figsize=((4.6, 6.6, 9.0)[columns - 1], 1.75 * len(ids) + 0.35),
+            len(ids),
+            columns,
+            figsize=((4.6, 6.6, 9.0)[columns - 1], 1.75 * len(ids) + 0.35),
             squeeze=False,
-            width_ratios=[2.4, 1.15, 1.15][:columns], layout="constrained",
-        )  # fmt: skip
+            width_ratios=[2.4, 1.15, 1.15][:columns],
+            layout="constrained",
+        )
         for row, key in zip(grid, ids, strict=True):
             _row(row, ds, runs, key)
             if columns == 3 and not row[1].axison:  # at rest

@@ -18,8 +18,8 @@ from saltus.plot.style import OKABE_ITO, QUIET, Scale, display_scale
 from saltus.results.dataset.schema import (
     contact_name,
     equations_of,
+    first_of,
     forcing_period,
-    states_of,
 )
 
 #: Marker, face and name of each kind of contact. Hollow means undecided.
@@ -39,13 +39,13 @@ def history(
     trajectory: int | Sequence[int] | None = None,
     state: str | None = None,
     periods: selection.Periods = None,
-    ax: Any = None,
+    ax: draw.Panels | None = None,
     *,
     time: Literal["s", "T", "both"] = "both",
     units: Mapping[str, str] | None = None,
     legend: bool = True,
 ) -> Any:
-    """Time history of one state, coloured by region, contacts marked.
+    """Time history of one state or output, coloured by region, contacts marked.
 
     Gap lines are dashed, contact regions lightly shaded. Colours change exactly at the contacts.
     More than 120 contacts aren't marked; choose fewer periods to see them. A
@@ -58,7 +58,8 @@ def history(
     trajectory : int or list of int, optional
         Trajectory of a batch; each gets a panel. Without it all are shown, at most 8.
     state : str, optional
-        Name of the state; the first one by default.
+        Name of the state, or of an output; by default the first state, of a structure by its modes
+        the first sensor.
     periods : int, float or pair, optional
         Number of forcing periods at the end, or (first, last) period; the whole run by default.
     ax : Axes or array of Axes, optional
@@ -82,7 +83,7 @@ def history(
     """
     if not among(time, ("s", "T", "both")):
         raise ParameterError(f"time={shown(time)}. Known: 'both', 's', 'T'.")
-    state = states_of(run)[0] if state is None else selection.state_named(run, state)
+    state = first_of(run) if state is None else selection.state_named(run, state)
     wanted = selection.units_of_states(run, units).get(state)
     labels = selection.chosen(run, trajectory)
     singles = [selection.single(run, label) for label in labels] or [selection.single(run, None)]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import textwrap
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -27,7 +26,7 @@ _LINE = 60
 
 @picture()
 def impacts(
-    ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, legend: bool = True
+    ds: xr.Dataset, trajectory: int | None = None, ax: Axes | None = None, *, legend: bool = True
 ) -> Axes:
     """Histogram of the speeds at contact, a colour for each guard. Where they repeat, or there are
     none, it is said in words.
@@ -119,7 +118,7 @@ def _in_words(ds: xr.Dataset, labels: np.ndarray | None, counts: xr.DataArray, s
 
 @picture()
 def energy(
-    ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, legend: bool = True
+    ds: xr.Dataset, trajectory: int | None = None, ax: Axes | None = None, *, legend: bool = True
 ) -> Axes:
     """Energy supplied, dissipated and stored, interval by interval; the largest imbalance is in the
     title.

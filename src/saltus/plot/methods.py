@@ -27,7 +27,7 @@ STEPS = 8
 
 
 @picture()
-def methods(ds: xr.Dataset, *, ax: Any = None) -> list[Axes]:
+def methods(ds: xr.Dataset, *, ax: draw.Panels | None = None) -> list[Axes]:
     """Draw the effect of the method on steady responses, against one parameter: three panels, the
     first method of ``ds`` being the reference.
 

@@ -26,7 +26,7 @@ def periodic_orbits(
     ds: xr.Dataset,
     x: str | None = None,
     y: str | None = None,
-    ax: Any = None,
+    ax: Axes | None = None,
     *,
     over: xr.Dataset | None = None,
     units: Mapping[str, str] | None = None,

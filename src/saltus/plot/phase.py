@@ -14,7 +14,7 @@ from saltus.plot import axes as draw
 from saltus.plot import regions, selection
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
-from saltus.results.dataset.schema import STROBOSCOPE, kind_of, states_of
+from saltus.results.dataset.schema import STROBOSCOPE, kind_of, told_of
 
 #: Without `periods` the last part of a forced run is shown: transients of lightly damped systems
 #: have mostly gone by then (of the rig with 3 % damping after 40 periods, at 15 Hz), and
@@ -28,7 +28,7 @@ def phase(
     trajectory: int | Sequence[int] | None = None,
     states: tuple[str, str] | None = None,
     periods: selection.Periods = None,
-    ax: Any = None,
+    ax: Axes | None = None,
     *,
     poincare: bool = True,
     units: Mapping[str, str] | None = None,
@@ -47,8 +47,9 @@ def phase(
     trajectory : int or list of int, optional
         Trajectory of a batch; without it all are laid over one another, at most 8.
     states : pair of str, optional
-        On the horizontal and the vertical axis; by default the first one and the state that is its
-        rate, else the second one.
+        On the horizontal and the vertical axis, states or outputs; by default the first state and
+        the one that is its rate, else the second one. Of a structure by its modes the sensors stand
+        for the states.
     periods : int, float or pair, optional
         Number of forcing periods at the end, or (first, last) period. By default the last 30 % of a
         forced run, as the picture says, and all of a run without forcing.
@@ -112,11 +113,12 @@ def phase(
 
 def _pair(run: xr.Dataset, states: Any) -> tuple[str, str]:
     """The two states to show."""
-    known = states_of(run)
+    known = told_of(run)
     if states is None:
         if len(known) < 2:
+            of = "outputs" if run.attrs.get("outputs_first") else "states"
             raise ParameterError(
-                f"a phase portrait needs two states, this system has only "
+                f"a phase portrait needs two {of}, this system has only "
                 f"{known[0]!r}. See plot.history."
             )
         return known[0], selection.rate_of(run, known[0]) or known[1]

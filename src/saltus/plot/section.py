@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -14,7 +13,7 @@ from saltus.plot import axes as draw
 from saltus.plot import regions, selection
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
-from saltus.results.dataset.schema import states_of
+from saltus.results.dataset.schema import outputs_in, states_of, told_of
 
 #: What can stand on an axis besides the states: variable and name.
 _OTHERS = {
@@ -31,12 +30,12 @@ def section(
     x: str | None = None,
     y: str | None = None,
     trajectory: int | Sequence[int] | None = None,
-    ax: Any = None,
+    ax: Axes | None = None,
     *,
     units: Mapping[str, str] | None = None,
     legend: bool = True,
 ) -> Axes:
-    """Points of a Poincare section: one state against another, or against the phase of the forcing.
+    """Points of a Poincare section: a state or output against another, or the phase of the forcing.
 
     A colour for each direction of crossing; of several trajectories one for each. Crossings too
     shallow to be sure of are hollow.
@@ -46,8 +45,9 @@ def section(
     ds : Dataset
         Result of ``poincare``.
     x, y : str, optional
-        A state, ``"phase"`` (t/T mod 1) or ``"time"``; by default the first two of the states that
-        differ between crossings, then phase (if forced), then time.
+        A state, an output, ``"phase"`` (t/T mod 1) or ``"time"``; by default the first two of the
+        states that differ between crossings, of a structure by its modes of the sensors; then
+        phase (if forced), then time.
     trajectory : int or list of int, optional
         Trajectory of a batch; without it all are laid over one another, at most 8.
     ax : Axes, optional
@@ -104,30 +104,34 @@ def section(
 def _axes(ds: xr.Dataset, x: str | None, y: str | None) -> tuple[str, str]:
     """Names of the two axes, checked."""
     forced = "crossing_phase" in ds and bool(np.isfinite(ds["crossing_phase"].values).any())
-    known = [*states_of(ds), *(["phase"] if forced else []), "time"]
+    known = [*outputs_in(ds), *(["phase"] if forced else []), "time"]
     for name in (x, y):
         if name is not None and name not in known:
             raise ParameterError(
                 f"this section has no {shown(name)} to draw. {nearest(name, known)}"
             )
-    sides = {side.strip() for side in str(ds.attrs["surface"]).split("=")}
-    moving = [name for name in states_of(ds) if name not in sides]
-    if ds.sizes["crossing"] and len(moving) == len(states_of(ds)):  # the surface fixes no state
+    surface = str(ds.attrs["surface"])
+    sides = {side.strip() for side in surface.split("=")}
+    turning = surface.removesuffix(" turns")
+    if turning in outputs_in(ds) and turning != surface:
+        sides.add(selection.rate_of(ds, turning))  # rounding is left of it there
+    moving = [name for name in told_of(ds) if name not in sides]
+    if ds.sizes["crossing"] and len(moving) == len(told_of(ds)):  # the surface fixes no state
         moving = [name for name in moving if np.ptp(ds[name].values) > 0]
-    free = [name for name in (*moving, *known[len(states_of(ds)) :]) if name not in (x, y)]
+    free = [name for name in (*moving, *known[len(outputs_in(ds)) :]) if name not in (x, y)]
     first = x if x is not None else free.pop(0)
     return first, y if y is not None else free[0]
 
 
 def _values(ds: xr.Dataset, name: str) -> np.ndarray:
     return np.asarray(
-        ds[_OTHERS[name][0] if name in _OTHERS and name not in states_of(ds) else name].values,
+        ds[_OTHERS[name][0] if name in _OTHERS and name not in outputs_in(ds) else name].values,
         dtype=float,
     )
 
 
 def _scale(ds: xr.Dataset, name: str, values: np.ndarray, unit: str | None) -> Scale:
-    if name in _OTHERS and name not in states_of(ds):
+    if name in _OTHERS and name not in outputs_in(ds):
         return Scale(1.0, "s" if name == "time" else "1")
     return display_scale(
         ds[name].attrs.get("units", ""), float(np.abs(values).max(initial=0.0)), unit
@@ -180,9 +184,11 @@ def _frame(
     ax: Axes, ds: xr.Dataset, direction: draw.Direction, name: str, values: np.ndarray, scale: Scale
 ) -> None:
     """Set limits, gap lines and name of one axis."""
-    label = scale.label(_OTHERS[name][1] if name in _OTHERS and name not in states_of(ds) else name)
+    label = scale.label(
+        _OTHERS[name][1] if name in _OTHERS and name not in outputs_in(ds) else name
+    )
     (ax.set_xlabel if direction == "x" else ax.set_ylabel)(label)
-    if name == "phase" and name not in states_of(ds):
+    if name == "phase" and name not in outputs_in(ds):
         (ax.set_xlim if direction == "x" else ax.set_ylim)(0.0, 1.0)
         return
     state_regions = (

@@ -7,7 +7,7 @@ from __future__ import annotations
 import json
 import math
 import numbers
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,8 +21,12 @@ from saltus.results.dataset.schema import (
     contact_name,
     equations_of,
     forcing_period,
+    output_word,
+    outputs_in,
+    rate_unit,
     sample_dim,
     states_of,
+    told_of,
 )
 from saltus.units import from_si
 
@@ -75,8 +79,10 @@ def _span(known: list[int]) -> str:
 
 
 def single(run: xr.Dataset, label: int | None) -> xr.Dataset:
-    """Select one trajectory of a run, with its contacts only."""
+    """Select one trajectory of a run, its samples in the order of time, with its contacts only."""
     ds = run if label is None else run.sel(trajectory=label)
+    if sample_dim(ds) in ds.dims and "sample_times" in ds.attrs:
+        ds = ds.sortby(sample_dim(ds))
     if "contact_trajectory" in ds and "trajectory" in ds.coords:
         ds = ds.isel(
             contact=np.flatnonzero(ds["contact_trajectory"].values == int(ds["trajectory"]))
@@ -105,16 +111,18 @@ def _valued(known: list[xr.DataArray]) -> str:
 
 
 def _start_that_differs(run: xr.Dataset, trajectory: xr.Dataset) -> list[xr.DataArray]:
-    """Initial values of the states that differ between trajectories; none if the start wasn't kept,
-    or they are more than fit a legend.
+    """Initial values of the states and outputs that differ between trajectories; none if the start
+    wasn't kept, or they are more than fit a legend.
     """
     dim = sample_dim(run)
-    sampled = dim in run.dims and all(name in run for name in states_of(run))
-    if not sampled or (
-        "period" in run.coords and float(run["period"].values.min(initial=0.0)) != 0.0
+    sampled = dim in run.dims and all(name in run for name in told_of(run))
+    if (
+        not sampled
+        or "sample_times" in run.attrs
+        or ("period" in run.coords and float(run["period"].values.min(initial=0.0)) != 0.0)
     ):
         return []
-    first = {name: run[name].isel({dim: 0}).values for name in states_of(run)}
+    first = {name: run[name].isel({dim: 0}).values for name in told_of(run)}
     differing = [name for name, values in first.items() if np.ptp(values) > 0.0]
     return (
         [trajectory[name].isel({dim: 0}) for name in differing]
@@ -124,17 +132,25 @@ def _start_that_differs(run: xr.Dataset, trajectory: xr.Dataset) -> list[xr.Data
 
 
 def rate_of(ds: xr.Dataset, state: str) -> str:
-    """State that is the rate of another, as v is of x; empty if there is none."""
+    """State that is the rate of another, as v is of x; of an output the next one that has the unit
+    of its rate. Empty if there is none.
+    """
+    if state not in states_of(ds):
+        unit = ds[state].attrs.get("units", "")
+        behind = told_of(ds)[told_of(ds).index(state) + 1 :] if unit else ()
+        rates = [name for name in behind if ds[name].attrs.get("units") == rate_unit(unit)]
+        return rates[0] if rates else ""
     return next((name for name in states_of(ds) if f"d{state}/dt = {name}" in equations_of(ds)), "")
 
 
 def state_named(run: xr.Dataset, name: str) -> str:
-    """Return the name if it is that of a state; else raise a ParameterError with the nearest
-    name.
+    """Return the name if it is that of a state or an output; else raise a ParameterError with the
+    nearest name.
     """
-    if not among(name, states_of(run)):
+    known = outputs_in(run)
+    if not among(name, known):
         raise ParameterError(
-            f"this run has no state {shown(name)}. {nearest(name, states_of(run))}"
+            f"this run has no {output_word(run)} {shown(name)}. {nearest(name, known)}"
         )
     return name
 
@@ -253,9 +269,9 @@ def path(ds: xr.Dataset, states: tuple[str, ...], begin: float, end: float) -> P
         {sample_dim(ds): np.flatnonzero((axis >= begin - slack) & (axis <= end + slack))}
     )
     table = contacts_in(ds, begin, end)
-    sides = [(contact_name, "contact_mode_after")]
-    if all(before_name(name) in table for name in states):
-        sides.insert(0, (before_name, "contact_mode_before"))
+    sides: list[tuple[Callable[[str], str], str]] = [(contact_name, "contact_mode_after")]
+    if any(before_name(name) in table for name in states):
+        sides.insert(0, (_before(table), "contact_mode_before"))
 
     def joined(samples: str, contacts: list[str]) -> np.ndarray:
         columns = np.stack([table[name].values for name in contacts], axis=-1)
@@ -269,6 +285,11 @@ def path(ds: xr.Dataset, states: tuple[str, ...], begin: float, end: float) -> P
     # At equal times contacts come last: the curve continues in their mode.
     order = np.argsort(time, kind="stable")
     return Path(time[order], values[order], mode[order])
+
+
+def _before(table: xr.Dataset) -> Callable[[str], str]:
+    """Name of the values before the contacts: those at the contacts where nothing jumps."""
+    return lambda name: before_name(name) if before_name(name) in table else contact_name(name)
 
 
 def stroboscope_points(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -14,7 +13,7 @@ from saltus.plot import axes as draw
 from saltus.plot import selection
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
-from saltus.results.dataset.schema import states_of
+from saltus.results.dataset.schema import output_word, outputs_in
 
 #: The picture reaches down to this share of the largest amplitude, and up to the last frequency
 #: that has so much; the rest is what sampling folds back.
@@ -28,7 +27,7 @@ def spectrum(
     ds: xr.Dataset,
     state: str | None = None,
     trajectory: int | Sequence[int] | None = None,
-    ax: Any = None,
+    ax: Axes | None = None,
     *,
     highest: float | None = None,
     units: Mapping[str, str] | None = None,
@@ -44,7 +43,8 @@ def spectrum(
     ds : Dataset
         Result of ``spectrum``.
     state : str, optional
-        Name of the state; the first one by default.
+        Name of the state, or of an output; by default the first state, of a structure by its modes
+        the first sensor.
     trajectory : int or list of int, optional
         Trajectory of a batch; without it all are laid over one another, at most 8.
     ax : Axes, optional
@@ -66,10 +66,12 @@ def spectrum(
     ParameterError
         If ``ds`` is not from ``spectrum``, or an argument doesn't fit it.
     """
-    known = states_of(ds)
+    known = outputs_in(ds)
     state = known[0] if state is None else state
     if state not in known:
-        raise ParameterError(f"this spectrum has no state {shown(state)}. {nearest(state, known)}")
+        raise ParameterError(
+            f"this spectrum has no {output_word(ds)} {shown(state)}. {nearest(state, known)}"
+        )
     labels = selection.chosen(ds, trajectory)
     singles = [ds.sel(trajectory=label) for label in labels] or [ds]
     curves = [np.asarray(motion[f"{state}_amplitude"].values, dtype=float) for motion in singles]

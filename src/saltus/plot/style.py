@@ -173,7 +173,7 @@ def display_scale(unit: str, largest: float, wanted: str | None = None) -> Scale
         )
     for prefix, size in known.items():
         limit = 1.0 if prefix + unit == "m" else _AT_LEAST
-        if unit in ("m", "s") and size > 1:
+        if unit in ("m", "s", "m/s", "m/s^2") and size > 1:
             continue  # nobody reads kilometres or kiloseconds here
         if largest / size >= (limit if size <= 1 else 1.0):
             return Scale(1 / size, prefix + unit)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -31,7 +29,9 @@ _UNSETTLED: dict[int, tuple[str, str]] = {
 
 
 @picture(needs=("type", "period", "response_of"))
-def type_map(ds: xr.Dataset, *, start: int = 0, legend: bool = True, ax: Any = None) -> Axes:
+def type_map(
+    ds: xr.Dataset, *, start: int = 0, legend: bool = True, ax: Axes | None = None
+) -> Axes:
     """Kind of motion over two parameters: a hue for each period, grey for motion that never
     repeats, chaos dark.
 

@@ -110,7 +110,9 @@ class Row:
             if found[row.get("when", ALWAYS)] and not found[row.get("unless", NEVER)]
         )
         return Finding(
-            filled(self.own, found), filled(self.exact, found),
+            filled(self.own, found),
+            filled(self.exact, found),
             tuple(Check(filled(row["text"], one), passed(row, one)) for row, one in checks),
-            filled(self.sure, found), filled(next(why, ""), found),
-        )  # fmt: skip
+            filled(self.sure, found),
+            filled(next(why, ""), found),
+        )

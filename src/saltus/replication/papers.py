@@ -167,11 +167,13 @@ def find(name: str) -> Paper:
     )
     sets, pictures, tables = (paper.pop(key) for key in ("sets", "picture", "table"))
     return Paper(
-        name=name, jobs=code(name, "jobs").jobs, **paper,
+        name=name,
+        jobs=code(name, "jobs").jobs,
+        **paper,
         pictures=tuple(Picture(**_part(name, row, sets, "draw")) for row in pictures),
         tables=tuple(Numbers(**_part(name, row, sets, "make")) for row in tables),
         claims=tuple(_claim(name, row, sets, claims["texts"]) for row in _whole(claims["claim"])),
-    )  # fmt: skip
+    )
 
 
 def _part(

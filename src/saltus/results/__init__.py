@@ -2,7 +2,7 @@
 
 from saltus.results import kinds as kinds
 from saltus.results.dataset.attractors import AttractorTable
-from saltus.results.dataset.build import Guards, Subject, build
+from saltus.results.dataset.build import Guards, Subject, build, subject_of
 from saltus.results.dataset.result import Result
 from saltus.results.describe import describe, headline
 from saltus.results.files.atomic import ResultFileError, usable_folder
@@ -29,6 +29,7 @@ __all__ = [
     "made_by",
     "samples",
     "save",
+    "subject_of",
     "to_csv",
     "to_mat",
     "to_netcdf",

@@ -18,11 +18,15 @@ def identity(system: System, method: Any, arguments: Mapping[str, Any]) -> dict[
     arguments, code.
     """
     fixed = {
-        "equations": system.fingerprint(), "values": to_json(dict(system.values)),
+        "equations": system.fingerprint(),
+        "values": to_json(dict(system.values)),
         "method": method.name,
-        "method options": to_json(method.options()), "saltus": version("saltus"),
+        "method options": to_json(method.options()),
+        "saltus": version("saltus"),
         "code": code_hash(),
-    }  # fmt: skip
+    }
+    if len(system.outputs):
+        fixed["outputs"] = to_json(system.to_dict()["outputs"])
     asked = {
         f"{name} of the question" if name in fixed else name: value
         for name, value in arguments.items()

@@ -16,13 +16,21 @@ from types import ModuleType
 from saltus.system.checks import check_values
 from saltus.system.guard_units import gap_units
 from saltus.system.regularisation import regularise
-from saltus.system.structures import Base, Contact, Force, structure
+from saltus.system.structures import (
+    Base,
+    Contact,
+    Force,
+    acceleration,
+    contact_force,
+    structure,
+    velocity,
+)
 from saltus.system.system import System
 from saltus.system.trace import system
 
 __all__ = [
-    "Base", "Contact", "Force", "System", "check_values", "gap_units", "regularise", "structure",
-    "system",
+    "Base", "Contact", "Force", "System", "acceleration", "check_values", "contact_force",
+    "gap_units", "regularise", "structure", "system", "velocity",
 ]  # fmt: skip
 
 

@@ -19,6 +19,10 @@ from saltus.units import from_si
 
 #: First words of the description of a structure.
 STRUCTURE = "Structure of"
+#: Most states whose equations are shown.
+MOST_SHOWN = 24
+#: Longest formula of an output that is shown [characters].
+_LONG = 80
 
 
 # -- text ------------------------------------------------------------------------------------------
@@ -56,14 +60,22 @@ def system_text(system: EquationsOfMotion) -> str:
     states = [
         f"{name} [{system.units[name]}]" if system.units[name] else name for name in system.states
     ]
+    long = len(states) > MOST_SHOWN
+    if long:
+        states[3:-1] = ["..."]
+    equations = ["not shown, as they are long: .equations lists them"] if long else None
     blocks = [
         [head],
         _about(system),
         [f"states      {', '.join(states)}"],
-        _labelled("equations", equation_lines(system)),
+        _labelled("equations", equations or equation_lines(system)),
     ]
-    if system.guards:
+    if system.guards and long:
+        blocks.append([f"guards      {', '.join(guard.name for guard in system.guards)}"])
+    elif system.guards:
         blocks.append(_labelled("guards", _aligned(_guard_rows(system))))
+    if len(system.outputs):
+        blocks.append(_labelled("outputs", _aligned(_output_rows(system))))
     if system.values:
         blocks.append(_labelled("parameters", _aligned(_parameter_rows(system))))
     if system.source:
@@ -80,6 +92,16 @@ def _about(system: EquationsOfMotion) -> list[str]:
 def _boundaries(system: EquationsOfMotion) -> int:
     """Number of boundaries, hold guards not counted."""
     return sum(not is_hold(guard) for guard in system.guards)
+
+
+def _output_rows(system: EquationsOfMotion) -> list[tuple[str, str]]:
+    """Name, unit and formula of each output; a long formula isn't shown."""
+    mine, rows = system.outputs, []
+    formulas, guards = mine.behind(system.guards)
+    for name, unit, formula in zip(mine.names, mine.units, formulas, strict=True):
+        text = Writer(guards, limit=_LONG).text(formula)
+        rows.append((f"{name} [{unit}]" if unit else name, "..." if "..." in text else text))
+    return rows
 
 
 def _forcing(system: EquationsOfMotion) -> str:
@@ -190,16 +212,20 @@ def latex_lines(system: EquationsOfMotion) -> list[str]:
 
 def system_html(system: EquationsOfMotion) -> str:
     """The notebook view: formulas, guards and parameters."""
-    formulas = " \\\\ ".join(latex_lines(system))
+    long = len(system.states) > MOST_SHOWN
     parts = [
         f"<b>{html.escape(system.name)}</b> "
         f"<span>{html.escape(_forcing(system).lstrip(', '))}</span>"
     ]
     if system.description:
         parts.append(f"<p>{html.escape(system.description.splitlines()[0])}</p>")
-    parts.append(f"$$\\begin{{aligned}} {html.escape(formulas)} \\end{{aligned}}$$")
-    if system.guards:
+    if not long:
+        formulas = " \\\\ ".join(latex_lines(system))
+        parts.append(f"$$\\begin{{aligned}} {html.escape(formulas)} \\end{{aligned}}$$")
+    if system.guards and not long:
         parts.append(_table(("guard", "boundary"), _guard_rows(system)))
+    if len(system.outputs):
+        parts.append(_table(("output", "formula"), _output_rows(system)))
     if system.values:
         parts.append(_table(("parameter", "value"), _parameter_rows(system)))
     return "<div>" + "".join(parts) + "</div>"

@@ -95,9 +95,9 @@ _ADVICE: dict[str, str] = {
         "acceleration into it."),
     **dict.fromkeys(("chirp", "sinesweep", "sweptsine"),
         "Write sl.sweep(first, last, rate), a function of the time."),
-    **dict.fromkeys(("sensor", "output", "outputs", "observer"),
-        "Outputs are formulas: outputs={name: lambda x: ...} of sl.frequency_response and "
-        "sl.bifurcation_diagram; of a run compute them from its states, such as 1e3*run.x."),
+    **dict.fromkeys(("sensor", "sensors", "output", "outputs", "observer", "withoutputs"),
+        "Outputs are formulas by name, which every result gives: "
+        "system.with_outputs({name: lambda x: ...}), and of structures sensors={name: 'x3'}."),
     **dict.fromkeys(("fixedpoint", "fixedpoints", "steadystate"),
         "Write sl.equilibria(system), or sl.periodic_orbits(system, start) for points of the map."),
     **dict.fromkeys(("limitcycle", "limitcycles", "shooting", "floquet", "monodromy"),

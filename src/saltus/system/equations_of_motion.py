@@ -10,6 +10,7 @@ from typing import Any
 from saltus.contact.guards import Guard
 from saltus.errors import must_be
 from saltus.language.expression import Expr
+from saltus.system.named_outputs import NO_OUTPUTS, NamedOutputs
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -28,6 +29,8 @@ class EquationsOfMotion:
     source: str = ""
     description: str = ""
     made: int = 0
+    tangent_of: EquationsOfMotion | None = None
+    outputs: NamedOutputs = NO_OUTPUTS
 
     def period(self, values: Mapping[str, Any] | None = None) -> Any:
         """Forcing period T [s]; None for a system that isn't forced.

@@ -56,12 +56,12 @@ _NODES = (
 )  # fmt: skip
 _MEANINGS = "a formula holds numbers, names, + - * / **, comparisons, functions"
 _INSTEAD: dict[type[ast.AST], str] = {
-    ast.BitXor: "a power is written x**2", ast.FloorDiv: "of a time the whole part is (t - mod(t, "
-                                                         "T))/T",
-    ast.Attribute: "functions stand without a name before them: write sin(x)", ast.Eq: "write the "
-        "two sides of a boundary with < or >",
+    ast.BitXor: "a power is written x**2",
+    ast.FloorDiv: "of a time the whole part is (t - mod(t, T))/T",
+    ast.Attribute: "functions stand without a name before them: write sin(x)",
+    ast.Eq: "write the two sides of a boundary with < or >",
     ast.NotEq: "write the two sides of a boundary with < or >",
-}  # fmt: skip
+}
 
 
 class Formula:

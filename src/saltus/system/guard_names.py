@@ -10,7 +10,7 @@ from saltus.contact.guards import equation_of, is_hold, number_of
 from saltus.errors import TraceError, shown
 from saltus.language.expression import Condition, Relation
 from saltus.language.names import why_no_title
-from saltus.system.quantity import Quantity, called
+from saltus.system.read_off import Quantity, called
 from saltus.system.system import System
 
 

@@ -16,6 +16,8 @@ from saltus.language.expression import Expr
 from saltus.language.known_sides import assuming
 from saltus.system.system import System
 
+#: Most states of a system whose segments are followed, parameters that vary included.
+MOST_STATES = 14
 #: States that a segment adds, in their order.
 START, SPAN = "start of the leg", "span of the leg"
 
@@ -56,8 +58,10 @@ def leg(system: System, mode: int) -> System:
 
 def has_legs(system: System) -> bool:
     """True if the system has segments: its equations are smooth in time within every mode, up to
-    its boundaries.
+    its boundaries, and its states are few enough for a compiled flow of each mode.
     """
+    if len(system.states) > MOST_STATES:
+        return False
     return not system.is_steep and all(_smooth_in_time(entry) for entry in system.field)
 
 

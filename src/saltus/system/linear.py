@@ -96,9 +96,8 @@ class LinearSystem:
 
     def of(self, quantities: tuple[Expr, ...]) -> tuple[Expr, ...] | None:
         """Quantities as functions of the states and the drives; None if one isn't linear."""
-        found = tuple(ex.substituted(entry, self._names) for entry in quantities)
-        linear = all(_is_affine(entry, len(self._names)) for entry in found)
-        return found if linear else None
+        found = ex.all_substituted(quantities, self._names)
+        return found if _are_affine(found, len(self._names)) else None
 
     def rows(
         self, quantities: tuple[Expr, ...], values: Mapping[str, float], mode: int
@@ -121,7 +120,7 @@ class LinearSystem:
 
     def pieces_of(self, entries: Sequence[Expr], values: Mapping[str, float]) -> LinearPiece:
         """Coefficients of other linear functions of the states and drives of the system."""
-        known = tuple(ex.substituted(one, self._names) for one in entries)
+        known = ex.all_substituted(tuple(entries), self._names)
         return LinearPiece(*self._coefficients(known, values, []))
 
     def rates(self, values: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
@@ -184,12 +183,10 @@ def linear_pieces(system: System) -> LinearSystem | str:
     if any(node.op != "table" for node in moving):
         return "a boundary of it moves by a drive that may jump"
     names = {node: ex.parameter(_name(i)) for i, node in enumerate((*drives, *courses))}
-    field, gaps, laws = (
-        tuple(ex.substituted(one, names) for one in given) for given in (system.field, gaps, laws)
-    )
+    field, gaps, laws = (ex.all_substituted(given, names) for given in (system.field, gaps, laws))
     if any(ex.depends_on(one, ("select",)) for one in (*(gaps[i] for i in plain), *laws)):
         return "a boundary of it moves when another is crossed"
-    if not all(_is_affine(entry, len(names)) for entry in (*field, *gaps, *laws)):
+    if not _are_affine((*field, *gaps, *laws), len(names)):
         return "it isn't linear between its contacts"
     return LinearSystem(system, tuple(drives.values()), tuple(courses), field, gaps, names)
 
@@ -227,13 +224,13 @@ def _missing_law(guards: Sequence[Guard]) -> str | None:
     return None
 
 
-def _is_affine(root: Expr, drives: int) -> bool:
-    """True if an expression is linear in the states and drives, whichever sides its conditions
+def _are_affine(roots: Sequence[Expr], drives: int) -> bool:
+    """True if expressions are linear in the states and drives, whichever sides their conditions
     choose.
     """
     moving = {_name(i) for i in range(drives)}
     degree: dict[Expr, float] = {}
-    for node in ex.walk(root):
+    for node in ex.walk(*roots):
         below = [degree[one] for one in node.args]
         match node.op:
             case "state":
@@ -253,4 +250,4 @@ def _is_affine(root: Expr, drives: int) -> bool:
                 degree[node] = max(below) if asks_bits else math.inf
             case _:
                 degree[node] = 0 if node.args and not any(below) else math.inf
-    return degree[root] <= 1
+    return all(degree[root] <= 1 for root in roots)

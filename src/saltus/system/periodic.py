@@ -22,9 +22,7 @@ from saltus.language.expression import (
     constant,
     depends_on,
     div,
-    operands,
     relations_in,
-    walk,
 )
 from saltus.sentences import Text
 from saltus.system.equations_of_motion import EquationsOfMotion
@@ -62,16 +60,12 @@ class Timing:
 @functools.lru_cache(maxsize=1024)
 def timing_of(entry: Expr) -> Timing:
     """Find the ways in which time enters an expression; cached."""
-    timed: set[Expr] = set()
-    for node in walk(entry):
-        if node.op == "time" or not timed.isdisjoint(operands(node)):
-            timed.add(node)
     clocks: dict[Expr, tuple[Expr, bool]] = {}
     phases: dict[Expr, Expr] = {}
     complete, waiting, seen = True, [entry], set()
     while waiting:
         node = waiting.pop()
-        if node in seen or node not in timed:
+        if node in seen or not depends_on(node, ("time",)):
             continue
         seen.add(node)
         below = list(node.args)
@@ -122,9 +116,9 @@ def check_periodic(system: EquationsOfMotion) -> None:
 
 def _entries(system: EquationsOfMotion) -> list[Expr]:
     """The field where no contact is held, then the gaps of the guards and the expressions of the
-    laws.
+    laws, then the outputs.
     """
-    return list(_written(system.field, system.guards))
+    return [*_written(system.field, system.guards), *system.outputs.formulas]
 
 
 @functools.lru_cache(maxsize=256)
@@ -170,6 +164,7 @@ def _check_samples(system: EquationsOfMotion, period: float, unsure: list[int]) 
     bits = [random.random(sizes.shape) < 0.5 for _ in system.guards]
     for bit, at_rest in zip(bits, sides(system, 0.0, np.zeros(len(system.states))), strict=True):
         bit[0] = at_rest
+    bits += [random.random(sizes.shape) < 0.5 for _ in system.outputs.guards]
     t = period * random.uniform(0, 3, (1, 8))
     now, later = (
         evaluate(expressions, t=when, states=states, values=system.values, bits=bits)
@@ -187,8 +182,11 @@ def _check_samples(system: EquationsOfMotion, period: float, unsure: list[int]) 
 def _not_periodic(system: EquationsOfMotion, entry: int, period: float) -> Text:
     """The message about the entry of the field or the guard that doesn't repeat."""
     count = len(system.states)
+    output = entry - len(_written(system.field, system.guards))
     what = (
-        f"d{system.states[entry]}/dt"
+        f"the output {system.outputs.names[output]!r}"
+        if output >= 0
+        else f"d{system.states[entry]}/dt"
         if entry < count
         else f"the boundary {system.guards[entry - count].name!r}"
         if entry < count + len(system.guards)

@@ -1,30 +1,22 @@
-"""Quantities: functions of time, states and parameters that a user adds to a system - a surface to
-cross, a power to integrate.
+"""What is added to a system: a surface to cross, a power to integrate.
 
-A quantity is traced as an equation is. Comparisons in it that mean a guard of the system read that
-guard's side; others become guards of their own, behind those of the system. The sign of friction
-that sticks is the one that holds it. With it the flow needs nothing new: a surface is one more
-guard, an integral one more state, and both come with the flow's own precision.
+The flow needs nothing new for it: a surface is one more guard, an integral one more state, and both
+come with the flow's own precision.
 """
 
 from __future__ import annotations
 
 import functools
-import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
-from saltus.contact.guards import Guard, Law, bits_in, expressions_of, join_guards, surface_guard
-from saltus.contact.singular import lifted
-from saltus.contact.surfaces import with_held_signs
-from saltus.errors import ParameterError, TraceError, nearest, shown
+from saltus.contact.guards import Guard, Law, bits_in, expressions_of, surface_guard
+from saltus.errors import ParameterError, among, shown, unknown
+from saltus.language.derivatives import gradient, time_derivative
 from saltus.language.expression import (
-    TIME,
     Bit,
     Expr,
     add,
-    as_expr,
     constant,
     div,
     mul,
@@ -36,121 +28,13 @@ from saltus.language.expression import (
     substituted,
 )
 from saltus.language.names import why_no_name
-from saltus.system.explained import explained, place
+from saltus.language.sums import total
+from saltus.system.read_off import Quantity, quantity
 from saltus.system.system import System
 from saltus.units import check_declared, to_si
 
 #: Suffix of a remembered state's name, which no user can write.
 _REMEMBERED = " before a jump"
-#: A function of (t, states, parameters), each argument by its name.
-Quantity = Callable[..., Any]
-
-
-def quantity(
-    system: System, function: Quantity, what: str = "a quantity"
-) -> tuple[Expr, tuple[Guard, ...]]:
-    """Trace a function of time, states and parameters of a system.
-
-    Parameters
-    ----------
-    system : System
-        Whose states and parameters the arguments are.
-    function : callable
-        Its arguments are found by name: ``t`` (the time), states, parameters, as many as it needs,
-        in any order; ``**rest`` takes all other parameters. So the signature of the equation itself
-        will do. Default values aren't used. It returns one number.
-    what : str
-        Words for the function in messages: ``"the surface"``.
-
-    Returns
-    -------
-    Expr, tuple of Guard
-        The expression, with bits in its conditions; the guards that these number: those of the
-        system, then new ones.
-
-    Raises
-    ------
-    TraceError
-        If an argument is neither time, state nor parameter, or the function can't be traced.
-    """
-    returned = called(system, function, what)
-    title = f"{what} of {system.name}"
-    try:
-        expression = as_expr(returned)
-    except Exception as error:
-        raise TraceError(*explained(error, function, title)) from error
-    try:
-        (root,), guards = join_guards([expression], system.guards)
-        (root,) = lifted([root], guards)
-        root = with_held_signs(root, guards, system.states)
-    except TraceError as error:
-        raise TraceError(f"{title} ({place(function)}): ", error) from error
-    return root, guards
-
-
-def called(system: System, function: Quantity, what: str) -> Any:
-    """The result of a user's function of time, states and parameters for symbols. Raises as
-    :func:`quantity` does.
-    """
-    if not callable(function) or isinstance(function, System):
-        names = ", ".join(("t", *_own_states(system)))
-        raise TraceError(
-            f"{what} must be a function such as `lambda {names}: ...`, not {shown(function)}. "
-            f"Parameters are further arguments, by name."
-        )
-    title = f"{what} of {system.name}"
-    positional, named = _arguments(system, function, title)
-    try:
-        returned = function(*positional, **named)
-        if returned is None:
-            raise TraceError("it returns nothing. End it with: return ...")
-    except Exception as error:
-        raise TraceError(*explained(error, function, title)) from error
-    return returned
-
-
-def _own_states(system: System) -> tuple[str, ...]:
-    """The states that a user knows: those of a tangent aren't named in functions."""
-    return (system.tangent_of or system).states
-
-
-def _arguments(
-    system: System, function: Quantity, title: str
-) -> tuple[list[Expr], dict[str, Expr]]:
-    """Symbols for the arguments of a function, by name."""
-    states = _own_states(system)
-    known = {
-        "t": TIME,
-        **{name: parameter(name) for name in system.values},
-        **{name: state(name) for name in states},
-    }
-    try:
-        arguments = list(inspect.signature(function).parameters.values())
-    except ValueError:  # of a class or function of C
-        raise TraceError(
-            f"{title}: Python doesn't know the arguments of {function!r:.80}. Write a "
-            f"function of names, such as x."
-        ) from None
-    plain = [a.name for a in arguments if a.kind in (a.POSITIONAL_ONLY, a.POSITIONAL_OR_KEYWORD)]
-    if tuple(plain[1:]) == states:
-        known[plain[0]] = TIME  # written as an equation: its first argument is the time
-    positional: list[Expr] = []
-    named: dict[str, Expr] = {}
-    for argument in arguments:
-        if argument.kind == argument.VAR_KEYWORD:
-            rest = set(system.values) - {a.name for a in arguments}
-            named.update((name, known[name]) for name in system.values if name in rest)
-        elif argument.kind == argument.VAR_POSITIONAL or argument.name not in known:
-            raise TraceError(
-                f"{title} ({place(function)}) asks for {argument.name!r}, which is neither t nor a "
-                f"state or parameter of {system.name}. "
-                f"{nearest(argument.name, known)} Constants of its own belong in its body."
-            )
-        elif argument.kind == argument.KEYWORD_ONLY:
-            named[argument.name] = known[argument.name]
-        else:
-            positional.append(known[argument.name])
-    return positional, named
 
 
 # -- surfaces --------------------------------------------------------------------------------------
@@ -164,7 +48,7 @@ def with_surface(system: System, surface: Quantity | str, name: str = "surface")
         The equations and values.
     surface : callable or str
         The motion is on the surface where this function of (t, states, parameters) is zero (see
-        :func:`quantity`); or the name of a state, for the surface on which that state is zero.
+        :func:`quantity`); or the name of a state or an output, for the surface on which it is zero.
     name : str
         Name of the guard; it gets primes if the system has one of that name.
 
@@ -183,22 +67,21 @@ def with_surface(system: System, surface: Quantity | str, name: str = "surface")
         If there is no such state.
     """
     if isinstance(surface, str):
-        system.state_unit(surface)
-        return _with_guard(system, state(surface), system.guards, name)
+        return _with_guard(system, *formula_of(system, surface), name)
     gap, guards = quantity(system, surface, "the surface")
     return _with_guard(system, gap, guards, name)
 
 
 def with_level(system: System, name: str, level: float | str) -> System:
-    """The system with a surface at a level of one state. The level is a new parameter, so another
-    one recompiles nothing.
+    """The system with a surface at a level of a state or an output. The level is a new parameter,
+    so another one recompiles nothing.
 
     Parameters
     ----------
     system : System
         The equations and values.
     name : str
-        A state.
+        A state or an output.
     level : float or str
         Its value on the surface: a number in SI, or text with a unit. It becomes the parameter
         ``surface_level``.
@@ -213,41 +96,72 @@ def with_level(system: System, name: str, level: float | str) -> System:
     ParameterError, UnitError
         If there is no such state, or the level isn't a finite number in its unit.
     """
-    unit, key = system.state_unit(name), _free("surface_level", system)
+    formula, guards = formula_of(system, name)
+    unit, key = unit_of(system, name), _free("surface_level", system)
     value = to_si(level, unit, f"the level of {name}")
     extended = replace(
         system, values={**system.values, key: value}, units={**system.units, key: unit}
     )
-    return _with_guard(extended, sub(state(name), parameter(key)), system.guards, key)
+    return _with_guard(extended, sub(formula, parameter(key)), guards, key)
 
 
 def turning_surface(system: System, name: str) -> System:
-    """The system with a surface on which a state turns: its rate is zero, from + to - (direction
-    -1) at a maximum.
+    """The system with a surface on which a state or an output turns: its rate is zero, from + to -
+    (direction -1) at a maximum.
 
     Parameters
     ----------
     system : System
         The equations and values.
     name : str
-        A state.
+        A state or an output.
 
     Returns
     -------
     System
-        The last guard is the surface; its gap is the rate of the state.
+        The last guard is the surface; its gap is the rate.
 
     Raises
     ------
     ParameterError
-        If there is no such state.
+        If there is no such state or output.
     TraceError
-        If the rate depends on no state, so that the state turns at given times.
+        If the rate depends on no state, so that it turns at given times.
     """
-    system.state_unit(name)
-    return _with_guard(
-        system, system.field[system.states.index(name)], system.guards, f"{name} turns"
-    )
+    formula, guards = formula_of(system, name)
+    return _with_guard(system, rate_of(system, formula), guards, f"{name} turns")
+
+
+def formula_of(system: System, name: str) -> tuple[Expr, tuple[Guard, ...]]:
+    """A state or an output of a system, and the guards that its bits number: those of the system,
+    and where it needs more, those of the outputs. Raises ParameterError for any other name.
+    """
+    if not among(name, system.outputs.names):
+        unit_of(system, name)
+        return state(name), system.guards
+    formulas, guards = system.outputs.behind(system.guards)
+    formula = formulas[system.outputs.names.index(name)]
+    more = bits_in([formula]) - set(range(len(system.guards)))
+    return formula, guards if more else system.guards
+
+
+def rate_of(system: System, formula: Expr) -> Expr:
+    """The time derivative of a function of the states and the time, in a frozen mode."""
+    slopes = gradient(formula, system.states)
+    moved = [mul(slope, rate) for slope, rate in zip(slopes, system.field, strict=True)]
+    return total([one for one in (*moved, time_derivative(formula)) if one is not constant(0.0)])
+
+
+def unit_of(system: System, name: str) -> str:
+    """Unit of a state or an output; ``""`` if it isn't known. Raises ParameterError for any other
+    name.
+    """
+    units = {one: system.units[one] for one in system.states}
+    units |= dict(zip(system.outputs.names, system.outputs.units, strict=True))
+    if not among(name, units):
+        what = "state or output" if len(system.outputs) else "state"
+        raise unknown(f"{system.name} has no {what}", name, units)
+    return units[name]
 
 
 def acting_guards(system: System) -> tuple[int, ...]:
@@ -269,7 +183,7 @@ def _with_guard(system: System, gap: Expr, guards: tuple[Guard, ...], name: str)
 
 # -- integrals -------------------------------------------------------------------------------------
 def with_integrals(
-    system: System, integrands: Mapping[str, Quantity], units: Mapping[str, str] | None = None
+    system: System, integrands: Mapping[str, Quantity | str], units: Mapping[str, str] | None = None
 ) -> System:
     """The system with more states, each the integral of a function along the motion; their starts
     are given, as a rule zero.
@@ -278,9 +192,9 @@ def with_integrals(
     ----------
     system : System
         The equations and values.
-    integrands : mapping of str to callable
+    integrands : mapping of str to callable or str
         Integrands by the name of the new state: functions of (t, states, parameters), see
-        :func:`quantity`. They can't use the other integrals.
+        :func:`quantity`, or names of states or outputs. They can't use the other integrals.
     units : mapping of str to str, optional
         Coherent SI unit of each integral.
 
@@ -306,7 +220,10 @@ def with_integrals(
                 f"an integral of {system.name} can't be called {shown(name)}: use letters, digits "
                 f"and _, and no name it has."
             )
-        rate, guards = quantity(extended, function, f"the integrand {shown(name)}")
+        if isinstance(function, str):
+            rate, guards = formula_of(extended, function)
+        else:
+            rate, guards = quantity(extended, function, f"the integrand {shown(name)}")
         extended = replace(extended, guards=guards)
         rates.append(rate)
     return with_states(extended, dict(zip(integrands, rates, strict=True)), new_units)

@@ -22,6 +22,9 @@ from saltus.language import expression as ex
 from saltus.language.names import why_no_name
 from saltus.system import checks
 from saltus.system.guard_units import gap_units
+from saltus.system.named_outputs import NO_OUTPUTS
+from saltus.system.outputs import with_formula
+from saltus.system.read_off import joined
 from saltus.system.system import System
 from saltus.units import coherent_unit
 
@@ -119,7 +122,10 @@ def regularise(
     _check_both_sides(system, parameters)
     called = law if isinstance(law, str) else getattr(law, "__name__", "law").strip("<>")
     try:
-        field, guards = blended(system.field, system.guards, system.states, step, parameters)
+        field, guards, formulas = blended(
+            system.field, system.guards, system.states, step, parameters,
+            (system.outputs.formulas, system.outputs.guards),
+        )  # fmt: skip
     except TraceError as error:
         raise TraceError(f"{system.name}, regularised: ", error) from error
     slips = " Friction slips only: its static limit is left out." if static else ""
@@ -127,7 +133,7 @@ def regularise(
         f"Regularised: {called} over {', '.join(values)} in place of the boundaries "
         f"{', '.join(system.guards[number].name for number in parameters)}.{slips}"
     )
-    return replace(
+    smooth = replace(
         system,
         name=f"{system.name} regularised by {called}",
         description=f"{system.description}\n\n{description}".strip(),
@@ -135,7 +141,12 @@ def regularise(
         guards=guards,
         values={**system.values, **values},
         units={**system.units, **units},
+        outputs=NO_OUTPUTS,
     )
+    old, new = system.outputs, replace(NO_OUTPUTS, first=system.outputs.first)
+    for name, unit, formula in zip(old.names, old.units, formulas, strict=True):
+        new = with_formula(smooth, new, name, *joined(formula, smooth, new), unit)
+    return replace(smooth, outputs=new) if len(new) else smooth
 
 
 def _without_laws(system: System) -> System:
@@ -148,10 +159,19 @@ def _without_laws(system: System) -> System:
                 f"{system.name}: at {guard.name!r} the state jumps, and nothing smooth stands for "
                 f"that. Write the contact as a stiff spring and a damper."
             )
+    guards, outputs = system.guards, system.outputs
+    left = tuple(guard for guard in guards if not is_hold(guard))
+    gaps = free_field([guard.gap for guard in outputs.guards], guards)
+    formulas, every = replace(
+        outputs,
+        formulas=free_field(outputs.formulas, guards),
+        guards=tuple(replace(one, gap=gap) for one, gap in zip(outputs.guards, gaps, strict=True)),
+    ).behind(left)
     return replace(
         system,
-        field=free_field(system.field, system.guards),
-        guards=tuple(guard for guard in system.guards if not is_hold(guard)),
+        field=free_field(system.field, guards),
+        guards=left,
+        outputs=replace(outputs, formulas=formulas, guards=every[len(left) :], after=len(left)),
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from saltus.contact.guards import Guard, Law, bits_in, expressions_of, is_hold
@@ -22,10 +22,17 @@ from saltus.language.expression import (
     varies,
     walk,
 )
-from saltus.language.names import why_no_name, why_no_text, why_no_title, why_not_together
+from saltus.language.names import (
+    why_no_name,
+    why_no_output,
+    why_no_text,
+    why_no_title,
+    why_not_together,
+)
 from saltus.language.operations import ARITHMETIC, FUNCTIONS
 from saltus.language.tables import Table
 from saltus.system.equations_of_motion import EquationsOfMotion
+from saltus.system.named_outputs import NO_OUTPUTS, NamedOutputs
 from saltus.units import check_declared
 
 #: Version of the data's meaning, for systems without a law of contact.
@@ -53,21 +60,34 @@ def to_dict(system: EquationsOfMotion) -> dict[str, Any]:
         "values": dict(system.values),
         "units": dict(system.units),
         **({"made": system.made} if system.made else {}),
+        **({"outputs": _outputs_data(system.outputs)} if len(system.outputs) else {}),
         **_equations(system),
     }
 
 
-def _format(system: EquationsOfMotion) -> str:
-    return WITH_LAWS if any(guard.law for guard in system.guards) else FORMAT
+def _outputs_data(outputs: NamedOutputs) -> dict[str, Any]:
+    """The outputs, which the generated code doesn't depend on."""
+    nodes, index = _nodes([*outputs.formulas, *_boundaries(outputs.guards)])
+    return {
+        "names": list(outputs.names),
+        "units": list(outputs.units),
+        "first": outputs.first,
+        "nodes": nodes,
+        "formulas": [index[one] for one in outputs.formulas],
+        "guards": [_guard_data(guard, index) for guard in outputs.guards],
+    }
 
 
-def _equations(system: EquationsOfMotion) -> dict[str, Any]:
-    """The part that the generated code depends on."""
-    roots = [*system.field]
-    for guard in system.guards:
-        roots += [guard.gap] if guard.boundary is None else [guard.gap, guard.boundary]
-    for guard in system.guards:
-        roots += guard.law.expressions() if guard.law else ()
+def _boundaries(guards: Iterable[Guard]) -> list[Expr]:
+    """The gaps of guards, and the levels of states that some of them are."""
+    found = []
+    for guard in guards:
+        found += [guard.gap] if guard.boundary is None else [guard.gap, guard.boundary]
+    return found
+
+
+def _nodes(roots: Iterable[Expr]) -> tuple[list[Any], dict[Expr, int]]:
+    """The nodes below the roots as data, and the number of each."""
     index: dict[Expr, int] = {}
     nodes = []
     for node in walk(*roots):
@@ -76,22 +96,36 @@ def _equations(system: EquationsOfMotion) -> dict[str, Any]:
         if isinstance(payload, Table):
             payload = payload.to_data()
         nodes.append([node.op, [index[child] for child in node.args], payload])
+    return nodes, index
+
+
+def _guard_data(guard: Guard, index: Mapping[Expr, int]) -> list[Any]:
+    return [
+        guard.name,
+        index[guard.gap],
+        guard.state,
+        None if guard.boundary is None else index[guard.boundary],
+        *([_law_data(guard.law, index)] if guard.law else []),
+    ]
+
+
+def _format(system: EquationsOfMotion) -> str:
+    return WITH_LAWS if any(guard.law for guard in system.guards) else FORMAT
+
+
+def _equations(system: EquationsOfMotion) -> dict[str, Any]:
+    """The part that the generated code depends on."""
+    roots = [*system.field, *_boundaries(system.guards)]
+    for guard in system.guards:
+        roots += guard.law.expressions() if guard.law else ()
+    nodes, index = _nodes(roots)
     return {
         "states": list(system.states),
         "parameters": list(system.values),
         "forced_at": system.forced_at,
         "nodes": nodes,
         "field": [index[root] for root in system.field],
-        "guards": [
-            [
-                guard.name,
-                index[guard.gap],
-                guard.state,
-                None if guard.boundary is None else index[guard.boundary],
-                *([_law_data(guard.law, index)] if guard.law else []),
-            ]
-            for guard in system.guards
-        ],
+        "guards": [_guard_data(guard, index) for guard in system.guards],
     }
 
 
@@ -189,13 +223,7 @@ def _read(data: Mapping[str, Any]) -> dict[str, Any]:
     )
     _require(len({*states, *parameters}) == len(states) + len(parameters), "a name stands twice")
     names = {"state": set(states), "param": set(parameters)}
-    nodes: list[Expr] = []
-    for op, args, payload in data["nodes"]:
-        _require(
-            len(args) == _OPERANDS[op] and all(0 <= i < len(nodes) for i in args),
-            f"wrong operands of {op!r}",
-        )
-        nodes.append(_node(op, tuple(nodes[i] for i in args), payload, names, nodes))
+    nodes = _read_nodes(data["nodes"], names)
     places = [
         *data["field"],
         *(guard[1] for guard in data["guards"]),
@@ -261,7 +289,51 @@ def _read(data: Mapping[str, Any]) -> dict[str, Any]:
         "field": field,
         "guards": guards,
         "made": made,
+        "outputs": _outputs(data.get("outputs"), names, len(guards)),
     }
+
+
+def _read_nodes(data: Any, names: Mapping[str, set[str]]) -> list[Expr]:
+    nodes: list[Expr] = []
+    for op, args, payload in data:
+        _require(
+            len(args) == _OPERANDS[op] and all(0 <= i < len(nodes) for i in args),
+            f"wrong operands of {op!r}",
+        )
+        nodes.append(_node(op, tuple(nodes[i] for i in args), payload, names, nodes))
+    return nodes
+
+
+def _outputs(
+    data: Mapping[str, Any] | None, names: Mapping[str, set[str]], after: int
+) -> NamedOutputs:
+    """The outputs from their data, checked; they stand behind the guards of the system."""
+    if data is None:
+        return NO_OUTPUTS
+    titles, nodes = tuple(data["names"]), _read_nodes(data["nodes"], names)
+    for name in titles:
+        _require(why_no_output(name) is None, f"{shown(name)} is no name of an output")
+        _require(name not in names["state"] | names["param"], f"{shown(name)} stands twice")
+    _require(len(set(titles)) == len(titles), "an output stands twice")
+    _require(len(data["units"]) == len(data["formulas"]) == len(titles), "an output isn't whole")
+    places = [*data["formulas"], *(i for one in data["guards"] for i in (one[1], one[3]))]
+    _require(
+        all(0 <= i < len(nodes) for i in places if i is not None), "an output stands in no node"
+    )
+    guards = tuple(
+        Guard(str(name), nodes[gap], state, None if boundary is None else nodes[boundary])
+        for name, gap, state, boundary in data["guards"]
+    )
+    formulas = tuple(nodes[i] for i in data["formulas"])
+    for number, guard in enumerate(guards, start=after):
+        _require(bits_in([guard.gap]) <= set(range(number)), "a gap depends on a later guard")
+    _require(
+        bits_in(formulas) <= set(range(after + len(guards))), "an output names an unknown guard"
+    )
+    units = tuple(
+        check_declared(unit, name) for unit, name in zip(data["units"], titles, strict=True)
+    )
+    return NamedOutputs(titles, units, formulas, guards, after, bool(data["first"]))
 
 
 def _law(

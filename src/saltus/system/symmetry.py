@@ -46,8 +46,12 @@ def is_symmetric(system: System, varied: Mapping[str, tuple[float, float]]) -> b
     if period is None:
         return False
     size = 10 ** random.uniform(*SIZES, SAMPLES)
-    sample = _Place(system, random.uniform(0, 1, SAMPLES) * period, values,
-                  size * random.normal(size=(len(system.states), SAMPLES)))  # fmt: skip
+    sample = _Place(
+        system,
+        random.uniform(0, 1, SAMPLES) * period,
+        values,
+        size * random.normal(size=(len(system.states), SAMPLES)),
+    )
     mirrored = _Place(system, sample.time + period / 2, values, -sample.states)
     if not all(map(_opposite, sample.of(system.field), mirrored.of(system.field))):
         return False

@@ -11,13 +11,14 @@ import numpy as np
 
 from saltus.contact.singular import is_steep
 from saltus.errors import ParameterError, among, nearest, shown, unknown
-from saltus.language.derivatives import gradient
+from saltus.language.derivatives import gradients
 from saltus.language.expression import Expr
 from saltus.system import checks, serial
 from saltus.system.display import equation_lines, system_html, system_text
 from saltus.system.equations_of_motion import EquationsOfMotion
 from saltus.system.fixed import Units, Values, no_change
 from saltus.system.modes import field
+from saltus.system.outputs import with_more
 from saltus.system.periodic import check_periodic
 from saltus.units import from_si
 
@@ -48,6 +49,9 @@ class System(EquationsOfMotion):
     tangent_of : System or None
         The system whose variational equations this one carries (see tangent.py); None for any
         other.
+    outputs : NamedOutputs
+        Named functions of the motion, which results hold besides the states (see
+        :meth:`with_outputs`).
     made : int
         How many of the last states elements with a memory have brought (see contact/memory.py); a
         start that doesn't give them is zero.
@@ -108,6 +112,30 @@ class System(EquationsOfMotion):
         origin: System = vars(self).get("_origin", self)
         return origin
 
+    def with_outputs(self, outputs: Mapping[str, Any]) -> System:
+        """The same equations with named outputs: sensors, forces, accelerations, whatever is read
+        off the motion. Every function then gives them besides the states. Nothing is compiled
+        again.
+
+        Parameters
+        ----------
+        outputs : mapping of str to callable, or to (callable, unit)
+            Functions of (t, states, parameters), arguments found by name: ``{"tip": lambda q1, q2:
+            0.3 * q1 - 0.1 * q2, "spring force": (lambda x, k: k * x, "N")}``. ``*q`` takes the
+            states ``q1``, ``q2``, ...: ``lambda *q: row @ q``. One may use those before it. They
+            come behind the outputs that the system has.
+
+        Raises
+        ------
+        ParameterError
+            If a name is taken or can't be one, or there are too many.
+        UnitError
+            If a unit isn't that of its formula.
+        TraceError
+            If a function can't be traced, or doesn't repeat with the forcing.
+        """
+        return replace(self, outputs=with_more(self, outputs))
+
     def resolve(self, name: str, value: Any) -> Any:
         """A value for a parameter, in SI and checked; the system itself stays as it is.
 
@@ -141,7 +169,7 @@ class System(EquationsOfMotion):
         """Derivative of each entry of the field (row) with respect to each state (column), in a
         frozen mode.
         """
-        return tuple(gradient(entry, self.states) for entry in self.field)
+        return gradients(self.field, self.states)
 
     @functools.cached_property
     def is_steep(self) -> bool:
@@ -155,7 +183,7 @@ class System(EquationsOfMotion):
     @functools.cached_property
     def guard_gradients(self) -> tuple[tuple[Expr, ...], ...]:
         """Derivative of each gap (row) with respect to each state (column), in a frozen mode."""
-        return tuple(gradient(guard.gap, self.states) for guard in self.guards)
+        return gradients([guard.gap for guard in self.guards], self.states)
 
     def rhs(self, t: Any, y: Any) -> np.ndarray:
         """The right-hand side as a plain function: time derivatives of the states, by NumPy.
@@ -271,6 +299,8 @@ class System(EquationsOfMotion):
             return (
                 f"{shown(name)} is a state. Its motion is sl.simulate({self.name}, ...)[{name!r}]."
             )
+        if among(name, self.outputs.names):
+            return f"{shown(name)} is an output: sl.simulate({self.name}, ...)[{name!r}]."
         if among(name, _DONE_ELSEWHERE):
             return f"write {_DONE_ELSEWHERE[name].format(self.name)}."
         return (

@@ -86,6 +86,7 @@ def system(
     name: str | None = None,
     source: str = "",
     check_units: bool = True,
+    outputs: Mapping[str, Any] | None = None,
 ) -> Callable[[Callable[..., Any]], System]:
     """Decorator that turns an equation of motion into a :class:`System`.
 
@@ -117,6 +118,10 @@ def system(
     check_units : bool, optional
         Whether to check known units: terms of a sum or comparison have one unit, and each rate has
         that of its state per second. False for equations whose numbers have units of their own.
+    outputs : mapping of str to callable, or to (callable, unit), optional
+        Named functions of the motion, such as a sensor or a force, which every result holds besides
+        the states: ``{"spring force": (lambda x, k: k * x, "N")}``; as of
+        :meth:`saltus.System.with_outputs`.
 
     Returns
     -------
@@ -200,7 +205,8 @@ def system(
                 description=description,
                 made=len(remembered),
             )
-            return with_guard_names(made, guards) if guards else made
+            made = with_guard_names(made, guards) if guards else made
+            return made.with_outputs(outputs) if outputs is not None else made
 
     return decorate
 

@@ -16,7 +16,8 @@ from saltus.language.evaluate import evaluate
 from saltus.language.expression import Expr
 from saltus.system import System
 from saltus.system.modes import field, sides
-from saltus.system.quantity import acting_guards, quantity, with_integrals, with_surface
+from saltus.system.quantity import acting_guards, with_integrals, with_surface
+from saltus.system.read_off import quantity
 from saltus.system.tangent import tangent_system
 
 RANDOM = np.random.default_rng(40)

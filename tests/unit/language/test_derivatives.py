@@ -8,7 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from saltus.language import expression as ex
-from saltus.language.derivatives import differentiate, gradient, time_derivative
+from saltus.language.derivatives import differentiate, gradient, gradients, time_derivative
 from saltus.language.evaluate import evaluate
 from saltus.language.operations import ELEMENTARY
 
@@ -140,3 +140,27 @@ def test_cost_grows_with_the_graph():
         power = ex.elementary("sin", power) * power
     assert sum(1 for _ in ex.walk(differentiate(power, X))) < 5000
     assert np.isfinite(at(differentiate(power, X), dict.fromkeys(LEAVES, 0.5)))
+
+
+@settings(max_examples=60, deadline=None)
+@given(data=st.data())
+def test_gradients_are_the_derivatives_one_by_one(expressions, data):
+    a, b = data.draw(expressions), data.draw(expressions)
+    pieces = ex.select(ex.Bit(0), a, b)
+    roots = [a, a - pieces, (pieces + b) * pieces, a + a, (a - b) + (pieces - a)]
+    for root, row in zip(roots, gradients(roots, ["x", "none", "v"]), strict=True):
+        one_by_one = [differentiate(root, leaf) for leaf in (X, ex.state("none"), V)]
+        for together, alone in zip(row, one_by_one, strict=True):
+            assert together is alone or together.payload == alone.payload == 0  # 0 or -0
+
+
+def test_the_gradient_of_a_sum_takes_a_step_for_each_term():
+    def steps(terms):
+        total, count = ex.constant(0), []
+        for i in range(terms):
+            total = total + (i + 0.5) * ex.state(f"x{i}") if i % 3 else total - ex.state(f"x{i}")
+        with ex.observed(count.append):
+            gradient(total - P, [f"x{i}" for i in range(terms)])
+        return len(count)
+
+    assert steps(200) < 2.1 * steps(100)

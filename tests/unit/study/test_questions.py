@@ -474,3 +474,27 @@ def test_a_system_without_forcing_is_looked_at_every_so_often(tmp_path):
     assert question.arguments["every"] == 0.25
     (question,) = questions_of(parse(text), None, Inputs(tmp_path))
     assert question.arguments.get("every") is None  # about once a turn
+
+
+def test_a_motion_at_given_times_has_a_row_for_each(tmp_path):
+    text = HEAD + '[simulate]\nstart = { x = "1 mm", v = "0 m/s" }\nat = ["20 ms", "5 ms"]\n'
+    Run(tmp_path, text)
+    run = load(next(tmp_path.rglob("run.nc")))
+    np.testing.assert_array_equal(run.time, [0.02, 0.005])
+    assert run.end_time == 0.02
+    with pytest.raises(StudyError, match="not both"):
+        Run(tmp_path / "both", text + "samples = 3\n")
+
+
+def test_a_motion_that_ends_at_a_condition_says_so(tmp_path):
+    text = HEAD + '[simulate]\nstart = { x = ["1 mm", "0 mm"], v = "0 m/s" }\nperiods = 3\n'
+    Run(tmp_path / "ends", text + 'until = "x < 0.5 mm and v < 0 m/s"\n')
+    ends = load(next((tmp_path / "ends").rglob("run.nc")))
+    assert ends.status.values.tolist() == ["until", "until"]
+    assert abs(ends.end_x[0] - 0.0005) < 1e-18
+    wrong = {"x < 0.5 N": "one unit", "q < 0.5 mm": "'q' is neither", "x >": "can't be read"}
+    for until, says in wrong.items():
+        with pytest.raises(StudyError, match=says):
+            Run(tmp_path / "wrong", f'{text}until = "{until}"\n')
+    with pytest.raises(StudyError, match="Leave one"):
+        Run(tmp_path / "wrong", text + 'until = "x > 1 m"\nkeep = 1\n')

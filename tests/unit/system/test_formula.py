@@ -8,7 +8,7 @@ from saltus.errors import TraceError
 from saltus.language import curve
 from saltus.models import MODELS
 from saltus.system.formula import DEPTH, LONGEST, Equations, Formulas
-from saltus.system.quantity import quantity
+from saltus.system.read_off import quantity
 
 RIG = sl.models.delangre("b")
 

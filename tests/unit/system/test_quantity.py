@@ -9,13 +9,13 @@ from saltus.errors import ParameterError, TraceError, UnitError
 from saltus.language.expression import Bit, Not
 from saltus.language.text import to_text
 from saltus.system.quantity import (
-    quantity,
     remembering,
     turning_surface,
     with_integrals,
     with_level,
     with_surface,
 )
+from saltus.system.read_off import quantity
 from saltus.system.tangent import tangent_system
 
 
@@ -79,7 +79,6 @@ def _branches(x):
             r"asks for 'stifness', which is neither t nor a state or parameter "
             r"of rig. Did you mean 'stiffness'\?",
         ),
-        (lambda *args: args, "asks for 'args'"),
         (lambda x: None, "returns nothing"),
         (_branches, r"if x > 0"),
         (lambda x: (x, x), "neither a number nor a traced value"),

@@ -27,9 +27,10 @@ FIRST_LOOK = BLOCKS // 5
 SURE = 4.0
 #: Exponent [per iterate] that is taken for zero whatever its error.
 FLOOR = 2e-3
-#: Recurrence below 1e-6 of the scale means periodic; a recurrence that falls by 20 means
-#: converging.
-REPEATS, SETTLING = 1e-6, 0.05
+#: Recurrence below this, in units of the scale, means periodic.
+REPEATS = 1e-6
+#: A recurrence that falls to this share of itself means converging.
+SETTLING = 0.05
 #: Iterates by which such an attractor is known.
 SURVEY_ITERATES = 4096
 #: Boxes across the range of a state. The finest is taken at which one half of the points knows the

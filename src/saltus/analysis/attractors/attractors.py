@@ -14,6 +14,7 @@ from saltus.analysis.attractors.portrait import portraits
 from saltus.analysis.closed.spread import spread
 from saltus.analysis.closed.turns import looks_every
 from saltus.analysis.dataset_parts import provenance, subject
+from saltus.analysis.inputs.given import Starts
 from saltus.analysis.inputs.starts import ensemble
 from saltus.analysis.inputs.verb import verb
 from saltus.flow.counts import whole
@@ -31,7 +32,7 @@ from saltus.system import System
 @verb
 def attractors(
     system: System,
-    start: Any,
+    start: Starts,
     *,
     method: Method | None = None,
     periods: int = 2000,
@@ -65,7 +66,8 @@ def attractors(
     start : sequence, mapping or array
         Starts, as for :func:`saltus.simulate`; one or many.
     method : Method
-        Default :class:`saltus.Taylor`.
+        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
+        it serves.
     periods : int
         Forcing periods after which a trajectory that hasn't settled is looked at for chaos.
     every : float or str, optional
@@ -108,7 +110,7 @@ def attractors(
     group, periods = ensemble(system, start, None), whole(periods, "periods")
     map_ = Stroboscope(
         system,
-        check_method(method),
+        check_method(method, system),
         every=looks_every(system, every, group.start),
         threads=threads,
     )

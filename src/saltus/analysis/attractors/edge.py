@@ -24,14 +24,18 @@ from saltus.flow.maps import Map
 
 #: Points that are tried between the two at once.
 BETWEEN = 15
-#: Distances to which the two are brought together, and from which on they have parted, in units of
-#: the scale.
-TOGETHER, PARTED = 1e-9, 1e-5
-#: Iterates on the boundary at most, and those before the first test for recurrence.
-MOST, FIRST = 256, 4
-#: Recurrence on the boundary from which Newton's method is tried, and how far from there its orbit
-#: may lie.
-NEAR, BESIDE = 1e-2, 0.1
+#: Distance to which the two are brought together, in units of the scale.
+TOGETHER = 1e-9
+#: Distance from which on they have parted, in units of the scale.
+PARTED = 1e-5
+#: Most iterates on the boundary.
+MOST = 256
+#: Iterates before the first test for recurrence.
+FIRST = 4
+#: Recurrence on the boundary from which Newton's method is tried.
+NEAR = 1e-2
+#: Farthest that its orbit lies from there.
+BESIDE = 0.1
 #: How far beside the orbit, along its unstable direction, both sides are looked at.
 ASIDE = 1e-6
 

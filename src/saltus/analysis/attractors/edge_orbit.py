@@ -15,6 +15,7 @@ from saltus.analysis.closed.orbit_table import table_of
 from saltus.analysis.closed.periodic_orbits import exact_method, orbits_dataset
 from saltus.analysis.closed.spread import spread
 from saltus.analysis.dataset_parts import provenance
+from saltus.analysis.inputs.given import Starts
 from saltus.analysis.inputs.starts import check_system, ensemble
 from saltus.analysis.inputs.verb import verb
 from saltus.errors import ParameterError
@@ -30,8 +31,8 @@ from saltus.units import from_si
 @verb
 def edge_orbit(
     system: System,
-    a: Any,
-    b: Any,
+    a: Starts,
+    b: Starts,
     *,
     method: Method | None = None,
     periods: int = 2000,
@@ -61,7 +62,8 @@ def edge_orbit(
     a, b : sequence or mapping
         Two starts, as for :func:`saltus.simulate`, that lead to different attractors.
     method : Method
-        Default :class:`saltus.Taylor`; another one has errors that keep unstable orbits from
+        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
+        it serves; another one has errors that keep unstable orbits from
         closing.
     periods : int
         Forcing periods after which a trajectory that hasn't settled is looked at for chaos.
@@ -101,7 +103,7 @@ def edge_orbit(
     """
     check_system(system)
     ends = np.concatenate([_one(system, "a", a), _one(system, "b", b)])
-    periods, method = whole(periods, "periods"), exact_method(method)
+    periods, method = whole(periods, "periods"), exact_method(method, system)
     _check_forced(system)
     map_ = Stroboscope(system, method, threads=threads)
     scale = spread(map_, ends)

@@ -34,8 +34,10 @@ Owners = list[ClosedMotion | SampledMotion | None]
 MAX_CANDIDATES = 12
 #: Trajectories that never recur whose motion is surveyed.
 MAX_SURVEYED = 24
-#: Iterates of the survey; recurrence below which its survivor is periodic after all.
-WATCHING_ITERATES, ARRIVED = 32 * 1024, 1e-5
+#: Iterates of the survey.
+WATCHING_ITERATES = 32 * 1024
+#: Recurrence below which its survivor is periodic after all.
+ARRIVED = 1e-5
 
 
 def find_attractors(
@@ -289,7 +291,7 @@ def _survey(
 
 def _watch(
     travel: Travel, going: np.ndarray, found: AttractorSet, owner: Owners, settled: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:  # fmt: skip
+) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
     """Trajectories that don't settle for SURVEY_ITERATES more, int64[k], their iterates, and those
     of the ones that do.
     """

@@ -31,15 +31,25 @@ from saltus.flow.threads import on_threads, usable_processors
 from saltus.kernels import status as st
 from saltus.results.dataset.kinds import Kind
 
-#: Trajectories that one thread follows at a time: so many, or fewer where each takes longer, so
-#: that all threads have work, and Ctrl-C finds some done. At least what fills the lanes; few are
-#: shared among all threads if each gets enough to fill its lanes some times.
-PIECE, PIECE_STATES, LANES, SHARED = 512, 2048, 8, 64
-#: Share of the work on a trajectory that is done when it has been followed, its growth is measured,
-#: and its iterates are known.
-FOLLOWED, MEASURED, KEPT = 0.4, 0.6, 0.7
-#: Periods, and samples in each, from which the range of a motion is taken.
-RANGE_PERIODS, SAMPLES_PER_PERIOD = 4, 32
+#: Most trajectories that one thread follows at a time, so that all threads have work, and Ctrl-C
+#: finds some done.
+PIECE = 512
+#: Most of them times the square of the number of states: each takes longer.
+PIECE_STATES = 2048
+#: Trajectories that fill the lanes: fewer aren't followed at a time.
+LANES = 8
+#: Trajectories that each thread gets at least: its lanes are filled some times.
+SHARED = 64
+#: Share of the work on a trajectory that is done when it has been followed.
+FOLLOWED = 0.4
+#: Share of the work that is done when its growth is measured.
+MEASURED = 0.6
+#: Share of the work that is done when its iterates are known.
+KEPT = 0.7
+#: Periods from which the range of a motion is taken.
+RANGE_PERIODS = 4
+#: Samples in each of these periods.
+SAMPLES_PER_PERIOD = 32
 #: Iterates that are kept of a motion that never repeats.
 KEPT_ITERATES = 1024
 

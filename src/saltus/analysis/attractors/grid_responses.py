@@ -225,7 +225,7 @@ def numbers_of(
     )
     rests = np.flatnonzero(found.kind == Kind.EQUILIBRIUM)
     if len(rests):
-        rest(map_.rows(rests), found.start()[rests], rests, numbers)
+        rest(map_.rows(rests), found.start()[rests], rests, numbers, outputs)
     return numbers
 
 

@@ -15,8 +15,10 @@ import numpy as np
 
 from saltus.flow.maps import Map, Stroboscope
 
-#: Iterates of one block, and blocks of one measurement.
-BLOCK, BLOCKS = 8, 192
+#: Iterates of one block.
+BLOCK = 8
+#: Blocks of one measurement.
+BLOCKS = 192
 #: Part of a measurement in which the direction finds its way: 1 in so many blocks.
 ALIGNING = 4
 #: Most states whose deviations the tangent flow carries: it costs up to 5 times the motion.

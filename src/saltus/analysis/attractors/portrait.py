@@ -5,6 +5,7 @@ columns of the attractor table.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from saltus.analysis.closed.field_zeros import autonomous, find_equilibria
 from saltus.analysis.closed.measures import Measures, measure, unknown
 from saltus.analysis.closed.motions import ClosedMotion
 from saltus.analysis.closed.unforced import rest
+from saltus.analysis.inputs.outputs import outputs_of
 from saltus.flow.maps import Map, Stroboscope
 from saltus.results import AttractorTable
 from saltus.results.dataset.kinds import Kind
@@ -67,6 +69,7 @@ def portraits(map_: Map, found: AttractorSet) -> AttractorTable:
         exponent_error=error,
         points=points,
         scatter=scatter if len(noisy) else None,
+        outputs=_outputs(map_, numbers),
     )
 
 
@@ -117,8 +120,9 @@ def _unforced(map_: Stroboscope, found: AttractorSet) -> AttractorTable:
         np.where(np.isfinite(cycle), cycle, map_.period)
     )
     closed = np.isin(kind, (Kind.EQUILIBRIUM.word, Kind.LIMIT_CYCLE.word)).astype(np.int64)
-    numbers = measure(own, start, closed, APERIODIC_PERIODS)
-    rest(map_.rows(np.arange(rests)), start[:rests], np.arange(rests), numbers)
+    asked = outputs_of(map_.system)
+    numbers = measure(own, start, closed, APERIODIC_PERIODS, asked)
+    rest(map_.rows(np.arange(rests)), start[:rests], np.arange(rests), numbers, asked)
     return AttractorTable(
         **numbers.columns(np.zeros(len(kind), np.int64)),
         kind=kind.tolist(),
@@ -128,6 +132,7 @@ def _unforced(map_: Stroboscope, found: AttractorSet) -> AttractorTable:
         points=points,
         cycle=cycle,
         eigenvalues=eigenvalues,
+        outputs=_outputs(map_, numbers),
     )
 
 
@@ -136,8 +141,21 @@ def _numbers(
 ) -> Measures:
     """The numbers of attractors from a point on each."""
     if isinstance(map_, Stroboscope):
-        return measure(map_.rows(np.arange(len(start))), start, period, APERIODIC_PERIODS)
+        rows, asked = map_.rows(np.arange(len(start))), outputs_of(map_.system)
+        return measure(rows, start, period, APERIODIC_PERIODS, asked)
     return _of_points(points, start.shape[1])
+
+
+def _outputs(map_: Map, numbers: Measures) -> dict[str, Any] | None:
+    """The numbers of the outputs of a flow; None of a system without outputs of its own."""
+    if not isinstance(map_, Stroboscope) or not len(map_.system.outputs):
+        return None
+    asked = outputs_of(map_.system)
+    return {
+        "output": list(asked.names),
+        "output_units": list(asked.units),
+        **{f"attractor_output_{name}": one for name, one in numbers.by_name().items()},
+    }
 
 
 def _of_points(points: list[np.ndarray], size: int) -> Measures:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -20,6 +19,7 @@ from saltus.analysis.closed.spread import spread
 from saltus.analysis.closed.turns import looks_every
 from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.inputs.box import box_ranges, draw
+from saltus.analysis.inputs.given import Range, Value
 from saltus.analysis.inputs.halton import halton
 from saltus.analysis.inputs.starts import check_system, fill, fixed_states
 from saltus.analysis.inputs.verb import verb
@@ -42,13 +42,13 @@ def basin_fractions(
     *,
     samples: int = 10_000,
     seed: int = 1,
-    at: Mapping[str, Any] | None = None,
+    at: Mapping[str, Value] | None = None,
     method: Method | None = None,
     periods: int = 2000,
     every: float | str | None = None,
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
-    **box: Any,
+    **box: Range,
 ) -> xr.Dataset:
     """Share of random starts that lead to each response, with confidence intervals. The starts are
     uniform in a box of any number of states.
@@ -110,7 +110,7 @@ def basin_fractions(
     )
     map_ = Stroboscope(
         system,
-        check_method(method),
+        check_method(method, system),
         every=looks_every(system, every, start),
         threads=threads,
     )

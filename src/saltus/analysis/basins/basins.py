@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 import xarray as xr
 
 from saltus.analysis.attractors.attractor_set import AttractorSet
 from saltus.analysis.basins.labels import Settling
 from saltus.analysis.basins.pipeline import BasinPlan, basin_plan
+from saltus.analysis.inputs.given import Axis, Value
 from saltus.analysis.inputs.verb import verb
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporting, stage
@@ -25,13 +25,13 @@ SCOUTING = 0.05
 def basins(
     system: System,
     *,
-    at: Mapping[str, Any] | None = None,
+    at: Mapping[str, Value] | None = None,
     method: Method | None = None,
     periods: int = 2000,
     every: float | str | None = None,
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
-    **axes: Any,
+    **axes: Axis,
 ) -> xr.Dataset:
     """The attractor that each start of a grid leads to, every attractor typed and verified.
 
@@ -61,7 +61,8 @@ def basins(
     at : mapping, optional
         Starts of the other states; default zero.
     method : Method
-        Default :class:`saltus.Taylor`.
+        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
+        it serves.
     periods : int
         Forcing periods that a trajectory is followed at most.
     every : float or str, optional
@@ -101,7 +102,9 @@ def basins(
     ((20, 20), [1, 1, 3, 9])
     """
     return map_of(
-        basin_plan(system, axes, at, check_method(method), periods, every), threads, progress
+        basin_plan(system, axes, at, check_method(method, system), periods, every),
+        threads,
+        progress,
     )
 
 

@@ -176,12 +176,13 @@ class BasinPlan:
         labels = result.label.reshape(self.shape)
         table = replace(portraits(map_, found), fractions=uncertainty.fractions(labels, len(found)))
         values = {
-            "<state>": self.axes, "basin": labels,
+            "<state>": self.axes,
+            "basin": labels,
             "periods_to_settle": result.periods.reshape(self.shape),
             "status": result.status.reshape(self.shape),
             "grazes_unresolved": result.unresolved.reshape(self.shape),
             **table.values(len(self.system.states)),
-        }  # fmt: skip
+        }
         flags = {
             "basin": basin_meanings(len(table)),
             "status": {code: name for code, (name, _) in st.STATUS.items()},

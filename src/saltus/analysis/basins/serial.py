@@ -101,9 +101,10 @@ def _found(data: Mapping[str, Any], size: int) -> AttractorSet:
 def _orbit_data(orbit: ClosedMotion) -> dict[str, Any]:
     values = orbit.multipliers
     return {
-        "points": orbit.points.tolist(), "mismatch": orbit.mismatch,
+        "points": orbit.points.tolist(),
+        "mismatch": orbit.mismatch,
         "multipliers": [[float(value.real), float(value.imag)] for value in values],
-    }  # fmt: skip
+    }
 
 
 def _orbit_from(data: Mapping[str, Any], size: int) -> ClosedMotion:
@@ -113,9 +114,12 @@ def _orbit_from(data: Mapping[str, Any], size: int) -> ClosedMotion:
 
 def _sampled_data(attractor: SampledMotion) -> dict[str, Any]:
     data = {
-        "kind": attractor.kind, "exponent": attractor.exponent, "error": attractor.exponent_error,
-        "points": attractor.points.tolist(), "scale": attractor.scale.tolist(),
-    }  # fmt: skip
+        "kind": attractor.kind,
+        "exponent": attractor.exponent,
+        "error": attractor.exponent_error,
+        "points": attractor.points.tolist(),
+        "scale": attractor.scale.tolist(),
+    }
     if not isinstance(attractor, Noisy):
         return data
     return data | {

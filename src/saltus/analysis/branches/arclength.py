@@ -11,10 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 
+from saltus.analysis.branches.equations import CurveEquations
 from saltus.analysis.solve.newton import Zeros, newton
 from saltus.flow.polynomials import between
 
@@ -30,51 +31,38 @@ CONTRACTS = 0.5
 #: Longest step over which the derivative and the tangent together change the sign of their
 #: determinant, in units of the scale: it passes a branch point, or leads to the branch beside.
 PASSING = 1e-3
-#: Farthest that a point lies from where it was predicted, in steps; more halves a step that is
-#: longer than this, in units of the scale: it may have passed over a loop of the curve.
-PREDICTED, SHORT = 0.05, 0.002
-#: Steps are doubled where so few evaluations sufficed and the tangent turned by less.
-EASY, STRAIGHT = 3, 0.995
-#: First, longest and shortest step, in units of the scale.
-FIRST, LONGEST, SHORTEST = 0.02, 0.12, 1e-7
-#: Distance from where a curve began, in units of the scale, at which steps may be longer than the
-#: longest; the least share of a tangent.
-FAR, TINY = 10.0, 1e-3
+#: Farthest that a point lies from where it was predicted, in steps: beyond, the step may have
+#: passed over a loop of the curve.
+PREDICTED = 0.05
+#: Steps shorter than this, in units of the scale, aren't halved for it.
+SHORT = 0.002
+#: Evaluations of a step behind which steps are doubled, at most.
+EASY = 3
+#: Cosine of the tangent's turn above which they are.
+STRAIGHT = 0.995
+#: First step, in units of the scale.
+FIRST = 0.02
+#: Longest step, in units of the scale.
+LONGEST = 0.12
+#: Shortest step, in units of the scale.
+SHORTEST = 1e-7
+#: Distance from where a curve began at which steps may be longer than the longest, in units of the
+#: scale.
+FAR = 10.0
+#: Least share of a tangent.
+TINY = 1e-3
 #: Distance from where a curve ends within which its last point lies, in units of the scale.
 ENDING = 0.0005
 #: Farthest that the corrector moves from the predicted point, in steps.
 ASTRAY = 0.6
-#: Points after which a curve may be found to be closed, and the cosine of the angle at which it
-#: then passes its start.
-LEAST_CLOSED, AGAIN = 8, 0.9
-#: Farthest that a step lies from a point that it passes, and from the line between its ends, in
-#: steps.
-PASSED, BENDS = 0.02, 0.1
-
-
-class CurveEquations(Protocol):
-    """m equations F(z) = 0 in m + 1 unknowns, for k curves.
-
-    Attributes
-    ----------
-    scale : float64[k, m + 1]
-        Unit of each unknown.
-    """
-
-    scale: np.ndarray
-
-    def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """F float64[r, m] and its derivative float64[r, m, m + 1], both in units of the scale, at
-        float64[r, m + 1] of the curves int64[r]; NaN where there is none.
-        """
-
-    def accepted(self, z: np.ndarray, rows: np.ndarray) -> None:
-        """Points float64[r, m + 1] of the curves int64[r] were accepted."""
-
-    def alike(self, z: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """Other unknowns that mean the same points float64[r, m + 1], float64[r, s, m + 1]; the
-        first are these. The last unknown of them all is the same.
-        """
+#: Points after which a curve may be found to be closed.
+LEAST_CLOSED = 8
+#: Cosine of the angle at which it passes its start then.
+AGAIN = 0.9
+#: Farthest that a step lies from a point that it passes, in steps.
+PASSED = 0.02
+#: Farthest that a step lies from the line between its ends, in steps.
+BENDS = 0.1
 
 
 @dataclass
@@ -115,6 +103,27 @@ class Arc:
         )
 
 
+class OneWay(Protocol):
+    """Part of a curve that was followed in one direction from a start."""
+
+    @property
+    def end(self) -> str:
+        """Reason why it ends, as :attr:`Arc.end`."""
+
+
+W = TypeVar("W", bound=OneWay)
+
+
+def both_sides(ways: list[W]) -> tuple[list[W], tuple[str, str]]:
+    """Choose the ways, ahead and back from a start, that make one curve: one that is closed alone,
+    or both. Also why the curve ends at its first and at its last point.
+    """
+    for way in ways:
+        if way.end == "closed":
+            return [way], ("closed", "closed")
+    return ways, (ways[1].end if len(ways) > 1 else "branch", ways[0].end)
+
+
 def correct(
     equations: CurveEquations,
     guess: np.ndarray,
@@ -127,7 +136,7 @@ def correct(
 
     Parameters
     ----------
-    equations : Equations
+    equations : CurveEquations
         The curves.
     guess, normal
         Where to begin, and the normals of the planes in units of the scale.
@@ -173,7 +182,7 @@ def follow(
 
     Parameters
     ----------
-    equations : Equations
+    equations : CurveEquations
         Row i is curve i.
     start, along : float64[k, m + 1]
         Points, and on which side of them to go, in units of the scale.
@@ -263,15 +272,15 @@ class _Fronts:
         moved = np.linalg.norm(step, axis=1)
         chord = step / np.maximum(moved, np.finfo(float).tiny)[:, None]
         sides = ((tangent, self.tangent[going]), (chord, tangent), (chord, self.tangent[going]))
-        turn = np.min([np.einsum("ki,ki->k", *both) for both in sides], axis=0)
+        cosine = np.min([np.einsum("ki,ki->k", *both) for both in sides], axis=0)
         side = _orientation(trial.derivative, tangent)
         stays = (side * self.side[going] >= 0) | (length < PASSING)
         off = np.linalg.norm((trial.z - guess) / scale, axis=1)
         foreseen = (off < PREDICTED * length) | (length < SHORT)
         converges = trial.found & (trial.contraction < CONTRACTS)
-        smooth = (turn > TURN) & stays & foreseen
+        smooth = (cosine > TURN) & stays & foreseen
         counts = converges & (smooth | (length < 100 * SHORTEST))  # a short one may turn a corner
-        easy = counts & (trial.evaluations <= EASY) & (turn > STRAIGHT)
+        easy = counts & (trial.evaluations <= EASY) & (cosine > STRAIGHT)
         there = counts & outside & (moved < SHORTEST)  # it began at that end of the range
         for i in going[there]:
             self.curves[i].end = "range"

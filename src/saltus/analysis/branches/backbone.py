@@ -20,16 +20,21 @@ from saltus.analysis.branches.free_vibration import (
 )
 from saltus.analysis.branches.special_points import zeros
 from saltus.analysis.dataset_parts import provenance, subject
+from saltus.analysis.inputs.given import Range, Value
 from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.inputs.starts import at_values, check_system
 from saltus.analysis.inputs.verb import verb
-from saltus.errors import ParameterError, UnitError, among, must_be, shown, unknown
+from saltus.errors import ParameterError, UnitError, must_be, shown
 from saltus.flow.counts import whole
 from saltus.flow.methods import Method, exact_method
 from saltus.flow.progress import reporting
+from saltus.language.derivatives import gradient
+from saltus.language.evaluate import evaluate
 from saltus.results import build
 from saltus.results.dataset import schema
 from saltus.system import System
+from saltus.system.modes import sides
+from saltus.system.quantity import formula_of, unit_of
 from saltus.units import to_si
 
 Orbits = FreeOrbits | QuadratureOrbits
@@ -50,13 +55,13 @@ BEHIND = 0.02
 @verb
 def backbone(
     system: System,
-    amplitude: Any,
+    amplitude: Range,
     *,
     state: str | None = None,
     mode: int = 1,
     phase: str = "free",
     force: str = "force",
-    values: Mapping[str, Any] | None = None,
+    values: Mapping[str, Value] | None = None,
     points: int = 400,
     method: Method | None = None,
     threads: int | None = None,
@@ -85,7 +90,8 @@ def backbone(
     amplitude : (low, high)
         Range of the largest magnitude of ``state``: numbers [SI], or texts with a unit.
     state : str, optional
-        Default the first state. A velocity reaches beyond an amplitude that rigid stops bound.
+        A state, or of free vibrations an output; default the first state. A velocity reaches beyond
+        an amplitude that rigid stops bound.
     mode : int
         Which mode of small vibrations to begin with, the slowest first, from 1.
     phase : {"free", "quadrature"}
@@ -98,7 +104,8 @@ def backbone(
     points : int
         Most points.
     method : Method
-        Default :class:`saltus.Taylor`; another one must be exact.
+        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
+        it serves; another one must be exact.
     threads : int, optional
         Default all processors.
     progress : bool or callable
@@ -107,9 +114,10 @@ def backbone(
     Returns
     -------
     Dataset
-        Dims ``point``, ``output`` (the states), ``multiplier``. ``backbone_frequency`` [Hz],
-        ``point_period`` [s], ``point_output_peak`` and so on of each state, ``point_<state>`` where
-        the vibration passes its rest (in quadrature: at whole forcing periods),
+        Dims ``point``, ``output`` (the states and outputs), ``multiplier``.
+        ``backbone_frequency`` [Hz], ``point_period`` [s], ``point_output_peak`` and so on of each
+        output, ``point_<state>`` where the vibration passes its rest (in quadrature: at whole
+        forcing periods),
         ``point_itinerary``, ``point_stable``, multipliers, and ``fictitious_damping`` [1/s], which
         is rounding; in quadrature ``point_<parameter>`` of the frequency and the force. The first
         and the last point have the amplitudes asked for; attribute ``end`` says ``points`` or
@@ -136,21 +144,23 @@ def backbone(
     '11.420668320 Hz'
     """
     check_system(system)
-    method, system = exact_method(method, "sl.backbone"), at_values(system, values)
+    method, system = exact_method(method, system, "sl.backbone"), at_values(system, values)
     state = system.states[0] if state is None else state
-    if not among(state, system.states):
-        raise unknown(f"{system.name} has no state", state, system.states)
-    low, high = _range(system, state, amplitude)
+    low, high = _range(unit_of(system, state), amplitude)
+    measured = outputs_of(system).names.index(state)
+    if phase == "quadrature" and state not in system.states:
+        raise ParameterError(
+            lambda say: f"{say.key('state')} is a state in quadrature, and {state!r} is an output."
+        )
     points, mode = whole(points, "points", 2), whole(mode, "mode", 1)
     if phase not in ("free", "quadrature"):
         raise ParameterError(
             lambda say: f'{say.key("phase")} is "free" or "quadrature", not {shown(phase)}.'
         )
-    measured = system.states.index(state)
     about = Forcing.of(system, force, state) if phase == "quadrature" else None
     with reporting(progress) as show:
         moving, orbits, z = (
-            _free_start(system, (low, high), mode, measured, method, threads)
+            _free_start(system, (low, high), mode, state, method, threads)
             if about is None
             else _forced_start(system, about, (low, high), mode, measured, method, threads)
         )
@@ -164,21 +174,28 @@ def _free_start(
     system: System,
     limits: tuple[float, float],
     mode: int,
-    measured: int,
+    state: str,
     method: Method,
     threads: int | None,
 ) -> tuple[System, FreeOrbits, np.ndarray]:
     """The undamped system, the equations of its vibrations, and a small one float64[1, z]."""
     low, high = limits
     free, name = free_system(system)
-    rest = place_of_rest(free)
-    period, shape, column = linear_mode(free, rest, mode)
-    sizes = _relative(system, shape, measured, mode)
+    equilibrium = place_of_rest(free)
+    period, shape, column = linear_mode(free, equilibrium, mode)
+    slopes = _slopes(free, state, equilibrium)
+    sizes, size = _relative(shape, slopes, state, mode), np.abs(slopes @ shape)
     scale = np.array([[*high * sizes, period, 1 / period]])
-    orbits = FreeOrbits(free, name, scale, method, rest, column, threads)
-    begin = rest + BEFORE * low * shape.real / np.abs(shape[measured])
+    orbits = FreeOrbits(free, name, scale, method, equilibrium, column, threads)
+    begin, largest = (
+        equilibrium + BEFORE * low * shape.real / size,
+        np.argmax(np.abs(slopes * shape)),
+    )
     _, swing = orbits.first_return(begin, LONGEST * period)
-    begin = rest + (begin - rest) * BEFORE * low / swing[measured]
+    begin = (
+        equilibrium
+        + (begin - equilibrium) * BEFORE * low * np.abs(shape[largest]) / size / swing[largest]
+    )
     z = np.array([[*begin, orbits.first_return(begin, LONGEST * period)[0], 0.0]])
     if not np.isfinite(z).all():
         raise ParameterError(
@@ -202,33 +219,46 @@ def _forced_start(
 ) -> tuple[System, QuadratureOrbits, np.ndarray]:
     """The system, the equations of its vibrations in quadrature, and a small one float64[1, z]."""
     low, high = limits
-    rest, shape, z = small_vibration(system, force, mode, measured, BEFORE * low, method)
+    equilibrium, shape, z = small_vibration(system, force, mode, measured, BEFORE * low, method)
     own = z[-2:]
-    sizes = high * _relative(system, shape, measured, mode)
+    slopes = np.eye(len(shape))[measured]
+    sizes = high * _relative(shape, slopes, system.states[measured], mode)
     scale = np.array([[*sizes, own[0], own[1] * high / (BEFORE * low)]])
     drive = np.abs(force.harmonics(system, own[0])[force.row])
     unit = sizes[force.displacement] * drive * system.period({str(system.forced_at): own[0]})
-    orbits = QuadratureOrbits(system, force, scale, unit, rest, method, threads)
+    orbits = QuadratureOrbits(system, force, scale, unit, equilibrium, method, threads)
     return system, orbits, z[None]
 
 
-def _relative(system: System, shape: np.ndarray, measured: int, mode: int) -> np.ndarray:
-    """Amplitudes of the states in units of that of one of them; of those at rest the largest."""
-    sizes = np.abs(shape)
-    if not sizes[measured] > NODE * sizes.max():
+def _slopes(system: System, name: str, rest: np.ndarray) -> np.ndarray:
+    """Derivatives of a state or an output with respect to the states, where the system rests,
+    float64[D].
+    """
+    formula, guards = formula_of(system, name)
+    about: dict[str, Any] = {
+        "states": dict(zip(system.states, rest, strict=True)), "values": system.values,
+    }  # fmt: skip
+    bits = sides(system, 0.0, rest)
+    for guard in guards[len(bits) :]:
+        bits.append(evaluate([guard.gap], **about, bits=bits)[0] > 0)
+    return np.array(evaluate(gradient(formula, system.states), **about, bits=bits), float)
+
+
+def _relative(shape: np.ndarray, slopes: np.ndarray, name: str, mode: int) -> np.ndarray:
+    """Amplitudes of the states in units of that of a state or an output with these slopes; of those
+    at rest the largest.
+    """
+    sizes, size = np.abs(shape), np.abs(slopes @ shape)
+    if not size > NODE * sizes.max() * np.linalg.norm(slopes):
         raise ParameterError(
-            lambda say: (
-                f"{system.states[measured]} is at rest in mode {mode}. Choose another "
-                f"{say.key('state')}."
-            )
+            lambda say: f"{name} is at rest in mode {mode}. Choose another {say.key('state')}."
         )
-    sizes = np.where(sizes > NODE * sizes.max(), sizes, sizes.max()) / sizes[measured]
+    sizes = np.where(sizes > NODE * sizes.max(), sizes, sizes.max()) / size
     return np.asarray(sizes)
 
 
-def _range(system: System, state: str, given: Any) -> tuple[float, float]:
+def _range(unit: str, given: Any) -> tuple[float, float]:
     """The amplitudes [SI]."""
-    unit = system.units.get(state, "")
     try:
         low, high = (to_si(end, unit, "amplitude") for end in given)
     except UnitError:
@@ -324,23 +354,21 @@ def _table(
     period, outputs = orbits.period(z), outputs_of(moving, None)
     numbers = numbers_of(moving, [(orbits, one) for one in z], outputs, method)
     rows = np.zeros(len(z), np.int64)
-    own = stacked([orbits.multipliers(z, orbits.evaluate(z, rows)[1], rows)], orbits.size)
+    multipliers = stacked([orbits.multipliers(z, orbits.evaluate(z, rows)[1], rows)], orbits.size)
     by_name = numbers.by_name()
     data: dict[str, Any] = {
         "point": np.arange(len(z)),
         "backbone_frequency": 1 / period,
         "point_period": period,
-        "point_stable": np.nanmax(np.abs(own), axis=1) < STABLE,
+        "point_stable": np.nanmax(np.abs(multipliers), axis=1) < STABLE,
         "point_itinerary": list(numbers.itinerary),
-        "point_multiplier_real": own.real,
-        "point_multiplier_imag": own.imag,
+        "point_multiplier_real": multipliers.real,
+        "point_multiplier_imag": multipliers.imag,
         "point_<state>": orbits.points(z)[:, 0],
         "output": list(outputs.names),
         "output_units": list(outputs.units),
-        **{
-            f"point_output_{key}": by_name[key] for key in ("maximum", "minimum", "peak", "rms")
-        },
-    }  # fmt: skip
+        **{f"point_output_{key}": by_name[key] for key in ("maximum", "minimum", "peak", "rms")},
+    }
     if isinstance(orbits, FreeOrbits):
         data["fictitious_damping"] = _conserved(system, z[:, -1], period)
         about, when = (

@@ -18,7 +18,8 @@ from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.singular_orbits import MULTIPLIER, SingularOrbits
 from saltus.analysis.closed.cycles import units
 from saltus.analysis.dataset_parts import provenance, subject
-from saltus.analysis.inputs.outputs import outputs_of
+from saltus.analysis.inputs.given import Range
+from saltus.analysis.inputs.outputs import states_alone
 from saltus.analysis.inputs.starts import check_system, range_of
 from saltus.analysis.inputs.verb import verb
 from saltus.errors import ParameterError, nearest, shown
@@ -31,14 +32,14 @@ from saltus.results.dataset.attractors import padded
 from saltus.results.dataset.schema import event_name, point_name
 from saltus.sentences import Word
 from saltus.system import System
-from saltus.system.leg import has_legs
+from saltus.system.leg import MOST_STATES, has_legs
 
 
 @verb
 def bifurcation_curve(
     system: System,
     event: xr.Dataset,
-    vary: Mapping[str, Any],
+    vary: Mapping[str, Range],
     *,
     points: int = 400,
     method: Method | None = None,
@@ -76,7 +77,8 @@ def bifurcation_curve(
     points : int
         Most points in each direction.
     method : Method
-        Default :class:`saltus.Taylor`; another one must be exact.
+        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
+        it serves; another one must be exact.
     threads : int, optional
         Default all processors.
     progress : bool or callable
@@ -122,7 +124,7 @@ def bifurcation_curve(
     ('fold', 'range')
     """
     check_system(system)
-    method = exact_method(method, "sl.bifurcation_curve")
+    method = exact_method(method, system, "sl.bifurcation_curve")
     names, limits = _ranges(system, vary)
     points = whole(points, "points", 2)
     start = _start(system, event)
@@ -207,8 +209,8 @@ def _start(system: System, event: Any) -> _Start:
     known = json.loads(event.attrs["parameters"])
     values = {**known, name: float(event[event_name(name)])}
     orbit = np.stack([event[event_name(state)].values for state in system.states], axis=1)
-    own = event["event_multiplier_real"].values + 1j * event["event_multiplier_imag"].values
-    pairs = own[np.abs(own.imag) > 0]
+    multipliers = event["event_multiplier_real"].values + 1j * event["event_multiplier_imag"].values
+    pairs = multipliers[np.abs(multipliers.imag) > 0]
     multiplier = pairs[np.argmin(np.abs(np.abs(pairs) - 1.0))] if len(pairs) else 1.0 + 0j
     period = float(event["point_period"].values[int(event["event_point"])])
     mine = event["point_branch"].values == int(event["event_branch"])
@@ -234,7 +236,7 @@ def _orbits(
     values = [system.values[name] for name in names]
     z = np.array([*start.orbit.ravel(), *period, *values])
     bare = PeriodicOrbits(system, names, n, np.ones((2, len(z))), method, threads)
-    numbers = numbers_of(system, [(bare, z)], outputs_of(system, None), method)
+    numbers = numbers_of(system, [(bare, z)], states_alone(system), method)
     states = np.fmax(units(numbers.maximum[0], numbers.minimum[0]), start.spread)
     spans = [high - low for low, high in limits]
     scale = np.array([*np.tile(np.where(np.isfinite(states), states, 1.0), n), *period, *spans])
@@ -250,8 +252,8 @@ def _equations(
         return SingularOrbits.of(orbits, start.kind, z, start.multiplier)
     if not has_legs(orbits.parametric.system):
         raise ParameterError(
-            f"{start.system.name} switches at instants, or has a remainder or a table of time: its "
-            "grazes can't be followed in two parameters."
+            f"{start.system.name} switches at instants, has a remainder or a table of time, or "
+            f"more than {MOST_STATES - 2} states: its grazes can't be followed in two parameters."
         )
     found = GrazingOrbits.of(orbits, z, start.guard, start.phase)
     if found is None:
@@ -278,12 +280,13 @@ def _table(
         len(curve.z),
     )
     every = curve.equations.orbit(np.array([*curve.z, *(point.z for point in special)]))
-    outputs = outputs_of(system, None)
-    numbers = numbers_of(system, [(orbits, z) for z in every[:count]], outputs, method)
+    numbers = numbers_of(system, [(orbits, z) for z in every[:count]], states_alone(system), method)
     states = padded([orbits.points(z) for z in every], size)
     grazes = curve.equations if isinstance(curve.equations, GrazingOrbits) else None
     values = orbits.values(every)
-    own = stacked([curve.multipliers, *(point.multipliers[None] for point in special)], size)
+    multipliers = stacked(
+        [curve.multipliers, *(point.multipliers[None] for point in special)], size
+    )
     data: dict[str, Any] = {
         "point": np.arange(count),
         "point_<parameter>": {name: values[:count, i] for i, name in enumerate(names)},
@@ -296,23 +299,26 @@ def _table(
         "point_sqrt_coefficient": (
             grazes.coefficients(curve.z) if grazes else np.full(count, np.nan)
         ),
-        "point_multiplier_real": own[:count].real,
-        "point_multiplier_imag": own[:count].imag,
+        "point_multiplier_real": multipliers[:count].real,
+        "point_multiplier_imag": multipliers[:count].imag,
         "point_<state>": states[:count],
         "codim2": np.arange(len(special)),
         "codim2_kind": [point.kind for point in special],
         "codim2_point": np.array([point.after for point in special], np.int64),
         "codim2_extremum": ["" if p.extremum < 0 else names[p.extremum] for p in special],
         "codim2_<parameter>": {name: values[count:, i] for i, name in enumerate(names)},
-        "codim2_multiplier_real": own[count:].real,
-        "codim2_multiplier_imag": own[count:].imag,
+        "codim2_multiplier_real": multipliers[count:].real,
+        "codim2_multiplier_imag": multipliers[count:].imag,
         "codim2_<state>": states[count:],
     }
     fixed = {key: value for key, value in system.values.items() if key not in names}
     attrs = provenance(system, method, fixed, names) | {
-        "bifurcation": start.kind, "periods": orbits.n, "begin": curve.ends[0],
-        "end": curve.ends[1], "guard": system.guards[start.guard].name if grazes else "",
-    }  # fmt: skip
+        "bifurcation": start.kind,
+        "periods": orbits.n,
+        "begin": curve.ends[0],
+        "end": curve.ends[1],
+        "guard": system.guards[start.guard].name if grazes else "",
+    }
     for axis, name, (low, high) in zip("xy", names, limits, strict=True):
         attrs |= {f"parameter_{axis}": name, f"{axis}_low": low, f"{axis}_high": high}
     when = "at whole forcing periods" if system.forced_at else "in equal steps of time"

@@ -26,6 +26,7 @@ from saltus.results.dataset import schema
 from saltus.results.dataset.attractors import padded
 from saltus.system import System
 
+Orbits = PeriodicOrbits | Rests
 #: Samples of a period by which branches are resolved.
 SAMPLES = 64
 #: Multipliers nearer to the unit circle than this don't count as inside: the orbit may not attract.
@@ -59,9 +60,11 @@ def attributes_of(
     changes that are not explained.
     """
     return {
-        "parameter": name, "parameter_low": limits[0], "parameter_high": limits[1],
+        "parameter": name,
+        "parameter_low": limits[0],
+        "parameter_high": limits[1],
         "unexplained_changes": sum(len(branch.unexplained) for branch in branches),
-    }  # fmt: skip
+    }
 
 
 def values_of(
@@ -79,10 +82,10 @@ def values_of(
     begins = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
     multipliers = stacked([branch.multipliers for branch in branches], size)
     event_multipliers = stacked([event.multipliers[None] for _, event in events], size)
-    rests = np.array([isinstance(branch.orbits, Rests) for branch, _ in points], bool)
-    event_rests = np.array([isinstance(branch.orbits, Rests) for branch, _ in at_events], bool)
-    own = _eigenvalues(points, size)
-    event_own = _eigenvalues(at_events, size)
+    at_rest = np.array([isinstance(branch.orbits, Rests) for branch, _ in points], bool)
+    event_at_rest = np.array([isinstance(branch.orbits, Rests) for branch, _ in at_events], bool)
+    eigenvalues = _eigenvalues(points, size)
+    event_eigenvalues = _eigenvalues(at_events, size)
     periods = np.array([branch.orbits.n for branch, _ in points], np.int64)
     states = padded([branch.orbits.points(z) for branch, z in [*points, *at_events]], size)
     return {
@@ -95,7 +98,7 @@ def values_of(
         "point_period": np.array(
             [
                 np.nan if rest else float(branch.orbits.period(z))
-                for (branch, z), rest in zip(points, rests, strict=True)
+                for (branch, z), rest in zip(points, at_rest, strict=True)
             ],
             float,
         ),
@@ -104,8 +107,8 @@ def values_of(
         "point_contacts": numbers.contacts * (1 if system.forced_at is None else periods),
         "point_itinerary": list(numbers.itinerary),
         "point_margin": numbers.margin,
-        **_complex("point_multiplier", np.where(rests[:, None], np.nan, multipliers)),
-        **_complex("point_eigenvalue", own),
+        **_complex("point_multiplier", np.where(at_rest[:, None], np.nan, multipliers)),
+        **_complex("point_eigenvalue", eigenvalues),
         "point_<state>": states[: len(points)],
         **{f"point_output_{key}": column for key, column in numbers.by_name().items()},
         **_branches(branches),
@@ -120,8 +123,8 @@ def values_of(
         "event_<parameter>": {name: _parameter(at_events)},
         "event_peak": event_numbers.peak[:, 0],
         "event_rms": event_numbers.rms[:, 0],
-        **_complex("event_multiplier", np.where(event_rests[:, None], np.nan, event_multipliers)),
-        **_complex("event_eigenvalue", event_own),
+        **_complex("event_multiplier", np.where(event_at_rest[:, None], np.nan, event_multipliers)),
+        **_complex("event_eigenvalue", event_eigenvalues),
         "event_<state>": states[len(points) :],
     }
 
@@ -182,7 +185,7 @@ def _sampled_peaks(system: System, method: Method, branch: Branch, z: np.ndarray
     to say where more orbits are needed.
     """
     if isinstance(branch.orbits, Rests):
-        return np.abs(z[:, 0])
+        return np.asarray(np.abs(z[:, 0]))
     n = branch.orbits.n if system.forced_at is not None else 1
     map_ = _map_of(system, method, [(branch.orbits, one) for one in z])
     starts = branch.orbits.points(z)[:, 0]
@@ -191,7 +194,7 @@ def _sampled_peaks(system: System, method: Method, branch: Branch, z: np.ndarray
 
 
 def _map_of(
-    system: System, method: Method, points: Sequence[tuple[PeriodicOrbits, np.ndarray]]
+    system: System, method: Method, points: Sequence[tuple[Orbits, np.ndarray]]
 ) -> Stroboscope:
     """A map for each orbit: over its forcing period, or its own period."""
     rows = np.tile(np.array(list(system.values.values())), (len(points), 1))
@@ -205,13 +208,13 @@ def _map_of(
 
 def _with_equations(
     points: Sequence[tuple[Branch, np.ndarray]],
-) -> list[tuple[PeriodicOrbits, np.ndarray]]:
+) -> list[tuple[Orbits, np.ndarray]]:
     return [(branch.orbits, z) for branch, z in points]
 
 
 def numbers_of(
     system: System,
-    points: Sequence[tuple[PeriodicOrbits, np.ndarray]],
+    points: Sequence[tuple[Orbits, np.ndarray]],
     outputs: Outputs,
     method: Method,
 ) -> Measures:

@@ -27,6 +27,7 @@ from saltus.analysis.branches.seeds import (
 from saltus.analysis.branches.switching import Seed
 from saltus.analysis.branches.tracing import trace
 from saltus.analysis.closed.field_zeros import autonomous
+from saltus.analysis.inputs.given import Range, Reading, Starts, Value
 from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.inputs.starts import at_values, check_system, range_of
 from saltus.analysis.inputs.verb import verb
@@ -42,16 +43,16 @@ from saltus.system import System
 @verb
 def branches(
     system: System,
-    vary: Mapping[str, Any],
-    start: Any = None,
+    vary: Mapping[str, Range],
+    start: xr.Dataset | Starts | None = None,
     *,
-    box: Mapping[str, Any] | None = None,
+    box: Mapping[str, Range] | None = None,
     at: int = 12,
     switch: Sequence[str] = SWITCHES,
     longest: int = LONGEST_DOUBLED,
     points: int = POINTS,
-    values: Mapping[str, Any] | None = None,
-    outputs: Mapping[str, Any] | None = None,
+    values: Mapping[str, Value] | None = None,
+    outputs: Mapping[str, Reading] | None = None,
     every: float | str | None = None,
     method: Method | None = None,
     periods: int = 2000,
@@ -74,7 +75,8 @@ def branches(
        impact appears or vanishes, because the map over a period isn't smooth there.
     5. Events are located to rounding where a test function changes its sign. Where the number of
        multipliers outside the unit circle changes otherwise, the step is refined; what stays
-       unexplained is counted in ``branch_unexplained``.
+       unexplained is counted in ``branch_unexplained``. Grazes and corners are left out of systems
+       with more than 13 states.
     6. The branches that leave at the events in ``switch`` are seeds of their own, begun beside the
        event.
 
@@ -113,7 +115,8 @@ def branches(
     every : float or str, optional
         For starts of a system without forcing: time between two samples [s].
     method : Method
-        Default :class:`saltus.Taylor`; another one must be exact.
+        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
+        it serves; another one must be exact.
     periods : int
         For starts: forcing periods after which a trajectory hasn't settled.
     seed : int
@@ -174,7 +177,7 @@ def branches(
     ['fold at 17.734087 Hz']
     """
     check_system(system)
-    method, system = exact_method(method, "sl.branches"), at_values(system, values)
+    method, system = exact_method(method, system, "sl.branches"), at_values(system, values)
     name, limits = _range(system, vary)
     chosen = frozenset(_kinds(switch))
     wanted = outputs_of(system, outputs)
@@ -182,20 +185,20 @@ def branches(
     done = list[Branch]()
     with reporting(progress) as show:
         try:
-            rests: list[Seed] = []
+            equilibria: list[Seed] = []
             if isinstance(start, xr.Dataset):
                 begins = seeds_of(system, name, start)
-                rests = [] if system.forced_at else resting_seeds(system, name, start)
+                equilibria = [] if system.forced_at else resting_seeds(system, name, start)
             else:
                 check_grid(system, whole(at, "at", 1), start)
                 places = np.linspace(*limits, int(at) + 2)[1:-1]
                 grid = grid_of(system, {name: places}, start, box, None, seed, None, every)
                 if autonomous(system):
-                    rests = resting_between(system, name, limits, grid.starts)
+                    equilibria = resting_between(system, name, limits, grid.starts)
                 begins = _found_in(grid, method, periods, threads)
             begins = scaled(system, name, _inside(begins, limits), method)
-            rests = _inside(rests, limits)
-            if not begins and not rests:
+            equilibria = _inside(equilibria, limits)
+            if not begins and not equilibria:
                 raise ParameterError(
                     lambda say: (
                         f"no periodic orbit of {system.name} is known between "
@@ -205,7 +208,7 @@ def branches(
                     )
                 )
             plan = plan_of(system, name, limits, method, threads, points, longest, chosen)
-            born = trace_rests(plan, system, name, rests, done) if rests else []
+            born = trace_rests(plan, system, name, equilibria, done) if equilibria else []
             born = born if "hopf" in chosen else []
             trace(plan, [*born, *begins], done, stage(show, 0.0, 0.9))
         except KeyboardInterrupt:

@@ -69,9 +69,12 @@ def tests(
     """
     one, two = orbits.parameters
     if isinstance(orbits, GrazingOrbits):
-        own = [np.prod(1.0 - multipliers, axis=1).real, np.prod(1.0 + multipliers, axis=1).real]
+        products = [
+            np.prod(1.0 - multipliers, axis=1).real,
+            np.prod(1.0 + multipliers, axis=1).real,
+        ]
         along = tangent[:, one], tangent[:, two]
-        return np.stack([*along, *own, orbits.coefficients(z)]), np.zeros((len(z), 0))
+        return np.stack([*along, *products, orbits.coefficients(z)]), np.zeros((len(z), 0))
     mine = derivative[:, : orbits.orbits.n * orbits.orbits.size + orbits.orbits.free]
     along = tangent[:, one], tangent[:, two]
     double = [np.prod(1.0 - multipliers, axis=1).real, np.prod(1.0 + multipliers, axis=1).real]
@@ -91,20 +94,18 @@ def tests(
 def _same_side(vectors: np.ndarray, side: np.ndarray | None) -> np.ndarray:
     """Vectors float64[p, 2, size] on the side of others, or each on that of the one before."""
     if side is not None:
-        turns = np.where((vectors * side).sum(axis=2) < 0, -1.0, 1.0)
+        signs = np.where((vectors * side).sum(axis=2) < 0, -1.0, 1.0)
     else:
-        turns = np.ones(vectors.shape[:2])
-        turns[1:] = np.where((vectors[1:] * vectors[:-1]).sum(axis=2) < 0, -1.0, 1.0)
-        turns = np.cumprod(turns, axis=0)
-    return np.asarray(vectors * turns[:, :, None])
+        signs = np.ones(vectors.shape[:2])
+        signs[1:] = np.where((vectors[1:] * vectors[:-1]).sum(axis=2) < 0, -1.0, 1.0)
+        signs = np.cumprod(signs, axis=0)
+    return np.asarray(vectors * signs[:, :, None])
 
 
 def _derivative_at(multipliers: np.ndarray, mu: float) -> np.ndarray:
     """The derivative of the characteristic polynomial: zero where ``mu`` is a double root."""
     factors = mu - multipliers
-    parts = [
-        np.prod(np.delete(factors, i, axis=1), axis=1) for i in range(multipliers.shape[1])
-    ]  # fmt: skip
+    parts = [np.prod(np.delete(factors, i, axis=1), axis=1) for i in range(multipliers.shape[1])]
     return np.asarray(np.sum(parts, axis=0).real)
 
 
@@ -130,7 +131,7 @@ def _cubic(
     bend = (8.0 * (ahead - behind) - (far_ahead - far_behind)) / (12.0 * WIDE)
     second = (
         16.0 * (ahead + behind) - (far_ahead + far_behind) - 30.0 * derivative[:, :, :width]
-    ) / (12.0 * WIDE**2)  # fmt: skip
+    ) / (12.0 * WIDE**2)
     whole = derivative.shape[1]
     right = -0.5 * np.einsum("pij,pj->pi", bend[:, :, :size], v)
     h = np.linalg.solve(derivative[:, :, :whole], right[:, :, None])[:, :, 0]
@@ -148,8 +149,8 @@ def find(
 ) -> list[Event]:
     """All points of codimension two on a curve float64[p, z], in its order."""
     rows = np.full(len(z), row)
-    own = orbits.multipliers(z, derivative, rows)
-    values, sides = tests(orbits, rows, z, tangent, derivative, own, None)
+    multipliers = orbits.multipliers(z, derivative, rows)
+    values, sides = tests(orbits, rows, z, tangent, derivative, multipliers, None)
     which, after = np.nonzero(_crosses(values))
     if not len(which):
         return []
@@ -164,17 +165,22 @@ def find(
         if not len(good):
             return result
         way = tangents(point.derivative[good], tangent[begin[good]])
-        own = local.multipliers(point.z[good], point.derivative[good], event[good])
+        multipliers = local.multipliers(point.z[good], point.derivative[good], event[good])
         tested, _ = tests(
-            local, event[good], point.z[good], way, point.derivative[good], own,
+            local,
+            event[good],
+            point.z[good],
+            way,
+            point.derivative[good],
+            multipliers,
             sides[begin[good]],
-        )  # fmt: skip
+        )
         result[good] = tested[which[event[good]], np.arange(len(good))]
         for place, i in enumerate(good):
             kind = int(which[event[i]])
             extreme = kind if kind < 2 else -1
             found[int(event[i])] = Event(
-                names[kind], int(begin[i]), point.z[i], own[place], extremum=extreme
+                names[kind], int(begin[i]), point.z[i], multipliers[place], extremum=extreme
             )
         return result
 

@@ -83,9 +83,9 @@ def sequences(orbits: PeriodicOrbits, z: np.ndarray) -> list[ContactSequence | N
     for i in range(p):
         rows = np.arange(begins[i * n], begins[(i + 1) * n])
         rows = rows[~_reported_before(table.guard[rows], table.direction[rows], phase[rows], n)]
-        what = np.stack([
-            table.guard, table.direction, table.kind, table.mode_before, table.mode_after,
-        ])[:, rows]  # fmt: skip
+        what = np.stack(
+            [table.guard, table.direction, table.kind, table.mode_before, table.mode_after]
+        )[:, rows]
         result.append(
             ContactSequence(
                 tuple(SequenceContact(*one) for one in what.T.tolist()),

@@ -104,8 +104,11 @@ def _entries(
             after = law.reset[:size]
     gap, *left = frozen(system, (gap, *after), before)
     return (
-        gap, *gradient(gap, system.states), time_derivative(gap),
-        *frozen(system, system.field[:size], before), *left,
+        gap,
+        *gradient(gap, system.states),
+        time_derivative(gap),
+        *frozen(system, system.field[:size], before),
+        *left,
         *(slope for one in left for slope in gradient(one, system.states)),
         *map(time_derivative, left),
-    )  # fmt: skip
+    )

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from saltus.analysis.branches.arclength import Arc, follow, tangents
+from saltus.analysis.branches.arclength import Arc, both_sides, follow, tangents
 from saltus.analysis.branches.codimension_two import Equations, find
 from saltus.analysis.branches.events import Event
 from saltus.analysis.branches.grazing_orbits import GrazingOrbits
@@ -115,24 +115,21 @@ def _end_at_double(equations: GrazingOrbits, curve: Arc, beyond: np.ndarray) -> 
 
 def _joined(equations: Equations, curves: list[Arc]) -> BifurcationCurve:
     """One curve from those in both directions."""
-    ahead, back = curves
-    closed = [row for row, curve in enumerate(curves) if curve.end == "closed"]
-    if closed:
-        whole, ends = curves[closed[0]], ("closed", "closed")
-    else:
-        whole = ahead.behind(back)
-        ends = (_end(equations, back), _end(equations, ahead))
+    for curve in curves:
+        curve.end = _end(equations, curve)
+    (whole, *back), ends = both_sides(curves)
+    whole = whole.behind(back[0]) if back else whole
     z, tangent, derivative = (np.array(part) for part in (whole.z, whole.tangent, whole.derivative))
     length = np.array(whole.length) - whole.length[0]
-    own = equations.multipliers(z, derivative, np.zeros(len(z), np.int64))
+    multipliers = equations.multipliers(z, derivative, np.zeros(len(z), np.int64))
     special = find(equations, 0, z, tangent, derivative)
     doubles = [
-        Event("double_graze", place, z[place], own[place])
+        Event("double_graze", place, z[place], multipliers[place])
         for place, end in zip((0, len(z) - 1), ends, strict=True)
         if end == "double_graze"
     ]
     special = sorted([*special, *doubles], key=lambda point: point.after)
-    return BifurcationCurve(equations, z, length, own, ends, special)
+    return BifurcationCurve(equations, z, length, multipliers, ends, special)
 
 
 def _end(equations: Equations, curve: Arc) -> str:

@@ -34,8 +34,10 @@ from saltus.system.quantity import with_states
 
 #: Instants of a period at which a force is looked at.
 SAMPLES = 256
-#: Frequencies about that of a mode among which quadrature is looked for, and how far it may be.
-LOOKS, FAR = 401, 0.5
+#: Frequencies about that of a mode among which quadrature is looked for.
+LOOKS = 401
+#: Distance of the farthest of them, as a share of that frequency.
+FAR = 0.5
 #: Name of the state that is the integral.
 INTEGRAL = "displacement_on_force"
 
@@ -92,10 +94,11 @@ class Forcing:
             if amplitude in set(ex.walk(entry))
         }
         if not rates or any(
-            ex.depends_on(rate, ("state", "select")) or amplitude in set(ex.walk(rate))
+            ex.depends_on(rate, ("state", "select"))
+            or amplitude in set(ex.walk(rate))
             or not ex.depends_on(rate, ("time",))
             for rate in rates.values()
-        ):  # fmt: skip
+        ):
             raise ParameterError(
                 lambda say: (
                     f"{name} isn't the amplitude of a force on {system.name}: it must multiply "
@@ -168,12 +171,16 @@ class QuadratureOrbits(PeriodicOrbits):
         rate = ex.mul(x, force.rates[force.row])
         self.rest = rest
         self._extended = PeriodicOrbits(
-            with_states(system, {INTEGRAL: rate}), names, 1,
-            np.insert(scale, self.size, unit, axis=1), method, threads,
-        )  # fmt: skip
+            with_states(system, {INTEGRAL: rate}),
+            names,
+            1,
+            np.insert(scale, self.size, unit, axis=1),
+            method,
+            threads,
+        )
 
     def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """See :class:`saltus.analysis.branches.arclength.Equations`."""
+        """See :class:`saltus.analysis.branches.equations.CurveEquations`."""
         whole = np.insert(z, self.size, 0.0, axis=1)
         residual, derivative = self._extended.evaluate(whole, rows)
         return residual, np.delete(derivative, self.size, axis=2)

@@ -61,10 +61,14 @@ def free_system(system: System) -> tuple[System, str]:
         if state in speeds:
             field[i] = ex.sub(field[i], ex.mul(drag, ex.state(state)))
     made = replace(
-        system, field=tuple(field), guards=tuple(_guard(guard, zeros) for guard in system.guards),
-        forced_at=None, values={**system.values, name: 0.0},
+        system,
+        field=tuple(field),
+        guards=tuple(_guard(guard, zeros) for guard in system.guards),
+        forced_at=None,
+        values={**system.values, name: 0.0},
         units={**system.units, name: "1/s"},
-    )  # fmt: skip
+        outputs=system.outputs.substituted(zeros),
+    )
     if not autonomous(made):
         raise ParameterError(
             lambda say: (
@@ -151,13 +155,13 @@ def place_of_rest(system: System) -> np.ndarray:
     def equations(x: np.ndarray, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return field_of(system, x, values) / size, jacobian_of(system, x, values) / size[..., None]
 
-    rest = newton(equations, zero, units, enough=0.0, longest_step=np.inf, least_squares=True)
-    if not rest.found[0]:
+    found = newton(equations, zero, units, enough=0.0, longest_step=np.inf, least_squares=True)
+    if not found.found[0]:
         raise ParameterError(
             f"no equilibrium of {system.name} was found from zero: a backbone begins with small "
             "vibrations about one."
         )
-    return np.asarray(rest.z[0])
+    return np.asarray(found.z[0])
 
 
 def linear_mode(system: System, rest: np.ndarray, mode: int) -> tuple[float, np.ndarray, int]:

@@ -27,7 +27,7 @@ LOOKS = 200
 
 
 @dataclass(frozen=True)
-class ContactEvent:
+class ContactChange:
     """An orbit at which a contact sequence changes.
 
     Attributes
@@ -109,7 +109,7 @@ def _entries(system: System, guard: int, mode: int) -> tuple[Expr, ...]:
     )
 
 
-def graze(legs: Legs, z: np.ndarray, guard: int, phase: float) -> ContactEvent | None:
+def graze(legs: Legs, z: np.ndarray, guard: int, phase: float) -> ContactChange | None:
     """The orbit that touches a boundary, by Newton's method from another one.
 
     Parameters
@@ -145,7 +145,7 @@ def graze(legs: Legs, z: np.ndarray, guard: int, phase: float) -> ContactEvent |
         return None
     z, phase = found.z[0, :-1], float(found.z[0, -1]) % legs.n  # the last step was rounding
     derivative = found.derivative[0, :-2, :-1]
-    return ContactEvent("graze", (guard,), phase, legs, z, place, state, slope, derivative)
+    return ContactChange("graze", (guard,), phase, legs, z, place, state, slope, derivative)
 
 
 def touch(
@@ -164,14 +164,14 @@ def touching(
     last entry is a time: all flights are computed in one call.
     """
     z, when, size = u[:, :-1], u[:, -1], legs.size
-    first, _, rest = legs.nodes(z)
+    first, _, others = legs.nodes(z)
     at, until = legs.at(z), when[:, None] - first[:, [place]]
     spans = np.concatenate([legs.spans(first), until], axis=1)
     state, by_z, by_time = legs.along(z, at, spans, [place])
     closed = legs.closed(z, rows, at, state[:, :-1], by_z[:, :-1], by_time[:, :-1])
     state, by_z, by_time = state[:, -1], by_z[:, -1], by_time[:, -1]
-    own, slopes, order = legs.orbits.own(rest)
-    found = gap.at(when * legs.unit, np.concatenate([state, own], axis=1))
+    carried, slopes, order = legs.orbits.parameter_states(others)
+    found = gap.at(when * legs.unit, np.concatenate([state, carried], axis=1))
     value, normal, by_clock = found[..., 0], found[..., 1:-1], found[..., -1] * legs.unit
     entries = normal[..., :size] @ by_z
     entries[..., legs.count * (size + 1) + order] += normal[..., size:] * slopes[:, None]
@@ -183,10 +183,10 @@ def nearest_turn(legs: Legs, z: np.ndarray, place: int, gap: Gap, since: float) 
     """Time after a contact [periods] at which the motion turns away from the boundary: the one
     nearest to the time ``since``, or ``since`` itself if there is none.
     """
-    first, _, rest = legs.nodes(z[None])
+    first, _, others = legs.nodes(z[None])
     spans, state = legs.flight(z, place, LOOKS)
-    own = np.repeat(legs.orbits.own(rest)[0], len(spans), axis=0)
-    found = gap.at((first[0, place] + spans) * legs.unit, np.concatenate([state, own], axis=1))
+    carried = np.repeat(legs.orbits.parameter_states(others)[0], len(spans), axis=0)
+    found = gap.at((first[0, place] + spans) * legs.unit, np.concatenate([state, carried], axis=1))
     rate = found[:, 1, 0] * gap.side
     turns = np.flatnonzero((rate[:-1] <= 0) & (rate[1:] > 0))
     if not len(turns):
@@ -195,7 +195,7 @@ def nearest_turn(legs: Legs, z: np.ndarray, place: int, gap: Gap, since: float) 
     return float(middle[np.abs(middle - since).argmin()])
 
 
-def corner(legs: Legs, z: np.ndarray, place: int) -> ContactEvent | None:
+def corner(legs: Legs, z: np.ndarray, place: int) -> ContactChange | None:
     """The orbit that meets two boundaries at once, by Newton's method from another one.
 
     Parameters
@@ -227,5 +227,5 @@ def corner(legs: Legs, z: np.ndarray, place: int) -> ContactEvent | None:
     slope = np.zeros(len(z))
     slope[after * width], slope[place * width] = 1.0, -1.0
     state = legs.nodes(u)[1][0, place]
-    own = found.derivative[0, :-1]
-    return ContactEvent("corner", guards, phase, legs, u[0], place, state, slope, own)
+    derivative = found.derivative[0, :-1]
+    return ContactChange("corner", guards, phase, legs, u[0], place, state, slope, derivative)

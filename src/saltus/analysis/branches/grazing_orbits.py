@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from saltus.analysis.branches.contact_sequences import sequences, shift, without
-from saltus.analysis.branches.grazes import ContactEvent, Gap, nearest_turn, touch, touching
+from saltus.analysis.branches.grazes import ContactChange, Gap, nearest_turn, touch, touching
 from saltus.analysis.branches.legs import Legs, product
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.solve.newton import newton
@@ -35,7 +35,7 @@ CONTINUOUS = 1e-9
 
 
 class GrazingOrbits:
-    """Curves of orbits that graze one boundary; an arclength ``Equations``.
+    """Curves of orbits that graze one boundary; a ``CurveEquations``.
 
     Unknowns z: those of :class:`Legs` over two parameters, without the contact that grazes, and the
     time at which the boundary is touched, in periods since the orbit's first point.
@@ -79,9 +79,10 @@ class GrazingOrbits:
         apart = np.abs((sequence.phase - phase + 0.5 * n) % n - 0.5 * n)
         slow = SLOW * np.abs(sequence.velocity).max(initial=0.0)
         grazing = [
-            i for i, one in enumerate(sequence.contacts)
+            i
+            for i, one in enumerate(sequence.contacts)
             if (one.guard == guard and apart[i] < TOUCHES) or abs(sequence.velocity[i]) < slow
-        ]  # fmt: skip
+        ]
         legs, z = Legs.of(orbits, without(sequence, grazing), z, orbits.scale[0])
         place = legs.leg_at(z, phase)
         first = legs.nodes(z[None])[0][0, place]
@@ -118,7 +119,7 @@ class GrazingOrbits:
 
     # -- equations ---------------------------------------------------------------------------------
     def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """See :class:`saltus.analysis.branches.arclength.Equations`."""
+        """See :class:`saltus.analysis.branches.equations.CurveEquations`."""
         (residual, derivative), _, value, slopes = touching(
             self.legs, self.place, self.gap, z, rows
         )
@@ -136,11 +137,11 @@ class GrazingOrbits:
         self.accepted(z, rows)
 
     def accepted(self, z: np.ndarray, rows: np.ndarray) -> None:
-        """See :class:`saltus.analysis.branches.arclength.Equations`."""
+        """See :class:`saltus.analysis.branches.equations.CurveEquations`."""
         self.legs.accepted(z[:, :-1], rows)
 
     def alike(self, z: np.ndarray, rows: np.ndarray) -> np.ndarray:  # noqa: ARG002
-        """See :class:`saltus.analysis.branches.arclength.Equations`."""
+        """See :class:`saltus.analysis.branches.equations.CurveEquations`."""
         return z[:, None]
 
     def multipliers(self, z: np.ndarray, derivative: np.ndarray, rows: np.ndarray) -> np.ndarray:
@@ -174,10 +175,10 @@ class GrazingOrbits:
             return None
         rise = touch(legs, self.place, self.gap, z[None])[2][0, 1, -1]
         keep = without(free, list(np.flatnonzero(np.abs(free.velocity) < SLOW * abs(rise))))
-        own = legs.sequence_at(z[:-1])
-        if (not keep.contacts and not legs.contacts) or shift(own, keep, legs.n) is not None:
+        sequence = legs.sequence_at(z[:-1])
+        if (not keep.contacts and not legs.contacts) or shift(sequence, keep, legs.n) is not None:
             return []
-        known = own.phase % legs.n
+        known = sequence.phase % legs.n
         return [
             (one.guard, float(when))
             for one, when in zip(keep.contacts, keep.phase, strict=True)
@@ -214,10 +215,10 @@ class GrazingOrbits:
         return found.z[0, :-1] if found.found[0] and near else None
 
     # -- normal form -------------------------------------------------------------------------------
-    def is_smooth(self, event: ContactEvent) -> bool:
+    def is_smooth(self, event: ContactChange) -> bool:
         """True if a graze has no square root, since the force begins at zero."""
-        own = self.legs.orbits.own(self.legs.nodes(event.z[None])[2])[0]
-        full, when = np.append(event.state, own[0]), event.phase * self.legs.unit
+        carried = self.legs.orbits.parameter_states(self.legs.nodes(event.z[None])[2])[0]
+        full, when = np.append(event.state, carried[0]), event.phase * self.legs.unit
         return self._law.is_continuous(np.array([when]), full[None])
 
     def coefficients(self, z: np.ndarray) -> np.ndarray:
@@ -225,10 +226,10 @@ class GrazingOrbits:
         legs, place = self.legs, self.place
         state, _, slopes = touch(legs, place, self.gap, z)
         rise = slopes[:, 1, -1] * self.gap.side / legs.unit
-        _, _, rest = legs.nodes(z[:, :-1])
-        own = legs.orbits.own(rest)[0]
+        _, _, others = legs.nodes(z[:, :-1])
+        carried = legs.orbits.parameter_states(others)[0]
         when = z[:, -1] * legs.unit
-        full = np.concatenate([state, own], axis=1)
+        full = np.concatenate([state, carried], axis=1)
         normals = self.gap.at(when, full)[..., 1 : 1 + legs.size]
         kick = self._law.kick(when, full, normals, rise)
         with np.errstate(invalid="ignore"):
@@ -245,12 +246,12 @@ def returned(
     and states float64[r, D], to itself, all periods later, float64[r, D, D].
     """
     size, rows = legs.size, np.zeros(len(z), np.int64)
-    at, (phase, _, rest) = legs.at(z), legs.nodes(z)
+    at, (phase, _, others) = legs.at(z), legs.nodes(z)
     first, after, span = phase.copy(), at.after.copy(), np.zeros_like(phase)
     first[:, place], after[:, place], span[:, place] = when, state, legs.n
     if legs.contacts:
         span[:, place] = legs.spans(phase)[:, place] - (when - phase[:, place])
-    onwards = legs.fly(after, rest, first, span)[1][:, place, :, :size]
+    onwards = legs.fly(after, others, first, span)[1][:, place, :, :size]
     if not legs.contacts:
         return onwards
     span = np.zeros_like(phase)
@@ -267,7 +268,7 @@ def returned(
     return result
 
 
-def sqrt_coefficient(event: ContactEvent) -> float:
+def sqrt_coefficient(event: ContactChange) -> float:
     """The coefficient of the square root at an event, see above; NaN unless it is a graze."""
     if event.kind != "graze":
         return np.nan

@@ -13,7 +13,7 @@ from saltus.analysis.branches.contact_sequences import (
     shift,
     without,
 )
-from saltus.analysis.branches.grazes import ContactEvent, corner, graze
+from saltus.analysis.branches.grazes import ContactChange, corner, graze
 from saltus.analysis.branches.legs import Legs
 from saltus.kernels import status as st
 
@@ -29,12 +29,13 @@ _ROW = np.zeros(1, np.int64)
 
 
 @dataclass(frozen=True)
-class End:
-    """The event at which a branch of orbits with one contact sequence ends.
+class Passage:
+    """The change at which a branch of orbits with one contact sequence ends, and goes on with
+    another.
 
     Attributes
     ----------
-    event : ContactEvent
+    change : ContactChange
         It.
     z : float64[z]
         The orbit in the unknowns of the branch that ends.
@@ -44,7 +45,7 @@ class End:
         In them: the orbit at the event, and the way to go, in units of the scale.
     """
 
-    event: ContactEvent
+    change: ContactChange
     z: np.ndarray
     onto: Legs | None
     start: np.ndarray
@@ -52,11 +53,11 @@ class End:
 
     def into(self, legs: Legs, tangent: np.ndarray) -> np.ndarray:
         """The way in which the branch that ends reaches the event, on the side of another."""
-        own = legs.tangent(self.z)
-        return own if own @ tangent > 0 else -own
+        way = legs.tangent(self.z)
+        return way if way @ tangent > 0 else -way
 
 
-def end_of(legs: Legs, z: np.ndarray, beyond: np.ndarray, tangent: np.ndarray) -> End | None:
+def end_of(legs: Legs, z: np.ndarray, beyond: np.ndarray, tangent: np.ndarray) -> Passage | None:
     """Locate the end of a branch between an orbit of the free flow and a virtual one; None if it
     isn't found.
 
@@ -88,7 +89,7 @@ def end_of(legs: Legs, z: np.ndarray, beyond: np.ndarray, tangent: np.ndarray) -
     return None
 
 
-def _reason(legs: Legs, z: np.ndarray, beyond: np.ndarray, tangent: np.ndarray) -> End | None:
+def _reason(legs: Legs, z: np.ndarray, beyond: np.ndarray, tangent: np.ndarray) -> Passage | None:
     """The event that makes an orbit virtual, if it is a single one."""
     speeds = legs.speeds(beyond[None])[0] if legs.contacts else np.ones(1)
     impacts = [int(i) for i in np.flatnonzero(speeds <= 0) if legs.jumps_at(int(i))]
@@ -102,21 +103,20 @@ def _reason(legs: Legs, z: np.ndarray, beyond: np.ndarray, tangent: np.ndarray) 
 
 
 # -- contacts that vanish --------------------------------------------------------------------------
-def _impact_vanishes(legs: Legs, z: np.ndarray, place: int) -> End | None:
+def _impact_vanishes(legs: Legs, z: np.ndarray, place: int) -> Passage | None:
     """An impact without speed: beyond, the orbit touches the stop no more."""
     event = _without(legs, z, (place,))
     if event is None:
         return None
     contact = legs.contacts[place]
-    own, _ = with_impact(event, contact, legs)
-    start = own
+    start, _ = with_impact(event, contact, legs)
     along = event.legs.tangent(event.z)
     away = _touching(event) @ along
     side = -contact.direction  # of the gap where the stop isn't met
-    return End(event, start, event.legs, event.z, along if away * side > 0 else -along)
+    return Passage(event, start, event.legs, event.z, along if away * side > 0 else -along)
 
 
-def _without(legs: Legs, z: np.ndarray, places: tuple[int, ...]) -> ContactEvent | None:
+def _without(legs: Legs, z: np.ndarray, places: tuple[int, ...]) -> ContactChange | None:
     """The graze at which some contacts of an orbit vanish."""
     phase = legs.nodes(z[None])[0][0]
     fewer = without(legs.sequence_at(z), places)
@@ -125,19 +125,19 @@ def _without(legs: Legs, z: np.ndarray, places: tuple[int, ...]) -> ContactEvent
     return graze(shorter, near, legs.contacts[places[0]].guard, 0.5 * (phase[places[0]] + last))
 
 
-def _touching(event: ContactEvent) -> np.ndarray:
+def _touching(event: ContactChange) -> np.ndarray:
     """Derivative of the gap that grazes with respect to the orbit, in units of the scale."""
     return np.asarray(event.slope * event.legs.scale[0])
 
 
 def with_impact(
-    event: ContactEvent, contact: SequenceContact, like: Legs | None
+    event: ContactChange, contact: SequenceContact, like: Legs | None
 ) -> tuple[np.ndarray, Legs]:
     """The orbit of a graze with the impact without speed among its contacts, float64[z], and its
     equations: those of another orbit if they are given.
     """
     legs, z = event.legs, event.z
-    phase, before, rest = legs.nodes(z[None])
+    phase, before, others = legs.nodes(z[None])
     place = event.place
     when = phase[0, place] + (event.phase - phase[0, place]) % legs.n
     nodes = np.concatenate([phase[0][:, None], before[0]], axis=1)
@@ -156,15 +156,14 @@ def with_impact(
         like = Legs(legs.orbits, sequence, np.append(np.tile(each, len(nodes)), unit)[None])
     else:  # in the order in which its contacts are numbered
         order = next(
-            by for by in range(len(contacts))
-            if (*contacts[by:], *contacts[:by]) == like.contacts
-        )  # fmt: skip
+            by for by in range(len(contacts)) if (*contacts[by:], *contacts[:by]) == like.contacts
+        )
         nodes[:order, 0] += legs.n
         nodes = np.roll(nodes, -order, axis=0)
-    return np.append(nodes.ravel(), rest[0]), like
+    return np.append(nodes.ravel(), others[0]), like
 
 
-def _leg_vanishes(legs: Legs, z: np.ndarray, place: int, tangent: np.ndarray) -> End | None:
+def _leg_vanishes(legs: Legs, z: np.ndarray, place: int, tangent: np.ndarray) -> Passage | None:
     """Two contacts at once: a guard that is left as it is met, or two guards."""
     after = (place + 1) % legs.count
     first, second = legs.contacts[place], legs.contacts[after]
@@ -172,11 +171,11 @@ def _leg_vanishes(legs: Legs, z: np.ndarray, place: int, tangent: np.ndarray) ->
         event = _without(legs, z, (place, after))
         if event is None:
             return None
-        own = z  # where the leg vanishes, these equations are singular
         onto, start = event.legs, event.z
         away, side = _touching(event) @ onto.tangent(start), -first.direction
         along = onto.tangent(start) * (1.0 if away * side > 0 else -1.0)
-        return End(event, own, onto, start, along)
+        # in its own unknowns at z: where the leg vanishes, these equations are singular
+        return Passage(event, z, onto, start, along)
     event = corner(legs, z, place)
     return None if event is None else _by_free_flow(event, event.z, tangent)
 
@@ -187,8 +186,8 @@ def _first_extra(legs: Legs, z: np.ndarray) -> tuple[SequenceContact, float] | N
     free, begin = legs.free_flow(z[None])[0], legs.begin(z[None])[0]
     if free is None:
         return None
-    own = legs.nodes(z[None])[0][0] if legs.contacts else np.zeros(0)
-    phase = np.sort((own - begin) % legs.n) + begin
+    known = legs.nodes(z[None])[0][0] if legs.contacts else np.zeros(0)
+    phase = np.sort((known - begin) % legs.n) + begin
     for i, contact in enumerate(free.contacts):
         if i == len(phase) or free.phase[i] < phase[i] - SAME_TIME:
             return contact, float(free.phase[i])
@@ -201,7 +200,7 @@ def _appears(
     beyond: np.ndarray,
     extra: tuple[SequenceContact, float],
     tangent: np.ndarray,
-) -> End | None:
+) -> Passage | None:
     """A boundary that is met beyond an orbit that touches it."""
     contact, phase = extra
     event = graze(legs, beyond, contact.guard, phase) or graze(legs, z, contact.guard, phase)
@@ -214,10 +213,10 @@ def _appears(
     place = event.place + 1 if legs.contacts else 0
     step = 1e-6 * along * onto.scale[0]
     faster = onto.speeds(np.array([start + step, start - step]))[:, place]
-    return End(event, event.z, onto, start, along if faster[0] > faster[1] else -along)
+    return Passage(event, event.z, onto, start, along if faster[0] > faster[1] else -along)
 
 
-def _by_free_flow(event: ContactEvent, z: np.ndarray, tangent: np.ndarray) -> End:
+def _by_free_flow(event: ContactChange, z: np.ndarray, tangent: np.ndarray) -> Passage:
     """The end of a branch beyond which the free flow finds the contacts of its orbits."""
     legs = event.legs
     for beyond in BEYOND:
@@ -235,5 +234,5 @@ def _by_free_flow(event: ContactEvent, z: np.ndarray, tangent: np.ndarray) -> En
         onto.accepted(near[None], _ROW)
         point = correct(onto, near[None], sign * along[None], _ROW, 10 * beyond)
         if point.found[0] and onto.admissible(point.z)[0]:
-            return End(event, z, onto, point.z[0], sign * along)
-    return End(event, z, None, z, tangent)
+            return Passage(event, z, onto, point.z[0], sign * along)
+    return Passage(event, z, None, z, tangent)

@@ -25,14 +25,16 @@ from saltus.flow.request import Schedule
 from saltus.kernels import status as st
 from saltus.system.leg import leg
 
-#: Legs that last less are flown by a detour that lasts so long, in periods.
-BRIEF, DETOUR = 1e-3, 1e-2
+#: Legs that last less take a detour, in periods.
+BRIEF = 1e-3
+#: Time that the detour takes, in periods.
+DETOUR = 1e-2
 #: Shorter times are rounding, in periods.
 AT_ONCE = 1e-14
 
 
 class Legs:
-    """Curves of periodic orbits of n periods with one contact sequence; an arclength ``Equations``.
+    """Curves of periodic orbits of n periods with one contact sequence; a ``CurveEquations``.
 
     Unknowns z: the time of each contact in periods since the orbit's first point and the state
     before it, one contact after the other; the period [s] of a system without forcing; the
@@ -61,11 +63,13 @@ class Legs:
         self.unit = float(orbits.map.period[0])  # of the time, in those of the parametric system
         self._maps = {
             mode: Stroboscope(
-                leg(orbits.parametric.system, mode), orbits.map.method, every=1.0,
+                leg(orbits.parametric.system, mode),
+                orbits.map.method,
+                every=1.0,
                 threads=orbits.map.threads,
             )
             for mode in set(self._modes)
-        }  # fmt: skip
+        }
         self.phase = np.full((len(scale), 2, self.size), np.nan)  # point and direction
 
     @classmethod
@@ -82,7 +86,7 @@ class Legs:
             Its contacts, or some of them.
         """
         size, n, count = orbits.size, orbits.n, max(len(sequence.contacts), 1)
-        rest, unit = z[n * size :], scale[n * size :]
+        others, unit = z[n * size :], scale[n * size :]
         each = np.append(1.0, scale[:size])
         legs = cls(orbits, sequence, np.append(np.tile(each, count), unit)[None])
         phase, after = sequence.phase, sequence.after
@@ -91,9 +95,11 @@ class Legs:
             before = after
         else:
             span = legs.spans(phase[None])
-            before = np.roll(legs.fly(after[None], rest[None], phase[None], span)[0][0], 1, axis=0)
+            before = np.roll(
+                legs.fly(after[None], others[None], phase[None], span)[0][0], 1, axis=0
+            )
         nodes = np.concatenate([phase[:, None], before], axis=1)
-        return legs, np.append(nodes.ravel(), rest)
+        return legs, np.append(nodes.ravel(), others)
 
     @property
     def width(self) -> int:
@@ -145,8 +151,8 @@ class Legs:
     def free_scale(self) -> np.ndarray:
         """Units of the unknowns with the contact sequence left to the flow."""
         unit = self.scale[0]
-        rest = unit[self.count * (self.size + 1) :]
-        return np.append(np.tile(unit[1 : self.size + 1], self.n), rest)
+        others = unit[self.count * (self.size + 1) :]
+        return np.append(np.tile(unit[1 : self.size + 1], self.n), others)
 
     def tangent(self, z: np.ndarray) -> np.ndarray:
         """A unit vector along the curve at an orbit float64[z], in units of the scale."""
@@ -157,7 +163,7 @@ class Legs:
     def fly(
         self,
         after: np.ndarray,
-        rest: np.ndarray,
+        others: np.ndarray,
         phase: np.ndarray,
         span: np.ndarray,
         legs: Sequence[int] | None = None,
@@ -171,7 +177,7 @@ class Legs:
             Their ends, and the derivatives with respect to the states of the parametric system, the
             time and the span [periods].
         """
-        start = self._states(after, rest, phase, span)
+        start = self._states(after, others, phase, span)
         modes = self._modes if legs is None else [self._modes[i] for i in legs]
         ends, matrices = self._ends(start, np.tile(modes, (len(after), 1)))
         matrices[..., -2:] *= self.unit
@@ -211,24 +217,26 @@ class Legs:
         return end, matrix
 
     def _states(
-        self, after: np.ndarray, rest: np.ndarray, phase: np.ndarray, span: np.ndarray
+        self, after: np.ndarray, others: np.ndarray, phase: np.ndarray, span: np.ndarray
     ) -> np.ndarray:
         """States of legs, float64[r, m, E + 2]."""
-        own = np.repeat(self.orbits.own(rest)[0][:, None], after.shape[1], axis=1)
+        carried = np.repeat(
+            self.orbits.parameter_states(others)[0][:, None], after.shape[1], axis=1
+        )
         times = np.stack([phase, span], axis=2) * self.unit
-        return np.concatenate([after, own, times], axis=2)
+        return np.concatenate([after, carried, times], axis=2)
 
     def at(self, z: np.ndarray) -> At:
         """Evaluate the contacts of orbits float64[r, z]: gaps, rates, states behind, and
         derivatives.
         """
-        phase, before, rest = self.nodes(z)
-        own = np.repeat(self.orbits.own(rest)[0][:, None], self.count, axis=1)
-        return self._jumps.at(phase * self.unit, np.concatenate([before, own], axis=2))
+        phase, before, others = self.nodes(z)
+        carried = np.repeat(self.orbits.parameter_states(others)[0][:, None], self.count, axis=1)
+        return self._jumps.at(phase * self.unit, np.concatenate([before, carried], axis=2))
 
     # -- equations ---------------------------------------------------------------------------------
     def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """See :class:`saltus.analysis.branches.arclength.Equations`."""
+        """See :class:`saltus.analysis.branches.equations.CurveEquations`."""
         at, spans = self.at(z), self.spans(self.nodes(z)[0])
         return self.closed(z, rows, at, *self.along(z, at, spans))
 
@@ -244,8 +252,8 @@ class Legs:
         """Residual and derivative that :meth:`evaluate` returns, from the results of :meth:`along`
         at the ends of the legs.
         """
-        phase, before, rest = self.nodes(z)
-        derivative = np.concatenate([derivative, self._of_gaps(at, rest)], axis=2)
+        phase, before, others = self.nodes(z)
+        derivative = np.concatenate([derivative, self._of_gaps(at, others)], axis=2)
         for i in range(self.count):
             there = (i + 1) % self.count * (self.size + 1)
             derivative[:, i, : self.size, there] += by_end[:, i]
@@ -286,9 +294,9 @@ class Legs:
             those with respect to that time [periods].
         """
         size, used, legs = self.size, self.count * (self.size + 1), [*range(self.count), *more]
-        phase, _, rest = self.nodes(z)
-        _, slopes, order = self.orbits.own(rest)
-        ends, matrices = self.fly(at.after[:, legs], rest, phase[:, legs], spans, legs)
+        phase, _, others = self.nodes(z)
+        _, slopes, order = self.orbits.parameter_states(others)
+        ends, matrices = self.fly(at.after[:, legs], others, phase[:, legs], spans, legs)
         by_state, by_start, by_span = matrices[..., :size], matrices[..., -2], matrices[..., -1]
         through = by_state @ at.by_state[:, legs]  # with respect to the states before the contact
         jumped = (by_state @ at.by_time[:, legs, :, None])[..., 0] * self.unit
@@ -297,27 +305,27 @@ class Legs:
             here, mine = i * (size + 1), derivative[:, flight]
             mine[..., here] = by_start[:, flight] - by_span[:, flight] + jumped[:, flight]
             mine[..., here + 1 : here + 1 + size] = through[:, flight, :, :size]
-        own = matrices[..., size:-2] + through[..., size:]
-        derivative[..., used + order] = own * slopes[:, None, None]
+        by_parameters = matrices[..., size:-2] + through[..., size:]
+        derivative[..., used + order] = by_parameters * slopes[:, None, None]
         return ends, derivative, by_span
 
     def flight(self, z: np.ndarray, place: int, count: int) -> tuple[np.ndarray, np.ndarray]:
         """The leg behind a contact of an orbit float64[z], cut into ``count`` equal times: those
         since the contact [periods], float64[count + 1], and the states, float64[count + 1, D].
         """
-        phase, _, rest = self.nodes(z[None])
+        phase, _, others = self.nodes(z[None])
         span, after = self.spans(phase)[:, [place]], self.at(z[None]).after[:, [place]]
-        start = self._states(after, rest, phase[:, [place]], span)[0]
+        start = self._states(after, others, phase[:, [place]], span)[0]
         map_ = self._maps[self._modes[place]]
         schedule = Schedule.even(1, count, beyond=1)
         states = map_.tangent_samples(start, 1, schedule)[0, :, : self.size]
         return span[0, 0] * np.linspace(0.0, 1.0, count + 1), states
 
-    def _of_gaps(self, at: At, rest: np.ndarray) -> np.ndarray:
+    def _of_gaps(self, at: At, others: np.ndarray) -> np.ndarray:
         """Derivatives of the gaps at the contacts, float64[r, m, 1, z]."""
         size, used = self.size, self.count * (self.size + 1)
-        _, slopes, order = self.orbits.own(rest)
-        result = np.zeros((*at.gap.shape, 1, used + rest.shape[1]))
+        _, slopes, order = self.orbits.parameter_states(others)
+        result = np.zeros((*at.gap.shape, 1, used + others.shape[1]))
         for i in range(self.count):
             here = i * (size + 1)
             result[:, i, 0, here] = at.gap_by_time[:, i] * self.unit
@@ -326,7 +334,7 @@ class Legs:
         return result
 
     def accepted(self, z: np.ndarray, rows: np.ndarray) -> None:
-        """See :class:`saltus.analysis.branches.arclength.Equations`."""
+        """See :class:`saltus.analysis.branches.equations.CurveEquations`."""
         if self.free and not self.contacts:
             self.phase[rows, 0] = self.nodes(z)[1][:, 0]
             flow = self.at(z).rate[:, 0] / self.scale[rows, 1 : self.size + 1]
@@ -343,7 +351,7 @@ class Legs:
 
     def alike(self, z: np.ndarray, rows: np.ndarray) -> np.ndarray:  # noqa: ARG002
         """The same orbits from another period on, float64[r, s, z]."""
-        phase, before, rest = self.nodes(z)
+        phase, before, others = self.nodes(z)
         m, n, result = self.count, self.n, [z]
         for by in range(1, m):
             order = (np.arange(m) + by) % m
@@ -352,7 +360,7 @@ class Legs:
             rolled = phase[:, order] + n * (np.arange(m) + by >= m)
             for periods in range(1, n):
                 nodes = np.concatenate([(rolled - periods)[..., None], before[:, order]], axis=2)
-                result.append(np.concatenate([nodes.reshape(len(z), -1), rest], axis=1))
+                result.append(np.concatenate([nodes.reshape(len(z), -1), others], axis=1))
         return np.stack(result, axis=1)
 
     # -- what an orbit is --------------------------------------------------------------------------
@@ -419,16 +427,16 @@ class Legs:
         """Orbits float64[r, z] by their points at whole periods after times float64[r] [periods]:
         unknowns of the free sequence.
         """
-        phase, _, rest = self.nodes(z)
+        phase, _, others = self.nodes(z)
         whole = np.arange(self.n) + np.broadcast_to(begin, len(z))[:, None]
         since = (whole[..., None] - phase[:, None]) % self.n  # of each point and contact
         since[np.minimum(since, self.n - since) < AT_ONCE] = 0.0
         last = since.argmin(axis=2)
         rows = np.arange(len(z))[:, None]
         span = np.take_along_axis(since, last[..., None], axis=2)[..., 0]
-        start = self._states(self.at(z).after[rows, last], rest, phase[rows, last], span)
+        start = self._states(self.at(z).after[rows, last], others, phase[rows, last], span)
         points = self._ends(start, np.array(self._modes)[last])[0]
-        return np.concatenate([points.reshape(len(z), self.n * self.size), rest], axis=1)
+        return np.concatenate([points.reshape(len(z), self.n * self.size), others], axis=1)
 
     def points(self, z: np.ndarray) -> np.ndarray:
         """The points at whole periods of orbits float64[r, z], float64[r, n, D]."""
@@ -446,11 +454,14 @@ class Legs:
             return result
         phase = self.nodes(z)[0]
         for i, free in zip(which, self.free_flow(z[which]), strict=True):
-            own = ContactSequence(
-                self.contacts, phase[i], self.sequence.after, self.sequence.velocity,
+            sequence = ContactSequence(
+                self.contacts,
+                phase[i],
+                self.sequence.after,
+                self.sequence.velocity,
                 self.sequence.mode,
-            )  # fmt: skip
-            result[i] = free is not None and shift(own, free, self.n) is not None
+            )
+            result[i] = free is not None and shift(sequence, free, self.n) is not None
         return result
 
     def free_flow(self, z: np.ndarray) -> list[ContactSequence | None]:

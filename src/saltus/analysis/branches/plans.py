@@ -14,9 +14,10 @@ from saltus.system import System
 from saltus.system.leg import has_legs
 from saltus.system.symmetry import is_symmetric
 
-#: Doubled branches are followed to orbits of this number of periods, each way over this number of
-#: points.
-LONGEST_DOUBLED, POINTS = 2, 1000
+#: Doubled branches are followed to orbits of this number of periods.
+LONGEST_DOUBLED = 2
+#: Most points of a branch in each direction.
+POINTS = 1000
 #: Events at which the branches that leave are followed.
 SWITCHES = ("period_doubling", "branch_point", "hopf")
 
@@ -44,7 +45,10 @@ def plan_of(
     symmetric = not twins and is_symmetric(system, {name: limits})
     return Plan(
         lambda n, scale: PeriodicOrbits(system, (name,), n, scale, method, threads, symmetric),
-        limits, points, longest, frozenset(switch),
+        limits,
+        points,
+        longest,
+        frozenset(switch),
         leg_branches if jumps and has_legs(system) else both_ways,
         stable=stable,
-    )  # fmt: skip
+    )

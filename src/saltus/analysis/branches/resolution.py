@@ -6,7 +6,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from saltus.analysis.branches.branch import Branch, refine
+from saltus.analysis.branches.branch import Branch
+from saltus.analysis.branches.piece import refine
 
 #: Largest change of the size of the orbit from one point to the next, relative to the larger.
 CHANGE = 0.08

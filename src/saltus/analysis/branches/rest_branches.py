@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 
 from saltus.analysis.branches.arclength import Arc, tangents
-from saltus.analysis.branches.branch import Branch, refine
+from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.criticality import criticality
 from saltus.analysis.branches.events import Event
+from saltus.analysis.branches.piece import refine
 from saltus.analysis.branches.rests import Rests
 from saltus.analysis.branches.switching import Seed, crossing
 from saltus.analysis.branches.tracing import Plan, both_ways, trace
@@ -48,7 +49,7 @@ class RestBranch(Branch):
         The direction in which the branch in the mode behind each begins, in units of the scale.
     """
 
-    orbits: Rests  # type: ignore[assignment]
+    orbits: Rests
     borders: list[Event | None] = field(default_factory=lambda: [None, None])
     beyond: list[np.ndarray | None] = field(default_factory=lambda: [None, None])
 
@@ -192,15 +193,22 @@ def _meet_boundary(branch: RestBranch, side: int, place: int) -> None:
     derivative = orbits.evaluate(end[None], one)[1]
     tangent = tangents(derivative, out[None])[0]
     outcome, branch.beyond[side] = _behind(branch, end, guard, tangent)
-    own = orbits.multipliers(end[None], derivative, one)
+    multipliers = orbits.multipliers(end[None], derivative, one)
     tangent = tangent if side else -tangent
     branch.borders[side] = Event(
-        "boundary_equilibrium", 0, end, own[0], tangent, derivative[0], (guard,), outcome=outcome
+        "boundary_equilibrium",
+        0,
+        end,
+        multipliers[0],
+        tangent,
+        derivative[0],
+        (guard,),
+        outcome=outcome,
     )
     at = len(branch.z) if side else 0
     length = branch.length[place] + (apart if side else -apart)
     new = {"z": end, "tangent": tangent, "derivative": derivative[0], "length": length}
-    for name, value in {**new, "multipliers": own[0]}.items():
+    for name, value in {**new, "multipliers": multipliers[0]}.items():
         setattr(branch, name, np.insert(getattr(branch, name), at, value, axis=0))
     branch.length = branch.length - branch.length[0]
 

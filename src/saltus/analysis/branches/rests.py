@@ -29,7 +29,7 @@ SLOWEST = 1e-3
 
 
 class Rests:
-    """Curves of equilibria over one parameter; an arclength ``Equations``, and what a branch asks
+    """Curves of equilibria over one parameter; a ``CurveEquations``, and what a branch asks
     of the equations of its orbits.
 
     Unknowns z: the state, and the parameter [SI]. The mode of a curve is that of the first point
@@ -47,7 +47,7 @@ class Rests:
 
     def __init__(self, system: System, name: str, scale: np.ndarray) -> None:
         self.system, self.names, self.scale = system, (name,), scale
-        self.n, self.size, self.free, self.symmetric = 1, len(system.states), False, False
+        self.n, self.size, self.free = 1, len(system.states), False
         self._whole = parametric(system, self.names).system
         size = self.size
         self._columns = [*range(size), len(self._whole.states) - 1]
@@ -85,9 +85,7 @@ class Rests:
         states = {name: np.ones(len(z)) for name in self._whole.states}
         for column, values in zip(self._columns, z.T, strict=True):
             states[self._whole.states[column]] = values
-        found = evaluate(
-            entries, states=states, values=self._whole.values, bits=list(modes.T)
-        )  # fmt: skip
+        found = evaluate(entries, states=states, values=self._whole.values, bits=list(modes.T))
         return np.stack([np.broadcast_to(one, len(z)) for one in found], axis=1).astype(float)
 
     def jacobian(self, z: np.ndarray, modes: np.ndarray) -> np.ndarray:
@@ -136,8 +134,8 @@ class Rests:
 
     # -- equations ---------------------------------------------------------------------------------
     def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """See :class:`saltus.analysis.branches.arclength.Equations`; each rate is divided by its
-        largest derivative where the curve begins.
+        """See :class:`saltus.analysis.branches.equations.CurveEquations`; each rate is divided by
+        its largest derivative where the curve begins.
         """
         modes, weight = self.modes[rows], self._weight[rows]
         derivative = self.jacobian(z, modes) * self.scale[rows][:, None]
@@ -145,7 +143,7 @@ class Rests:
         return residual / weight, derivative / weight[:, :, None]
 
     def accepted(self, z: np.ndarray, rows: np.ndarray) -> None:
-        """See :class:`saltus.analysis.branches.arclength.Equations`."""
+        """See :class:`saltus.analysis.branches.equations.CurveEquations`."""
         new = np.isnan(self._weight[rows, 0])
         if new.any():
             z, rows = z[new], rows[new]
@@ -179,15 +177,15 @@ class Rests:
         complex128[r, D].
         """
         matrices = self.jacobian(z, self.modes[rows])[:, :, : self.size]
-        own = leading_first(matrices)
-        order = np.lexsort((-own.imag, -own.real), axis=1)
-        return np.take_along_axis(own, order, axis=1)
+        values = leading_first(matrices)
+        order = np.lexsort((-values.imag, -values.real), axis=1)
+        return np.take_along_axis(values, order, axis=1)
 
     def multipliers(self, z: np.ndarray, derivative: np.ndarray, rows: np.ndarray) -> np.ndarray:  # noqa: ARG002
         """Those of the linear flow over :meth:`period`: exponentials of the eigenvalues, of which
         as many lie outside the unit circle as eigenvalues to the right of the imaginary axis;
         complex128[r, D].
         """
-        own = self.eigenvalues(z, rows) * self.period(z)[:, None]
-        multipliers: np.ndarray = np.exp(np.minimum(own.real, STEEP) + 1j * own.imag)
+        exponents = self.eigenvalues(z, rows) * self.period(z)[:, None]
+        multipliers: np.ndarray = np.exp(np.minimum(exponents.real, STEEP) + 1j * exponents.imag)
         return multipliers

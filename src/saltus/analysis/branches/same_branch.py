@@ -9,6 +9,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from saltus.analysis.branches.arclength import correct
 from saltus.analysis.branches.branch import Branch
+from saltus.analysis.branches.shooting import PeriodicOrbits
 
 #: Orbits nearer than this, in units of the scale, are one.
 SAME = 1e-6
@@ -21,10 +22,8 @@ def branch_of(z: np.ndarray, n: int, branches: Sequence[Branch]) -> int:
     these.
     """
     mine = [i for i, branch in enumerate(branches) if _is_alike(branch, n, len(z))]
-    same = [z]
-    if mine and branches[mine[0]].orbits.symmetric:
-        same.append(branches[mine[0]].orbits.mirrored(z[None])[0])
-    there = (i for one in same for i in mine if _on(one[None], branches[i])[0])
+    same = [z[None], *(_mirrored(z[None], branches[i]) for i in mine[:1])]
+    there = (i for one in same for i in mine if _on(one, branches[i]).any())
     return next(there, -1)
 
 
@@ -36,7 +35,18 @@ def on_branch(z: np.ndarray, n: int, branch: Branch) -> np.ndarray:
 def has_twin(branch: Branch) -> bool:
     """True if the mirror image of a branch is another branch."""
     middle = branch.z[len(branch.z) // 2][None]
-    return branch.orbits.symmetric and not _on(branch.orbits.mirrored(middle), branch)[0]
+    mirrored = _mirrored(middle, branch)
+    return len(mirrored) > 0 and not _on(mirrored, branch)[0]
+
+
+def _mirrored(z: np.ndarray, branch: Branch) -> np.ndarray:
+    """The mirror images of orbits float64[r, z] if they are orbits of the same equations; none
+    otherwise.
+    """
+    orbits = branch.orbits
+    if isinstance(orbits, PeriodicOrbits) and orbits.symmetric:
+        return orbits.mirrored(z)
+    return z[:0]
 
 
 def _is_alike(branch: Branch, n: int, width: int) -> bool:
@@ -97,7 +107,7 @@ def _apart(a: np.ndarray, b: np.ndarray, branch: Branch, exact: bool = False) ->
     """
     orbits, row = branch.orbits, branch.row
     size = orbits.n * orbits.size
-    if orbits.free:
+    if isinstance(orbits, PeriodicOrbits) and orbits.free:
         periods: float = abs(a[size] - b[size]) / abs(b[size])
         return max(periods, orbits.beside(b, a[: orbits.size], row) if exact else 0.0)
     others = orbits.alike(a[None], np.array([row]))[0]

@@ -19,8 +19,10 @@ from saltus.flow.methods import Method
 from saltus.results.dataset import schema
 from saltus.system import System
 
-#: Values of a parameter at which equilibria are looked for, and random starts at each.
-RESTING_VALUES, RESTING_STARTS = 3, 64
+#: Values of a parameter at which equilibria are looked for.
+RESTING_VALUES = 3
+#: Random starts at each of these values.
+RESTING_STARTS = 64
 #: An equilibrium so near to zero is there, in units of the starts.
 NOTHING = 1e-8
 #: Names of what a Dataset knows of its orbits: points, period, limit cycles' time.
@@ -140,9 +142,9 @@ def resting_between(
             found = all_equilibria(system.with_values(**{name: float(value)}), begin, unit)
         except ParameterError:  # too many modes
             return []
-        rests = [one.state for one in found if one.place == "region" and not one.dimension]
-        places += rests
-        values += [float(value)] * len(rests)
+        equilibria = [one.state for one in found if one.place == "region" and not one.dimension]
+        places += equilibria
+        values += [float(value)] * len(equilibria)
     return rests_at(np.reshape(places, (-1, len(system.states))), np.array(values), starts)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from saltus.analysis.branches.contact_sequences import (
     without,
 )
 from saltus.analysis.branches.events import Event
-from saltus.analysis.branches.grazes import ContactEvent, corner, graze
+from saltus.analysis.branches.grazes import ContactChange, corner, graze
 from saltus.analysis.branches.grazing_orbits import sqrt_coefficient
 from saltus.analysis.branches.legs import Legs
 from saltus.analysis.branches.shooting import PeriodicOrbits
@@ -26,9 +26,10 @@ from saltus.system.leg import has_legs
 #: How often an interval is halved in which the change isn't one graze, one corner, or several
 #: grazes at once.
 HALVINGS = 24
-#: Grazes at one interval of a branch that are told apart without halving it, and the shortest
-#: contacts among which they are sought.
-MOST_AT_ONCE, SHORTEST = 4, 16
+#: Grazes at one interval of a branch that are told apart without halving it.
+MOST_AT_ONCE = 4
+#: Shortest contacts among which they are sought.
+SHORTEST = 16
 #: How far outside of its interval an event may lie, in intervals.
 OUTSIDE = 0.02
 #: Grazes nearer than this, in units of the scale, come at once.
@@ -47,7 +48,7 @@ def contact_points(
     orbits: PeriodicOrbits, row: int, z: np.ndarray, tangent: np.ndarray
 ) -> list[Event]:
     """All changes of the contact sequence between the points of a branch and the next ones; none
-    where contacts are held, or equations switch by the time.
+    where contacts are held, equations switch by the time, or the states are many.
 
     Parameters
     ----------
@@ -62,22 +63,33 @@ def contact_points(
         return []
     points = _points(orbits, z)
     found = [
-        (after, event)
+        (after, change)
         for after, (one, other) in enumerate(itertools.pairwise(points))
         if one is not None and other is not None
-        for event in _between(orbits, row, tangent[after], one, other, 0)
+        for change in _between(orbits, row, tangent[after], one, other, 0)
     ]
     if not found:
         return []
-    places = np.array([event.orbit for _, event in found])
-    derivative = orbits.evaluate(places, np.full(len(found), row))[1]
+    events = [(after, event_of(change)) for after, change in found]
+    derivative = orbits.evaluate(
+        np.array([event.z for _, event in events]), np.full(len(events), row)
+    )[1]
     return [
-        Event(
-            event.kind, after, place, event.multipliers, tangent[after], matrix,
-            event.guards, event.phase, sqrt_coefficient=sqrt_coefficient(event),
-        )
-        for (after, event), place, matrix in zip(found, places, derivative, strict=True)
-    ]  # fmt: skip
+        replace(event, after=after, tangent=tangent[after], derivative=matrix)
+        for (after, event), matrix in zip(events, derivative, strict=True)
+    ]
+
+
+def event_of(change: ContactChange, begin: float = 0.0, outcome: str = "") -> Event:
+    """The event on a branch that a change of contacts is, with its orbit by the points at whole
+    periods after a time [periods].
+    """
+    legs = change.legs
+    return Event(
+        change.kind, 0, legs.orbit(change.z[None], begin)[0], change.multipliers,
+        guards=change.guards, phase=(change.phase - begin) % legs.n, outcome=outcome,
+        sqrt_coefficient=sqrt_coefficient(change),
+    )  # fmt: skip
 
 
 def _points(orbits: PeriodicOrbits, z: np.ndarray) -> list[_Point | None]:
@@ -90,7 +102,7 @@ def _points(orbits: PeriodicOrbits, z: np.ndarray) -> list[_Point | None]:
 
 def _between(
     orbits: PeriodicOrbits, row: int, tangent: np.ndarray, one: _Point, other: _Point, depth: int
-) -> list[ContactEvent]:
+) -> list[ContactChange]:
     """The events between two points of a branch."""
     first, second = one.sequence, other.sequence
     if shift(first, second, orbits.n) is not None:
@@ -117,7 +129,7 @@ def _between(
 
 
 def _ahead(
-    orbits: PeriodicOrbits, row: int, tangent: np.ndarray, z: np.ndarray, event: ContactEvent
+    orbits: PeriodicOrbits, row: int, tangent: np.ndarray, z: np.ndarray, event: ContactChange
 ) -> float:
     return _ahead_of(orbits, row, tangent, z, event.orbit)
 
@@ -129,7 +141,7 @@ def _ahead_of(
     return float((other - z) / orbits.scale[row] @ tangent)
 
 
-def _at_once(orbits: PeriodicOrbits, row: int, one: _Point, other: _Point) -> list[ContactEvent]:
+def _at_once(orbits: PeriodicOrbits, row: int, one: _Point, other: _Point) -> list[ContactChange]:
     """The grazes, or the corner, that alone tell two sequences apart; none if there are more."""
     scale = orbits.scale[row]
     fewer, more = sorted((one, other), key=lambda point: len(point.sequence.contacts))
@@ -141,8 +153,8 @@ def _at_once(orbits: PeriodicOrbits, row: int, one: _Point, other: _Point) -> li
                 return [event] if event is not None else []
         return []
     for contacts in _removals(long, len(long.contacts) - len(short.contacts), orbits.n):
-        rest = without(long, [place for contact in contacts for place in contact])
-        if shift(rest, short, orbits.n) is None:
+        fewer_contacts = without(long, [place for contact in contacts for place in contact])
+        if shift(fewer_contacts, short, orbits.n) is None:
             continue
         legs, z = Legs.of(orbits, short, fewer.z, scale)
         events = [

@@ -26,8 +26,10 @@ from saltus.flow.stops import on_allowed_sides
 from saltus.system import System
 from saltus.system.parametric import parametric
 
-#: Samples of a limit cycle in which the nearest to a point is looked for, and steps that locate it.
-SAMPLES, LOCATED = 400, 3
+#: Samples of a limit cycle in which the nearest to a point is looked for.
+SAMPLES = 400
+#: Steps that locate it.
+LOCATED = 3
 #: Radius of a limit cycle that is small, in units of the scale.
 SMALL = 0.3
 #: A guess so many roundings beyond a rigid stop, 2e-7 of the size of the states, lies on it: orbits
@@ -36,7 +38,7 @@ GUESSED = 1e9
 
 
 class PeriodicOrbits:
-    """Curves of periodic orbits of n periods over one parameter; an arclength ``Equations``.
+    """Curves of periodic orbits of n periods over one parameter; a ``CurveEquations``.
 
     Unknowns z: the n points, one after the other; the time from one to the next [s] in a system
     without forcing; the parameters [SI].
@@ -103,39 +105,43 @@ class PeriodicOrbits:
             return np.asarray(self.n * self._turns / self.values(z)[..., self.names.index(where)])
         return np.full(z.shape[:-1], self.n * self.system.period())
 
-    def own(self, rest: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def parameter_states(self, others: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Initial values of the states of the parametric system beside the points, from the
         unknowns beside the points float64[r, e]; the derivative of each with respect to its
         unknown, both float64[r, e]; and the number of that unknown, int64[e].
         """
-        slopes = np.ones(rest.shape)
+        slopes = np.ones(others.shape)
         if self.system.forced_at not in self.names:
-            return rest, slopes, self._order
-        values, frequency = rest[:, self._order], rest[:, self._order[0]]
+            return others, slopes, self._order
+        values, frequency = others[:, self._order], others[:, self._order[0]]
         values[:, 0] = self._turns / frequency
         slopes[:, 0] = -values[:, 0] / frequency
         return values, slopes, self._order
 
     def starts(self, z: np.ndarray) -> np.ndarray:
         """The points as states of the parametric system, float64[r, n, E]."""
-        return self._with_own(z, self.own(z[:, self.n * self.size :])[0])
+        return self._with_parameters(z, self.parameter_states(z[:, self.n * self.size :])[0])
 
-    def _with_own(self, z: np.ndarray, own: np.ndarray) -> np.ndarray:
-        states = np.empty((len(z), self.n, self.size + own.shape[1]))
-        states[..., : self.size], states[..., self.size :] = self.points(z), own[:, None]
+    def _with_parameters(self, z: np.ndarray, carried: np.ndarray) -> np.ndarray:
+        states = np.empty((len(z), self.n, self.size + carried.shape[1]))
+        states[..., : self.size], states[..., self.size :] = self.points(z), carried[:, None]
         return states
 
     # -- equations ---------------------------------------------------------------------------------
     def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """See :class:`saltus.analysis.branches.arclength.Equations`."""
+        """See :class:`saltus.analysis.branches.equations.CurveEquations`."""
         r, n, size = len(z), self.n, self.size
-        own, slopes, order = self.own(z[:, n * size :])
-        points, start = self.points(z), self._with_own(z, own).reshape(r * n, -1)
+        carried, slopes, order = self.parameter_states(z[:, n * size :])
+        points, start = self.points(z), self._with_parameters(z, carried).reshape(r * n, -1)
         if self._stops:
             start, _ = on_allowed_sides(
-                self.map.system, start, self.map.parameters, 0.0,
-                np.broadcast_to(self.map.period, r * n), GUESSED,
-            )  # fmt: skip
+                self.map.system,
+                start,
+                self.map.parameters,
+                0.0,
+                np.broadcast_to(self.map.period, r * n),
+                GUESSED,
+            )
         ends, matrices = self.map.tangent(start, 1)
         ends = ends[:, :size].reshape(r, n, size)
         matrices = matrices[:, :size].reshape(r, n, size, -1)
@@ -156,7 +162,7 @@ class PeriodicOrbits:
         return np.append(residual, where[:, None], axis=1), np.append(derivative, row, axis=1)
 
     def accepted(self, z: np.ndarray, rows: np.ndarray) -> None:
-        """See :class:`saltus.analysis.branches.arclength.Equations`."""
+        """See :class:`saltus.analysis.branches.equations.CurveEquations`."""
         if self.free:
             self.phase[rows, 0] = z[:, : self.size]
             self.phase[rows, 1] = self._flow(z) / self.scale[rows, : self.size]
@@ -215,8 +221,8 @@ class PeriodicOrbits:
         points = self.points(z)
         shifts = (np.arange(self.n)[:, None] + np.arange(self.n)) % self.n
         rolled = points[:, shifts].reshape(len(z), self.n, self.n * self.size)
-        rest = np.repeat(z[:, None, self.n * self.size :], self.n, axis=1)
-        return np.concatenate([rolled, rest], axis=2)
+        others = np.repeat(z[:, None, self.n * self.size :], self.n, axis=1)
+        return np.concatenate([rolled, others], axis=2)
 
     def mirrored(self, z: np.ndarray) -> np.ndarray:
         """The mirror images -x(t + T/2) of orbits float64[r, z]; of limit cycles -x(t)."""
@@ -226,8 +232,8 @@ class PeriodicOrbits:
             half = Schedule(np.zeros(1, np.int64), np.full(1, 0.5))
             seen = self.map.run(starts, 1, half).samples[:, 0, : self.size]
             points = seen.reshape(points.shape)
-        rest = z[:, self.n * self.size :]
-        return np.concatenate([-points.reshape(len(z), -1), rest], axis=1)
+        others = z[:, self.n * self.size :]
+        return np.concatenate([-points.reshape(len(z), -1), others], axis=1)
 
     # -- what an orbit is --------------------------------------------------------------------------
     def segments(self, derivative: np.ndarray, rows: np.ndarray) -> np.ndarray:
@@ -235,8 +241,8 @@ class PeriodicOrbits:
         size, unit = self.size, self.scale[rows]
         result = np.empty((len(rows), self.n, size, size))
         for i in range(self.n):
-            own = slice(i * size, (i + 1) * size)
-            result[:, i] = derivative[:, own, own] * unit[:, own, None] / unit[:, None, own]
+            part = slice(i * size, (i + 1) * size)
+            result[:, i] = derivative[:, part, part] * unit[:, part, None] / unit[:, None, part]
         return result + np.eye(size) if self.n == 1 else result
 
     def multipliers(self, z: np.ndarray, derivative: np.ndarray, rows: np.ndarray) -> np.ndarray:

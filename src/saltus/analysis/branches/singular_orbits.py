@@ -25,7 +25,7 @@ COSINES = (-1.0 + 1e-9, 1.0 - 1e-9)
 
 
 class SingularOrbits:
-    """Curves of bifurcations of one kind; an arclength ``Equations``.
+    """Curves of bifurcations of one kind; a ``CurveEquations``.
 
     Unknowns z: those of :class:`PeriodicOrbits` over two parameters, and for a torus the cosine of
     the angle of its multipliers.
@@ -122,7 +122,7 @@ class SingularOrbits:
 
     # -- equations ---------------------------------------------------------------------------------
     def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """See :class:`saltus.analysis.branches.arclength.Equations`."""
+        """See :class:`saltus.analysis.branches.equations.CurveEquations`."""
         width, size = self.orbits.width, self.size
         residual, derivative = self.orbits.evaluate(z[:, :width], rows)
         mu = self._multipliers(z)
@@ -142,10 +142,13 @@ class SingularOrbits:
         column = np.zeros((len(z), derivative.shape[1], 1))
         odd = by_cosine.imag / sine + g.imag * cosine / sine**3
         pair = np.stack([g.real, g.imag / sine], axis=1)
-        two = np.stack([
-            np.append(-slope.real, by_cosine.real[:, None], axis=1),
-            np.append(-slope.imag / sine[:, None], odd[:, None], axis=1),
-        ], axis=1)  # fmt: skip
+        two = np.stack(
+            [
+                np.append(-slope.real, by_cosine.real[:, None], axis=1),
+                np.append(-slope.imag / sine[:, None], odd[:, None], axis=1),
+            ],
+            axis=1,
+        )
         whole = np.concatenate([np.concatenate([derivative, column], axis=2), two], axis=1)
         return np.concatenate([residual, pair], axis=1), whole
 
@@ -177,9 +180,9 @@ class SingularOrbits:
         size = np.linalg.norm(along, axis=1)
         share = BESIDE / np.where(size > 0, size, 1.0)
         step = np.zeros_like(z)
-        step[:, : along.shape[1]] = share[:, None] * along * self.orbits.scale[rows][
-            :, : along.shape[1]
-        ]  # fmt: skip
+        step[:, : along.shape[1]] = (
+            share[:, None] * along * self.orbits.scale[rows][:, : along.shape[1]]
+        )
         beside = np.concatenate([z + step, z - step])
         _, derivative = self.orbits.evaluate(beside, np.concatenate([rows, rows]))
         ahead, behind = np.split(derivative, 2)
@@ -187,17 +190,17 @@ class SingularOrbits:
         return bend
 
     def accepted(self, z: np.ndarray, rows: np.ndarray) -> None:
-        """See :class:`saltus.analysis.branches.arclength.Equations`."""
+        """See :class:`saltus.analysis.branches.equations.CurveEquations`."""
         self.orbits.accepted(z[:, : self.orbits.width], rows)
         good = np.isfinite(self._latest[:, rows]).all(axis=(0, 2))
         self._border[:, rows[good]] = self._latest[:, rows[good]]
 
     def alike(self, z: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """See :class:`saltus.analysis.branches.arclength.Equations`."""
+        """See :class:`saltus.analysis.branches.equations.CurveEquations`."""
         width = self.orbits.width
         same = self.orbits.alike(z[:, :width], rows)
-        rest = np.repeat(z[:, None, width:], same.shape[1], axis=1)
-        return np.concatenate([same, rest], axis=2)
+        others = np.repeat(z[:, None, width:], same.shape[1], axis=1)
+        return np.concatenate([same, others], axis=2)
 
 
 def _real(vectors: np.ndarray) -> np.ndarray:

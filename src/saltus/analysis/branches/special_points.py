@@ -16,8 +16,8 @@ import numpy as np
 from scipy.optimize import elementwise
 
 from saltus.analysis.branches.arclength import correct, tangents
+from saltus.analysis.branches.equations import OrbitEquations
 from saltus.analysis.branches.events import Event
-from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.solve.newton import newton
 from saltus.flow.polynomials import between
 
@@ -28,9 +28,10 @@ KINDS = ("fold", "branch_point", "period_doubling", "neimark_sacker")
 COMPLEX = 1e-7
 #: Distance of a multiplier from the unit circle within which it isn't counted.
 ON_CIRCLE = 1e-9
-#: Newton's method at branch points: length of the last step, and distance of two derivatives whose
-#: difference is their slope, in units of the scale.
-CONVERGED, ASIDE = 1e-11, 1e-5
+#: Length of the last step of Newton's method at a branch point, in units of the scale.
+CONVERGED = 1e-11
+#: Distance of two derivatives whose difference is their slope, in units of the scale.
+ASIDE = 1e-5
 #: Farthest that a branch point lies from where it was seen, in units of the scale.
 FARTHEST = 0.3
 
@@ -60,16 +61,18 @@ def tests(
     for i in range(count):
         for j in range(i + 1, count):
             pairs = pairs * (multipliers[:, i] * multipliers[:, j] - 1.0)
-    return np.stack([
-        tangent[:, column],
-        sign * np.exp(size / width),
-        np.prod(1.0 + multipliers, axis=1).real,
-        pairs.real if count > 1 else ones,
-    ])  # fmt: skip
+    return np.stack(
+        [
+            tangent[:, column],
+            sign * np.exp(size / width),
+            np.prod(1.0 + multipliers, axis=1).real,
+            pairs.real if count > 1 else ones,
+        ]
+    )
 
 
 def locate(
-    orbits: PeriodicOrbits,
+    orbits: OrbitEquations,
     rows: np.ndarray,
     z: np.ndarray,
     tangent: np.ndarray,
@@ -79,7 +82,7 @@ def locate(
 
     Parameters
     ----------
-    orbits : PeriodicOrbits
+    orbits : OrbitEquations
         The equations.
     rows : int64[e]
         Which of its curves.
@@ -111,12 +114,17 @@ def locate(
         values = np.full(len(flat), np.nan)
         good = np.flatnonzero(point.found)
         if len(good):
-            own = orbits.multipliers(point.z[good], derivative[good], mine[good])
-            tested = tests(direction[good], derivative[good], own, column)
+            multipliers = orbits.multipliers(point.z[good], derivative[good], mine[good])
+            tested = tests(direction[good], derivative[good], multipliers, column)
             values[good] = tested[kind[which[good]], np.arange(len(good))]
             for place, i in enumerate(good):
                 known[int(which[i])] = Event(
-                    KINDS[kind[which[i]]], -1, point.z[i], own[place], direction[i], derivative[i]
+                    KINDS[kind[which[i]]],
+                    -1,
+                    point.z[i],
+                    multipliers[place],
+                    direction[i],
+                    derivative[i],
                 )
         return values
 
@@ -144,15 +152,18 @@ def zeros(at: Callable[[np.ndarray, np.ndarray], np.ndarray], length: np.ndarray
         return at(step.ravel(), event.astype(np.int64).ravel()).reshape(step.shape)
 
     root = elementwise.find_root(
-        values, (np.zeros(len(length)), length), args=(which.astype(float),),
-        tolerances={"xrtol": 1e-14, "xatol": 1e-15, "fatol": 0.0, "frtol": 0.0}, maxiter=60,
-    )  # fmt: skip
+        values,
+        (np.zeros(len(length)), length),
+        args=(which.astype(float),),
+        tolerances={"xrtol": 1e-14, "xatol": 1e-15, "fatol": 0.0, "frtol": 0.0},
+        maxiter=60,
+    )
     at(root.x, which)
     return np.asarray(root.x)
 
 
 def _branch_point(
-    orbits: PeriodicOrbits, row: int, start: np.ndarray, along: np.ndarray
+    orbits: OrbitEquations, row: int, start: np.ndarray, along: np.ndarray
 ) -> Event | None:
     """The point near another at which two branches cross; None if none is found.
 
@@ -182,9 +193,12 @@ def _branch_point(
 
     null = np.linalg.svd(derivative[0])[0][:, -1]
     zeros = newton(
-        equations, np.concatenate([start, [0.0], null])[None],
-        np.concatenate([unit, np.ones(size)])[None], enough=CONVERGED, longest_step=np.inf,
-    )  # fmt: skip
+        equations,
+        np.concatenate([start, [0.0], null])[None],
+        np.concatenate([unit, np.ones(size)])[None],
+        enough=CONVERGED,
+        longest_step=np.inf,
+    )
     z = zeros.z[0, :size]
     if not zeros.found[0]:
         return None
@@ -194,8 +208,8 @@ def _branch_point(
     spans = np.linalg.svd(derivative[0])[2][-2:]
     direction = spans.T @ (spans @ along)
     direction /= np.linalg.norm(direction)
-    own = orbits.multipliers(z[None], derivative, one)[0]
-    return Event("branch_point", -1, z, own, direction, derivative[0])
+    multipliers = orbits.multipliers(z[None], derivative, one)[0]
+    return Event("branch_point", -1, z, multipliers, direction, derivative[0])
 
 
 def outside(multipliers: np.ndarray) -> np.ndarray:
@@ -204,11 +218,14 @@ def outside(multipliers: np.ndarray) -> np.ndarray:
     """
     size, real = np.abs(multipliers), np.abs(multipliers.imag) <= COMPLEX * np.abs(multipliers)
     far = size > 1.0 + ON_CIRCLE
-    return np.stack([
-        (far & real & (multipliers.real > 0)).sum(axis=1),
-        (far & real & (multipliers.real < 0)).sum(axis=1),
-        (far & ~real).sum(axis=1),
-    ], axis=1)  # fmt: skip
+    return np.stack(
+        [
+            (far & real & (multipliers.real > 0)).sum(axis=1),
+            (far & real & (multipliers.real < 0)).sum(axis=1),
+            (far & ~real).sum(axis=1),
+        ],
+        axis=1,
+    )
 
 
 def unstable(

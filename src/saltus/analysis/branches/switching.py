@@ -9,6 +9,7 @@ import numpy as np
 
 from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.events import Event
+from saltus.analysis.branches.shooting import PeriodicOrbits
 
 #: A branch that ends so near to where another is to leave is that one, in units of the scale.
 BORN = 0.015
@@ -65,9 +66,12 @@ def children(branch: Branch, number: int, switch: frozenset[str], longest: int) 
         unit = branch.scale[:size]
         if event.kind == "period_doubling" and 2 * branch.orbits.n <= longest:
             yield Seed(
-                np.concatenate([points, points]), own, unit,
-                _doubled(branch, event), (number, index),
-            )  # fmt: skip
+                np.concatenate([points, points]),
+                own,
+                unit,
+                _doubled(branch, event),
+                (number, index),
+            )
         elif event.kind == "branch_point":
             aside = crossing(event)
             for sign in (1.0, -1.0):
@@ -83,24 +87,26 @@ def children(branch: Branch, number: int, switch: frozenset[str], longest: int) 
 
 def _doubled(branch: Branch, event: Event) -> np.ndarray:
     """The direction of the branch of twice the period."""
-    (segments,) = branch.orbits.segments(event.derivative[None], np.array([branch.row]))
-    product = np.eye(branch.orbits.size)
+    orbits = branch.orbits
+    assert isinstance(orbits, PeriodicOrbits)
+    (segments,) = orbits.segments(event.derivative[None], np.array([branch.row]))
+    product = np.eye(orbits.size)
     for one in segments:
         product = one @ product
     vector = np.linalg.svd(product + np.eye(len(product)))[2][-1]
     way = [vector]
     for one in segments[:-1]:
         way.append(one @ way[-1])
-    way = np.array(way) / branch.scale[: branch.orbits.size]
-    whole = np.concatenate([way.ravel(), -way.ravel(), np.zeros(branch.orbits.free + 1)])
+    way = np.array(way) / branch.scale[: orbits.size]
+    whole = np.concatenate([way.ravel(), -way.ravel(), np.zeros(orbits.free + 1)])
     return np.asarray(whole / np.linalg.norm(whole))
 
 
 def crossing(event: Event) -> np.ndarray:
     """The direction of the branch that crosses at a branch point."""
     null = np.linalg.svd(event.derivative)[2][-2:]
-    rest = null - np.outer(null @ event.tangent, event.tangent)
-    longest = rest[np.argmax(np.linalg.norm(rest, axis=1))]
+    across = null - np.outer(null @ event.tangent, event.tangent)
+    longest = across[np.argmax(np.linalg.norm(across, axis=1))]
     return np.asarray(longest / np.linalg.norm(longest))
 
 

@@ -11,7 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from saltus.analysis.branches.arclength import ENDING, FIRST, Arc, correct, follow, tangents
+from saltus.analysis.branches.arclength import (
+    ENDING,
+    FIRST,
+    Arc,
+    both_sides,
+    correct,
+    follow,
+    tangents,
+)
 from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.events import Event
 from saltus.analysis.branches.legs import Legs
@@ -143,8 +151,9 @@ def _is_known(start: Start, branches: Sequence[Branch]) -> bool:
 
 
 def _was_followed(plan: Plan, branch: Branch, branches: Sequence[Branch]) -> bool:
-    middle = branch.z[len(branch.z) // 2]
-    return plan.crossed and branch_of(middle, branch.orbits.n, branches) >= 0
+    if not plan.crossed:
+        return False
+    return branch_of(branch.z[len(branch.z) // 2], branch.orbits.n, branches) >= 0
 
 
 def _place(branch: Branch, branches: list[Branch], *waiting: list[Seed]) -> int:
@@ -283,8 +292,8 @@ def both_ways(
         if any(way.end == "met" for way in ways):
             result.append(None)
             continue
-        own = orbits.near(z[mine], mine) if len(starts) > 1 else orbits
-        result.append(_joined(own, [way for way in ways if way.z], kind))
+        equations = orbits.near(z[mine], mine) if len(starts) > 1 else orbits
+        result.append(_joined(equations, [way for way in ways if way.z], kind))
     return result
 
 
@@ -292,13 +301,8 @@ def _joined(orbits: PeriodicOrbits, curves: list[Arc], kind: type[Branch]) -> Br
     """One branch from the curves to both sides."""
     if not curves:
         return None
-    for curve in curves:
-        if curve.end == "closed":
-            return _of(orbits, curve, ("closed", "closed"), kind)
-    if len(curves) == 1:
-        return _of(orbits, curves[0], ("branch", curves[0].end), kind)
-    up, down = curves
-    return _of(orbits, up.behind(down), (down.end, up.end), kind)
+    (curve, *back), ends = both_sides(curves)
+    return _of(orbits, curve.behind(back[0]) if back else curve, ends, kind)
 
 
 def _of(orbits: PeriodicOrbits, curve: Arc, ends: tuple[str, str], kind: type[Branch]) -> Branch:
@@ -310,5 +314,5 @@ def _of(orbits: PeriodicOrbits, curve: Arc, ends: tuple[str, str], kind: type[Br
     good = point.found
     z[good], derivative[good] = point.z[good], point.derivative[good]
     tangent[good] = tangents(derivative[good], tangent[good])
-    own = here.multipliers(z, derivative, rows)
-    return kind(orbits, 0, z, tangent, derivative, length, own, ends)
+    multipliers = here.multipliers(z, derivative, rows)
+    return kind(orbits, 0, z, tangent, derivative, length, multipliers, ends)

@@ -38,10 +38,14 @@ from saltus.flow.request import Schedule
 WINDOWS = 3
 #: Starts whose motions are held at a time.
 TOGETHER = 64
-#: Points of a cycle that are unknowns: at least, at most; one for each turn between.
-FEWEST, MOST = 4, 16
-#: Looks at a cycle for each of them to see whether it repeats, and the largest difference.
-FINER, FAR = 8, 1e-2
+#: Fewest points of a cycle that are unknowns; one for each rotation otherwise.
+FEWEST = 4
+#: Most points of a cycle that are unknowns.
+MOST = 16
+#: Places between two points at which a cycle is looked at to see whether it repeats.
+FINER = 8
+#: Largest difference there.
+FAR = 1e-2
 #: Farthest that points go from the guess, in units of its range.
 FARTHEST = 3.0
 #: Sample points of a cycle by which duplicates of it are recognised.
@@ -162,8 +166,8 @@ class Cycles(Family[Cycle]):
     def same(self, motion: Cycle, closed: Shooting) -> np.ndarray:
         """See :class:`Family`: once or several times round."""
         assert closed.time is not None
-        turns = np.maximum(np.round(closed.time / motion.time), 1.0)
-        same = np.abs(closed.time / motion.time - turns) < SAME * turns
+        rotations = np.maximum(np.round(closed.time / motion.time), 1.0)
+        same = np.abs(closed.time / motion.time - rotations) < SAME * rotations
         rows = np.flatnonzero(same)
         if len(rows):
             points = closed.points[rows]
@@ -182,12 +186,12 @@ class Cycles(Family[Cycle]):
             points = z[:, :-1].reshape(len(z), n, (z.shape[1] - 1) // n)
             result = np.empty((len(z), len(cycles), z.shape[1]))
             for i, cycle in enumerate(cycles):
-                turns = np.maximum(np.round(z[:, -1] / cycle.time), 1.0)
+                rotations = np.maximum(np.round(z[:, -1] / cycle.time), 1.0)
                 place = cycle.nearest(points[:, 0])[:, None] + np.arange(n) * (
-                    turns[:, None] * SAMPLES / n
+                    rotations[:, None] * SAMPLES / n
                 )
                 result[:, i, :-1] = cycle.at(place).reshape(len(z), z.shape[1] - 1)
-                result[:, i, -1] = turns * cycle.time
+                result[:, i, -1] = rotations * cycle.time
             return result
 
         return zeros
@@ -198,8 +202,8 @@ class Cycles(Family[Cycle]):
         """
         far = np.concatenate([np.full(len(SIZES), BESIDE[0]), BESIDE, BESIDE])
         size = np.concatenate([SIZES, np.ones(2 * len(BESIDE))])
-        turns = np.where(np.arange(len(far)) < len(SIZES) + len(BESIDE), 1, 2)
-        steps = np.arange(n) * turns[:, None] * SAMPLES / n
+        rotations = np.where(np.arange(len(far)) < len(SIZES) + len(BESIDE), 1, 2)
+        steps = np.arange(n) * rotations[:, None] * SAMPLES / n
         guesses = []
         for cycle in self.motions:
             middle = cycle.samples[:-1].mean(axis=0)
@@ -207,7 +211,7 @@ class Cycles(Family[Cycle]):
             points = middle + size[:, None, None] * (points - middle)
             points += far[:, None, None] * random.standard_normal(points.shape) * cycle.scale
             scale = np.broadcast_to(cycle.scale, (len(far), len(cycle.scale)))
-            guesses.append(self.guess(points, turns * cycle.time, scale))
+            guesses.append(self.guess(points, rotations * cycle.time, scale))
         return guesses
 
     def place(self, motion: Cycle) -> tuple[float, ...]:
@@ -239,8 +243,8 @@ def all_cycles(
         Called with the share done.
     """
     search, result = Search(0, len(start)), Cycles(map_, limits[1])
-    turn = float(map_.period[0])
-    n = int(np.clip(np.ceil(limits[1] / turn), FEWEST, MOST))
+    rotation = float(map_.period[0])
+    n = int(np.clip(np.ceil(limits[1] / rotation), FEWEST, MOST))
 
     def guesses() -> Iterator[tuple[Shooting, np.ndarray]]:
         for first in range(0, len(start), TOGETHER):

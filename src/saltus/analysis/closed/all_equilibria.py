@@ -27,8 +27,10 @@ from saltus.system import System
 
 #: Modes that are looked at; each boundary doubles them.
 MOST_MODES = 1024
-#: A gap that is zero to so small a share of its terms, and of those that the scale would make.
-ON, ON_SCALE = 1e-10, 1e-13
+#: Share of its terms below which a gap is zero.
+ON = 1e-10
+#: Share of the terms that the scale would make, likewise.
+ON_SCALE = 1e-13
 #: Parts of eigenvalues below this share of the largest eigenvalue are zero.
 NEUTRAL = 1e-12
 
@@ -92,16 +94,18 @@ def all_equilibria(system: System, starts: np.ndarray, scale: np.ndarray) -> lis
     continua: list[ModeEquations] = []
     for mode in _modes(system.guards):
         piece = ModeEquations(system, mode, scale)
-        rests: list[Equilibrium] = []
+        equilibria: list[Equilibrium] = []
         for state in piece.zeros(starts):
-            rest = _rest(piece, state)
-            if rest is not None and rest.dimension and rest.place != "boundary":
+            equilibrium = _rest(piece, state)
+            if equilibrium is None:
+                continue
+            if equilibrium.dimension and equilibrium.place != "boundary":
                 continua.append(piece)
-                rests = [rest]  # one of a continuum says all
+                equilibria = [equilibrium]  # one of a continuum says all
                 break
-            if rest is not None and not (rest.dimension and rests):
-                rests.append(rest)
-        found += [one for one in rests if not any(_same(one, other, scale) for other in found)]
+            if not (equilibrium.dimension and equilibria):
+                equilibria.append(equilibrium)
+        found += [one for one in equilibria if not any(_same(one, other, scale) for other in found)]
     edges = [  # where a continuum ends it is found from beyond too
         any(piece.vanishes(one.state) for piece in continua) and one.place == "boundary"
         for one in found
@@ -162,15 +166,16 @@ def _rest(piece: ModeEquations, state: np.ndarray) -> Equilibrium | None:
             releases.append(owner)
         attracts &= _attracts(piece, law, state)
     dimension = len(piece.along(state))
-    own = _eigenvalues(piece, state)
-    kind, stable = _named(own, dimension)
+    eigenvalues = _eigenvalues(piece, state)
+    kind, stable = _named(eigenvalues, dimension)
     if touched or releases:
         kind, stable = "undecided", False
     place = "boundary" if touched or releases else "pseudo" if piece.held else "region"
     ends = piece.ends(state) if dimension else np.stack([state, state])
+    missing = np.full(len(state) - len(eigenvalues), np.nan + 0j)
     return Equilibrium(
         state + 0.0, piece.mode, place, kind, stable and attracts, (*piece.held, *touched),
-        dimension, np.append(own, np.full(len(state) - len(own), np.nan + 0j)), ends, margin,
+        dimension, np.append(eigenvalues, missing), ends, margin,
     )  # fmt: skip
 
 
@@ -213,18 +218,18 @@ def _eigenvalues(piece: ModeEquations, state: np.ndarray) -> np.ndarray:
     if len(normals):
         _, singular, right = np.linalg.svd(normals)
         frame = right[np.count_nonzero(singular > RANK * singular.max()) :].T
-    own = np.linalg.eigvals(frame.T @ matrix[:size] @ frame) + 0j
-    largest = np.abs(own).max(initial=0.0)
-    own.real[np.abs(own.real) <= NEUTRAL * largest] = 0.0
-    own.imag[np.abs(own.imag) <= NEUTRAL * largest] = 0.0
-    return np.asarray(own[np.lexsort((-own.imag, -own.real))])
+    eigenvalues = np.linalg.eigvals(frame.T @ matrix[:size] @ frame) + 0j
+    largest = np.abs(eigenvalues).max(initial=0.0)
+    eigenvalues.real[np.abs(eigenvalues.real) <= NEUTRAL * largest] = 0.0
+    eigenvalues.imag[np.abs(eigenvalues.imag) <= NEUTRAL * largest] = 0.0
+    return np.asarray(eigenvalues[np.lexsort((-eigenvalues.imag, -eigenvalues.real))])
 
 
-def _named(own: np.ndarray, dimension: int) -> tuple[str, bool]:
+def _named(eigenvalues: np.ndarray, dimension: int) -> tuple[str, bool]:
     """The kind of an equilibrium, and whether its linear part is stable: by the eigenvalues, but
     for those along a continuum.
     """
-    across = own[np.argsort(np.abs(own), kind="stable")[dimension:]]
+    across = eigenvalues[np.argsort(np.abs(eigenvalues), kind="stable")[dimension:]]
     stable = bool((across.real < 0).all())
     if dimension:
         return "continuum", stable

@@ -31,9 +31,10 @@ DIRECTIONS = 16
 #: Every so-manyth point of the outer shell is followed first: a radius that is too large is nearly
 #: always seen to be by these alone.
 SPARSE = 4
-#: What is left of the distance after the returns that are looked at together, and how many these
-#: may be.
-CONTRACTION, MOST_RETURNS = 0.5, 64
+#: Share of the distance that is left after the returns that are looked at together.
+CONTRACTION = 0.5
+#: Most returns that are looked at together.
+MOST_RETURNS = 64
 #: Points of an orbit that get a neighbourhood: a trajectory on its way passes all of them in a
 #: response.
 MOST_POINTS = 8

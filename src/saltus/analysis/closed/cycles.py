@@ -36,16 +36,20 @@ from saltus.flow.request import Schedule
 
 #: A state that stays smaller than this is zero [SI].
 ZERO = 1e-15
-#: Samples of the motion in which a return is searched; ratio of the lengths of two windows.
-SAMPLES, ZOOM = 4096, 8
+#: Samples of the motion in which a return is searched.
+SAMPLES = 4096
+#: Ratio of the lengths of two windows.
+ZOOM = 8
 #: Most windows that are tried, from that of the samples on.
 MOST_WINDOWS = 6
-#: Samples follow the motion where its direction turns by less than 18 degrees from one to the next,
-#: for so large a share of them.
-TURN, FOLLOWED = 0.95, 0.9
-#: A return farther than this, in units of the scale, may be none: a longer window is searched,
-#: unless this one holds this number of turns.
-FAR, ENOUGH = 0.05, 8
+#: Cosine of the turn between two samples that follow the motion: 18 degrees.
+TURN = 0.95
+#: Share of the samples for which that must hold.
+FOLLOWED = 0.9
+#: A return farther than this, in units of the scale, may be none: a longer window is searched.
+FAR = 0.05
+#: Rotations in a window after which none is.
+ENOUGH = 8
 #: Returns that samples can't tell apart: the error of the cubic between them, in units of the
 #: scale.
 SAMPLED = 1e-6
@@ -98,11 +102,11 @@ def returns(map_: Stroboscope, start: np.ndarray, window: float) -> Returns:
     result = Returns(np.full(k, np.nan), np.full(k, np.inf), np.ones((k, size)))
     length, rows, refined = np.full(k, float(window)), np.arange(k), np.zeros(k, bool)
     for _ in range(MOST_WINDOWS):
-        time, apart, scale, followed, turns = _seen(map_.rows(rows), start[rows], length[rows])
+        time, apart, scale, followed, count = _seen(map_.rows(rows), start[rows], length[rows])
         result.scale[rows] = scale
         done = followed & np.isfinite(apart)
         result.time[rows[done]], result.apart[rows[done]] = time[done], apart[done]
-        longer = followed & ((turns == 0) | (turns < ENOUGH) & (apart > FAR)) & ~refined[rows]
+        longer = followed & ((count == 0) | (count < ENOUGH) & (apart > FAR)) & ~refined[rows]
         refined[rows[~followed]] = True
         length[rows] *= np.where(followed, ZOOM, 1.0 / ZOOM)
         rows = rows[~followed | longer]
@@ -185,8 +189,8 @@ def _seen(map_: Stroboscope, start: np.ndarray, length: np.ndarray) -> tuple[np.
     across, scale, (samples, rates) = directions(map_, start, length)
     step = (length / SAMPLES)[:, None, None]
     with np.errstate(all="ignore"):
-        turns = np.einsum("kij,kij->ki", across[:, 1:], across[:, :-1])
-        followed = (turns > TURN).mean(axis=1) >= FOLLOWED
+        cosines = np.einsum("kij,kij->ki", across[:, 1:], across[:, :-1])
+        followed = (cosines > TURN).mean(axis=1) >= FOLLOWED
         time, apart, rises = _crossings(start, across, scale, samples, step * rates)
     time, apart = _first_of_the_nearest(time, apart)
     return time * length / SAMPLES, apart, scale, followed, rises.sum(axis=1)

@@ -12,6 +12,7 @@ from saltus.analysis.closed.all_equilibria import Equilibrium, all_equilibria
 from saltus.analysis.closed.field_zeros import autonomous
 from saltus.analysis.dataset_parts import gap_unit
 from saltus.analysis.inputs.box import box_ranges, draw
+from saltus.analysis.inputs.given import Range, Starts, Value
 from saltus.analysis.inputs.halton import halton
 from saltus.analysis.inputs.starts import check_system, ensemble, fill, fixed_states
 from saltus.analysis.inputs.verb import verb
@@ -31,11 +32,11 @@ MOST_STARTS = 100_000
 @verb
 def equilibria(
     system: System,
-    start: Any = None,
+    start: Starts | None = None,
     *,
     starts: int = 256,
-    at: Mapping[str, Any] | None = None,
-    **box: Any,
+    at: Mapping[str, Value] | None = None,
+    **box: Range,
 ) -> xr.Dataset:
     """All equilibria of a system without forcing: in each region, on boundaries, and held by
     contacts; stable ones and unstable ones.
@@ -154,7 +155,7 @@ def _starts(
 def _columns(system: System, found: list[Equilibrium]) -> dict[str, Any]:
     """The variables of the result."""
     size, names = len(system.states), [guard.name for guard in system.guards]
-    own = np.array([one.eigenvalues for one in found], complex).reshape(-1, size)
+    eigenvalues = np.array([one.eigenvalues for one in found], complex).reshape(-1, size)
     ends = np.array([one.ends for one in found]).reshape(-1, 2, size)
     return {
         "equilibrium": np.arange(len(found)),
@@ -165,8 +166,8 @@ def _columns(system: System, found: list[Equilibrium]) -> dict[str, Any]:
         "equilibrium_mode": np.array([mode_number(one.mode) for one in found], "i8"),
         "equilibrium_margin": np.array([one.margin for one in found]),
         "equilibrium_dimension": np.array([one.dimension for one in found], "i8"),
-        "equilibrium_eigenvalue_real": own.real,
-        "equilibrium_eigenvalue_imag": np.where(np.isnan(own), np.nan, own.imag),
+        "equilibrium_eigenvalue_real": eigenvalues.real,
+        "equilibrium_eigenvalue_imag": np.where(np.isnan(eigenvalues), np.nan, eigenvalues.imag),
         "equilibrium_<state>": np.array([one.state for one in found]).reshape(-1, size),
         "equilibrium_<state>_from": ends[:, 0],
         "equilibrium_<state>_to": ends[:, 1],

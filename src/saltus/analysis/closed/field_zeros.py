@@ -123,8 +123,8 @@ def find_equilibria(map_: Stroboscope, start: np.ndarray, scale: np.ndarray) -> 
     found = zeros.found
     result.period[found], result.time[found], result.points[found, 0] = 1, 0.0, zeros.z[found]
     for i, matrix in _jacobians(map_, result):
-        own = np.linalg.eigvals(matrix)
-        result.multipliers[i] = own[np.lexsort((-own.imag, -own.real))]
+        eigenvalues = np.linalg.eigvals(matrix)
+        result.multipliers[i] = eigenvalues[np.lexsort((-eigenvalues.imag, -eigenvalues.real))]
     return result
 
 

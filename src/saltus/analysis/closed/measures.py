@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.analysis.inputs.outputs import Outputs, outputs_of
+from saltus.analysis.inputs.outputs import Outputs, states_alone
 from saltus.flow import polynomials
 from saltus.flow.maps import Stroboscope
 from saltus.flow.modal_motions import wave_motions
@@ -23,7 +23,7 @@ from saltus.flow.motion_series import Pieces
 from saltus.flow.pieces import nodes_of, pieces
 from saltus.flow.request import Outcome
 from saltus.flow.threads import on_threads
-from saltus.flow.waves import Legs, deviations, harmonics, largest, least_turn, means, turns
+from saltus.flow.waves import WaveLegs, deviations, harmonics, largest, least_turn, means, turns
 from saltus.kernels import status as st
 
 #: Forcing periods of a motion that never repeats from which its numbers are taken, where there are
@@ -65,8 +65,9 @@ class Measures:
     itinerary : list of str
         Guards met, with + where the gap becomes positive, in the order of time; empty for a motion
         that never repeats.
-    turning : list of float64[n, D]
-        States where the first one turns, in the order of time.
+    turning : list of float64[n, K]
+        The outputs where the first state turns, or the first output where these stand first, in the
+        order of time.
     """
 
     maximum: np.ndarray
@@ -106,10 +107,13 @@ class Measures:
         contacts: of those in a whole period int64[m], in one forcing period where it is 0.
         """
         return {
-            "period": period, "contacts": self.contacts * np.maximum(period, 1),
-            "itinerary": self.itinerary, "peak": self.peak[:, 0], "rms": self.rms[:, 0],
+            "period": period,
+            "contacts": self.contacts * np.maximum(period, 1),
+            "itinerary": self.itinerary,
+            "peak": self.peak[:, 0],
+            "rms": self.rms[:, 0],
             "margin": self.margin,
-        }  # fmt: skip
+        }
 
     def rows(self, which: slice) -> Measures:
         """Those of some of the motions."""
@@ -131,7 +135,7 @@ def unknown(m: int, size: int, outputs: int | None = None) -> Measures:
     wide = size if outputs is None else outputs
     maximum, minimum, mean, deviation = np.full((4, m, wide), np.nan)
     margin, span, contacts = np.full((3, m), np.nan)
-    harmonic, turning = np.full((m, wide), np.nan + 0j), [np.zeros((0, size)) for _ in range(m)]
+    harmonic, turning = np.full((m, wide), np.nan + 0j), [np.zeros((0, wide)) for _ in range(m)]
     return Measures(
         maximum, minimum, mean, deviation, harmonic, margin, span, contacts, [""] * m, turning
     )
@@ -159,7 +163,7 @@ def measure(
     outputs : Outputs, optional
         What is asked about; default the states.
     """
-    wanted = outputs or outputs_of(map_.system)
+    wanted = outputs or states_alone(map_.system)
     result, parts = unknown(len(start), start.shape[1], len(wanted)), []
     for n in np.unique(periods):
         rows = np.flatnonzero(periods == n)
@@ -202,7 +206,8 @@ def _measured(
         ranges = [np.subtract(*_extremes(whole, first, turns[gap], gap)) for gap in gaps]
         result.margin[known] = np.min(margins, axis=0, initial=np.inf) if margins else np.inf
         result.span[known] = np.max(ranges, axis=0) if ranges else 0.0
-        for motion, points in zip(known, turns[0].states(map_, whole, first, size), strict=True):
+        shown = turns[size if map_.system.outputs.first and wide > size else 0]
+        for motion, points in zip(known, shown.states(map_, whole, first, wide), strict=True):
             result.turning[motion] = points
     return result
 
@@ -217,7 +222,7 @@ def _count_contacts(
 
 def _measured_by_waves(
     map_: Stroboscope,
-    motions: list[list[Legs]],
+    motions: list[list[WaveLegs]],
     outcome: Outcome,
     span: int,
     closed: bool,
@@ -249,7 +254,7 @@ def _measured_by_waves(
     return result
 
 
-def _turning_states(parts: list[Legs], size: int, closed: bool) -> np.ndarray:
+def _turning_states(parts: list[WaveLegs], size: int, closed: bool) -> np.ndarray:
     """The states where the first one turns, float64[n, D], in the order of time: inside legs, and
     where one ends and the next begins.
     """
@@ -308,7 +313,7 @@ class _Turns:
     def states(
         self, map_: Stroboscope, whole: Pieces, first: np.ndarray, size: int
     ) -> list[np.ndarray]:
-        """All states there, float64[n, D] for each motion, each turn once."""
+        """The first ``size`` quantities there, float64[n, size] for each motion, each turn once."""
         period, motion = map_.period[whole.motion[self.piece]], whole.motion[self.piece]
         time = (
             whole.period[self.piece] * period

@@ -22,8 +22,10 @@ from saltus.language.evaluate import evaluate
 from saltus.language.expression import Expr, depends_on
 from saltus.system import System
 
-#: Rounds of deflation, and starts of each but the first.
-ROUNDS, DEFLATED_STARTS = 8, 64
+#: Rounds of deflation.
+ROUNDS = 8
+#: Starts of each round but the first.
+DEFLATED_STARTS = 64
 #: Zeros of one mode from which deflation finds more at its own pace only: a field may have no end
 #: of them.
 MANY = 32
@@ -31,9 +33,10 @@ MANY = 32
 ASIDE = 0.1
 #: Longest step of Newton's method, in units of the scale.
 LONGEST_STEP = 1e8
-#: Distance of equal zeros, relative to the states and to the scale; size of a residual, relative to
-#: the terms of its linear part.
-SAME, RESIDUAL = 1e-7, 1e-9
+#: Distance of equal zeros, relative to the states and to the scale.
+SAME = 1e-7
+#: Size of a residual that vanishes, relative to the terms of its linear part.
+RESIDUAL = 1e-9
 #: States below this share of the scale may be zeros but for rounding.
 ROUNDED = 1e-12
 
@@ -102,9 +105,12 @@ class ModeEquations:
         return found
 
     def _solve(
-        self, entries: Sequence[Expr], slopes: Sequence[Sequence[Expr]], start: np.ndarray,
+        self,
+        entries: Sequence[Expr],
+        slopes: Sequence[Sequence[Expr]],
+        start: np.ndarray,
         known: Sequence[np.ndarray] = (),
-    ) -> np.ndarray:  # fmt: skip
+    ) -> np.ndarray:
         """Zeros float64[m, D] of expressions by Newton's method from float64[k, D], those that are
         known deflated.
         """
@@ -113,9 +119,13 @@ class ModeEquations:
             return self._equilibrated(entries, slopes, x)
 
         zeros = newton(
-            equations, start, np.broadcast_to(self.scale, start.shape), longest_step=LONGEST_STEP,
-            least_squares=True, known=np.array(known) if len(known) else None,
-        )  # fmt: skip
+            equations,
+            start,
+            np.broadcast_to(self.scale, start.shape),
+            longest_step=LONGEST_STEP,
+            least_squares=True,
+            known=np.array(known) if len(known) else None,
+        )
         x = zeros.z[zeros.found]
         residual, derivative = self._equilibrated(entries, slopes, x)
         with np.errstate(invalid="ignore", over="ignore"):

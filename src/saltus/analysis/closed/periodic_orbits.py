@@ -18,6 +18,7 @@ from saltus.analysis.closed.search import AGES, Search
 from saltus.analysis.closed.spread import spread
 from saltus.analysis.closed.turns import looks_every
 from saltus.analysis.dataset_parts import provenance, subject
+from saltus.analysis.inputs.given import Range, Starts, Value
 from saltus.analysis.inputs.random_starts import random_count, random_starts
 from saltus.analysis.inputs.starts import check_system, ensemble, trajectories
 from saltus.analysis.inputs.verb import verb
@@ -35,20 +36,22 @@ from saltus.results.dataset.orbits import OrbitTable
 from saltus.system import System
 from saltus.units import to_si
 
-#: Steps and contacts for each iterate of a trial's motion, unless the method says how many. The rig
-#: takes 14 steps a period from where it moves, 5 million from a kilometre away; a ball that keeps
-#: 0.9 of its speed comes to rest in 200 contacts, and never where the impacts are written as jumps.
-STEPS, CONTACTS = 10_000, 1000
+#: Steps for each iterate of a trial's motion, unless the method says how many. The rig takes 14 a
+#: period from where it moves, 5 million from a kilometre away.
+STEPS = 10_000
+#: Contacts for each iterate likewise: a ball that keeps 0.9 of its speed comes to rest in 200, and
+#: never where the impacts are written as jumps.
+CONTACTS = 1000
 
 
 @verb
 def periodic_orbits(
     system: System,
-    start: Any = "random 1000",
+    start: Starts = "random 1000",
     *,
-    box: Mapping[str, Any] | None = None,
+    box: Mapping[str, Range] | None = None,
     periods: int = 3,
-    period: Any = None,
+    period: Value | Range | None = None,
     method: Method | None = None,
     seed: int = 1,
     threads: int | None = None,
@@ -89,7 +92,8 @@ def periodic_orbits(
         Of a system without forcing, in place of ``periods``: the range of periods looked for,
         ``("1 s", "5 s")``, or a first guess, which stands for half to twice of it.
     method : Method
-        Default :class:`saltus.Taylor`; another one has errors that keep unstable orbits from
+        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
+        it serves; another one has errors that keep unstable orbits from
         closing. Its budgets, ``max_steps`` and ``max_events``, are those of each motion that is
         followed; default: 10 000 steps and 1000 contacts for each forcing period or turn, 12 of
         which a start may be followed before the search begins. Starts that need more, as those
@@ -153,15 +157,15 @@ def periodic_orbits(
         if isinstance(start, str)
         else _given(system, start, box)
     )
-    method = exact_method(method)
+    method = exact_method(method, system)
     attrs = provenance(system, method, system.values) | {"starts": len(states), "seed": seed}
     if system.forced_at is None:
-        turn = _turn(system, states)
-        limits, guess = _range(period, (0.0, (periods + 0.5) * turn))
-        method = _with_budget(method, max(AGES[-1], limits[1] / turn))
-        looks = Stroboscope(system, method, every=turn, threads=threads)
+        rotation = _turn(system, states)
+        limits, guess = _range(period, (0.0, (periods + 0.5) * rotation))
+        method = _with_budget(method, max(AGES[-1], limits[1] / rotation))
+        looks = Stroboscope(system, method, every=rotation, threads=threads)
         with reporting(progress) as show:
-            cycles = all_cycles(looks, states, limits, guess or turn, show)
+            cycles = all_cycles(looks, states, limits, guess or rotation, show)
             table = table_of(looks, cycles.motions, cycles.found)
         attrs |= {"shortest_period": limits[0], "longest_period": limits[1]}
         return orbits_dataset(system, attrs, table, searches(cycles.searches))
@@ -213,9 +217,9 @@ def _range(period: Any, default: tuple[float, float]) -> tuple[tuple[float, floa
     return (0.5 * ends[0], 2.0 * ends[0]), ends[0]
 
 
-def exact_method(method: Method | None) -> Method:
+def exact_method(method: Method | None, system: System) -> Method:
     """The method. Raises ParameterError for one whose errors are more than rounding."""
-    method = check_method(method)
+    method = check_method(method, system)
     if not method.exact:
         raise ParameterError(
             lambda say: (

@@ -29,9 +29,10 @@ from saltus.kernels import status as st
 #: Iterates that starts are followed before Newton's method begins, in turn: none, so that motions
 #: are found which nothing comes near; some, so that a chaotic set is reached.
 AGES = (0, 4, 8, 12)
-#: Guesses that a search with known motions deflated begins with, and its steps: most of them lead
-#: nowhere.
-DEFLATED_STARTS, DEFLATED_STEPS = 64, 40
+#: Guesses that a search with known motions deflated begins with.
+DEFLATED_STARTS = 64
+#: Steps of such a search: most guesses lead nowhere.
+DEFLATED_STEPS = 40
 #: How far beside known motions it begins too, in units of their range.
 BESIDE = np.repeat([0.01, 0.1, 0.3], 6)
 

@@ -20,12 +20,18 @@ from saltus.flow.taylor import Taylor
 from saltus.system import System
 from saltus.units import to_si
 
-#: Motions that are asked, and fastest times of the linear part after which they are.
-ASKED, SETTLING = 8, 64
-#: Windows that are tried, the next so many times longer or shorter.
-WINDOWS, ZOOM = 8, 8.0
-#: Turns that a window must hold, and the angle between two samples that they can follow [rad].
-TURNS, FOLLOWED = 2.0, 0.3
+#: Motions that are asked.
+ASKED = 8
+#: Fastest times of the linear part after which they are.
+SETTLING = 64
+#: Windows that are tried.
+WINDOWS = 8
+#: Ratio of the lengths of two windows.
+ZOOM = 8.0
+#: Rotations that a window must hold.
+TURNS = 2.0
+#: Angle between two samples that they can follow [rad].
+FOLLOWED = 0.3
 #: Share of the steps from sample to sample that must be followed: impacts turn a motion at once.
 SHARE = 0.9
 
@@ -82,11 +88,11 @@ def _turn(system: System, start: np.ndarray, parameters: np.ndarray | None) -> f
     flight = map_.with_period(fastest).launch(begin, SETTLING)
     state = flight.advance(SETTLING)[:, -1]
     kept = np.isfinite(state).all(axis=1)
-    turn = np.where(np.isfinite(fastest), fastest, 1.0)
+    rotation = np.where(np.isfinite(fastest), fastest, 1.0)
     if kept.any():
         rows_kept = np.flatnonzero(kept)
-        turn[rows_kept] = _turning(map_.rows(rows_kept), state[kept], fastest[kept])
-    return float(f"{float(np.median(turn)):.1e}")
+        rotation[rows_kept] = _turning(map_.rows(rows_kept), state[kept], fastest[kept])
+    return float(f"{float(np.median(rotation)):.1e}")
 
 
 def _fastest(map_: Stroboscope, start: np.ndarray) -> np.ndarray:
@@ -110,9 +116,9 @@ def _turning(map_: Stroboscope, state: np.ndarray, first: np.ndarray) -> np.ndar
         angle = np.arccos(np.clip(np.einsum("kij,kij->ki", toward[:, 1:], toward[:, :-1]), -1, 1))
         with np.errstate(invalid="ignore"):
             followed = (angle < FOLLOWED).mean(axis=1) >= SHARE
-            turns = np.nansum(angle, axis=1) / (2.0 * np.pi)
-        done = followed & (turns >= TURNS)
-        result[rows[done]] = length[rows[done]] / turns[done]
+            rotations = np.nansum(angle, axis=1) / (2.0 * np.pi)
+        done = followed & (rotations >= TURNS)
+        result[rows[done]] = length[rows[done]] / rotations[done]
         length[rows] *= np.where(followed, ZOOM, 1.0 / ZOOM)
         rows = rows[~done]
         if not len(rows):

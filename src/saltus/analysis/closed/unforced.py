@@ -10,13 +10,16 @@ from saltus.analysis.closed.cycles import attracting_cycles, find_cycles, return
 from saltus.analysis.closed.field_zeros import captured, find_equilibria
 from saltus.analysis.closed.measures import Measures
 from saltus.analysis.closed.motions import ClosedMotions
+from saltus.analysis.inputs.outputs import Outputs
 from saltus.contact.guards import is_hold
 from saltus.flow.maps import Stroboscope
 from saltus.language.evaluate import evaluate
+from saltus.system.modes import mode_number, sides
 
-#: Parts of a motion that must each be larger than the one before, and how much the last must be
-#: larger than the first, to run away.
-EIGHTHS, GROWN = 8, 3.0
+#: Parts of a motion that must each be larger than the one before, to run away.
+EIGHTHS = 8
+#: Ratio of the last of them to the first, at least.
+GROWN = 3.0
 #: Returns farther than this, in units of the range, are no sign of a limit cycle.
 TORUS = 1e-2
 
@@ -48,10 +51,10 @@ def attracted(
         Range of each state on the limit cycle; of an equilibrium that which was given.
     """
     result, size = ClosedMotions.none(*state.shape), scale.copy()
-    rests = find_equilibria(map_, state, scale)
-    here = np.flatnonzero(captured(map_, rests, state, scale))
-    result.put(here, rests.rows(here))
-    size[here] = np.maximum(scale[here], np.abs(rests.points[here, 0]))
+    equilibria = find_equilibria(map_, state, scale)
+    here = np.flatnonzero(captured(map_, equilibria, state, scale))
+    result.put(here, equilibria.rows(here))
+    size[here] = np.maximum(scale[here], np.abs(equilibria.points[here, 0]))
     rows = np.flatnonzero(result.period == 0)
     if len(rows):
         cycles, beside, own = attracting_cycles(map_.rows(rows), state[rows], window, near)
@@ -76,14 +79,21 @@ def runs_away(iterates: np.ndarray) -> np.ndarray:
         return np.asarray((np.diff(sizes, axis=0) > 0).all(axis=0) & (sizes[-1] > GROWN * sizes[0]))
 
 
-def rest(map_: Stroboscope, place: np.ndarray, rows: np.ndarray, numbers: Measures) -> None:
-    """Fill in the rows int64[m] of equilibria float64[m, D]: the size of their states, and the
-    distance to the nearest boundary.
+def rest(
+    map_: Stroboscope, place: np.ndarray, rows: np.ndarray, numbers: Measures,
+    outputs: Outputs | None = None,
+) -> None:  # fmt: skip
+    """Fill in the rows int64[m] of equilibria float64[m, D]: the size of their states and outputs,
+    and the distance to the nearest boundary.
     """
+    held = any(is_hold(guard) for guard in map_.system.guards)
+    if outputs is not None and not held:
+        mode = mode_number(sides(map_.system, 0.0, place.T, map_.values))
+        place = outputs.values(0.0, place, map_.values, mode)
     size = place.shape[1]
     numbers.maximum[rows, :size] = numbers.minimum[rows, :size] = numbers.mean[rows, :size] = place
     numbers.deviation[rows, :size], numbers.span[rows] = 0.0, 0.0
-    states, values = dict(zip(map_.system.states, place.T, strict=True)), map_.values
+    states, values = dict(zip(map_.system.states, place.T, strict=False)), map_.values
     bits: list[np.ndarray] = []
     nearest = np.full(len(rows), np.inf)
     for guard in map_.system.guards:
@@ -93,8 +103,8 @@ def rest(map_: Stroboscope, place: np.ndarray, rows: np.ndarray, numbers: Measur
         bits.append(np.broadcast_to(gap, len(rows)) > 0)
         nearest = np.minimum(nearest, np.abs(gap))
     numbers.margin[rows] = nearest
-    for row, one in zip(rows, place, strict=True):
-        numbers.turning[row] = one[None]
+    for row in rows:
+        numbers.turning[row] = numbers.mean[row][None]
 
 
 def multipliers_and_eigenvalues(

@@ -5,16 +5,18 @@ of a base.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from saltus.contact.guards import Guard
-from saltus.errors import ParameterError, UnitError, shown
-from saltus.language import units_of, why_no_title
+from saltus.errors import ParameterError, shown
+from saltus.language.evaluate import evaluate
 from saltus.language.expression import Expr
+from saltus.results.dataset.schema import reserved_names
 from saltus.system import System
-from saltus.system.quantity import quantity
-from saltus.units import check_declared, dimension
+from saltus.system.outputs import with_more
 
 
 @dataclass(frozen=True)
@@ -31,19 +33,73 @@ class Outputs:
         Of the functions; conditions hold bits.
     guards : tuple of Guard
         The guards of these bits: those of the system, then those that only the functions need.
+    own : int
+        Number of the guards of the system.
     """
 
     names: tuple[str, ...]
     units: tuple[str, ...]
     formulas: tuple[Expr, ...]
     guards: tuple[Guard, ...]
+    own: int = 0
 
     def __len__(self) -> int:
         return len(self.names)
 
+    def values(
+        self, t: Any, states: np.ndarray, parameters: Mapping[str, Any], mode: np.ndarray
+    ) -> np.ndarray:
+        """All of them where the motion is known.
+
+        Parameters
+        ----------
+        t : float or array, shape (...)
+            Time [s].
+        states : float64[..., D]
+            The states there; NaN where they aren't known.
+        parameters : mapping of str to float or array, shape (...)
+            Values of all parameters [SI].
+        mode : int64[...]
+            Sides of the guards of the system: bit i is set where gap i is positive.
+
+        Returns
+        -------
+        float64[..., K]
+            The states come first. A function is NaN where a state is.
+        """
+        if not self.formulas:
+            return states
+        names = self.names[: states.shape[-1]]
+        known = dict(zip(names, np.moveaxis(states, -1, 0), strict=True))
+        bits: list[Any] = [(np.asarray(mode) >> i) & 1 == 1 for i in range(self.own)]
+        about: dict[str, Any] = {"t": t, "states": known, "values": parameters}
+        for guard in self.guards[self.own :]:
+            (gap,) = evaluate([guard.gap], **about, bits=bits)
+            bits.append(gap > 0)
+        there = np.isfinite(states).all(axis=-1)
+        found = evaluate(self.formulas, **about, bits=bits)
+        columns = [np.where(there, one, np.nan) for one in found]
+        return np.concatenate([states, np.stack(columns, axis=-1)], axis=-1)
+
+
+def check_outputs(system: System) -> None:
+    """Raise a ParameterError for an output that has the name of another variable of results."""
+    for name in system.outputs.names:
+        if name in reserved_names():
+            raise ParameterError(
+                f"the output {shown(name)} has the name of something else in results. Give it "
+                f"another one."
+            )
+
+
+def states_alone(system: System) -> Outputs:
+    """The states of a system as outputs, and no functions."""
+    units = tuple(system.units[name] for name in system.states)
+    return Outputs(system.states, units, (), system.guards, len(system.guards))
+
 
 def outputs_of(system: System, given: Mapping[str, Any] | None = None) -> Outputs:
-    """The outputs of a system: its states, then the user's functions.
+    """The outputs of a system: its states, those that it has by name, then the user's functions.
 
     Parameters
     ----------
@@ -51,7 +107,7 @@ def outputs_of(system: System, given: Mapping[str, Any] | None = None) -> Output
         The equations and values.
     given : mapping of str to callable, or to (callable, unit)
         Functions of (t, states, parameters), arguments found by name; see
-        :func:`saltus.system.quantity.quantity`.
+        :func:`saltus.system.read_off.quantity`.
 
     Raises
     ------
@@ -59,31 +115,7 @@ def outputs_of(system: System, given: Mapping[str, Any] | None = None) -> Output
         If a name is taken, a unit can't be read, or a function can't be traced or doesn't repeat
         with the forcing.
     """
-    if given is not None and not isinstance(given, Mapping):
-        raise ParameterError(
-            f'outputs must be functions by name, such as outputs={{"spring force": lambda x, k: '
-            f"k*x}}, not {shown(given)}. "
-            f"States are read off without being asked for."
-        )
-    extended, formulas, units = system, [], [system.units[name] for name in system.states]
-    for name, one in (given or {}).items():
-        if why_no_title(name) or name in system.states:
-            why = why_no_title(name) or f"{system.name} has a state of this name"
-            raise ParameterError(f"an output can't be called {shown(name)}: {why}.")
-        function, unit = one if isinstance(one, tuple) and len(one) == 2 else (one, "")
-        formula, guards = quantity(extended, function, f"the output {shown(name)}")
-        extended = replace(extended, guards=guards)
-        formulas.append(formula)
-        units.append(_unit(system, formula, name, check_declared(unit, name) if unit else ""))
-    return Outputs((*system.states, *(given or {})), tuple(units), tuple(formulas), extended.guards)
-
-
-def _unit(system: System, formula: Expr, name: str, declared: str) -> str:
-    """The unit of an output: the declared one, or that of its formula."""
-    (found,) = units_of(system.states, system.units, system.field, [formula])
-    if declared and found and dimension(found) != dimension(declared):
-        raise UnitError(
-            f"the output {shown(name)} is said to be in {declared}, but its formula is in {found}. "
-            f"Correct one, or leave the unit out."
-        )
-    return declared or found
+    found = system.outputs if given is None else with_more(system, given, variables=False)
+    formulas, guards = found.behind(system.guards)
+    units = (*(system.units[name] for name in system.states), *found.units)
+    return Outputs((*system.states, *found.names), units, formulas, guards, len(system.guards))

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from saltus.analysis.inputs.axes import along, axes_of, count_along
+from saltus.analysis.inputs.outputs import check_outputs
 from saltus.errors import ParameterError, SaltusError, among, must_be, shown, unknown
 from saltus.flow.counts import whole
 from saltus.flow.request import Request, Schedule
@@ -167,8 +168,11 @@ def _labels(value: Any) -> Any:
 
 
 def check_system(system: Any) -> None:
-    """Raise a ParameterError for anything that isn't a System."""
+    """Raise a ParameterError for anything that isn't a System, and for one with an output that has
+    the name of another variable of results.
+    """
     if isinstance(system, System):
+        check_outputs(system)
         return
     name = getattr(system, "__name__", "")
     if callable(system) and str(getattr(system, "__module__", "")).startswith("saltus.models"):

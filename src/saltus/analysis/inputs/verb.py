@@ -15,7 +15,7 @@ import numpy as np
 
 from saltus.announce import silent
 from saltus.arguments import Kinds
-from saltus.errors import ParameterError, nearest, shown
+from saltus.errors import ParameterError, closest, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.engine import MOST_THREADS, RunInterrupted
 from saltus.interrupt import Interrupted, no_ctrl_c_is_lost
@@ -30,14 +30,14 @@ _ELSEWHERE: Mapping[str, str] = {
         ("tend", "tfinal", "t_final", "tf", "t_max", "tmax", "duration", "t_span", "tspan"),
         "t_end=",
     ),
-    **dict.fromkeys(
-        ("t_eval", "teval", "n_samples", "nsamples", "dt", "step"), "samples= (per period)"
-    ),
+    **dict.fromkeys(("t_eval", "teval", "times", "saveat"), "at= (times)"),
+    **dict.fromkeys(("n_samples", "nsamples", "dt", "step"), "samples= (per period)"),
     **dict.fromkeys(("y0", "x0", "u0", "initial", "initial_state", "ic"), "start="),
     **dict.fromkeys(
         ("rtol", "atol", "tol", "tolerance", "reltol", "abstol"),
         "method=sl.ODE45(rtol=..., atol=...), or sl.Taylor(), which needs none",
     ),
+    **dict.fromkeys(("terminal", "stop", "stop_at", "stop_condition"), 'until="x > 2 mm"'),
     **dict.fromkeys(("params", "parameters", "args", "p"), "values="),
     **dict.fromkeys(("n_jobs", "workers", "cores"), "threads="),
     **dict.fromkeys(("n", "n_periods", "nperiods", "cycles"), "periods="),
@@ -56,16 +56,13 @@ _RECORDS = (
 _MISSING: Mapping[str, str] = {
     **dict.fromkeys(("events", "event", "callback"), _RECORDS),
     **dict.fromkeys(
-        ("terminal", "stop", "stop_at", "until"),
-        "To stop at an event isn't possible: run on, and cut the result at run.contact_time.",
+        ("until", "terminal", "stop", "stop_at"),
+        'sl.simulate ends at a condition: sl.simulate(system, start, t_end=10, until="x > 2 mm").',
     ),
-    "outputs": (
-        "sl.frequency_response, sl.bifurcation_diagram and sl.branches know outputs; of a run "
-        "compute them from its states, such as 1e3*run.x."
-    ),
+    "outputs": "The system has them: system.with_outputs({'tip': lambda x: ...}).",
     **dict.fromkeys(("max_step", "first_step", "min_step", "hmax", "h0", "options"), _STEPS),
     **dict.fromkeys(("jac", "jacobian", "vectorized", "mass_matrix"), _NOT_NEEDED),
-    "dense_output": "Write samples= for more samples; run.x.interp(time=...) reads between them.",
+    "dense_output": "Write at=[...] for the states at given times, or samples= for more samples.",
     **dict.fromkeys(
         ("transient", "discard", "settle", "skip"),
         "Write keep=, how many of the last periods are kept.",
@@ -175,7 +172,7 @@ def _by_name(
     ):
         raise ParameterError(
             f"sl.{name}: samples is a number: how many in a forcing period, or in the whole run of "
-            f"a system without forcing. run.x.interp(time=[...]) reads a state at given times."
+            f"a system without forcing. Write at=[...] for the states at given times."
         )
     return given
 
@@ -195,8 +192,8 @@ def _misspelt(
         and isinstance(system, System)
         and word not in system.values
         and word not in system.states
-        and nearest(word, [*known, *system.states]) == nearest(word, known)
-        and nearest(word, known).startswith("Did you mean")
+        and (meant := closest(word, known)) is not None
+        and closest(word, [*known, *system.states]) == meant
     )
 
 
@@ -249,10 +246,10 @@ def _length(known: Mapping[str, inspect.Parameter]) -> str:
     """The arguments of a verb for the length of its run."""
     ways = {
         "t_end": "t_end= [s]",
-        "periods": "periods= (forcing periods)" if "every" not in known else "periods= (forcing "
-            "periods, or samples every= seconds of "
-        "a system without forcing)",
-    }  # fmt: skip
+        "periods": "periods= (forcing periods)"
+        if "every" not in known
+        else "periods= (forcing periods, or samples every= seconds of a system without forcing)",
+    }
     return (
         f"The length of the run is "
         f"{' or '.join(text for name, text in ways.items() if name in known)}."

@@ -11,6 +11,7 @@ import xarray as xr
 
 from saltus.analysis.closed.turns import looks_every
 from saltus.analysis.dataset_parts import provenance, shared_values, subject
+from saltus.analysis.inputs.given import Starts, Values
 from saltus.analysis.inputs.starts import Ensemble, check_system, ensemble
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.lyapunov.algorithm import Algorithm
@@ -43,14 +44,14 @@ LEAST_PERIODS = 64
 @verb
 def lyapunov(
     system: System,
-    start: Any = None,
+    start: Starts | None = None,
     *,
     method: str = "variational",
     flow: Method | None = None,
     periods: int = 2000,
     transient: int = 500,
     every: float | str | None = None,
-    values: Mapping[str, Any] | None = None,
+    values: Mapping[str, Values] | None = None,
     unit: str = "1/s",
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
@@ -91,7 +92,8 @@ def lyapunov(
         states and the phase of the forcing, 32 in a block; an evolution is one block. It is the
         largest exponent of the flow, so never below zero: neighbours on an orbit stay neighbours.
     flow : Method
-        The method of integration. Default :class:`saltus.Taylor`. With
+        The method of integration. Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from
+        eight states on where it serves. With
         ``sl.ODE45(events="ignore")`` jumps of the tangent are left out, as contacts aren't known.
     periods : int
         Blocks that growth is measured over, at least 64. The error falls with the square root of
@@ -157,7 +159,7 @@ def lyapunov(
     """
     check_system(system)
     _check_words(method, unit, system)
-    flow = check_method(flow)
+    flow = check_method(flow, system)
     group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
     periods, transient = whole(periods, "periods", LEAST_PERIODS), whole(transient, "transient", 0)
     rows = np.broadcast_to(group.parameters, (group.size, len(system.values)))

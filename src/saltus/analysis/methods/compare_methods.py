@@ -120,7 +120,7 @@ def compare_methods(
     if "method" in arguments:
         raise ParameterError("give the methods as methods=[...]; method= is for a single analysis.")
     everything = list(
-        dict.fromkeys([check_method(reference or Taylor()), *map(check_method, methods)])
+        dict.fromkeys(check_method(one, system) for one in (reference or Taylor(), *methods))
     )
     if len(everything) < 2:
         raise ParameterError(
@@ -150,12 +150,15 @@ def compare_methods(
     return methods_dataset(
         base=results[0],
         labels=[method.label for method in everything],
-        columns={"method_cpu_seconds": np.array(costs), "method_agreement": agreeing / settled,
+        columns={
+            "method_cpu_seconds": np.array(costs),
+            "method_agreement": agreeing / settled,
             "method_agreement_low": low,
-                 "method_agreement_high": high},
+            "method_agreement_high": high,
+        },
         fields=parts,
         attrs=provenance(system, everything[0], system.values) | {"analysis": name},
-    )  # fmt: skip
+    )
 
 
 def methods_dataset(

@@ -4,6 +4,7 @@ integrates it, and the steps it then takes.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import xarray as xr
 
 from saltus.analysis.attractors.find_responses import motion_range
 from saltus.analysis.dataset_parts import provenance, subject
+from saltus.analysis.inputs.given import Starts, Value
 from saltus.analysis.inputs.starts import ensemble
 from saltus.analysis.inputs.verb import verb
 from saltus.contact import STEPS
@@ -35,8 +37,8 @@ def regularisation_widths(
     law: str = "tanh",
     *,
     method: Method | None = None,
-    start: Any = None,
-    widths: Any = None,
+    start: Starts | None = None,
+    widths: Sequence[Value] | np.ndarray | None = None,
     transient: int = 200,
     points: int = 32,
     threads: int | None = None,
@@ -92,7 +94,7 @@ def regularisation_widths(
     True
     """
     one_of(STEPS, "regularisation_widths: ", law=law)
-    method = check_method(ODE45(rtol=1e-4, atol=1e-7) if method is None else method)
+    method = check_method(method or ODE45(rtol=1e-4, atol=1e-7), system)
     zero = dict.fromkeys(system.states, 0.0)
     group = ensemble(system, zero if start is None else start, None)
     if len(group.start) != 1:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from saltus.analysis.inputs.given import Starts, Values
 from saltus.analysis.inputs.starts import check_system
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion.window import Stretch, computed, dataset, stretch
@@ -23,7 +23,8 @@ from saltus.language.evaluate import evaluate
 from saltus.language.expression import Expr
 from saltus.results.dataset import schema
 from saltus.system import System
-from saltus.system.quantity import Quantity, quantity, with_integrals, with_losses
+from saltus.system.quantity import with_integrals, with_losses
+from saltus.system.read_off import Quantity, quantity
 
 #: Default number of intervals of an unforced system's span.
 INTERVALS = 100
@@ -40,7 +41,7 @@ _IMPACTS = "energy_impacts_"
 @verb
 def energy_balance(
     system: System,
-    start: Any = None,
+    start: Starts | None = None,
     *,
     energy: Quantity,
     supplied: Quantity,
@@ -52,7 +53,7 @@ def energy_balance(
     transient: int | float | str = 0,
     intervals: int | None = None,
     method: Method | None = None,
-    values: Mapping[str, Any] | None = None,
+    values: Mapping[str, Values] | None = None,
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
 ) -> xr.Dataset:
@@ -121,7 +122,7 @@ def energy_balance(
     True
     """
     check_system(system)
-    method = check_method(method)
+    method = check_method(method, system)
     stored, guards = quantity(system, energy, "the energy")
     powers = {"supplied": supplied, "dissipated": dissipated, "friction": friction}
     parts = {name: power for name, power in powers.items() if power is not None}

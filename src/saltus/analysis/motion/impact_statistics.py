@@ -1,16 +1,20 @@
-"""`impact_statistics`: rate, speed and duration of contacts."""
+"""`impact_statistics`: rate, speed, duration, peak force and impulse of contacts."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from saltus.analysis.dataset_parts import motion_values
+from saltus.analysis.inputs.given import Starts, Values
 from saltus.analysis.inputs.starts import check_system
 from saltus.analysis.inputs.verb import verb
-from saltus.analysis.motion import touchdowns
+from saltus.analysis.motion import contact_peaks, touchdowns
+from saltus.analysis.motion.contact_peaks import ContactForces, Peaks
 from saltus.analysis.motion.touchdowns import Touchdowns
 from saltus.analysis.motion.window import Stretch, computed, dataset, stretch
 from saltus.analysis.outcome_messages import warn
@@ -19,11 +23,13 @@ from saltus.flow.counts import whole
 from saltus.flow.methods import Method, check_method
 from saltus.flow.request import Outcome, Schedule
 from saltus.flow.room import check_room
+from saltus.interrupt import Interrupted
 from saltus.language.evaluate import evaluate
 from saltus.language.expression import walk
 from saltus.results.dataset import schema
 from saltus.system import System
-from saltus.system.quantity import Quantity, with_impulses, with_integrals
+from saltus.system.contact_forces import side_that_pushes
+from saltus.system.quantity import with_impulses, with_integrals
 
 #: Blocks whose scatter gives a standard error: consecutive contacts are not independent, blocks
 #: nearly are.
@@ -35,21 +41,22 @@ BINS = 20
 @verb
 def impact_statistics(
     system: System,
-    start: Any = None,
+    start: Starts | None = None,
     *,
     periods: int | None = None,
     t_end: float | str | None = None,
     t_start: float | str = 0.0,
     transient: int | float | str = 0,
-    force: Mapping[str, Quantity] | None = None,
+    force: Mapping[str, Any] | None = None,
     contact_side: Mapping[str, int] | None = None,
+    peaks: bool | None = None,
     bins: int | Sequence[float] = BINS,
     method: Method | None = None,
-    values: Mapping[str, Any] | None = None,
+    values: Mapping[str, Values] | None = None,
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
 ) -> xr.Dataset:
-    """Rate, speed, duration and impulse of the contacts, guard by guard.
+    """Rate, speed, duration, peak force and impulse of the contacts, guard by guard and one by one.
 
     Runs the motion itself, since the impulse of a contact is an integral along it; no samples are
     kept, so runs may be long.
@@ -64,15 +71,23 @@ def impact_statistics(
         Time at the end [s], in place of periods.
     transient : int, or float or str
         Whole forcing periods before; of an unforced system a time [s].
-    force : mapping of str to callable, optional
+    force : mapping of str to callable or str, optional
         For guards by name: the force of that contact [N] as a function of (t, states, parameters),
-        arguments found by name; it needs to be right in contact only. Its integral from the
-        beginning of a contact to its end is the impulse. Rigid stops need none: theirs is that of
-        their law. ``ODE45`` controls the error of the
-        integral too, so its steps may differ from those without.
+        arguments found by name, or the name of an output, such as that of a sensor
+        ``sl.contact_force``; it needs to be right in contact only. Its integral from the beginning
+        of a contact to its end is the impulse. Forces that stand in the equations as
+        terms that are zero out of contact, as those of :func:`saltus.freeplay` and
+        :func:`saltus.hertz`, are found there. Rigid stops need none: theirs is that of their law.
+        ``ODE45`` controls the error of the integral of a given force too, so its steps may differ
+        from those without.
     contact_side : mapping of str to int, optional
         For guards by name: the sign of the gap in contact. By default it is the side on which the
-        state of rest (all states zero, t = 0) does not lie; a gap of zero counts as a tiny one.
+        state of rest (all states zero, t = 0) does not lie; a gap of zero counts as a tiny one,
+        and a boundary at rest itself touches where the equations push.
+    peaks : bool, optional
+        Whether to find the peak force and the depth of every contact, from the series of the
+        motion in it: by default of 10 000 contacts at most, of systems with N > 8 states of
+        640 000/N^2 at most.
     bins : int or sequence of float
         Bins of the histogram of speeds: how many between zero and the largest one, or their edges
         [unit of the gap per second].
@@ -84,7 +99,10 @@ def impact_statistics(
         ``speed_bin``, and ``trajectory`` for many. For each guard ``contacts``,
         ``contacts_per_second``, ``contacts_per_period`` (if forced), ``speed_mean``, ``speed_rms``,
         ``speed_max``, ``speed_histogram``, ``duration_mean``, ``duration_min``, ``duration_max``,
-        ``share_in_contact``, with ``force=`` or a rigid stop ``impulse_mean``, ``impulse_max``;
+        ``share_in_contact``, with a force or a rigid stop ``impulse_mean``, ``impulse_max``, with
+        a force ``peak_force``, the largest; for each contact ``contact_time``,
+        ``contact_duration``, ``contact_speed``, ``contact_exit_speed``, ``contact_impulse``,
+        ``contact_peak_force`` and ``contact_depth``;
         ``<...>_error`` is
         the standard error by the means of 20 blocks (NaN where there are too few; zero for a
         periodic response whose blocks hold whole responses). A contact whose beginning or end isn't
@@ -94,7 +112,8 @@ def impact_statistics(
         shorter than the one before it, ``contact_impacts`` is how many were met before the
         infinitely many that are left were summed up (the error is below 1e-8 of their own part),
         ``contact_impulse_of_impacts`` is that of all of them, and ``contact_impulse`` has that of
-        the force at rest too, which is also the impulse of the guard ``... at rest``. Impulses of a
+        the force at rest too, which is also the impulse of the guard ``... at rest``. Of a system
+        with outputs ``touchdown_<output>``, their values where each contact begins. Impulses of a
         stop are relative to the mass if ``sl.impact`` has no ``inertia``.
 
     Raises
@@ -121,7 +140,7 @@ def impact_statistics(
     40
     """
     check_system(system)
-    method = check_method(method)
+    method = check_method(method, system)
     if not method.records_contacts:
         raise ParameterError(
             f"impact_statistics needs a method that locates contacts, and "
@@ -133,9 +152,11 @@ def impact_statistics(
     forces = _by_guard(system, force or {}, "force")
     sides = contact_sides(system, _by_guard(system, contact_side or {}, "contact_side"))
     stops = [
-        number for number, guard in enumerate(system.guards)
+        number
+        for number, guard in enumerate(system.guards)
         if guard.law and guard.law.mass is not None and number not in forces
-    ]  # fmt: skip
+    ]
+    own = contact_peaks.forces_of(system, forces, sides)
     extended = with_integrals(
         system, {f"impulse_{guard}_": function for guard, function in forces.items()}
     )
@@ -153,7 +174,14 @@ def impact_statistics(
 
     def answer(outcome: Outcome) -> xr.Dataset:
         found = touchdowns.find(seen, outcome, sides, columns)
-        return _dataset(system, method, seen, sides, found, bins, outcome)
+        ask = partial(_dataset, system, method, seen, sides, found, bins, outcome)
+        if not (contact_peaks.are_few(system, len(found.guard)) if peaks is None else peaks):
+            return ask()
+        try:
+            tops = contact_peaks.peaks(seen, method, sides, own, outcome, found)
+        except KeyboardInterrupt:
+            raise Interrupted(ask) from None
+        return ask(own, tops)
 
     result = computed(
         extended, method, seen.request(extended, begin, record=True), answer, threads, progress
@@ -192,6 +220,8 @@ def contact_sides(system: System, given: Mapping[int, Any]) -> np.ndarray:
         gap = evaluate([guard.gap], states=rest, values=system.values, bits=bits)[0]
         if gap == 0:
             gap = evaluate([guard.gap], states=rest, values=values, bits=bits)[0]
+        if gap == 0:  # no gap can open: contact is where the equations push
+            gap = -side_that_pushes(system, len(bits))
         bits.append(bool(gap > 0))
     return np.array(
         [given.get(i, -1 if positive else 1) for i, positive in enumerate(bits)], dtype=np.int8
@@ -207,9 +237,14 @@ def _dataset(
     found: Touchdowns,
     bins: Any,
     outcome: Outcome,
+    forces: ContactForces | None = None,
+    tops: Peaks | None = None,
 ) -> xr.Dataset:
     """The contacts and their statistics, by name."""
     size, guards = seen.group.size, len(system.guards)
+    words = {"<impulse>": _impulse_unit(system), "<force>": "N"}
+    if forces is not None and tops is not None:
+        found, words = contact_peaks.with_found(system, found, forces, tops, words)
     ends = np.searchsorted(found.trajectory, np.arange(size + 1))
     cells = [
         (i, g, ends[i] + np.flatnonzero(found.guard[ends[i] : ends[i + 1]] == g))
@@ -228,13 +263,17 @@ def _dataset(
         put("speed_histogram", i, g, np.histogram(found.speed[rows], edges)[0])
         for name, value in {**_rates(seen, found, i, g, rows), **_sizes(found, rows)}.items():
             put(name, i, g, value)
+        if tops is not None and forces is not None and forces.formulas:
+            put("peak_force", i, g, _largest(np.abs(tops.force[rows])))
     names = np.array([guard.name for guard in system.guards], dtype=np.str_)
     columns = {
-        "contact_time": found.begin, "contact_guard": names[found.guard],
+        "contact_time": found.begin,
+        "contact_guard": names[found.guard],
         "contact_speed": found.speed,
-        "contact_exit_speed": found.exit_speed, "contact_duration": found.end - found.begin,
+        "contact_exit_speed": found.exit_speed,
+        "contact_duration": found.end - found.begin,
         "contact_trajectory": found.trajectory,
-    }  # fmt: skip
+    }
     if found.impacts.any():
         columns["contact_impacts"], columns["contact_impulse_of_impacts"] = (
             found.impacts,
@@ -242,8 +281,19 @@ def _dataset(
         )
     if found.impulse is not None:
         columns["contact_impulse"] = found.impulse
+    if len(system.outputs):
+        table, size = outcome.contacts.rows(found.first), len(system.states)
+        known = motion_values(
+            system, seen.group, table.time, table.state, table.mode_after, table.trajectory
+        )
+        columns["touchdown_<state>"] = dict(
+            zip(system.outputs.names, known[:, size:].T, strict=True)
+        )
+    if tops is not None:
+        if forces is not None and forces.formulas:
+            columns["contact_peak_force"] = tops.force
+        columns["contact_depth"] = tops.depth
     columns |= {"contact_side": sides, "speed_low": edges[:-1], "speed_high": edges[1:]}
-    words = {"<impulse>": _impulse_unit(system)}
     return dataset(schema.IMPACTS, seen, system, method, outcome, columns, each, words=words)
 
 
@@ -320,11 +370,15 @@ def _sizes(found: Touchdowns, rows: np.ndarray) -> dict[str, float]:
     speed, duration = found.speed[rows], (found.end - found.begin)[rows]
     duration = duration[np.isfinite(duration)]
     result = {
-        "speed_mean": _mean(speed), "speed_mean_error": _error_of_row(speed),
-        "speed_rms": _mean(speed**2) ** 0.5, "speed_max": _largest(speed),
-        "duration_mean": _mean(duration), "duration_mean_error": _error_of_row(duration),
-        "duration_min": -_largest(-duration), "duration_max": _largest(duration),
-    }  # fmt: skip
+        "speed_mean": _mean(speed),
+        "speed_mean_error": _error_of_row(speed),
+        "speed_rms": _mean(speed**2) ** 0.5,
+        "speed_max": _largest(speed),
+        "duration_mean": _mean(duration),
+        "duration_mean_error": _error_of_row(duration),
+        "duration_min": -_largest(-duration),
+        "duration_max": _largest(duration),
+    }
     if found.impulse is not None:
         impulse = found.impulse[rows]
         impulse = impulse[np.isfinite(impulse)]

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from saltus.analysis.dataset_parts import motion_values
+from saltus.analysis.inputs.given import Starts, Values
 from saltus.analysis.inputs.starts import check_system
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion.window import Stretch, computed, dataset, stretch
@@ -22,12 +24,13 @@ from saltus.kernels import status as st
 from saltus.results.dataset import schema
 from saltus.system import System
 from saltus.system.quantity import (
-    Quantity,
     acting_guards,
     turning_surface,
+    unit_of,
     with_level,
     with_surface,
 )
+from saltus.system.read_off import Quantity
 
 #: Touches closer than this are one [forcing periods; the span if unforced]: where a gap is flat its
 #: minimum is that uncertain.
@@ -37,7 +40,7 @@ SAME_TOUCH = 1e-9
 @verb
 def poincare(
     system: System,
-    start: Any,
+    start: Starts,
     surface: Quantity | str | tuple[str, float | str],
     *,
     direction: int = 0,
@@ -46,7 +49,7 @@ def poincare(
     t_start: float | str = 0.0,
     transient: int | float | str = 0,
     method: Method | None = None,
-    values: Mapping[str, Any] | None = None,
+    values: Mapping[str, Values] | None = None,
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
 ) -> xr.Dataset:
@@ -63,8 +66,8 @@ def poincare(
         event, so its steps and with them its errors are others than without the surface.
     surface : callable, str or tuple
         A function of (t, states, parameters), zero on the surface: ``lambda x, v: v + 10 * x``; its
-        arguments are found by name. Or ``("x", "0.3 mm")``, a level of a state; or ``"x turns"``,
-        the turning points of a state; or the name of a guard of the system.
+        arguments are found by name. Or ``("x", "0.3 mm")``, a level of a state or an output; or
+        ``"x turns"``, its turning points; or the name of a guard of the system.
     direction : {0, 1, -1}
         Keep all crossings, or only those where the function rises (1) or falls (-1).
     periods : int
@@ -78,8 +81,9 @@ def poincare(
     -------
     Dataset
         Dims ``crossing`` (one table for all trajectories, sorted by trajectory and time), ``guard``
-        (of the system itself), and ``trajectory`` for many. Each state at the crossings,
-        ``crossing_time``, ``crossing_phase`` (t/T mod 1, NaN if unforced), ``crossing_period``,
+        (of the system itself), and ``trajectory`` for many. Each state and output
+        at the crossings, ``crossing_time``, ``crossing_phase`` (t/T mod 1, NaN if unforced),
+        ``crossing_period``,
         ``crossing_direction``, ``crossing_rate`` of the function (zero: a tangency),
         ``crossing_kind`` (``graze_unresolved``: too shallow to be sure of),
         ``crossing_trajectory``; per trajectory ``crossings``, ``tangencies``, ``contacts``,
@@ -109,7 +113,7 @@ def poincare(
     6
     """
     check_system(system)
-    method = check_method(method)
+    method = check_method(method, system)
     if not method.records_contacts:
         raise ParameterError(
             f'poincare needs a method that locates contacts, and {method.name}(events="ignore") '
@@ -165,7 +169,7 @@ def crossed(system: System, surface: Any, values: Mapping[str, Any]) -> Crossed:
         level = leveled.guards[-1].name
         return _last(
             leveled,
-            system.units[surface[0]],
+            unit_of(system, surface[0]),
             "" if level in values else f"{surface[0]} = {leveled.parameter_text(level)}",
         )
     names = [guard.name for guard in system.guards]
@@ -175,11 +179,11 @@ def crossed(system: System, surface: Any, values: Mapping[str, Any]) -> Crossed:
         return Crossed(
             system, number, system.units[owner] if owner else "", equation_of(number, system.guards)
         )
-    turns = {f"{name} turns": name for name in system.states}
+    turns = {f"{name} turns": name for name in (*system.states, *system.outputs.names)}
     if among(surface, turns):
         return _last(
             turning_surface(system, turns[surface]),
-            schema.rate_unit(system.units[turns[surface]]),
+            schema.rate_unit(unit_of(system, turns[surface])),
             surface,
         )
     raise ParameterError(
@@ -216,7 +220,9 @@ def _dataset(
         return np.bincount(who[of], minlength=seen.group.size)
 
     columns = {
-        "<state>": crossings.state[:, : len(system.states)],
+        "<state>": motion_values(
+            system, seen.group, crossings.time, crossings.state, crossings.mode_after, rows
+        ),
         "crossing_time": crossings.time,
         "crossing_time_error": crossings.time_error,
         "crossing_period": crossings.period,

@@ -18,13 +18,14 @@ from saltus.analysis.inputs.verb import verb
 from saltus.errors import ParameterError
 from saltus.flow.counts import whole as whole_number
 from saltus.flow.method import check_positive
-from saltus.results import Subject, build, inherited
+from saltus.results import build, inherited, subject_of
 from saltus.results.dataset.reader import reader
 from saltus.results.dataset.schema import (
     SETTLED,
     TRAJECTORY,
     check,
     kind_of,
+    outputs_in,
     sample_dim,
     states_of,
 )
@@ -80,7 +81,7 @@ def settled(
         relative difference at that n (at the best n, where none repeats). From ``simulate`` also
         ``contacts_per_response`` (grazes left out; NaN if not periodic), and ``<state>_peak``,
         ``<state>_rms`` over whole responses: largest absolute value and root mean square of the
-        samples [unit of the state].
+        samples [unit of the state]; of the outputs of the system too.
 
     Raises
     ------
@@ -99,6 +100,11 @@ def settled(
     check_positive("tolerance", tolerance)
     phases = _phases(run)
     whole_periods = np.flatnonzero(phases == np.round(phases))
+    if not (np.diff(phases[whole_periods]) == 1.0).all():
+        raise ParameterError(
+            "settled compares whole forcing periods one after the other, and this run has some of "
+            "them at times of its own (at=). Run it with samples= instead."
+        )
     available = max(whole_periods.size - 1, 0)
     last = min(LAST, available) if last is None else whole_number(last, "last")
     if not 2 <= last <= available:
@@ -122,7 +128,11 @@ def settled(
     n = np.where(np.isin(run["status"].values, ("ok", "graze_unresolved")), n, 0)
     values: dict[str, Any] = {"mismatch": mismatch, "response_period": n}
     if kind_of(run) == TRAJECTORY:
-        values |= _measures(run, dict(zip(states, samples, strict=True)), whole_periods, n)
+        others = [name for name in outputs_in(run) if name not in states and name in run]
+        sized = dict(zip(states, samples, strict=True)) | {
+            name: np.atleast_2d(run[name].transpose(..., sample_dim(run)).values) for name in others
+        }
+        values |= _measures(run, sized, whole_periods, n)
     return _dataset(run, values, last // 2)
 
 
@@ -261,8 +271,6 @@ def _contacts(run: xr.Dataset, first: np.ndarray, final: int, count: int) -> np.
 
 
 def _dataset(run: xr.Dataset, values: Mapping[str, Any], longest: int) -> xr.Dataset:
-    states, batch = states_of(run), "trajectory" in run.dims
-    units = {name: run[name].attrs.get("units", "") for name in states}
-    attrs = inherited(run) | {"longest_period": longest}
+    batch, attrs = "trajectory" in run.dims, inherited(run) | {"longest_period": longest}
     trajectory = {"trajectory": run["trajectory"].values} if batch else {}
-    return build(SETTLED, Subject(states, units, attrs, batch=batch), {**values, **trajectory})
+    return build(SETTLED, subject_of(run, outputs_in(run), attrs, batch), {**values, **trajectory})

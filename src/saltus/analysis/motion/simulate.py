@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -14,26 +14,31 @@ from saltus.analysis import dataset_parts
 from saltus.analysis.inputs.starts import Ensemble, Span, check_system, ensemble, span, trajectories
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion import time_errors as measure
+from saltus.analysis.motion.sample_times import (
+    NO_SAMPLES,
+    SampleTimes,
+    at_times,
+    check_samples,
+    first_kept,
+    last_of,
+    least_samples,
+    planned,
+    times_of,
+)
 from saltus.analysis.outcome_messages import warn
 from saltus.errors import ParameterError, among, must_be
 from saltus.flow import engine
-from saltus.flow.counts import whole
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporting
-from saltus.flow.request import Outcome, Request, Schedule
-from saltus.flow.room import check_room
+from saltus.flow.request import Outcome
 from saltus.interrupt import Interrupted
 from saltus.results import build
 from saltus.results.dataset import schema
 from saltus.system import System
 from saltus.system.quantity import remembering
 
-#: Default samples per forcing period, enough for a picture; contacts are exact without them.
-PER_PERIOD = 200
-#: Samples over the whole span of an unforced system: a smooth curve over a hundred oscillations.
-MOST_PER_SPAN = 10_000
-#: Least number of these, for each of many trajectories.
-LEAST_PER_SPAN = 2000
+if TYPE_CHECKING:
+    from saltus.analysis.motion.ending import Ending
 
 
 @verb
@@ -46,6 +51,8 @@ def simulate(
     t_start: float | str = 0.0,
     method: Method | None = None,
     samples: int | None = None,
+    at: Any = None,
+    until: Any = None,
     keep: int | None = None,
     values: Mapping[str, Any] | None = None,
     time_errors: str = "measured",
@@ -68,12 +75,24 @@ def simulate(
     t_start : float or str
         Time at the start [s]; the phase of the forcing is that of this time.
     method : Method
-        Default :class:`saltus.Taylor`; :class:`saltus.ODE45` for MATLAB's.
+        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
+        it serves; :class:`saltus.ODE45` for MATLAB's.
     samples : int
         Samples per forcing period (default 200), or over the whole span if the system isn't forced
         (default 10 000, and down to 2000 for many trajectories).
+    at : float, str or sequence, optional
+        Times at which the states are wanted [s], in any order, in place of ``samples``; text has a
+        unit: ``["10 ms", "25 ms"]``. The result has these times in this order, each state with the
+        flow's own precision. Without ``periods`` and ``t_end`` the run ends at the last of them.
+    until : str or callable, optional
+        Condition at which a trajectory ends, at the instant at which it becomes true:
+        ``"x > 2 mm"``, ``"x > 2 mm and v < 0"``, or a function of (t, states, parameters) by their
+        names, ``lambda x: x > 2e-3``. A number, such as ``lambda x: x - 2e-3``, ends it where it
+        crosses zero. Its status is then ``until``; ``periods`` or ``t_end`` are the end of those
+        for which it never does. Samples reach as far as the last end.
     keep : int
-        Number of periods at the end whose samples and contacts are kept (default all).
+        Number of periods at the end whose samples and contacts are kept (default all); with ``at``
+        whose contacts.
     values : mapping
         Parameter values of this call: one each, or an array with one for each trajectory (the
         forcing frequency included).
@@ -95,7 +114,7 @@ def simulate(
         ``contact_guard``, ``contact_direction``, ``contact_velocity``, ``contact_kind``, ...,
         each state at the contact (``contact_x``, behind it where it jumps; ``contact_x_before`` of
         systems with impacts or jumps), ``status``, counters. If the trajectories have forcing
-        periods of their own, samples lie along ``period``.
+        periods of their own, samples lie along ``period``; those of ``at`` along ``time``.
 
     Raises
     ------
@@ -117,152 +136,135 @@ def simulate(
     >>> run.sizes["contact"], bool(run["contact_time_error"].max() < 1e-12)
     (21, True)
     """
-    method = check_method(method)
+    method = check_method(method, system)
     check_system(system)
     many = trajectories(start, values)
-    _check_room(system, many, _least_samples(system, many, periods, samples, keep))
+    times = None if at is None else _given_times(system, many, at, samples)
+    if times is not None and periods is None and t_end is None:
+        t_end = last_of(times, t_start)
+    if times is None and until is None:
+        check_samples(system, many, least_samples(system, many, periods, samples, keep))
     group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
     length = span(system, group, periods, t_end, t_start)
-    flown = remembering(system)
-    plan = _plan(system, group, length, samples, keep, len(flown.states))
+    end = None if until is None else _ending(system, method, group, length, until, keep)
+    flown = remembering(system if end is None else end.condition.system)
     if not among(time_errors, ("measured", "local")):
         raise must_be("time_errors", '"measured" or "local"', time_errors)
+    plan = NO_SAMPLES
+    if times is not None:
+        plan = at_times(length, first_kept(system, length, keep), times)
+    elif end is None:
+        plan = planned(system, group, length, samples, keep, len(flown.states))
+    asked = _Asked(system, method, group, length, plan, times is not None, end)
 
     def so_far(outcome: Outcome) -> xr.Dataset:
-        return _dataset(system, method, group, length, plan, outcome, measure.local(outcome))
+        return _dataset(asked, outcome, measure.local(outcome))
 
-    outcome, request = None, plan.request(group, length, len(flown.states))
+    outcome = None
     with reporting(progress) as show:
         try:
-            if time_errors == "measured" and system.guards and method.records_contacts:
-                outcome, errors = measure.measured(flown, method, request, threads, show)
-            else:
-                outcome = engine.run(flown, method.suited_to(group.size), request, threads, show)
-                errors = measure.local(outcome)
-            result = _dataset(system, method, group, length, plan, outcome, errors)
+            if end is not None and times is None:
+                plan = end.plan(system, method, group, length, samples, threads, show)
+                asked, show = replace(asked, plan=plan), end.afterwards(show)
+            outcome, errors = asked.run(flown, time_errors == "measured", threads, show)
+            result = _dataset(asked, outcome, errors)
         except KeyboardInterrupt as stop:
             if outcome is not None:
                 raise Interrupted(partial(so_far, outcome)) from None
             raise stop.then(so_far) if isinstance(stop, engine.RunInterrupted) else stop from None
+    if end is not None:
+        end.warn_of_starts()
     warn(result, length, system)
     return result
 
 
-@dataclass(frozen=True)
-class _Plan:
-    """The samples and contacts that are kept."""
+def _ending(
+    system: System, method: Method, group: Ensemble, length: Span, until: Any, keep: Any
+) -> Ending:
+    from saltus.analysis.motion.ending import ending  # few runs need it
 
-    schedule: Schedule
-    first: int
-
-    def request(self, group: Ensemble, length: Span, states: int) -> Request:
-        more = ((0, 0), (0, states - group.start.shape[1]))
-        return replace(
-            length.request(np.pad(group.start, more), group.parameters, self.schedule, self.first),
-            t_end=length.t_end,
-        )
+    return ending(system, method, group, length, until, keep)
 
 
-def _plan(
-    system: System,
-    group: Ensemble,
-    length: Span,
-    samples: int | None,
-    keep: int | None,
-    states: int,
-) -> _Plan:
-    per = _whole(
-        samples, "samples", _per_span(group.size) if system.forced_at is None else PER_PERIOD
-    )
-    last = int(np.max(length.count + length.phase / length.period))
-    periods_kept = _whole(keep, "keep", max(last, 1))
-    if keep is not None and system.forced_at is None:
+def _given_times(system: System, trajectories: int, at: Any, samples: Any) -> np.ndarray:
+    """The times that are asked for, in place of samples."""
+    if samples is not None:
         raise ParameterError(
             lambda say: (
-                f"{system.name} has no forcing period, so {say.key('keep')} has no "
-                f"meaning. Start later, or take fewer {say.key('samples')}."
+                f"give {say.key('at')} (times) or {say.key('samples')} (how many), and only one of "
+                f"them."
             )
         )
-    first = max(int(np.min(length.count)) - periods_kept, 0) if keep is not None else 0
-    longest = np.max((length.count + length.phase / length.period) * per)
-    count = int(longest + 1e-9) + 1 - first * per
-    _check_room(system, group.size, count, states)
-    periods = np.arange(first, first - (-count // per))
-    return _Plan(
-        Schedule(
-            np.repeat(periods, per)[:count], np.tile(np.arange(per) / per, len(periods))[:count]
-        ),
-        first,
-    )
+    return times_of(system, trajectories, at)
 
 
-def _least_samples(system: System, trajectories: int, periods: Any, samples: Any, keep: Any) -> int:
-    """Least number of samples of each trajectory, known before any array is made."""
-    if system.forced_at is None:
-        return _whole(samples, "samples", _per_span(trajectories)) + 1
-    if periods is None:
-        return 1
-    kept = whole(periods, "periods")
-    return min(kept, _whole(keep, "keep", kept)) * _whole(samples, "samples", PER_PERIOD) + 1
+@dataclass(frozen=True)
+class _Asked:
+    """The arguments of a run, as they were read."""
+
+    system: System
+    method: Method
+    group: Ensemble
+    length: Span
+    plan: SampleTimes
+    given: bool
+    end: Ending | None
+
+    def run(
+        self,
+        flown: System,
+        measured: bool,
+        threads: int | None,
+        show: Callable[[float], None] | None,
+    ) -> tuple[Outcome, np.ndarray]:
+        """The outcome of the system ``flown``, and the errors of its contact times [s]."""
+        request = self.plan.request(self.group, self.length, len(flown.states))
+        if self.end is not None:
+            request = self.end.asked(request)
+        if measured and self.system.guards and self.method.records_contacts:
+            return measure.measured(flown, self.method, request, threads, show)
+        method = self.method.suited_to(self.group.size)
+        outcome = engine.run(flown, method, request, threads, show)
+        return outcome, measure.local(outcome)
 
 
-def _check_room(system: System, trajectories: int, samples: int, states: int | None = None) -> None:
-    """Raise a ParameterError if samples of so many trajectories don't fit into memory."""
-    check_room(
-        samples * trajectories * (16.0 * (states or len(system.states)) + 16.0),
-        f"{trajectories} trajectories with {samples} samples each",
-        lambda say: (
-            f"Give {say.key('keep')} (last periods) or fewer {say.key('samples')}, or use "
-            f"{say.verb('stroboscope')}."
-        ),
-    )
-
-
-def _per_span(trajectories: int) -> int:
-    """Samples of a motion without forcing: enough for a smooth curve, fewer for many
-    trajectories.
-    """
-    return max(MOST_PER_SPAN // max(trajectories // 20, 1), LEAST_PER_SPAN)
-
-
-def _whole(value: int | None, name: str, default: int) -> int:
-    return default if value is None else whole(value, name)
-
-
-def _dataset(
-    system: System,
-    method: Method,
-    group: Ensemble,
-    length: Span,
-    plan: _Plan,
-    outcome: Outcome,
-    errors: np.ndarray,
-) -> xr.Dataset:
+def _dataset(asked: _Asked, outcome: Outcome, errors: np.ndarray) -> xr.Dataset:
     """The Dataset of a run."""
-    reached = slice(outcome.reached())
-    count, fraction = plan.schedule.count[reached], plan.schedule.fraction[reached]
+    system, group, length, plan = asked.system, asked.group, asked.length, asked.plan
     forced = system.forced_at is not None
     own_periods = forced and bool(np.ptp(length.period) > 0)
-    scale = length.period[:, None] if own_periods else length.period[0]
-    time = np.minimum(length.t_start + (count * scale + fraction * scale), length.t_end)
+    time, period = plan.of_result(outcome, length, forced)
+    kept = plan.kept(outcome)
+    samples, modes = outcome.samples[:, kept, : len(system.states)], outcome.sample_mode[:, kept]
+    attrs: dict[str, Any] = {"sample_times": "given"} if asked.given else {}
+    if asked.end is not None:
+        outcome, errors = asked.end.of_the_user(outcome, errors)
+        samples, modes = asked.end.with_ends(outcome, samples, modes, time)
+        attrs["until"] = asked.end.condition.text
     subject = dataset_parts.trajectories(
         system,
-        method,
+        asked.method,
         group,
         (length.period if own_periods else float(length.period[0])) if forced else None,
     )
+    subject = replace(subject, attrs={**subject.attrs, **attrs})
     values = {
         "trajectory": np.arange(group.size),
-        **({"period": count + fraction} if forced else {}),
+        **({"period": period} if forced and period is not None else {}),
         "time": time,
-        "<state>": outcome.samples[:, reached, : len(system.states)],
-        "mode": outcome.sample_mode[:, reached],
-        **dataset_parts.contacts(system, outcome, errors),
+        "<state>": dataset_parts.motion_values(system, group, time, samples, modes),
+        "mode": modes,
+        **dataset_parts.contacts(system, group, outcome, errors),
         **dataset_parts.endings(outcome),
         **dataset_parts.minima(outcome),
         "end_time": outcome.time,
-        "end_<state>": outcome.state[:, : len(system.states)],
+        "end_<state>": dataset_parts.motion_values(
+            system, group, outcome.time, outcome.state, outcome.mode
+        ),
     }
     return build(
-        schema.TRAJECTORY, subject, values, along={"time": "period"} if own_periods else {}
+        schema.TRAJECTORY,
+        subject,
+        values,
+        along={"time": "period"} if own_periods and plan.given is None else {},
     )

@@ -15,7 +15,7 @@ from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion.settled import settled
 from saltus.errors import ParameterError, among, one_of, unknown
 from saltus.flow.counts import whole as whole_number
-from saltus.results import Subject, build, inherited
+from saltus.results import build, inherited, subject_of
 from saltus.results.dataset import schema
 from saltus.results.dataset.reader import reader
 from saltus.sentences import Given
@@ -43,7 +43,7 @@ def spectrum(
     window: str | None = None,
     last: int | None = None,
 ) -> xr.Dataset:
-    """Amplitude spectrum of the states of a run.
+    """Amplitude spectrum of the states and outputs of a run.
 
     The amplitude of a line is that of the cosine it stands for: ``x(t) = x_0 + sum of x_k cos(2 pi
     f_k t + phase_k)``. Where the response repeats after n forcing periods (:func:`saltus.settled`
@@ -66,7 +66,7 @@ def spectrum(
         bend and their lines fall off as the third power of the order, so 200 samples a period leave
         some 1e-6 of the largest line.
     state : str or sequence of str, optional
-        The states; all of them by default.
+        The states and outputs; all of them by default.
     window : {"none", "hann"}, optional
         For all trajectories; by default ``"none"`` where the response repeats, else ``"hann"``.
     last : int, optional
@@ -119,16 +119,12 @@ def spectrum(
         if name in run.coords and name not in ("frequency", "order")
     }
     separate = stretch.frequency.ndim == 2
-    subject = Subject(
-        states=names,
-        units={name: run[name].attrs.get("units", "") for name in (*names, *varied)},
-        forcing_period=np.atleast_1d(run["forcing_period"].values)
+    period = (
+        np.atleast_1d(run["forcing_period"].values)
         if separate
-        else run.attrs.get("forcing_period_s"),
-        varied=varied,
-        attrs=inherited(run),
-        batch=batch,
+        else run.attrs.get("forcing_period_s")
     )
+    subject = subject_of(run, names, inherited(run), batch, varied, period)
     places = {"trajectory": np.arange(len(chosen)), "frequency": stretch.frequency}
     if stretch.order is not None:
         places["order"] = stretch.order
@@ -167,7 +163,7 @@ class _Stretch:
 
 
 def _states(run: xr.Dataset, state: str | Sequence[str] | None) -> list[str]:
-    known = schema.states_of(run)
+    known = schema.outputs_in(run)
     names = (
         list(known)
         if state is None
@@ -177,7 +173,7 @@ def _states(run: xr.Dataset, state: str | Sequence[str] | None) -> list[str]:
     )
     for name in names:
         if not among(name, known):
-            raise unknown("spectrum: this run has no state", name, known)
+            raise unknown(f"spectrum: this run has no {schema.output_word(run)}", name, known)
     return names
 
 

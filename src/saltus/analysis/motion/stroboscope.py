@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from saltus.analysis import dataset_parts
+from saltus.analysis.inputs.given import Starts, Values
 from saltus.analysis.inputs.starts import check_system, ensemble, span, trajectories
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion.window import computed
@@ -27,13 +27,13 @@ from saltus.system import System
 @verb
 def stroboscope(
     system: System,
-    start: Any = None,
+    start: Starts | None = None,
     periods: int = 1,
     keep: int | None = None,
     *,
     t_start: float | str = 0.0,
     method: Method | None = None,
-    values: Mapping[str, Any] | None = None,
+    values: Mapping[str, Values] | None = None,
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
 ) -> xr.Dataset:
@@ -77,7 +77,7 @@ def stroboscope(
     >>> bool(abs(x[300] - x[297]) < 1e-6 < abs(x[300] - x[299]))  # it repeats after three periods
     True
     """
-    method = check_method(method)
+    method = check_method(method, system)
     check_system(system)
     if system.forced_at is None:
         raise ParameterError(
@@ -109,7 +109,13 @@ def stroboscope(
         values = {
             "trajectory": np.arange(group.size),
             "period": periods_kept[reached],
-            "<state>": outcome.samples[:, reached, : len(system.states)],
+            "<state>": dataset_parts.motion_values(
+                system,
+                group,
+                length.t_start + periods_kept[reached] * length.period[:, None],
+                outcome.samples[:, reached],
+                outcome.sample_mode[:, reached],
+            ),
             **dataset_parts.endings(outcome),
             **dataset_parts.minima(outcome),
         }

@@ -13,7 +13,7 @@ import numpy as np
 from saltus.flow import engine
 from saltus.flow.engine import RunInterrupted
 from saltus.flow.methods import Method
-from saltus.flow.request import Outcome, Request, Schedule
+from saltus.flow.request import Outcome, Request
 from saltus.kernels import status as st
 from saltus.language import expression as ex
 from saltus.language.evaluate import evaluate
@@ -116,7 +116,7 @@ def _one_by_one(
     def part(begin: float, share: float) -> Callable[[float], None] | None:
         return None if show is None else lambda done: show(begin + share * done)
 
-    n, silent = len(request.start), replace(request, schedule=Schedule.none())
+    n, silent = len(request.start), request.unsampled()
     runs = [silent]
     if method.exact:
         runs = [

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -37,6 +37,8 @@ class Touchdowns:
         Impacts that were met one by one: none for a contact with a force.
     spells : mapping of (trajectory, guard) to float64[m, 2]
         Begin and end of all times in contact, cut at the ends of the stretch [s].
+    first, final : int64[k]
+        Rows of the table of contacts at which each begins and ends; -1 if it doesn't end.
     """
 
     trajectory: np.ndarray
@@ -49,6 +51,8 @@ class Touchdowns:
     struck: np.ndarray
     impacts: np.ndarray
     spells: Mapping[tuple[int, int], np.ndarray]
+    first: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
+    final: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
 
     def covered(self, trajectory: int, guard: int, borders: np.ndarray) -> np.ndarray:
         """Time in contact in each of the blocks between borders float64[b + 1] [s]."""
@@ -117,6 +121,8 @@ def find(
         struck=_impulses(seen, outcome, first, last, integrals) + summed[last],
         impacts=impacts,
         spells=spells,
+        first=first,
+        final=final,
     )
 
 

@@ -152,7 +152,11 @@ def dataset(
     )
     counters = ("steps", "rejected_steps", "mode_violations", "grazes_unresolved")
     ending = {**dataset_parts.endings(outcome, counters), "end_time": outcome.time}
-    ends = {"end_<state>": outcome.state[:, : len(system.states)]}
+    ends = {
+        "end_<state>": dataset_parts.motion_values(
+            system, seen.group, outcome.time, outcome.state, outcome.mode
+        )
+    }
     return build(
         kind,
         subject,

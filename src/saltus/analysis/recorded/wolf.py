@@ -11,7 +11,9 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import ArrayLike
 
+from saltus.analysis.inputs.given import Value
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.recorded.embedding import embed as embedded
 from saltus.analysis.recorded.embedding import (
@@ -90,8 +92,8 @@ NOTHING = Growing(
 
 @verb
 def wolf(
-    series: Any,
-    sampling_interval: Any,
+    series: ArrayLike,
+    sampling_interval: Value | ArrayLike,
     *,
     dimension: int | None = None,
     delay: int | str | None = None,

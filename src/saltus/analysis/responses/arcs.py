@@ -82,7 +82,7 @@ def check_unstable(unstable: bool, grid: Grid, method: Method) -> None:
             )
         )
     if unstable:
-        exact_method(method, "unstable=True")
+        exact_method(method, grid.system, "unstable=True")
 
 
 def follow_arcs(
@@ -173,9 +173,12 @@ def _follow_orbits(
         rank = np.arange(len(left)) - np.repeat(first, np.diff(np.append(first, len(left))))
         some, left = left[rank < most], left[rank >= most]
         seeds = seeds_at(
-            grid.system, orbits.points[some], orbits.period[some], orbits.time[some],
+            grid.system,
+            orbits.points[some],
+            orbits.period[some],
+            orbits.time[some],
             values[found.place[some]],
-        )  # fmt: skip
+        )
         beginnings = scaled(grid.system, name, list(seeds), method)
         try:
             trace(plan, beginnings, arcs.branches, None if plan.stable else progress)

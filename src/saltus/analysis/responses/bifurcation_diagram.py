@@ -5,11 +5,11 @@ types over two.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
 
 import xarray as xr
 
 from saltus.analysis.attractors.grid import grid_of
+from saltus.analysis.inputs.given import Axis, Range, Reading, Starts, Value
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.responses.response_table import respond
 from saltus.analysis.responses.samples import check_sample, check_unforced_sample
@@ -21,15 +21,15 @@ from saltus.system import System
 @verb
 def bifurcation_diagram(
     system: System,
-    vary: Mapping[str, Any],
-    start: Any = None,
+    vary: Mapping[str, Axis],
+    start: Starts | None = None,
     *,
     sample: str = "turning_points",
     follow: bool = False,
     unstable: bool = False,
-    box: Mapping[str, Any] | None = None,
-    values: Mapping[str, Any] | None = None,
-    outputs: Mapping[str, Any] | None = None,
+    box: Mapping[str, Range] | None = None,
+    values: Mapping[str, Value] | None = None,
+    outputs: Mapping[str, Reading] | None = None,
     method: Method | None = None,
     periods: int = 2000,
     every: float | str | None = None,
@@ -102,7 +102,7 @@ def bifurcation_diagram(
                 f"{say.key(vary={'contact_stiffness': ('1e3 N/m', '1e9 N/m', 200, 'log')})}."
             )
         )
-    method = check_method(method)
+    method = check_method(method, system)
     check_sample(sample, method)
     grid = grid_of(system, vary, start, box, values, seed, follow, every)
     check_unforced_sample(sample, grid.system)

@@ -5,11 +5,11 @@ branch kept apart.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
 
 import xarray as xr
 
 from saltus.analysis.attractors.grid import grid_of
+from saltus.analysis.inputs.given import Axis, Range, Reading, Starts, Value
 from saltus.analysis.inputs.starts import check_system
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.responses.response_table import respond
@@ -21,14 +21,14 @@ from saltus.system import System
 @verb
 def frequency_response(
     system: System,
-    frequency: Any,
-    start: Any = None,
+    frequency: Axis,
+    start: Starts | None = None,
     *,
-    box: Mapping[str, Any] | None = None,
+    box: Mapping[str, Range] | None = None,
     follow: bool = False,
     unstable: bool = False,
-    values: Mapping[str, Any] | None = None,
-    outputs: Mapping[str, Any] | None = None,
+    values: Mapping[str, Value] | None = None,
+    outputs: Mapping[str, Reading] | None = None,
     method: Method | None = None,
     periods: int = 2000,
     seed: int = 1,
@@ -71,7 +71,8 @@ def frequency_response(
         their arguments found by name, such as ``{"acceleration": (lambda x, v, k, c, m: -(k*x +
         c*v)/m, "m/s^2")}``. Comparisons that are contacts of the system read their sides.
     method : Method
-        Default :class:`saltus.Taylor`.
+        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
+        it serves.
     periods : int
         Forcing periods after which a trajectory that hasn't settled is looked at for chaos. It
         bounds the work: closing orbits and measuring exponents may each cost ten times as many

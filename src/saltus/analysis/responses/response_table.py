@@ -39,7 +39,7 @@ def respond(
     """The Dataset of a grid's responses, with the branches that they lie on if it has one axis.
     Raises Interrupted, with the Dataset of what is known, on Ctrl-C.
     """
-    method, periods = check_method(method), whole(periods, "periods")
+    method, periods = check_method(method, grid.system), whole(periods, "periods")
     check_unstable(unstable, grid, method)
     arcs = Arcs(unstable=unstable)
     part = functools.partial(
@@ -95,7 +95,12 @@ def _dataset(
         "output_units": list(outputs.units),
         **{f"output_{name}": column for name, column in numbers.by_name().items()},
         **(
-            {"sample_<state>": padded(sampled(sample, numbers, grid, method, found, threads), size)}
+            {
+                "sample_<state>": padded(
+                    sampled(sample, numbers, grid, method, found, outputs, threads),
+                    size + len(system.outputs),
+                )
+            }
             if sample
             else {}
         ),

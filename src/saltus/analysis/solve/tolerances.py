@@ -42,9 +42,12 @@ AMPLIFIED = 1e-9
 SLOW = 0.75
 #: A step that quadratic convergence foresees to be shorter than this isn't waited for.
 FORESEEN = 1e-16
-#: Damped steps: most of them, shortened ones included; the longest, in units of the scale; the
-#: share of a step below which it isn't shortened any more.
-MAX_DAMPED_STEPS, LONGEST_DAMPED, SHORTEST_SHARE = 60, 0.3, 1.0 / 64
+#: Most damped steps, shortened ones included.
+MAX_DAMPED_STEPS = 60
+#: Longest damped step, in units of the scale.
+LONGEST_DAMPED = 0.3
+#: A damped step isn't shortened below this share of it.
+SHORTEST_SHARE = 1.0 / 64
 #: Condition number of a linear system from which its solution has no digit.
 SINGULAR = 1e15
 #: Singular values below this share of the largest are zero, where equations may depend on each
@@ -54,8 +57,10 @@ RANK = 1e-9
 MARGINAL = 1e-7
 
 # -- maps with errors of their own, such as ode45's ------------------------------------------------
-#: Iterates after which a trajectory has settled, and returns whose mean is taken then.
-SETTLING_ITERATES, AVERAGED_RETURNS = 400, 8
+#: Iterates after which a trajectory has settled.
+SETTLING_ITERATES = 400
+#: Returns whose mean is taken then.
+AVERAGED_RETURNS = 8
 #: Scatter of the returns to a point, in units of the map's noise, that its errors may make.
 JITTER = 2.0
 #: Least distance of two points of an orbit, in units of the scatter.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -118,6 +118,9 @@ class AttractorTable:
     scatter : array, shape (m,), optional
         Root mean square distance of the points of a noisy attractor from the exact orbit, first
         state [its unit]; NaN for the others.
+    outputs : mapping of str to array, shape (m, K), optional
+        Numbers of the states and outputs of a system that has outputs, by the names of their
+        variables, with the names and units of the outputs.
     """
 
     kind: Sequence[str]
@@ -135,6 +138,7 @@ class AttractorTable:
     cycle: np.ndarray | None = None
     eigenvalues: np.ndarray | None = None
     scatter: np.ndarray | None = None
+    outputs: Mapping[str, Any] | None = None
 
     def __len__(self) -> int:
         return len(self.kind)
@@ -173,7 +177,7 @@ class AttractorTable:
             found |= dict(
                 zip((f"attractor_fraction{end}" for end in ENDS), self.fractions, strict=True)
             )
-        return found | {"attractor_<state>": padded(self.points, size)}
+        return found | dict(self.outputs or {}) | {"attractor_<state>": padded(self.points, size)}
 
 
 def _parts(both: np.ndarray, count: int, size: int) -> tuple[np.ndarray, np.ndarray]:

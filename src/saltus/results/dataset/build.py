@@ -38,6 +38,10 @@ _NAMES = {
 }  # fmt: skip
 
 
+#: Attributes of results of systems with outputs: their names, and whether they come first.
+_ABOUT_OUTPUTS = ("outputs", "outputs_first")
+
+
 # -- what the caller hands over --------------------------------------------------------------------
 @dataclass(frozen=True)
 class Guards:
@@ -74,9 +78,11 @@ class Guards:
     def values(self, states: Mapping[str, str]) -> dict[str, Any]:
         """Their variables, given the units of the states."""
         return {
-            "guard": list(self.names), "guard_state": [state or "" for state in self.states],
-            "guard_units": self.units_among(states), "guard_boundary": self.boundaries,
-        }  # fmt: skip
+            "guard": list(self.names),
+            "guard_state": [state or "" for state in self.states],
+            "guard_units": self.units_among(states),
+            "guard_boundary": self.boundaries,
+        }
 
 
 @dataclass(frozen=True)
@@ -87,6 +93,10 @@ class Subject:
     ----------
     states : sequence of str
         Names, in the order of the system; none for a recorded series.
+    outputs : sequence of str
+        Names of the outputs of the system.
+    outputs_first : bool
+        Whether they stand before the states where one is shown.
     units : mapping of str to str
         Units of states and parameters; missing ones are unknown.
     attrs : mapping
@@ -112,6 +122,27 @@ class Subject:
     varied: Mapping[str, Any] = field(default_factory=dict)
     forcing_period: float | np.ndarray | None = None
     batch: bool = True
+    outputs: Sequence[str] = ()
+    outputs_first: bool = False
+
+
+def subject_of(
+    ds: xr.Dataset, names: Sequence[str], attrs: Mapping[str, Any], batch: bool = True,
+    varied: Mapping[str, Any] | None = None, forcing_period: Any = None,
+) -> Subject:  # fmt: skip
+    """The subject of a result that is made of another one, with some of its states and outputs."""
+    states = [name for name in names if name in schema.states_of(ds)]
+    known = [name for name in (*names, *(varied or {})) if name in ds]
+    return Subject(
+        states=states,
+        units={name: ds[name].attrs.get("units", "") for name in known},
+        attrs=attrs,
+        varied=varied or {},
+        forcing_period=forcing_period,
+        batch=batch,
+        outputs=[name for name in names if name not in states],
+        outputs_first=bool(ds.attrs.get("outputs_first")),
+    )
 
 
 def build(
@@ -136,8 +167,8 @@ def build(
     values : mapping of str to array, or its items
         Variables in the order of the result, under their names in the table and with all dims that
         it names: with ``trajectory`` also where that is dropped. A row for all states or parameters
-        takes a mapping by their names; for all states, an array whose last axis is the state will
-        do.
+        takes a mapping by their names; for all states, and for the outputs behind them, an array
+        whose last axis is the state will do.
     grid : sequence of str
         Dims that ``...`` stands for.
     along : mapping of str to str, optional
@@ -166,6 +197,9 @@ def build(
         "schema_version": schema.VERSION,
         "states": " ".join(subject.states),
     }
+    attrs = {name: one for name, one in attrs.items() if name not in _ABOUT_OUTPUTS}
+    if subject.outputs:
+        attrs |= {"outputs": list(subject.outputs), "outputs_first": int(subject.outputs_first)}
     period = subject.forcing_period
     if period is not None and subject.batch and np.ndim(period):
         given.append(("forcing_period", period))
@@ -203,9 +237,13 @@ class _Building:
         )
         first = subject.units.get(subject.states[0], "") if subject.states else ""
         self.words = {
-            "<gap>": gap, "<gap rate>": schema.rate_unit(gap), "<root gap>": schema.root_unit(gap),
-            "<first>": first, **words,
-        }  # fmt: skip
+            "<gap>": gap,
+            "<gap rate>": schema.rate_unit(gap),
+            "<root gap>": schema.root_unit(gap),
+            "<first>": first,
+            "<output>": "",
+            **words,
+        }
         self.data: dict[str, xr.Variable] = {}
         self.coords: dict[str, xr.Variable] = {}
 
@@ -222,7 +260,7 @@ class _Building:
         of_each = (
             values.items()
             if isinstance(values, Mapping)
-            else zip(self.subject.states, np.moveaxis(values, -1, 0), strict=True)
+            else zip(self._outputs(np.shape(values)[-1]), np.moveaxis(values, -1, 0), strict=True)
         )
         for name, given in of_each:
             if row == f"<{what}>" and name in self._reserved():
@@ -239,6 +277,11 @@ class _Building:
             self._put(
                 own, spec, given, {f"<{what}>": (name, self.subject.units.get(name, ""), text)}
             )
+
+    def _outputs(self, count: int) -> Sequence[str]:
+        """The states, or the states and the outputs: that many."""
+        states = self.subject.states
+        return states if count == len(states) else (*states, *self.subject.outputs)
 
     def _reserved(self) -> set[str]:
         """Names of the table, and of its dims."""

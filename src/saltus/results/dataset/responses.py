@@ -14,7 +14,7 @@ SAMPLES = {
     "turning_points": "where the velocity is zero",
     "stroboscope": "at whole forcing periods",
     "contacts": "at the contacts",
-}  # fmt: skip
+}
 
 
 def grid_values(response_of: np.ndarray, table: AttractorTable) -> dict[str, np.ndarray]:

@@ -6,6 +6,7 @@ account. :func:`saltus.results.dataset.build.build` makes Datasets by them.
 
 from __future__ import annotations
 
+import functools
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -196,6 +197,55 @@ def states_of(ds: xr.Dataset) -> tuple[str, ...]:
             "returned it, or a selection of it."
         )
     return tuple(ds.attrs["states"].split())
+
+
+def outputs_in(ds: xr.Dataset) -> tuple[str, ...]:
+    """Names of what a result tells of its motions, the usual one first: the states in the order of
+    the system, and its named outputs. Those of a structure whose states are coordinates of modes
+    stand before the states.
+    """
+    outputs = tuple(json.loads(ds.attrs.get("outputs", "[]")))
+    states = states_of(ds)
+    return (*outputs, *states) if ds.attrs.get("outputs_first") else (*states, *outputs)
+
+
+def told_of(ds: xr.Dataset) -> tuple[str, ...]:
+    """Names of what tables tell of the motions: the states and the outputs; the outputs alone where
+    they stand before the states.
+    """
+    names = outputs_in(ds)
+    return names[: len(names) - len(states_of(ds))] if ds.attrs.get("outputs_first") else names
+
+
+def output_word(ds: xr.Dataset) -> str:
+    """``state``, or ``state or output`` where there are outputs: what messages call one of them."""
+    return "state or output" if len(outputs_in(ds)) > len(states_of(ds)) else "state"
+
+
+def first_of(ds: xr.Dataset) -> str:
+    """The state or output that is shown of a result where none is asked for."""
+    return outputs_in(ds)[0]
+
+
+def first_size(ds: xr.Dataset, own: str, of_output: str) -> tuple[str, xr.DataArray]:
+    """The size of the state or output that is shown first, and its name: the variable ``own`` of
+    the first state, or that of ``of_output`` which is of the output.
+    """
+    name = first_of(ds)
+    if name == states_of(ds)[0] or of_output not in ds:
+        return states_of(ds)[0], ds[own]
+    chosen = ds[of_output].sel(output=name)
+    return name, chosen.assign_attrs(units=str(chosen["output_units"].item()))
+
+
+@functools.cache
+def reserved_names() -> frozenset[str]:
+    """Names of variables and dims of results that hold outputs beside them, which no output can
+    have.
+    """
+    tables = [kind.variables for kind in KINDS.values() if "<state>" in kind.variables]
+    dims = {dim.rstrip("?") for table in tables for row in table.values() for dim in row.dims}
+    return frozenset(dims.union(*tables))
 
 
 def equations_of(ds: xr.Dataset) -> list[str]:

@@ -17,7 +17,7 @@ import sys
 import threading
 from pathlib import Path
 
-from saltus.fence import printable, shown
+from saltus.errors import shown
 from saltus.results.files.atomic import ResultFileError
 
 _ENDING = re.compile(rb"\nsaltus-sha256:([0-9a-f]{64})\n")
@@ -147,6 +147,5 @@ def try_elsewhere(path: Path, engine: str) -> None:
             -1
         ]
         raise ResultFileError(
-            f"{path} is damaged: {shown(printable(why), 200)}. Restore it from a "
-            f"copy or compute it again."
+            f"{path} is damaged: {shown(why, 200)}. Restore it from a copy or compute it again."
         )

@@ -10,8 +10,14 @@ import xarray as xr
 from saltus.errors import counted
 from saltus.results.dataset.attractors import ATTRACTOR_VARIABLES
 from saltus.results.dataset.kinds import LONGER, WITHOUT, Kind, sentences
-from saltus.results.dataset.schema import ResultKind, attractor_name, kind_text, states_of
-from saltus.results.dataset.variable import TRAJECTORY_NUMBER, Variable
+from saltus.results.dataset.schema import (
+    ResultKind,
+    attractor_name,
+    first_size,
+    kind_text,
+    states_of,
+)
+from saltus.results.dataset.variable import OUTPUT, TRAJECTORY_NUMBER, Variable, of_outputs
 from saltus.results.table import (
     Column,
     TextTable,
@@ -31,6 +37,8 @@ VARIABLES = {
         ("trajectory",), "1", "forcing periods until it had settled, -1 if it hadn't", "i4"
     ),
     **ATTRACTOR_VARIABLES,
+    **OUTPUT,
+    **of_outputs("attractor", "attractor_"),
 }
 
 
@@ -137,7 +145,10 @@ def _one(attractor: xr.Dataset) -> str:
     if kind == "limit_cycle" and "attractor_cycle" in attractor:
         cycle = float(attractor["attractor_cycle"])
         name += f", period {cycle:.4g} s, {1 / cycle:.4g} Hz"
-    size = f"peak {sized(attractor['attractor_peak'])}"
+    of, peak = first_size(attractor, "attractor_peak", "attractor_output_peak")
+    size = f"peak {sized(peak)}"
+    if of != states_of(attractor)[0]:
+        size = f"peak |{of}| {sized(peak)}"
     if kind == Kind.NOISY_PERIODIC.word:
         size += f", scatter {sized(attractor['attractor_scatter'], '.2g')}"
     return f"{name}, {size}"
@@ -163,6 +174,8 @@ def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
         if name.startswith("attractor_")
     }
     first, kinds = states_of(ds)[0], kind_texts(ds, "attractor_")
+    shown, rms = first_size(ds, "attractor_rms", "attractor_output_rms")
+    known |= {"peak": first_size(ds, "attractor_peak", "attractor_output_peak")[1], "rms": rms}
 
     def sized(heading: str, name: str, digits: int = 4) -> list[Column]:
         one = known.get(name)
@@ -172,8 +185,8 @@ def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
         words("", ds["attractor"].values, "attractor"),
         words("type", kinds),
         number("contacts", known["contacts"].values.astype(float), "g"),
-        *sized(f"peak |{first}|", "peak"),
-        *sized(f"rms {first}", "rms"),
+        *sized(f"peak |{shown}|", "peak"),
+        *sized(f"rms {shown}", "rms"),
         *sized(f"scatter {first}", "scatter", 2),
         number("|multiplier|", _largest(ds) if kinds else np.empty(0), ".4f"),
         with_error(

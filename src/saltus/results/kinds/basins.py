@@ -6,7 +6,7 @@ import xarray as xr
 
 from saltus.results.dataset.attractors import ATTRACTOR_VARIABLES
 from saltus.results.dataset.schema import ResultKind, axes_of
-from saltus.results.dataset.variable import Variable
+from saltus.results.dataset.variable import OUTPUT, Variable, of_outputs
 from saltus.results.kinds.attractors import found, rows
 from saltus.results.wording import span
 
@@ -31,6 +31,8 @@ VARIABLES = {
         ("...",), "1", "grazes shallower than the local error", "i2", clipped=True
     ),
     **ATTRACTOR_VARIABLES,
+    **OUTPUT,
+    **of_outputs("attractor", "attractor_"),
 }
 
 

@@ -12,9 +12,11 @@ from saltus.errors import counted
 from saltus.results.dataset.schema import (
     ResultKind,
     event_name,
+    first_size,
     period_text,
     point_name,
     states_of,
+    told_of,
 )
 from saltus.results.dataset.variable import GUARDS, OUTPUT, SQRT_COEFFICIENT, Variable, of_outputs
 from saltus.results.table import ROWS, TextTable, quantity, table, words
@@ -206,10 +208,11 @@ def _branches(title: str, ds: xr.Dataset) -> TextTable:
     """A row for each branch; on the screen the longest ones if there are many."""
     name, branch_of = ds.attrs["parameter"], ds["point_branch"].values
     values, unit = ds[point_name(name)].values, unit_of(ds[point_name(name)])
-    stable, peak = ds["point_stable"].values, ds["point_peak"].values
+    stable = ds["point_stable"].values
+    first, peak = first_size(ds, "point_peak", "point_output_peak")
     numbers = ds["branch"].values
     mine = [np.flatnonzero(branch_of == number) for number in numbers]
-    along, first = plain(name), states_of(ds)[0]
+    along = plain(name)
     columns = [
         words("branch", numbers),
         words("period", [period_text(int(n)) for n in ds["branch_periods"].values]),
@@ -217,7 +220,7 @@ def _branches(title: str, ds: xr.Dataset) -> TextTable:
         quantity("to", [values[i].max() for i in mine], unit, 6, name=f"{along} to"),
         words("closed", ["yes" if one else "no" for one in ds["branch_closed"].values]),
         words("stable orbits", [f"{100 * stable[i].mean():.0f} %" for i in mine]),
-        quantity(f"largest |{first}|", [peak[i].max() for i in mine], unit_of(ds["point_peak"])),
+        quantity(f"largest |{first}|", [peak.values[i].max() for i in mine], unit_of(peak)),
         words("bifurcations", [int((ds["event_branch"].values == i).sum()) for i in numbers]),
     ]
     notes = [f"{len(branch_of)} orbits on {len(numbers)} branches."]
@@ -232,13 +235,14 @@ def events(title: str, ds: xr.Dataset) -> list[TextTable]:
         return []
     at = ds[event_name(ds.attrs["parameter"])]
     order = np.argsort(at.values, kind="stable")
-    peak = ds["event_peak"]
+    peak, first = ds["event_peak"], states_of(ds)[0]
     columns = [
         quantity(plain(ds.attrs["parameter"]), at.values[order], unit_of(at), DIGITS),
         words("branch", ds["event_branch"].values[order]),
         words("what happens", [plain(kind) for kind in ds["event_kind"].values[order]]),
-        quantity(f"peak |{states_of(ds)[0]}|", peak.values[order], unit_of(peak)),
     ]
+    if first in told_of(ds):
+        columns.append(quantity(f"peak |{first}|", peak.values[order], unit_of(peak)))
     return [table(f"{title}: bifurcations", columns)]
 
 

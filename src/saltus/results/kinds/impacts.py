@@ -1,4 +1,4 @@
-"""Result of ``impact_statistics``: number, speeds and durations of contacts."""
+"""Result of ``impact_statistics``: number, speeds, durations, forces and impulses of contacts."""
 
 from __future__ import annotations
 
@@ -38,7 +38,14 @@ VARIABLES = {
     "contact_impulse_of_impacts": Variable(
         _CONTACT, "<impulse>", "impulse of the impacts of the contact, without that at rest"
     ),
+    "touchdown_<state>": Variable(_CONTACT, "<state>", "<state> where the contact begins"),
     "contact_impulse": Variable(_CONTACT, "<impulse>", "impulse of the contact force"),
+    "contact_peak_force": Variable(
+        _CONTACT, "<force>", "force of the largest magnitude in the contact, with its sign"
+    ),
+    "contact_depth": Variable(
+        _CONTACT, "<gap>", "largest distance beyond the boundary in the contact"
+    ),
     "contact_trajectory": Variable(_CONTACT, "1", "trajectory that the contact belongs to", "i8"),
     "contact_side": Variable(("guard",), "1", "sign of the gap in contact", "i1"),
     "contacts": Variable(_GUARD, "1", "contacts that begin", "i8"),
@@ -69,6 +76,7 @@ VARIABLES = {
     "share_in_contact_error": Variable(
         _GUARD, "1", "standard error of the share of the time in contact"
     ),
+    "peak_force": Variable(_GUARD, "<force>", "largest magnitude of the force of a contact"),
     "impulse_mean": Variable(_GUARD, "<impulse>", "mean impulse of a contact"),
     "impulse_mean_error": Variable(
         _GUARD, "<impulse>", "standard error of the mean impulse of a contact"
@@ -89,11 +97,19 @@ def account(ds: xr.Dataset) -> list[str]:
             float(one[key].mean()) for key in ("contacts_per_second", "share_in_contact")
         )
         speed = sized(one["speed_mean"].mean(keep_attrs=True))
+        peak = _peak(one)
         lines.append(
             f"  {name}: {rate:.4g} a second, at {speed} on average, in contact {share:.2%} of the "
-            f"time"
+            f"time{peak}"
         )
     return lines
+
+
+def _peak(one: xr.Dataset) -> str:
+    """The largest force of a guard in words; "" if it isn't known."""
+    if "peak_force" not in one or not np.isfinite(one["peak_force"].values).any():
+        return ""
+    return f", peak force {sized(one['peak_force'].max(keep_attrs=True))}"
 
 
 def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
@@ -119,6 +135,12 @@ def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
         quantity("longest", column("duration_max"), "s", name="longest duration"),
         measured("share of the time in contact", "share_in_contact"),
     ]
+    if "peak_force" in ds:
+        columns.append(quantity("peak force", column("peak_force"), unit_of(ds["peak_force"])))
+    if "impulse_max" in ds:
+        columns.append(
+            quantity("largest impulse", column("impulse_max"), unit_of(ds["impulse_max"]))
+        )
     notes = ["± is the standard error by the means of blocks."]
     notes += left_out(like.size, "guards and trajectories")
     return [table(title, columns, [*notes, *failed(ds)])]

@@ -16,10 +16,10 @@ from saltus.results.dataset.attractors import rows_as
 from saltus.results.dataset.kinds import OPEN, WITHOUT_WORDS, Kind, sentences
 from saltus.results.dataset.schema import (
     ResultKind,
+    first_size,
     parameters_of,
     point_name,
     response_name,
-    states_of,
 )
 from saltus.results.dataset.variable import GUARDS, OUTPUT, Variable, of_outputs
 from saltus.results.kinds import branches
@@ -146,12 +146,14 @@ def _branches(title: str, ds: xr.Dataset) -> TextTable:
     numbers, sizes = np.unique(branch, return_counts=True)
     shown = np.sort(np.argsort(-sizes, kind="stable")[:ROWS]).tolist()
     each = [ds.isel(response=np.flatnonzero(branch == number)) for number in numbers]
-    tops = [
-        int(np.nan_to_num(responses["response_rms"].values, nan=-math.inf).argmax())
-        for responses in each
-    ]
-    first, along, values = states_of(ds)[0], plain(axis), response_name(axis)
-    unit, size, gap = (unit_of(ds[name]) for name in (axis, "response_rms", "response_margin"))
+    sizes_of = {
+        name: [first_size(one, f"response_{name}", f"output_{name}")[1] for one in each]
+        for name in ("rms", "peak")
+    }
+    tops = [int(np.nan_to_num(rms.values, nan=-math.inf).argmax()) for rms in sizes_of["rms"]]
+    first, rms = first_size(ds, "response_rms", "output_rms")
+    along, values, size = plain(axis), response_name(axis), unit_of(rms)
+    unit, gap = (unit_of(ds[name]) for name in (axis, "response_margin"))
 
     def ends(name: str, pick: Callable[[np.ndarray], Any]) -> list[float]:
         return [float(pick(responses[name].values)) for responses in each]
@@ -173,9 +175,13 @@ def _branches(title: str, ds: xr.Dataset) -> TextTable:
         quantity(f"{along} from", [low for low, _ in extents], unit, 5),
         quantity("to", [high for _, high in extents], unit, 5, name=f"{along} to"),
         interval("contacts in T", fewest, most, "{:.3g}".format),
-        quantity(f"largest rms of {first}", at_top("response_rms"), size),
+        quantity(
+            f"largest rms of {first}",
+            [float(one.values[top]) for one, top in zip(sizes_of["rms"], tops, strict=True)],
+            size,
+        ),
         quantity("at", at_top(values), unit, 5, name=f"{along} at the largest rms"),
-        quantity(f"peak |{first}|", ends("response_peak", _most), size),
+        quantity(f"peak |{first}|", [_most(one.values) for one in sizes_of["peak"]], size),
         quantity("to a graze", ends("response_margin", _least), gap, 3),
         number("largest exponent", ends("response_exponent", _most), ".4g", "1/s"),
     ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from saltus.results.dataset.schema import ResultKind, states_of
+from saltus.results.dataset.schema import ResultKind, told_of
 from saltus.results.dataset.variable import ENDINGS, GUARDS, SHARED, Variable
 from saltus.results.table import (
     Column,
@@ -64,7 +64,7 @@ def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
     columns.append(number("time", ds["crossing_time"].values, ".10g", "s"))
     if "crossing_phase" in ds and np.isfinite(ds["crossing_phase"].values).any():
         columns.append(number("phase of the forcing", ds["crossing_phase"].values, ".8f"))
-    columns += [quantity(name, ds[name].values, unit_of(ds[name]), 8) for name in states_of(ds)]
+    columns += [quantity(name, ds[name].values, unit_of(ds[name]), 8) for name in told_of(ds)]
     columns += [
         Column("direction", lambda i: "up" if up[i] > 0 else "down", {"direction": up}),
         words("kind", ds["crossing_kind"].values.astype(str)),

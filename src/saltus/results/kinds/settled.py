@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from saltus.results.dataset.schema import ResultKind, period_text, states_of
+from saltus.results.dataset.schema import ResultKind, period_text, told_of
 from saltus.results.dataset.variable import TRAJECTORY_NUMBER, Variable
 from saltus.results.kinds.spectrum import RESPONSE_PERIOD
 from saltus.results.table import TextTable, left_out, number, of_trajectory, quantity, table, words
@@ -57,7 +57,7 @@ def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
         quantity(
             heading.format(name), batch[f"{name}_{size}"].values, unit_of(batch[f"{name}_{size}"])
         )
-        for name in states_of(ds)
+        for name in told_of(ds)
         for size, heading in (("peak", "peak |{}|"), ("rms", "rms {}"))
         if f"{name}_{size}" in batch
     ]

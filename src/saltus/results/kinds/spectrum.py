@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.results.dataset.schema import ResultKind, period_text, states_of
+from saltus.results.dataset.schema import ResultKind, period_text, told_of
 from saltus.results.dataset.variable import SHARED, STATUS, Variable
 from saltus.results.table import (
     ROWS,
@@ -47,13 +47,13 @@ VARIABLES = {
 
 
 def account(ds: xr.Dataset) -> list[str]:
-    """The largest lines of each state, of the first trajectory."""
+    """The largest lines of each state and output, of the first trajectory."""
     run = ds.isel(trajectory=0) if "trajectory" in ds.dims else ds
     frequency = run["frequency"].values
     lines = [
         f"extent   {len(frequency)} lines up to {frequency[-1]:g} Hz, window {run['window'].item()}"
     ]
-    for name in states_of(ds):
+    for name in told_of(ds):
         amplitude = run[f"{name}_amplitude"]
         largest = np.argsort(amplitude.values)[::-1][:_LARGEST]
         told = [f"{sized(amplitude[i])} at {frequency[i]:.6g} Hz" for i in largest]
@@ -62,16 +62,16 @@ def account(ds: xr.Dataset) -> list[str]:
 
 
 def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
-    """A row for each line; on the screen the largest ones of the first state, in the order of the
-    file.
+    """A row for each line; on the screen the largest ones of the first state or output, in the
+    order of the file.
     """
-    amplitudes = [ds[f"{name}_amplitude"] for name in states_of(ds)]
+    amplitudes = [ds[f"{name}_amplitude"] for name in told_of(ds)]
     like = amplitudes[0]
     columns = of_trajectory(ds, like=like)
     columns.append(number("frequency", flat(ds["frequency"], like), ".8g", "Hz"))
     if "order" in ds.variables:
         columns.append(number("order", flat(ds["order"], like), ".6g"))
-    for name, amplitude in zip(states_of(ds), amplitudes, strict=True):
+    for name, amplitude in zip(told_of(ds), amplitudes, strict=True):
         columns += [
             quantity(f"amplitude of {name}", flat(amplitude, like), unit_of(amplitude), 6),
             number(f"phase of {name}", flat(ds[f"{name}_phase"], like), ".4f", "rad"),

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.errors import counted
-from saltus.results.dataset.schema import ResultKind, end_name, sample_dim, states_of
+from saltus.results.dataset.schema import ResultKind, end_name, outputs_in, sample_dim, told_of
 from saltus.results.dataset.variable import (
     COUNTERS,
     END_STATES,
@@ -69,6 +69,8 @@ VARIABLES = {
 def account(ds: xr.Dataset) -> list[str]:
     """Extent, status and contacts."""
     lines = [f"extent   {_extent(ds)}", f"status   {told(ds['status'].values)}"]
+    if "until" in ds.attrs:
+        lines.append(f"until    {ds.attrs['until']}")
     if "contact_kind" in ds:
         kinds = told(ds["contact_kind"].values) if ds.sizes["contact"] else "none"
         lines.append(f"contacts {kinds}")
@@ -140,7 +142,7 @@ def rows(
     ]
     columns += [
         quantity(f"{name} at the end", batch[end_name(name)].values, unit_of(batch[name]), 5)
-        for name in states_of(run)
+        for name in told_of(run)
         if end_name(name) in batch
     ]
     columns += [words("response", responses)] * bool(responses)
@@ -151,15 +153,26 @@ def rows(
     return [table(title, columns, (*left_out(total, "trajectories"), *early))]
 
 
+def sample_rows(run: xr.Dataset) -> TextTable:
+    """A row for each given time, of each trajectory: the states there."""
+    columns = {name: values for name, (_, values) in sample_columns(run).items()}
+    shown = [words("", columns["trajectory"], "trajectory")] if "trajectory" in columns else []
+    shown += [
+        quantity(name, columns[name], unit_of(run[name]), 6) for name in ("time", *told_of(run))
+    ]
+    total = len(columns["time"])
+    return table("states at the given times", shown, left_out(total, "times"))
+
+
 # -- all of it -------------------------------------------------------------------------------------
 #: Columns by name, each with the name and the values of its variable.
 Columns = dict[str, tuple[str, np.ndarray]]
 
 
 def sample_columns(ds: xr.Dataset) -> Columns:
-    """One row a sample: trajectory (of a batch), time, period, states, mode."""
+    """One row a sample: trajectory (of a batch), time, period, states, outputs, mode."""
     names = [
-        name for name in ("trajectory", "time", "period", *states_of(ds), "mode") if name in ds
+        name for name in ("trajectory", "time", "period", *outputs_in(ds), "mode") if name in ds
     ]
     dims = [dim for dim in ("trajectory", sample_dim(ds)) if dim in ds.dims]
     shape = xr.Variable(dims, np.empty([ds.sizes[dim] for dim in dims]))

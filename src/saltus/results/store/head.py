@@ -37,10 +37,13 @@ _TYPES = {
 def head_of(identity: Mapping[str, str], note: Mapping[str, Any], chunks: Chunks) -> dict[str, Any]:
     """Return the content of ``store.json``."""
     return {
-        "format": FORMAT, "identity": dict(identity), "note": dict(note),
-        "shape": list(chunks.shape), "chunk": chunks.chunk,
+        "format": FORMAT,
+        "identity": dict(identity),
+        "note": dict(note),
+        "shape": list(chunks.shape),
+        "chunk": chunks.chunk,
         "arrays": {name: dtype.name for name, dtype in chunks.arrays.items()},
-    }  # fmt: skip
+    }
 
 
 def fingerprint(head: Mapping[str, Any]) -> str:

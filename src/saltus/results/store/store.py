@@ -500,12 +500,16 @@ class Store:
             are counted.
         """
         return StoreStatus(
-            path=self.path, identity=self.identity, note=self.note, done=int(self.done().sum()),
+            path=self.path,
+            identity=self.identity,
+            note=self.note,
+            done=int(self.done().sum()),
             total=self.chunks.count,
             damaged=len(self.damaged(checksums=checksums)),
             bytes=sum(size(file) or 0 for file in self.path.rglob("*")),
-            last_written=self._last_written(), writers=tuple(holders(self.path / "locks")),
-        )  # fmt: skip
+            last_written=self._last_written(),
+            writers=tuple(holders(self.path / "locks")),
+        )
 
     def _last_written(self) -> datetime | None:
         times = []

@@ -85,9 +85,13 @@ class OfMaps(Generated):
 
     axes: dict[str, Axis] = Field(
         description="The two states that the map is drawn over.",
-        examples=[{"x": {"first": "-5 mm", "last": "5 mm", "count": 400},
-            "v": {"first": "-1 m/s", "last": "1 m/s", "count": 400}}],
-    )  # fmt: skip
+        examples=[
+            {
+                "x": {"first": "-5 mm", "last": "5 mm", "count": 400},
+                "v": {"first": "-1 m/s", "last": "1 m/s", "count": 400},
+            }
+        ],
+    )
     map: list[MapTable] = Field(
         default_factory=list,
         description="Several maps of one study.",

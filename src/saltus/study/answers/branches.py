@@ -59,5 +59,5 @@ class Backbone(OneVerb):
         state = table.state or self.system.states[0]
         place = f"{self.place}.amplitude"
         self.arguments["amplitude"] = tuple(
-            quantities.states(self.system, {state: one}, place)[state] for one in table.amplitude
+            quantities.levels(self.system, {state: one}, place)[state] for one in table.amplitude
         )

@@ -12,7 +12,7 @@ from saltus.study.code import code_hash
 from saltus.study.setting import quantities
 from saltus.study.tables.kinds import KINDS, whole
 from saltus.study.tables.signature import Asked, OfLength, table, verb
-from saltus.system.quantity import quantity
+from saltus.system.read_off import quantity
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,8 +28,10 @@ _OPTIONAL = ("friction",)
 
 
 _BASE: Any = (OfLength, Asked)
-_STATES = Field(None, min_length=1, description="Which states; all by default.", examples=[["x"]])
-_LEFT_OUT = ("state", "keep", "time_errors", "surface", "direction")
+_STATES = Field(
+    None, min_length=1, description="Which states and outputs; all by default.", examples=[["x"]]
+)
+_LEFT_OUT = ("state", "at", "until", "keep", "time_errors", "surface", "direction")
 
 
 class OfMotions(OneVerb):
@@ -104,7 +106,7 @@ class Section(OfMotions):
         surface: Any = table.surface
         known = [
             *(guard.name for guard in self.system.guards),
-            *(f"{name} turns" for name in self.system.states),
+            *(f"{name} turns" for name in (*self.system.states, *self.system.outputs.names)),
         ]
         if (
             isinstance(surface, dict)
@@ -113,7 +115,7 @@ class Section(OfMotions):
         ):
             surface = setting.formula(text, f"{self.place}.surface")
         elif isinstance(surface, dict):
-            (surface,) = quantities.states(self.system, surface, f"{self.place}.surface").items()
+            (surface,) = quantities.levels(self.system, surface, f"{self.place}.surface").items()
         elif surface not in known:
             level = f'surface = {{ {self.system.states[0]} = "0.3 mm" }}'
             raise StudyError(
@@ -144,11 +146,12 @@ class LinesQuestion(OfMotions):
     def check_more(self, table: Any, setting: Setting) -> None:  # noqa: ARG002
         """Read and check states and periods."""
         self.arguments["states"] = table.states
+        known = (*self.system.states, *self.system.outputs.names)
         for name in table.states or []:
-            if name not in self.system.states:
+            if name not in known:
                 raise StudyError(
                     f"[{self.place}] states: {name!r} is unknown to "
-                    f"{self.system.name}. {nearest(name, self.system.states)}"
+                    f"{self.system.name}. {nearest(name, known)}"
                 )
         if table.last is not None and table.periods is None:
             raise StudyError(
@@ -183,6 +186,13 @@ class Statistics(OfMotions):
 
     picture = "impacts"
 
+    def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
+        """The histogram of speeds, and the contacts in time."""
+        from saltus import plot
+
+        contacts = {"forces": first_figure(plot.contact_forces(ds))} if ds.sizes["contact"] else {}
+        return {**super().pictures(ds), **contacts}
+
     def check_more(self, table: Any, setting: Setting) -> None:
         """Sides and forces."""
         self.needs_contacts()
@@ -199,11 +209,15 @@ class Statistics(OfMotions):
                         f"[{self.place}.{key}] {name!r} is no boundary of "
                         f"{self.system.name}. {nearest(name, names)}"
                     )
-        force = {
-            name: setting.formula(text, f"{self.place}.force") for name, text in table.force.items()
+        force: dict[str, Any] = {
+            name: text
+            if text in self.system.outputs.names
+            else setting.formula(text, f"{self.place}.force")
+            for name, text in table.force.items()
         }
         for name, function in force.items():
-            quantity(self.system, function, f"the force at {name!r}")
+            if not isinstance(function, str):
+                quantity(self.system, function, f"the force at {name!r}")
         self.arguments["force"] = force or None
 
 

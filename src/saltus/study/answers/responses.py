@@ -144,17 +144,19 @@ class Response(Responses):
         return OneVerb.call(self, how | {"frequency": _array(self.arguments["frequency"])})
 
     def drawn_with(self) -> dict[str, Any]:
-        """Measured points in SI: amplitudes of the first state."""
+        """Measured points in SI: amplitudes of the state or sensor that is drawn."""
         if self.measured is None:
             return {}
-        units, axis, first = self.system.units, str(self.system.forced_at), self.system.states[0]
+        units, axis = self.system.units, str(self.system.forced_at)
+        outputs = self.system.outputs
+        unit = outputs.units[0] if outputs.first else units.get(self.system.states[0], "1")
         try:
             points = measured_points(
                 self.measured.data,
                 self.measured.path,
                 axis,
                 units.get(axis, "1"),
-                units.get(first, "1"),
+                unit,
             )
         except SaltusError as error:
             raise fault(self.place, error) from None

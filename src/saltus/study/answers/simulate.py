@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 from saltus.analysis.motion.settled import settled
 from saltus.errors import ParameterError, StudyError
-from saltus.kernels.status import STATUS
+from saltus.flow.until import STATUS
 from saltus.results.kinds.settled import responses
-from saltus.results.kinds.trajectory import rows
+from saltus.results.kinds.trajectory import rows, sample_rows
 from saltus.study.answers.compare import contact_table, exact_times, printed_rows
 from saltus.study.answers.question import Answers, OneVerb, Question, asked, first_figure
 from saltus.study.setting import quantities
-from saltus.study.tables.kinds import KINDS
+from saltus.study.tables.kinds import OF_MOTION
 from saltus.study.tables.signature import OfLength
 from saltus.study.tables.signature import table as asking
+from saltus.system.condition import end_condition
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -38,7 +39,7 @@ def _files(_table: Any, study: Study) -> list[tuple[str, str]]:
     return [(title, RUN), *([(f"{title}, reference", REFERENCE)] if second else [])]
 
 
-@asked(10, asking("simulate", ["simulate"], KINDS, base=OfLength), _files)
+@asked(10, asking("simulate", ["simulate"], OF_MOTION, base=OfLength), _files)
 def questions(table: Any, setting: Setting) -> list[Question]:
     """Questions on how given starts move: by the study's method, and before it by the second method
     that [compare] names.
@@ -67,6 +68,13 @@ class Motion(OneVerb):
 
     def check_first(self, table: Any) -> None:
         """Refuse forcing periods for an unforced system."""
+        if table.at is not None and table.samples is not None:
+            raise StudyError("[simulate] give at (times) or samples (how many), not both.")
+        if table.until is not None and table.keep is not None:
+            raise StudyError(
+                "[simulate] keep counts periods before an end that is known, and until finds it. "
+                "Leave one of them out."
+            )
         if table.periods is not None and self.system.forced_at is None:
             raise StudyError(
                 f"[simulate] periods: {self.system.name} has no forcing period. Write "
@@ -75,6 +83,8 @@ class Motion(OneVerb):
 
     def check(self, table: Any, setting: Setting) -> None:
         """Read the files of [compare] now: errors come before anything is computed."""
+        if table.until is not None:
+            end_condition(self.system, table.until)
         self.compare = setting.study.compare
         if self.compare is None:
             return
@@ -96,7 +106,9 @@ class Motion(OneVerb):
     def rows(self, ds: xr.Dataset, found: Answers) -> list[TextTable]:
         """A row for each trajectory, or for each contact that was printed."""
         if self.compare is None:
-            return rows(self.title, ds, response_texts(ds), dict(STATUS.values()))
+            repeats = [] if self.arguments["until"] else response_texts(ds)
+            tables = rows(self.title, ds, repeats, dict(STATUS.values()))
+            return [*tables, sample_rows(ds)] if self.arguments["at"] else tables
         return [contact_table(self.title, ds, self.printed, self.exact, found.get(REFERENCE))]
 
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
@@ -105,9 +117,9 @@ class Motion(OneVerb):
         """
         from saltus import plot
         from saltus.plot.selection import MOST
-        from saltus.results.dataset.schema import states_of
+        from saltus.results.dataset.schema import told_of
 
-        draw = plot.phase if len(states_of(ds)) > 1 else plot.history
+        draw = plot.phase if len(told_of(ds)) > 1 else plot.history
         some = (
             {"trajectory": ds["trajectory"].values[:MOST].tolist()}
             if "trajectory" in ds.dims

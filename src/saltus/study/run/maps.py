@@ -46,10 +46,13 @@ def open_store(job: BasinMap, folder: Path) -> Store:
     """
     (folder / STORES).mkdir(parents=True, exist_ok=True)
     return Store.create_or_resume(
-        folder / STORES / job.stem, job.identity(), shape=job.plan.shape, chunk=CHUNK,
+        folder / STORES / job.stem,
+        job.identity(),
+        shape=job.plan.shape,
+        chunk=CHUNK,
         arrays=cell_types(job.plan.system.states),
         note={"name": job.title},
-    )  # fmt: skip
+    )
 
 
 def compute(

@@ -81,12 +81,14 @@ def _row(store: StoreStatus | DamagedStore) -> tuple[str, ...]:
     if isinstance(store, DamagedStore):
         return store.name, "damaged", "-", "-", "-", "-", "-"
     return (
-        str(store.note.get("name", store.path.name)), f"{store.done} of {store.total}",
+        str(store.note.get("name", store.path.name)),
+        f"{store.done} of {store.total}",
         f"{100 * store.done / max(store.total, 1):.0f} %",
-        str(store.damaged), f"{store.bytes / 1e6:.1f}",
+        str(store.damaged),
+        f"{store.bytes / 1e6:.1f}",
         store.last_written.strftime(_TIME) if store.last_written else "never",
         ", ".join(store.writers) or "-",
-    )  # fmt: skip
+    )
 
 
 def question_table(folder: Path) -> TextTable | None:

@@ -110,6 +110,7 @@ _READINGS: dict[str, Callable[[Any, _At], Any]] = {
     "start": lambda value, at: quantities.starts(at.system, value, at.place),
     "box": lambda value, at: quantities.box(at.system, value, at.place),
     "time": lambda value, at: quantities.number(value, "s", at.place, at.key),
+    "times": lambda value, at: [quantities.number(one, "s", at.place, at.key) for one in value],
     "transient": _transient,
     "period": _period,
     "values": _values,

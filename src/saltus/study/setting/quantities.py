@@ -64,6 +64,23 @@ def states(system: System, table: Mapping[str, Quantity], place: str) -> dict[st
     }
 
 
+def levels(system: System, table: Mapping[str, Quantity], place: str) -> dict[str, float]:
+    """Values of some states or outputs in SI. Raises StudyError for an unknown one or a missing
+    unit.
+    """
+    outputs = dict(zip(system.outputs.names, system.outputs.units, strict=True))
+    known = (*system.states, *outputs)
+    return {
+        name: number(
+            value,
+            outputs[name] if name in outputs else _unit(system, name, known, place),
+            place,
+            name,
+        )
+        for name, value in table.items()
+    }
+
+
 def start(
     system: System, table: Mapping[str, Start], place: str = "simulate"
 ) -> dict[str, float | list[float]]:

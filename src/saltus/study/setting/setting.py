@@ -157,7 +157,8 @@ def system_of(
             base = model() if table.case is None else model(table.case)
         except ParameterError as error:
             raise fault("system", error) from None
-    return _with_values(base, table.values, "system")
+    with_values = _with_values(base, table.values, "system")
+    return _with_outputs(with_values, table.outputs, formulas or Formulas())
 
 
 def _with_values(system: System, values: Mapping[str, Quantity], place: str) -> System:
@@ -167,6 +168,15 @@ def _with_values(system: System, values: Mapping[str, Quantity], place: str) -> 
         return system.with_values(**given)
     except ParameterError as error:
         raise fault(place, error) from None
+
+
+def _with_outputs(system: System, given: Mapping[str, Output], formulas: Formulas) -> System:
+    """System with the outputs of a table. Raises StudyError if one is refused."""
+    try:
+        outputs = {name: (formulas.formula(one.formula), one.unit) for name, one in given.items()}
+        return system.with_outputs(outputs) if outputs else system
+    except SaltusError as error:
+        raise fault("system.outputs", error) from None
 
 
 def _written(table: SystemTable, formulas: Formulas, header: Header | None) -> System:
@@ -186,10 +196,14 @@ def _written(table: SystemTable, formulas: Formulas, header: Header | None) -> S
         title, source = (header.name, header.source) if header else ("system", "")
         guards = {name: formulas.formula(text) for name, text in table.guards.items()}
         return system(
-            states=list(rates), units=table.units, forced_at=table.forced_at, guards=guards,
-            check_units=table.check_units, name=title,
+            states=list(rates),
+            units=table.units,
+            forced_at=table.forced_at,
+            guards=guards,
+            check_units=table.check_units,
+            name=title,
             source=source,
-        )(equations)  # fmt: skip
+        )(equations)
     except StudyError:
         raise
     except SaltusError as error:

@@ -6,10 +6,18 @@ import re
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from saltus.errors import SaltusError, StudyError, nearest
+from saltus.errors import SaltusError, StudyError, nearest, shown
 from saltus.study.setting import quantities
 from saltus.study.tables.toml import fault
-from saltus.system import Base, Contact, Force, structure
+from saltus.system import (
+    Base,
+    Contact,
+    Force,
+    acceleration,
+    contact_force,
+    structure,
+    velocity,
+)
 from saltus.system.structures import drives, laws
 from saltus.system.structures.equations import UNITS
 from saltus.system.structures.files import File
@@ -56,6 +64,8 @@ def structure_of(table: Any, inputs: Inputs, formulas: Formulas, header: Header 
                 for name, value, unit in entries(one):
                     if value is not None and length:
                         quantities.number(value, unit, place, name.lstrip("_") or "amplitude")
+        if "sensors" in given:
+            given["sensors"] = {name: _sensor(text) for name, text in given["sensors"].items()}
         if "frequency" in given:
             quantities.number(given["frequency"], "Hz", _PLACE, "frequency")
         title, source = (header.name, header.source) if header else ("structure", "")
@@ -64,6 +74,25 @@ def structure_of(table: Any, inputs: Inputs, formulas: Formulas, header: Header 
         raise
     except SaltusError as error:
         raise fault(_PLACE, error) from None
+
+
+def _sensor(text: str) -> Any:
+    """A sensor from its text, such as ``acceleration(w_30)`` or ``w_30 - w_12``. Raises StudyError
+    if it can't be read.
+    """
+    kinds = {"velocity": velocity, "acceleration": acceleration, "contact_force": contact_force}
+    found = re.fullmatch(r"\s*(\w+)\s*\((.*)\)\s*", text)
+    kind, inner = found.groups() if found else ("", text)
+    places = [one.strip() for one in inner.split(" - ")]
+    if kind not in ("", *kinds) or len(places) > (1 if kind == "contact_force" else 2):
+        raise StudyError(
+            f"[{_PLACE}.sensors] {shown(text)} is no sensor. Write a degree of freedom, w_30, the "
+            f"stretch between two, w_30 - w_12, velocity(...) or acceleration(...) of either, or "
+            f"contact_force(stop)."
+        )
+    if kind:
+        return kinds[kind](*places)
+    return places[0] if len(places) == 1 else tuple(places)
 
 
 def _given(table: StudyTable) -> dict[str, Any]:

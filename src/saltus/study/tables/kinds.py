@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Discriminator, Tag
+from pydantic import AfterValidator, Discriminator, Field, Tag
 
 from saltus.fence import MOST_COUNT, MOST_PERIODS
 from saltus.study.tables.methods import OWN_METHOD
@@ -43,8 +43,8 @@ _STARTS = (
     "At rest by default."
 )
 _FORMULAS_OF_GUARDS = (
-    "For guards by name: the force of that contact, right in contact only. Its "
-    "integral is the impulse."
+    "For guards by name: the force of that contact, right in contact only, or the name of an "
+    "output. Its integral is the impulse."
 )
 KINDS = {
     "start": WrittenAs(
@@ -113,7 +113,7 @@ KINDS = {
     "surface": WrittenAs(
         Surface,
         ({"x": "0.3 mm"}, "x turns", {"formula": "x - 0.1*v"}),
-        'A level of a state; its turning points, "x turns"; a guard of the system by '
+        'A level of a state or an output; its turning points, "x turns"; a guard of the system by '
         "name; or where a formula is zero.",
     ),
     "contact_side": WrittenAs(dict[str, Literal[-1, 1]], ({"upper_gap": 1},), default={}),
@@ -138,6 +138,23 @@ KINDS = {
         ("slip*sign(v)*v",),
         "Power that friction takes [W], a formula, a "
         "part of its own beside dissipated; 0 by default.",
+        None,
+    ),
+}
+#: What a motion is asked for besides its samples.
+OF_MOTION = KINDS | {
+    "at": WrittenAs(
+        Annotated[list[Quantity], Field(min_length=1)],
+        (["10 ms", "25 ms"],),
+        "Times at which the states are wanted, in any order, in place of samples.",
+        None,
+        convert="times",
+    ),
+    "until": WrittenAs(
+        str,
+        ("x > 2 mm", "x > 2 mm and v < 0 m/s"),
+        "Condition at which a motion ends, at the instant at which it becomes true: a comparison, "
+        "or several joined by and, or; numbers may have units.",
         None,
     ),
 }

@@ -121,6 +121,25 @@ class MeasuredCurve(StudyTable):
     )
 
 
+class Output(StudyTable):
+    """An output: a formula, and the unit that it is in."""
+
+    formula: Formula = Field(description="What is read off the motion.", examples=["k*(x - gap)"])
+    unit: str = Field(
+        "", description="Its unit; by default what the formula comes to.", examples=["N"]
+    )
+
+
+def _alone(given: Any) -> Any:
+    """A formula alone: ``"spring force" = "k*x"``."""
+    if not isinstance(given, str | dict | Output):
+        raise ValueError('must be a formula, such as "k*x", or a table of a formula and its unit')
+    return {"formula": given} if isinstance(given, str) else given
+
+
+Outputs = dict[str, Annotated[Output, BeforeValidator(_alone, json_schema_input_type=str | Output)]]
+
+
 # -- questions -------------------------------------------------------------------------------------
 class Range(StudyTable):
     """Values of a parameter: from one to another, ends included, or given one by one."""
@@ -191,24 +210,6 @@ Starts = Annotated[
     Discriminator(lambda given: "dict[str]" if isinstance(given, dict) else "str"),
 ]
 
-
-class Output(StudyTable):
-    """An output: a formula, and the unit that it is in."""
-
-    formula: Formula = Field(description="What is read off the motion.", examples=["k*(x - gap)"])
-    unit: str = Field(
-        "", description="Its unit; by default what the formula comes to.", examples=["N"]
-    )
-
-
-def _alone(given: Any) -> Any:
-    """A formula alone: ``"spring force" = "k*x"``."""
-    if not isinstance(given, str | dict | Output):
-        raise ValueError('must be a formula, such as "k*x", or a table of a formula and its unit')
-    return {"formula": given} if isinstance(given, str) else given
-
-
-Outputs = dict[str, Annotated[Output, BeforeValidator(_alone, json_schema_input_type=str | Output)]]
 
 T = TypeVar("T", bound=StudyTable)
 

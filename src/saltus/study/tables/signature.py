@@ -72,11 +72,12 @@ class Asked(Generated, Named):
 
 
 class OfLength(Generated):
-    """A table that says how long to go on."""
+    """A table that says how long to go on; given times are enough."""
 
     @model_validator(mode="after")
     def _one_length(self) -> OfLength:
-        if (getattr(self, "periods", None) is None) == (getattr(self, "t_end", None) is None):
+        lengths = [getattr(self, name, None) is not None for name in ("periods", "t_end")]
+        if sum(lengths) != 1 and (any(lengths) or getattr(self, "at", None) is None):
             raise ValueError(
                 "give the length once: periods = 60, or, of a system without forcing, "
                 't_end = "20 s"'

@@ -92,6 +92,14 @@ Structure: Any = table(
         "damping_ratio": WrittenAs(Quantity | list[Quantity], ("2 %",)),
         "modes": whole(8),
         "names": WrittenAs(str | list[str], ("x1 x2",)),
+        "sensors": WrittenAs(
+            dict[str, str],
+            ({"tip": "w_30", "tip acceleration": "acceleration(w_30)"},),
+            "What every result holds and every picture shows, by name: a degree of freedom, the "
+            "stretch between two, w_30 - w_12, velocity(...) or acceleration(...) of either, "
+            "contact_force(stop).",
+            {},
+        ),
     },
     base=Generated,
     without=("name", "source"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import ConfigDict, Field
 
-from saltus.study.tables.parts import Formula, MeasuredCurve, Quantity, StudyTable
+from saltus.study.tables.parts import Formula, MeasuredCurve, Outputs, Quantity, StudyTable
 from saltus.study.tables.structure import Structure
 
 
@@ -66,6 +66,13 @@ class SystemTable(StudyTable):
         default_factory=dict,
         description="Curves by name, for formulas to call.",
         examples=[{"stop": {"file": "stop.csv"}}],
+    )
+
+    outputs: Outputs = Field(
+        default_factory=dict,
+        description="What every result holds besides the states, by name: formulas. They may be of "
+        "a model or of --system too.",
+        examples=[{"spring force": "k*x", "power": {"formula": "c*v**2", "unit": "W"}}],
     )
 
     @property

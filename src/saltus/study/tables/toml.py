@@ -9,8 +9,7 @@ import re
 from typing import Any
 
 from saltus.errors import SaltusError, StudyError
-from saltus.fence import SHOWN
-from saltus.sentences import Given, Word
+from saltus.sentences import SHOWN, Given, Word
 
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 #: Tables by the function of the analyses that answers them.

@@ -94,7 +94,7 @@ def traced(
 ) -> tuple[System, dict[str, Relation]]:
     """The system, and the boundary of each contact by its name."""
     needs, repeats = drives.forcing(loads.drives, frequency)
-    ways = [_way(moving, degrees, label, contact) for label, contact in loads.contacts]
+    ways = [way_of(moving, degrees, label, contact) for label, contact in loads.contacts]
     along = [moving.load(one) for one in loads.along]
     defaults, units = _parameters(loads, unit)
     if needs:
@@ -120,9 +120,9 @@ def traced(
         for matrix, of in ((moving.stiffness, z), (moving.damping, w)):
             if matrix is not None:
                 rows = matrices.dense(matrix)
-                load = [one - _sum(row, of) for one, row in zip(load, rows, strict=True)]
+                load = [one - sum_of(row, of) for one, row in zip(load, rows, strict=True)]
         if moving.inverse is not None:
-            load = [_sum(row, load) for row in moving.inverse]
+            load = [sum_of(row, load) for row in moving.inverse]
         return (*w, *load, *stops)
 
     rates.__signature__ = _signature((*moving.names, *moving.rates), defaults)  # type: ignore[attr-defined]
@@ -164,11 +164,11 @@ class Way:
 
     def moving(self, z: Sequence[Any], w: Sequence[Any]) -> laws.Moving:
         """The motion at the contact."""
-        slip = _sum(self.rubbed, w) if self.rubbed.any() else None
-        return laws.Moving(_sum(self.pushed, z), _sum(self.pushed, w), slip)
+        slip = sum_of(self.rubbed, w) if self.rubbed.any() else None
+        return laws.Moving(sum_of(self.pushed, z), sum_of(self.pushed, w), slip)
 
 
-def _way(moving: Coordinates, degrees: list[str], label: str, contact: Contact) -> Way:
+def way_of(moving: Coordinates, degrees: list[str], label: str, contact: Contact) -> Way:
     """The way of a contact. Raises ParameterError if the structure can't move so."""
     pushed = moving.along(direction(contact, degrees))
     rubbed = np.zeros(len(pushed))
@@ -226,7 +226,7 @@ def _signature(states: tuple[str, ...], defaults: dict[str, Any]) -> inspect.Sig
     )
 
 
-def _sum(coefficients: Any, values: Sequence[Any]) -> Any:
+def sum_of(coefficients: Any, values: Sequence[Any]) -> Any:
     """The sum of products without zeros, positive ones first."""
     places = np.flatnonzero(coefficients).tolist()
     total: Any = 0.0

@@ -168,7 +168,7 @@ def _held(file: File) -> dict[str, Any]:
         raise ParameterError(f"{file.name} doesn't fit into the memory.") from None
     except Exception as error:  # readers of foreign files raise what they like
         why = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise ParameterError(f"{file.name} can't be read: {fence.shown(why)}. {_HOW}") from None
+        raise ParameterError(f"{file.name} can't be read: {shown(why)}. {_HOW}") from None
     return held
 
 

@@ -282,7 +282,7 @@ def _check_places(name: str, places: Sequence[Any], known: list[str]) -> None:
     for place in places:
         if not among(place, known):
             raise ParameterError(
-                f"{name}: {shown(place)} is no degree of freedom. {_named(place, known)}"
+                f"{name}: {shown(place)} is no degree of freedom. {named(place, known)}"
             )
     if len(places) == 2 and places[0] == places[1]:
         raise ParameterError(f"{name}: at and to are both {places[0]!r}.")
@@ -343,7 +343,7 @@ def _check_friction(name: str, part: Contact, known: list[str]) -> None:
         )
 
 
-def _named(degree: Any, known: list[str]) -> str:
+def named(degree: Any, known: list[str]) -> str:
     """Advice on a degree of freedom that is given by its number or misspelt."""
     number = isinstance(degree, int | np.integer) and not isinstance(degree, bool)
     if number and 1 <= degree <= len(known):

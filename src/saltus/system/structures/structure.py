@@ -22,6 +22,7 @@ from saltus.system.structures.files import matrices_of
 from saltus.system.structures.matrices import ASYMMETRY
 from saltus.system.structures.parts import Base, Contact, Force, direction, parts
 from saltus.system.structures.reduction import Modes, modal_damping, modes_of
+from saltus.system.structures.sensors import with_sensors
 from saltus.system.system import System
 from saltus.units import to_si
 
@@ -40,9 +41,8 @@ _ELSEWHERE = {
     **dict.fromkeys(("freq", "f", "forcing", "forced_at"), "Write frequency=."),
     **dict.fromkeys(("support", "ground", "excitation", "quake"),
         "Write base=sl.Base(direction, acceleration)."),
-    **dict.fromkeys(("outputs", "sensors", "output"), "An output is a formula of "
-        "the coordinates: outputs= of sl.frequency_response and others, with the mode shapes of "
-        "sl.structure_modes."),
+    **dict.fromkeys(("outputs", "output", "observers", "probes"),
+        "Write sensors={\"tip\": \"x3\"}."),
 }  # fmt: skip
 
 
@@ -62,6 +62,7 @@ def structure(
     unit: str = "m",
     name: str = "structure",
     source: str = "",
+    sensors: Mapping[str, Any] | None = None,
 ) -> System:
     """A system of n degrees of freedom, from its matrices, with contacts and forces given as data.
 
@@ -106,6 +107,11 @@ def structure(
         Unit of all degrees of freedom; ``""`` if they differ.
     name, source : str
         As of :func:`saltus.system`.
+    sensors : mapping, optional
+        Named outputs, which every result holds and every picture shows: a degree of freedom for its
+        deflection, a pair of them for a stretch, ``sl.velocity("x3")``, ``sl.acceleration("x3")``,
+        ``sl.contact_force("stop")``, or a function of the states as of
+        :meth:`saltus.System.with_outputs`.
 
     Returns
     -------
@@ -120,7 +126,8 @@ def structure(
     ------
     ParameterError, UnitError
         If a matrix has a wrong shape, isn't finite, or the mass matrix isn't symmetric and positive
-        definite; if a contact or force can't be used, or there are too many degrees of freedom.
+        definite; if a contact, force or sensor can't be used, or there are too many degrees of
+        freedom.
 
     Notes
     -----
@@ -188,7 +195,8 @@ def structure(
             told.doubt_stiff(label, spring, compliance, angular[:count].max(initial=0.0))
     numbers = {label: number_of(side, made.guards) for label, side in sides.items()}
     named = {number: label for label, number in numbers.items() if number is not None}
-    return replace(made, guards=renamed(made.guards, named), description=words)
+    made = replace(made, guards=renamed(made.guards, named), description=words)
+    return made if sensors is None else with_sensors(made, sensors, moving, degrees, loads, unit)
 
 
 # -- coordinates -----------------------------------------------------------------------------------

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -194,3 +196,31 @@ def test_modes_refuse():
         sl.structure_modes(M, K, at=3)
     with pytest.raises(ParameterError, match="modes"):
         sl.structure_modes(M, K, 4)
+
+
+def test_work_of_tracing_grows_with_the_equations():
+    def work(modes):
+        n, calls = 2 * modes, 0
+
+        def count(_frame, event, _argument):
+            nonlocal calls
+            calls += event == "call"
+
+        stiffness = 1e6 * (2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1))
+        stops = [sl.Contact(f"x{n - i}", 5e5, "0.1 mm", side="both") for i in range(3)]
+        before = sys.getprofile()
+        sys.setprofile(count)
+        try:
+            chain = sl.structure(
+                np.eye(n), stiffness, modes=modes, damping_ratio="1 %", contacts=stops,
+                forces=[sl.Force(f"x{n}", "20 N")], frequency="10 Hz",
+            )  # fmt: skip
+            assert chain.equations()
+            assert chain.guard_gradients
+            assert chain.fingerprint()
+        finally:
+            sys.setprofile(before)
+        return calls
+
+    work(2)  # what is done once in a process
+    assert work(32) < 2.2 * work(16)

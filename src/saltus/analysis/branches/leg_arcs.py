@@ -1,5 +1,5 @@
-"""Branches of orbits from contact to contact in one direction, in pieces of one contact sequence
-each, up to the events at which one becomes another.
+"""Branches of orbits from contact to contact in one direction, in arcs of one contact sequence
+each, up to the changes at which one becomes another.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from saltus.analysis.branches.arclength import FIRST, Arc, correct, follow, tangents
-from saltus.analysis.branches.contact_sequences import sequences
+from saltus.analysis.branches.contact_sequences import ContactSequence
 from saltus.analysis.branches.ladders import accumulation
-from saltus.analysis.branches.leg_ends import End, end_of
+from saltus.analysis.branches.leg_ends import Passage, end_of
 from saltus.analysis.branches.legs import Legs
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.special_points import unstable
@@ -22,34 +22,35 @@ from saltus.analysis.branches.tracing import halved
 MOST_PIECES = 40
 #: How far a branch may pass its start sideways, over the step that passes it.
 SIDEWAYS = 0.3
-#: Where before an event the last point of a piece lies, in steps, and the shortest such step in
-#: units of the scale.
-NEXT_TO, LEAST = 1e-3, 1e-7
+#: Distance of the last point of an arc from the event behind it, in steps.
+NEXT_TO = 1e-3
+#: Shortest last step for which such a point is added, in units of the scale.
+LEAST = 1e-7
 #: First step behind an event, in units of the scale.
 AFTER = 1e-4
 _ROW = np.zeros(1, np.int64)
 
 
 @dataclass
-class Piece:
-    """A part of a branch, of orbits with one contact sequence.
+class SequenceArc:
+    """A curve in one direction, of orbits with one contact sequence.
 
     Attributes
     ----------
     legs : Legs
         Its equations.
-    curve : Curve
+    curve : Arc
         Its points, all of the free flow.
     after_event : bool
         Whether its first point is an event.
-    end : End or None
-        The event behind its last point.
+    end : Passage or None
+        What is behind its last point.
     """
 
     legs: Legs
     curve: Arc
     after_event: bool = False
-    end: End | None = None
+    end: Passage | None = None
 
     @property
     def outcome(self) -> str:
@@ -81,26 +82,41 @@ class Piece:
 
 
 @dataclass
-class _Way:
-    """A branch in one direction."""
+class LegWay:
+    """A branch in one direction.
+
+    Attributes
+    ----------
+    limits, points, first, stable
+        See :func:`follow_legs`.
+    home : (Legs, float64[z])
+        Where it begins.
+    arcs : list of SequenceArc
+        The contact sequences one after the other.
+    end : str
+        Why it ends: see :class:`saltus.analysis.branches.arclength.Arc`; ``graze`` or ``corner``
+        where it isn't known how it goes on; ``accumulates`` where its grazes do.
+    limit : float
+        The parameter at which they do, NaN otherwise.
+    """
 
     limits: tuple[float, float]
     points: int
     first: float
-    home: tuple[Legs, np.ndarray]
     stable: bool
-    pieces: list[Piece] = field(default_factory=list)
+    home: tuple[Legs, np.ndarray]
+    arcs: list[SequenceArc] = field(default_factory=list)
     end: str = ""
     limit: float = np.nan
 
     def follow(self, legs: Legs, z: np.ndarray, along: np.ndarray) -> None:
-        """Follow the branch from an orbit on, piece by piece."""
+        """Follow the branch from an orbit on, arc by arc."""
         for _ in range(MOST_PIECES):
-            end = self._piece(legs, z, along)
+            end = self._arc(legs, z, along)
             if end is None:
                 return
             if end.onto is None:
-                self.end = end.event.kind
+                self.end = end.change.kind
                 return
             self.limit = self._accumulation()
             if np.isfinite(self.limit):
@@ -110,14 +126,14 @@ class _Way:
         self.end = "points"
 
     def _accumulation(self) -> float:
-        """The parameter at which the events behind the pieces accumulate; NaN if they don't."""
-        ends = [piece.end for piece in self.pieces if piece.end is not None]
-        contacts = [len(piece.legs.contacts) for piece in self.pieces]
-        return accumulation(contacts, [float(end.event.z[-1]) for end in ends])
+        """The parameter at which the events behind the arcs accumulate; NaN if they don't."""
+        ends = [arc.end for arc in self.arcs if arc.end is not None]
+        contacts = [len(arc.legs.contacts) for arc in self.arcs]
+        return accumulation(contacts, [float(end.change.z[-1]) for end in ends])
 
-    def _piece(self, legs: Legs, z: np.ndarray, along: np.ndarray) -> End | None:
+    def _arc(self, legs: Legs, z: np.ndarray, along: np.ndarray) -> Passage | None:
         """One contact sequence, and where it ends if that is at an event."""
-        again, virtual = bool(self.pieces), list[np.ndarray]()
+        again, virtual = bool(self.arcs), list[np.ndarray]()
 
         def ends(curve: Arc) -> str:
             if not legs.admissible(curve.z[-1][None])[0]:
@@ -127,7 +143,7 @@ class _Way:
                 return "closed"
             return halved(legs, curve)
 
-        left = self.points - sum(len(piece.curve.z) for piece in self.pieces)
+        left = self.points - sum(len(arc.curve.z) for arc in self.arcs)
         step = AFTER if again else self.first
         limits = {legs.width - 1: self.limits}
         enough = functools.partial(unstable, legs.multipliers) if self.stable else None
@@ -135,16 +151,16 @@ class _Way:
             legs, z[None], along[None], limits, max(left, 2), step, ends=ends, enough=enough
         )
         curve.end = "unstable" if curve.end == "enough" else curve.end
-        piece = Piece(legs, curve, again)
-        self.pieces.append(piece)
+        arc = SequenceArc(legs, curve, again)
+        self.arcs.append(arc)
         if curve.end != "virtual":
             self.end = curve.end
             return None
-        piece.end = end_of(legs, curve.z[-1], virtual[-1], curve.tangent[-1])
-        piece.close_up()
-        if piece.end is None:
+        arc.end = end_of(legs, curve.z[-1], virtual[-1], curve.tangent[-1])
+        arc.close_up()
+        if arc.end is None:
             self.end = "lost"
-        return piece.end
+        return arc.end
 
     def _returns(self, legs: Legs, curve: Arc) -> bool:
         """True if the last step passed the orbit from which the branch was followed."""
@@ -165,6 +181,7 @@ class _Way:
 
 def follow_legs(
     orbits: PeriodicOrbits,
+    sequence: ContactSequence,
     z: np.ndarray,
     scale: np.ndarray,
     along: np.ndarray,
@@ -172,13 +189,15 @@ def follow_legs(
     points: int,
     first: float = FIRST,
     stable: bool = False,
-) -> tuple[list[Piece], str, float]:
+) -> LegWay:
     """A branch of periodic orbits in one direction, contact by contact.
 
     Parameters
     ----------
     orbits : PeriodicOrbits
         The equations.
+    sequence : ContactSequence
+        The contacts of the orbit.
     z, scale : float64[z]
         An orbit of the free flow by its points, and the units of these unknowns.
     along : float64[z]
@@ -191,24 +210,13 @@ def follow_legs(
         First step, in units of the scale.
     stable : bool
         See :class:`saltus.analysis.branches.tracing.Plan`.
-
-    Returns
-    -------
-    list of Piece, str, float
-        The contact sequences one after the other, and why the branch ends: see
-        :class:`saltus.analysis.branches.arclength.Arc`; ``graze`` or ``corner`` where it isn't
-        known how it goes on; ``accumulates`` where its grazes do, and at which value of the
-        parameter, NaN otherwise.
     """
-    sequence = sequences(orbits, z[None])[0]
-    if sequence is None:
-        return [], "lost", np.nan
     legs, start = Legs.of(orbits, sequence, z, scale)
     legs.accepted(start[None], _ROW)
     tangent = legs.tangent(start)
     step = 1e-6 * tangent * legs.scale[0]
     moved = np.subtract(*legs.orbit(np.array([start + step, start - step])))
     side = 1.0 if (moved / scale) @ along > 0 else -1.0
-    way = _Way(limits, points, first, (legs, start), stable)
+    way = LegWay(limits, points, first, stable, (legs, start))
     way.follow(legs, start, side * tangent)
-    return way.pieces, way.end, way.limit
+    return way

@@ -1,0 +1,82 @@
+"""Contacts in time: the peak force of each, or its impulse, as a stem."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+
+from saltus.plot import axes as draw
+from saltus.plot import selection
+from saltus.plot.picture import picture
+from saltus.plot.style import CYCLE, display_scale
+
+#: What a stem can show, the first that the result has.
+_HEIGHTS = ("contact_peak_force", "contact_impulse", "contact_speed")
+#: Words for each on the axis.
+_WORDS = {
+    "contact_peak_force": "peak force", "contact_impulse": "impulse",
+    "contact_speed": "speed at contact",
+}  # fmt: skip
+
+
+@picture()
+def contact_forces(
+    ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, legend: bool = True
+) -> Axes:
+    """Stems of the peak force of each contact over the time at which it begins, a colour for each
+    guard; of rigid stops the impulse.
+
+    Parameters
+    ----------
+    ds : Dataset
+        Result of ``impact_statistics``.
+    trajectory : int, optional
+        Trajectory of a batch; all of them together by default.
+    ax : Axes, optional
+        Axes to draw into; a new figure by default.
+    legend : bool
+        Whether to name the guards.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ParameterError
+        If ``ds`` is not from ``impact_statistics``, or there is no such trajectory.
+    """
+    shown = next(n for n in _HEIGHTS if (n in ds and _known(ds, n)) or n == _HEIGHTS[-1])
+    mine = np.isfinite(ds[shown].values)
+    if trajectory is not None and "contact_trajectory" in ds:
+        mine &= np.isin(ds["contact_trajectory"].values, selection.chosen(ds, trajectory))
+    time, height = ds["contact_time"].values[mine], ds[shown].values[mine]
+    guards = ds["contact_guard"].values[mine].astype(str)
+    x = display_scale("s", float(np.abs(time).max(initial=0.0)))
+    y = display_scale(str(ds[shown].attrs.get("units", "")), float(np.abs(height).max(initial=0.0)))
+    with draw.panels(ax, 1, (5.2, 2.8)) as (panel,):
+        if not mine.any():
+            draw.say(panel, "No contact in the observed time.", ds)
+            return panel
+        for i, name in enumerate(ds["guard"].values.tolist()):
+            if (rows := guards == name).any():
+                colour = CYCLE[i % len(CYCLE)]
+                top = height[rows] * y.factor
+                panel.vlines(time[rows] * x.factor, 0.0, top, color=colour, linewidth=0.8)
+                panel.plot(
+                    time[rows] * x.factor, top, "o", color=colour, markersize=3.5,
+                    label=name.replace("_", " "),
+                )  # fmt: skip
+        panel.axhline(0.0, color="0.6", linewidth=0.6)
+        panel.set_xlabel(x.label("time"))
+        panel.set_ylabel(y.label(_WORDS[shown]))
+        if legend:
+            panel.legend(loc="upper left", bbox_to_anchor=(1.02, 1))
+    return panel
+
+
+def _known(ds: xr.Dataset, name: str) -> bool:
+    return bool(np.isfinite(ds[name].values).any())

@@ -1,0 +1,198 @@
+"""Conditions at which a run ends: comparisons of time, states and parameters that a user adds to a
+system, as text or as a function.
+
+Text is a formula (:mod:`saltus.system.formula`) whose numbers may have units: ``"x > 2 mm"``. Every
+comparison becomes a guard of the system, behind its own, unless it means one of these.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from saltus.contact.guards import bits_in, join_guards
+from saltus.errors import ParameterError, TraceError, UnitError, nearest, shown
+from saltus.language.dimensions import DimensionCheck
+from saltus.language.expression import (
+    Bit,
+    Condition,
+    Expr,
+    observed,
+    relations_in,
+    select,
+)
+from saltus.system.formula import Formula, Formulas
+from saltus.system.quantity import with_surface
+from saltus.system.read_off import called
+from saltus.system.system import System
+from saltus.units import coherent_unit, is_unit, to_si
+
+#: A number and what may be its unit, in a formula.
+_QUANTITY = re.compile(
+    r"(?<![\w.])(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*"
+    r"(?P<unit>[^\W\d_]+(?:\^-?[\d.]+)?(?:[*/][^\W\d_]+(?:\^-?[\d.]+)?)*)(?![\w(])"
+)
+#: Words of formulas that may follow a number.
+_WORDS = ("and", "or", "if", "else", "not")
+#: The name of the parameter that holds a number with a unit, before its number.
+_LEVEL = "until_level"
+
+
+@dataclass(frozen=True)
+class EndCondition:
+    """A condition on the sides of guards.
+
+    Attributes
+    ----------
+    system : System
+        The system with the guards of the condition, and a parameter for each number with a unit.
+    sides : Expr
+        1 where the condition holds, 0 where it doesn't; it depends on sides alone.
+    crossing : bool
+        True if the user's function is a number: the condition is then that it has changed its sign.
+    text : str
+        The condition in words.
+    """
+
+    system: System
+    sides: Expr
+    crossing: bool
+    text: str
+
+    @property
+    def guards(self) -> tuple[int, ...]:
+        """Numbers of its guards."""
+        return tuple(sorted(bits_in([self.sides])))
+
+
+def end_condition(system: System, given: Any) -> EndCondition:
+    """The condition of a user's text or function.
+
+    Parameters
+    ----------
+    system : System
+        Whose states and parameters it is about.
+    given : str or callable
+        A formula, or a function of (t, states, parameters), each by its name; see
+        :func:`saltus.system.read_off.quantity`. A comparison, or several joined by ``and``, ``or``
+        (in Python ``&``, ``|``), ends where it becomes true; a number where it crosses zero.
+
+    Raises
+    ------
+    ParameterError, TraceError, UnitError
+        If it can't be read, is about time or parameters alone, or compares different units.
+    """
+    if isinstance(given, str):
+        system, function = _from_text(system, given)
+        text = " ".join(given.split())
+    elif callable(given) and not isinstance(given, System):
+        function, text = given, getattr(given, "text", "the condition")
+    else:
+        raise ParameterError(
+            f'until must be a condition, such as "{system.states[0]} > 1 mm" or '
+            f"lambda {system.states[0]}: {system.states[0]} > 1e-3, not {shown(given)}."
+        )
+    units = DimensionCheck(system.states, system.units)
+    with observed(units):
+        found = called(system, function, "the condition until")
+    if isinstance(found, Condition):
+        return _of_comparisons(system, found, text)
+    if isinstance(found, Expr) and found.op != "const":
+        extended = with_surface(system, lambda **_: found, "until")
+        return EndCondition(extended, _sides(Bit(len(extended.guards) - 1)), True, f"{text} = 0")
+    raise TraceError(
+        f"the condition until of {system.name} is always {shown(found)}. Write a comparison of its "
+        f"states, such as {system.states[0]} > 1e-3."
+    )
+
+
+def _sides(condition: Condition) -> Expr:
+    return select(condition, 1.0, 0.0)
+
+
+def _of_comparisons(system: System, condition: Condition, text: str) -> EndCondition:
+    """The condition in terms of sides of guards."""
+    try:
+        (sides,), guards = join_guards([_sides(condition)], system.guards)
+    except TraceError as error:
+        raise TraceError(f"the condition until of {system.name}: ", error) from error
+    if sides.op != "select":
+        raise TraceError(
+            f"the condition until of {system.name} is always {sides.payload == 1.0}: it compares "
+            f"no states."
+        )
+    if next(relations_in(sides.payload), None) is not None:
+        raise TraceError(
+            lambda say: (
+                f"the condition until of {system.name} compares the time. Give the end by "
+                f"{say.key('t_end')}, and the rest of the condition by {say.key('until')}."
+            )
+        )
+    return EndCondition(replace(system, guards=guards), sides, False, text)
+
+
+# -- text ------------------------------------------------------------------------------------------
+def _from_text(system: System, text: str) -> tuple[System, Callable[..., Any]]:
+    """The system with a parameter for each number with a unit in a text, and the function that the
+    text is.
+    """
+    levels: dict[str, tuple[float, str]] = {}
+
+    def named(match: re.Match[str]) -> str:
+        number, unit = match["number"], _unit(match, text, system)
+        if not unit:
+            return match[0]
+        level = f"{_LEVEL}_{len(levels) + 1}"
+        quantity = f"{number} {unit}"
+        own = coherent_unit(quantity, "until")
+        levels[level] = (to_si(quantity, own, "until"), own)
+        return level + match["unit"][len(unit) :]
+
+    try:
+        formula = Formula(_QUANTITY.sub(named, text), Formulas())
+    except TraceError as error:
+        raise TraceError(f"until = {shown(text)}: ", error) from error
+    values = {name: value for name, (value, _) in levels.items()}
+    units = {name: unit for name, (_, unit) in levels.items()}
+    known = ("t", *system.states, *system.outputs.names, *system.values)
+    for name in formula.names:
+        if name not in known and name not in levels:
+            raise ParameterError(
+                f"until = {shown(text)}: {shown(name)} is neither t nor a state or parameter of "
+                f"{system.name}. {nearest(name, known)}"
+            )
+    if taken := [name for name in levels if name in system.units]:
+        raise ParameterError(f"until: {system.name} has a name {taken[0]!r} already. Rename it.")
+    extended = replace(system, values={**system.values, **values}, units={**system.units, **units})
+    return extended, formula
+
+
+def _unit(match: re.Match[str], text: str, system: System) -> str:
+    """The longest unit behind a number; "" if there is none.
+
+    Raises
+    ------
+    ParameterError
+        If a factor of it could be a state or a parameter as well.
+    """
+    unit = match["unit"]
+    while unit and not is_unit(unit):
+        cut = max(unit.rfind("*"), unit.rfind("/"), 0)
+        unit = unit[:cut]
+    if not unit and match["unit"] not in _WORDS:
+        raise UnitError(
+            f"until = {shown(text)}: the unit {shown(match['unit'])} can't be read. Write it like "
+            f"2 mm, 0.5 m/s, 3 kN; a product with a sign: 2*{match['unit']}."
+        )
+    end = match.start("unit") + len(unit)
+    alone = text[: match.start()].rstrip().endswith("(") and text[end:].lstrip().startswith(")")
+    factors = re.split(r"[*/]", unit)[1:]
+    doubtful = [one for one in factors if one.partition("^")[0] in system.units]
+    if doubtful and not alone:
+        raise ParameterError(
+            f"until = {shown(text)}: {doubtful[0]!r} could be a unit or the {doubtful[0]!r} of "
+            f"{system.name}. Put a number with its unit into brackets: ({match['number']} {unit})."
+        )
+    return unit

@@ -1,0 +1,43 @@
+"""An output changes nothing else: every verb gives the same numbers of a system with outputs, and
+what it gives can be saved, described and read back.
+"""
+
+import numpy as np
+import pytest
+from tests.conformance.test_every_verb import CALLS, RIG, few_scouts  # noqa: F401
+
+import saltus as sl
+
+OUTPUTS = {
+    "stop force": lambda x, contact_stiffness, upper_gap: (
+        contact_stiffness * sl.max(x - upper_gap, 0)
+    ),
+    "drive": (lambda t, force, frequency: force * sl.cos(2 * sl.pi * frequency * t), "N"),
+}
+#: One with a boundary of its own, at which the pieces of a motion are cut: sums round otherwise.
+BEYOND = {"beyond": lambda x: sl.piecewise((x, x > 0.2e-3), otherwise=0)}
+VERBS = [name for name, call in CALLS.items() if call("in SI")[0] is RIG]
+
+
+@pytest.mark.parametrize("outputs", [OUTPUTS, OUTPUTS | BEYOND], ids=["smooth", "cut"])
+@pytest.mark.parametrize("name", VERBS)
+def test_an_output_changes_nothing_else(name, outputs, tmp_path):
+    verb, (system, arguments) = getattr(sl, name), CALLS[name]("in SI")
+    arguments = {key: value for key, value in arguments.items() if key != "outputs"}
+    plain = verb(system, **arguments)
+    more = verb(system.with_outputs(outputs), **arguments)
+    for key, one in plain.drop_vars("method_cpu_seconds", errors="ignore").variables.items():
+        other = more[key]
+        if "output" in one.dims:  # the states stand first
+            other = other.isel(output=slice(0, one.sizes["output"]))
+        if outputs is OUTPUTS or one.dtype.kind != "f":
+            np.testing.assert_array_equal(one.values, other.values, err_msg=key)
+        else:
+            # a mean may be zero: what it rounds with is the motion's size
+            size = plain[key.replace("output_mean", "output_rms")].values
+            atol = 1e-12 * np.abs(size[np.isfinite(size)]).max(initial=0.0)
+            np.testing.assert_allclose(one.values, other.values, rtol=1e-12, atol=atol, err_msg=key)
+    assert "outputs" not in plain.attrs
+    file = sl.save(more, tmp_path / "more.nc")
+    assert sl.load(file).identical(more)
+    assert sl.describe(more)

@@ -1,0 +1,218 @@
+"""Peak force, depth, duration and impulse of each contact of a transient, by closed forms."""
+
+from math import gamma, pi, sqrt
+
+import numpy as np
+import pytest
+
+import saltus as sl
+from saltus.analysis.motion import contact_peaks
+
+SEED = 6703
+
+
+@sl.system(states="x v", units={"x": "m", "v": "m/s"})
+def onto_spring(t, x, v, *, m="1 kg", k="1e4 N/m", c="0 kg/s", gap="10 mm"):
+    """A free mass between two springs with dampers."""
+    contact = sl.piecewise(
+        (k * (x - gap) + c * v, x > gap), (k * (x + gap) + c * v, x < -gap), otherwise=0
+    )
+    return v, -contact / m
+
+
+@sl.system(states="x v", units={"x": "m", "v": "m/s"})
+def onto_ball(t, x, v, *, m="2 kg", k="1e6 N/m^1.5"):
+    """A free mass onto a curved surface at 0."""
+    return v, -sl.hertz(x, stiffness=k) / m
+
+
+def contacts(system, start, t_end, **more):
+    return sl.impact_statistics(system, start, t_end=t_end, progress=False, **more)
+
+
+def test_a_mass_on_a_spring_makes_half_a_sine():
+    random = np.random.default_rng(SEED)
+    stiffness, speed = 10 ** random.uniform(2, 8, 30), random.uniform(-3, 3, 30)
+    found = contacts(
+        onto_spring, {"x": 0.0, "v": speed}, 3.0, values={"k": stiffness, "m": np.full(30, 2.5)}
+    )
+    turn = np.sqrt(stiffness / 2.5)[found.contact_trajectory]
+    speed = np.abs(speed)[found.contact_trajectory]
+    ended = np.isfinite(found.contact_duration.values)
+    assert ended.sum() > 1000
+    for name, closed in {
+        "contact_duration": pi / turn,
+        "contact_depth": speed / turn,
+        "contact_peak_force": speed * 2.5 * turn,
+        "contact_impulse": 2 * 2.5 * speed,
+    }.items():
+        np.testing.assert_allclose(np.abs(found[name])[ended], closed[ended], rtol=1e-9)
+    assert found.contact_peak_force.attrs["units"] == "N"
+    assert found.contact_impulse.attrs["units"] == "N*s"
+    assert found.contact_depth.attrs["units"] == "m"
+    signs = np.sign(found.contact_peak_force.values)
+    assert (signs == np.sign(found.contact_impulse.values))[ended].all()
+
+
+def test_hertz_contact_has_its_published_time():
+    """Johnson, Contact Mechanics (1985), eq. 11.24: 2.94 d/v with the depth d of eq. 11.23."""
+    found = contacts(onto_ball, {"x": -0.01, "v": [0.5, 1.0, 3.0]}, 1.0)
+    v = np.array([0.5, 1.0, 3.0])
+    depth = (5 * 2.0 * v**2 / (4 * 1e6)) ** 0.4
+    time = 4 / 5 * sqrt(pi) * gamma(2 / 5) / gamma(9 / 10) * depth / v
+    assert abs(time[1] * v[1] / depth[1] - 2.94) < 0.005
+    np.testing.assert_allclose(found.contact_duration, time, rtol=1e-11)
+    np.testing.assert_allclose(found.contact_depth, depth, rtol=1e-12)
+    np.testing.assert_allclose(found.contact_peak_force, 1e6 * depth**1.5, rtol=1e-11)
+    np.testing.assert_allclose(found.contact_impulse, 2 * 2.0 * v, rtol=1e-12)
+
+
+@pytest.mark.parametrize("damping", [3.0, 60.0, 150.0, 400.0])
+def test_impulse_is_the_change_of_momentum_and_a_damper_moves_the_peak(damping):
+    """Of c v + k y at y = 0: where the damper is strong the force is largest as contact begins."""
+    found = contacts(onto_spring, (0.0, 1.3), 1.5, values={"c": damping}).isel(contact=0)
+    momentum = 1.0 * (found.contact_speed + found.contact_exit_speed)
+    np.testing.assert_allclose(found.contact_impulse, momentum, rtol=1e-12)
+    times = float(found.contact_time) + np.linspace(0.0, 1.0, 20001) * min(
+        float(np.nan_to_num(found.contact_duration, nan=0.1)), 0.1
+    )
+    run = sl.simulate(onto_spring, (0.0, 1.3), at=times, values={"c": damping}, progress=False)
+    force = 1e4 * (run.x - 0.01) + damping * run.v
+    np.testing.assert_allclose(found.contact_peak_force, force.max(), rtol=1e-7)
+    assert found.contact_peak_force >= force.max() * (1 - 1e-13)
+    np.testing.assert_allclose(found.contact_depth, (run.x - 0.01).max(), rtol=1e-7)
+
+
+def test_forced_contacts_have_the_peaks_of_dense_samples_wherever_time_begins():
+    rig = sl.models.delangre("a", force="4 N", frequency="17 Hz")
+    ask = {"periods": 12, "progress": False}
+    found = sl.impact_statistics(rig, ("1 mm", 0), **ask)
+    later = sl.impact_statistics(rig, ("1 mm", 0), t_start=5 / 17, **ask)
+    np.testing.assert_allclose(found.contact_peak_force, later.contact_peak_force, rtol=1e-9)
+    run = sl.simulate(rig, ("1 mm", 0), periods=12, samples=20000, progress=False)
+    for row in range(found.sizes["contact"]):
+        one = found.isel(contact=row)
+        if not np.isfinite(one.contact_duration):
+            continue
+        begin = float(one.contact_time)
+        inside = run.sel(time=slice(begin, begin + float(one.contact_duration)))
+        gap = 4e-4 if one.contact_guard == "upper_gap" else -4e-4
+        force = 14e3 * (inside.x - gap)
+        np.testing.assert_allclose(np.abs(one.contact_peak_force), np.abs(force).max(), rtol=1e-5)
+        np.testing.assert_allclose(one.contact_impulse, force.integrate("time"), rtol=2e-4)
+
+
+def test_a_force_that_is_given_is_that_in_the_equations():
+    rig = sl.models.delangre("a", force="4 N", frequency="17 Hz")
+    ask = {"periods": 12, "progress": False}
+    given = {
+        "upper_gap": lambda x, contact_stiffness, upper_gap: contact_stiffness * (x - upper_gap)
+    }
+    ours, theirs = (
+        sl.impact_statistics(rig, ("1 mm", 0), **ask, **more) for more in ({}, {"force": given})
+    )
+    upper = ours.contact_guard == "upper_gap"
+    for name in ("contact_peak_force", "contact_impulse"):
+        np.testing.assert_allclose(ours[name][upper], theirs[name][upper], rtol=1e-9)
+
+
+def test_other_methods_find_the_same():
+    exact, other = (
+        contacts(onto_spring, (0.0, 1.0), 1.0, method=method)
+        for method in (sl.Taylor(), sl.ODE45(1e-10, 1e-12))
+    )
+    for name in ("contact_peak_force", "contact_impulse", "contact_depth"):
+        np.testing.assert_allclose(exact[name], other[name], rtol=1e-6)
+
+
+def test_a_structure_has_the_forces_of_its_stops():
+    beam = sl.structure(
+        np.eye(3), 1e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1.0]]), modes=3,
+        contacts=[sl.Contact("x3", stiffness="1 MN/m", gap="0.1 mm", side="both")],
+    )  # fmt: skip
+    found = contacts(beam, (1e-3, 0, 0, 0, 0, 0), 0.2)
+    assert found.contact_peak_force.attrs["units"] == "N"
+    assert found.contact_impulse.attrs["units"] == "N*s"
+    modal = contacts(beam, (1e-3, 0, 0, 0, 0, 0), 0.2, method=sl.Modal())
+    np.testing.assert_allclose(modal.contact_peak_force, found.contact_peak_force, rtol=1e-8)
+    assert found.sizes["contact"] > 10
+    np.testing.assert_allclose(
+        np.abs(found.contact_peak_force), 1e6 * found.contact_depth, rtol=1e-10
+    )
+
+
+def test_a_contact_that_does_not_end_has_its_peak_so_far():
+    @sl.system(states="x v", units={"x": "m", "v": "m/s"})
+    def pressed(t, x, v, *, m="1 kg", k="100 N/m", c="30 kg/s", push="5 N"):
+        return v, (push - sl.piecewise((k * x + c * v, x > 0), otherwise=0)) / m
+
+    found = contacts(pressed, (-0.1, 0.0), 9.0)
+    assert found.sizes["contact"] == 1
+    assert np.isnan(found.contact_duration[0])
+    assert np.isnan(found.contact_impulse[0])
+    np.testing.assert_allclose(found.contact_peak_force[0], 30.0, rtol=1e-12)  # c v, as it begins
+    np.testing.assert_allclose(found.contact_depth[0], 0.05, rtol=1e-6)
+
+
+def test_a_rigid_stop_has_an_impulse_and_no_peak():
+    @sl.system(states="x v", units={"x": "m", "v": "m/s"})
+    def rigid(t, x, v, *, m="3 kg"):
+        return v, 0.0, sl.impact(x < 1, v, restitution=0.5, inertia=(m,))
+
+    found = contacts(rigid, (0.0, 2.0), 2.0)
+    np.testing.assert_allclose(np.abs(found.contact_impulse), 3.0 * 1.5 * 2.0, rtol=1e-12)
+    assert np.isnan(found.contact_depth).all()
+    assert "contact_peak_force" not in found
+
+
+def test_what_is_no_contact_force_is_left_out():
+    @sl.system(states="x v", units={"x": "m", "v": "m/s"})
+    def whole(t, x, v, *, k="1 1/s^2", stiff="9 1/s^2"):
+        """The spring stands in both pieces."""
+        return v, sl.piecewise((-stiff * x, x > 0), otherwise=-k * x)
+
+    @sl.system(states="x v", units={"x": "m", "v": "m/s"})
+    def two(t, x, v, *, k="9 1/s^2", c="1 1/s"):
+        """Spring and damper are terms of their own."""
+        return v, (
+            -sl.piecewise((k * x, x > 0), otherwise=0)
+            - c * v * sl.piecewise((1, x > 0), otherwise=0) - x * k
+        )  # fmt: skip
+
+    for system in (whole, two):
+        found = contacts(system, (-1.0, 0.0), 9.0)
+        assert found.sizes["contact"] > 0
+        assert "contact_peak_force" not in found
+        assert "contact_impulse" not in found
+        assert np.isfinite(found.contact_depth).all()
+
+
+def test_long_runs_leave_the_peaks_out_unless_asked(monkeypatch):
+    monkeypatch.setattr(contact_peaks, "MOST_CONTACTS", 10)
+    assert "contact_depth" not in contacts(onto_spring, (0.0, 1.0), 1.0)
+    assert "contact_depth" in contacts(onto_spring, (0.0, 1.0), 1.0, peaks=True)
+    assert "contact_depth" not in contacts(onto_spring, (0.0, 1.0), 0.1, peaks=False)
+
+
+def test_the_picture_has_a_stem_for_each_contact():
+    found = contacts(onto_spring, (0.0, 1.0), 1.0)
+    axes = sl.plot.contact_forces(found)
+    drawn = sum(len(line.get_xdata()) for line in axes.lines if line.get_marker() == "o")
+    assert drawn == np.isfinite(found.contact_peak_force).sum()
+    assert "N" in axes.get_ylabel()
+    assert "peak force" in sl.describe(found)
+
+
+def test_a_floor_at_zero_touches_where_it_pushes():
+    """Of a ball that falls from h the first contact begins at sqrt(2 h/g)."""
+
+    @sl.system(states="x v", units={"x": "m", "v": "m/s"})
+    def ball(t, x, v, *, m="1 kg", k="10 kN/m", g="9.81 m/s^2"):
+        return v, sl.piecewise((-k * x, x < 0), otherwise=0) / m - g
+
+    found = contacts(ball, (1.0, 0.0), 2.0)
+    assert found.contact_side[0] == -1
+    np.testing.assert_allclose(found.contact_time[0], sqrt(2 / 9.81), rtol=1e-14)
+    depth = 9.81e-4 + sqrt(9.81e-4**2 + 2 * 9.81e-4)  # energy: k d^2/2 = m g (h + d)
+    np.testing.assert_allclose(found.contact_depth[0], depth, rtol=1e-12)
+    np.testing.assert_allclose(found.contact_peak_force[0], 1e4 * depth, rtol=1e-12)
