@@ -22,6 +22,7 @@ from saltus.kernels.batch import Batch
 from saltus.kernels.isolation import DEEPEST, MOST_TOUCHES
 from saltus.system import System
 from saltus.system.linear import linear_pieces
+from saltus.system.quantity import remembered
 from saltus.system.tangent import tangent_states
 
 #: Share of a period, or of an unforced span, that is tried as the first step.
@@ -45,7 +46,7 @@ class ModalFlow:
     def __init__(self, tables: Tables, tangents: bool = False) -> None:
         self.tables, self._kernel, self._tangents = tables, modal_module(), tangents
         self._lanes, self._memory = self.tables.modes.table.shape[1], threading.local()
-        size, _, _, _, guards, _, rows, _, _ = tables.sizes.tolist()
+        size, _, _, _, guards, _, rows, *_ = tables.sizes.tolist()
         self._states, self._sizes = size, tables.sizes.copy()
         self._sizes[layout.TANGENTS] = tangents
         self.CARRY = layout.AMPLITUDES + rows * self._lanes + tangents * (size + guards)
@@ -91,7 +92,7 @@ class ModalFlow:
         """Work arrays of this thread, in the order in which the kernel takes them."""
         if not hasattr(self._memory, "arrays"):
             (
-                size, groups, states, rows, guards, drives, amplitudes, courses, _,
+                size, groups, states, rows, guards, drives, amplitudes, courses, *_,
             ) = self._sizes.tolist()  # fmt: skip
             terms, lanes, empty = layout.ORDER + 1, self._lanes, np.zeros
             columns = size if self._tangents else 1
@@ -257,7 +258,9 @@ class Modal(Method):
 
     def serving(self, system: System) -> Method:
         """Taylor's method for a system that has no modal flow."""
-        if isinstance(linear_pieces((system.tangent_of or system).origin), str):
+        base = system.tangent_of
+        past = base is not None and remembered(base)
+        if past or isinstance(linear_pieces((base or system).origin), str):
             return Taylor(max_steps=self.max_steps, max_events=self.max_events)
         return self
 
@@ -267,7 +270,7 @@ class Modal(Method):
 
     def tangents(self, system: System) -> System | None:
         """The states alone: the modes of a contact state move the derivative too."""
-        if self.serving(system.origin) is not self:
+        if self.serving(system.origin) is not self or remembered(system):
             return super().tangents(system)
         return tangent_states(system)
 

@@ -20,6 +20,7 @@ from saltus.system import System
 from saltus.system.courses import TERMS, Course, course_of
 from saltus.system.linear import LinearPiece, LinearSystem
 from saltus.system.linear_laws import Constrained, Impacts, constrained, impacts_of, rows_of
+from saltus.system.quantity import remembered
 
 #: Memory of the tables of one system [bytes]. Beyond it all are dropped, as soon as no trajectory
 #: that a call moves needs them; those still to be moved make theirs anew.
@@ -93,10 +94,11 @@ class Tables:
         self.plain = np.array([law is None for law in laws], bool)
         self.allowed = np.array([law.side if law else 0 for law in laws], np.int64)
         self._laws = _laws_of(linear.system)
+        self._remembers = np.array(remembered(linear.system), np.int64)
         self._impacts = impacts_of(linear, linear.system.values)
         self.generation = 0
         self.clear()
-        n, guards = len(linear.system.states), len(linear.system.guards)
+        n, guards = len(linear.states), len(linear.system.guards)
         self.row_of, self.sign_of = self._rows_of_gaps()
         rows = int(self.row_of.max(initial=-1)) + 1
         self.first_guard = [int(np.flatnonzero(self.row_of == r)[0]) for r in range(rows)]
@@ -107,10 +109,8 @@ class Tables:
         courses = len(linear.courses)
         self.block_groups = -(-(n + 1 + 2 * drives + TERMS * courses) // LANES)
         self.rows = 2 * self.groups + self.block_groups
-        self.sizes = np.array(
-            [n, self.groups, self.state_groups, rows, guards, drives, self.rows, courses, 0],
-            np.int64,
-        )
+        counts = n, self.groups, self.state_groups, rows, guards, drives, self.rows, courses
+        self.sizes = np.array([*counts, 0, len(self._remembers)], np.int64)
 
     def clear(self) -> None:
         """Drop all sets and contact states: their numbers are of a new generation. Arrays that
@@ -132,7 +132,7 @@ class Tables:
         self._offset, self._rate, self._lag = _Rows(max(guards, 1)), _Rows(drives), _Rows(drives)
         self._links = _Rows(layout.BEHIND + guards, int)
         self._course = _Rows(max(4 * len(self.linear.courses), 1))
-        states = len(self.linear.system.states)
+        states = len(self.linear.states)
         width = states + 1 + len(self.linear.drives) + len(self.linear.courses)
         self._acts, self._presses = _Rows(2 * width + states + 1), _Rows(width)
         self._held = 0
@@ -174,7 +174,7 @@ class Tables:
         return (
             self.row_of, self.sign_of, self._offset.table, self._rate.table, self._lag.table,
             self.modes.table, self.steady.table, links, self._course.table, self.pieces.table,
-            self._laws, self._acts.table, self._presses.table,
+            self._laws, self._acts.table, self._presses.table, self._remembers,
         )  # fmt: skip
 
     def set_of(self, row: np.ndarray) -> int:

@@ -265,6 +265,9 @@ def strike(i, g, now, modes, steady, batch, m):
     if closing > 0.0:
         if not -PART <= restitution <= 1.0 + PART:
             return INVALID_RESTITUTION
+        for k in range(m.sizes[REMEMBERED]):
+            j = m.remembers[k]
+            batch.state[i, m.sizes[STATES] + k] = m.state[j // LANES, j % LANES]
         push(i, g, -(1.0 + restitution) * closing, batch, m)
         batch.carry[i, CROSSED] = float(1 << g)
         starts = batch.carry[i, STARTS] > 0.5

@@ -23,8 +23,11 @@ FACTORIAL = 20922789888000.0
 #: its own series is at most its amplitude there.
 FOLLOWED = 6.0
 # Columns of `sizes`; ROWS are the rows of amplitudes: those of the modes, real parts then imaginary
-# ones, then those of a block; TANGENTS is 1 where the derivative of the state is carried.
-STATES, MODE_GROUPS, STATE_GROUPS, GAP_ROWS, GUARDS, DRIVES, ROWS, COURSES, TANGENTS = range(9)
+# ones, then those of a block; TANGENTS is 1 where the derivative of the state is carried;
+# REMEMBERED are the states behind the others that hold others of before the last impact, whose
+# numbers are in `remembers`.
+STATES, MODE_GROUPS, STATE_GROUPS, GAP_ROWS, GUARDS, DRIVES, ROWS, COURSES = range(8)
+TANGENTS, REMEMBERED = range(8, 10)
 # Columns of `record`: the time of a course at the beginning of the period, the times of the period
 # at which its piece begins and ends [s], the row of that piece, its value and derivatives.
 BASE, SINCE, UNTIL, PIECE, VALUE = range(5)
@@ -77,7 +80,7 @@ HUGE = 1.0e300
 
 Modal = namedtuple(
     "Modal",
-    "sizes row_of sign_of offset rate lag modes steady links course pieces laws acts presses y "
-    "moved size sums q errors p bern bounds slopes out touches state answer angle found chain "
-    "record factor column columns struck",
+    "sizes row_of sign_of offset rate lag modes steady links course pieces laws acts presses "
+    "remembers y moved size sums q errors p bern bounds slopes out touches state answer angle "
+    "found chain record factor column columns struck",
 )

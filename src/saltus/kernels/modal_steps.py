@@ -267,6 +267,8 @@ def record(i, g, tau, kind, direction, velocity, after, error, batch, m):
     batch.rec_f[r, REC_TIME_ERROR] = error
     for j in range(m.sizes[STATES]):
         batch.rec_f[r, RECORD_FLOATS + j] = m.state[j // LANES, j % LANES]
+    for j in range(m.sizes[STATES], m.sizes[STATES] + m.sizes[REMEMBERED]):
+        batch.rec_f[r, RECORD_FLOATS + j] = batch.state[i, j]
     batch.rec_f[r, RECORD_FLOATS + batch.state.shape[1]] = time_of(i, tau, batch)
 
 
@@ -306,8 +308,13 @@ def write_samples(i, tau, until, modes, steady, batch, m):
             break
         state_after(i, tau, due - tau, modes, steady, batch, m)
         states = m.sizes[STATES]
+        if due == tau and has_just_landed(i, tau, batch):
+            for j in range(states):
+                m.state[j // LANES, j % LANES] = batch.state[i, j]
         for j in range(states):
             batch.samples[i, k, j] = m.state[j // LANES, j % LANES]
+        for j in range(states, states + m.sizes[REMEMBERED]):
+            batch.samples[i, k, j] = batch.state[i, j]
         if m.sizes[TANGENTS] != 0:
             columns_after(i, modes, batch.carry[i, WAITED] + (due - tau), batch, m)
             for j in range(states * states):
@@ -524,9 +531,9 @@ def propagate(
     period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count,
     end_phase, counters, minima, sample_count, sample_fraction, cursor, samples, sample_mode,
     rec_first, rec_i, rec_f, rec_used, options, data, budget, sizes, row_of, sign_of, offset, rate,
-    lag, modes, steady, links, course, pieces, laws, acts, presses, y, moved, size, sums, q, errors,
-    p, bern, bounds, slopes, out, touches, place, answer, angle, found, chain, follows, factor,
-    column, columns, struck,
+    lag, modes, steady, links, course, pieces, laws, acts, presses, remembers, y, moved, size, sums,
+    q, errors, p, bern, bounds, slopes, out, touches, place, answer, angle, found, chain, follows,
+    factor, column, columns, struck,
 ):  # fmt: skip
     """Move every trajectory whose status is RUNNING and whose contact state has been made, `budget`
     steps at most. See kernels/batch.py for the arrays.
@@ -538,8 +545,8 @@ def propagate(
     )  # fmt: skip
     m = Modal(
         sizes, row_of, sign_of, offset, rate, lag, modes, steady, links, course, pieces, laws, acts,
-        presses, y, moved, size, sums, q, errors, p, bern, bounds, slopes, out, touches, place,
-        answer, angle, found, chain, follows, factor, column, columns, struck,
+        presses, remembers, y, moved, size, sums, q, errors, p, bern, bounds, slopes, out, touches,
+        place, answer, angle, found, chain, follows, factor, column, columns, struck,
     )  # fmt: skip
     waits = False
     for i in range(status.shape[0]):

@@ -76,7 +76,7 @@ class Constrained:
 
 def impacts_of(linear: LinearSystem, values: Mapping[str, float]) -> Impacts:
     """The laws of a system by numbers."""
-    guards, n = linear.system.guards, len(linear.system.states)
+    guards, n = linear.system.guards, len(linear.states)
     constraints = [ex.constant(0.0)] * len(guards)
     push, restitution = np.zeros((len(guards), n)), np.zeros(len(guards))
     for g, guard in enumerate(guards):
@@ -85,7 +85,7 @@ def impacts_of(linear: LinearSystem, values: Mapping[str, float]) -> Impacts:
             continue
         constraints[g] = law.constraint
         normal = linear.pieces_of([law.constraint], values).matrix[0]
-        settled = linear.pieces_of(law.settled, values).matrix
+        settled = linear.pieces_of(law.settled[:n], values).matrix
         push[g] = (np.eye(n) - settled) @ normal / (normal @ normal)
         restitution[g] = float(evaluate([law.restitution], values=values)[0])
     closing = linear.pieces_of(constraints, values)
@@ -94,7 +94,7 @@ def impacts_of(linear: LinearSystem, values: Mapping[str, float]) -> Impacts:
 
 def constrained(system: System, mode: int, gaps: LinearPiece, impacts: Impacts) -> Constrained:
     """The states that the contacts held in a mode (bits) allow."""
-    n = len(system.states)
+    n = gaps.matrix.shape[1]
     held = [
         g.law.partner for i, g in enumerate(system.guards) if g.law and is_hold(g) and mode >> i & 1
     ]
