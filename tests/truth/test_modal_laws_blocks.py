@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
+from saltus.system.quantity import quantity, with_impulses, with_losses
 from two_flows import FOLLOWS, runs, same_rows, times
 
 TIMES = np.linspace(0.0, 4.0, 21)
@@ -115,3 +116,33 @@ def test_a_record_that_pulls_releases_a_contact_at_rest_at_its_break():
     assert times(run, "release").tolist() == pytest.approx([1.0], abs=1e-15)
     w = math.sqrt(0.5)
     assert float(run.end_x) == pytest.approx(-6.0 * (1.0 - math.cos(w * 0.5)), abs=1e-14)
+
+
+@sl.system(states="x y v u", forced_at="w", units={"w": "rad/s"})
+def pair(t, x, y, v, u, *, w=3.0, gap=0.1):
+    law = sl.impact(x < y + gap, v - u, restitution=0.7, inertia={"v": 1.0, "u": 2.0})
+    return v, u, 3.0 * sl.cos(w * t) - 4.0 * x, -3.0 * y, law
+
+
+def test_states_before_impacts_are_told():
+    modal, taylor = runs(pair, np.zeros(4), periods=20)
+    assert modal.sizes["contact"] > 10
+    for name in ("v", "u"):
+        before, after = (modal[f"contact_{name}{kind}"].values for kind in ("_before", ""))
+        assert np.abs(before - after).min() > 0
+        assert before == pytest.approx(taylor[f"contact_{name}_before"].values, abs=1e-9)
+
+
+def test_what_impacts_change_besides_is_carried_or_left_to_taylor():
+    """Impulses are linear in the closing velocity, losses of energy aren't."""
+    summed = with_impulses(pair, {0: "pushed"})
+    ends = []
+    for method in (sl.Modal(), sl.Taylor()):
+        assert isinstance(method.serving(summed), type(method))
+        run = sl.simulate(summed, np.zeros(5), periods=5, method=method, **FOLLOWS)
+        ends.append([float(run[f"end_{name}"]) for name in summed.states])
+    assert abs(ends[0][-1]) > 0.1
+    assert ends[0] == pytest.approx(ends[1], abs=1e-10)
+    stored, _ = quantity(pair, lambda v, u: 0.5 * v * v + u * u, "the energy")
+    lossy = with_losses(pair, stored, "lost", "")
+    assert isinstance(sl.Modal().serving(lossy), sl.Taylor)
