@@ -120,3 +120,22 @@ def test_numbers_of_a_motion_are_those_of_its_polynomials(modes):
     np.testing.assert_allclose(
         other.turning[0], one.turning[0], atol=1e-8 * np.abs(one.maximum).max()
     )
+
+
+def test_modal_is_the_default_of_many_states_that_it_serves():
+    """Taylor's method keeps few states, and what isn't linear between contacts."""
+    run = [
+        sl.simulate(system, periods=2, progress=False).attrs["method"]
+        for system in (chain(3), chain(4), sl.models.chain())
+    ]
+    assert run == ["Taylor", "Modal", "Taylor"]
+    curved = [sl.Contact("x1", stiffness=1e4, gap=0.01, power=1.5)]
+    hertz = sl.structure(np.eye(5), 400.0 * np.eye(5), modes=5, contacts=curved)
+    assert sl.simulate(hertz, t_end=0.1, progress=False).attrs["method"] == "Taylor"
+
+
+def test_peaks_of_many_contacts_are_found_within_seconds():
+    from saltus.analysis.motion.contact_peaks import are_few
+
+    assert are_few(chain(2), 10_000) and not are_few(chain(2), 10_001)
+    assert are_few(chain(8), 2_500) and not are_few(chain(8), 2_501)
