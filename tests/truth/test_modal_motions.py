@@ -135,3 +135,61 @@ def test_numbers_of_a_motion_are_those_of_its_polynomials(modes):
     np.testing.assert_allclose(
         other.turning[0], one.turning[0], atol=1e-8 * np.abs(one.maximum).max()
     )
+
+
+def test_modal_is_the_default_of_many_states_that_it_serves():
+    """Taylor's method keeps few states, and what isn't linear between contacts."""
+    run = [
+        sl.simulate(system, periods=2, progress=False).attrs["method"]
+        for system in (chain(3), chain(4), sl.models.chain())
+    ]
+    assert run == ["Taylor", "Modal", "Taylor"]
+    curved = [sl.Contact("x1", stiffness=1e4, gap=0.01, power=1.5)]
+    hertz = sl.structure(np.eye(5), 400.0 * np.eye(5), modes=5, contacts=curved)
+    assert sl.simulate(hertz, t_end=0.1, progress=False).attrs["method"] == "Taylor"
+
+
+def test_peaks_of_many_contacts_are_found_within_seconds():
+    from saltus.analysis.motion.contact_peaks import are_few
+
+    assert are_few(chain(2), 10_000)
+    assert not are_few(chain(2), 10_001)
+    assert are_few(chain(8), 2_500)
+    assert not are_few(chain(8), 2_501)
+
+
+@pytest.mark.parametrize("seed", [40917, 40918, 40919, 40920])
+def test_random_structures(seed):
+    """Derivatives and numbers of a random structure, damped stops and several forces among them."""
+    rng = np.random.default_rng(seed)
+    degrees = int(rng.integers(2, 5))
+    root = rng.normal(size=(degrees, degrees))
+    stops = [
+        sl.Contact(
+            f"x{place}", float(10 ** rng.uniform(2, 4)), float(rng.uniform(0.001, 0.02)),
+            side=str(rng.choice(["both", "upper", "lower"])), name=f"stop_{place}",
+            damping=float(rng.uniform(0.5, 5)) if rng.random() < 0.5 else None,
+        )
+        for place in rng.choice(degrees, 2, replace=False) + 1
+    ]  # fmt: skip
+    forces = [
+        sl.Force("x1", 20.0, phase=0.4, name="a"),
+        sl.Force("x2", 2.0, harmonic=2, name="b"),
+        sl.Force("x1", 1.5, harmonic=0, name="dead"),
+    ]
+    system = sl.structure(
+        np.eye(degrees), 400 * (root @ root.T / degrees + np.eye(degrees)), modes=degrees,
+        damping_ratio=float(rng.uniform(0.005, 0.2)), contacts=stops, frequency=2.5,
+        forces=forces,
+    )  # fmt: skip
+    start, _ = Stroboscope(system, sl.Modal()).ends(np.zeros((1, 2 * degrees)), 20)
+    maps = [Stroboscope(system, method) for method in (sl.Taylor(), sl.Modal())]
+    (ends, exact), (others, found) = (map_.tangent(start, 1) for map_ in maps)
+    np.testing.assert_allclose(others, ends, atol=1e-10 * np.abs(ends).max())
+    np.testing.assert_allclose(found, exact, atol=1e-9 * np.abs(exact).max())
+    one, other = (measure(map_, start, np.array([1])) for map_ in maps)
+    for name in ("maximum", "minimum", "mean", "deviation", "harmonic", "margin"):
+        np.testing.assert_allclose(
+            getattr(other, name), getattr(one, name), atol=1e-10 * np.abs(one.maximum).max()
+        )
+    assert other.itinerary == one.itinerary

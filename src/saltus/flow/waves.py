@@ -16,6 +16,8 @@ import numpy as np
 
 #: Largest error of a largest value, relative to the size of its waves.
 TOLERANCE = 1e-14
+#: A step of Newton's method that is rounding, relative to the time.
+SETTLED = 4e-16
 #: Most halvings of a leg.
 DEEPEST = 60
 #: Numbers that an evaluation holds at a time: some 60 MB.
@@ -239,16 +241,33 @@ def turns(one: WaveLegs, row: int, below: float = np.inf) -> tuple[np.ndarray, n
             break
         at = _halves(*(each[on] for each in at))
     leg, rows, middle, half = (np.concatenate(each) for each in zip(*found, strict=True))
-    low, high = middle - half, middle + half
+    return _zeros(one, leg, rows, middle - half, middle + half)
 
-    def slope_at(time: np.ndarray) -> np.ndarray:
-        return np.asarray((one.values(leg, time, rows) * one.rates).real.sum(axis=1))
 
-    first = slope_at(low)
-    turned = first * slope_at(high) < 0.0
-    leg, rows, low, high, first = (each[turned] for each in (leg, rows, low, high, first))
+def _zeros(
+    one: WaveLegs, leg: np.ndarray, row: np.ndarray, low: np.ndarray, high: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Legs and times of the turning points in intervals that hold one or none, by Newton's method
+    inside a shrinking bracket.
+    """
+
+    def slopes(time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        rates = one.values(leg, time, row) * one.rates
+        return rates.real.sum(axis=1), (rates * one.rates).real.sum(axis=1)
+
+    first, _ = slopes(low)
+    turned = first * slopes(high)[0] < 0.0
+    leg, row, low, high, first = (each[turned] for each in (leg, row, low, high, first))
+    time = 0.5 * (low + high)
     for _ in range(DEEPEST):
-        middle = 0.5 * (low + high)
-        before = slope_at(middle) * first > 0.0
-        low, high = np.where(before, middle, low), np.where(before, high, middle)
-    return leg, 0.5 * (low + high)
+        slope, bend = slopes(time)
+        before = slope * first > 0.0
+        low, high = np.where(before, time, low), np.where(before, high, time)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            new = time - slope / bend
+        new = np.where((new > low) & (new < high), new, 0.5 * (low + high))
+        settled = np.abs(new - time) <= SETTLED * (np.abs(time) + high - low)
+        time = np.where(slope == 0.0, time, new)
+        if settled.all():
+            break
+    return leg, time

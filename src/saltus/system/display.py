@@ -63,7 +63,7 @@ def system_text(system: EquationsOfMotion) -> str:
     long = len(states) > MOST_SHOWN
     if long:
         states[3:-1] = ["..."]
-    equations = ["not shown, as they are long: .equations lists them"] if long else None
+    equations = ["not shown, as they are long: .equations() lists them"] if long else None
     blocks = [
         [head],
         _about(system),

@@ -98,3 +98,19 @@ def test_singular_and_indefinite_matrices():
         sl.structure(np.diag([1.0, 0.0]), np.eye(2), modes=1)
     with pytest.raises(ParameterError, match="negative eigenvalue"):
         sl.structure(np.eye(2), np.diag([1.0, -1e-3]), modes=1)
+
+
+def test_long_equations_are_not_shown():
+    size = 13
+    chain = 900.0 * (2 * np.eye(size) - np.eye(size, k=1) - np.eye(size, k=-1))
+    stops = [sl.Contact("x3", 1e3, 0.01, side="both", name="stop")]
+    made = sl.structure(np.eye(size), chain, modes=size, contacts=stops)
+    shown = repr(made)
+    assert "q1 [kg^0.5*m], q2 [kg^0.5*m], q3 [kg^0.5*m], ..., q13_rate [kg^0.5*m/s]" in shown
+    assert ".equations() lists them" in shown
+    assert "guards      stop lower, stop upper" in shown
+    assert "dq1/dt" not in shown
+    assert "dq1/dt = q1_rate" in made.equations()
+    assert r"\dot" not in made._repr_html_()
+    few = sl.structure(np.eye(2), chain[:2, :2], modes=2)
+    assert "dq1/dt" in repr(few)

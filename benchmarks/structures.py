@@ -1,0 +1,170 @@
+"""Structures of many modes with stops: saltus beside heyoka and SciPy, same work, same run.
+
+A cantilever of 30 beam elements by its lowest modes, forced at its tip at 1.1 of its first natural
+frequency, with soft stops on both sides of up to eight nodes. One trajectory from rest; CPU time of
+one pinned core. The programs follow the same motion: numbers of contacts are given side by side.
+heyoka has a callback in Python at each contact; its compact mode compiles in a bounded time.
+
+    python benchmarks/structures.py               the table
+    python benchmarks/structures.py 60 8          one row: 60 modes, 8 stops
+"""
+
+from __future__ import annotations
+
+import os
+import resource
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent))
+sys.path.insert(0, str(HERE.parent / "src"))
+
+import saltus as sl  # noqa: E402
+
+GAP, STIFFNESS, FORCE, RATIO = 1e-3, 5e4, 2.0, 0.01
+#: Nodes with stops, in the order in which they are taken.
+NODES = (30, 15, 20, 25, 10, 28, 22, 18)
+#: Modes and stops of each row.
+ROWS = ((5, 1), (10, 1), (20, 1), (40, 1), (60, 1), (60, 2), (60, 8))
+#: Most modes for which a program is asked: it takes minutes for more.
+MOST_SCIPY, MOST_HEYOKA = 5, 40
+PERIODS = 40
+
+
+def beam(elements: int = 30) -> tuple[np.ndarray, np.ndarray]:
+    """Mass and stiffness of a cantilever of steel, 1 m by 20 mm by 5 mm: Euler-Bernoulli."""
+    length, area, inertia = 1.0 / elements, 1e-4, 0.02 * 0.005**3 / 12
+    a, m = 2.1e11 * inertia / length**3, 7850.0 * area * length / 420
+    b = length
+    stiff = a * np.array(
+        [[12, 6 * b, -12, 6 * b], [6 * b, 4 * b * b, -6 * b, 2 * b * b],
+         [-12, -6 * b, 12, -6 * b], [6 * b, 2 * b * b, -6 * b, 4 * b * b]]
+    )  # fmt: skip
+    heavy = m * np.array(
+        [[156, 22 * b, 54, -13 * b], [22 * b, 4 * b * b, 13 * b, -3 * b * b],
+         [54, 13 * b, 156, -22 * b], [-13 * b, -3 * b * b, -22 * b, 4 * b * b]]
+    )  # fmt: skip
+    mass, stiffness = np.zeros((2, 2 * elements + 2, 2 * elements + 2))
+    for e in range(elements):
+        own = slice(2 * e, 2 * e + 4)
+        mass[own, own] += heavy
+        stiffness[own, own] += stiff
+    return mass[2:, 2:], stiffness[2:, 2:]
+
+
+def structure(modes: int, stops: int) -> sl.System:
+    """The beam with stops."""
+    mass, stiffness = beam()
+    names = [f"{kind}{i // 2 + 1}" for i, kind in enumerate("wr" * (len(mass) // 2))]
+    first = sl.structure_modes(mass, stiffness, 1).frequency.values[0]
+    contacts = [
+        sl.Contact(f"w{node}", STIFFNESS, GAP, side="both", name=f"stop_{node}")
+        for node in NODES[:stops]
+    ]
+    return sl.structure(
+        mass, stiffness, names=names, modes=modes, damping_ratio=RATIO, contacts=contacts,
+        forces=[sl.Force("w30", FORCE)], frequency=1.1 * first,
+    )  # fmt: skip
+
+
+def matrices(modes: int, stops: int) -> tuple[np.ndarray, ...]:
+    """Squares, damping, shapes at the stops and loads of the modes."""
+    mass, stiffness = beam()
+    found = sl.structure_modes(mass, stiffness, modes)
+    shapes = found.shape.values
+    shapes = shapes if shapes.shape[0] == modes else shapes.T
+    omega = 2 * np.pi * found.frequency.values
+    at = np.array([2 * node - 2 for node in NODES[:stops]])
+    return omega**2, 2 * RATIO * omega, shapes[:, at].T, FORCE * shapes[:, 58]
+
+
+def seconds(work: Callable[[], object]) -> float:
+    """CPU time of a call [s]."""
+    begun = time.process_time()
+    work()
+    return time.process_time() - begun
+
+
+def by_saltus(modes: int, stops: int) -> tuple[str, int]:
+    """First result and time of a period, as cells; contacts."""
+    runs: list = []
+
+    def first() -> None:
+        system = structure(modes, stops)
+        runs.append(system)
+        sl.simulate(system, periods=1, progress=False, threads=1, time_errors="local")
+
+    beginning = seconds(first)
+    kw = {"progress": False, "threads": 1, "time_errors": "local"}
+    each = seconds(lambda: runs.append(sl.simulate(runs[0], periods=PERIODS, **kw)))
+    again = seconds(lambda: sl.simulate(runs[0], periods=PERIODS, **kw))
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    cells = f"{beginning:.2f} | {1e3 * each / PERIODS:.2f} | {1e3 * again / PERIODS:.2f}"
+    return f"{cells} | {memory:.0f}", int(runs[1].sizes["contact"])
+
+
+def by_heyoka(modes: int, stops: int, compact: bool) -> tuple[str, int]:
+    """Time of compiling and of a period, as cells; contacts."""
+    from benchmarks.rivals.heyoka_structures import Trajectory
+
+    omega2, damping, shapes, push = matrices(modes, stops)
+    rate, made = 2 * np.pi * float(structure(1, 0).values["frequency"]), []
+    compiled = seconds(
+        lambda: made.append(
+            Trajectory(omega2, damping, shapes, push, GAP, STIFFNESS, rate, compact)
+        )
+    )
+    each = seconds(lambda: made[0].run(PERIODS * 2 * np.pi / rate))
+    return f"{compiled:.1f} | {1e3 * each / PERIODS:.2f}", made[0].contacts
+
+
+def by_scipy(modes: int, stops: int) -> str:
+    """Time of a period, as a cell: DOP853 at rtol = 1e-10, contacts not located."""
+    omega2, damping, shapes, push = matrices(modes, stops)
+    rate = 2 * np.pi * float(structure(1, 0).values["frequency"])
+
+    def rates(t: float, y: np.ndarray) -> np.ndarray:
+        q, v = y[:modes], y[modes:]
+        d = shapes @ q
+        force = STIFFNESS * (np.maximum(d - GAP, 0.0) + np.minimum(d + GAP, 0.0))
+        return np.append(v, push * np.cos(rate * t) - omega2 * q - damping * v - shapes.T @ force)
+
+    end = PERIODS * 2 * np.pi / rate
+    each = seconds(
+        lambda: solve_ivp(rates, (0, end), np.zeros(2 * modes), "DOP853", rtol=1e-10, atol=1e-14)
+    )
+    return f"{1e3 * each / PERIODS:.1f}"
+
+
+def row(modes: int, stops: int) -> str:
+    """One row of the table."""
+    own, contacts = by_saltus(modes, stops)
+    cells, seen = ["- | -", "- | -"], "-"
+    if modes <= MOST_HEYOKA:
+        found = [by_heyoka(modes, stops, compact) for compact in (False, True)]
+        cells, seen = [cell for cell, _ in found], str(found[0][1])
+    scipy = by_scipy(modes, stops) if modes <= MOST_SCIPY else "-"
+    return f"| {modes} | {stops} | {contacts} / {seen} | {own} | {' | '.join(cells)} | {scipy} |"
+
+
+def main(arguments: list[str]) -> None:
+    """Print the table."""
+    if hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+    rows = [(int(arguments[0]), int(arguments[1]))] if arguments else ROWS
+    print("| modes | stops | contacts saltus / heyoka | saltus: first result [s] | a period [ms] | "
+          "again [ms] | memory [MB] | heyoka: compile [s] | a period [ms] | compact: compile [s] | "
+          "a period [ms] | SciPy: a period [ms] |")  # fmt: skip
+    print("|" + "---|" * 12, flush=True)
+    for modes, stops in rows:
+        print(row(modes, stops), flush=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
