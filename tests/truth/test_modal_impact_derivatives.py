@@ -70,6 +70,22 @@ def test_contact_that_comes_to_rest_by_chatter_leaves_the_others_free():
     np.testing.assert_allclose(found, exact, rtol=0, atol=1e-8 * np.abs(exact).max())
 
 
+@pytest.mark.parametrize("restitution", [0.0, 0.3])
+def test_bodies_that_stay_together_share_their_momentum(restitution):
+    """One comes to rest on the other: both velocities change, by their inertias."""
+
+    @sl.system(states="x y v u", forced_at="w", units={"w": "rad/s"})
+    def pair(t, x, y, v, u, *, w=0.5, gap=0.1):
+        law = sl.impact(x < y + gap, v - u, restitution=restitution, inertia={"v": 1.0, "u": 2.0})
+        return v, u, 3.0 * sl.cos(w * t) - 4.0 * x, -3.0 * y, law
+
+    start = np.array([[-0.5, 0.3, 0.2, -0.1], [-0.4, 0.2, 0.0, -0.3]])
+    run = sl.simulate(pair, start[0], periods=1, progress=False)
+    assert "hold" in run.contact_kind.values
+    found, exact = compared(pair, start, 1)
+    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-9 * np.abs(exact).max())
+
+
 def test_impacts_at_resonance_have_the_derivatives_of_taylor():
     """The drive goes together with the mode, on both sides of an impact."""
 

@@ -105,6 +105,27 @@ def test_a_ball_without_a_spring_comes_to_rest_at_the_exact_time(restitution, fl
     assert (float(run.end_x), float(run.end_v), str(run.status.values)) == (floor, 0.0, "ok")
 
 
+def test_modes_that_go_together_while_a_contact_rests():
+    """The first body is pressed onto its stop. The second, on a critical damper, creeps towards it;
+    the third has no spring and falls.
+    """
+
+    @sl.system(states="x y z u v w")
+    def three(t, x, y, z, u, v, w, *, gravity=9.81):
+        pull = 0.2 * (x - y) - 2.0 * math.sqrt(0.2) * v
+        return u, v, w, 5.0 - 0.2 * (x - y), pull, -gravity, sl.impact(x < 0.25, u, restitution=0)
+
+    run = sl.simulate(
+        three, (0.25, 1.0, 2.0, 0.0, -0.3, 4.0), t_end=5.0, samples=50, method=sl.Modal(), **FOLLOWS
+    )
+    t, rate = run["time"].values, math.sqrt(0.2)
+    creeps = 0.25 + (0.75 + (0.75 * rate - 0.3) * t) * np.exp(-rate * t)
+    assert run.sizes["contact"] == 0
+    assert set(run["x"].values) == {0.25}
+    np.testing.assert_allclose(run["y"].values, creeps, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(run["z"].values, 2.0 + 4.0 * t - 0.5 * 9.81 * t**2, atol=1e-12)
+
+
 def test_a_record_that_pulls_releases_a_contact_at_rest_at_its_break():
     """A square wave presses a body onto its stop and pulls it off again, at whole seconds."""
 
