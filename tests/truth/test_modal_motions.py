@@ -49,6 +49,21 @@ def test_derivative_of_the_state(modes, damping):
     assert np.abs(found - exact).max() < 1e-9 * np.abs(exact).max()
 
 
+def test_derivative_where_a_drive_resonates():
+    """Its force is one on both sides of a boundary at which that of a damper jumps."""
+
+    @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
+    def driven(t, x, v, *, w=1.0, gap=0.4):
+        return v, 0.3 * sl.cos(w * t) - x - sl.where(x > gap, 4.0 * (x - gap) + v, 0.0)
+
+    start = np.random.default_rng(4).normal(0, 0.5, (6, 2))
+    (ends, exact), (others, found) = (
+        Stroboscope(driven, method).tangent(start, 2) for method in (sl.Taylor(), sl.Modal())
+    )
+    np.testing.assert_allclose(others, ends, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-10 * np.abs(exact).max())
+
+
 def test_derivative_without_contacts_is_a_matrix_exponential():
     stiffness = 400.0 * (2 * np.eye(3) - np.eye(3, k=1) - np.eye(3, k=-1))
     squares = np.linalg.eigvalsh(stiffness)

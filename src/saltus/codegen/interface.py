@@ -187,8 +187,11 @@ CAPTURE = Interface(
     truths=(),
 )
 
-_MODAL_TABLES = (_I1, _I1, _F1, _F2, _F2, _F2, _F2, _F2, _I2, _F2, _F2)
-_MODAL_WORK = (_F2,) * 6 + (_F1, _F2, _F2, _F1, _F1) + (_F2,) * 10
+_MODAL_TABLES = (
+    *(_I1, _I1, _F1, _F2, _F2, _F2, _F2, _F2, _I2, _F2, _F2),
+    *(_I2, _F2, _F2, _I1),
+)
+_MODAL_WORK = (_F2,) * 6 + (_F1, _F2, _F2, _F1, _F1) + (_F2,) * 11
 
 #: The modal flow: what it needs of an equation are tables, which it is given.
 MODAL = Interface(
@@ -199,6 +202,8 @@ MODAL = Interface(
         "modal_records",
         "modal_blocks",
         "modal_series",
+        "modal_laws",
+        "modal_impacts",
         "modal_tangents",
         "modal_steps",
     ),

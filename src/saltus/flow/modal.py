@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,7 +14,7 @@ from saltus.codegen.module import Flow, modal_module
 from saltus.errors import ParameterError
 from saltus.flow.counts import whole
 from saltus.flow.method import Method, explain_unknown_options, step_budget
-from saltus.flow.modal_tables import Tables
+from saltus.flow.modal_tables import Tables, ValueSet
 from saltus.flow.taylor import Taylor
 from saltus.kernels import modal_layout as layout
 from saltus.kernels import status as st
@@ -23,6 +22,7 @@ from saltus.kernels.batch import Batch
 from saltus.kernels.isolation import DEEPEST, MOST_TOUCHES
 from saltus.system import System
 from saltus.system.linear import linear_pieces
+from saltus.system.quantity import remembered
 from saltus.system.tangent import tangent_states
 
 #: Share of a period, or of an unforced span, that is tried as the first step.
@@ -46,11 +46,11 @@ class ModalFlow:
     def __init__(self, tables: Tables, tangents: bool = False) -> None:
         self.tables, self._kernel, self._tangents = tables, modal_module(), tangents
         self._lanes, self._memory = self.tables.modes.table.shape[1], threading.local()
-        size, _, _, _, guards, _, rows, _, _ = tables.sizes.tolist()
+        size, _, _, _, guards, _, rows, *_ = tables.sizes.tolist()
         self._states, self._sizes = size, tables.sizes.copy()
         self._sizes[layout.TANGENTS] = tangents
         self.CARRY = layout.AMPLITUDES + rows * self._lanes + tangents * (size + guards)
-        self.STEP_RECORDS = guards + MOST_TOUCHES
+        self.STEP_RECORDS = 2 * guards + MOST_TOUCHES
 
     def workspace(self) -> tuple[np.ndarray, ...]:
         """None that the engine must keep."""
@@ -92,7 +92,7 @@ class ModalFlow:
         """Work arrays of this thread, in the order in which the kernel takes them."""
         if not hasattr(self._memory, "arrays"):
             (
-                size, groups, states, rows, guards, drives, amplitudes, courses, _,
+                size, groups, states, rows, guards, drives, amplitudes, courses, *_,
             ) = self._sizes.tolist()  # fmt: skip
             terms, lanes, empty = layout.ORDER + 1, self._lanes, np.zeros
             columns = size if self._tangents else 1
@@ -106,6 +106,7 @@ class ModalFlow:
                 empty(((terms + 2) * self.tables.block_groups, lanes)),
                 empty((max(courses, 1), layout.VALUE + layout.COURSE_TERMS)),
                 empty((2 * groups, lanes)), empty((amplitudes, lanes)), empty((columns, columns)),
+                empty((3, size)),
             )  # fmt: skip
         arrays: tuple[np.ndarray, ...] = self._memory.arrays
         return arrays
@@ -140,17 +141,37 @@ class ModalFlow:
         gap = parts[0] + parts[1] + parts[2]
         size = np.abs(state) @ np.abs(given.gaps.matrix.T)
         zero = np.abs(gap) <= layout.ROUNDED * (size + np.abs(parts[1]) + np.abs(parts[2]))
-        bits = 1 << np.arange(gap.shape[1])
-        mode = ((gap > 0) & ~zero) @ bits if gap.shape[1] else np.zeros(len(who), np.int64)
+        bits, allowed, plain = 1 << np.arange(gap.shape[1]), self.tables.allowed, self.tables.plain
+        zero &= plain | (allowed != 0)
+        up = np.where(zero, allowed > 0, gap > 0) & ~self.tables.holds
+        mode = up @ bits if gap.shape[1] else np.zeros(len(who), np.int64)
         fresh = zero @ bits if gap.shape[1] else mode
-        for i in np.flatnonzero(fresh).tolist():
+        zero &= plain
+        for i in np.flatnonzero(zero.any(axis=1)).tolist():
             mode[i] |= self._ways(which, int(mode[i]), zero[i], state[i], time[i])
         batch.mode[who], batch.fresh[who] = mode, fresh
         carry = np.zeros((len(who), layout.AMPLITUDES))
-        carry[:, layout.AT], carry[:, layout.ENTERS] = -1.0, 1.0
+        carry[:, layout.AT], carry[:, layout.ENTERS], carry[:, layout.STARTS] = -1.0, 1.0, 1.0
         carry[:, layout.NEXT_STEP] = FIRST_STEP * batch.period[who]
-        carry[:, layout.LANDED_AT], carry[:, layout.RIDES] = -math.inf, fresh
+        carry[:, layout.TWICE] = self._at_rest(given, state, drives, fresh)
+        carry[:, layout.LANDED_AT] = time
+        carry[:, layout.RIDES] = zero @ bits if gap.shape[1] else 0.0
         batch.carry[who, : layout.AMPLITUDES] = carry
+
+    def _at_rest(
+        self, given: ValueSet, states: np.ndarray, drives: np.ndarray, fresh: np.ndarray
+    ) -> np.ndarray:
+        """Bits of the stops among those in `fresh` that neither close nor open."""
+        closing = given.impacts.closing
+        parts = states @ closing.matrix.T, drives @ closing.driven.T
+        size = np.abs(states) @ np.abs(closing.matrix.T) + np.abs(parts[1])
+        slow = np.abs(parts[0] + parts[1] + closing.constant) <= layout.ROUNDED * (
+            size + np.abs(closing.constant)
+        )
+        bits = 1 << np.arange(slow.shape[1])
+        stops = (self.tables.allowed != 0) & ((fresh[:, None] & bits) != 0)
+        found: np.ndarray = (slow & stops) @ bits if slow.shape[1] else fresh
+        return found
 
     def _ways(self, which: int, mode: int, zero: np.ndarray, state: np.ndarray, time: float) -> int:
         """Bits of the guards at zero whose gaps open upwards: by the first derivative that isn't
@@ -214,8 +235,9 @@ class Modal(Method):
     together. The modes of one system take 256 MB at most.
 
     A gap is followed by the modes that matter and bounded by the others, so that no contact is
-    missed; the instant of a contact is a zero of all modes, to rounding. Systems that it doesn't
-    serve - nonlinear forces, laws of contact, swept drives - are moved by
+    missed; the instant of a contact is a zero of all modes, to rounding. At a rigid stop
+    (:func:`saltus.impact`) impacts, rest and release follow the rules of :class:`saltus.Taylor`.
+    Systems that it doesn't serve - nonlinear forces, friction, jumps, swept drives - are moved by
     :class:`saltus.Taylor`.
 
     Parameters
@@ -236,7 +258,9 @@ class Modal(Method):
 
     def serving(self, system: System) -> Method:
         """Taylor's method for a system that has no modal flow."""
-        if isinstance(linear_pieces((system.tangent_of or system).origin), str):
+        base = system.tangent_of
+        past = base is not None and remembered(base)
+        if past or isinstance(linear_pieces((base or system).origin), str):
             return Taylor(max_steps=self.max_steps, max_events=self.max_events)
         return self
 
@@ -246,7 +270,7 @@ class Modal(Method):
 
     def tangents(self, system: System) -> System | None:
         """The states alone: the modes of a contact state move the derivative too."""
-        if self.serving(system.origin) is not self:
+        if self.serving(system.origin) is not self or remembered(system):
             return super().tangents(system)
         return tangent_states(system)
 

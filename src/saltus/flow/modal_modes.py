@@ -8,7 +8,7 @@ never bounds a block, it follows it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from saltus.flow.modal_blocks import (
     loss_of,
 )
 from saltus.system.linear import LinearPiece
+from saltus.system.linear_laws import Constrained
 
 #: Rate of growth that is none, in units of the largest eigenvalue.
 NO_GROWTH = 1e-12
@@ -80,6 +81,9 @@ def modes_of(
         Size of the largest eigenvalue of other contact states [1/s]: they tell how slow a mode is.
     """
     values, vectors, inverse = eigen
+    if not len(values):  # contacts at rest hold all states
+        answers = np.zeros((0, 1 + len(rates) + 4 * len(speeds)), complex)
+        return StateModes(values, vectors, inverse, None, answers)
     every = np.concatenate([[0.0], rates])
     acts = ModalLoads(
         every,
@@ -94,8 +98,28 @@ def modes_of(
         return StateModes(values, vectors, inverse, None, _answers(values, vectors, inverse, acts))
     spaces, values, vectors, inverse = _parted(piece.matrix, acts, most)
     answers = _answers(values, vectors, inverse, acts)
+    if not spaces:  # states that the equations keep apart aren't mixed any more
+        return StateModes(values, vectors, inverse, None, answers)
     block, answers = block_of(spaces, acts, answers)
     return StateModes(values, vectors, inverse, block, answers)
+
+
+def spread_over(modes: StateModes, free: Constrained, drives: int) -> StateModes:
+    """Modes of the states that contacts at rest allow as modes of all states; number of harmonic
+    drives.
+    """
+    states, harmonic = len(free.spread), 1 + drives
+    inverse = np.zeros((len(modes.values), states), complex)
+    inverse[:, free.kept] = modes.inverse
+    answers = free.spread @ modes.answers
+    answers[:, :harmonic] += free.base[:, :harmonic]
+    answers[:, harmonic::4] += free.base[:, harmonic:]
+    block = modes.block
+    if block is not None:
+        left = np.zeros((len(block.matrix), states))
+        left[:, free.kept] = block.left
+        block = replace(block, right=free.spread @ block.right, left=left)
+    return StateModes(modes.values, free.spread @ modes.vectors, inverse, block, answers)
 
 
 def slots_of(values: np.ndarray) -> np.ndarray:
@@ -109,7 +133,7 @@ def slots_of(values: np.ndarray) -> np.ndarray:
 def eigen_of(matrix: np.ndarray) -> Eigen:
     """Eigenvalues, eigenvectors and the inverse of these, large where they coincide."""
     values, vectors = np.linalg.eig(matrix)
-    if np.linalg.cond(vectors) < 1 / ROUNDING:
+    if not len(values) or np.linalg.cond(vectors) < 1 / ROUNDING:
         inverse = np.linalg.inv(vectors)
         inverse += inverse @ (np.eye(len(matrix)) - vectors @ inverse)
         return values, vectors, inverse

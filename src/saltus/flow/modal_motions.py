@@ -40,13 +40,14 @@ def wave_motions(
     list of list of WaveLegs, Outcome
         The legs of each motion, none of one that didn't reach the end; their quantities are the
         states, then those asked for, then the gaps. None if another method moves this system, a
-        quantity isn't linear, a drive is a record, or modes go together in a block.
+        quantity isn't linear, a drive is a record, a contact has a law, or modes go together in a
+        block.
     """
     system = map_.system
     method = map_.method.serving(system.origin)
     if not isinstance(method, Modal) or system.tangent_of is not None:
         return None
-    if len(guards) != len(system.guards):
+    if len(guards) != len(system.guards) or any(guard.law for guard in system.guards):
         return None
     tables = modal_flow(system.origin).tables
     asked = tables.linear.of(tuple(quantities))

@@ -10,12 +10,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from saltus.codegen.module import MODAL_LANES as LANES
+from saltus.contact.guards import is_hold
 from saltus.flow.modal_blocks import table_of
-from saltus.flow.modal_modes import Eigen, StateModes, eigen_of, modes_of, slots_of
+from saltus.flow.modal_modes import Eigen, StateModes, eigen_of, modes_of, slots_of, spread_over
 from saltus.kernels import modal_layout as layout
+from saltus.kernels.status import LAW_KINDS, NO_LAW
 from saltus.language.expression import Expr, walk
+from saltus.system import System
 from saltus.system.courses import TERMS, Course, course_of
 from saltus.system.linear import LinearPiece, LinearSystem
+from saltus.system.linear_laws import Constrained, Impacts, constrained, impacts_of, rows_of
+from saltus.system.quantity import remembered
 
 #: Memory of the tables of one system [bytes]. Beyond it all are dropped, as soon as no trajectory
 #: that a call moves needs them; those still to be moved make theirs anew.
@@ -57,7 +62,7 @@ class _Equations:
 
 
 @dataclass(frozen=True)
-class _Set:
+class ValueSet:
     """Gaps and drives for one set of parameter values, in any contact state."""
 
     values: dict[str, float]
@@ -65,6 +70,7 @@ class _Set:
     rates: np.ndarray
     lags: np.ndarray
     courses: tuple[Course, ...]
+    impacts: Impacts
 
 
 class Tables:
@@ -83,9 +89,16 @@ class Tables:
     def __init__(self, linear: LinearSystem) -> None:
         self.linear = linear
         self.lock = threading.Lock()
+        laws = [guard.law for guard in linear.system.guards]
+        self.holds = np.array([is_hold(guard) for guard in linear.system.guards], bool)
+        self.plain = np.array([law is None for law in laws], bool)
+        self.allowed = np.array([law.side if law else 0 for law in laws], np.int64)
+        self._laws = _laws_of(linear.system)
+        self._remembers = np.array(remembered(linear.system), np.int64)
+        self._impacts = impacts_of(linear, linear.system.values)
         self.generation = 0
         self.clear()
-        n, guards = len(linear.system.states), len(linear.system.guards)
+        n, guards = len(linear.states), len(linear.system.guards)
         self.row_of, self.sign_of = self._rows_of_gaps()
         rows = int(self.row_of.max(initial=-1)) + 1
         self.first_guard = [int(np.flatnonzero(self.row_of == r)[0]) for r in range(rows)]
@@ -96,10 +109,8 @@ class Tables:
         courses = len(linear.courses)
         self.block_groups = -(-(n + 1 + 2 * drives + TERMS * courses) // LANES)
         self.rows = 2 * self.groups + self.block_groups
-        self.sizes = np.array(
-            [n, self.groups, self.state_groups, rows, guards, drives, self.rows, courses, 0],
-            np.int64,
-        )
+        counts = n, self.groups, self.state_groups, rows, guards, drives, self.rows, courses
+        self.sizes = np.array([*counts, 0, len(self._remembers)], np.int64)
 
     def clear(self) -> None:
         """Drop all sets and contact states: their numbers are of a new generation. Arrays that
@@ -109,7 +120,7 @@ class Tables:
         self.modes, self.steady, self.pieces = _Rows(), _Rows(), _Rows()
         self._courses: dict[tuple[Expr, bytes], tuple[Course, list[float]]] = {}
         self._sets: dict[bytes, int] = {}
-        self.sets: list[_Set] = []
+        self.sets: list[ValueSet] = []
         self._equations: dict[tuple[object, ...], _Equations] = {}
         self._fast: dict[tuple[float, ...], float] = {}
         self._smooth: dict[tuple[object, ...], bool] = {}
@@ -121,12 +132,16 @@ class Tables:
         self._offset, self._rate, self._lag = _Rows(max(guards, 1)), _Rows(drives), _Rows(drives)
         self._links = _Rows(layout.BEHIND + guards, int)
         self._course = _Rows(max(4 * len(self.linear.courses), 1))
+        states = len(self.linear.states)
+        width = states + 1 + len(self.linear.drives) + len(self.linear.courses)
+        self._acts, self._presses = _Rows(2 * width + states + 1), _Rows(width)
         self._held = 0
 
     @property
     def full(self) -> bool:
         """True if the tables hold MOST_BYTES or more."""
-        rows = sum(one.table.nbytes for one in (self.modes, self.steady, self.pieces))
+        tables = self.modes, self.steady, self.pieces, self._acts, self._presses
+        rows = sum(one.table.nbytes for one in tables)
         return self._held + rows >= MOST_BYTES
 
     def _rows_of_gaps(self) -> tuple[np.ndarray, np.ndarray]:
@@ -140,7 +155,8 @@ class Tables:
         for g in range(len(seen[0])):
             for row, first in enumerate(rows):
                 for sign in (1.0, -1.0):
-                    if all(np.array_equal(one[g], sign * one[first]) for one in seen):
+                    alike = not (self.holds[g] or self.holds[first])
+                    if alike and all(np.array_equal(one[g], sign * one[first]) for one in seen):
                         row_of[g], sign_of[g] = row, sign
                         break
                 else:
@@ -158,6 +174,7 @@ class Tables:
         return (
             self.row_of, self.sign_of, self._offset.table, self._rate.table, self._lag.table,
             self.modes.table, self.steady.table, links, self._course.table, self.pieces.table,
+            self._laws, self._acts.table, self._presses.table, self._remembers,
         )  # fmt: skip
 
     def set_of(self, row: np.ndarray) -> int:
@@ -169,12 +186,25 @@ class Tables:
             found = [self._course_of(node, values) for node in self.linear.courses]
             rows = np.array([row for _, row in found], float).ravel()
             courses, gaps = tuple(course for course, _ in found), self.linear.gaps(values)
+            gaps.constant[self.holds] = 0.0
             for table, numbers in (
                 (self._offset, gaps.constant), (self._rate, rates), (self._lag, lags),
                 (self._course, rows),
             ):  # fmt: skip
                 table.add(np.append(numbers, np.zeros(table.table.shape[1] - len(numbers))))
-            self.sets.append(_Set(values, gaps, rates, lags, courses))
+            impacts = self._impacts
+            if not self.plain.all():
+                impacts = impacts_of(self.linear, values)
+                self._acts.add(
+                    np.column_stack(
+                        [
+                            *(gaps.matrix, gaps.constant, gaps.driven, impacts.closing.matrix),
+                            *(impacts.closing.constant, impacts.closing.driven),
+                            *(impacts.push, impacts.restitution),
+                        ]
+                    )
+                )
+            self.sets.append(ValueSet(values, gaps, rates, lags, courses, impacts))
             self._sets[key] = len(self.sets) - 1
             self._held += SET_BYTES + self.sets[-1].gaps.matrix.nbytes
         return self._sets[key]
@@ -201,41 +231,66 @@ class Tables:
         return self._states[which, mode]
 
     def _make(self, which: int, mode: int) -> None:
-        given, known = self.sets[which], self._equations_of(self.sets[which], mode)
-        speeds = np.array([one.speeds for one in given.courses]).reshape(-1, TERMS)
-        modes = modes_of(
-            known.piece, given.gaps, given.rates, speeds, LANES * self.groups, known.eigen,
-            known.fastest,
-        )  # fmt: skip
+        given = self.sets[which]
+        shown = self._shown(given, mode)
+        free = constrained(self.linear.system, mode, given.gaps, given.impacts)
+        known = self._equations_of(given, mode, free)
+        modes = self._state_modes(known, given, shown, free)
         number, guards = len(self.made), len(self.linear.system.guards)
-        links = [self._modes_of(known, modes, given), self._steady_of(modes, given), 0]
+        links = [self._modes_of(known, modes, shown), self._steady_of(modes, given, shown), 0]
         for g in range(guards):
             behind = self._states.get((which, mode ^ 1 << g), -1)
             links.append(behind)
             if behind >= 0:
                 self._links.table[behind, layout.BEHIND + g] = number
-                if self._is_smooth(known, self.made[behind][0], given.gaps, g):
+                if self.plain[g] and self._is_smooth(known, self.made[behind][0], given.gaps, g):
                     links[layout.SMOOTH] |= 1 << g
                     self._links.table[behind, layout.SMOOTH] |= 1 << g
         self._links.add(np.array(links))
+        if self.holds.any():
+            # the closing accelerations of contacts that can be held: the gaps of their hold guards
+            rows, partner = rows_of(shown), self._laws[:, layout.PARTNER]
+            self._presses.add(np.where((partner >= 0)[:, None], rows[partner], 0.0))
         self.made.append((known, modes))
         self._states[which, mode] = number
 
     # -- one contact state -------------------------------------------------------------------------
-    def _equations_of(self, given: _Set, mode: int) -> _Equations:
+    def _shown(self, given: ValueSet, mode: int) -> LinearPiece:
+        """The gaps in a contact state: those of hold guards depend on it."""
+        return self.linear.gaps(given.values, mode) if self.holds.any() else given.gaps
+
+    def _state_modes(
+        self, known: _Equations, given: ValueSet, shown: LinearPiece, free: Constrained
+    ) -> StateModes:
+        """The modes of a contact state, of those states that contacts at rest allow."""
+        speeds = np.array([one.speeds for one in given.courses]).reshape(-1, TERMS)
+        held = len(free.kept) < len(free.spread)
+        piece, gaps = (
+            (free.reduced(known.piece), free.seen(shown)) if held else (known.piece, shown)
+        )
+        modes = modes_of(
+            piece, gaps, given.rates, speeds, LANES * self.groups, known.eigen, known.fastest
+        )
+        return spread_over(modes, free, len(given.rates)) if held else modes
+
+    def _equations_of(self, given: ValueSet, mode: int, free: Constrained) -> _Equations:
         """The equations of a contact state, read off once for all rates of the drives."""
         used = tuple(given.values[name] for name in self.linear.parameters)
-        if (mode, used) not in self._equations:
+        key = mode, used, free.spread.tobytes()
+        if key not in self._equations:
             piece = self.linear.piece(given.values, mode)
             fastest = self._fastest(given, used) if piece.constant.any() else 0.0
-            self._equations[mode, used] = _Equations(piece, eigen_of(piece.matrix), fastest)
+            eigen = eigen_of(piece.matrix[free.kept] @ free.spread)
+            self._equations[key] = _Equations(piece, eigen, fastest)
             self._held += 8 * piece.matrix.nbytes
-        return self._equations[mode, used]
+        return self._equations[key]
 
-    def _fastest(self, given: _Set, used: tuple[float, ...]) -> float:
-        """Size of the fastest eigenvalue where all gaps have one sign [1/s]."""
+    def _fastest(self, given: ValueSet, used: tuple[float, ...]) -> float:
+        """Size of the fastest eigenvalue where all gaps have one sign, and no contact is at rest
+        [1/s].
+        """
         if used not in self._fast:
-            every = (1 << len(self.linear.system.guards)) - 1
+            every = int(np.sum((1 << np.arange(len(self.holds)))[~self.holds]))
             matrices = [self.linear.piece(given.values, mode).matrix for mode in (0, every)]
             self._fast[used] = max(float(np.abs(np.linalg.eigvals(one)).max()) for one in matrices)
         return self._fast[used]
@@ -246,15 +301,15 @@ class Tables:
             self._smooth[key] = _is_smooth(one.piece, other.piece, gaps, g)
         return self._smooth[key]
 
-    def _modes_of(self, known: _Equations, modes: StateModes, given: _Set) -> int:
+    def _modes_of(self, known: _Equations, modes: StateModes, shown: LinearPiece) -> int:
         """First row of the table of some modes; those of equal equations share one, but for blocks,
         which hold drives.
         """
-        key = id(known), given.gaps.matrix.tobytes()
+        key = id(known), shown.matrix.tobytes()
         if modes.block is not None:
-            return self.modes.add(self._table(modes, given.gaps.matrix))
+            return self.modes.add(self._table(modes, shown.matrix))
         if key not in self._known:
-            self._known[key] = self.modes.add(self._table(modes, given.gaps.matrix))
+            self._known[key] = self.modes.add(self._table(modes, shown.matrix))
         return self._known[key]
 
     def _table(self, modes: StateModes, gaps: np.ndarray) -> np.ndarray:
@@ -284,7 +339,7 @@ class Tables:
             [one.ravel() for one in (lam.real, lam.imag, size, left, right, waves, *block)]
         )
 
-    def _steady_of(self, modes: StateModes, given: _Set) -> int:
+    def _steady_of(self, modes: StateModes, given: ValueSet, shown: LinearPiece) -> int:
         """First row of the table of the steady answer: to the constant, to cosine and sine of each
         harmonic drive, to each derivative of each course.
         """
@@ -292,9 +347,10 @@ class Tables:
         answers = modes.answers.T  # [1 + drives + TERMS * courses, N]
         padded = np.zeros((len(answers), LANES * self.state_groups), complex)
         padded[:, : answers.shape[1]] = answers
-        gaps = given.gaps.matrix[first] @ answers.T
-        gaps[:, 1:harmonic] += given.gaps.driven[first, : harmonic - 1]
-        gaps[:, harmonic::TERMS] += given.gaps.driven[first, harmonic - 1 :]
+        gaps = shown.matrix[first] @ answers.T
+        gaps[:, 0] += np.where(self.holds, shown.constant, 0.0)[first]
+        gaps[:, 1:harmonic] += shown.driven[first, : harmonic - 1]
+        gaps[:, harmonic::TERMS] += shown.driven[first, harmonic - 1 :]
         # only the harmonic ones have an imaginary part
         states = [padded[0].real]
         numbers = [gaps[:, 0].real]
@@ -306,6 +362,21 @@ class Tables:
         flat = np.array(numbers).T.ravel()
         flat = np.concatenate([flat, np.zeros(-len(flat) % LANES)])
         return self.steady.add(np.concatenate([*states, flat]))
+
+
+def _laws_of(system: System) -> np.ndarray:
+    """Of each guard the kind of its law, its partner, and the state that its gap is a level of,
+    int64[guards, 3]; -1 where there is none.
+    """
+    table = np.full((len(system.guards), 3), -1, np.int64)
+    table[:, layout.KIND] = NO_LAW
+    for g, guard in enumerate(system.guards):
+        if guard.law is not None:
+            table[g, layout.KIND] = LAW_KINDS[guard.law.kind]
+            table[g, layout.PARTNER] = guard.law.partner
+        if guard.state is not None:
+            table[g, layout.LEVEL] = system.states.index(guard.state)
+    return table
 
 
 def _is_smooth(one: LinearPiece, other: LinearPiece, gaps: LinearPiece, g: int) -> bool:

@@ -68,11 +68,12 @@ def on_allowed_sides(
         inside = columns([system.guards[g].gap])[:, 0] * side
         if not (inside < 0.0).any():
             continue
-        normal = columns(system.guard_gradients[g]) * side
+        moved = len(system.field)  # a flow may carry derivatives without equations of theirs
+        normal = columns(system.guard_gradients[g][:moved]) * side
         way = np.abs(columns(system.field)) * period[:, None]
-        size = (np.abs(normal) * (np.abs(start) + way)).sum(axis=1)
+        size = (np.abs(normal) * (np.abs(start[:, :moved]) + way)).sum(axis=1)
         here = (inside < 0.0) & (inside >= -roundings * EPS * size)
         back = (EPS * size - inside) / (normal**2).sum(axis=1)
-        start[here] += (back[:, None] * normal)[here]
+        start[here, :moved] += (back[:, None] * normal)[here]
         beyond |= (inside < 0.0) & ~here
     return start, beyond

@@ -1,4 +1,4 @@
-"""Template, 2 of 5 of the modal flow: modes that don't go their own ways go together, in a block.
+"""Template, 2 of 7 of the modal flow: modes that don't go their own ways go together, in a block.
 
 The block of a contact state is v' = T v: amplitudes of an invariant subspace, and of the drives
 that it resonates with. Its table: a row (groups, alpha, drives); T, column by column; L and V; for
@@ -186,6 +186,29 @@ def add_block_state(modes, y, m):
         for j in range(LANES * groups):
             a = fma(load(m.modes, row + j * states + s, LANES), number(y, first, j), a)
         store(m.state, s, a)
+
+
+@kernel
+def block_terms(r, modes, y, m):
+    """A block's part of what :func:`terms_of_gap` says of a row of gaps, by its amplitudes y: the
+    size of what makes the rate, the second, third and fourth derivative.
+    """
+    groups, first = block_groups(modes, m), 2 * m.sizes[MODE_GROUPS]
+    size, second, third, fourth = 0.0, 0.0, 0.0, 0.0
+    if groups > 0:
+        row = block_waves(modes, groups, m) + groups * r
+        rates = row + groups * m.sizes[GAP_ROWS]
+        for g in range(groups):
+            store(m.chain, g, load(y, first + g, LANES))
+        for k in range(3):
+            times_block(modes, groups, k * groups, 1.0, (k + 1) * groups, m)
+        for j in range(LANES * groups):
+            w = number(m.modes, rates, j)
+            size += abs(w * number(m.chain, 0, j))
+            second += w * number(m.chain, groups, j)
+            third += w * number(m.chain, 2 * groups, j)
+            fourth += w * number(m.chain, 3 * groups, j)
+    return size, second, third, fourth
 
 
 @kernel

@@ -23,8 +23,11 @@ FACTORIAL = 20922789888000.0
 #: its own series is at most its amplitude there.
 FOLLOWED = 6.0
 # Columns of `sizes`; ROWS are the rows of amplitudes: those of the modes, real parts then imaginary
-# ones, then those of a block; TANGENTS is 1 where the derivative of the state is carried.
-STATES, MODE_GROUPS, STATE_GROUPS, GAP_ROWS, GUARDS, DRIVES, ROWS, COURSES, TANGENTS = range(9)
+# ones, then those of a block; TANGENTS is 1 where the derivative of the state is carried;
+# REMEMBERED are the states behind the others that hold others of before the last impact, whose
+# numbers are in `remembers`.
+STATES, MODE_GROUPS, STATE_GROUPS, GAP_ROWS, GUARDS, DRIVES, ROWS, COURSES = range(8)
+TANGENTS, REMEMBERED = range(8, 10)
 # Columns of `record`: the time of a course at the beginning of the period, the times of the period
 # at which its piece begins and ends [s], the row of that piece, its value and derivatives.
 BASE, SINCE, UNTIL, PIECE, VALUE = range(5)
@@ -38,17 +41,37 @@ MODES, STEADY, SMOOTH, BEHIND = range(4)
 # of the state, the next step [s], the time of the last landing, landings there since, guards that
 # the state has ridden from its start on (bits), the set of parameter values, the generation of the
 # tables in which these numbers stand; with tangents the time for which they haven't been moved [s]
-# and the boundaries just crossed (bits); then the amplitudes, and with tangents the rates of the
+# and the boundaries just crossed (bits); gaps whose rate is known to be zero too, and those whose
+# acceleration is (bits), whether no time has passed since the start, the contact that was struck
+# (one more than its number; 0: none); then the amplitudes, and with tangents the rates of the
 # states and the gaps before these boundaries.
-(
-    AT, ENTERS, NEXT_STEP, LANDED_AT, LANDINGS, RIDES, SET, TABLES, WAITED, CROSSED, AMPLITUDES,
-) = range(11)  # fmt: skip
+AT, ENTERS, NEXT_STEP, LANDED_AT, LANDINGS, RIDES, SET, TABLES, WAITED, CROSSED = range(10)
+TWICE, THRICE, STARTS, ASKS, AMPLITUDES = range(10, 15)
+# Columns of `laws`, for each guard: the kind of its law (status.py), its hold guard (of a hold
+# guard: its contact's), the state that its gap is a level of; -1 where there is none.
+KIND, PARTNER, LEVEL = range(3)
+# Rows of `acts`, where a guard has a law: guards, set by set. Columns: the gap and the closing
+# velocity as functions of the state - N slopes, a constant, slopes for the cosines of the H drives
+# and for the C courses -, the change of the state by a unit of closing velocity, N numbers, the
+# restitution. Rows of `presses`: guards, contact state by contact state. Columns: the acceleration
+# with which the contact closes without its own force, as such a function.
+# Rows of `struck`: the state before impacts and the one behind them in the order of the guards, the
+# way that each state has gone in them.
+AT_FIRST, BY_GUARDS, WAY = range(3)
 # Columns of `options`.
 MOST_STEPS, MOST_CONTACTS = range(2)
 # What is known of a guard in a step.
 CLEAR, CROSSES, OPEN = range(3)
 #: Landings at one instant before they count as sliding.
 MOST_LANDINGS = 100
+#: Landings at one instant after which impacts that cause each other are completed at once, least
+#: part of the first closing velocity then; the most impacts of it.
+MOST_STRIKES, CLOSED, MOST_IMPACTS = 50, 1.0e-16, 50_000
+#: Least effect of an impact on another contact, and where a comparison of orders ends, as parts of
+#: its closing velocity; rounding of a restitution.
+FELT, ENDED, PART = 1.0e-9, 1.0e-12, 1.0e-12
+#: Remainder of a chatter when it is completed, as a part of the time scale of the acceleration.
+CHATTER = 1.0e-8
 #: Times within this many ulp are one event.
 COINCIDENT = 10.0 * 2.220446049250313e-16
 #: Rounding of a gap, in units of the sizes of its terms.
@@ -57,7 +80,7 @@ HUGE = 1.0e300
 
 Modal = namedtuple(
     "Modal",
-    "sizes row_of sign_of offset rate lag modes steady links course pieces y moved size sums q "
-    "errors p bern bounds slopes out touches state answer angle found chain record factor column "
-    "columns",
+    "sizes row_of sign_of offset rate lag modes steady links course pieces laws acts presses "
+    "remembers y moved size sums q errors p bern bounds slopes out touches state answer angle "
+    "found chain record factor column columns struck",
 )

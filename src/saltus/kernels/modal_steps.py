@@ -1,4 +1,4 @@
-"""Template, 5 of 5 of the modal flow: steps that are proven to cross no boundary, or just one, and
+"""Template, 7 of 7 of the modal flow: steps that are proven to cross no boundary, or just one, and
 the life of a trajectory.
 
 A step is tried and halved until every gap is decided. Modes that are too fast for it are bounded:
@@ -34,6 +34,7 @@ from saltus.kernels.status import (
     GAP_MARGIN,
     GRAZE_SHALLOW,
     GRAZE_UNRESOLVED,
+    HOLD_LAW,
     MODE_VIOLATION,
     NONFINITE,
     OK,
@@ -53,7 +54,6 @@ from saltus.kernels.status import (
     REJECTED,
     RESTING,
     RUNNING,
-    SLIDING,
     STEPS,
     UNRESOLVED,
 )
@@ -85,12 +85,14 @@ def decide(i, g, batch, m):
     side = side_of(g, batch.mode[i])
     noise = terms_of(i, g, side, batch, m)
     error, slope_error = m.errors[m.row_of[g], 0], m.errors[m.row_of[g], 1]
-    exact, fresh = error <= noise, (batch.fresh[i] >> g) & 1 == 1
-    degree, m.found[g, 2] = ORDER, 0.0
+    exact, known = error <= noise, known_zeros(i, g, batch)
+    fresh, degree = known > 0, ORDER - known
     if fresh:
-        for k in range(ORDER):
-            m.p[k] = m.p[k + 1]
-        m.p[ORDER], degree, error = 0.0, ORDER - 1, slope_error
+        for k in range(ORDER + 1):
+            m.p[k] = m.p[k + known] if k <= degree else 0.0
+        error = slope_error
+        if known > 1 and not exact:
+            return OPEN
         if exact and is_rounding(m.p, degree, noise):
             m.found[g, 2] = 1.0  # it is ridden
             return CLEAR
@@ -102,10 +104,11 @@ def decide(i, g, batch, m):
     elif not exact and m.p[0] <= error:
         return OPEN
     elif m.p[0] <= noise:
-        if m.p[0] < -noise:
+        if m.p[0] < -noise and m.laws[g, KIND] != HOLD_LAW:
             batch.status[i] = MODE_VIOLATION
             return CLEAR
-        if side_of_leaving(m.p, degree, False, noise) < 0:
+        # what presses a contact at rest jumps where the state does
+        if m.p[0] < -noise or side_of_leaving(m.p, degree, False, noise) < 0:
             m.found[g, 0], m.found[g, 1] = 0.0, 1.0
             return CROSSES
     to_bernstein(m.p, degree, m.bern[0])
@@ -143,6 +146,7 @@ def place_of(i, g, tau, h, modes, steady, batch, m):
     which, side = int(batch.carry[i, SET]), side_of(g, batch.mode[i])
     sign, away = side * m.sign_of[g], side * m.offset[which, g]
     low, high, d = 0.0, h, m.found[g, 0] * h
+    size = m.errors[m.row_of[g], 2] + abs(away)
     for _ in range(60):
         move(modes, d, m)
         drive(i, tau + d, batch, m)
@@ -157,9 +161,9 @@ def place_of(i, g, tau, h, modes, steady, batch, m):
         new = d - value / rate if rate < 0.0 else 0.5 * (low + high)
         if not low <= new <= high:
             new = 0.5 * (low + high)
-        if abs(new - d) <= 2.3e-16 * (tau + d):
+        change, d = abs(new - d), new
+        if change <= 2.3e-16 * d or change * abs(rate) <= 2.3e-16 * size:
             break
-        d = new
     return d
 
 
@@ -178,6 +182,8 @@ def reach(i, tau, h, modes, steady, batch, m):
         store(m.moved, g, load(m.y, g, LANES))
     waves = modes + groups * (3 + 4 * LANES * m.sizes[STATE_GROUPS])
     for g in range(m.sizes[GUARDS]):
+        if not is_watched(g, batch.mode[i], m):
+            continue
         r, side = m.row_of[g], side_of(g, batch.mode[i])
         value, rate = gap_of_moved(r, modes, steady, which, m)
         value, rate = side * (m.sign_of[g] * value + m.offset[which, g]), side * m.sign_of[g] * rate
@@ -213,7 +219,8 @@ def look(i, tau, h, modes, steady, batch, m):
     m.out[MARGIN], m.found[0, 3] = batch.minima[i, GAP_MARGIN], 0.0
     crossing, hits, first = 0, 0, h
     for g in range(m.sizes[GUARDS]):
-        answer = decide(i, g, batch, m)
+        m.found[g, 2] = 0.0
+        answer = decide(i, g, batch, m) if is_watched(g, batch.mode[i], m) else CLEAR
         if answer == OPEN:
             return OPEN, 0.0, 0
         if answer == CROSSES:
@@ -241,7 +248,7 @@ def time_of(i, tau, batch):
 @inner
 def has_room(batch, m):
     """True if the contacts of one more step fit in the table."""
-    most = m.sizes[GUARDS] + MOST_TOUCHES
+    most = 2 * m.sizes[GUARDS] + MOST_TOUCHES
     return batch.rec_i.shape[0] == 0 or batch.rec_used[0] + most <= batch.rec_i.shape[0]
 
 
@@ -260,6 +267,8 @@ def record(i, g, tau, kind, direction, velocity, after, error, batch, m):
     batch.rec_f[r, REC_TIME_ERROR] = error
     for j in range(m.sizes[STATES]):
         batch.rec_f[r, RECORD_FLOATS + j] = m.state[j // LANES, j % LANES]
+    for j in range(m.sizes[STATES], m.sizes[STATES] + m.sizes[REMEMBERED]):
+        batch.rec_f[r, RECORD_FLOATS + j] = batch.state[i, j]
     batch.rec_f[r, RECORD_FLOATS + batch.state.shape[1]] = time_of(i, tau, batch)
 
 
@@ -299,8 +308,13 @@ def write_samples(i, tau, until, modes, steady, batch, m):
             break
         state_after(i, tau, due - tau, modes, steady, batch, m)
         states = m.sizes[STATES]
+        if due == tau and has_just_landed(i, tau, batch):
+            for j in range(states):
+                m.state[j // LANES, j % LANES] = batch.state[i, j]
         for j in range(states):
             batch.samples[i, k, j] = m.state[j // LANES, j % LANES]
+        for j in range(states, states + m.sizes[REMEMBERED]):
+            batch.samples[i, k, j] = batch.state[i, j]
         if m.sizes[TANGENTS] != 0:
             columns_after(i, modes, batch.carry[i, WAITED] + (due - tau), batch, m)
             for j in range(states * states):
@@ -321,15 +335,16 @@ def enter(i, tau, batch, m):
     answer_now(m.links[at, STEADY], m)
     less_answer(m)
     amplitudes_of(m.links[at, MODES], m.y, m)
+    set_block_drives(m.links[at, MODES], m)
     if m.sizes[TANGENTS] != 0:
         enter_columns(i, at, batch, m)
     batch.carry[i, ENTERS] = 0.0
 
 
 @kernel
-def leave(i, tau, batch, m):
-    """Make the state of the amplitudes before a course changes its piece; nothing without one."""
-    if m.sizes[COURSES] > 0:
+def keep_state(i, tau, batch, m):
+    """Store the state that the amplitudes are, but for one that is known to the bit."""
+    if not has_just_landed(i, tau, batch):
         at = int(batch.carry[i, AT])
         drive(i, tau, batch, m)
         answer_now(m.links[at, STEADY], m)
@@ -340,7 +355,7 @@ def leave(i, tau, batch, m):
 
 @kernel
 def take_up(i, tau, batch, m):
-    """Make the amplitudes anew of the state that :func:`leave` has left."""
+    """Make the amplitudes anew of the state, where a course has changed its piece."""
     if m.sizes[COURSES] > 0:
         follow_courses(i, tau, batch, m)
         enter(i, tau, batch, m)
@@ -351,7 +366,9 @@ def land(i, tau, d, hits, modes, steady, batch, m):
     """Cross boundaries a time d after tau: the contacts are recorded, the contact state changes.
     Returns the status.
     """
-    which, before = int(batch.carry[i, SET]), batch.mode[i]
+    which, before, law = int(batch.carry[i, SET]), batch.mode[i], first_law(hits, m)
+    if law >= 0:
+        return act(i, law, tau, d, hits, modes, steady, batch, m)
     state_after(i, tau, d, modes, steady, batch, m)
     for g in range(m.sizes[GUARDS]):
         if (hits >> g) & 1:
@@ -364,23 +381,17 @@ def land(i, tau, d, hits, modes, steady, batch, m):
             batch.counters[i, EVENTS] += 1
             batch.minima[i, CONTACT_SPEED] = min(batch.minima[i, CONTACT_SPEED], abs(rate))
             record(i, g, tau + d, CROSSING, direction, rate, after, error, batch, m)
-    for j in range(m.sizes[STATES]):
-        batch.state[i, j] = m.state[j // LANES, j % LANES]
+    if d > 0.0:
+        know_nothing(i, batch)
+    for g in range(m.sizes[GUARDS]):
+        if (hits >> g) & 1:
+            know_zeros(i, g, 1, batch)
+    batch.mode[i] = before ^ hits
+    leave(i, before, batch, m)
     if m.sizes[TANGENTS] != 0:
         batch.carry[i, WAITED] += d
         leave_columns(i, hits, modes, steady, batch, m)
-    at = int(batch.carry[i, AT])
-    for g in range(m.sizes[GUARDS]):
-        if (hits >> g) & 1 and at >= 0:
-            at = m.links[at, BEHIND + g]
-    batch.mode[i], batch.fresh[i] = before ^ hits, hits
-    batch.carry[i, AT], batch.carry[i, ENTERS] = at, 1.0
-    now = time_of(i, tau + d, batch)
-    batch.carry[i, LANDINGS] = (
-        batch.carry[i, LANDINGS] + 1.0 if now == batch.carry[i, LANDED_AT] else 0.0
-    )
-    batch.carry[i, LANDED_AT] = now
-    return SLIDING if batch.carry[i, LANDINGS] >= MOST_LANDINGS else RUNNING
+    return count_landing(i, tau + d, batch)
 
 
 @inner
@@ -390,7 +401,10 @@ def keep_on(i, h, batch, m):
     for g in range(m.sizes[GUARDS]):
         if m.found[g, 2] > 0.5:
             fresh |= 1 << g
+    twice, thrice = int(batch.carry[i, TWICE]), int(batch.carry[i, THRICE])
+    know_nothing(i, batch)
     batch.fresh[i] = fresh
+    batch.carry[i, TWICE], batch.carry[i, THRICE] = float(twice & fresh), float(thrice & fresh)
     batch.carry[i, RIDES] = float(int(batch.carry[i, RIDES]) & fresh)
     batch.carry[i, NEXT_STEP] = 2.0 * h
     batch.minima[i, GAP_MARGIN] = m.out[MARGIN]
@@ -437,11 +451,17 @@ def advance(i, budget, batch, m):
     while status == RUNNING and budget > 0 and batch.carry[i, AT] >= 0.0 and has_room(batch, m):
         at = int(batch.carry[i, AT])
         modes, steady = m.links[at, MODES], m.links[at, STEADY]
+        if batch.carry[i, ASKS] > 0.5:
+            rest_or_go(i, tau, modes, steady, batch, m)
+            if batch.carry[i, ENTERS] > 0.5 and batch.carry[i, AT] >= 0.0:
+                enter(i, tau, batch, m)
+            continue
         write_samples(i, tau, tau, modes, steady, batch, m)
         end = end_of(i, batch)
         if tau >= end:
             if batch.count[i] < batch.end_count[i]:
-                leave(i, tau, batch, m)
+                if m.sizes[COURSES] > 0:
+                    keep_state(i, tau, batch, m)
                 batch.count[i] += 1
                 tau = 0.0
                 begin_period(i, batch, m)
@@ -477,7 +497,7 @@ def advance(i, budget, batch, m):
                 else:
                     tau = end if h == end - tau else tau + h
                 if is_break(i, tau, batch, m):
-                    leave(i, tau, batch, m)
+                    keep_state(i, tau, batch, m)
                     take_up(i, tau, batch, m)
                 status = NONFINITE if is_lost(i, batch, m) else RUNNING
             else:
@@ -501,11 +521,7 @@ def put_back(i, tau, status, batch, m):
         at = int(batch.carry[i, AT])
         for k in range(m.sizes[ROWS] * LANES):
             batch.carry[i, AMPLITUDES + k] = m.y[k // LANES, k % LANES]
-        drive(i, tau, batch, m)
-        answer_now(m.links[at, STEADY], m)
-        state_of(m.links[at, MODES], m.y, m)
-        for j in range(m.sizes[STATES]):
-            batch.state[i, j] = m.state[j // LANES, j % LANES]
+        keep_state(i, tau, batch, m)
         move_columns(i, m.links[at, MODES], batch, m)
     batch.phase[i], batch.status[i] = tau, status
 
@@ -515,8 +531,9 @@ def propagate(
     period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count,
     end_phase, counters, minima, sample_count, sample_fraction, cursor, samples, sample_mode,
     rec_first, rec_i, rec_f, rec_used, options, data, budget, sizes, row_of, sign_of, offset, rate,
-    lag, modes, steady, links, course, pieces, y, moved, size, sums, q, errors, p, bern, bounds,
-    slopes, out, touches, place, answer, angle, found, chain, follows, factor, column, columns,
+    lag, modes, steady, links, course, pieces, laws, acts, presses, remembers, y, moved, size, sums,
+    q, errors, p, bern, bounds, slopes, out, touches, place, answer, angle, found, chain, follows,
+    factor, column, columns, struck,
 ):  # fmt: skip
     """Move every trajectory whose status is RUNNING and whose contact state has been made, `budget`
     steps at most. See kernels/batch.py for the arrays.
@@ -527,9 +544,9 @@ def propagate(
         rec_first, rec_i, rec_f, rec_used, options, data,
     )  # fmt: skip
     m = Modal(
-        sizes, row_of, sign_of, offset, rate, lag, modes, steady, links, course, pieces, y, moved,
-        size, sums, q, errors, p, bern, bounds, slopes, out, touches, place, answer, angle, found,
-        chain, follows, factor, column, columns,
+        sizes, row_of, sign_of, offset, rate, lag, modes, steady, links, course, pieces, laws, acts,
+        presses, remembers, y, moved, size, sums, q, errors, p, bern, bounds, slopes, out, touches,
+        place, answer, angle, found, chain, follows, factor, column, columns, struck,
     )  # fmt: skip
     waits = False
     for i in range(status.shape[0]):

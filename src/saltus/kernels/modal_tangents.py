@@ -1,10 +1,11 @@
-"""Template, 4 of 5 of the modal flow: the derivative of the state with respect to the state at the
+"""Template, 6 of 7 of the modal flow: the derivative of the state with respect to the state at the
 start.
 
 In a contact state it is moved by e^{A h}, whatever the motion does, so it waits until the motion
 leaves that state, ends, or is sampled. Where the rates jump at a boundary g = 0, from f- to f+, it
-jumps by (f+ - f-) (dg/dz Y) / g'. Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth
-Mechanical Systems (2004), section 7. Entry (r, c) of Y is state N + N r + c of a trajectory.
+jumps by (f+ - f-) (dg/dz Y) / g'; at an impact Y and f- are reflected before. Leine & Nijmeijer,
+Dynamics and Bifurcations of Non-Smooth Mechanical Systems (2004), section 7. Entry (r, c) of Y is
+state N + N r + c of a trajectory.
 """
 
 from saltus.kernels.lanes import fma, load, splat, store
@@ -90,6 +91,50 @@ def leave_columns(i, hits, modes, steady, batch, m):
         batch.carry[i, first + r] = m.state[r // LANES, r % LANES]
     batch.carry[i, CROSSED] = float(hits)
     move_columns(i, modes, batch, m)
+
+
+@kernel
+def strike_columns(i, g, batch, m):
+    """Let the impact of a contact act on the derivative, and on the rates before it: by
+    I - (1 + e) p n', with the closing velocity n' z and what a unit of it moves, p. Needs `angle`.
+    """
+    states, row, width = m.sizes[STATES], law_row(i, g, batch, m), width_of(m)
+    first, factor, rate = first_rate(m), 1.0 + restitution_of(i, g, batch, m), 0.0
+    for d in range(m.sizes[DRIVES]):
+        slope = m.acts[row, width + states + 1 + d] * m.angle[d, 2]
+        rate -= m.rate[int(batch.carry[i, SET]), d] * slope
+    for r in range(states):
+        rate += m.acts[row, width + r] * batch.carry[i, first + r]
+    for r in range(states):
+        batch.carry[i, first + r] -= factor * rate * m.acts[row, 2 * width + r]
+    project_columns(i, row, width, 2 * width, factor, batch, m)
+
+
+@kernel
+def settle_columns(i, g, batch, m):
+    """Bring the derivative onto the constraint of a contact that begins to be held: its closing
+    velocity and its gap don't change. See codegen/saltation.py.
+    """
+    row, width, square = law_row(i, g, batch, m), width_of(m), 0.0
+    for r in range(m.sizes[STATES]):
+        square += m.acts[row, r] * m.acts[row, r]
+    project_columns(i, row, width, 2 * width, 1.0, batch, m)
+    project_columns(i, row, 0, 0, 1.0 / square, batch, m)
+
+
+@kernel
+def project_columns(i, row, over, along, factor, batch, m):
+    """Take a part off the derivative, by columns of `acts`: what it is over some of them, times a
+    factor, along others.
+    """
+    states = m.sizes[STATES]
+    for c in range(states):
+        total = 0.0
+        for r in range(states):
+            total += m.acts[row, over + r] * batch.state[i, states + states * r + c]
+        total *= factor
+        for r in range(states):
+            batch.state[i, states + states * r + c] -= total * m.acts[row, along + r]
 
 
 @kernel

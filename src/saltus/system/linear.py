@@ -15,16 +15,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from saltus.contact.guards import Law, is_hold
 from saltus.language import expression as ex
 from saltus.language.evaluate import evaluate
 from saltus.language.expression import Expr
 from saltus.system.courses import reason_against
 from saltus.system.periodic import rate_of
+from saltus.system.quantity import is_remembered, remembered
 from saltus.system.system import System
 
 #: Size of the states and drives by which coefficients are read off: so large that constants of the
 #: equations leave no rounding in them.
 PROBE = 2.0**40
+#: Difference of coefficients that is none, relative to the largest.
+SAME = 1e-12
 
 
 @dataclass(frozen=True)
@@ -85,6 +89,11 @@ class LinearSystem:
     _names: Mapping[Expr, Expr]
 
     @functools.cached_property
+    def states(self) -> tuple[str, ...]:
+        """The states that the equations move: those that hold past values left out."""
+        return self.system.states[: len(self._field)]
+
+    @functools.cached_property
     def parameters(self) -> tuple[str, ...]:
         """The parameters of the equations between contacts, those of the drives' rates left
         out.
@@ -110,9 +119,17 @@ class LinearSystem:
         bits = [bool(mode >> i & 1) for i in range(len(self.system.guards))]
         return LinearPiece(*self._coefficients(self._field, values, bits))
 
-    def gaps(self, values: Mapping[str, float]) -> LinearPiece:
-        """a, c and e of all guards, float64[guards, N], float64[guards], float64[guards, D]."""
-        return LinearPiece(*self._coefficients(self._gaps, values, []))
+    def gaps(self, values: Mapping[str, float], mode: int = 0) -> LinearPiece:
+        """a, c and e of all guards in a contact state, float64[guards, N], float64[guards],
+        float64[guards, D]; only those of hold guards depend on it.
+        """
+        bits = [bool(mode >> i & 1) for i in range(len(self.system.guards))]
+        return LinearPiece(*self._coefficients(self._gaps, values, bits))
+
+    def pieces_of(self, entries: Sequence[Expr], values: Mapping[str, float]) -> LinearPiece:
+        """Coefficients of other linear functions of the states and drives of the system."""
+        known = ex.all_substituted(tuple(entries), self._names)
+        return LinearPiece(*self._coefficients(known, values, []))
 
     def rates(self, values: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
         """Rates [rad/s] and phases [rad] of the drives as cosines."""
@@ -124,11 +141,11 @@ class LinearSystem:
         self, entries: tuple[Expr, ...], values: Mapping[str, float], bits: list[bool]
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Coefficients of the states, constants, and coefficients of the drives."""
-        n, m = len(self.system.states), len(self.drives) + len(self.courses)
+        n, m = len(self.states), len(self.drives) + len(self.courses)
         probes = np.zeros((n + m, 1 + 2 * (n + m)))
         probes[:, 1 : 1 + n + m] = PROBE * np.eye(n + m)
         probes[:, 1 + n + m :] = -PROBE * np.eye(n + m)
-        states = dict(zip(self.system.states, probes[:n], strict=True))
+        states = dict(zip(self.states, probes[:n], strict=True))
         known = {**values, **{_name(d): probes[n + d] for d in range(m)}}
         found = np.array(
             [
@@ -147,13 +164,20 @@ def _name(drive: int) -> str:
 @functools.lru_cache(maxsize=256)
 def linear_pieces(system: System) -> LinearSystem | str:
     """The system as one that is linear between its contacts, or the reason why it isn't."""
-    if system.tangent_of is not None:
-        return "it carries its own derivatives"
-    if any(guard.law for guard in system.guards):
-        return "a contact of it has a law: an impact, a jump, friction"
+    size = len(system.states) - len(remembered(system))
+    missing = _missing(system, size)
+    if missing is not None:
+        return missing
+    stops = [guard.law for guard in system.guards if guard.law and guard.law.kind == "impact"]
+    laws = tuple(
+        one
+        for law in stops
+        for one in (law.constraint, *law.settled[:size], *law.reset[:size])
+        if one is not None
+    )
     gaps = tuple(guard.gap for guard in system.guards)
     drives, courses = dict[Expr, Drive](), dict[Expr, None]()
-    for node in _driving(*system.field, *gaps):
+    for node in _driving(*system.field[:size], *gaps, *laws):
         if node.op in ("sin", "cos"):
             rate = rate_of(node.args[0])
             if rate is None:
@@ -166,15 +190,22 @@ def linear_pieces(system: System) -> LinearSystem | str:
             return reason
         else:
             courses[node] = None
-    if any(node.op != "table" for node in courses.keys() & set(_driving(*gaps))):
+    plain = [i for i, guard in enumerate(system.guards) if not is_hold(guard)]
+    moving = courses.keys() & set(_driving(*(gaps[i] for i in plain), *laws))
+    if any(node.op != "table" for node in moving):
         return "a boundary of it moves by a drive that may jump"
     names = {node: ex.parameter(_name(i)) for i, node in enumerate((*drives, *courses))}
-    field, gaps = ex.all_substituted(system.field, names), ex.all_substituted(gaps, names)
-    if any(ex.depends_on(gap, ("select",)) for gap in gaps):
+    field, gaps, laws = (
+        ex.all_substituted(given, names) for given in (system.field[:size], gaps, laws)
+    )
+    if any(ex.depends_on(one, ("select",)) for one in (*(gaps[i] for i in plain), *laws)):
         return "a boundary of it moves when another is crossed"
-    if not _are_affine((*field, *gaps), len(names)):
+    if not _are_affine((*field, *gaps, *laws), len(names)):
         return "it isn't linear between its contacts"
-    return LinearSystem(system, tuple(drives.values()), tuple(courses), field, gaps, names)
+    linear = LinearSystem(system, tuple(drives.values()), tuple(courses), field, gaps, names)
+    if not all(_only_reverses(linear, law) for law in stops):
+        return "an impact of it changes more than velocities"
+    return linear
 
 
 def _driving(*roots: Expr) -> Iterator[Expr]:
@@ -196,6 +227,38 @@ def _driving(*roots: Expr) -> Iterator[Expr]:
             yield node
         else:
             waiting += reversed(node.args)
+
+
+def _only_reverses(linear: LinearSystem, law: Law) -> bool:
+    """True if an impact changes the state as a loss of its closing velocity does, times 1 + e."""
+    values, size = linear.system.values, len(linear.states)
+    given = ex.constant(0.0) if law.restitution is None else law.restitution
+    (restitution,) = evaluate([given], values=values)
+    changes = []
+    for after in (law.reset[:size], law.settled[:size]):
+        piece = linear.pieces_of(after, values)
+        matrix = piece.matrix - np.eye(size)
+        changes.append(np.column_stack([matrix, piece.constant, piece.driven]))
+    apart = np.abs(changes[0] - (1 + restitution) * changes[1])
+    return bool((apart <= SAME * np.abs(changes).max()).all())
+
+
+def _missing(system: System, size: int) -> str | None:
+    """The reason why a system isn't served, whose first states are moved: by what it carries, or by
+    its laws of contact; None if there is none.
+    """
+    if system.tangent_of is not None:
+        return "it carries its own derivatives"
+    if any(map(is_remembered, system.states[:size])):
+        return "states of it that hold past values aren't the last"
+    for law in [guard.law for guard in system.guards if guard.law]:
+        if law.kind == "jump":
+            return "a contact of it makes its state jump"
+        if law.kind == "surface" or law.friction is not None:
+            return "a contact of it has friction, or a force that jumps"
+        if law.restitution is not None and ex.varies(law.restitution):
+            return "a restitution of it isn't a number"
+    return None
 
 
 def _are_affine(roots: Sequence[Expr], drives: int) -> bool:

@@ -274,6 +274,17 @@ def is_remembered(name: str) -> bool:
     return name.endswith(_REMEMBERED)
 
 
+def remembered(system: System) -> tuple[int, ...]:
+    """Numbers of the states whose past values the states that :func:`remembering` has added
+    hold.
+    """
+    return tuple(
+        system.states.index(name.removesuffix(_REMEMBERED))
+        for name in system.states
+        if is_remembered(name)
+    )
+
+
 @functools.lru_cache(maxsize=64)
 def remembering(system: System) -> System:
     """The system extended by its :func:`jumping_states` as they were before the last impact or

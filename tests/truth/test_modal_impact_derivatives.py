@@ -1,0 +1,114 @@
+"""Derivatives of motions with impacts and rest by the modal flow: Taylor's method, closed forms."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import impact_orbits
+import saltus as sl
+from saltus.flow.maps import Stroboscope
+from two_flows import structure
+
+
+def compared(system, start, periods):
+    """Derivatives by Taylor's method and by modes, at the same ends."""
+    assert isinstance(sl.Modal().serving(sl.Modal().tangents(system)), sl.Modal)
+    (ends, exact), (others, found) = (
+        Stroboscope(system, method).tangent(start, periods) for method in (sl.Taylor(), sl.Modal())
+    )
+    np.testing.assert_allclose(others, ends, rtol=0, atol=1e-11)
+    return found, exact
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_random_structures_have_the_derivatives_of_taylor(seed):
+    """Stops that move, bodies that strike each other, springs beside them, rest and release."""
+    rng = np.random.default_rng([20261126, seed])
+    degrees = int(rng.integers(1, 4))
+    system = structure(
+        rng, degrees, 2, pairs=seed % 4 == 2, soft=seed % 4 == 3, moving=seed % 3 == 2
+    )
+    start = np.hstack([np.zeros((3, degrees)), rng.normal(0, 0.1, (3, degrees))])
+    found, exact = compared(system, start, 1)
+    sizes = np.abs(exact).max(axis=(1, 2), keepdims=True)
+    assert (np.abs(found - exact) <= 1e-10 * sizes).all()
+
+
+def test_start_beyond_a_stop_has_no_derivative():
+    """One that is beyond it by rounding lies on it."""
+
+    @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
+    def stop(t, x, v, *, w=1.0, gap=0.2):
+        return v, sl.cos(w * t) - x, sl.impact(x < gap, v, restitution=0.6)
+
+    start = np.array([[0.1, 0.0], [np.nextafter(0.2, 1.0), -0.5], [0.3, 0.0]])
+    (_, exact), (_, found) = (
+        Stroboscope(stop, method).tangent(start, 1) for method in (sl.Taylor(), sl.Modal())
+    )
+    assert np.isnan(found).all(axis=(1, 2)).tolist() == [False, False, True]
+    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-12)
+
+
+def test_contact_that_comes_to_rest_by_chatter_leaves_the_others_free():
+    """Two masses, the first of which comes to rest and is released again. The remainder of the
+    chatter is completed at 1e-8.
+    """
+
+    @sl.system(states="x y v u", forced_at="w", units={"w": "rad/s"})
+    def pair(t, x, y, v, u, *, w=0.3, gap=0.2):
+        push = sl.cos(w * t)
+        law = sl.impact(x < gap, v, restitution=0.6)
+        return v, u, push - x + 0.2 * (y - x) - 0.1 * v, 0.2 * (x - y) - 3.0 * y, law
+
+    start = np.random.default_rng(4).normal(0, 0.1, (4, 4))
+    run = sl.simulate(pair, start[0], periods=2, progress=False)
+    assert {"impact", "hold", "release"} <= set(run.contact_kind.values.tolist())
+    found, exact = compared(pair, start, 2)
+    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-8 * np.abs(exact).max())
+
+
+def test_impacts_at_resonance_have_the_derivatives_of_taylor():
+    """The drive goes together with the mode, on both sides of an impact."""
+
+    @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
+    def driven(t, x, v, *, w=1.0, gap=0.5):
+        return v, 0.3 * sl.cos(w * t) - x, sl.impact(x < gap, v, restitution=0.6)
+
+    found, exact = compared(driven, np.random.default_rng(4).normal(0, 0.1, (4, 2)), 4)
+    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-11 * np.abs(exact).max())
+
+
+@pytest.mark.parametrize("n", [1, 2])
+@pytest.mark.parametrize("damping", [0.0, 0.1])
+def test_areas_shrink_by_the_square_of_the_restitution(damping, n):
+    """The orbit with one impact in n periods is known; det Y = e^2 exp(-c n T)."""
+    w, e, gap = 2.5 * n, 0.7, 0.0
+
+    @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
+    def oscillator(t, x, v, *, w=w):
+        return v, sl.cos(w * t) - damping * v - x, sl.impact(x < gap, v, restitution=e)
+
+    values = {"damping": damping, "gap": gap, "restitution": e, "frequency": w, "n": n}
+    _, start = impact_orbits.oscillator(**values)[-1]
+    ends, found = Stroboscope(oscillator, sl.Modal()).tangent(start[None], n)
+    np.testing.assert_allclose(ends[0], start, rtol=0, atol=1e-13)
+    shrinks = e**2 * math.exp(-damping * n * 2 * math.pi / w)
+    assert np.linalg.det(found[0]) == pytest.approx(shrinks, rel=1e-12)
+
+
+def test_branches_of_orbits_with_impacts_are_those_of_taylor():
+    @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
+    def stop(t, x, v, *, w=2.5, gap=0.05):
+        return v, sl.cos(w * t) - 0.1 * v - x, sl.impact(x < gap, v, restitution=0.7)
+
+    _, start = impact_orbits.oscillator(damping=0.1, gap=0.05, restitution=0.7, frequency=2.5)[-1]
+    one, other = (
+        sl.branches(stop, {"gap": (0.0, 0.1)}, start, method=method, progress=False)
+        for method in (sl.Taylor(), sl.Modal())
+    )
+    assert one.sizes["branch"] == other.sizes["branch"]
+    assert list(one.event_kind.values) == list(other.event_kind.values)
+    np.testing.assert_allclose(other.event_gap.values, one.event_gap.values, rtol=0, atol=1e-9)
