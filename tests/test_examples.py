@@ -150,8 +150,10 @@ def test_the_plate_in_a_study_is_that_in_python(tmp_path):
     assert run.sizes["contact"] == truth.sizes["contact"] > 20
     names = {f"{name} {side}" for name in ("left", "right") for side in ("lower", "upper")}
     assert set(run["contact_guard"].values) == names
-    for name in plate.states:
-        assert abs(run[f"end_{name}"] - truth[f"end_{name}"]) < 1e-9 * abs(truth[name]).max()
+    for kind in (plate.states[:8], plate.states[8:]):  # a mode that isn't excited is rounding
+        scale = max(float(abs(truth[name]).max()) for name in kind)
+        for name in kind:
+            assert abs(run[f"end_{name}"] - truth[f"end_{name}"]) < 1e-9 * scale
 
 
 def test_a_buckled_beam_rests_on_either_side(tmp_path):

@@ -16,7 +16,8 @@ OUTPUTS = {
 }
 #: One with a boundary of its own, at which the pieces of a motion are cut: sums round otherwise.
 BEYOND = {"beyond": lambda x: sl.piecewise((x, x > 0.2e-3), otherwise=0)}
-VERBS = [name for name, call in CALLS.items() if call("in SI")[0] is RIG]
+#: Those that take the rig; the call of compare would compute two maps when this file is read.
+VERBS = [name for name in CALLS if name != "compare" and CALLS[name]("in SI")[0] is RIG]
 
 
 @pytest.mark.parametrize("outputs", [OUTPUTS, OUTPUTS | BEYOND], ids=["smooth", "cut"])

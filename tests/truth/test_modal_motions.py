@@ -64,6 +64,22 @@ def test_derivative_where_a_drive_resonates():
     np.testing.assert_allclose(found, exact, rtol=0, atol=1e-10 * np.abs(exact).max())
 
 
+@pytest.mark.nojit
+def test_derivative_is_the_difference_of_neighbours():
+    """Through contacts whose dampers make the force jump."""
+    system = chain(2, damping=15.0)
+    map_ = Stroboscope(system, sl.Modal())
+    start = np.array([[0.012, -0.02, 0.4, 0.3]])
+    _, found = map_.tangent(start, 1)
+    steps = 1e-6 * np.array([0.02, 0.02, 0.5, 0.5])
+    for j, step in enumerate(steps):
+        both = start + step * np.array([[1.0], [-1.0]]) * np.eye(4)[j]
+        (above, below), _ = map_.rows(np.zeros(2, int)).ends(both, 1)
+        np.testing.assert_allclose(
+            (above - below) / (2 * step), found[0, :, j], atol=1e-5 * np.abs(found).max()
+        )
+
+
 def test_derivative_without_contacts_is_a_matrix_exponential():
     stiffness = 400.0 * (2 * np.eye(3) - np.eye(3, k=1) - np.eye(3, k=-1))
     squares = np.linalg.eigvalsh(stiffness)

@@ -48,6 +48,7 @@ def test_a_run_imports_what_it_needs(start):
         "motion.time_errors",
         "inputs",
         "inputs.axes",
+        "inputs.outputs",
         "inputs.starts",
         "inputs.verb",
         "dataset_parts",

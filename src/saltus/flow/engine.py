@@ -96,7 +96,7 @@ def run(
     periods = float(np.max(request.end_count + request.end_phase / request.period, initial=0.0))
     data, due = tables_of(system.origin), method.due(periods)
     arrays["options"] = options_of(method, periods, len(request.start), request.checks)
-    most = float(arrays["options"][0, method.EVENT_BUDGET])
+    most = float(arrays["options"][:, method.EVENT_BUDGET].max(initial=0.0))
     if request.until is not None:
         arrays["options"][:, method.EVENT_BUDGET] = 0.5
     check_steps(system, method, request.period)

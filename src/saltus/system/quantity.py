@@ -1,4 +1,4 @@
-"""What is added to a system: a surface to cross, a power to integrate.
+"""Quantities that are added to a system: a surface to cross, a power to integrate.
 
 The flow needs nothing new for it: a surface is one more guard, an integral one more state, and both
 come with the flow's own precision.

@@ -84,6 +84,7 @@ def count_along(given: Any) -> int:
     if isinstance(given, tuple):
         count = given[2] if len(given) in (3, 4) else 1
         number = isinstance(count, int | float | np.integer | np.floating)
+        number = number and not isinstance(count, np.timedelta64)
         return int(count) if number and 1 <= count <= MOST else 1
     return max(len(given), 1) if not isinstance(given, str) and axes_of(given) == 1 else 1
 

@@ -94,7 +94,7 @@ def regularisation_widths(
     True
     """
     one_of(STEPS, "regularisation_widths: ", law=law)
-    method = check_method(method or ODE45(rtol=1e-4, atol=1e-7), system)
+    method = check_method(ODE45(rtol=1e-4, atol=1e-7) if method is None else method, system)
     zero = dict.fromkeys(system.states, 0.0)
     group = ensemble(system, zero if start is None else start, None)
     if len(group.start) != 1:

@@ -30,6 +30,7 @@ from saltus.results.dataset import schema
 from saltus.system import System
 from saltus.system.contact_forces import side_that_pushes
 from saltus.system.quantity import with_impulses, with_integrals
+from saltus.system.read_off import Quantity
 
 #: Blocks whose scatter gives a standard error: consecutive contacts are not independent, blocks
 #: nearly are.
@@ -47,7 +48,7 @@ def impact_statistics(
     t_end: float | str | None = None,
     t_start: float | str = 0.0,
     transient: int | float | str = 0,
-    force: Mapping[str, Any] | None = None,
+    force: Mapping[str, Quantity | str] | None = None,
     contact_side: Mapping[str, int] | None = None,
     peaks: bool | None = None,
     bins: int | Sequence[float] = BINS,

@@ -187,10 +187,10 @@ class Statistics(OfMotions):
     picture = "impacts"
 
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
-        """The histogram of speeds, and the contacts in time."""
+        """The histogram of speeds, and the forces of the contacts."""
         from saltus import plot
 
-        contacts = {"forces": first_figure(plot.contact_forces(ds))} if ds.sizes["contact"] else {}
+        contacts = {"-forces": first_figure(plot.contact_forces(ds))} if ds.sizes["contact"] else {}
         return {**super().pictures(ds), **contacts}
 
     def check_more(self, table: Any, setting: Setting) -> None:

@@ -24,8 +24,8 @@ ZERO = constant(0.0)
 
 @dataclass(frozen=True)
 class Sensor:
-    """What is measured on a structure. Made by :func:`acceleration`, :func:`velocity` and
-    :func:`contact_force`.
+    """A quantity that is measured on a structure. It is made by :func:`acceleration`,
+    :func:`velocity` and :func:`contact_force`.
 
     Attributes
     ----------
@@ -209,7 +209,7 @@ def _unit(one: Sensor, unit: str) -> str:
 
 @dataclass(frozen=True)
 class _Sensors:
-    """What the formulas of sensors are made of."""
+    """The parts of a structure that the formulas of sensors need."""
 
     made: System
     moving: Coordinates

@@ -21,7 +21,7 @@ rig = sl.models.delangre("b")
         ),
         ({"v": 1}, r"state of delangre: give it by start={'x': \.\.\., 'v': \.\.\.}"),
         ({"tend": 1}, "Write t_end="),
-        ({"t_eval": [1]}, "Write samples="),
+        ({"t_eval": [1]}, "Write at="),
         ({"y0": [1, 0]}, "Write start="),
         ({"rtol": 1e-3}, "Write method=sl.ODE45"),
         ({"peroids": 1}, "Did you mean 'periods'"),
