@@ -145,6 +145,21 @@ def pair(t, x, y, v, u, *, w=3.0, gap=0.1):
     return v, u, 3.0 * sl.cos(w * t) - 4.0 * x, -3.0 * y, law
 
 
+def test_contacts_at_rest_are_released_together_at_a_break():
+    """What presses them jumps to the other side, and grows again from there."""
+
+    @sl.system(states="x y v u")
+    def two(t, x, y, v, u):
+        pull = 3.0 * sl.square(sl.pi * t) + 0.1 * sl.sin(sl.pi * t)
+        return (
+            v, u, pull - x, 2.0 * pull - y,
+            sl.impact(x < 0, v, restitution=0.0), sl.impact(y < 0, u, restitution=0.0),
+        )  # fmt: skip
+
+    run = sl.simulate(two, np.zeros(4), t_end=1.4, method=sl.Modal(), **FOLLOWS)
+    assert times(run, "release").tolist() == pytest.approx([1.0, 1.0], abs=1e-15)
+
+
 def test_states_before_impacts_are_told():
     modal, taylor = runs(pair, np.zeros(4), periods=20)
     assert modal.sizes["contact"] > 10

@@ -162,7 +162,8 @@ def act(i, g, tau, d, hits, modes, steady, batch, m):
         for j in range(m.sizes[STATES]):
             m.state[j // LANES, j % LANES] = batch.state[i, j]
     for other in range(m.sizes[GUARDS]):
-        if (hits >> other) & 1:
+        jumps = d == 0.0 and m.laws[other, KIND] == HOLD_LAW  # what presses it isn't zero
+        if (hits >> other) & 1 and not jumps:
             know_zeros(i, other, max(1, known_zeros(i, other, batch)), batch)
     before, status = batch.mode[i], RUNNING
     if m.laws[g, KIND] == HOLD_LAW:
