@@ -13,6 +13,12 @@ from saltus.flow.maps import Stroboscope
 from two_flows import structure
 
 
+@pytest.fixture(autouse=True)
+def also_of_several_stops(monkeypatch):
+    """The modal flow's own derivatives, where Taylor's are taken for a few states."""
+    monkeypatch.setattr("saltus.flow.modal.FEW_STATES", 0)
+
+
 def compared(system, start, periods):
     """Derivatives by Taylor's method and by modes, at the same ends."""
     assert isinstance(sl.Modal().serving(sl.Modal().tangents(system)), sl.Modal)

@@ -213,6 +213,10 @@ class ModalFlow:
         return np.hstack([waves.real, courses]), np.hstack([np.abs(waves), np.abs(courses)])
 
 
+#: States of a system with several rigid stops whose derivatives are Taylor's.
+FEW_STATES = 16
+
+
 @functools.lru_cache(maxsize=64)
 def modal_flow(system: System) -> ModalFlow:
     """The modal flow of a system. Raises ParameterError, with the reason, if it has none."""
@@ -259,8 +263,8 @@ class Modal(Method):
     def serving(self, system: System) -> Method:
         """Taylor's method for a system that has no modal flow."""
         base = system.tangent_of
-        past = base is not None and remembered(base)
-        if past or isinstance(linear_pieces((base or system).origin), str):
+        with_equations = base is not None and len(system.field) == len(system.states)
+        if with_equations or isinstance(linear_pieces((base or system).origin), str):
             return Taylor(max_steps=self.max_steps, max_events=self.max_events)
         return self
 
@@ -269,8 +273,13 @@ class Modal(Method):
         return modal_flow(system)
 
     def tangents(self, system: System) -> System | None:
-        """The states alone: the modes of a contact state move the derivative too."""
-        if self.serving(system.origin) is not self or remembered(system):
+        """The states alone: the modes of a contact state move the derivative too. That of impacts
+        on several stops is Taylor's, unless the states are many: where one impact causes another at
+        the same instant, the modal flow's doesn't always agree with it.
+        """
+        stops = sum(guard.law is not None and guard.law.kind == "impact" for guard in system.guards)
+        few = stops > 1 and len(system.states) <= FEW_STATES
+        if self.serving(system.origin) is not self or remembered(system) or few:
             return super().tangents(system)
         return tangent_states(system)
 
