@@ -427,6 +427,19 @@ def test_a_study_without_a_model_names_the_file_beside_it(tmp_path, monkeypatch)
     assert f"saltusrun{study}--system{tmp_path / 'my_rig.py'}" in told
 
 
+def test_a_study_of_a_structure_looks_at_no_file_beside_it(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    study = tmp_path / "study.toml"
+    study.write_text(
+        STUDY.replace('model = "delangre"\n', "")
+        + '[system.structure]\nmass = "gone.npz"\nmodes = 2\n'
+    )
+    (tmp_path / "my_rig.py").write_text("import saltus as sl\n\nrig = sl.structure(1, 2)\n")
+    told = refused(study)
+    assert "gone.npz" in told
+    assert "my_rig" not in told
+
+
 def test_a_refused_study_leaves_no_folder(tmp_path):
     study = tmp_path / "study.toml"
     study.write_text(STUDY.replace("periods = 3", 'periods = 3\nstart = { y = "1 mm" }'))

@@ -172,7 +172,8 @@ def run(
         if not place.is_dir():
             raise StudyError(f"--inputs {place}: there is no such folder.")
     user_system = own_system(system) if system else None
-    if user_system is None and spec.system.model is None and not spec.system.rates:
+    named = spec.system.model or spec.system.rates or spec.system.structure
+    if user_system is None and not named:
         check_beside(study)
     resources = _resources(spec, threads, workers, scheduler, shard)
     folder = out or Path("saltus-runs") / study.stem
