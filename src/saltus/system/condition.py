@@ -1,15 +1,18 @@
 """Conditions at which a run ends: comparisons of time, states and parameters that a user adds to a
 system, as text or as a function.
 
-Text is a formula (:mod:`saltus.system.formula`) whose numbers may have units: ``"x > 2 mm"``. Every
-comparison becomes a guard of the system, behind its own, unless it means one of these.
+Text is a formula (:mod:`saltus.system.formula`) whose numbers may have units: ``"x > 2 mm"``. A
+name of several words stands in quotes: ``"'stop force' > 5 N"``. Every comparison becomes a guard
+of the system, behind its own, unless it means one of these.
 """
 
 from __future__ import annotations
 
+import ast
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 from saltus.contact.guards import bits_in, join_guards
@@ -24,20 +27,24 @@ from saltus.language.expression import (
     select,
 )
 from saltus.system.formula import Formula, Formulas
+from saltus.system.named_outputs import NamedOutputs
 from saltus.system.quantity import with_surface
 from saltus.system.read_off import called
 from saltus.system.system import System
-from saltus.units import coherent_unit, is_unit, to_si
+from saltus.units import coherent_unit, dimension, is_unit, to_si
 
 #: A number and what may be its unit, in a formula.
 _QUANTITY = re.compile(
-    r"(?<![\w.])(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*"
+    r"(?<![\w.])(?P<number>(?>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?))\s*"
     r"(?P<unit>[^\W\d_]+(?:\^-?[\d.]+)?(?:[*/][^\W\d_]+(?:\^-?[\d.]+)?)*)(?![\w(])"
 )
 #: Words of formulas that may follow a number.
 _WORDS = ("and", "or", "if", "else", "not")
 #: The name of the parameter that holds a number with a unit, before its number.
 _LEVEL = "until_level"
+#: A name in quotes, and the beginning of the name that stands for it.
+_QUOTED = re.compile(r"(['\"`])(?P<name>[^'\"`]*)\1")
+_NAME = "until_name"
 
 
 @dataclass(frozen=True)
@@ -84,8 +91,9 @@ def end_condition(system: System, given: Any) -> EndCondition:
     ParameterError, TraceError, UnitError
         If it can't be read, is about time or parameters alone, or compares different units.
     """
+    outputs = system.outputs
     if isinstance(given, str):
-        system, function = _from_text(system, given)
+        system, outputs, function = _from_text(system, given)
         text = " ".join(given.split())
     elif callable(given) and not isinstance(given, System):
         function, text = given, getattr(given, "text", "the condition")
@@ -96,7 +104,7 @@ def end_condition(system: System, given: Any) -> EndCondition:
         )
     units = DimensionCheck(system.states, system.units)
     with observed(units):
-        found = called(system, function, "the condition until")
+        found = called(system, function, "the condition until", outputs)
     if isinstance(found, Condition):
         return _of_comparisons(system, found, text)
     if isinstance(found, Expr) and found.op != "const":
@@ -134,11 +142,26 @@ def _of_comparisons(system: System, condition: Condition, text: str) -> EndCondi
 
 
 # -- text ------------------------------------------------------------------------------------------
-def _from_text(system: System, text: str) -> tuple[System, Callable[..., Any]]:
-    """The system with a parameter for each number with a unit in a text, and the function that the
-    text is.
+def _from_text(system: System, text: str) -> tuple[System, NamedOutputs, Callable[..., Any]]:
+    """The system with a parameter for each number with a unit in a text, its outputs by the names
+    that the text has for them, and the function that the text is.
     """
     levels: dict[str, tuple[float, str]] = {}
+    known = ("t", *system.states, *system.outputs.names, *system.values)
+    titles = {
+        name if name.isidentifier() else f"{_NAME}_{i}": name
+        for i, name in enumerate(system.outputs.names, 1)
+    }
+    outputs = replace(system.outputs, names=tuple(titles))
+
+    def plain(match: re.Match[str]) -> str:
+        name = match["name"]
+        if name not in known:
+            raise ParameterError(
+                f"until = {shown(text)}: {shown(name)} is neither t nor a state, an output or a "
+                f"parameter of {system.name}. {nearest(name, known)}"
+            )
+        return next((short for short, title in titles.items() if title == name), name)
 
     def named(match: re.Match[str]) -> str:
         number, unit = match["number"], _unit(match, text, system)
@@ -150,23 +173,64 @@ def _from_text(system: System, text: str) -> tuple[System, Callable[..., Any]]:
         levels[level] = (to_si(quantity, own, "until"), own)
         return level + match["unit"][len(unit) :]
 
+    written = _QUOTED.sub(plain, text)
     try:
-        formula = Formula(_QUANTITY.sub(named, text), Formulas())
+        formula = Formula(_QUANTITY.sub(named, written), Formulas())
     except TraceError as error:
+        _check_quotes(system, written, text)
         raise TraceError(f"until = {shown(text)}: ", error) from error
     values = {name: value for name, (value, _) in levels.items()}
     units = {name: unit for name, (_, unit) in levels.items()}
-    known = ("t", *system.states, *system.outputs.names, *system.values)
     for name in formula.names:
-        if name not in known and name not in levels:
+        if name not in known and name not in titles and name not in levels:
+            _check_quotes(system, written, text)
             raise ParameterError(
                 f"until = {shown(text)}: {shown(name)} is neither t nor a state or parameter of "
                 f"{system.name}. {nearest(name, known)}"
             )
     if taken := [name for name in levels if name in system.units]:
         raise ParameterError(f"until: {system.name} has a name {taken[0]!r} already. Rename it.")
+    own = dict(zip(titles, system.outputs.units, strict=True))
+    _check_sides(formula, {**system.units, **own}, units, titles, text)
     extended = replace(system, values={**system.values, **values}, units={**system.units, **units})
-    return extended, formula
+    return extended, outputs, formula
+
+
+def _check_quotes(system: System, written: str, text: str) -> None:
+    """Raise a ParameterError for a name of several words without quotes."""
+    for name in system.outputs.names:
+        if not name.isidentifier() and name in written:
+            raise ParameterError(
+                f"until = {shown(text)}: write {name!r} in quotes, such as until=\"'{name}' > 0\"."
+            )
+
+
+def _check_sides(
+    formula: Formula, units: dict[str, str], levels: dict[str, str], titles: dict[str, str],
+    text: str,
+) -> None:  # fmt: skip
+    """Raise a UnitError where a name is compared with a number of another unit, or of none."""
+    for node in ast.walk(formula.tree):
+        if not isinstance(node, ast.Compare):
+            continue
+        sides = [node.left, *node.comparators]
+        for one, other in [*pairwise(sides), *pairwise(sides[::-1])]:
+            own = units.get(one.id, "") if isinstance(one, ast.Name) else ""
+            if own in ("", "1"):
+                continue
+            what = titles.get(ast.unparse(one), ast.unparse(one))
+            number = ast.unparse(other)
+            if re.fullmatch(r"-?[\d.e+-]+", number) and float(number):
+                raise UnitError(
+                    f"until = {shown(text)}: {number} has no unit, and {what!r} is in {own}. Write "
+                    f"{f'{number} {own}'!r}."
+                )
+            level = levels.get(number.lstrip("-"))
+            if level and what in titles.values() and dimension(level) != dimension(own):
+                raise UnitError(
+                    f"until = {shown(text)}: {what!r} is in {own}, and is compared with a number "
+                    f"in {level}."
+                )
 
 
 def _unit(match: re.Match[str], text: str, system: System) -> str:
@@ -187,7 +251,8 @@ def _unit(match: re.Match[str], text: str, system: System) -> str:
             f"2 mm, 0.5 m/s, 3 kN; a product with a sign: 2*{match['unit']}."
         )
     end = match.start("unit") + len(unit)
-    alone = text[: match.start()].rstrip().endswith("(") and text[end:].lstrip().startswith(")")
+    before, behind = match.string[: match.start()].rstrip(), match.string[end:].lstrip()
+    alone = before.endswith("(") and behind.startswith(")")
     factors = re.split(r"[*/]", unit)[1:]
     doubtful = [one for one in factors if one.partition("^")[0] in system.units]
     if doubtful and not alone:

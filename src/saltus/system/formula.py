@@ -74,11 +74,13 @@ class Formula:
     names : tuple of str
         What it needs, in the order of their first mention: the terms that it uses are looked
         through.
+    tree : ast.expr
+        Its syntax tree.
     """
 
     def __init__(self, text: str, book: Formulas):
-        self.text, self.book, self._tree = text, book, _parsed(text)
-        named = list(dict.fromkeys(_names(self._tree)))
+        self.text, self.book, self.tree = text, book, _parsed(text)
+        named = list(dict.fromkeys(_names(self.tree)))
         self._terms = [name for name in named if name in book.terms]
         inner = [name for term in self._terms for name in book.terms[term].names]
         self.names: tuple[str, ...] = tuple(
@@ -98,7 +100,7 @@ class Formula:
             for term in self._terms
         }
         try:
-            return self._value(self._tree, {**_CONSTANTS, **values, **terms})
+            return self._value(self.tree, {**_CONSTANTS, **values, **terms})
         except SaltusError as error:
             raise type(error)(f"{self.place}: ", error) from error
         except (ArithmeticError, TypeError, ValueError) as error:
@@ -110,7 +112,7 @@ class Formula:
         """
         tables = {
             node.func.id
-            for node in ast.walk(self._tree)
+            for node in ast.walk(self.tree)
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
         }
         return [
