@@ -241,7 +241,7 @@ def recorded(
     own = coherent_unit(f"1 {unit}", "values") if unit else ""
     points = _times(times, to_si(f"1 {time_unit}", "s", "times"))
     heights = _times(values, to_si(f"1 {unit}", own, "values") if unit else 1.0)
-    return Record(curve(points, heights, kind, outside, name, own), own)
+    return Record(curve(points, heights, kind, outside, name, own, "sl.recorded"), own)
 
 
 def _times(numbers: Any, factor: float) -> Any:

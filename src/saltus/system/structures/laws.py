@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from saltus.contact.declared import Impact, impact
+from saltus.contact.declared import Impact, impact, outside
 from saltus.contact.dry_friction import friction
 from saltus.contact.forces import freeplay, hertz
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, must_be
 from saltus.language.expression import Expr, Relation, as_expr
 from saltus.language.functions import piecewise
 from saltus.system.structures.parts import Contact
@@ -40,7 +40,8 @@ def entries(label: str, contact: Contact, units: tuple[str, ...]) -> list[tuple[
     Raises
     ------
     ParameterError
-        If the gap of both sides is negative.
+        If the gap of both sides, a stiffness or a damping is negative, or a restitution is outside
+        [0, 1].
     """
     length, force, spring, damper = units
     if contact.side == "both" and to_si(contact.gap, length, f"{label}_gap") < 0:
@@ -51,6 +52,14 @@ def entries(label: str, contact: Contact, units: tuple[str, ...]) -> list[tuple[
     if contact.power is not None and contact.power != 1 and length:
         spring = f"{force}/{length}^{contact.power:g}"
     rebounds = contact.restitution if contact.friction is None else None
+    for key, value, unit in (("stiffness", contact.stiffness, spring),
+                             ("damping", contact.damping, damper)):  # fmt: skip
+        if value is not None and to_si(value, unit, f"{label}_{key}") < 0:
+            raise must_be(f"{label}: {key}", "0 or more", value)
+    if rebounds is not None:
+        bounce = to_si(rebounds, "1", f"{label}_restitution")
+        if not 0 <= bounce <= 1:
+            raise ParameterError(f"{label}: {outside(bounce)}")
     return [
         (f"{label}_gap", contact.gap, length),
         (f"{label}_stiffness", contact.stiffness, spring),

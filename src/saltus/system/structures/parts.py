@@ -18,6 +18,8 @@ from saltus.units import to_si
 SIDES = ("upper", "lower", "both")
 #: Largest exponent of the depth of a contact.
 MOST_POWER = 5
+#: Signs at the end of a name that number degrees of freedom of one kind.
+_NUMBERS = "_0123456789"
 P = TypeVar("P", "Contact", "Force", "Base")
 
 #: Advice on arguments that a part lacks or calls otherwise.
@@ -374,8 +376,9 @@ def _moved(given: Any, names: list[str]) -> np.ndarray:
     if isinstance(given, str):
         vector = np.array([float(_matches(name, given)) for name in names])
         if not vector.any():
+            stems = [name.rstrip(_NUMBERS) or name for name in names]
             raise ParameterError(
-                f"base: {shown(given)} names no degree of freedom. {nearest(given, names)} Give "
+                f"base: {shown(given)} names no degree of freedom. {nearest(given, stems)} Give "
                 f"names such as 'w', for w1, w_2, ..., or a vector."
             )
         return vector
@@ -399,4 +402,4 @@ def _moved(given: Any, names: list[str]) -> np.ndarray:
 
 def _matches(name: str, pattern: str) -> bool:
     """True if a name is that of a pattern, with numbers behind it or without."""
-    return fnmatch.fnmatchcase(name, pattern) or name.rstrip("_0123456789") == pattern
+    return fnmatch.fnmatchcase(name, pattern) or name.rstrip(_NUMBERS) == pattern

@@ -171,6 +171,11 @@ def structure(
         + [-(mass @ direction(one, degrees)) for _, one in shaking],
     )  # fmt: skip
     count = _count(modes, size)
+    if count < size and abs(stiffness).max() == 0:
+        raise ParameterError(
+            "all entries of stiffness are zero, so all modes have the frequency 0, and none are "
+            "the lowest. Give the stiffness matrix, or leave modes= out."
+        )
     known = modes_of(mass, stiffness, count) if reduced else None
     if known is not None and damping_ratio is not None:
         damping = _ratio(damping_ratio, known, count if modes is not None else size)
@@ -201,17 +206,24 @@ def structure(
 
 # -- coordinates -----------------------------------------------------------------------------------
 def degree_names(names: Any, size: int) -> list[str]:
-    """Names of the degrees of freedom. Raises ParameterError if others are given than there are."""
+    """Names of the degrees of freedom. Raises ParameterError unless there is one for each, and none
+    stands twice.
+    """
     if names is None:
         return [f"x{i}" for i in range(1, size + 1)]
-    found = names.replace(",", " ").split() if isinstance(names, str) else names
-    if (
-        not isinstance(found, list | tuple)
-        or len(found) != size
-        or not all(isinstance(one, str) for one in found)
-    ):
-        raise ParameterError(f"names must name {size} degrees of freedom, not {shown(names)}.")
-    return list(found)
+    given = names.tolist() if isinstance(names, np.ndarray) else names
+    found = given.replace(",", " ").split() if isinstance(given, str) else given
+    if not isinstance(found, list | tuple) or not all(isinstance(one, str) for one in found):
+        raise must_be("names", f"the names of {size} degrees of freedom, as texts", names)
+    if len(found) != size:
+        raise ParameterError(
+            f"names must name {size} degrees of freedom, not {len(found)}: {shown(names)}."
+        )
+    found = [str(one) for one in found]  # those of NumPy are texts of its own kind
+    if len(set(found)) < size:
+        twice = next(one for one in found if found.count(one) > 1)
+        raise ParameterError(f"names: two degrees of freedom are called {twice!r}.")
+    return found
 
 
 def rate_name(name: str) -> str:

@@ -9,7 +9,7 @@ import pytest
 import scipy.sparse as sp
 
 import saltus as sl
-from saltus.errors import ParameterError, UnitError
+from saltus.errors import ParameterError, TraceError, UnitError
 
 M, K = np.eye(3), 2 * np.eye(3) - np.eye(3, k=1) - np.eye(3, k=-1)
 STOP, PUSH = sl.Contact("x3", 50.0, 0.5), sl.Force("x1", 1.0)
@@ -83,7 +83,10 @@ def changed(matrix, place, value):
         ({"modes": 4}, "at most 3"),
         ({"modes": 1.5}, "whole number"),
         ({"frequency": None}, "give frequency="),
-        ({"names": "a b"}, "3 degrees of freedom"),
+        ({"names": "a b"}, "3 degrees of freedom, not 2: 'a b'"),
+        ({"names": [1, 2, 3]}, "3 degrees of freedom, as texts"),
+        ({"names": "a b a"}, "two degrees of freedom are called 'a'"),
+        ({"stiffness": 0 * K, "modes": 2}, "entries of stiffness are zero"),
         ({"unit": "inch"}, "unit must be"),
         ({"contacts": STOP}, "a list"),
         ({"contacts": [sl.Contact("x4", 1.0, 1.0)]}, "x4"),
@@ -99,7 +102,10 @@ def changed(matrix, place, value):
         ({"contacts": [sl.Contact("x1", gap=-1.0, restitution=0, side="both")]}, "two contacts"),
         ({"contacts": [sl.Contact("x1", 1.0, 1.0, restitution=0.5)]}, "Give one of the two"),
         ({"contacts": [sl.Contact("x1", gap=1.0)]}, "Give one of the two"),
-        ({"contacts": [sl.Contact("x1", gap=1.0, restitution=2)]}, r"outside \[0, 1\]"),
+        ({"contacts": [sl.Contact("x1", gap=1.0, restitution=2)]},
+            r"^stop: the restitution 2 is outside \[0, 1\]"),
+        ({"contacts": [sl.Contact("x1", "-50 kN/m", 1.0)]}, "stop: stiffness must be 0 or more"),
+        ({"contacts": [sl.Contact("x1", 1.0, 1.0, damping=-1)]}, "stop: damping must be 0 or more"),
         ({"contacts": [sl.Contact("x1", gap=1.0, restitution=1, damping=1.0)]}, "a rigid stop has"),
         ({"contacts": [sl.Contact("x1", 1.0, 1.0, power=0.5)]}, "power must be"),
         ({"contacts": [sl.Contact("x1", 1.0, 1.0, side="both", preload=1.0)]}, "onto one side"),
@@ -111,6 +117,8 @@ def changed(matrix, place, value):
             "no rebound"),
         ({"mass": M + 0.1, "contacts": [sl.Contact("x1", gap=1.0, restitution=1)]}, "Give modes="),
         ({"base": sl.Base("y", 1.0)}, "names no degree of freedom"),
+        ({"base": sl.Base("rot", 1.0), "names": "rx_1_1 rx_1_2 w_1_2", "contacts": [],
+            "forces": []}, "'rot' names no degree of freedom. Known: rx, w"),
         ({"base": sl.Base([1.0, 2.0], 1.0)}, "a vector of 3 finite numbers"),
         ({"base": sl.Base([0, 0, 0], 1.0)}, "not all zero"),
         ({"base": sl.Base({"y": 1.0}, 1.0)}, "'y' is no degree"),
@@ -169,7 +177,23 @@ def test_sweeps_refuse(first):
         sl.sweep(5.0, "5 Hz", 1.0)
 
 
+def test_names_of_numpy_become_plain_text():
+    names = np.array(["u_1", "w_1", "w_2"])
+    for given in (names, list(names), tuple(names)):
+        made = sl.structure(M, K, names=given)
+        assert {type(one) for one in made.states} == {str}
+        with pytest.raises(ParameterError, match=r"Did you mean 'u_1'\?"):
+            sl.structure(M, K, names=given, contacts=[sl.Contact("u_11", 1.0, 1.0)])
+
+
+def test_a_free_mass_between_stops_needs_no_stiffness():
+    made = sl.structure([[1.0]], [[0.0]], contacts=[sl.Contact("x1", 1.0, 1.0, side="both")])
+    assert made.rhs(0.0, [3.0, 0.0]).tolist() == [0.0, -2.0]
+
+
 def test_a_record_of_something_else():
+    with pytest.raises(TraceError, match=r"sl\.recorded: points must ascend"):
+        sl.recorded([0, 1, 1], [0, 1, 2])
     with pytest.raises(UnitError, match="values are in m, and an acceleration is in m/s"):
         sl.structure(M, K, base=sl.Base("x", sl.recorded([0, 1], [0, 1], "mm")))
 
