@@ -31,6 +31,20 @@ from saltus.language.tables import Table, look_up
 LONGEST = 1000
 #: Deepest nesting of a formula: each level takes a few of Python's thousand nested calls.
 DEPTH = 200
+
+
+def _swept(
+    t: Any = None, first: Any = None, last: Any = None, rate: Any = None, **named: Any
+) -> Any:
+    """A sine whose frequency is swept, at a time. Raises TraceError unless all are given."""
+    if rate is None or named:
+        raise TraceError(
+            "in a formula a sweep is a value at a time: write sweep(t, first, last, rate), such "
+            "as 2*sweep(t, 5, 40, 5), from 5 Hz to 40 Hz by 5 Hz/s."
+        )
+    return sweep(first, last, rate)(t)
+
+
 #: Functions of formulas.
 FUNCTIONS: dict[str, Callable[..., Any]] = {
     **{name: getattr(language, name) for name in operations.FUNCTIONS},
@@ -38,7 +52,7 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "lankarani_nikravesh": lankarani_nikravesh, "flores": flores, "mod": mod, "play": play,
     "slider": slider,
     "square": square, "sawtooth": sawtooth, "pulse": pulse,
-    "sweep": lambda t, first, last, rate: sweep(first, last, rate)(t),
+    "sweep": _swept,
 }  # fmt: skip
 _CONSTANTS = {"pi": functions.pi}
 _BINARY: dict[type[ast.AST], Callable[[Any, Any], Any]] = {

@@ -113,6 +113,8 @@ def test_terms_and_tables_are_shared():
         ("x" * (LONGEST + 1), "1 to 1000 characters"), ("9**9**9**9", "has no value"),
         ("1/0", "has no value"),
         ("sin(x, v)", "has no value"),
+        ("sweep(5, 40, 5)", "write sweep\\(t, first, last, rate\\)"),
+        ("sweep(t, 5, 40, 5, amplitude=2)", "as 2\\*sweep\\(t, 5, 40, 5\\)"),
         ("nothing(x)", "there is no function 'nothing'"), ("xx", "Did you mean 'x'"),
         ("x if v else 1", "'v' is no condition"),
         ("~x", "'x' is no condition"), ("1e999*x", "must be finite"),
