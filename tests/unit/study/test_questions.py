@@ -496,5 +496,13 @@ def test_a_motion_that_ends_at_a_condition_says_so(tmp_path):
     for until, says in wrong.items():
         with pytest.raises(StudyError, match=says):
             Run(tmp_path / "wrong", f'{text}until = "{until}"\n')
+    far = text + '[system.outputs]\n"far edge" = "2*x"\n'
+    far = far.replace("periods = 3\n", "periods = 3\nuntil = \"'far edge' < 1 mm and v < 0 m/s\"\n")
+    Run(tmp_path / "far", far)
+    edge = load(next((tmp_path / "far").rglob("run.nc")))
+    assert edge.status.values.tolist() == ["until", "until"]
+    assert abs(edge.end_x[0] - 0.0005) < 1e-18
+    with pytest.raises(StudyError, match="write 'far edge' in quotes"):
+        Run(tmp_path / "wrong", far.replace("'far edge'", "far edge"))
     with pytest.raises(StudyError, match="Leave one"):
         Run(tmp_path / "wrong", text + 'until = "x > 1 m"\nkeep = 1\n')

@@ -86,9 +86,10 @@ def simulate(
         flow's own precision. Without ``periods`` and ``t_end`` the run ends at the last of them.
     until : str or callable, optional
         Condition at which a trajectory ends, at the instant at which it becomes true:
-        ``"x > 2 mm"``, ``"x > 2 mm and v < 0"``, or a function of (t, states, parameters) by their
-        names, ``lambda x: x > 2e-3``. A number, such as ``lambda x: x - 2e-3``, ends it where it
-        crosses zero. Its status is then ``until``; ``periods`` or ``t_end`` are the end of those
+        ``"x > 2 mm"``, ``"x > 2 mm and v < 0"``, with a name of several words in quotes,
+        ``"'stop force' > 5 N"``; or a function of (t, states, parameters) by their names,
+        ``lambda x: x > 2e-3``. A number, such as ``lambda x: x - 2e-3``, ends it where it crosses
+        zero. Its status is then ``until``; ``periods`` or ``t_end`` are the end of those
         for which it never does. Samples reach as far as the last end.
     keep : int
         Number of periods at the end whose samples and contacts are kept (default all); with ``at``
