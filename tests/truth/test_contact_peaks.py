@@ -1,5 +1,6 @@
 """Peak force, depth, duration and impulse of each contact of a transient, by closed forms."""
 
+import warnings
 from math import gamma, pi, sqrt
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 import saltus as sl
 from saltus.analysis.motion import contact_peaks
+from saltus.errors import ParameterError, SaltusWarning
 
 SEED = 6703
 
@@ -189,9 +191,37 @@ def test_what_is_no_contact_force_is_left_out():
 
 def test_long_runs_leave_the_peaks_out_unless_asked(monkeypatch):
     monkeypatch.setattr(contact_peaks, "MOST_CONTACTS", 10)
-    assert "contact_depth" not in contacts(onto_spring, (0.0, 1.0), 1.0)
-    assert "contact_depth" in contacts(onto_spring, (0.0, 1.0), 1.0, peaks=True)
-    assert "contact_depth" not in contacts(onto_spring, (0.0, 1.0), 0.1, peaks=False)
+    with pytest.warns(SaltusWarning, match="peaks=True") as heard:
+        many = contacts(onto_spring, (0.0, 1.0), 1.0)
+    (one,) = heard
+    assert f"{many.sizes['contact']} contacts are more than the 10 " in str(one.message)
+    assert one.filename == __file__
+    assert "contact_depth" not in many
+    with pytest.raises(ParameterError, match="peaks=True"):
+        sl.plot.contact_forces(many)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert "contact_depth" in contacts(onto_spring, (0.0, 1.0), 1.0, peaks=True)
+        assert "contact_depth" not in contacts(onto_spring, (0.0, 1.0), 0.1, peaks=False)
+
+
+def test_long_systems_have_fewer_peaks_by_default():
+    beam = sl.structure(
+        np.eye(20),
+        np.diag(np.arange(1e4, 3e4, 1e3)),
+        modes=20,
+        contacts=[sl.Contact("x1", stiffness=1e4, gap="1 mm")],
+    )
+    assert contact_peaks.most(beam) == 400  # 640 000/40**2
+    assert contact_peaks.most(onto_spring) == 10_000
+
+
+def test_each_of_many_guards_has_a_colour_of_its_own():
+    stops = [sl.Contact(f"x{i}", stiffness=1e4, gap="1 mm") for i in range(1, 13)]
+    row = sl.structure(np.eye(12), 1e3 * np.eye(12), modes=12, contacts=stops)
+    axes = sl.plot.contact_forces(contacts(row, (0.0,) * 12 + (1.0,) * 12, 0.5))
+    drawn = [line.get_color() for line in axes.lines if line.get_marker() == "o"]
+    assert len(drawn) == len({tuple(colour) for colour in drawn}) == 12
 
 
 def test_the_picture_has_a_stem_for_each_contact():

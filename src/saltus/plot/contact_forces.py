@@ -8,18 +8,17 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
+from saltus.errors import ParameterError
 from saltus.plot import axes as draw
 from saltus.plot import selection
+from saltus.plot.palette import hues
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, display_scale
 
 #: What a stem can show, the first that the result has.
-_HEIGHTS = ("contact_peak_force", "contact_impulse", "contact_speed")
+_HEIGHTS = ("contact_peak_force", "contact_impulse")
 #: Words for each on the axis.
-_WORDS = {
-    "contact_peak_force": "peak force", "contact_impulse": "impulse",
-    "contact_speed": "speed at contact",
-}  # fmt: skip
+_WORDS = {"contact_peak_force": "peak force", "contact_impulse": "impulse"}
 
 
 @picture()
@@ -47,9 +46,16 @@ def contact_forces(
     Raises
     ------
     ParameterError
-        If ``ds`` is not from ``impact_statistics``, or there is no such trajectory.
+        If ``ds`` is not from ``impact_statistics``, there is no such trajectory, or its contacts
+        have neither a peak force nor an impulse.
     """
-    shown = next(n for n in _HEIGHTS if (n in ds and _known(ds, n)) or n == _HEIGHTS[-1])
+    shown = height_of(ds)
+    if shown is None:
+        raise ParameterError(
+            "this result has contacts, but no peak force and no impulse of any. Compute it with "
+            "sl.impact_statistics(..., peaks=True); where that finds no force in the equations, "
+            "give it by force=."
+        )
     mine = np.isfinite(ds[shown].values)
     if trajectory is not None and "contact_trajectory" in ds:
         mine &= np.isin(ds["contact_trajectory"].values, selection.chosen(ds, trajectory))
@@ -61,9 +67,11 @@ def contact_forces(
         if not mine.any():
             draw.say(panel, "No contact in the observed time.", ds)
             return panel
-        for i, name in enumerate(ds["guard"].values.tolist()):
+        names = ds["guard"].values.tolist()
+        colours = CYCLE if len(names) <= len(CYCLE) else hues(len(names))
+        for i, name in enumerate(names):
             if (rows := guards == name).any():
-                colour = CYCLE[i % len(CYCLE)]
+                colour = colours[i]
                 top = height[rows] * y.factor
                 panel.vlines(time[rows] * x.factor, 0.0, top, color=colour, linewidth=0.8)
                 panel.plot(
@@ -78,5 +86,10 @@ def contact_forces(
     return panel
 
 
-def _known(ds: xr.Dataset, name: str) -> bool:
-    return bool(np.isfinite(ds[name].values).any())
+def height_of(ds: xr.Dataset) -> str | None:
+    """The variable that stems show; None if a result with contacts has neither forces nor
+    impulses.
+    """
+    if not ds.sizes["contact"]:
+        return "contact_speed"  # there is no contact to show
+    return next((n for n in _HEIGHTS if n in ds and np.isfinite(ds[n].values).any()), None)

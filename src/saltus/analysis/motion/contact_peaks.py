@@ -4,6 +4,7 @@ instants at which the flow knows it.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -12,6 +13,7 @@ import numpy as np
 from saltus.analysis.motion.touchdowns import Touchdowns
 from saltus.analysis.motion.window import Stretch
 from saltus.contact.guards import Guard
+from saltus.errors import SaltusWarning
 from saltus.flow import polynomials
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
@@ -109,9 +111,22 @@ def with_found(
     return replace(found, impulse=impulse), {"<impulse>": of_impulse, "<force>": unit}
 
 
-def are_few(system: System, contacts: int) -> bool:
-    """True if the peaks of so many contacts are found within seconds."""
-    return contacts * max(1.0, (len(system.states) / FEW_STATES) ** 2) <= MOST_CONTACTS
+def most(system: System) -> int:
+    """Contacts whose peaks are found within seconds."""
+    return int(MOST_CONTACTS / max(1.0, (len(system.states) / FEW_STATES) ** 2))
+
+
+def warn_of_many(system: System, contacts: int) -> None:
+    """Say that peaks are left out, at the line of the user's call; rigid stops have none."""
+    if contacts > most(system) and any(guard.law is None for guard in system.guards):
+        warnings.warn(
+            f"{system.name}: {contacts} contacts are more than the {most(system)} whose peak "
+            f"forces, depths and impulses are found by default (of {len(system.states)} states), "
+            f"so these are left out. For all of them give peaks=True, in a study file peaks = "
+            f"true; it takes longer.",
+            SaltusWarning,
+            stacklevel=4,
+        )
 
 
 # -- peaks -----------------------------------------------------------------------------------------

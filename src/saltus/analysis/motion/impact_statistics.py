@@ -88,7 +88,7 @@ def impact_statistics(
     peaks : bool, optional
         Whether to find the peak force and the depth of every contact, from the series of the
         motion in it: by default of 10 000 contacts at most, of systems with N > 8 states of
-        640 000/N^2 at most.
+        640 000/N^2 at most. Where there are more, a warning says so.
     bins : int or sequence of float
         Bins of the histogram of speeds: how many between zero and the largest one, or their edges
         [unit of the gap per second].
@@ -176,7 +176,8 @@ def impact_statistics(
     def answer(outcome: Outcome) -> xr.Dataset:
         found = touchdowns.find(seen, outcome, sides, columns)
         ask = partial(_dataset, system, method, seen, sides, found, bins, outcome)
-        if not (contact_peaks.are_few(system, len(found.guard)) if peaks is None else peaks):
+        few = len(found.guard) <= contact_peaks.most(system)
+        if not (few if peaks is None else peaks):
             return ask()
         try:
             tops = contact_peaks.peaks(seen, method, sides, own, outcome, found)
@@ -188,6 +189,8 @@ def impact_statistics(
         extended, method, seen.request(extended, begin, record=True), answer, threads, progress
     )
     warn(result)
+    if peaks is None:
+        contact_peaks.warn_of_many(system, result.sizes["contact"])
     return result
 
 

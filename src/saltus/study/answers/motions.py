@@ -187,10 +187,12 @@ class Statistics(OfMotions):
     picture = "impacts"
 
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
-        """The histogram of speeds, and the forces of the contacts."""
+        """The histogram of speeds, and the forces of the contacts where they are known."""
         from saltus import plot
+        from saltus.plot.contact_forces import height_of
 
-        contacts = {"-forces": first_figure(plot.contact_forces(ds))} if ds.sizes["contact"] else {}
+        known = ds.sizes["contact"] and height_of(ds) is not None
+        contacts = {"-forces": first_figure(plot.contact_forces(ds))} if known else {}
         return {**super().pictures(ds), **contacts}
 
     def check_more(self, table: Any, setting: Setting) -> None:
