@@ -246,3 +246,93 @@ def test_a_floor_at_zero_touches_where_it_pushes():
     depth = 9.81e-4 + sqrt(9.81e-4**2 + 2 * 9.81e-4)  # energy: k d^2/2 = m g (h + d)
     np.testing.assert_allclose(found.contact_depth[0], depth, rtol=1e-12)
     np.testing.assert_allclose(found.contact_peak_force[0], 1e4 * depth, rtol=1e-12)
+
+
+def one_mass(modes, contact):
+    """A driven mass, as it is or as its mode, whose shape is 1/sqrt(4 kg)."""
+    return sl.structure(
+        [[4.0]], [[400.0]], [[0.4]], modes=modes, names="x", frequency=2,
+        forces=[sl.Force("x", 5.0)], contacts=[contact],
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        {"stiffness": 1e5},
+        {"stiffness": 1e7, "power": 1.5},
+        {"stiffness": 1e5, "damping": 20.0, "side": "both"},
+        {"restitution": 0.5},
+        {"restitution": 0.6, "side": "lower"},
+    ],
+)
+def test_a_mode_has_the_contacts_of_its_mass(law):
+    """Gaps of modal coordinates are larger by sqrt(mass), forces on them smaller."""
+    contact = sl.Contact("x", gap="5 mm", **law)
+    whole, modal = (
+        contacts(one_mass(modes, contact), (0, 0), 6.0).drop_vars("guard") for modes in (None, 1)
+    )
+    names = [name for name in whole.data_vars if name.startswith("contact_")]
+    assert whole.sizes["contact"] > 8
+    for name in [*names, "speed_mean", "impulse_max"]:
+        assert modal[name].attrs["units"] == whole[name].attrs["units"], name
+        if whole[name].dtype.kind == "f":
+            np.testing.assert_allclose(modal[name], whole[name], rtol=1e-6, err_msg=name)
+    units = {"contact_speed": "m/s", "contact_depth": "m", "contact_impulse": "N*s"}
+    for name, unit in (units | {"contact_exit_speed": "m/s", "speed_max": "m/s"}).items():
+        assert modal[name].attrs["units"] == unit
+    assert set(modal.guard_units.values[:1]) == {"m"}
+
+
+def two_masses(*stops):
+    return sl.structure(
+        np.eye(2), [[4e3, 0], [0, 9e3]], modes=2, damping_ratio="1 %", names="x y", frequency=5,
+        forces=[sl.Force("x", 20.0), sl.Force("y", 30.0)], contacts=list(stops),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "second", [{"restitution": 0.5}, {"stiffness": "1 MN/m^1.5", "power": 1.5}]
+)
+def test_stops_of_two_kinds_have_each_its_impulse(second):
+    """The masses are apart, so each stop does as if it were alone."""
+    stops = [
+        sl.Contact("x", stiffness="50 kN/m", gap="1 mm", name="soft"),
+        sl.Contact("y", gap="0.5 mm", name="other", **second),
+    ]
+    rest, compared = (0.0,) * 4, ("contact_impulse", "contact_speed", "contact_exit_speed")
+    found = contacts(two_masses(*stops), rest, 2.0)
+    for stop in stops:
+        part = contacts(two_masses(stop), rest, 2.0)
+        mine, own = (one.isel(contact=one.contact_guard == stop.name) for one in (found, part))
+        assert np.isfinite(own.contact_impulse[:-1]).all()
+        for what in compared:
+            np.testing.assert_allclose(mine[what], own[what], rtol=1e-6, err_msg=what)
+    for name in ("contact_impulse", "impulse_mean"):
+        assert found[name].attrs["units"] == "N*s"
+    assert found.contact_peak_force.attrs["units"] == "N"
+    assert found.contact_depth.attrs["units"] == "m"
+    assert found.speed_mean.attrs["units"] == "m/s"
+
+
+def test_impulses_of_stops_in_another_unit_are_left_out_and_it_is_said():
+    @sl.system(states="x v", units={"x": "m", "v": "m/s"})
+    def mixed(t, x, v, *, m="2 kg", k="1 kN/m", gap="1 cm", far="2 cm"):
+        soft = sl.freeplay(x, stiffness=k, upper_gap=gap)
+        return v, -soft / m, sl.impact(x > -far, -v, restitution=0.9)
+
+    with pytest.warns(SaltusWarning, match="inertia=") as heard:
+        found = contacts(mixed, (0.0, 1.0), 1.0)
+    assert [one.filename for one in heard] == [__file__]
+    soft = found.contact_guard.values == "gap"
+    assert 1 < soft.sum() < soft.size
+    assert found.contact_impulse.attrs["units"] == "N*s"
+    speed = found.contact_speed.values[soft][:-1]
+    np.testing.assert_allclose(np.abs(found.contact_impulse[soft][:-1]), 2 * 2 * speed, rtol=1e-12)
+    assert np.isnan(found.contact_impulse[~soft]).all()
+
+
+def test_no_contact_has_no_speed_in_words():
+    none = contacts(one_mass(1, sl.Contact("x", stiffness=1e5, gap="9 m")), (0, 0), 1.0)
+    assert "nan" not in sl.describe(none)
+    sl.plot.contact_forces(none)

@@ -14,7 +14,7 @@ import sys
 from types import ModuleType
 
 from saltus.system.checks import check_values
-from saltus.system.guard_units import gap_units
+from saltus.system.guard_units import gap_units, written_gaps
 from saltus.system.regularisation import regularise
 from saltus.system.structures import (
     Base,
@@ -30,7 +30,7 @@ from saltus.system.trace import system
 
 __all__ = [
     "Base", "Contact", "Force", "System", "acceleration", "check_values", "contact_force",
-    "gap_units", "regularise", "structure", "system", "velocity",
+    "gap_units", "regularise", "structure", "system", "velocity", "written_gaps",
 ]  # fmt: skip
 
 

@@ -56,6 +56,8 @@ def _with_factors(system: System, field: tuple[Expr, ...], term: Expr) -> Expr:
     units = units_of(system.states, system.units, field, [*chain, *whole])
     if "N" in units:
         return [*chain, *whole][units.index("N")]
+    if _spring_unit(system, term):
+        return term  # of a structure: the factors are its mode shapes
     products = next((i for i, node in enumerate(chain) if node.op == "div"), len(chain))
     return chain[products - 1]
 
@@ -101,18 +103,27 @@ def _is_zero_apart(term: Expr, sides: np.ndarray) -> bool:
 def force_unit(system: System, formulas: Mapping[int, Expr]) -> str:
     """The unit that all these forces share, ``""`` if it isn't known."""
     rates = free_field(system.field, system.guards)
-    units = set(units_of(system.states, system.units, rates, list(formulas.values())))
-    if units == {""} and all(_is_of_springs(system, one) for one in formulas.values()):
-        return "N"  # depths of structures are sums of modes, whose units aren't known
+    known = units_of(system.states, system.units, rates, list(formulas.values()))
+    # depths of structures are sums of modes, whose units aren't known
+    units = {
+        unit or _spring_unit(system, one)
+        for unit, one in zip(known, formulas.values(), strict=True)
+    }
     return units.pop() if len(units) == 1 else ""
 
 
-def _is_of_springs(system: System, term: Expr) -> bool:
-    """True if every piece of a force is zero, or a sum with a stiffness [N/m] times something."""
+def _spring_unit(system: System, term: Expr) -> str:
+    """N or N*m if every piece of a force is zero, or a sum with a stiffness [N/m or N/m^p, N*m/rad]
+    times something; ``""`` for any other.
+    """
     if term.op == "select":
-        return all(_is_of_springs(system, piece) for piece in term.args)
+        found = {_spring_unit(system, piece) for piece in term.args if not _is_zero(piece)}
+        return found.pop() if len(found) == 1 else ""
     if term.op in ("add", "sub", "neg"):
-        return any(_is_of_springs(system, part) and not _is_zero(part) for part in term.args)
+        return next(filter(None, (_spring_unit(system, part) for part in term.args)), "")
     factors = term.args if term.op == "mul" else ()
-    springs = [one for one in factors if one.op == "param" and system.units[one.payload] == "N/m"]
-    return _is_zero(term) or bool(springs)
+    stiffnesses = [system.units[one.payload] for one in factors if one.op == "param"]
+    for start, unit in (("N/m", "N"), ("N*m/rad", "N*m")):
+        if any(own == start or own.startswith(f"{start}^") for own in stiffnesses):
+            return unit
+    return ""

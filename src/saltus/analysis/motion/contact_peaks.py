@@ -5,7 +5,7 @@ instants at which the flow knows it.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,11 +21,13 @@ from saltus.flow.motion_series import MotionSeries, Nodes, Pieces
 from saltus.flow.pieces import watched_system
 from saltus.flow.request import Outcome
 from saltus.interrupt import check_stop
-from saltus.language.expression import Expr
-from saltus.system import System
+from saltus.language.derivatives import gradient
+from saltus.language.expression import Expr, constant, div, mul, walk
+from saltus.system import System, written_gaps
 from saltus.system.contact_forces import force_unit, forces_in_equations
 from saltus.system.quantity import formula_of
 from saltus.system.read_off import Quantity, quantity
+from saltus.units import dimension
 
 #: Contacts whose peaks are found unless more are asked for: some seconds. Of systems of more than
 #: eight states they are fewer, by the square of the states.
@@ -33,6 +35,8 @@ MOST_CONTACTS = 10_000
 FEW_STATES = 8
 #: Parts of contacts whose series are made at a time: some tens of megabytes.
 WIDTH = 256
+#: In place of a unit: there is no such impulse.
+NONE = "none"
 #: Share of a part of a contact that may be missing at its end: rounding.
 MISSING = 1e-9
 
@@ -93,22 +97,92 @@ def forces_of(
     return ContactForces(formulas, extended.guards, frozenset(found.keys() - given.keys()))
 
 
+def impulse_units(system: System, forces: ContactForces, peaks: bool) -> tuple[str, str, str]:
+    """Units of the forces, of their impulses, and of those of rigid stops; ``none`` where there are
+    none.
+    """
+    known = {g: one for g, one in forces.formulas.items() if peaks or g not in forces.found}
+    unit = "N"
+    if forces.found & known.keys():
+        unit = force_unit(system, {g: known[g] for g in forces.found})
+    of_impulse = {"N": "N*s", "m/s^2": "m/s"}.get(unit, f"{unit}*s" if unit else "")
+    stops = [g for g, guard in enumerate(system.guards) if g not in known and _is_stop(guard)]
+    return (
+        unit,
+        of_impulse if known else NONE,
+        _impulse_of_stops(system, stops) if stops else NONE,
+    )
+
+
 def with_found(
-    system: System, found: Touchdowns, forces: ContactForces, tops: Peaks, words: dict[str, str]
+    system: System, found: Touchdowns, forces: ContactForces, tops: Peaks | None
 ) -> tuple[Touchdowns, dict[str, str]]:
     """The contacts with the impulses of forces in the equations, and the units of forces and
-    impulses; impulses of another unit than that of stops are left out.
+    impulses; impulses of stops in another unit than that of forces are left out.
     """
-    if not forces.found:
-        return found, words
-    unit = force_unit(system, {g: forces.formulas[g] for g in forces.found})
-    of_impulse = {"N": "N*s", "m/s^2": "m/s"}.get(unit, f"{unit}*s" if unit else "")
-    if found.impulse is not None and of_impulse != words["<impulse>"]:
-        return found, {**words, "<force>": unit}
-    known = np.full(len(found.guard), np.nan) if found.impulse is None else found.impulse
-    own = np.isin(found.guard, list(forces.found))
-    impulse = np.where(own, tops.impulse, known)
-    return replace(found, impulse=impulse), {"<impulse>": of_impulse, "<force>": unit}
+    unit, of_forces, of_stops = impulse_units(system, forces, tops is not None)
+    words = {"<impulse>": of_stops if of_forces == NONE else of_forces, "<force>": unit}
+    if tops is not None and forces.found:
+        known = np.full(len(found.guard), np.nan) if found.impulse is None else found.impulse
+        own = np.isin(found.guard, list(forces.found))
+        found = replace(found, impulse=np.where(own, tops.impulse, known))
+    if found.impulse is not None and NONE not in (of_forces, of_stops) and of_forces != of_stops:
+        rigid = np.array([guard.law is not None for guard in system.guards])[found.guard]
+        rigid &= ~np.isin(found.guard, list(forces.formulas))
+        found = replace(
+            found,
+            impulse=np.where(rigid, np.nan, found.impulse),
+            struck=np.where(rigid, np.nan, found.struck),
+        )
+    return found, words
+
+
+def warn_of_stops(system: System, forces: ContactForces, peaks: bool) -> None:
+    """Say that impulses of rigid stops are left out, at the line of the user's call."""
+    _, of_forces, of_stops = impulse_units(system, forces, peaks)
+    if NONE not in (of_forces, of_stops) and of_forces != of_stops:
+        warnings.warn(
+            f"{system.name}: impulses of rigid stops [{of_stops or 'unknown unit'}] have another "
+            f"unit than those of forces [{of_forces or 'unknown unit'}], so those of the stops are "
+            f"left out. Give sl.impact the masses by inertia=.",
+            SaltusWarning,
+            stacklevel=4,
+        )
+
+
+def _is_stop(guard: Guard) -> bool:
+    return guard.law is not None and guard.law.mass is not None
+
+
+def _impulse_of_stops(system: System, stops: Sequence[int]) -> str:
+    """The unit that the impulses of rigid stops share: that of a velocity where no inertia is
+    given, ``""`` if it isn't known.
+    """
+    written, found = written_gaps(system)[1], set()
+    for number in stops:
+        law = system.guards[number].law
+        assert law is not None
+        assert law.constraint is not None
+        assert law.mass is not None
+        states = [node.payload for node in walk(law.constraint) if node.op == "state"]
+        own = system.units[states[0]]
+        slope = gradient(law.constraint, states[:1])[0]
+        alone = len(states) == 1 and law.mass is div(constant(1.0), mul(slope, slope))
+        if alone and "kg" not in (dimension(own) if own else ()):
+            found.add(own)
+        else:  # of coordinates of modes, the mass is 1 without a unit
+            found.add("N*m*s" if written[number] == "rad" else "N*s")
+    return found.pop() if len(found) == 1 else ""
+
+
+def as_written(
+    system: System, found: Touchdowns, tops: Peaks | None
+) -> tuple[Touchdowns, Peaks | None, list[str]]:
+    """Speeds and depths of the gaps as they were written, and the units of these gaps."""
+    scales, units = written_gaps(system)
+    scale = scales[found.guard]
+    found = replace(found, speed=scale * found.speed, exit_speed=scale * found.exit_speed)
+    return found, tops and replace(tops, depth=scale * tops.depth), units
 
 
 def most(system: System) -> int:

@@ -18,6 +18,7 @@ from saltus.analysis.motion.contact_peaks import ContactForces, Peaks
 from saltus.analysis.motion.touchdowns import Touchdowns
 from saltus.analysis.motion.window import Stretch, computed, dataset, stretch
 from saltus.analysis.outcome_messages import warn
+from saltus.contact.guards import is_hold
 from saltus.errors import ParameterError, must_be, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.methods import Method, check_method
@@ -25,7 +26,6 @@ from saltus.flow.request import Outcome, Schedule
 from saltus.flow.room import check_room
 from saltus.interrupt import Interrupted
 from saltus.language.evaluate import evaluate
-from saltus.language.expression import walk
 from saltus.results.dataset import schema
 from saltus.system import System
 from saltus.system.contact_forces import side_that_pushes
@@ -175,7 +175,7 @@ def impact_statistics(
 
     def answer(outcome: Outcome) -> xr.Dataset:
         found = touchdowns.find(seen, outcome, sides, columns)
-        ask = partial(_dataset, system, method, seen, sides, found, bins, outcome)
+        ask = partial(_dataset, system, method, seen, sides, found, bins, outcome, own)
         few = len(found.guard) <= contact_peaks.most(system)
         if not (few if peaks is None else peaks):
             return ask()
@@ -183,7 +183,7 @@ def impact_statistics(
             tops = contact_peaks.peaks(seen, method, sides, own, outcome, found)
         except KeyboardInterrupt:
             raise Interrupted(ask) from None
-        return ask(own, tops)
+        return ask(tops)
 
     result = computed(
         extended, method, seen.request(extended, begin, record=True), answer, threads, progress
@@ -191,6 +191,7 @@ def impact_statistics(
     warn(result)
     if peaks is None:
         contact_peaks.warn_of_many(system, result.sizes["contact"])
+    contact_peaks.warn_of_stops(system, own, "contact_depth" in result)
     return result
 
 
@@ -241,14 +242,16 @@ def _dataset(
     found: Touchdowns,
     bins: Any,
     outcome: Outcome,
-    forces: ContactForces | None = None,
+    forces: ContactForces,
     tops: Peaks | None = None,
 ) -> xr.Dataset:
     """The contacts and their statistics, by name."""
     size, guards = seen.group.size, len(system.guards)
-    words = {"<impulse>": _impulse_unit(system), "<force>": "N"}
-    if forces is not None and tops is not None:
-        found, words = contact_peaks.with_found(system, found, forces, tops, words)
+    found, words = contact_peaks.with_found(system, found, forces, tops)
+    found, tops, units = contact_peaks.as_written(system, found, tops)
+    common = {unit for unit, one in zip(units, system.guards, strict=True) if not is_hold(one)}
+    if len(common) == 1:
+        words |= {"<gap>": (gap := common.pop()), "<gap rate>": schema.rate_unit(gap)}
     ends = np.searchsorted(found.trajectory, np.arange(size + 1))
     cells = [
         (i, g, ends[i] + np.flatnonzero(found.guard[ends[i] : ends[i + 1]] == g))
@@ -267,7 +270,7 @@ def _dataset(
         put("speed_histogram", i, g, np.histogram(found.speed[rows], edges)[0])
         for name, value in {**_rates(seen, found, i, g, rows), **_sizes(found, rows)}.items():
             put(name, i, g, value)
-        if tops is not None and forces is not None and forces.formulas:
+        if tops is not None and forces.formulas:
             put("peak_force", i, g, _largest(np.abs(tops.force[rows])))
     names = np.array([guard.name for guard in system.guards], dtype=np.str_)
     columns = {
@@ -294,28 +297,22 @@ def _dataset(
             zip(system.outputs.names, known[:, size:].T, strict=True)
         )
     if tops is not None:
-        if forces is not None and forces.formulas:
+        if forces.formulas:
             columns["contact_peak_force"] = tops.force
         columns["contact_depth"] = tops.depth
     columns |= {"contact_side": sides, "speed_low": edges[:-1], "speed_high": edges[1:]}
-    return dataset(schema.IMPACTS, seen, system, method, outcome, columns, each, words=words)
+    result = dataset(schema.IMPACTS, seen, system, method, outcome, columns, each, words=words)
+    return _with_own_units(result, system, units)
 
 
-def _impulse_unit(system: System) -> str:
-    """Unit of impulses: that of a velocity where all are relative to the mass."""
-    laws = [
-        (guard.law.mass, guard.law.constraint)
-        for guard in system.guards
-        if guard.law and guard.law.mass is not None and guard.law.constraint is not None
-    ]
-    units = {
-        system.units.get(node.payload, "")
-        for _, velocity in laws
-        for node in walk(velocity)
-        if node.op == "state"
-    }
-    relative = laws and all(mass.op == "const" for mass, _ in laws)
-    return units.pop() if relative and len(units) == 1 else "N*s"
+def _with_own_units(result: xr.Dataset, system: System, units: list[str]) -> xr.Dataset:
+    """The result with the units of gaps as written; a boundary has that of its state."""
+    bounded = {system.units[guard.state] for guard in system.guards if guard.state is not None}
+    named = result["guard_units"]
+    result["guard_units"] = (named.dims, np.array(units, np.str_), named.attrs)
+    if "guard_boundary" in result:
+        result["guard_boundary"].attrs["units"] = bounded.pop() if len(bounded) == 1 else ""
+    return result
 
 
 def _edges(bins: Any, speed: np.ndarray) -> np.ndarray:

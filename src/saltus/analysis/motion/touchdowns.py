@@ -13,6 +13,7 @@ from saltus.flow.request import Outcome
 from saltus.kernels import status as st
 from saltus.language.evaluate import evaluate
 from saltus.system import System
+from saltus.system.quantity import rate_of
 
 
 @dataclass(frozen=True)
@@ -105,9 +106,9 @@ def find(
     first, final, impacts, last = pairs.T
     ended = final >= 0
     speed = np.abs(contacts.velocity)
-    after, mass = _rebounds(seen, contacts)
-    after = np.where(struck, after, speed)
-    summed = _summed_up(contacts, mass, speed, after)
+    after, momentum = _rebounds(seen, contacts)
+    after = np.where(struck, after, np.where(contacts.kind == st.RELEASE, 0.0, speed))
+    summed = _summed_up(contacts, momentum, speed, after)
     held = np.where(contacts.kind[first] == st.HOLD, summed[first], 0.0)
     impulse = _impulses(seen, outcome, first, final, integrals)
     return Touchdowns(
@@ -127,10 +128,11 @@ def find(
 
 
 def _rebounds(seen: Stretch, contacts: ContactTable) -> tuple[np.ndarray, np.ndarray]:
-    """Rebound speed at an impact's guard, and its impulse per unit of the change of speed,
-    float64[c]; zero for other contacts.
+    """Rate of the gap after an impact, and the momentum of the rebound, float64[c]; zero for other
+    contacts. The gap may be scaled: 2*x < 1 is x < 0.5.
     """
-    system, speed, mass = seen.system, np.zeros(len(contacts)), np.zeros(len(contacts))
+    system = seen.system
+    speed, momentum = np.zeros(len(contacts)), np.zeros(len(contacts))
     values = dict(zip(system.values, seen.group.parameters.T, strict=True))
     if len(seen.group.parameters) > 1:
         values = {name: column[contacts.trajectory] for name, column in values.items()}
@@ -138,15 +140,15 @@ def _rebounds(seen: Stretch, contacts: ContactTable) -> tuple[np.ndarray, np.nda
     bits = [(contacts.mode_after >> i) & 1 == 1 for i in range(len(system.guards))]
     for g, guard in enumerate(system.guards):
         if guard.law and guard.law.mass is not None and guard.law.constraint is not None:
-            wanted = [guard.law.constraint, guard.law.mass]
+            wanted = [rate_of(system, guard.gap), guard.law.constraint, guard.law.mass]
             found = evaluate(wanted, t=contacts.time, states=states, values=values, bits=bits)
             speed = np.where(contacts.guard == g, np.abs(found[0]), speed)
-            mass = np.where(contacts.guard == g, found[1], mass)
-    return speed, mass
+            momentum = np.where(contacts.guard == g, found[2] * np.abs(found[1]), momentum)
+    return speed, momentum
 
 
 def _summed_up(
-    contacts: ContactTable, mass: np.ndarray, speed: np.ndarray, after: np.ndarray
+    contacts: ContactTable, momentum: np.ndarray, speed: np.ndarray, after: np.ndarray
 ) -> np.ndarray:
     """Impulses that are summed up where a chatter isn't followed to its end, float64[c]. In the row
     of its last impact: that of the missing impacts, ``m v (1 + e)/(1 - e)`` from a rebound v. In
@@ -156,9 +158,9 @@ def _summed_up(
     result = np.zeros(len(contacts))
     last = np.flatnonzero(contacts.chatters[:-1] & (contacts.kind[1:] == st.HOLD))
     last = last[after[last] > 0]
-    momentum, lost = mass[last] * after[last], 1.0 - after[last] / speed[last]
-    result[last] = momentum * (2.0 - lost) / lost
-    result[last + 1] = -2.0 * momentum / lost
+    lost = 1.0 - after[last] / speed[last]
+    result[last] = momentum[last] * (2.0 - lost) / lost
+    result[last + 1] = -2.0 * momentum[last] / lost
     return result
 
 

@@ -96,11 +96,10 @@ def account(ds: xr.Dataset) -> list[str]:
         rate, share = (
             float(one[key].mean()) for key in ("contacts_per_second", "share_in_contact")
         )
-        speed = sized(one["speed_mean"].mean(keep_attrs=True))
-        peak = _peak(one)
+        mean = one["speed_mean"].mean(keep_attrs=True)
+        speed = f" at {sized(mean)} on average," if np.isfinite(mean) else ""
         lines.append(
-            f"  {name}: {rate:.4g} a second, at {speed} on average, in contact {share:.2%} of the "
-            f"time{peak}"
+            f"  {name}: {rate:.4g} a second,{speed} in contact {share:.2%} of the time{_peak(one)}"
         )
     return lines
 
