@@ -47,8 +47,7 @@ def _of_summand(system: System, gap: Expr) -> str:
 
 
 def written_gaps(system: System) -> tuple[np.ndarray, list[str]]:
-    """How much larger the gaps as they were written are than those of the guards, float64[guard],
-    and their units.
+    """Ratio of each gap as it was written to that of its guard, float64[guard], and its unit.
 
     The guard of ``0.5*q - gap > 0`` is that of ``q > gap/0.5``. Where the coordinate q of a mode
     has a unit of its own, the gap is as large as written in the unit of its parameter.
