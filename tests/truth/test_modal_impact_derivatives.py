@@ -58,6 +58,7 @@ def test_start_beyond_a_stop_has_no_derivative():
     np.testing.assert_allclose(found, exact, rtol=0, atol=1e-12)
 
 
+@pytest.mark.nojit
 def test_contact_that_comes_to_rest_by_chatter_leaves_the_others_free():
     """Two masses, the first of which comes to rest and is released again. The remainder of the
     chatter is completed at 1e-8.
@@ -76,6 +77,7 @@ def test_contact_that_comes_to_rest_by_chatter_leaves_the_others_free():
     np.testing.assert_allclose(found, exact, rtol=0, atol=1e-8 * np.abs(exact).max())
 
 
+@pytest.mark.nojit
 @pytest.mark.parametrize("restitution", [0.0, 0.3])
 def test_bodies_that_stay_together_share_their_momentum(restitution):
     """One comes to rest on the other: both velocities change, by their inertias."""

@@ -126,6 +126,7 @@ def test_modes_that_go_together_while_a_contact_rests():
     np.testing.assert_allclose(run["z"].values, 2.0 + 4.0 * t - 0.5 * 9.81 * t**2, atol=1e-12)
 
 
+@pytest.mark.nojit
 def test_a_record_that_pulls_releases_a_contact_at_rest_at_its_break():
     """A square wave presses a body onto its stop and pulls it off again, at whole seconds."""
 
@@ -145,6 +146,7 @@ def pair(t, x, y, v, u, *, w=3.0, gap=0.1):
     return v, u, 3.0 * sl.cos(w * t) - 4.0 * x, -3.0 * y, law
 
 
+@pytest.mark.nojit
 def test_contacts_at_rest_are_released_together_at_a_break():
     """What presses them jumps to the other side, and grows again from there."""
 
@@ -160,6 +162,7 @@ def test_contacts_at_rest_are_released_together_at_a_break():
     assert times(run, "release").tolist() == pytest.approx([1.0, 1.0], abs=1e-15)
 
 
+@pytest.mark.nojit
 def test_states_before_impacts_are_told():
     modal, taylor = runs(pair, np.zeros(4), periods=20)
     assert modal.sizes["contact"] > 10
