@@ -236,7 +236,7 @@ class Modal(Method):
 
     Drives are harmonic, or polynomials of time between breaks: records, square waves, saw-teeth,
     pulses. Modes that don't go their own ways - critical damping, rigid bodies, resonance - go
-    together. The modes of one system take 256 MB at most.
+    together. The modes of one system take 1 GB at most.
 
     A gap is followed by the modes that matter and bounded by the others, so that no contact is
     missed; the instant of a contact is a zero of all modes, to rounding. At a rigid stop
