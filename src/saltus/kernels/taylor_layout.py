@@ -210,7 +210,7 @@ def workspace():
     slow = Slow(
         q=np.zeros(ORDER + 1), b=np.zeros((DEEPEST + 2, ORDER + 1)),
         bounds=np.zeros((DEEPEST + 2, 2)), rates=np.zeros(ORDER + 1),
-        out=np.zeros(2), gaps=np.zeros(4 * guards), state=np.zeros((5 if LAWS else 1) * NSTATES),
+        out=np.zeros(2), gaps=np.zeros(5 * guards), state=np.zeros((5 if LAWS else 1) * NSTATES),
         touches=np.zeros((MOST_TOUCHES, 2)),
         held=np.zeros(HELD * NCLOCKS), numbers=np.zeros((NUMBERS + 1) * NCLOCKS),
     )  # fmt: skip

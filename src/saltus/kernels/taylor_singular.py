@@ -33,6 +33,7 @@ from saltus.kernels.lanes import (
     splat,
     store,
 )
+from saltus.kernels.status import SURFACE_LAW
 
 
 @inner
@@ -233,8 +234,22 @@ def gap_at(lanes, g, d):
 
 
 @inner
+def hold_ridden(lanes, side):
+    """Set the hold guards of the surfaces that this step rides: what was left out holds them, and
+    leads off neither side.
+    """
+    for lane in range(LANES):
+        rides = lanes.memo[lane, RESTS] if lanes.memo[lane, DECIDED] == 1 else 0
+        for g in range(NGUARDS):
+            if LAW[g] == SURFACE_LAW and (rides >> g) & 1 == 1:
+                lanes.side[PARTNER[g], lane] = side
+
+
+@inner
 def add_what_was_left_out(lanes, d):
     """Add to the states at d the integral of the terms that were set aside."""
+    if LAWS:
+        hold_ridden(lanes, 1.0)
     for j in range(NSINGULAR):
         aside = (
             (load(lanes.side, NGUARDS + j, LANES) > 0.0)
@@ -256,6 +271,8 @@ def add_what_was_left_out(lanes, d):
                 gained = integral(lanes, i, d, starts, ends)
                 value = load(lanes.y, i, LANES)
                 store(lanes.y, i, select(aside & (magnitude(gained) < HUGE), value + gained, value))
+    if LAWS:
+        hold_ridden(lanes, -1.0)
 
 
 @inner
