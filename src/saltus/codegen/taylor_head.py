@@ -67,8 +67,9 @@ def gaps_function(system: System, clocks: Clocks) -> str:
             if guard.law.kind == "impact":
                 rough = guard.law.remaining is not None
                 pivot = guard.law.remaining if rough else ex.constant(1.0)
-            size = size_of_terms(guard.gap) if guard.law.partner >= 0 else None
-            behind = (guard.law.drive, pivot, guard.law.constraint, size)
+            constraint = guard.law.constraint
+            sizes = () if constraint is None else map(size_of_terms, (guard.gap, constraint))
+            behind = (guard.law.drive, pivot, constraint, *sizes)
             held += [
                 f"out[{(1 + block) * count + i}] = {code.value(value)}"
                 for block, value in enumerate(behind)

@@ -102,7 +102,8 @@ def first_place(lanes, lane, g, h, slow, count):
         sign = side_of_leaving(slow.q, ORDER, True, noise)
     elif not fresh and sign < 0 and slow.q[0] > -noise:  # it may have reversed at the node
         sign = 1 if side_of_leaving(slow.q, ORDER, False, noise) > 0 else -1
-    if sign == 0 and LAW[g] == HOLD_LAW and LAW[PARTNER[g]] == SURFACE_LAW:
+    holds = LAW[g] == HOLD_LAW and not sets_aside(lanes, lane)
+    if sign == 0 and holds and LAW[PARTNER[g]] == SURFACE_LAW:
         return 0.0, count  # its force has gone: it holds nothing
     if sign == 0:
         lanes.memo[lane, RESTS] |= 1 << g  # it is ridden

@@ -9,6 +9,7 @@ it isn't. docs/decisions/0040.
 
 import math
 
+from saltus.kernels.isolation import ROUNDING
 from saltus.kernels.status import (
     CROSSING,
     HOLD,
@@ -221,7 +222,7 @@ def loosen(lanes, lane, batch, struck, closing, slow):
     for g in range(NGUARDS):
         if g != struck and PARTNER[g] >= 0 and LAW[g] != HOLD_LAW:
             left = slow.gaps[3 * NGUARDS + g]
-            feels = abs(left) > FELT * closing
+            feels = abs(left) > FELT * closing + ROUNDING * slow.gaps[5 * NGUARDS + g]
             if feels and (mode >> PARTNER[g]) & 1 == 0:
                 if LAW[g] == IMPACT_LAW and lanes.fresh[g, lane] > 1.5:
                     lanes.fresh[g, lane] = 1.0
@@ -433,6 +434,8 @@ def watch_friction(lanes, batch, slow):
     for lane in range(LANES):
         watched = lanes.run[ACTIVE, lane] > 0.5 and lanes.memo[lane, MAY_PUSH] == 1
         whole = lanes.clock[TAU, lane] - lanes.run[START, lane]
+        if watched and crossing_guards(lanes, lane) != 0:
+            whole *= JUST_BEFORE  # a friction that ends there is zero but for rounding
         for look in range(LOOKS if watched else 0):
             d = whole * ((look + 1) / LOOKS)
             if (found >> lane) & 1 == 0 and pushes_on_at(lanes, lane, batch, d, slow):

@@ -234,6 +234,15 @@ def gap_at(lanes, g, d):
 
 
 @inner
+def sets_aside(lanes, lane):
+    """True if terms of a lane are set aside in this step."""
+    aside = False
+    for j in range(NSINGULAR):
+        aside = aside or lanes.side[NGUARDS + j, lane] > 0.0
+    return aside
+
+
+@inner
 def hold_ridden(lanes, side):
     """Set the hold guards of the surfaces that this step rides: what was left out holds them, and
     leads off neither side.
