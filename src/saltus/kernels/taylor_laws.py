@@ -296,7 +296,8 @@ def caught(lanes, lane, batch, g, slow):
     back_again = lanes.run[BOUNCES, lane] > 1.5 and (int(lanes.run[FLIPPED, lane]) >> g) & 1 == 1
     if slow.gaps[NGUARDS + g] == 0.0 and slow.gaps[2 * NGUARDS + g] == 0.0 and not back_again:
         # another contact may hold what this one could
-        return lanes.fresh[g, lane] != RIDDEN and holds_any(lanes, lane)
+        first = lanes.fresh[g, lane] != RIDDEN and lanes.run[BOUNCES, lane] <= 1.5
+        return first and holds_any(lanes, lane)
     if slow.gaps[2 * NGUARDS + g] < 0.0 and slow.gaps[PARTNER[g]] > 0.0:
         hold(lanes, lane, batch, g, 0.0, 0.0, slow)
         return True

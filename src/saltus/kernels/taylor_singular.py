@@ -160,10 +160,9 @@ def negligible_step(lanes, h, j, wanted):
         magnitude(load(lanes.work, GUARD_ROW[g] + 1, LANES)),
         magnitude(load(lanes.work, GUARD_ROW[g] + 2, LANES)),
     )
-    longest = h
-    floor = smaller(
-        larger(2.0 * goal / (rate + root(rate * rate + 4.0 * bend * goal)), SHORTEST), longest
-    )
+    longest, speed = h, rate + root(rate * rate + 4.0 * bend * goal)
+    leaves = select(speed > 0.0, 2.0 * goal / speed, 0.0)
+    floor = smaller(larger(leaves, SHORTEST), longest)
     power, before, log_before = splat(USUAL_POWER, LANES), splat(2000.0, LANES), splat(0.0, LANES)
     # logs of a step short enough, and of one too long
     low, high = coarse_log2(floor), coarse_log2(longest)
@@ -197,6 +196,8 @@ def left_out(lanes, h, j):
     turn = smaller(-0.5 * rate / bend, h)
     rising = rate + 2.0 * bend * h >= 0.0
     widest = select(rising, select(fma(bend, h, rate) > 0.0, h, 0.0), select(rate > 0.0, turn, 0.0))
+    # from rest a gap may begin with its third power
+    widest = select(gap_at(lanes, g, h) > gap_at(lanes, g, widest), h, widest)
     look_with(lanes, widest, j)
     worst = splat(0.0, LANES)
     for i in range(NMOVED):
