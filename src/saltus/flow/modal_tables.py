@@ -13,7 +13,7 @@ from saltus.codegen.module import MODAL_LANES as LANES
 from saltus.contact.guards import is_hold
 from saltus.flow.modal_blocks import table_of
 from saltus.flow.modal_modes import Eigen, StateModes, eigen_of, modes_of, slots_of, spread_over
-from saltus.kernels import modal_layout as layout
+from saltus.kernels.modal import layout
 from saltus.kernels.status import LAW_KINDS, NO_LAW
 from saltus.language.expression import Expr, walk
 from saltus.system import System

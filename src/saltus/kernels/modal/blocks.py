@@ -1,4 +1,4 @@
-"""Template, 2 of 7 of the modal flow: modes that don't go their own ways go together, in a block.
+"""Template of the modal flow: modes that don't go their own ways go together, in a block.
 
 The block of a contact state is v' = T v: amplitudes of an invariant subspace, and of the drives
 that it resonates with. Its table: a row (groups, alpha, drives); T, column by column; L and V; for
