@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.analysis.inputs.starts import Ensemble, Span
+from saltus.analysis.inputs.spans import Span
+from saltus.analysis.inputs.starts import Ensemble
 from saltus.analysis.motion.sample_times import NO_SAMPLES, SampleTimes, evenly, planned
 from saltus.errors import ParameterError, SaltusWarning
 from saltus.flow import engine

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.analysis.inputs.starts import Ensemble, Span
+from saltus.analysis.inputs.spans import Span
+from saltus.analysis.inputs.starts import Ensemble
 from saltus.errors import ParameterError, shown
 from saltus.flow.counts import whole
 from saltus.flow.request import Outcome, Request, Schedule

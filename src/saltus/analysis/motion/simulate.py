@@ -11,7 +11,8 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis import dataset_parts
-from saltus.analysis.inputs.starts import Ensemble, Span, check_system, ensemble, span, trajectories
+from saltus.analysis.inputs.spans import Span, span
+from saltus.analysis.inputs.starts import Ensemble, check_system, ensemble, trajectories
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion import time_errors as measure
 from saltus.analysis.motion.sample_times import (

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from saltus.arguments import checked
+from saltus.contact.boundaries import number_of
 from saltus.contact.contacts import renamed
-from saltus.contact.guards import number_of
 from saltus.errors import ParameterError, SaltusWarning, among, must_be, shown
 from saltus.system.structures import matrices, told
 from saltus.system.structures.equations import UNITS, Coordinates, Loads, traced
