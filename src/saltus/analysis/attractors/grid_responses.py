@@ -14,7 +14,7 @@ from saltus.analysis.attractors.find_responses import SettledMotions, find_respo
 from saltus.analysis.attractors.grid import Grid
 from saltus.analysis.closed.cycles import ASIDE
 from saltus.analysis.closed.measures import Measures, measure
-from saltus.analysis.closed.unforced import multipliers_and_eigenvalues, rest
+from saltus.analysis.closed.unforced import measure_equilibria, multipliers_and_eigenvalues
 from saltus.analysis.inputs.outputs import Outputs
 from saltus.analysis.solve.tolerances import SAME
 from saltus.flow.maps import Stroboscope
@@ -223,9 +223,11 @@ def numbers_of(
         spans_of(found),
         outputs=outputs,
     )
-    rests = np.flatnonzero(found.kind == Kind.EQUILIBRIUM)
-    if len(rests):
-        rest(map_.rows(rests), found.start()[rests], rests, numbers, outputs)
+    equilibria = np.flatnonzero(found.kind == Kind.EQUILIBRIUM)
+    if len(equilibria):
+        measure_equilibria(
+            map_.rows(equilibria), found.start()[equilibria], equilibria, numbers, outputs
+        )
     return numbers
 
 

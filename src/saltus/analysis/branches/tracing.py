@@ -28,7 +28,7 @@ from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.special_points import unstable
 from saltus.analysis.branches.switching import Seed, children, ends_there
 
-#: How far a new branch begins from the point where it leaves another, in units of the scale: the
+#: Distances from the point where a branch leaves another, in units of the scale: it begins at the
 #: first of these at which Newton's method finds it.
 ASIDE = (1e-3, 2e-4, 4e-5)
 #: Radius of a limit cycle that is lost because it shrinks to an equilibrium, in units of the scale.

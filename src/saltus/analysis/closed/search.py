@@ -33,7 +33,7 @@ AGES = (0, 4, 8, 12)
 DEFLATED_STARTS = 64
 #: Steps of such a search: most guesses lead nowhere.
 DEFLATED_STEPS = 40
-#: How far beside known motions it begins too, in units of their range.
+#: Distances from known motions at which it begins too, in units of their range.
 BESIDE = np.repeat([0.01, 0.1, 0.3], 6)
 
 

@@ -23,5 +23,5 @@ Axis: TypeAlias = Sequence[Value] | np.ndarray | xr.DataArray
 #: A value for each state; a mapping of states to values; an array (n, states); words such as
 #: "random 20".
 Starts: TypeAlias = Sequence[Values] | Mapping[str, Values] | np.ndarray | xr.DataArray | str
-#: What is read off a motion: a function, or it with its unit.
+#: A quantity that is read off a motion: a function, or it with its unit.
 Reading: TypeAlias = Quantity | tuple[Quantity, str]

@@ -24,10 +24,10 @@ from saltus.analysis.attractors.grid import Grid
 from saltus.analysis.attractors.grid_responses import GridResponses
 from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.branch_table import attributes_of, values_of
+from saltus.analysis.branches.equilibrium_branches import trace_equilibria
 from saltus.analysis.branches.plans import LONGEST_DOUBLED, POINTS, SWITCHES, plan_of
-from saltus.analysis.branches.rest_branches import trace_rests
 from saltus.analysis.branches.same_branch import on_branch
-from saltus.analysis.branches.seeds import rests_at, scaled, seeds_at
+from saltus.analysis.branches.seeds import equilibria_at, scaled, seeds_at
 from saltus.analysis.branches.tracing import Plan, trace
 from saltus.analysis.closed.motions import ClosedMotions, phase_distances
 from saltus.analysis.closed.orbits import find_orbits
@@ -124,26 +124,26 @@ def follow_arcs(
         return
     orbits = _exact_orbits(found, grid, method, threads)
     try:
-        _follow_rests(found, orbits, grid, plan, arcs)
+        _follow_equilibria(found, orbits, grid, plan, arcs)
         _follow_orbits(found, orbits, grid, plan, exact, arcs, progress)
     finally:
         _in_order(arcs)
 
 
-def _follow_rests(
+def _follow_equilibria(
     found: GridResponses, orbits: ClosedMotions, grid: Grid, plan: Plan, arcs: Arcs
 ) -> None:
     """Follow the branches of equilibria, and those of limit cycles born at Hopf points if unstable
     orbits are followed.
     """
-    rests = np.flatnonzero((found.kind == Kind.EQUILIBRIUM) & (orbits.period > 0))
-    if not len(rests):
+    equilibria = np.flatnonzero((found.kind == Kind.EQUILIBRIUM) & (orbits.period > 0))
+    if not len(equilibria):
         return
     ((name, values),) = grid.axes.items()
-    usual = np.concatenate([grid.starts, found.motions.scale[found.row[rests]]])
-    seeds = rests_at(orbits.points[rests, 0], values[found.place[rests]], usual)
-    born = trace_rests(plan, grid.system, name, seeds, arcs.branches)
-    _number(found, orbits, grid, plan, rests, arcs, 0)
+    usual = np.concatenate([grid.starts, found.motions.scale[found.row[equilibria]]])
+    seeds = equilibria_at(orbits.points[equilibria, 0], values[found.place[equilibria]], usual)
+    born = trace_equilibria(plan, grid.system, name, seeds, arcs.branches)
+    _number(found, orbits, grid, plan, equilibria, arcs, 0)
     if "hopf" in plan.switch:
         trace(plan, born, arcs.branches)
 
