@@ -129,7 +129,7 @@ def _limits_and_gaps(
     ax: Axes, drawn: Sequence[curves.Curves], state: str, up: Scale, across: Scale
 ) -> None:
     """Set limits around all dots, and draw the gaps near them."""
-    first = drawn[0].one
+    first = drawn[0].shown
     values = np.concatenate([np.ravel(each.dots) for each in drawn if each.dots is not None])
     varied, fixed = _boundaries(first.ds, state)
     marks = [boundary.value * up.factor for boundary in fixed.boundaries] if fixed else []

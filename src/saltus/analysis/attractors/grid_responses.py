@@ -41,14 +41,14 @@ class GridResponses:
         A trajectory that settled to the response.
     place : int64[m]
         Where on the grid it is.
-    of : int64[places, s]
+    response_of : int64[places, s]
         Response of every trajectory, or a code below zero.
     """
 
     motions: SettledMotions
     row: np.ndarray
     place: np.ndarray
-    of: np.ndarray
+    response_of: np.ndarray
     complete: bool = True
     table: AttractorTable | None = field(default=None, repr=False)
 
@@ -157,7 +157,7 @@ def _gathered(
     result: SettledMotions, places: int, count: int, tolerance: np.ndarray, complete: bool
 ) -> GridResponses:
     """Group the trajectories of each value by the response they settled to."""
-    of = result.kind.copy()
+    response_of = result.kind.copy()
     rows: list[int] = []
     for place in range(places):
         here = [row for row in range(place * count, (place + 1) * count) if result.kind[row] >= 0]
@@ -176,10 +176,12 @@ def _gathered(
             else:
                 home.append(row)
         for group in sorted(groups, key=lambda group: _order(result, group[0])):
-            of[group] = len(rows)
+            response_of[group] = len(rows)
             rows.append(group[0])
     chosen = np.array(rows, np.int64)
-    return GridResponses(result, chosen, chosen // count, of.reshape(places, count), complete)
+    return GridResponses(
+        result, chosen, chosen // count, response_of.reshape(places, count), complete
+    )
 
 
 def _same(result: SettledMotions, a: int, b: int, tolerance: float) -> bool:
@@ -239,7 +241,7 @@ def table_of(found: GridResponses, numbers: Measures, grid: Grid, method: Method
     multipliers, eigenvalues = multipliers_and_eigenvalues(
         s.orbits.multipliers[found.row], kind == Kind.EQUILIBRIUM
     )
-    hits = np.bincount(found.of[found.of >= 0], minlength=len(found))
+    hits = np.bincount(found.response_of[found.response_of >= 0], minlength=len(found))
     low, high = wilson(hits, len(grid.starts))
     shares = (hits / len(grid.starts), low, high) if grid.drawn else None
     return AttractorTable(

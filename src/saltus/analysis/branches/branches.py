@@ -250,7 +250,7 @@ def _kinds(switch: Any) -> Sequence[str]:
 
 
 def _inside(seeds: list[Seed], limits: tuple[float, float]) -> list[Seed]:
-    return [seed for seed in seeds if limits[0] <= seed.own[-1] <= limits[1]]
+    return [seed for seed in seeds if limits[0] <= seed.others[-1] <= limits[1]]
 
 
 def _found_in(grid: Grid, method: Method, periods: int, threads: int | None) -> list[Seed]:

@@ -176,7 +176,7 @@ def scaled(system: System, name: str, seeds: list[Seed], method: Method) -> list
     if not unknown:
         return seeds
     rows = np.tile(np.array(list(system.values.values())), (len(unknown), 1))
-    rows[:, list(system.values).index(name)] = [seeds[i].own[-1] for i in unknown]
+    rows[:, list(system.values).index(name)] = [seeds[i].others[-1] for i in unknown]
     starts = np.array([seeds[i].points[0] for i in unknown])
     periods = np.array([len(seeds[i].points) for i in unknown])
     numbers = measure(Stroboscope(system, method, rows), starts, periods)

@@ -120,7 +120,7 @@ def _abreast(waiting: list[Seed]) -> list[Seed]:
     leaves at the first.
     """
     first = waiting[0]
-    free = len(first.own) > 1
+    free = len(first.others) > 1
     most = 1 if free and first.along is None else max(ABREAST // first.points.size**2, 1)
     taken, left = list[Seed](), list[Seed]()
     for place, seed in enumerate(waiting):
@@ -230,7 +230,7 @@ class Start:
         no orbit.
         """
         n, z = len(seed.points), seed.z
-        scale = np.concatenate([np.tile(seed.scale, n), np.abs(seed.own)])
+        scale = np.concatenate([np.tile(seed.scale, n), np.abs(seed.others)])
         scale[-1] = plan.limits[1] - plan.limits[0]
         row, orbits = np.zeros(1, np.int64), plan.make(n, scale[None])
         up = np.eye(len(z))[-1]

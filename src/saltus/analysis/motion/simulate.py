@@ -236,7 +236,7 @@ def _dataset(asked: _Asked, outcome: Outcome, errors: np.ndarray) -> xr.Dataset:
     forced = system.forced_at is not None
     own_periods = forced and bool(np.ptp(length.period) > 0)
     time, period = plan.of_result(outcome, length, forced)
-    kept = plan.kept(outcome)
+    kept = plan.reached(outcome)
     samples, modes = outcome.samples[:, kept, : len(system.states)], outcome.sample_mode[:, kept]
     attrs: dict[str, Any] = {"sample_times": "given"} if asked.given else {}
     if asked.end is not None:

@@ -79,7 +79,7 @@ def structure_modes(
     known = modes_of(mass, stiffness, count)
     places, vectors = _directions(at, degrees if known.shapes.shape[1] == size else [], degrees)
     total, residual = flexibility(stiffness, known, count, vectors)
-    kept = known.kept(count)
+    kept = known.lowest(count)
     with np.errstate(invalid="ignore"):  # a rigid body moves, or nothing does
         share = np.where(np.isfinite(total), 1 - residual / total, np.nan)
 

@@ -53,7 +53,7 @@ class Arcs:
     ----------
     branches : list of Branch
         Those that were followed, in the order of their first responses.
-    of : int64[m]
+    branch_of : int64[m]
         Branch of each response; -1 of those on none.
     unstable : bool
         Whether unstable orbits are followed too, and branches that leave others.
@@ -62,7 +62,7 @@ class Arcs:
     """
 
     branches: list[Branch] = field(default_factory=list)
-    of: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
+    branch_of: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
     unstable: bool = False
     refused: str = ""
 
@@ -114,7 +114,7 @@ def follow_arcs(
         grid.system, name, (float(values[0]), float(values[-1])), exact, threads, POINTS,
         LONGEST_DOUBLED, SWITCHES if arcs.unstable else (), stable=not arcs.unstable, twins=True,
     )  # fmt: skip
-    arcs.of = np.full(len(found), -1, np.int64)
+    arcs.branch_of = np.full(len(found), -1, np.int64)
     try:
         parametric(grid.system, (name,))
     except ParameterError as error:
@@ -184,7 +184,7 @@ def _follow_orbits(
             trace(plan, beginnings, arcs.branches, None if plan.stable else progress)
         finally:  # also with the results so far, when interrupted
             _number(found, orbits, grid, plan, np.append(some, left), arcs, known)
-        left, known = left[arcs.of[left] < 0], len(arcs.branches)
+        left, known = left[arcs.branch_of[left] < 0], len(arcs.branches)
         if progress is not None:
             progress(1.0 - len(left) / number)
 
@@ -218,10 +218,10 @@ def _number(
             arcs.branches += others
     for z, n, which in _unknowns(found, orbits, values, some):
         for number, branch in enumerate(arcs.branches[known:], known):
-            mine = which[arcs.of[which] < 0]
+            mine = which[arcs.branch_of[which] < 0]
             if len(mine):
-                here = on_branch(z[arcs.of[which] < 0], n, branch)
-                arcs.of[mine[here]] = number
+                here = on_branch(z[arcs.branch_of[which] < 0], n, branch)
+                arcs.branch_of[mine[here]] = number
 
 
 def _unknowns(
@@ -245,12 +245,12 @@ def _unknowns(
 
 def _in_order(arcs: Arcs) -> None:
     """Number branches in the order of their first responses; those without a response come last."""
-    first = np.full(len(arcs.branches), len(arcs.of))
-    for response in np.flatnonzero(arcs.of >= 0)[::-1]:
-        first[arcs.of[response]] = response
+    first = np.full(len(arcs.branches), len(arcs.branch_of))
+    for response in np.flatnonzero(arcs.branch_of >= 0)[::-1]:
+        first[arcs.branch_of[response]] = response
     order = np.argsort(first, kind="stable")
     rank = np.argsort(order)
-    arcs.of = np.where(arcs.of >= 0, np.append(rank, -1)[arcs.of], -1)
+    arcs.branch_of = np.where(arcs.branch_of >= 0, np.append(rank, -1)[arcs.branch_of], -1)
     arcs.branches[:] = [arcs.branches[i] for i in order]
     for branch in arcs.branches:
         if branch.parent is not None:

@@ -188,7 +188,7 @@ def structure(
     else:
         if damping is not None and damping_ratio is None:
             damping = modal_damping(damping, known, count)
-        moving = _modal(known.kept(count), damping)
+        moving = _modal(known.lowest(count), damping)
         words = told.reduced(mass, stiffness, known, count, degrees, loads, unit)
     angular = known.angular if known is not None else _angular(moving, stiffness)
     told.doubt(angular)
