@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis import dataset_parts
+from saltus.analysis.inputs.given import Starts, UntilTrue, Values
 from saltus.analysis.inputs.spans import Span, span
 from saltus.analysis.inputs.starts import Ensemble, check_system, ensemble, trajectories
 from saltus.analysis.inputs.verb import verb
@@ -45,17 +46,17 @@ if TYPE_CHECKING:
 @verb
 def simulate(
     system: System,
-    start: Any = None,
+    start: Starts | None = None,
     periods: int | None = None,
     t_end: float | str | None = None,
     *,
     t_start: float | str = 0.0,
     method: Method | None = None,
     samples: int | None = None,
-    at: Any = None,
-    until: Any = None,
+    at: Values | None = None,
+    until: UntilTrue | None = None,
     keep: int | None = None,
-    values: Mapping[str, Any] | None = None,
+    values: Mapping[str, Values] | None = None,
     time_errors: str = "measured",
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,

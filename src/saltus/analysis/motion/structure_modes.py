@@ -28,7 +28,7 @@ def structure_modes(
     stiffness: Any = None,
     modes: int | None = None,
     *,
-    at: Any = None,
+    at: str | Sequence[str | tuple[str, str]] | None = None,
     names: Sequence[str] | str | None = None,
 ) -> xr.Dataset:
     """The lowest modes of a structure, and their share of the static flexibility.
