@@ -26,8 +26,8 @@ from saltus.analysis.solve.deflation import Known
 from saltus.flow.maps import Travel
 from saltus.kernels import status as st
 
-#: Iterates that starts are followed before Newton's method begins, in turn: none, so that motions
-#: are found which nothing comes near; some, so that a chaotic set is reached.
+#: Iterates before Newton's method begins, in rotation: 0 finds motions that repel, more iterates
+#: reach the chaotic set.
 AGES = (0, 4, 8, 12)
 #: Guesses that a search with known motions deflated begins with.
 DEFLATED_STARTS = 64
