@@ -28,7 +28,7 @@ MOST_STATES = 4
 APART = 1e-8
 #: Iterates of the tangent flow that closing an orbit of period 1 takes, its multipliers included.
 NEWTON = 5
-#: What telling the kind of a motion may cost at most, in multiples of the iterates that it was
+#: Most iterates that telling the kind of a motion may take, in multiples of those that it was
 #: followed for: four measurements of a motion of two states.
 BUDGET = 10
 
