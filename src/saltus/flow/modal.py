@@ -178,7 +178,7 @@ class ModalFlow:
         rounding.
         """
         given = self.tables.sets[which]
-        piece = self.tables.linear.piece(given.values, mode)
+        piece = self.tables.piece_of(given, mode)
         values, sizes = self._drives_at(which, time)
         rate, size, steady = state, np.abs(state), piece.constant
         open_, bits = set(np.flatnonzero(zero).tolist()), 0
