@@ -137,7 +137,10 @@ def test_curved_contacts_on_both_sides_can_stick():
 
 # -- random structures -----------------------------------------------------------------------------
 def drawn(random):
-    """A random structure: its size, stiffness, damping ratio, base, drive and contacts."""
+    """A random structure: its size, stiffness, damping ratio, base, drive and contacts. Nothing
+    slides along a rigid stop's own direction: what friction there would take of its force isn't
+    said.
+    """
     n = int(random.integers(2, SIZE + 1))
     axes = np.eye(n) if random.random() < 0.4 else np.linalg.qr(random.normal(size=(n, n)))[0]
     stiffness = axes @ np.diag(random.uniform(30, 150, n) ** 2) @ axes.T
@@ -147,8 +150,9 @@ def drawn(random):
     contacts = []
     for number in range(int(random.integers(1, MOST + 1))):
         at, along = random.permutation(n)[:2].tolist()
-        taken = [(one["at"], one["sliding"]) for one in contacts]
-        rough = random.random() < 0.7 and along not in [sliding for _, sliding in taken]
+        slide = [one["sliding"] for one in contacts]
+        stopped = [one["at"] for one in contacts if "restitution" in one]
+        rough = random.random() < 0.7 and along not in slide + stopped
         given = {
             "at": at, "sliding": along if rough else None, "name": f"s{number}",
             "side": str(random.choice(["upper", "lower"])),
@@ -156,7 +160,7 @@ def drawn(random):
             "preload": float(random.uniform(1, 20)) if random.random() < 0.5 else None,
             "friction": float(random.uniform(0.1, 0.8)) if rough else None,
         }  # fmt: skip
-        if random.random() < 0.4 and at not in [other for other, _ in taken]:
+        if random.random() < 0.4 and at not in slide + stopped:
             given["restitution"] = 0.0 if rough else float(random.uniform(0, 0.8))
         else:
             given["stiffness"] = float(10 ** random.uniform(3.7, 5.0))
@@ -223,10 +227,12 @@ def stepped(n, stiffness, ratio, moves, drive, contacts, t_end, step):
 
 @pytest.mark.parametrize("number", range(STRUCTURES))
 def test_random_structures_against_time_stepping(number):
-    """The steps' error is of first order, about the change when they are halved."""
+    """The steps' error is of first order, about the change when they are halved. A gap that begins
+    with a high power of time, below the rounding of its modes, may be touched either way.
+    """
     given = drawn(np.random.default_rng([SEED, number]))
     coarse, fine = (stepped(*given, 0.1, step) for step in (1e-4, 5e-5))
     status, x = ours(*given, 0.1)
-    assert status == "ok"
-    allowed = 4 * np.abs(coarse - fine).max() + 4e-3 * np.abs(fine).max()
+    assert status in ("ok", "graze_unresolved")
+    allowed = 4 * np.abs(coarse - fine).max() + 1e-3 * np.abs(fine).max()
     assert np.abs(x - fine).max() < allowed
