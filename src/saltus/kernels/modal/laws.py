@@ -165,7 +165,7 @@ def act(i, g, tau, d, hits, modes, steady, batch, m):
         jumps = d == 0.0 and m.laws[other, KIND] == HOLD_LAW  # what presses it isn't zero
         if (hits >> other) & 1 and not jumps:
             know_zeros(i, other, max(1, known_zeros(i, other, batch)), batch)
-    before, status = batch.mode[i], RUNNING
+    before, at, status = batch.mode[i], int(batch.carry[i, AT]), RUNNING
     if m.laws[g, KIND] == HOLD_LAW:
         release(i, g, tau + d, 3 if d > 0.0 else 2, batch, m)
     else:
@@ -174,9 +174,9 @@ def act(i, g, tau, d, hits, modes, steady, batch, m):
     if m.sizes[TANGENTS] != 0:
         batch.carry[i, WAITED] += d
         struck = int(batch.carry[i, CROSSED])
-        leave_columns(i, struck, modes, steady, batch, m)
+        leave_columns(i, struck, at, tau + d, batch, m)
         if struck != 0:
-            strike_columns(i, g, batch, m)
+            strike_columns(i, g, tau + d, batch, m)
     slides = count_landing(i, tau + d, batch)
     return slides if status == RUNNING else status
 
@@ -314,7 +314,7 @@ def rest_or_go(i, now, modes, steady, batch, m):
         hold(i, g, now, later, batch, m)
         leave(i, before, batch, m)
         if m.sizes[TANGENTS] != 0:
-            settle_columns(i, g, batch, m)
+            settle_columns(i, g, now, batch, m)
 
 
 @inner
