@@ -39,7 +39,8 @@ class StateModes:
     Attributes
     ----------
     values, vectors, inverse : complex128[M], complex128[N, M], complex128[M, N]
-        Eigenvalues [1/s], V and L of the modes that go their own ways.
+        Eigenvalues [1/s], V and L of the modes that go their own ways: of each pair the one that
+        :func:`slots_of` keeps.
     block : Block or None
         Those that don't.
     answers : complex128[N, 1 + D + 4 * C]
@@ -76,14 +77,13 @@ def modes_of(
     most : int
         Modes that may go their own ways; of a pair one counts.
     eigen : tuple
-        :func:`eigen_of` the matrix.
+        :func:`eigen_of` the matrix, halved by :func:`one_of_each_pair`.
     fastest : float
         Size of the largest eigenvalue of other contact states [1/s]: they tell how slow a mode is.
     """
-    values, vectors, inverse = eigen
-    if not len(values):  # contacts at rest hold all states
-        answers = np.zeros((0, 1 + len(rates) + 4 * len(speeds)), complex)
-        return StateModes(values, vectors, inverse, None, answers)
+    if not len(eigen[0]):  # contacts at rest hold all states
+        return StateModes(*eigen, None, np.zeros((0, 1 + len(rates) + 4 * len(speeds)), complex))
+    whole = _both_of_each_pair(eigen)
     every = np.concatenate([[0.0], rates])
     acts = ModalLoads(
         every,
@@ -91,17 +91,16 @@ def modes_of(
         np.column_stack([piece.constant, piece.driven]),
         gaps.matrix,
         gaps.constant,
-        float(max(np.abs(values).max(), np.abs(every).max())),
+        float(max(np.abs(eigen[0]).max(), np.abs(every).max())),
         fastest,
     )
-    if not _together(values, vectors, inverse, acts).any() and len(slots_of(values)) <= most:
-        return StateModes(values, vectors, inverse, None, _answers(values, vectors, inverse, acts))
-    spaces, values, vectors, inverse = _parted(piece.matrix, acts, most)
-    answers = _answers(values, vectors, inverse, acts)
+    if not _together(*whole, acts).any() and len(eigen[0]) <= most:
+        return StateModes(*eigen, None, _answers(*whole, acts))
+    spaces, whole = _parted(piece.matrix, acts, most)
+    eigen, answers = one_of_each_pair(whole), _answers(*whole, acts)
     if not spaces:  # states that the equations keep apart aren't mixed any more
-        return StateModes(values, vectors, inverse, None, answers)
-    block, answers = block_of(spaces, acts, answers)
-    return StateModes(values, vectors, inverse, block, answers)
+        return StateModes(*eigen, None, answers)
+    return StateModes(*eigen, *block_of(spaces, acts, answers))
 
 
 def spread_over(modes: StateModes, free: Constrained, drives: int) -> StateModes:
@@ -128,6 +127,24 @@ def slots_of(values: np.ndarray) -> np.ndarray:
     """
     kept = np.flatnonzero(values.imag >= 0)
     return kept[np.argsort(np.abs(values[kept]), kind="stable")]
+
+
+def one_of_each_pair(eigen: Eigen) -> Eigen:
+    """Half of what :func:`eigen_of` gives: the other modes are the conjugates of these."""
+    values, vectors, inverse = eigen
+    slots = slots_of(values)
+    return values[slots], vectors[:, slots], inverse[slots]
+
+
+def _both_of_each_pair(half: Eigen) -> Eigen:
+    """All modes of those that :func:`one_of_each_pair` keeps."""
+    values, vectors, inverse = half
+    pairs = np.flatnonzero(values.imag > 0)
+    return (
+        np.concatenate([values, values[pairs].conj()]),
+        np.concatenate([vectors, vectors[:, pairs].conj()], axis=1),
+        np.concatenate([inverse, inverse[pairs].conj()]),
+    )
 
 
 def eigen_of(matrix: np.ndarray) -> Eigen:
@@ -212,9 +229,7 @@ def _answers(
 
 
 # -- parting -----------------------------------------------------------------------------------
-def _parted(
-    matrix: np.ndarray, acts: ModalLoads, most: int
-) -> tuple[list[Subspace], np.ndarray, np.ndarray, np.ndarray]:
+def _parted(matrix: np.ndarray, acts: ModalLoads, most: int) -> tuple[list[Subspace], Eigen]:
     """Subspaces whose modes go together, and the other modes. States that the equations keep apart
     stay apart: a rigid body isn't rounded by the stiffest mode.
     """
@@ -236,8 +251,7 @@ def _parted(
         inverse = np.zeros((len(modes[0]), size), complex)
         vectors[one], inverse[:, one] = modes[1], modes[2]
         found.append((modes[0], vectors, inverse))
-    return (
-        spaces,
+    return spaces, (
         np.concatenate([one[0] for one in found]),
         np.concatenate([one[1] for one in found], axis=1),
         np.concatenate([one[2] for one in found]),
