@@ -16,20 +16,25 @@ from saltus.flow.modal_blocks import (
     MOST_LOSS,
     MOST_LOSS_OF_TWO,
     MOST_SPREAD,
-    ROUNDING,
     Block,
     ModalLoads,
     Subspace,
     block_of,
     loss_of,
 )
+from saltus.flow.modal_eigen import (
+    ROUNDING,
+    Eigen,
+    both_of_each_pair,
+    eigen_of,
+    one_of_each_pair,
+    slots_of,
+)
 from saltus.system.linear import LinearPiece
 from saltus.system.linear_laws import Constrained
 
 #: Rate of growth that is none, in units of the largest eigenvalue.
 NO_GROWTH = 1e-12
-#: Eigenvalues, eigenvectors, and the inverse of these.
-Eigen = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -77,13 +82,13 @@ def modes_of(
     most : int
         Modes that may go their own ways; of a pair one counts.
     eigen : tuple
-        :func:`eigen_of` the matrix, halved by :func:`one_of_each_pair`.
+        :func:`saltus.flow.modal_eigen.half_of` the matrix.
     fastest : float
         Size of the largest eigenvalue of other contact states [1/s]: they tell how slow a mode is.
     """
     if not len(eigen[0]):  # contacts at rest hold all states
         return StateModes(*eigen, None, np.zeros((0, 1 + len(rates) + 4 * len(speeds)), complex))
-    whole = _both_of_each_pair(eigen)
+    whole = both_of_each_pair(eigen)
     every = np.concatenate([[0.0], rates])
     acts = ModalLoads(
         every,
@@ -119,66 +124,6 @@ def spread_over(modes: StateModes, free: Constrained, drives: int) -> StateModes
         left[:, free.kept] = block.left
         block = replace(block, right=free.spread @ block.right, left=left)
     return StateModes(modes.values, free.spread @ modes.vectors, inverse, block, answers)
-
-
-def slots_of(values: np.ndarray) -> np.ndarray:
-    """Indices of one of each pair of complex eigenvalues and of all real ones, ascending by
-    size.
-    """
-    kept = np.flatnonzero(values.imag >= 0)
-    return kept[np.argsort(np.abs(values[kept]), kind="stable")]
-
-
-def one_of_each_pair(eigen: Eigen) -> Eigen:
-    """Half of what :func:`eigen_of` gives: the other modes are the conjugates of these."""
-    values, vectors, inverse = eigen
-    slots = slots_of(values)
-    return values[slots], vectors[:, slots], inverse[slots]
-
-
-def _both_of_each_pair(half: Eigen) -> Eigen:
-    """All modes of those that :func:`one_of_each_pair` keeps."""
-    values, vectors, inverse = half
-    pairs = np.flatnonzero(values.imag > 0)
-    return (
-        np.concatenate([values, values[pairs].conj()]),
-        np.concatenate([vectors, vectors[:, pairs].conj()], axis=1),
-        np.concatenate([inverse, inverse[pairs].conj()]),
-    )
-
-
-def eigen_of(matrix: np.ndarray) -> Eigen:
-    """Eigenvalues, eigenvectors and the inverse of these, large where they coincide."""
-    values, vectors = np.linalg.eig(matrix)
-    inverse = _real_inverse(values, vectors)
-    if inverse is not None:
-        return values, vectors, inverse
-    size = np.maximum(np.abs(vectors).max(axis=1, keepdims=True), ROUNDING)
-    left, parts, right = np.linalg.svd(vectors / size)
-    least = np.maximum(parts, ROUNDING * parts[0])
-    return values, vectors, (right.conj().T / least) @ left.conj().T / size.T
-
-
-def _real_inverse(values: np.ndarray, vectors: np.ndarray) -> np.ndarray | None:
-    """The inverse of eigenvectors of a real matrix, computed by their real and imaginary parts,
-    four times as cheap; None if they nearly coincide.
-    """
-    pairs = np.flatnonzero(values.imag > 0)  # LAPACK has the conjugate behind each
-    parts = vectors.real.copy()
-    parts[:, pairs + 1] = vectors[:, pairs].imag
-    try:
-        back = np.linalg.inv(parts)
-    except np.linalg.LinAlgError:
-        return None
-    # of columns that are 1 at most
-    losses = np.abs(parts).max(axis=0, initial=0.0) * np.abs(back).max(axis=1, initial=0.0)
-    if not losses.max(initial=0.0) < 1 / ROUNDING:
-        return None
-    back += back @ (np.eye(len(parts)) - parts @ back)
-    inverse = back.astype(complex)
-    inverse[pairs] = (back[pairs] - 1j * back[pairs + 1]) / 2
-    inverse[pairs + 1] = inverse[pairs].conj()
-    return inverse
 
 
 def _together(

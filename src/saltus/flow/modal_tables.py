@@ -13,15 +13,8 @@ import numpy as np
 from saltus.codegen.module import MODAL_LANES as LANES
 from saltus.contact.guards import is_hold
 from saltus.flow.modal_blocks import table_of
-from saltus.flow.modal_modes import (
-    Eigen,
-    StateModes,
-    eigen_of,
-    modes_of,
-    one_of_each_pair,
-    slots_of,
-    spread_over,
-)
+from saltus.flow.modal_eigen import Eigen, half_of, slots_of
+from saltus.flow.modal_modes import StateModes, modes_of, spread_over
 from saltus.kernels import modal_layout as layout
 from saltus.kernels.status import LAW_KINDS, NO_LAW
 from saltus.language.expression import Expr, walk
@@ -299,7 +292,7 @@ class Tables:
         if key not in self._equations:
             piece = self.piece_of(given, mode)
             fastest = self._fastest(given, used) if piece.constant.any() else 0.0
-            eigen = one_of_each_pair(eigen_of(piece.matrix[free.kept] @ free.spread))
+            eigen = half_of(piece.matrix[free.kept] @ free.spread)
             self._equations[key] = _Equations(piece, eigen, fastest)
             self._held += piece.matrix.nbytes + 2 * sum(
                 one.nbytes for one in eigen
