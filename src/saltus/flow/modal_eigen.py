@@ -98,7 +98,8 @@ def _of_structure(matrix: np.ndarray) -> Eigen | None:
     size = len(matrix) // 2
     stiffness, damping = -matrix[size:, :size], -matrix[size:, size:]
     if (
-        len(matrix) != 2 * size
+        not size
+        or len(matrix) != 2 * size
         or matrix[:size, :size].any()
         or (matrix[:size, size:] != np.eye(size)).any()
         or not _is_symmetric(stiffness)

@@ -15,7 +15,9 @@ from saltus.contact.guards import is_hold
 from saltus.flow.modal_blocks import table_of
 from saltus.flow.modal_eigen import Eigen, half_of, slots_of
 from saltus.flow.modal_modes import StateModes, modes_of, spread_over
-from saltus.kernels import modal_layout as layout
+from saltus.flow.modal_parameters import ParameterTables
+from saltus.flow.modal_rows import Rows
+from saltus.kernels.modal import layout
 from saltus.kernels.status import LAW_KINDS, NO_LAW
 from saltus.language.expression import Expr, walk
 from saltus.system import System
@@ -32,25 +34,6 @@ MOST_BYTES = 2**30
 SET_BYTES = 4096
 #: Rounding of a coefficient of the equations, relative to it.
 ROUNDED = 16 * np.finfo(float).eps
-
-
-class _Rows:
-    """A table that grows: [rows, width]."""
-
-    def __init__(self, width: int = LANES, kind: type = float) -> None:
-        self.used = 0
-        self.table: np.ndarray = np.zeros((64, width), kind)
-
-    def add(self, numbers: np.ndarray) -> int:
-        """Append rows; returns the first."""
-        first, rows = self.used, numbers.reshape(-1, self.table.shape[1])
-        if first + len(rows) > len(self.table):
-            grown = np.zeros((2 * (first + len(rows)), self.table.shape[1]), self.table.dtype)
-            grown[:first] = self.table[:first]
-            self.table = grown
-        self.used += len(rows)
-        self.table[first : self.used] = rows
-        return first
 
 
 @dataclass(frozen=True)
@@ -120,7 +103,7 @@ class Tables:
         kernels hold stay as they are.
         """
         self.generation += 1
-        self.modes, self.steady, self.pieces = _Rows(), _Rows(), _Rows()
+        self.modes, self.steady, self.pieces = Rows(), Rows(), Rows()
         self._courses: dict[tuple[Expr, bytes], tuple[Course, list[float]]] = {}
         self._sets: dict[bytes, int] = {}
         self.sets: list[ValueSet] = []
@@ -132,13 +115,14 @@ class Tables:
         self._states: dict[tuple[int, int], int] = {}
         #: Equations and modes of each contact state.
         self.made: list[tuple[_Equations, StateModes]] = []
+        self._by: dict[tuple[str, ...], ParameterTables] = {}
         drives, guards = max(len(self.linear.drives), 1), len(self.linear.system.guards)
-        self._offset, self._rate, self._lag = _Rows(max(guards, 1)), _Rows(drives), _Rows(drives)
-        self._links = _Rows(layout.BEHIND + guards, int)
-        self._course = _Rows(max(4 * len(self.linear.courses), 1))
+        self._offset, self._rate, self._lag = Rows(max(guards, 1)), Rows(drives), Rows(drives)
+        self._links = Rows(layout.BEHIND + guards, int)
+        self._course = Rows(max(4 * len(self.linear.courses), 1))
         states = len(self.linear.states)
         width = states + 1 + len(self.linear.drives) + len(self.linear.courses)
-        self._acts, self._presses = _Rows(2 * width + states + 1), _Rows(width)
+        self._acts, self._presses = Rows(2 * width + states + 1), Rows(width)
         self._held = 0
 
     @property
@@ -146,7 +130,10 @@ class Tables:
         """True if the tables hold MOST_BYTES or more."""
         tables = self.modes, self.steady, self.pieces, self._acts, self._presses
         rows = sum(one.table.nbytes for one in tables)
-        return self._held + rows >= MOST_BYTES
+        return (
+            self._held + rows + sum(one.rows.table.nbytes for one in self._by.values())
+            >= MOST_BYTES
+        )
 
     def _rows_of_gaps(self) -> tuple[np.ndarray, np.ndarray]:
         """Row and sign of each guard's gap: guards whose gaps differ by a number only share one."""
@@ -172,13 +159,26 @@ class Tables:
         return row_of, sign_of
 
     # -- what the kernel reads ---------------------------------------------------------------------
-    def arrays(self) -> tuple[np.ndarray, ...]:
-        """The tables, in the order in which the kernel takes them after the sizes."""
+    def by(self, names: tuple[str, ...]) -> ParameterTables:
+        """The derivatives with respect to some parameters."""
+        if names not in self._by:
+            self._by[names] = ParameterTables(self, names)
+        return self._by[names]
+
+    def arrays(self, names: tuple[str, ...] = ()) -> tuple[np.ndarray, ...]:
+        """The tables, in the order in which the kernel takes them after the sizes. With names of
+        parameters a contact state that lacks the derivatives with respect to them isn't linked.
+        """
         links = self._links.table[: self._links.used].copy()  # others change while a kernel reads
+        slopes = self.by(names)
+        if names:
+            links[:, layout.SLOPES], behind = slopes.first, links[:, layout.BEHIND :]
+            behind[slopes.first[behind] < 0] = -1
         return (
             self.row_of, self.sign_of, self._offset.table, self._rate.table, self._lag.table,
             self.modes.table, self.steady.table, links, self._course.table, self.pieces.table,
             self._laws, self._acts.table, self._presses.table, self._remembers,
+            slopes.rows.table, slopes.shifts.table,
         )  # fmt: skip
 
     def set_of(self, row: np.ndarray) -> int:
@@ -241,7 +241,7 @@ class Tables:
         known = self._equations_of(given, mode, free)
         modes = self._state_modes(known, given, shown, free)
         number, guards = len(self.made), len(self.linear.system.guards)
-        links = [self._modes_of(known, modes, shown), self._steady_of(modes, given, shown), 0]
+        links = [self._modes_of(known, modes, shown), self._steady_of(modes, given, shown), 0, -1]
         for g in range(guards):
             behind = self._states.get((which, mode ^ 1 << g), -1)
             links.append(behind)

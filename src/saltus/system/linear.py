@@ -11,12 +11,13 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from saltus.contact.guards import Law, is_hold
 from saltus.language import expression as ex
+from saltus.language.derivatives import differentiate
 from saltus.language.evaluate import evaluate
 from saltus.language.expression import Expr
 from saltus.system.courses import reason_against
@@ -107,10 +108,29 @@ class LinearSystem:
         used = {node.payload for node in nodes if node.op == "param"}
         return tuple(name for name in self.system.values if name in used)
 
+    @property
+    def own_gaps(self) -> tuple[Expr, ...]:
+        """The gaps, as functions of the states and the drives."""
+        return self._gaps
+
     def of(self, quantities: tuple[Expr, ...]) -> tuple[Expr, ...] | None:
         """Quantities as functions of the states and the drives; None if one isn't linear."""
         found = ex.all_substituted(quantities, self._names)
         return found if _are_affine(found, self._driving) else None
+
+    def by(self, name: str) -> LinearSystem:
+        """The derivative of the equations, the gaps and the drives' rates and phases with respect
+        to a parameter, as a system of the same states and drives.
+        """
+        along = ex.parameter(name)
+        drives = tuple(
+            Drive(differentiate(d.rate, along), differentiate(d.phase, along), 0.0)
+            for d in self.drives
+        )
+        field, gaps = (
+            tuple(differentiate(one, along) for one in given) for given in (self._field, self._gaps)
+        )
+        return replace(self, drives=drives, _field=field, _gaps=gaps)
 
     def rows(
         self, quantities: tuple[Expr, ...], values: Mapping[str, float], mode: int
