@@ -3,9 +3,9 @@
 In a contact state the motion is ``z = s + V e^(Lambda h) y``, with s its steady answer. With
 respect to a parameter p its derivative w obeys ``w' = A w + A_p z + ...``; the derivative s_p of
 the steady answer is one solution of it, so that ``w - s_p`` is moved as a column of the tangent is,
-but for what A_p makes of the modes. Each drive Re(r e^(i theta)) of s gives s_p two parts: that of its
-amplitude, Re(r_p e^(i theta)), and that of its phase, theta_p Re(i r e^(i theta)), which grows with
-the time where p is a frequency. A state whose derivative has no such form has NaN there.
+but for what A_p makes of the modes. Each drive Re(r e^(i theta)) of s gives s_p two parts: that of
+its amplitude, Re(r_p e^(i theta)), and that of its phase, theta_p Re(i r e^(i theta)), which grows
+with the time where p is a frequency. A state whose derivative has no such form has NaN there.
 """
 
 from __future__ import annotations

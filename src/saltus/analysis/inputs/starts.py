@@ -11,7 +11,16 @@ import numpy as np
 from saltus.analysis.inputs.axes import along, axes_of, count_along
 from saltus.analysis.inputs.outputs import check_outputs
 from saltus.analysis.inputs.sensed import sensed
-from saltus.errors import ParameterError, SaltusError, among, listed, must_be, shown, unknown
+from saltus.errors import (
+    MOST_IN_A_ROW,
+    ParameterError,
+    SaltusError,
+    among,
+    listed,
+    must_be,
+    shown,
+    unknown,
+)
 from saltus.flow.room import check_room
 from saltus.language import expression as ex
 from saltus.sentences import Word
@@ -340,8 +349,8 @@ def _columns(system: System, start: Any) -> dict[str, np.ndarray]:
         start = {**dict.fromkeys(_made(system), 0.0), **start}
         missing = [name for name in system.states if name not in start]
         if missing:
-            example: dict[Any, Any] = dict.fromkeys(system.states[:3], 0.0)
-            if len(system.states) > 3:
+            example: dict[Any, Any] = dict.fromkeys(system.states[:MOST_IN_A_ROW], 0.0)
+            if len(system.states) > MOST_IN_A_ROW:
                 example = {**example, Word("..."): Word("...")}
             raise ParameterError(
                 lambda say: f"the start gives no {missing[0]!r}. Write {say.key(start=example)}."
