@@ -46,9 +46,7 @@ class ModalFlow:
         Parameters with respect to which it is carried too.
     """
 
-    def __init__(
-        self, tables: Tables, tangents: bool = False, names: tuple[str, ...] = ()
-    ) -> None:
+    def __init__(self, tables: Tables, tangents: bool = False, names: tuple[str, ...] = ()) -> None:
         self.tables, self._kernel, self._tangents = tables, modal_module(), tangents
         self._lanes, self._memory = self.tables.modes.table.shape[1], threading.local()
         size, _, _, _, guards, _, rows, *_ = tables.sizes.tolist()

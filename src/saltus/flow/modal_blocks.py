@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from saltus.flow.modal_eigen import ROUNDING
+
 #: Most that rounding may be multiplied by: 2^10 * 2.2e-16 = 2.3e-13 of the motion.
 MOST_LOSS = 2.0**10
 #: The same for each of two modes that coincide: their losses are multiplied.
@@ -14,8 +16,6 @@ MOST_LOSS_OF_TWO = 2.0**5
 #: Times that the slowest pair of modes may be slower than the fastest: its amplitudes hold speeds
 #: over its rate, and its vectors rounding of the others.
 MOST_SPREAD = 2.0**14
-#: Rounding of an eigenvalue, in units of the largest.
-ROUNDING = 64 * 2.220446049250313e-16
 
 
 @dataclass(frozen=True)

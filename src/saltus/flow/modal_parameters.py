@@ -1,16 +1,17 @@
 """Derivatives of the contact states of a modal flow with respect to parameters, as tables.
 
-In a contact state the motion is ``z = s + V e^(Lambda h) y``, with s its steady answer. With respect
-to a parameter p its derivative w obeys ``w' = A w + A_p z + ...``; the derivative s_p of the steady
-answer is one solution of it, so that ``w - s_p`` is moved as a column of the tangent is, but for
-what A_p makes of the modes. Each drive Re(r e^(i theta)) of s gives s_p two parts: that of its
-amplitude, Re(r_p e^(i theta)), and that of its phase, theta_p Re(i r e^(i theta)), which grows with
-the time where p is a frequency. A state whose derivative has no such form has NaN there.
+In a contact state the motion is ``z = s + V e^(Lambda h) y``, with s its steady answer. With
+respect to a parameter p its derivative w obeys ``w' = A w + A_p z + ...``; the derivative s_p of
+the steady answer is one solution of it, so that ``w - s_p`` is moved as a column of the tangent is,
+but for what A_p makes of the modes. Each drive Re(r e^(i theta)) of s gives s_p two parts: that of
+its amplitude, Re(r_p e^(i theta)), and that of its phase, theta_p Re(i r e^(i theta)), which grows
+with the time where p is a frequency. A state whose derivative has no such form has NaN there.
 """
 
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +19,7 @@ import numpy as np
 from saltus.codegen.module import MODAL_LANES as LANES
 from saltus.contact.guards import is_hold
 from saltus.flow.modal_blocks import MOST_LOSS, MOST_SPREAD
+from saltus.flow.modal_eigen import both_of_each_pair
 from saltus.flow.modal_modes import StateModes
 from saltus.flow.modal_rows import Rows
 from saltus.language import expression as ex
@@ -76,6 +78,7 @@ class ParameterTables:
         self.rows, self.shifts = Rows(), Rows(max(len(names) * self._width, 1))
         #: First row of each contact state, -1 where it has none yet.
         self._first = np.zeros(0, np.int64)
+        self._pieces: dict[tuple[int, int], Callable[[int], LinearPiece]] = {}
 
     @property
     def first(self) -> np.ndarray:
@@ -89,8 +92,8 @@ class ParameterTables:
         while self.shifts.used <= which:
             self.shifts.add(self._shifts_of(self._tables.sets[self.shifts.used]))
         if self.first[at] < 0:
-            given, (_, modes) = self._tables.sets[which], self._tables.made[at]
-            parts = [self._slopes_of(one, given, modes, mode) for one in self._linear]
+            _, modes = self._tables.made[at]
+            parts = [self._slopes_of(p, which, modes, mode) for p in range(len(self._linear))]
             self._first[at] = self.rows.add(np.concatenate(parts))
 
     def _shifts_of(self, given: ValueSet) -> np.ndarray:
@@ -105,12 +108,13 @@ class ParameterTables:
             found += [rates, phases, rows.ravel()]
         return np.concatenate(found)
 
-    def _slopes_of(
-        self, linear: LinearSystem, given: ValueSet, modes: StateModes, mode: int
-    ) -> np.ndarray:
+    def _slopes_of(self, p: int, which: int, modes: StateModes, mode: int) -> np.ndarray:
         """The derivative of the steady answer, as the answer stands in its table."""
+        linear, given = self._linear[p], self._tables.sets[which]
+        if (p, which) not in self._pieces:
+            self._pieces[p, which] = linear.every_piece(given.values)
         slow, _ = linear.rates(given.values)
-        answers = slopes_of(linear.piece(given.values, mode), given.rates, slow, modes)
+        answers = slopes_of(self._pieces[p, which](mode), given.rates, slow, modes)
         padded = np.zeros((len(answers.T), LANES * self._tables.state_groups), complex)
         padded[:, : len(answers)] = answers.T
         parts = [padded[0].real, *(part for one in padded[1:] for part in (one.real, one.imag))]
@@ -138,15 +142,16 @@ def slopes_of(
         block, or are so slow that a constant force moves them without end.
     """
     every, changes = np.append(0.0, rates), np.append(0.0, slow)
+    values, vectors, inverse = both_of_each_pair((modes.values, modes.vectors, modes.inverse))
     loads = np.column_stack([piece.constant, piece.driven]) + piece.matrix @ modes.answers
-    loads = modes.inverse @ (loads - 1j * changes * modes.answers)
-    sizes = np.abs(modes.values)[:, None]
-    far = 1j * every - modes.values[:, None]
+    loads = inverse @ (loads - 1j * changes * modes.answers)
+    sizes = np.abs(values)[:, None]
+    far = 1j * every - values[:, None]
     scale = max(sizes.max(initial=0.0), np.abs(every).max())
     lost = MOST_LOSS * np.abs(far) <= np.maximum(np.abs(every), sizes)
     lost[:, 0] |= MOST_SPREAD * sizes[:, 0] <= scale
     if modes.block is not None or piece.matrix.any() or (lost & (loads != 0)).any():
         return np.full(modes.answers.shape, np.nan, complex)
     with np.errstate(all="ignore"):
-        answers: np.ndarray = modes.vectors @ np.where(loads == 0, 0, loads / far)
+        answers: np.ndarray = vectors @ np.where(loads == 0, 0, loads / far)
     return answers

@@ -13,7 +13,8 @@ import numpy as np
 from saltus.codegen.module import MODAL_LANES as LANES
 from saltus.contact.guards import is_hold
 from saltus.flow.modal_blocks import table_of
-from saltus.flow.modal_modes import Eigen, StateModes, eigen_of, modes_of, slots_of, spread_over
+from saltus.flow.modal_eigen import Eigen, half_of, slots_of
+from saltus.flow.modal_modes import StateModes, modes_of, spread_over
 from saltus.flow.modal_parameters import ParameterTables
 from saltus.flow.modal_rows import Rows
 from saltus.kernels.modal import layout
@@ -37,8 +38,8 @@ ROUNDED = 16 * np.finfo(float).eps
 
 @dataclass(frozen=True)
 class _Equations:
-    """The equations of a contact state, the eigenvalues and -vectors of their matrix, and the
-    fastest eigenvalue of other states [1/s]: the same for all rates of the drives.
+    """The equations of a contact state, one of each pair of eigenvalues and -vectors of their
+    matrix, and the fastest eigenvalue of other states [1/s]: the same for all rates of the drives.
     """
 
     piece: LinearPiece
@@ -129,7 +130,10 @@ class Tables:
         """True if the tables hold MOST_BYTES or more."""
         tables = self.modes, self.steady, self.pieces, self._acts, self._presses
         rows = sum(one.table.nbytes for one in tables)
-        return self._held + rows + sum(one.rows.table.nbytes for one in self._by.values()) >= MOST_BYTES
+        return (
+            self._held + rows + sum(one.rows.table.nbytes for one in self._by.values())
+            >= MOST_BYTES
+        )
 
     def _rows_of_gaps(self) -> tuple[np.ndarray, np.ndarray]:
         """Row and sign of each guard's gap: guards whose gaps differ by a number only share one."""
@@ -288,9 +292,11 @@ class Tables:
         if key not in self._equations:
             piece = self.piece_of(given, mode)
             fastest = self._fastest(given, used) if piece.constant.any() else 0.0
-            eigen = eigen_of(piece.matrix[free.kept] @ free.spread)
+            eigen = half_of(piece.matrix[free.kept] @ free.spread)
             self._equations[key] = _Equations(piece, eigen, fastest)
-            self._held += 8 * piece.matrix.nbytes
+            self._held += piece.matrix.nbytes + 2 * sum(
+                one.nbytes for one in eigen
+            )  # at most two copies
         return self._equations[key]
 
     def _fastest(self, given: ValueSet, used: tuple[float, ...]) -> float:
@@ -322,17 +328,15 @@ class Tables:
 
     def _table(self, modes: StateModes, gaps: np.ndarray) -> np.ndarray:
         """The table of some modes: lambda, its size, L, V, amplitudes of the gaps; the block."""
-        values, vectors, inverse = modes.values, modes.vectors, modes.inverse
-        slots, states = slots_of(values), len(vectors)
+        values, states, slots = modes.values, len(modes.vectors), len(modes.values)
         width, count = LANES * self.groups, LANES * self.state_groups
-        weight = np.where(values[slots].imag > 0, 2.0, 1.0)
+        weight = np.where(values.imag > 0, 2.0, 1.0)
         lam, size = np.zeros(width, complex), np.zeros(width)
-        lam[: len(slots)] = values[slots]
-        size[: len(slots)] = np.abs(values[slots])
-        size[len(slots) :] = size[: len(slots)].max(initial=0.0)
+        lam[:slots], size[:slots] = values, np.abs(values)
+        size[slots:] = size[:slots].max(initial=0.0)
         to_modes, to_states = np.zeros((width, count), complex), np.zeros((count, width), complex)
-        to_modes[: len(slots), :states] = inverse[slots]
-        to_states[:states, : len(slots)] = vectors[:, slots] * weight
+        to_modes[:slots, :states] = modes.inverse
+        to_states[:states, :slots] = modes.vectors * weight
         # L: by groups of modes, real parts then imaginary ones, each for all states
         left = to_modes.reshape(self.groups, LANES, count).transpose(0, 2, 1)
         left = np.concatenate([left.real, left.imag])
