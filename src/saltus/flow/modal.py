@@ -46,9 +46,7 @@ class ModalFlow:
         Parameters with respect to which it is carried too.
     """
 
-    def __init__(
-        self, tables: Tables, tangents: bool = False, names: tuple[str, ...] = ()
-    ) -> None:
+    def __init__(self, tables: Tables, tangents: bool = False, names: tuple[str, ...] = ()) -> None:
         self.tables, self._kernel, self._tangents = tables, modal_module(), tangents
         self._lanes, self._memory = self.tables.modes.table.shape[1], threading.local()
         size, _, _, _, guards, _, rows, *_ = tables.sizes.tolist()
@@ -56,6 +54,7 @@ class ModalFlow:
         self._names, columns = names, size + len(names) if tangents else 0
         self._sizes[layout.TANGENTS] = columns
         self.CARRY = layout.AMPLITUDES + rows * self._lanes + tangents * (size + guards)
+        self.CARRY += 2 * tables.groups * self._lanes if names else 0
         self.STEP_RECORDS = 2 * guards + MOST_TOUCHES
 
     def workspace(self) -> tuple[np.ndarray, ...]:

@@ -24,8 +24,9 @@ FACTORIAL = 20922789888000.0
 FOLLOWED = 6.0
 # Columns of `sizes`; ROWS are the rows of amplitudes: those of the modes, real parts then imaginary
 # ones, then those of a block; TANGENTS are the columns of the derivative of the state that is
-# carried: one for each state at the start, then one for each parameter; 0: none. REMEMBERED are the states behind the others that hold others of before the last impact, whose
-# numbers are in `remembers`.
+# carried: one for each state at the start, then one for each parameter; 0: none. REMEMBERED are the
+# states behind the others that hold others of before the last impact, whose numbers are in
+# `remembers`.
 STATES, MODE_GROUPS, STATE_GROUPS, GAP_ROWS, GUARDS, DRIVES, ROWS, COURSES = range(8)
 TANGENTS, REMEMBERED = range(8, 10)
 # Columns of `record`: the time of a course at the beginning of the period, the times of the period
@@ -34,8 +35,8 @@ BASE, SINCE, UNTIL, PIECE, VALUE = range(5)
 #: Value and derivatives of a course.
 COURSE_TERMS = 4
 # Columns of `links`: first row of the modes' table, first row of the drives' table, guards where
-# the rates don't jump (bits), first row of the derivatives by parameters; then for each guard the contact state behind its boundary, -1 where
-# it hasn't been made yet.
+# the rates don't jump (bits), first row of the derivatives by parameters; then for each guard the
+# contact state behind its boundary, -1 where it hasn't been made yet.
 MODES, STEADY, SMOOTH, SLOPES, BEHIND = range(5)
 # Columns of `carry`: the contact state (-1: to be looked up), whether its amplitudes must be made
 # of the state, the next step [s], the time of the last landing, landings there since, guards that
