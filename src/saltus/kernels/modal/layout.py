@@ -10,8 +10,8 @@ Symbols
 -------
 N states; G groups of LANES modes, ascending by |lambda|; S groups of LANES states; R rows of gaps,
 of which guards are plus or minus one, and an offset; H drives Re(e^{i (rate t + phase)}). Modes
-that don't go their own ways go together in a block: see modal_blocks.py. Drives that are
-polynomials between breaks are courses: see modal_records.py.
+that don't go their own ways go together in a block: see blocks.py. Drives that are
+polynomials between breaks are courses: see records.py.
 """
 
 from collections import namedtuple
