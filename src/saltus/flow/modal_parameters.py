@@ -11,6 +11,7 @@ with the time where p is a frequency. A state whose derivative has no such form 
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -74,6 +75,8 @@ class ParameterTables:
         #: Numbers of each set of values, for each parameter.
         self._width = 2 * drives + guards * (1 + 2 * drives)
         self.rows, self.shifts = Rows(), Rows(max(len(names) * self._width, 1))
+        #: Derivatives of the equations, by the parameters and the values that they depend on.
+        self._pieces: dict[tuple[float, ...], Callable[[int], LinearPiece]] = {}
         #: First row of each contact state, -1 where it has none yet.
         self._first = np.zeros(0, np.int64)
 
@@ -90,7 +93,7 @@ class ParameterTables:
             self.shifts.add(self._shifts_of(self._tables.sets[self.shifts.used]))
         if self.first[at] < 0:
             given, (_, modes) = self._tables.sets[which], self._tables.made[at]
-            parts = [self._slopes_of(one, given, modes, mode) for one in self._linear]
+            parts = [self._slopes_of(j, given, modes, mode) for j in range(len(self._linear))]
             answers, mixing = zip(*parts, strict=True)
             behind = np.cumsum([sum(map(len, answers)), *map(len, mixing)])
             for one, more, place in zip(answers, mixing, behind, strict=False):
@@ -110,13 +113,17 @@ class ParameterTables:
         return np.concatenate(found)
 
     def _slopes_of(
-        self, linear: LinearSystem, given: ValueSet, modes: StateModes, mode: int
+        self, parameter: int, given: ValueSet, modes: StateModes, mode: int
     ) -> tuple[np.ndarray, np.ndarray]:
         """The derivative of the steady answer behind a row of its own, and what mixes the modes:
         rows of the table.
         """
+        linear = self._linear[parameter]
         slow, _ = linear.rates(given.values)
-        piece = linear.piece(given.values, mode)
+        key = parameter, *(given.values[name] for name in linear.parameters)
+        if key not in self._pieces:
+            self._pieces[key] = linear.every_piece(given.values)
+        piece = self._pieces[key](mode)
         answers = slopes_of(piece, given.rates, slow, modes)
         padded = np.zeros((len(answers.T), LANES * self._tables.state_groups), complex)
         padded[:, : len(answers)] = answers.T
