@@ -44,10 +44,12 @@ MODES, STEADY, SMOOTH, SLOPES, BEHIND = range(5)
 # tables in which these numbers stand; with tangents the time for which they haven't been moved [s]
 # and the boundaries just crossed (bits); gaps whose rate is known to be zero too, and those whose
 # acceleration is (bits), whether no time has passed since the start, the contact that was struck
-# (one more than its number; 0: none); then the amplitudes, and with tangents the rates of the
-# states and the gaps before these boundaries.
+# (one more than its number; 0: none), whether it is known how the instant of a landing moves; then
+# the amplitudes, and with tangents the rates of the states and the gaps before these boundaries,
+# how that instant moves with each column, and with parameters the amplitudes when the derivative
+# was moved last.
 AT, ENTERS, NEXT_STEP, LANDED_AT, LANDINGS, RIDES, SET, TABLES, WAITED, CROSSED = range(10)
-TWICE, THRICE, STARTS, ASKS, AMPLITUDES = range(10, 15)
+TWICE, THRICE, STARTS, ASKS, DATED, AMPLITUDES = range(10, 16)
 # Columns of `laws`, for each guard: the kind of its law (status.py), its hold guard (of a hold
 # guard: its contact's), the state that its gap is a level of; -1 where there is none.
 KIND, PARTNER, LEVEL = range(3)

@@ -93,9 +93,15 @@ def load_column(i, c, batch, m):
 
 
 @inner
+def first_date(m):
+    """Column of `carry` of the first of the derivatives of the instant of a landing."""
+    return AMPLITUDES + m.sizes[ROWS] * LANES + m.sizes[STATES] + m.sizes[GUARDS]
+
+
+@inner
 def first_kept(m):
     """Column of `carry` of the first of the amplitudes when the derivative was moved last."""
-    return AMPLITUDES + m.sizes[ROWS] * LANES + m.sizes[STATES] + m.sizes[GUARDS]
+    return first_date(m) + m.sizes[TANGENTS]
 
 
 @kernel
@@ -319,8 +325,10 @@ def slope_along(r, modes, m):
 
 @kernel
 def enter_columns(i, at, tau, batch, m):
-    """The jump of the derivative at the boundary just crossed, behind which the amplitudes are `y`:
-    by the first of several whose crossing makes the rates jump. Needs `angle`.
+    """The jump of the derivative at the boundary just crossed, behind which the amplitudes are `y`.
+    The instant moves with the first of several boundaries whose crossing makes the rates jump, and
+    with that of the first landing where landings cause others at once: their own gaps and rates
+    become as small as rounding. Needs `angle`.
     """
     modes, first = m.links[at, MODES], first_rate(m)
     states, columns = m.sizes[STATES], m.sizes[TANGENTS]
@@ -334,12 +342,25 @@ def enter_columns(i, at, tau, batch, m):
     rates_of(modes, m.links[at, STEADY], int(batch.carry[i, SET]), m.y, m)
     for r in range(states):
         batch.carry[i, first + r] = m.state[r // LANES, r % LANES] - batch.carry[i, first + r]
-    share = m.sign_of[g] / batch.carry[i, first + states + g]
+    if batch.carry[i, DATED] == 0.0:
+        date_landing(i, g, modes, tau, batch, m)
     for c in range(columns):
+        early = batch.carry[i, first_date(m) + c]
+        for r in range(states):
+            batch.state[i, states + columns * r + c] += batch.carry[i, first + r] * early
+
+
+@kernel
+def date_landing(i, g, modes, tau, batch, m):
+    """By how much earlier the boundary of a guard is met, for each column: (dg/dz Y + dg/dp) / g'.
+    Needs `angle`.
+    """
+    rate = batch.carry[i, first_rate(m) + m.sizes[STATES] + g]
+    for c in range(m.sizes[TANGENTS]):
         load_column(i, c, batch, m)
         amplitudes_of(modes, m.column, m)
-        slope = slope_along(m.row_of[g], modes, m) * share
-        if c >= states:
-            slope += gap_slope(i, g, c, tau, batch, m) / batch.carry[i, first + states + g]
-        for r in range(states):
-            batch.state[i, states + columns * r + c] += batch.carry[i, first + r] * slope
+        slope = slope_along(m.row_of[g], modes, m) * m.sign_of[g]
+        if c >= m.sizes[STATES]:
+            slope += gap_slope(i, g, c, tau, batch, m)
+        batch.carry[i, first_date(m) + c] = slope / rate
+    batch.carry[i, DATED] = 1.0
