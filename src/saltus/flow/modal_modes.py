@@ -42,7 +42,7 @@ class StateModes:
         Eigenvalues [1/s], V and L of the modes that go their own ways.
     block : Block or None
         Those that don't.
-    answers : complex128[N, 1 + D + 4 * C]
+    answers : complex128[N, 1 + D + K * C]
         Steady answers to the constant, to each harmonic drive, and to each derivative of each
         course, as far as they aren't in the block.
     """
@@ -71,7 +71,7 @@ def modes_of(
         Its equations; the gaps.
     rates : float64[D]
         Rates of the harmonic drives [rad/s].
-    speeds : float64[C, 4]
+    speeds : float64[C, K]
         Derivatives of the courses, in units of their values [1/s^k].
     most : int
         Modes that may go their own ways; of a pair one counts.
@@ -82,7 +82,7 @@ def modes_of(
     """
     values, vectors, inverse = eigen
     if not len(values):  # contacts at rest hold all states
-        answers = np.zeros((0, 1 + len(rates) + 4 * len(speeds)), complex)
+        answers = np.zeros((0, 1 + len(rates) + speeds.size), complex)
         return StateModes(values, vectors, inverse, None, answers)
     every = np.concatenate([[0.0], rates])
     acts = ModalLoads(
@@ -109,11 +109,14 @@ def spread_over(modes: StateModes, free: Constrained, drives: int) -> StateModes
     drives.
     """
     states, harmonic = len(free.spread), 1 + drives
+    courses = free.base.shape[1] - harmonic
     inverse = np.zeros((len(modes.values), states), complex)
     inverse[:, free.kept] = modes.inverse
     answers = free.spread @ modes.answers
     answers[:, :harmonic] += free.base[:, :harmonic]
-    answers[:, harmonic::4] += free.base[:, harmonic:]
+    if courses:
+        terms = (answers.shape[1] - harmonic) // courses
+        answers[:, harmonic::terms] += free.base[:, harmonic:]
     block = modes.block
     if block is not None:
         left = np.zeros((len(block.matrix), states))
@@ -173,7 +176,7 @@ def _together(
 def _answers(
     values: np.ndarray, vectors: np.ndarray, inverse: np.ndarray, acts: ModalLoads
 ) -> np.ndarray:
-    """Steady answers of modes that go their own ways: complex128[N, 1 + D + 4 * C]."""
+    """Steady answers of modes that go their own ways: complex128[N, 1 + D + K * C]."""
     harmonic = len(acts.rates)
     far = 1j * acts.rates[:, None] - values[None]
     parts = inverse @ acts.loads
@@ -182,7 +185,7 @@ def _answers(
             parts[:, :harmonic] == 0, 0, parts[:, :harmonic] / far.T
         )
         # -A^-(k+1) B of the k-th derivative
-        powers = -((1 / values[:, None]) ** np.arange(1, 5))
+        powers = -((1 / values[:, None]) ** np.arange(1, acts.speeds.shape[1] + 1))
         courses = [
             vectors @ np.where(part[:, None] == 0, 0, part[:, None] * powers)
             for part in parts.T[harmonic:]
