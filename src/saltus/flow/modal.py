@@ -14,12 +14,13 @@ from saltus.codegen.module import Flow, modal_module
 from saltus.errors import ParameterError
 from saltus.flow.counts import whole
 from saltus.flow.method import Method, explain_unknown_options, step_budget
+from saltus.flow.modal_parameters import varies_by
 from saltus.flow.modal_tables import Tables, ValueSet
 from saltus.flow.taylor import Taylor
-from saltus.kernels import modal_layout as layout
 from saltus.kernels import status as st
 from saltus.kernels.batch import Batch
 from saltus.kernels.isolation import DEEPEST, MOST_TOUCHES
+from saltus.kernels.modal import layout
 from saltus.system import System
 from saltus.system.linear import linear_pieces
 from saltus.system.quantity import remembered
@@ -41,14 +42,19 @@ class ModalFlow:
     tangents : bool
         Whether the states are followed by the derivative of the state with respect to the state at
         the start, row by row.
+    names : tuple of str, optional
+        Parameters with respect to which it is carried too.
     """
 
-    def __init__(self, tables: Tables, tangents: bool = False) -> None:
+    def __init__(
+        self, tables: Tables, tangents: bool = False, names: tuple[str, ...] = ()
+    ) -> None:
         self.tables, self._kernel, self._tangents = tables, modal_module(), tangents
         self._lanes, self._memory = self.tables.modes.table.shape[1], threading.local()
         size, _, _, _, guards, _, rows, *_ = tables.sizes.tolist()
         self._states, self._sizes = size, tables.sizes.copy()
-        self._sizes[layout.TANGENTS] = tangents
+        self._names, columns = names, size + len(names) if tangents else 0
+        self._sizes[layout.TANGENTS] = columns
         self.CARRY = layout.AMPLITUDES + rows * self._lanes + tangents * (size + guards)
         self.STEP_RECORDS = 2 * guards + MOST_TOUCHES
 
@@ -67,7 +73,7 @@ class ModalFlow:
         with self.tables.lock:
             self._begin(batch)
             self._look_up(batch)
-            tables = self._sizes, *self.tables.arrays()
+            tables = self._sizes, *self.tables.arrays(self._names)
         answer: int = self._kernel.propagate(*batch, budget, *tables, *self._work())
         return answer
 
@@ -86,6 +92,8 @@ class ModalFlow:
                 return
             which = tables.set_of(batch.param[i if batch.stride else 0])
             at = tables.state_of(which, int(batch.mode[i]))
+            if self._names:
+                tables.by(self._names).need(at, which, int(batch.mode[i]))
             batch.carry[i, [layout.AT, layout.SET, layout.TABLES]] = at, which, tables.generation
 
     def _work(self) -> tuple[np.ndarray, ...]:
@@ -95,7 +103,7 @@ class ModalFlow:
                 size, groups, states, rows, guards, drives, amplitudes, courses, *_,
             ) = self._sizes.tolist()  # fmt: skip
             terms, lanes, empty = layout.ORDER + 1, self._lanes, np.zeros
-            columns = size if self._tangents else 1
+            columns = int(self._sizes[layout.TANGENTS]) or 1
             self._memory.arrays = (
                 empty((amplitudes, lanes)), empty((amplitudes, lanes)), empty((groups, lanes)),
                 empty((terms + 3, lanes)),
@@ -105,7 +113,7 @@ class ModalFlow:
                 empty((max(drives, 1), 4)), empty((max(guards, 1), 4)),
                 empty(((terms + 2) * self.tables.block_groups, lanes)),
                 empty((max(courses, 1), layout.VALUE + self.tables.linear.terms)),
-                empty((2 * groups, lanes)), empty((amplitudes, lanes)), empty((columns, columns)),
+                empty((2 * groups, lanes)), empty((amplitudes, lanes)), empty((size, columns)),
                 empty((3, size)),
             )  # fmt: skip
         arrays: tuple[np.ndarray, ...] = self._memory.arrays
@@ -185,7 +193,7 @@ class ModalFlow:
         rounding.
         """
         given = self.tables.sets[which]
-        piece = self.tables.linear.piece(given.values, mode)
+        piece = self.tables.piece_of(given, mode)
         values, sizes = self._drives_at(which, time)
         rate, size, steady = state, np.abs(state), piece.constant
         open_, bits = set(np.flatnonzero(zero).tolist()), 0
@@ -229,7 +237,8 @@ FEW_STATES = 16
 def modal_flow(system: System) -> ModalFlow:
     """The modal flow of a system. Raises ParameterError, with the reason, if it has none."""
     if system.tangent_of is not None:
-        return ModalFlow(modal_flow(system.tangent_of.origin).tables, tangents=True)
+        tables = modal_flow(system.tangent_of.origin).tables
+        return ModalFlow(tables, tangents=True, names=system.tangent_by)
     linear = linear_pieces(system)
     if isinstance(linear, str):
         raise ParameterError(f"sl.Modal doesn't serve {system.name}: {linear}.")
@@ -280,7 +289,7 @@ class Modal(Method):
         """The modal flow."""
         return modal_flow(system)
 
-    def tangents(self, system: System) -> System | None:
+    def tangents(self, system: System, names: tuple[str, ...] = ()) -> System | None:
         """The states alone: the modes of a contact state move the derivative too. That of impacts
         on several stops is Taylor's, unless the states are many: where one impact causes another at
         the same instant, the modal flow's doesn't always agree with it.
@@ -288,8 +297,11 @@ class Modal(Method):
         stops = sum(guard.law is not None and guard.law.kind == "impact" for guard in system.guards)
         few = stops > 1 and len(system.states) <= FEW_STATES
         if self.serving(system.origin) is not self or remembered(system) or few:
-            return super().tangents(system)
-        return tangent_states(system)
+            return super().tangents(system, names)
+        linear = linear_pieces(system.origin)
+        if isinstance(linear, str) or not all(varies_by(linear, name) for name in names):
+            return None
+        return tangent_states(system, names)
 
     def numbers(self, periods: float) -> np.ndarray:
         """Step budget, event budget."""

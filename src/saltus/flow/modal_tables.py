@@ -5,6 +5,7 @@ made when a motion first comes to them.
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,9 @@ from saltus.codegen.module import MODAL_LANES as LANES
 from saltus.contact.guards import is_hold
 from saltus.flow.modal_blocks import table_of
 from saltus.flow.modal_modes import Eigen, StateModes, eigen_of, modes_of, slots_of, spread_over
-from saltus.kernels import modal_layout as layout
+from saltus.flow.modal_parameters import ParameterTables
+from saltus.flow.modal_rows import Rows
+from saltus.kernels.modal import layout
 from saltus.kernels.status import LAW_KINDS, NO_LAW
 from saltus.language.expression import Expr, walk
 from saltus.system import System
@@ -30,25 +33,6 @@ MOST_BYTES = 2**30
 SET_BYTES = 4096
 #: Rounding of a coefficient of the equations, relative to it.
 ROUNDED = 16 * np.finfo(float).eps
-
-
-class _Rows:
-    """A table that grows: [rows, width]."""
-
-    def __init__(self, width: int = LANES, kind: type = float) -> None:
-        self.used = 0
-        self.table: np.ndarray = np.zeros((64, width), kind)
-
-    def add(self, numbers: np.ndarray) -> int:
-        """Append rows; returns the first."""
-        first, rows = self.used, numbers.reshape(-1, self.table.shape[1])
-        if first + len(rows) > len(self.table):
-            grown = np.zeros((2 * (first + len(rows)), self.table.shape[1]), self.table.dtype)
-            grown[:first] = self.table[:first]
-            self.table = grown
-        self.used += len(rows)
-        self.table[first : self.used] = rows
-        return first
 
 
 @dataclass(frozen=True)
@@ -118,24 +102,26 @@ class Tables:
         kernels hold stay as they are.
         """
         self.generation += 1
-        self.modes, self.steady, self.pieces = _Rows(), _Rows(), _Rows()
+        self.modes, self.steady, self.pieces = Rows(), Rows(), Rows()
         self._courses: dict[tuple[Expr, bytes], tuple[Course, list[float]]] = {}
         self._sets: dict[bytes, int] = {}
         self.sets: list[ValueSet] = []
         self._equations: dict[tuple[object, ...], _Equations] = {}
+        self._pieces: dict[tuple[float, ...], Callable[[int], LinearPiece]] = {}
         self._fast: dict[tuple[float, ...], float] = {}
         self._smooth: dict[tuple[object, ...], bool] = {}
         self._known: dict[tuple[int, bytes], int] = {}
         self._states: dict[tuple[int, int], int] = {}
         #: Equations and modes of each contact state.
         self.made: list[tuple[_Equations, StateModes]] = []
+        self._by: dict[tuple[str, ...], ParameterTables] = {}
         drives, guards = max(len(self.linear.drives), 1), len(self.linear.system.guards)
-        self._offset, self._rate, self._lag = _Rows(max(guards, 1)), _Rows(drives), _Rows(drives)
-        self._links = _Rows(layout.BEHIND + guards, int)
-        self._course = _Rows(max(5 * len(self.linear.courses), 1))
+        self._offset, self._rate, self._lag = Rows(max(guards, 1)), Rows(drives), Rows(drives)
+        self._links = Rows(layout.BEHIND + guards, int)
+        self._course = Rows(max(5 * len(self.linear.courses), 1))
         states = len(self.linear.states)
         width = states + 1 + len(self.linear.drives) + len(self.linear.courses)
-        self._acts, self._presses = _Rows(2 * width + states + 1), _Rows(width)
+        self._acts, self._presses = Rows(2 * width + states + 1), Rows(width)
         self._held = 0
 
     @property
@@ -143,7 +129,7 @@ class Tables:
         """True if the tables hold MOST_BYTES or more."""
         tables = self.modes, self.steady, self.pieces, self._acts, self._presses
         rows = sum(one.table.nbytes for one in tables)
-        return self._held + rows >= MOST_BYTES
+        return self._held + rows + sum(one.rows.table.nbytes for one in self._by.values()) >= MOST_BYTES
 
     def _rows_of_gaps(self) -> tuple[np.ndarray, np.ndarray]:
         """Row and sign of each guard's gap: guards whose gaps differ by a number only share one."""
@@ -169,13 +155,26 @@ class Tables:
         return row_of, sign_of
 
     # -- what the kernel reads ---------------------------------------------------------------------
-    def arrays(self) -> tuple[np.ndarray, ...]:
-        """The tables, in the order in which the kernel takes them after the sizes."""
+    def by(self, names: tuple[str, ...]) -> ParameterTables:
+        """The derivatives with respect to some parameters."""
+        if names not in self._by:
+            self._by[names] = ParameterTables(self, names)
+        return self._by[names]
+
+    def arrays(self, names: tuple[str, ...] = ()) -> tuple[np.ndarray, ...]:
+        """The tables, in the order in which the kernel takes them after the sizes. With names of
+        parameters a contact state that lacks the derivatives with respect to them isn't linked.
+        """
         links = self._links.table[: self._links.used].copy()  # others change while a kernel reads
+        slopes = self.by(names)
+        if names:
+            links[:, layout.SLOPES], behind = slopes.first, links[:, layout.BEHIND :]
+            behind[slopes.first[behind] < 0] = -1
         return (
             self.row_of, self.sign_of, self._offset.table, self._rate.table, self._lag.table,
             self.modes.table, self.steady.table, links, self._course.table, self.pieces.table,
             self._laws, self._acts.table, self._presses.table, self._remembers,
+            slopes.rows.table, slopes.shifts.table,
         )  # fmt: skip
 
     def set_of(self, row: np.ndarray) -> int:
@@ -238,7 +237,7 @@ class Tables:
         known = self._equations_of(given, mode, free)
         modes = self._state_modes(known, given, shown, free)
         number, guards = len(self.made), len(self.linear.system.guards)
-        links = [self._modes_of(known, modes, shown), self._steady_of(modes, given, shown), 0]
+        links = [self._modes_of(known, modes, shown), self._steady_of(modes, given, shown), 0, -1]
         for g in range(guards):
             behind = self._states.get((which, mode ^ 1 << g), -1)
             links.append(behind)
@@ -274,12 +273,20 @@ class Tables:
         )
         return spread_over(modes, free, len(given.rates)) if held else modes
 
+    def piece_of(self, given: ValueSet, mode: int) -> LinearPiece:
+        """The matrices of a contact state."""
+        used = tuple(given.values[name] for name in self.linear.parameters)
+        if used not in self._pieces:
+            self._pieces[used] = self.linear.every_piece(given.values)
+            self._held += getattr(self._pieces[used], "nbytes", 0)
+        return self._pieces[used](mode)
+
     def _equations_of(self, given: ValueSet, mode: int, free: Constrained) -> _Equations:
         """The equations of a contact state, read off once for all rates of the drives."""
         used = tuple(given.values[name] for name in self.linear.parameters)
         key = mode, used, free.spread.tobytes()
         if key not in self._equations:
-            piece = self.linear.piece(given.values, mode)
+            piece = self.piece_of(given, mode)
             fastest = self._fastest(given, used) if piece.constant.any() else 0.0
             eigen = eigen_of(piece.matrix[free.kept] @ free.spread)
             self._equations[key] = _Equations(piece, eigen, fastest)
@@ -292,7 +299,7 @@ class Tables:
         """
         if used not in self._fast:
             every = int(np.sum((1 << np.arange(len(self.holds)))[~self.holds]))
-            matrices = [self.linear.piece(given.values, mode).matrix for mode in (0, every)]
+            matrices = [self.piece_of(given, mode).matrix for mode in (0, every)]
             self._fast[used] = max(float(np.abs(np.linalg.eigvals(one)).max()) for one in matrices)
         return self._fast[used]
 

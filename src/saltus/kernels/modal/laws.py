@@ -1,4 +1,4 @@
-"""Template, 4 of 7 of the modal flow: laws of contact - impacts, contacts at rest, their release.
+"""Template of the modal flow: laws of contact - impacts, contacts at rest, their release.
 
 A contact at rest has a guard of its own, the hold guard (docs/decisions/0040): its bit names the
 contact state in which the contact is held, and its gap there is the acceleration with which the
@@ -165,7 +165,7 @@ def act(i, g, tau, d, hits, modes, steady, batch, m):
         jumps = d == 0.0 and m.laws[other, KIND] == HOLD_LAW  # what presses it isn't zero
         if (hits >> other) & 1 and not jumps:
             know_zeros(i, other, max(1, known_zeros(i, other, batch)), batch)
-    before, status = batch.mode[i], RUNNING
+    before, at, status = batch.mode[i], int(batch.carry[i, AT]), RUNNING
     if m.laws[g, KIND] == HOLD_LAW:
         release(i, g, tau + d, 3 if d > 0.0 else 2, batch, m)
     else:
@@ -174,9 +174,9 @@ def act(i, g, tau, d, hits, modes, steady, batch, m):
     if m.sizes[TANGENTS] != 0:
         batch.carry[i, WAITED] += d
         struck = int(batch.carry[i, CROSSED])
-        leave_columns(i, struck, modes, steady, batch, m)
+        leave_columns(i, struck, at, tau + d, batch, m)
         if struck != 0:
-            strike_columns(i, g, batch, m)
+            strike_columns(i, g, tau + d, batch, m)
     slides = count_landing(i, tau + d, batch)
     return slides if status == RUNNING else status
 
@@ -314,13 +314,13 @@ def rest_or_go(i, now, modes, steady, batch, m):
         hold(i, g, now, later, batch, m)
         leave(i, before, batch, m)
         if m.sizes[TANGENTS] != 0:
-            settle_columns(i, g, batch, m)
+            settle_columns(i, g, now, batch, m)
 
 
 @inner
 def too_short(i, now, restitution, second, third, fourth, batch):
     """Duration of a chatter [s] below which it is completed: the remainder changes the acceleration
-    by less than 1e-8, so the time of its end is accurate to rounding. See taylor_laws.py.
+    by less than 1e-8, so the time of its end is accurate to rounding. See taylor/laws.py.
     """
     scale = end_of(i, batch)
     if second < scale * third:
@@ -377,7 +377,7 @@ def terms_of_gap(r, modes, steady, which, m):
 @inner
 def is_hidden(i, g, rebound, pressing, batch, m):
     """True if a flight stays within the rounding of its gap, which counts in two steps, where
-    another boundary may put a node into the flight. See taylor_laws.py.
+    another boundary may put a node into the flight. See taylor/laws.py.
     """
     height = 0.5 * rebound * rebound / pressing
     size = 2.0 * size_of(m.acts, law_row(i, g, batch, m), 0, m)

@@ -10,8 +10,8 @@ Symbols
 -------
 N states; G groups of LANES modes, ascending by |lambda|; S groups of LANES states; R rows of gaps,
 of which guards are plus or minus one, and an offset; H drives Re(e^{i (rate t + phase)}). Modes
-that don't go their own ways go together in a block: see modal_blocks.py. Drives that are
-polynomials between breaks are courses: see modal_records.py.
+that don't go their own ways go together in a block: see blocks.py. Drives that are
+polynomials between breaks are courses: see records.py.
 """
 
 from collections import namedtuple
@@ -23,18 +23,18 @@ FACTORIAL = 20922789888000.0
 #: its own series is at most its amplitude there.
 FOLLOWED = 6.0
 # Columns of `sizes`; ROWS are the rows of amplitudes: those of the modes, real parts then imaginary
-# ones, then those of a block; TANGENTS is 1 where the derivative of the state is carried;
-# REMEMBERED are the states behind the others that hold others of before the last impact, whose
-# numbers are in `remembers`; TERMS is the number of coefficients of the pieces of courses, 4 or 16.
+# ones, then those of a block; TANGENTS are the columns of the derivative of the state that is
+# carried: one for each state at the start, then one for each parameter; 0: none. REMEMBERED are the states behind the others that hold others of before the last impact, whose
+# numbers are in `remembers`; TERMS are the coefficients of the pieces of courses, 4 or 16.
 STATES, MODE_GROUPS, STATE_GROUPS, GAP_ROWS, GUARDS, DRIVES, ROWS, COURSES = range(8)
 TANGENTS, REMEMBERED, TERMS = range(8, 11)
 # Columns of `record`: the time of a course at the beginning of the period, the times of the period
 # at which its piece begins and ends [s], the row of that piece, its value and derivatives.
 BASE, SINCE, UNTIL, PIECE, VALUE = range(5)
 # Columns of `links`: first row of the modes' table, first row of the drives' table, guards where
-# the rates don't jump (bits); then for each guard the contact state behind its boundary, -1 where
+# the rates don't jump (bits), first row of the derivatives by parameters; then for each guard the contact state behind its boundary, -1 where
 # it hasn't been made yet.
-MODES, STEADY, SMOOTH, BEHIND = range(4)
+MODES, STEADY, SMOOTH, SLOPES, BEHIND = range(5)
 # Columns of `carry`: the contact state (-1: to be looked up), whether its amplitudes must be made
 # of the state, the next step [s], the time of the last landing, landings there since, guards that
 # the state has ridden from its start on (bits), the set of parameter values, the generation of the
@@ -79,6 +79,6 @@ HUGE = 1.0e300
 Modal = namedtuple(
     "Modal",
     "sizes row_of sign_of offset rate lag modes steady links course pieces laws acts presses "
-    "remembers y moved size sums q errors p bern bounds slopes out touches state answer angle "
-    "found chain record factor column columns struck",
+    "remembers varied shifts y moved size sums q errors p bern bounds slopes out touches state "
+    "answer angle found chain record factor column columns struck",
 )

@@ -1,4 +1,4 @@
-"""Template, 7 of 7 of the modal flow: steps that are proven to cross no boundary, or just one, and
+"""Template of the modal flow: steps that are proven to cross no boundary, or just one, and
 the life of a trajectory.
 
 A step is tried and halved until every gap is decided. Modes that are too fast for it are bounded:
@@ -316,9 +316,10 @@ def write_samples(i, tau, until, modes, steady, batch, m):
         for j in range(states, states + m.sizes[REMEMBERED]):
             batch.samples[i, k, j] = batch.state[i, j]
         if m.sizes[TANGENTS] != 0:
-            columns_after(i, modes, batch.carry[i, WAITED] + (due - tau), batch, m)
-            for j in range(states * states):
-                batch.samples[i, k, states + j] = m.columns[j // states, j % states]
+            at, columns = int(batch.carry[i, AT]), m.sizes[TANGENTS]
+            columns_after(i, at, due, batch.carry[i, WAITED] + (due - tau), batch, m)
+            for j in range(states * columns):
+                batch.samples[i, k, states + j] = m.columns[j // columns, j % columns]
         batch.sample_mode[i, k] = batch.mode[i]
         k += 1
     batch.cursor[i] = k
@@ -337,7 +338,7 @@ def enter(i, tau, batch, m):
     amplitudes_of(m.links[at, MODES], m.y, m)
     set_block_drives(m.links[at, MODES], m)
     if m.sizes[TANGENTS] != 0:
-        enter_columns(i, at, batch, m)
+        enter_columns(i, at, tau, batch, m)
     batch.carry[i, ENTERS] = 0.0
 
 
@@ -367,6 +368,7 @@ def land(i, tau, d, hits, modes, steady, batch, m):
     Returns the status.
     """
     which, before, law = int(batch.carry[i, SET]), batch.mode[i], first_law(hits, m)
+    at = int(batch.carry[i, AT])
     if law >= 0:
         return act(i, law, tau, d, hits, modes, steady, batch, m)
     state_after(i, tau, d, modes, steady, batch, m)
@@ -390,7 +392,7 @@ def land(i, tau, d, hits, modes, steady, batch, m):
     leave(i, before, batch, m)
     if m.sizes[TANGENTS] != 0:
         batch.carry[i, WAITED] += d
-        leave_columns(i, hits, modes, steady, batch, m)
+        leave_columns(i, hits, at, tau + d, batch, m)
     return count_landing(i, tau + d, batch)
 
 
@@ -522,7 +524,7 @@ def put_back(i, tau, status, batch, m):
         for k in range(m.sizes[ROWS] * LANES):
             batch.carry[i, AMPLITUDES + k] = m.y[k // LANES, k % LANES]
         keep_state(i, tau, batch, m)
-        move_columns(i, m.links[at, MODES], batch, m)
+        move_columns(i, at, tau, batch, m)
     batch.phase[i], batch.status[i] = tau, status
 
 
@@ -531,9 +533,9 @@ def propagate(
     period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count,
     end_phase, counters, minima, sample_count, sample_fraction, cursor, samples, sample_mode,
     rec_first, rec_i, rec_f, rec_used, options, data, budget, sizes, row_of, sign_of, offset, rate,
-    lag, modes, steady, links, course, pieces, laws, acts, presses, remembers, y, moved, size, sums,
-    q, errors, p, bern, bounds, slopes, out, touches, place, answer, angle, found, chain, follows,
-    factor, column, columns, struck,
+    lag, modes, steady, links, course, pieces, laws, acts, presses, remembers, varied, shifts, y,
+    moved, size, sums, q, errors, p, bern, bounds, slopes, out, touches, place, answer, angle,
+    found, chain, follows, factor, column, columns, struck,
 ):  # fmt: skip
     """Move every trajectory whose status is RUNNING and whose contact state has been made, `budget`
     steps at most. See kernels/batch.py for the arrays.
@@ -545,8 +547,9 @@ def propagate(
     )  # fmt: skip
     m = Modal(
         sizes, row_of, sign_of, offset, rate, lag, modes, steady, links, course, pieces, laws, acts,
-        presses, remembers, y, moved, size, sums, q, errors, p, bern, bounds, slopes, out, touches,
-        place, answer, angle, found, chain, follows, factor, column, columns, struck,
+        presses, remembers, varied, shifts, y, moved, size, sums, q, errors, p, bern, bounds,
+        slopes, out, touches, place, answer, angle, found, chain, follows, factor, column, columns,
+        struck,
     )  # fmt: skip
     waits = False
     for i in range(status.shape[0]):

@@ -1,0 +1,251 @@
+"""Template of the modal flow: the derivative of the state with respect to the state at the
+start, and to parameters.
+
+In a contact state it is moved by e^{A h}, whatever the motion does, so it waits until the motion
+leaves that state, ends, or is sampled. Where the rates jump at a boundary g = 0, from f- to f+, it
+jumps by (f+ - f-) (dg/dz Y) / g'; at an impact Y and f- are reflected before. Leine & Nijmeijer,
+Dynamics and Bifurcations of Non-Smooth Mechanical Systems (2004), section 7. Entry (r, c) of Y is
+state N + C r + c of a trajectory, with C columns: those of the N states, then those of parameters.
+
+That of a parameter p is moved likewise but for the derivative of the steady answer, s_p, which is
+taken off before and added behind; and where a boundary moves with p, dg/dp is added to dg/dz Y.
+
+Rows of `varied`, from `links[at, SLOPES]` on, one parameter after the other: derivatives of the
+amplitudes of the steady answer, as they stand in `steady`. Columns of `shifts`, set by set, one
+parameter after the other: derivatives of the rates and of the phases of the drives; then for each
+guard the derivatives of its constant and of its drives, and these drives.
+"""
+
+from saltus.kernels.lanes import fma, load, splat, store
+
+
+@inner
+def shift_of(c, m):
+    """First column of `shifts` for a column of the derivative."""
+    width = 2 * m.sizes[DRIVES] + m.sizes[GUARDS] * (1 + 2 * m.sizes[DRIVES])
+    return (c - m.sizes[STATES]) * width
+
+
+@inner
+def lead_of(i, c, d, tau, batch, m):
+    """The derivative of the phase of a drive with respect to the parameter of a column."""
+    which, first = int(batch.carry[i, SET]), shift_of(c, m)
+    slope = m.shifts[which, first + m.sizes[DRIVES] + d]
+    return slope + m.shifts[which, first + d] * time_of(i, tau, batch)
+
+
+@kernel
+def answer_slope(i, at, c, tau, batch, m):
+    """The derivative of the steady answer of a contact state with respect to the parameter of a
+    column, to `answer`. Needs `angle`.
+    """
+    groups, steady = m.sizes[STATE_GROUPS], m.links[at, STEADY]
+    varied = m.links[at, SLOPES] + (c - m.sizes[STATES]) * (1 + 2 * m.sizes[DRIVES]) * groups
+    for s in range(groups):
+        store(m.answer, s, load(m.varied, varied + s, LANES))
+    for d in range(m.sizes[DRIVES]):
+        lead, cosine, sine = lead_of(i, c, d, tau, batch, m), m.angle[d, 1], m.angle[d, 2]
+        for s in range(groups):
+            row, total = (1 + 2 * d) * groups + s, load(m.answer, s, LANES)
+            total = fma(load(m.varied, varied + row, LANES), cosine, total)
+            total = fma(load(m.varied, varied + row + groups, LANES), -sine, total)
+            total = fma(load(m.steady, steady + row, LANES), -lead * sine, total)
+            total = fma(load(m.steady, steady + row + groups, LANES), -lead * cosine, total)
+            store(m.answer, s, total)
+
+
+@kernel
+def gap_slope(i, g, c, tau, batch, m):
+    """The derivative of the gap of a guard with respect to the parameter of a column, in the same
+    state. Needs `angle`.
+    """
+    which, drives = int(batch.carry[i, SET]), m.sizes[DRIVES]
+    first = shift_of(c, m) + 2 * drives + g * (1 + 2 * drives)
+    total = m.shifts[which, first]
+    for d in range(drives):
+        lead = lead_of(i, c, d, tau, batch, m) * m.angle[d, 2]
+        total += m.shifts[which, first + 1 + d] * m.angle[d, 1]
+        total -= m.shifts[which, first + 1 + drives + d] * lead
+    return total
+
+
+@kernel
+def load_column(i, c, batch, m):
+    """A column of the derivative, to `state`."""
+    states = m.sizes[STATES]
+    for r in range(states):
+        m.state[r // LANES, r % LANES] = batch.state[i, states + m.sizes[TANGENTS] * r + c]
+
+
+@kernel
+def columns_after(i, at, tau, h, batch, m):
+    """The derivative a time h after it was moved last in a contact state, to `columns`. Sets
+    `angle` for that time, tau.
+    """
+    modes = m.links[at, MODES]
+    groups, states = m.sizes[MODE_GROUPS], m.sizes[STATES]
+    for g in range(groups):
+        a, b = factor_of(modes, g, h, m)
+        store(m.factor, g, a)
+        store(m.factor, groups + g, b)
+    for s in range(m.sizes[STATE_GROUPS]):
+        store(m.answer, s, splat(0.0, LANES))
+    for c in range(m.sizes[TANGENTS]):
+        load_column(i, c, batch, m)
+        if h != 0.0:
+            if c >= states:
+                drive(i, tau - h, batch, m)
+                answer_slope(i, at, c, tau - h, batch, m)
+                less_answer(m)
+                drive(i, tau, batch, m)
+                answer_slope(i, at, c, tau, batch, m)
+            amplitudes_of(modes, m.column, m)
+            for g in range(groups):
+                turn(
+                    m.column, g, load(m.factor, g, LANES), load(m.factor, groups + g, LANES),
+                    m.column, m,
+                )  # fmt: skip
+            move_block(modes, h, m.column, m.column, m)
+            state_of(modes, m.column, m)
+        for r in range(states):
+            m.columns[r, c] = m.state[r // LANES, r % LANES]
+
+
+@kernel
+def move_columns(i, at, tau, batch, m):
+    """Move the derivative to where the motion is in a contact state."""
+    if m.sizes[TANGENTS] == 0 or batch.carry[i, WAITED] == 0.0:
+        return
+    states, columns = m.sizes[STATES], m.sizes[TANGENTS]
+    columns_after(i, at, tau, batch.carry[i, WAITED], batch, m)
+    for r in range(states):
+        for c in range(columns):
+            batch.state[i, states + columns * r + c] = m.columns[r, c]
+    batch.carry[i, WAITED] = 0.0
+
+
+@kernel
+def rates_of(modes, steady, which, y, m):
+    """The rates of the states where the amplitudes are y, to `state`. Needs `angle`."""
+    groups = m.sizes[MODE_GROUPS]
+    for g in range(groups):
+        a, b = load(m.modes, modes + g, LANES), load(m.modes, modes + groups + g, LANES)
+        turn(y, g, a, b, m.column, m)
+    block_rates(modes, y, m.column, m)
+    answer_rate(steady, which, m)
+    state_of(modes, m.column, m)
+
+
+@inner
+def first_rate(m):
+    """Column of `carry` of the first of the rates before a boundary: those of the states, then of
+    the gaps.
+    """
+    return AMPLITUDES + 2 * m.sizes[MODE_GROUPS] * LANES
+
+
+@kernel
+def leave_columns(i, hits, at, tau, batch, m):
+    """Bring the derivative to a boundary that is crossed with the amplitudes in `moved`, and keep
+    what the jump there needs. Needs `angle`.
+    """
+    first, states = first_rate(m), m.sizes[STATES]
+    modes, steady = m.links[at, MODES], m.links[at, STEADY]
+    for g in range(m.sizes[GUARDS]):
+        _, rate = gap_of_moved(m.row_of[g], modes, steady, int(batch.carry[i, SET]), m)
+        batch.carry[i, first + states + g] = m.sign_of[g] * rate
+    rates_of(modes, steady, int(batch.carry[i, SET]), m.moved, m)
+    for r in range(states):
+        batch.carry[i, first + r] = m.state[r // LANES, r % LANES]
+    batch.carry[i, CROSSED] = float(hits)
+    move_columns(i, at, tau, batch, m)
+
+
+@kernel
+def strike_columns(i, g, tau, batch, m):
+    """Let the impact of a contact act on the derivative, and on the rates before it: by
+    I - (1 + e) p n', with the closing velocity n' z and what a unit of it moves, p. Needs `angle`.
+    """
+    states, row, width = m.sizes[STATES], law_row(i, g, batch, m), width_of(m)
+    first, factor, rate = first_rate(m), 1.0 + restitution_of(i, g, batch, m), 0.0
+    for d in range(m.sizes[DRIVES]):
+        slope = m.acts[row, width + states + 1 + d] * m.angle[d, 2]
+        rate -= m.rate[int(batch.carry[i, SET]), d] * slope
+    for r in range(states):
+        rate += m.acts[row, width + r] * batch.carry[i, first + r]
+    for r in range(states):
+        batch.carry[i, first + r] -= factor * rate * m.acts[row, 2 * width + r]
+    project_columns(i, tau, row, width, 2 * width, factor, batch, m)
+
+
+@kernel
+def settle_columns(i, g, tau, batch, m):
+    """Bring the derivative onto the constraint of a contact that begins to be held: its closing
+    velocity and its gap don't change. See codegen/saltation.py. Needs `angle`.
+    """
+    row, width, square = law_row(i, g, batch, m), width_of(m), 0.0
+    for r in range(m.sizes[STATES]):
+        square += m.acts[row, r] * m.acts[row, r]
+    project_columns(i, tau, row, width, 2 * width, 1.0, batch, m)
+    project_columns(i, tau, row, 0, 0, 1.0 / square, batch, m)
+
+
+@kernel
+def project_columns(i, tau, row, over, along, factor, batch, m):
+    """Take a part off the derivative, by columns of `acts`: what it does to the function that
+    stands in some of them, times a factor, along others.
+    """
+    states, columns = m.sizes[STATES], m.sizes[TANGENTS]
+    for c in range(columns):
+        total = 0.0
+        for r in range(states):
+            total += m.acts[row, over + r] * batch.state[i, states + columns * r + c]
+        if c >= states:
+            for d in range(m.sizes[DRIVES]):
+                lead = lead_of(i, c, d, tau, batch, m) * m.angle[d, 2]
+                total -= m.acts[row, over + states + 1 + d] * lead
+        total *= factor
+        for r in range(states):
+            batch.state[i, states + columns * r + c] -= total * m.acts[row, along + r]
+
+
+@kernel
+def slope_along(r, modes, m):
+    """The derivative of a row of gaps along the amplitudes in `column`."""
+    groups = m.sizes[MODE_GROUPS]
+    row = modes + groups * (3 + 4 * LANES * m.sizes[STATE_GROUPS]) + 3 * groups * r
+    total = splat(0.0, LANES)
+    for g in range(groups):
+        a, b = load(m.modes, row + g, LANES), load(m.modes, row + groups + g, LANES)
+        total = fma(load(m.column, g, LANES), a, total)
+        total = fma(-load(m.column, groups + g, LANES), b, total)
+    store(m.sums, 0, total + block_gap(r, modes, m.column, m))
+    return total_of(m.sums, 0)
+
+
+@kernel
+def enter_columns(i, at, tau, batch, m):
+    """The jump of the derivative at the boundary just crossed, behind which the amplitudes are `y`:
+    by the first of several whose crossing makes the rates jump. Needs `angle`.
+    """
+    modes, first = m.links[at, MODES], first_rate(m)
+    states, columns = m.sizes[STATES], m.sizes[TANGENTS]
+    jumps = int(batch.carry[i, CROSSED]) & ~m.links[at, SMOOTH]
+    batch.carry[i, CROSSED] = 0.0
+    if jumps == 0:
+        return
+    g = 0
+    while (jumps >> g) & 1 == 0:
+        g += 1
+    rates_of(modes, m.links[at, STEADY], int(batch.carry[i, SET]), m.y, m)
+    for r in range(states):
+        batch.carry[i, first + r] = m.state[r // LANES, r % LANES] - batch.carry[i, first + r]
+    share = m.sign_of[g] / batch.carry[i, first + states + g]
+    for c in range(columns):
+        load_column(i, c, batch, m)
+        amplitudes_of(modes, m.column, m)
+        slope = slope_along(m.row_of[g], modes, m) * share
+        if c >= states:
+            slope += gap_slope(i, g, c, tau, batch, m) / batch.carry[i, first + states + g]
+        for r in range(states):
+            batch.state[i, states + columns * r + c] += batch.carry[i, first + r] * slope
