@@ -11,6 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import saltus as sl
+from saltus.flow.maps import Stroboscope
 
 SEED = 20261
 STRUCTURES = 12
@@ -126,6 +127,26 @@ def test_a_curved_contact_that_is_entered_with_the_third_power_of_time():
         rates, (0, 0.05), (0, 0), method="DOP853", rtol=1e-12, atol=1e-17, max_step=1e-4
     )
     assert ends(run) == pytest.approx(truth.y[:, -1], rel=1e-10)
+
+
+def test_the_derivative_where_friction_begins_at_zero_against_finite_differences():
+    """What slides there when the contact closes is stopped in a time that goes as the root of its
+    speed, so the difference is one over 1e-10 m.
+    """
+    made = sl.structure(
+        np.eye(2), [[4e3, 0.0], [0.0, 9e3]], modes=2, damping_ratio="1 %", names="x y",
+        base=sl.Base("x", "8 m/s^2"), frequency="6.366 Hz",
+        contacts=[sl.Contact("x", stiffness="50 kN/m", gap="1 mm", **SLIDES)],
+    )  # fmt: skip
+    start = np.zeros((1, 4))
+    _, tangent = Stroboscope(made, sl.Taylor()).tangent(start, np.array([1]))
+    for i, small in ((0, 1e-6), (1, 1e-10)):
+        beside = np.outer([small, -small], np.eye(4)[i])
+        run = sl.simulate(made, beside, periods=1, progress=False)
+        forth, back = (np.array([run[f"end_{name}"].values[k] for name in made.states])
+                       for k in range(2))  # fmt: skip
+        found = (forth - back) / (2 * small)
+        assert tangent[0][:, i] == pytest.approx(found, abs=5e-3 * np.abs(found).max())
 
 
 def test_curved_contacts_on_both_sides_can_stick():
