@@ -273,7 +273,8 @@ def _turns(
     one: WaveLegs, at: Intervals, wanted: Wanted | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """As :func:`turns`, in some intervals."""
-    once, block = [tuple(each[:0] for each in at)], max(1, HELD // (8 * len(one.rates)))
+    once: list[tuple[np.ndarray, ...]] = [tuple(each[:0] for each in at)]
+    block = max(1, HELD // (8 * len(one.rates)))
     for _ in range(DEEPEST):
         ahead = []
         for first in range(0, len(at[0]), block):

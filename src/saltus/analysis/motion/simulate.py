@@ -69,7 +69,9 @@ def simulate(
         Equations, contacts and parameter values.
     start : sequence, mapping or array
         State at the start: ``(0.0, 0.0)``, ``("1 mm", 0)``, ``{"x": [...], "v": [...]}`` or an
-        array (trajectory, state). Numbers are SI. Default: all zero.
+        array (trajectory, state). Numbers are SI. Default: all zero. Of a structure by its modes
+        also deflections and velocities that sensors show, ``{"tip": "1 mm"}``: the state of least
+        energy that shows them.
     periods : int
         Whole forcing periods to run.
     t_end : float or str
