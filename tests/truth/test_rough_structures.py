@@ -75,7 +75,7 @@ def test_a_contact_that_nothing_slides_moves_as_without_friction(law, gap):
 
 @pytest.mark.nojit
 def test_friction_that_begins_with_its_contact_sticks():
-    """A mass at rest in the direction of sliding, pressed by a spring whose force begins at zero."""
+    """A mass at rest in the direction of sliding, pressed by a spring whose force begins at 0."""
     run = moved(shaken([sl.Contact("x", gap=0.0, preload=5.0, stiffness=5e4, **SLIDES)]), 0.02)
     assert (ends(run)[1], ends(run)[3]) == (0.0, 0.0)
 
