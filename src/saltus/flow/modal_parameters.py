@@ -182,7 +182,7 @@ def slopes_of(
 
 
 def mixing_of(matrix: np.ndarray, modes: StateModes, groups: int) -> np.ndarray:
-    """What a change of the matrix of a contact state makes of its modes, as rows of LANES modes.
+    """Change of the modes of a contact state by a change of its matrix, as rows of LANES modes.
 
     The derivative of e^(A h) is V (G * D) L, with G = L A_p V and the divided differences D_jk of
     e^(lambda h) (Higham, Functions of Matrices (2008), theorem 3.9). For each kept mode k: by
