@@ -11,8 +11,8 @@ with the time where p is a frequency. A state whose derivative has no such form 
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from typing import Protocol
 
 import numpy as np
 
@@ -21,12 +21,22 @@ from saltus.contact.guards import is_hold
 from saltus.flow.modal_blocks import MOST_LOSS, MOST_SPREAD
 from saltus.flow.modal_eigen import both_of_each_pair
 from saltus.flow.modal_modes import StateModes
-from saltus.flow.modal_rows import Rows
+from saltus.flow.modal_rows import Rows, ValueSet
 from saltus.language import expression as ex
 from saltus.system.linear import LinearPiece, LinearSystem
 
-if TYPE_CHECKING:
-    from saltus.flow.modal_tables import Tables, ValueSet
+
+class ContactStates(Protocol):
+    """The part of the tables of a system (modal_tables.py) that its derivatives need."""
+
+    linear: LinearSystem
+    sets: list[ValueSet]
+    groups: int
+    state_groups: int
+
+    @property
+    def made(self) -> Sequence[tuple[object, StateModes]]:
+        """Equations and modes of each contact state."""
 
 
 @functools.lru_cache(maxsize=256)
@@ -63,13 +73,13 @@ class ParameterTables:
 
     Parameters
     ----------
-    tables : Tables
+    tables : ContactStates
         Its contact states.
     names : tuple of str
         The parameters.
     """
 
-    def __init__(self, tables: Tables, names: tuple[str, ...]) -> None:
+    def __init__(self, tables: ContactStates, names: tuple[str, ...]) -> None:
         self._tables = tables
         self._linear = [tables.linear.by(name) for name in names]
         drives, guards = len(tables.linear.drives), len(tables.linear.system.guards)
@@ -172,7 +182,7 @@ def slopes_of(
 
 
 def mixing_of(matrix: np.ndarray, modes: StateModes, groups: int) -> np.ndarray:
-    """What a change of the matrix of a contact state makes of its modes, as rows of LANES modes.
+    """Change of the modes of a contact state by a change of its matrix, as rows of LANES modes.
 
     The derivative of e^(A h) is V (G * D) L, with G = L A_p V and the divided differences D_jk of
     e^(lambda h) (Higham, Functions of Matrices (2008), theorem 3.9). For each kept mode k: by

@@ -176,7 +176,7 @@ def _exponential(series: np.ndarray) -> np.ndarray:
     return found
 
 
-#: How operations combine the series of their operands.
+#: Rules by which operations combine the series of their operands.
 RULES: dict[str, Callable[..., np.ndarray]] = {
     "add": np.add,
     "sub": np.subtract,

@@ -162,7 +162,7 @@ def _degree(root: Expr) -> float:
 
 
 def _last_rate(node: Expr, values: Mapping[str, float]) -> float | None:
-    """What :func:`rate_at` says of the time behind all breaks."""
+    """The value of :func:`rate_at` for the time behind all breaks."""
     breaks = _all_breaks(node, values)
     place = 2 * np.abs(breaks).max(initial=0.5) + 1.0
     with np.errstate(all="ignore"):

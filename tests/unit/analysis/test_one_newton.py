@@ -15,6 +15,7 @@ WHY = {
     "solve/linear.py": "linear systems, some of which have no solution",
     "closed/capture.py": "norms in which a neighbourhood shrinks",
     "closed/field_zeros.py": "points around an equilibrium in such a norm",
+    "inputs/sensed.py": "the state of least energy at which sensors read given values",
     "branches/criticality.py": "the Lyapunov coefficient of a Hopf point",
     "branches/codimension_two.py": "the quadratic part at a fold",
     "branches/forced_vibration.py": "the answer of a rigid body to a static force",

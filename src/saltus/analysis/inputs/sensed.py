@@ -61,7 +61,7 @@ def sensed(system: System, given: Mapping[str, np.ndarray]) -> dict[str, np.ndar
 
 
 def _row(system: System, name: str, size: int) -> np.ndarray:
-    """What each state adds to a sensor: float64[states]."""
+    """Share of each state in a sensor: float64[states]."""
     names, outputs = system.states, system.outputs
     if name not in outputs.names:
         raise ParameterError(
