@@ -53,7 +53,8 @@ class ModalFlow:
         self._states, self._sizes = size, tables.sizes.copy()
         self._names, columns = names, size + len(names) if tangents else 0
         self._sizes[layout.TANGENTS] = columns
-        self.CARRY = layout.AMPLITUDES + rows * self._lanes + tangents * (size + guards)
+        self.CARRY = layout.AMPLITUDES + rows * self._lanes + tangents * (size + guards) + columns
+        self.CARRY += 2 * tables.groups * self._lanes if names else 0
         self.STEP_RECORDS = 2 * guards + MOST_TOUCHES
 
     def workspace(self) -> tuple[np.ndarray, ...]:
@@ -219,10 +220,6 @@ class ModalFlow:
         return np.hstack([waves.real, courses]), np.hstack([np.abs(waves), np.abs(courses)])
 
 
-#: States of a system with several rigid stops whose derivatives are Taylor's.
-FEW_STATES = 16
-
-
 @functools.lru_cache(maxsize=64)
 def modal_flow(system: System) -> ModalFlow:
     """The modal flow of a system. Raises ParameterError, with the reason, if it has none."""
@@ -280,13 +277,8 @@ class Modal(Method):
         return modal_flow(system)
 
     def tangents(self, system: System, names: tuple[str, ...] = ()) -> System | None:
-        """The states alone: the modes of a contact state move the derivative too. That of impacts
-        on several stops is Taylor's, unless the states are many: where one impact causes another at
-        the same instant, the modal flow's doesn't always agree with it.
-        """
-        stops = sum(guard.law is not None and guard.law.kind == "impact" for guard in system.guards)
-        few = stops > 1 and len(system.states) <= FEW_STATES
-        if self.serving(system.origin) is not self or remembered(system) or few:
+        """The states alone: the modes of a contact state move the derivative too."""
+        if self.serving(system.origin) is not self or remembered(system):
             return super().tangents(system, names)
         linear = linear_pieces(system.origin)
         if isinstance(linear, str) or not all(varies_by(linear, name) for name in names):

@@ -76,9 +76,10 @@ class ParameterTables:
         #: Numbers of each set of values, for each parameter.
         self._width = 2 * drives + guards * (1 + 2 * drives)
         self.rows, self.shifts = Rows(), Rows(max(len(names) * self._width, 1))
+        #: Derivatives of the equations, by the parameters and the values that they depend on.
+        self._pieces: dict[tuple[float, ...], Callable[[int], LinearPiece]] = {}
         #: First row of each contact state, -1 where it has none yet.
         self._first = np.zeros(0, np.int64)
-        self._pieces: dict[tuple[int, int], Callable[[int], LinearPiece]] = {}
 
     @property
     def first(self) -> np.ndarray:
@@ -92,9 +93,13 @@ class ParameterTables:
         while self.shifts.used <= which:
             self.shifts.add(self._shifts_of(self._tables.sets[self.shifts.used]))
         if self.first[at] < 0:
-            _, modes = self._tables.made[at]
-            parts = [self._slopes_of(p, which, modes, mode) for p in range(len(self._linear))]
-            self._first[at] = self.rows.add(np.concatenate(parts))
+            given, (_, modes) = self._tables.sets[which], self._tables.made[at]
+            parts = [self._slopes_of(j, given, modes, mode) for j in range(len(self._linear))]
+            answers, mixing = zip(*parts, strict=True)
+            behind = np.cumsum([sum(map(len, answers)), *map(len, mixing)])
+            for one, more, place in zip(answers, mixing, behind, strict=False):
+                one[0, 0] = place if len(more) else 0
+            self._first[at] = self.rows.add(np.concatenate([*answers, *mixing]))
 
     def _shifts_of(self, given: ValueSet) -> np.ndarray:
         """Of each parameter: what it does to the rate and the phase of each drive; of each guard
@@ -108,17 +113,26 @@ class ParameterTables:
             found += [rates, phases, rows.ravel()]
         return np.concatenate(found)
 
-    def _slopes_of(self, p: int, which: int, modes: StateModes, mode: int) -> np.ndarray:
-        """The derivative of the steady answer, as the answer stands in its table."""
-        linear, given = self._linear[p], self._tables.sets[which]
-        if (p, which) not in self._pieces:
-            self._pieces[p, which] = linear.every_piece(given.values)
+    def _slopes_of(
+        self, parameter: int, given: ValueSet, modes: StateModes, mode: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The derivative of the steady answer behind a row of its own, and what mixes the modes:
+        rows of the table.
+        """
+        linear = self._linear[parameter]
         slow, _ = linear.rates(given.values)
-        answers = slopes_of(self._pieces[p, which](mode), given.rates, slow, modes)
+        key = parameter, *(given.values[name] for name in linear.parameters)
+        if key not in self._pieces:
+            self._pieces[key] = linear.every_piece(given.values)
+        piece = self._pieces[key](mode)
+        answers = slopes_of(piece, given.rates, slow, modes)
         padded = np.zeros((len(answers.T), LANES * self._tables.state_groups), complex)
         padded[:, : len(answers)] = answers.T
         parts = [padded[0].real, *(part for one in padded[1:] for part in (one.real, one.imag))]
-        return np.concatenate(parts)
+        rows = np.concatenate([np.zeros(LANES), *parts]).reshape(-1, LANES)
+        if modes.block is not None or not piece.matrix.any():
+            return rows, np.zeros((0, LANES))
+        return rows, mixing_of(piece.matrix, modes, self._tables.groups)
 
 
 def slopes_of(
@@ -150,8 +164,25 @@ def slopes_of(
     scale = max(sizes.max(initial=0.0), np.abs(every).max())
     lost = MOST_LOSS * np.abs(far) <= np.maximum(np.abs(every), sizes)
     lost[:, 0] |= MOST_SPREAD * sizes[:, 0] <= scale
-    if modes.block is not None or piece.matrix.any() or (lost & (loads != 0)).any():
+    if modes.block is not None or (lost & (loads != 0)).any():
         return np.full(modes.answers.shape, np.nan, complex)
     with np.errstate(all="ignore"):
         answers: np.ndarray = vectors @ np.where(loads == 0, 0, loads / far)
     return answers
+
+
+def mixing_of(matrix: np.ndarray, modes: StateModes, groups: int) -> np.ndarray:
+    """What a change of the matrix of a contact state makes of its modes, as rows of LANES modes.
+
+    The derivative of e^(A h) is V (G * D) L, with G = L A_p V and the divided differences D_jk of
+    e^(lambda h) (Higham, Functions of Matrices (2008), theorem 3.9). For each kept mode k: by
+    groups of modes j the real and the imaginary part of G_jk, then those for its complex partner.
+    """
+    count, paired = len(modes.values), modes.values.imag > 0
+    mixed = np.zeros((2, LANES * groups, LANES * groups), complex)
+    left = modes.inverse @ matrix
+    mixed[0, :count, :count] = left @ modes.vectors
+    mixed[1, :count, :count] = left @ (modes.vectors.conj() * paired)
+    parts = np.stack([mixed[0].real, mixed[0].imag, mixed[1].real, mixed[1].imag])
+    # [part, j, k] -> [k, group, part, lane]
+    return parts.reshape(4, groups, LANES, -1).transpose(3, 1, 0, 2).reshape(-1, LANES)

@@ -128,12 +128,9 @@ class Tables:
     @property
     def full(self) -> bool:
         """True if the tables hold MOST_BYTES or more."""
-        tables = self.modes, self.steady, self.pieces, self._acts, self._presses
-        rows = sum(one.table.nbytes for one in tables)
-        return (
-            self._held + rows + sum(one.rows.table.nbytes for one in self._by.values())
-            >= MOST_BYTES
-        )
+        tables = [self.modes, self.steady, self.pieces, self._acts, self._presses]
+        tables += [one.rows for one in self._by.values()]
+        return self._held + sum(one.table.nbytes for one in tables) >= MOST_BYTES
 
     def _rows_of_gaps(self) -> tuple[np.ndarray, np.ndarray]:
         """Row and sign of each guard's gap: guards whose gaps differ by a number only share one."""

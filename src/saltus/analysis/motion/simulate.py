@@ -11,7 +11,6 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis import dataset_parts
-from saltus.analysis.inputs.given import Starts, UntilTrue, Values
 from saltus.analysis.inputs.spans import Span, span
 from saltus.analysis.inputs.starts import Ensemble, check_system, ensemble, trajectories
 from saltus.analysis.inputs.verb import verb
@@ -40,6 +39,7 @@ from saltus.system import System
 from saltus.system.quantity import remembering
 
 if TYPE_CHECKING:
+    from saltus.analysis.inputs.given import Starts, UntilTrue, Values
     from saltus.analysis.motion.ending import Ending
 
 
