@@ -59,7 +59,7 @@ class ModalLoads:
     ----------
     rates : float64[1 + D]
         Of the constant, 0, and of the harmonic drives [rad/s].
-    speeds : float64[C, 4]
+    speeds : float64[C, K]
         Derivatives of the courses, in units of their values.
     loads : float64[N, 1 + D + C]
         Their factors in the equations.
@@ -141,7 +141,7 @@ def _generator(drive: int, speed: float, acts: ModalLoads) -> np.ndarray:
         return np.zeros((1, 1))
     if drive < len(acts.rates):
         return np.array([[0.0, -1.0], [1.0, 0.0]]) * float(acts.rates[drive])
-    return np.array(speed * np.eye(4, k=1))
+    return np.array(speed * np.eye(acts.speeds.shape[1], k=1))
 
 
 def _speed(speeds: np.ndarray) -> float:
@@ -170,9 +170,10 @@ def _answer(
         away = 1j * acts.rates[drive] * np.eye(len(load)) - space.matrix
         answers[:, drive] += space.right @ np.linalg.solve(away, load)
         return
-    for k in range(4):
+    terms = acts.speeds.shape[1]
+    for k in range(terms):
         load = np.linalg.solve(space.matrix, load) * (-1.0 if k == 0 else 1.0)
-        answers[:, harmonic + 4 * (drive - harmonic) + k] += space.right @ load
+        answers[:, harmonic + terms * (drive - harmonic) + k] += space.right @ load
 
 
 def _limit(matrix: np.ndarray) -> float:

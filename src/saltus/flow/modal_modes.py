@@ -48,7 +48,7 @@ class StateModes:
         :func:`slots_of` keeps.
     block : Block or None
         Those that don't.
-    answers : complex128[N, 1 + D + 4 * C]
+    answers : complex128[N, 1 + D + K * C]
         Steady answers to the constant, to each harmonic drive, and to each derivative of each
         course, as far as they aren't in the block.
     """
@@ -77,7 +77,7 @@ def modes_of(
         Its equations; the gaps.
     rates : float64[D]
         Rates of the harmonic drives [rad/s].
-    speeds : float64[C, 4]
+    speeds : float64[C, K]
         Derivatives of the courses, in units of their values [1/s^k].
     most : int
         Modes that may go their own ways; of a pair one counts.
@@ -87,7 +87,7 @@ def modes_of(
         Size of the largest eigenvalue of other contact states [1/s]: they tell how slow a mode is.
     """
     if not len(eigen[0]):  # contacts at rest hold all states
-        return StateModes(*eigen, None, np.zeros((0, 1 + len(rates) + 4 * len(speeds)), complex))
+        return StateModes(*eigen, None, np.zeros((0, 1 + len(rates) + speeds.size), complex))
     whole = both_of_each_pair(eigen)
     every = np.concatenate([[0.0], rates])
     acts = ModalLoads(
@@ -113,11 +113,14 @@ def spread_over(modes: StateModes, free: Constrained, drives: int) -> StateModes
     drives.
     """
     states, harmonic = len(free.spread), 1 + drives
+    courses = free.base.shape[1] - harmonic
     inverse = np.zeros((len(modes.values), states), complex)
     inverse[:, free.kept] = modes.inverse
     answers = free.spread @ modes.answers
     answers[:, :harmonic] += free.base[:, :harmonic]
-    answers[:, harmonic::4] += free.base[:, harmonic:]
+    if courses:
+        terms = (answers.shape[1] - harmonic) // courses
+        answers[:, harmonic::terms] += free.base[:, harmonic:]
     block = modes.block
     if block is not None:
         left = np.zeros((len(block.matrix), states))
@@ -156,7 +159,7 @@ def _together(
 def _answers(
     values: np.ndarray, vectors: np.ndarray, inverse: np.ndarray, acts: ModalLoads
 ) -> np.ndarray:
-    """Steady answers of modes that go their own ways: complex128[N, 1 + D + 4 * C]."""
+    """Steady answers of modes that go their own ways: complex128[N, 1 + D + K * C]."""
     harmonic = len(acts.rates)
     far = 1j * acts.rates[:, None] - values[None]
     parts = inverse @ acts.loads
@@ -165,7 +168,7 @@ def _answers(
             parts[:, :harmonic] == 0, 0, parts[:, :harmonic] / far.T
         )
         # -A^-(k+1) B of the k-th derivative
-        powers = -((1 / values[:, None]) ** np.arange(1, 5))
+        powers = -((1 / values[:, None]) ** np.arange(1, acts.speeds.shape[1] + 1))
         courses = [
             vectors @ np.where(part[:, None] == 0, 0, part[:, None] * powers)
             for part in parts.T[harmonic:]

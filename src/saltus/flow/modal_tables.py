@@ -21,7 +21,7 @@ from saltus.kernels.modal import layout
 from saltus.kernels.status import LAW_KINDS, NO_LAW
 from saltus.language.expression import Expr, walk
 from saltus.system import System
-from saltus.system.courses import TERMS, Course, course_of
+from saltus.system.courses import Course, course_of
 from saltus.system.linear import LinearPiece, LinearSystem
 from saltus.system.linear_laws import Constrained, Impacts, constrained, impacts_of, rows_of
 from saltus.system.quantity import remembered
@@ -93,10 +93,10 @@ class Tables:
         self.groups, self.state_groups = -(-slots // LANES), -(-n // LANES)
         drives = len(linear.drives)
         courses = len(linear.courses)
-        self.block_groups = -(-(n + 1 + 2 * drives + TERMS * courses) // LANES)
+        self.block_groups = -(-(n + 1 + 2 * drives + linear.terms * courses) // LANES)
         self.rows = 2 * self.groups + self.block_groups
         counts = n, self.groups, self.state_groups, rows, guards, drives, self.rows, courses
-        self.sizes = np.array([*counts, 0, len(self._remembers)], np.int64)
+        self.sizes = np.array([*counts, 0, len(self._remembers), linear.terms], np.int64)
 
     def clear(self) -> None:
         """Drop all sets and contact states: their numbers are of a new generation. Arrays that
@@ -119,7 +119,7 @@ class Tables:
         drives, guards = max(len(self.linear.drives), 1), len(self.linear.system.guards)
         self._offset, self._rate, self._lag = Rows(max(guards, 1)), Rows(drives), Rows(drives)
         self._links = Rows(layout.BEHIND + guards, int)
-        self._course = Rows(max(4 * len(self.linear.courses), 1))
+        self._course = Rows(max(5 * len(self.linear.courses), 1))
         states = len(self.linear.states)
         width = states + 1 + len(self.linear.drives) + len(self.linear.courses)
         self._acts, self._presses = Rows(2 * width + states + 1), Rows(width)
@@ -217,10 +217,10 @@ class Tables:
         asked = [one.payload for one in walk(node) if one.op == "param"]
         key = (node, np.array([values[name] for name in asked]).tobytes())
         if key not in self._courses:
-            course = course_of(node, values)
+            course = course_of(node, values, self.linear.terms)
             begins = np.concatenate([course.begins, np.zeros(-len(course.begins) % LANES)])
             first = self.pieces.add(np.concatenate([begins, course.terms.ravel()]))
-            row = [first, len(course.begins), course.cycle, len(begins) // LANES]
+            row = [first, len(course.begins), course.cycle, len(begins) // LANES, course.tail]
             self._courses[key] = course, row
             self._held += course.begins.nbytes + course.terms.nbytes
         return self._courses[key]
@@ -264,7 +264,7 @@ class Tables:
         self, known: _Equations, given: ValueSet, shown: LinearPiece, free: Constrained
     ) -> StateModes:
         """The modes of a contact state, of those states that contacts at rest allow."""
-        speeds = np.array([one.speeds for one in given.courses]).reshape(-1, TERMS)
+        speeds = np.array([one.speeds for one in given.courses]).reshape(-1, self.linear.terms)
         held = len(free.kept) < len(free.spread)
         piece, gaps = (
             (free.reduced(known.piece), free.seen(shown)) if held else (known.piece, shown)
@@ -353,13 +353,13 @@ class Tables:
         harmonic drive, to each derivative of each course.
         """
         harmonic, first = 1 + len(given.rates), self.first_guard
-        answers = modes.answers.T  # [1 + drives + TERMS * courses, N]
+        answers = modes.answers.T  # [1 + drives + terms * courses, N]
         padded = np.zeros((len(answers), LANES * self.state_groups), complex)
         padded[:, : answers.shape[1]] = answers
         gaps = shown.matrix[first] @ answers.T
         gaps[:, 0] += np.where(self.holds, shown.constant, 0.0)[first]
         gaps[:, 1:harmonic] += shown.driven[first, : harmonic - 1]
-        gaps[:, harmonic::TERMS] += shown.driven[first, harmonic - 1 :]
+        gaps[:, harmonic :: self.linear.terms] += shown.driven[first, harmonic - 1 :]
         # only the harmonic ones have an imaginary part
         states = [padded[0].real]
         numbers = [gaps[:, 0].real]
