@@ -14,8 +14,8 @@ SEED = 20261126
 def contact_state(rng, modes, *, ratio=0.02, stops=2, stiffness=5e4, damper=0.0):
     """The matrix of a structure of unit modal masses where some stops touch."""
     rates = 40.0 * np.arange(1, modes + 1) ** 2 * rng.uniform(0.9, 1.1, modes)
-    shapes = rng.normal(size=(modes, stops))
-    push = shapes @ shapes.T
+    shapes, scale = rng.normal(size=(modes, stops)), rng.uniform(1, 2, stops)
+    push = (shapes * scale) @ (shapes / scale).T  # symmetric to rounding
     held, lost = np.diag(rates**2) + stiffness * push, np.diag(2 * ratio * rates) + damper * push
     return np.block([[np.zeros((modes, modes)), np.eye(modes)], [-held, -lost]])
 
@@ -35,6 +35,7 @@ def exact(matrix):
         (7, {}, True),
         (7, {"ratio": 0.0}, True),
         (5, {"stops": 0}, True),
+        (9, {"stops": 7}, True),
         (6, {"ratio": 0.05, "stiffness": 1e7}, True),
         (6, {"damper": 3.0}, True),
         (6, {"damper": 3e3}, False),  # a mode that doesn't vibrate
