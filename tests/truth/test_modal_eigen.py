@@ -35,7 +35,6 @@ def exact(matrix):
         (7, {}, True),
         (7, {"ratio": 0.0}, True),
         (5, {"stops": 0}, True),
-        (9, {"stops": 7}, True),
         (6, {"ratio": 0.05, "stiffness": 1e7}, True),
         (6, {"damper": 3.0}, True),
         (6, {"damper": 3e3}, False),  # a mode that doesn't vibrate
@@ -69,3 +68,11 @@ def test_only_structures_take_the_quick_way(change):
     elif change == "other rates":
         matrix[1, 5] = 1.0 + 1e-12
     assert (modal_eigen._of_structure(matrix) is not None) == (change == "none")
+
+
+def test_sums_of_several_stops_are_symmetric_to_rounding_of_their_terms():
+    matrix = contact_state(np.random.default_rng(SEED + 12), 12, stops=5)
+    stiffness = matrix[12:, :12]
+    apart = np.abs(stiffness - stiffness.T)
+    assert (apart > modal_eigen.ROUNDING * np.abs(stiffness)).any()  # of an entry that cancels
+    assert modal_eigen._of_structure(matrix) is not None
