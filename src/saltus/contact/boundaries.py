@@ -80,20 +80,19 @@ def number_of(condition: Relation, guards: Sequence[Guard]) -> int | None:
     TraceError
         If it is no boundary at all: of parameters or time only, or of equal things.
     """
-    finder = _Finder(guards)
-    for relation in relations([ex.select(condition, 1, 0)]):
-        finder.add(relation)
-    found = finder.outcome[condition]
-    found = found.inner if isinstance(found, Not) else found
-    if not isinstance(found, Bit):
-        return None
-    if found.guard < len(guards):
-        return found.guard
-    meant = finder.polynomial(found.guard)
-    multiples = [
-        number for number in range(len(guards)) if is_multiple(finder.polynomial(number), meant)
-    ]
-    return multiples[0] if len(multiples) == 1 else None
+    return numbers_of([condition], guards)[0]
+
+
+def numbers_of(conditions: Iterable[Relation], guards: Sequence[Guard]) -> list[int | None]:
+    """:func:`number_of` several comparisons."""
+    finder, numbers = _Finder(guards), list[int | None]()
+    for condition in conditions:
+        for relation in relations([ex.select(condition, 1, 0)]):
+            finder.add(relation)
+        found = finder.outcome[condition]
+        found = found.inner if isinstance(found, Not) else found
+        numbers.append(finder.meant(found.guard, len(guards)) if isinstance(found, Bit) else None)
+    return numbers
 
 
 def relations(roots: Sequence[Expr]) -> Iterator[Relation]:
@@ -165,6 +164,14 @@ class _Finder:
         """The normal form of a guard's gap; empty for a hold guard."""
         guard = self.guards[number]
         return {} if is_hold(guard) else self._canonical.polynomial(guard.gap)
+
+    def meant(self, number: int, known: int) -> int | None:
+        """The one among the first guards, that many, of whose gap a guard's is a multiple."""
+        if number < known:
+            return number
+        own = self.polynomial(number)
+        multiples = [one for one in range(known) if is_multiple(self.polynomial(one), own)]
+        return multiples[0] if len(multiples) == 1 else None
 
     def rewrite(self, root: Expr) -> Expr:
         """The expression with bits in place of relations, all of which must be known."""

@@ -62,10 +62,12 @@ def is_surface(
     gap = guards[number].gap
     if has_clock(gap):
         return False
+    asking = [i for i, entry in enumerate(field) if number in bits_in([entry])]
+    moving = {node.payload for node in ex.walk(gap) if node.op == "state"}
+    if not any(states[i] in moving for i in asking):
+        return False
     normal = gradient(gap, states)
-    moved = [
-        i for i, entry in enumerate(field) if not _is_zero(normal[i]) and number in bits_in([entry])
-    ]
+    moved = [i for i in asking if not _is_zero(normal[i])]
     if not moved:
         return False
     sides = {

@@ -128,9 +128,11 @@ def _of_structure(matrix: np.ndarray) -> Eigen | None:
 
 
 def _is_symmetric(matrix: np.ndarray) -> bool:
-    """True if a matrix is symmetric to rounding of each entry."""
-    size = np.abs(matrix)
-    return bool((np.abs(matrix - matrix.T) <= ROUNDING * np.minimum(size, size.T)).all())
+    """True if a matrix is symmetric to rounding of the terms of each entry: in one of energy these
+    are no larger than the root of the two entries on the diagonal.
+    """
+    size = np.sqrt(np.abs(np.diag(matrix)))
+    return bool((np.abs(matrix - matrix.T) <= ROUNDING * np.outer(size, size)).all())
 
 
 def _damped(stiffness: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from saltus.arguments import checked
-from saltus.contact.boundaries import number_of
+from saltus.contact.boundaries import numbers_of
 from saltus.contact.contacts import renamed
 from saltus.errors import ParameterError, SaltusWarning, among, must_be, shown
 from saltus.system.structures import matrices, told
@@ -198,7 +198,7 @@ def structure(
         if spring is not None and contact.power in (None, 1):
             compliance = moving.compliance(moving.along(direction(contact, degrees)))
             told.doubt_stiff(label, spring, compliance, angular[:count].max(initial=0.0))
-    numbers = {label: number_of(side, made.guards) for label, side in sides.items()}
+    numbers = dict(zip(sides, numbers_of(sides.values(), made.guards), strict=True))
     named = {number: label for label, number in numbers.items() if number is not None}
     made = replace(made, guards=renamed(made.guards, named), description=words)
     return made if sensors is None else with_sensors(made, sensors, moving, degrees, loads, unit)
