@@ -46,16 +46,15 @@ class ModalFlow:
         Parameters with respect to which it is carried too.
     """
 
-    def __init__(
-        self, tables: Tables, tangents: bool = False, names: tuple[str, ...] = ()
-    ) -> None:
+    def __init__(self, tables: Tables, tangents: bool = False, names: tuple[str, ...] = ()) -> None:
         self.tables, self._kernel, self._tangents = tables, modal_module(), tangents
         self._lanes, self._memory = self.tables.modes.table.shape[1], threading.local()
         size, _, _, _, guards, _, rows, *_ = tables.sizes.tolist()
         self._states, self._sizes = size, tables.sizes.copy()
         self._names, columns = names, size + len(names) if tangents else 0
         self._sizes[layout.TANGENTS] = columns
-        self.CARRY = layout.AMPLITUDES + rows * self._lanes + tangents * (size + guards)
+        self.CARRY = layout.AMPLITUDES + rows * self._lanes + tangents * (size + guards) + columns
+        self.CARRY += 2 * tables.groups * self._lanes if names else 0
         self.STEP_RECORDS = 2 * guards + MOST_TOUCHES
 
     def workspace(self) -> tuple[np.ndarray, ...]:
@@ -112,7 +111,7 @@ class ModalFlow:
                 empty((MOST_TOUCHES, 2)), empty((states, lanes)), empty((states, lanes)),
                 empty((max(drives, 1), 4)), empty((max(guards, 1), 4)),
                 empty(((terms + 2) * self.tables.block_groups, lanes)),
-                empty((max(courses, 1), layout.VALUE + layout.COURSE_TERMS)),
+                empty((max(courses, 1), layout.VALUE + self.tables.linear.terms)),
                 empty((2 * groups, lanes)), empty((amplitudes, lanes)), empty((size, columns)),
                 empty((3, size)),
             )  # fmt: skip
@@ -135,6 +134,13 @@ class ModalFlow:
         """The same for trajectories with one set of parameter values."""
         given, state = self.tables.sets[which], batch.state[who, : self._states]
         time = batch.origin[who] + batch.count[who] * batch.period[who] + batch.phase[who]
+        earliest = max((course.earliest for course in given.courses), default=-np.inf)
+        if (time < earliest).any():
+            raise ParameterError(
+                f"a motion begins at {time.min():g} s, and sl.Modal knows a drive of "
+                f"{self.tables.linear.system.name} from {earliest:g} s on: ask for "
+                f"method=sl.Taylor(), or begin later."
+            )
         drives = np.column_stack(
             [
                 np.cos(given.rates * time[:, None] + given.lags),
@@ -217,12 +223,9 @@ class ModalFlow:
         waves = np.exp(1j * (given.rates * time + given.lags)) * (1j * given.rates) ** orders
         courses = np.zeros((WAYS + 1, len(given.courses)))
         for p, course in enumerate(given.courses):
-            courses[: layout.COURSE_TERMS, p] = course.at(np.array(time))
+            known = course.at(np.array(time))[: WAYS + 1]
+            courses[: len(known), p] = known
         return np.hstack([waves.real, courses]), np.hstack([np.abs(waves), np.abs(courses)])
-
-
-#: States of a system with several rigid stops whose derivatives are Taylor's.
-FEW_STATES = 16
 
 
 @functools.lru_cache(maxsize=64)
@@ -282,13 +285,8 @@ class Modal(Method):
         return modal_flow(system)
 
     def tangents(self, system: System, names: tuple[str, ...] = ()) -> System | None:
-        """The states alone: the modes of a contact state move the derivative too. That of impacts
-        on several stops is Taylor's, unless the states are many: where one impact causes another at
-        the same instant, the modal flow's doesn't always agree with it.
-        """
-        stops = sum(guard.law is not None and guard.law.kind == "impact" for guard in system.guards)
-        few = stops > 1 and len(system.states) <= FEW_STATES
-        if self.serving(system.origin) is not self or remembered(system) or few:
+        """The states alone: the modes of a contact state move the derivative too."""
+        if self.serving(system.origin) is not self or remembered(system):
             return super().tangents(system, names)
         linear = linear_pieces(system.origin)
         if isinstance(linear, str) or not all(varies_by(linear, name) for name in names):

@@ -7,7 +7,7 @@ blocks            modes that go together
 series            amplitudes on their way, and what they say of gaps
 laws              impacts, contacts at rest, their release
 impacts           several impacts at one instant
-tangents          the derivative of the state with respect to the state at the start
+tangents          the derivative of the state with respect to the start and to parameters
 steps             steps, and the life of a trajectory
 ================  ==================================================================================
 """

@@ -339,6 +339,7 @@ def enter(i, tau, batch, m):
     set_block_drives(m.links[at, MODES], m)
     if m.sizes[TANGENTS] != 0:
         enter_columns(i, at, tau, batch, m)
+        keep_amplitudes(i, batch, m)
     batch.carry[i, ENTERS] = 0.0
 
 
@@ -525,6 +526,7 @@ def put_back(i, tau, status, batch, m):
             batch.carry[i, AMPLITUDES + k] = m.y[k // LANES, k % LANES]
         keep_state(i, tau, batch, m)
         move_columns(i, at, tau, batch, m)
+        keep_amplitudes(i, batch, m)
     batch.phase[i], batch.status[i] = tau, status
 
 

@@ -8,15 +8,23 @@ Dynamics and Bifurcations of Non-Smooth Mechanical Systems (2004), section 7. En
 state N + C r + c of a trajectory, with C columns: those of the N states, then those of parameters.
 
 That of a parameter p is moved likewise but for the derivative of the steady answer, s_p, which is
-taken off before and added behind; and where a boundary moves with p, dg/dp is added to dg/dz Y.
+taken off before and added behind, and for what a derivative of A adds: its amplitudes gain sum_k
+G_jk D_jk y_k, with the amplitudes y of the motion when it was moved last, G = L (dA/dp) V, and D_jk
+= (e^{lambda_j h} - e^{lambda_k h}) / (lambda_j - lambda_k). Where a boundary moves with p, dg/dp is
+added to dg/dz Y.
 
-Rows of `varied`, from `links[at, SLOPES]` on, one parameter after the other: derivatives of the
-amplitudes of the steady answer, as they stand in `steady`. Columns of `shifts`, set by set, one
-parameter after the other: derivatives of the rates and of the phases of the drives; then for each
-guard the derivatives of its constant and of its drives, and these drives.
+Rows of `varied`, from `links[at, SLOPES]` on, one parameter after the other: the number of the
+first row of G, 0 if there is none; derivatives of the amplitudes of the steady answer, as they
+stand in `steady`. Behind them those of G: for each mode k, by groups of modes j, the real and the
+imaginary part of G_jk, then those where k is the partner of a kept mode. Columns of `shifts`, set
+by set, one parameter after the other: derivatives of the rates and of the phases of the drives;
+then for each guard the derivatives of its constant and of its drives, and these drives.
 """
 
-from saltus.kernels.lanes import fma, load, splat, store
+from saltus.kernels.lanes import any_lane, fma, load, select, splat, store
+
+#: |lambda_j - lambda_k| h, squared, below which D_jk is a series: of terms (x/2 .. x^11/12!).
+CLOSE, CLOSE_TERMS = 0.0625, 12
 
 
 @inner
@@ -34,13 +42,20 @@ def lead_of(i, c, d, tau, batch, m):
     return slope + m.shifts[which, first + d] * time_of(i, tau, batch)
 
 
+@inner
+def varied_of(at, c, m):
+    """First row of `varied` for a contact state and a column."""
+    rows = 1 + (1 + 2 * m.sizes[DRIVES]) * m.sizes[STATE_GROUPS]
+    return m.links[at, SLOPES] + (c - m.sizes[STATES]) * rows
+
+
 @kernel
 def answer_slope(i, at, c, tau, batch, m):
     """The derivative of the steady answer of a contact state with respect to the parameter of a
     column, to `answer`. Needs `angle`.
     """
     groups, steady = m.sizes[STATE_GROUPS], m.links[at, STEADY]
-    varied = m.links[at, SLOPES] + (c - m.sizes[STATES]) * (1 + 2 * m.sizes[DRIVES]) * groups
+    varied = varied_of(at, c, m) + 1
     for s in range(groups):
         store(m.answer, s, load(m.varied, varied + s, LANES))
     for d in range(m.sizes[DRIVES]):
@@ -77,6 +92,87 @@ def load_column(i, c, batch, m):
         m.state[r // LANES, r % LANES] = batch.state[i, states + m.sizes[TANGENTS] * r + c]
 
 
+@inner
+def first_date(m):
+    """Column of `carry` of the first of the derivatives of the instant of a landing."""
+    return AMPLITUDES + m.sizes[ROWS] * LANES + m.sizes[STATES] + m.sizes[GUARDS]
+
+
+@inner
+def first_kept(m):
+    """Column of `carry` of the first of the amplitudes when the derivative was moved last."""
+    return first_date(m) + m.sizes[TANGENTS]
+
+
+@kernel
+def keep_amplitudes(i, batch, m):
+    """Keep the amplitudes, where the derivative is as far as the motion."""
+    if m.sizes[TANGENTS] > m.sizes[STATES]:
+        for k in range(2 * m.sizes[MODE_GROUPS] * LANES):
+            batch.carry[i, first_kept(m) + k] = m.y[k // LANES, k % LANES]
+
+
+@inner
+def divided(modes, g, k, sign, h, m):
+    """D_jk of a group of modes j, for the mode k if `sign` is 1, for its partner if it is -1. Needs
+    `factor`.
+    """
+    groups = m.sizes[MODE_GROUPS]
+    a = load(m.modes, modes + g, LANES) - number(m.modes, modes, k)
+    b = load(m.modes, modes + groups + g, LANES) - sign * number(m.modes, modes + groups, k)
+    real, imaginary = number(m.factor, 0, k), sign * number(m.factor, groups, k)
+    size = fma(a, a, b * b)
+    near = size * (h * h) < CLOSE
+    below = select(near, splat(1.0, LANES), size)
+    c, d = load(m.factor, g, LANES) - real, load(m.factor, groups + g, LANES) - imaginary
+    x, y = fma(c, a, d * b) / below, fma(d, a, -(c * b)) / below
+    if any_lane(near):
+        a, b = a * h, b * h
+        p, q = splat(1.0, LANES), splat(0.0, LANES)
+        for term in range(CLOSE_TERMS, 1, -1):  # 1 + x/2 (1 + x/3 (1 + ...))
+            share = 1.0 / term
+            c, d = a * share, b * share
+            p, q = fma(c, p, -(d * q)) + 1.0, fma(c, q, d * p)
+        x = select(near, (p * real - q * imaginary) * h, x)
+        y = select(near, (p * imaginary + q * real) * h, y)
+    return x, y
+
+
+@kernel
+def mix_modes(i, at, c, h, batch, m):
+    """Add to the amplitudes of a column what the derivative of A adds in a time h, for the
+    parameter of the column. Needs `factor`.
+    """
+    groups, modes, first = m.sizes[MODE_GROUPS], m.links[at, MODES], m.links[at, SLOPES]
+    behind = m.varied[varied_of(at, c, m), 0]
+    if behind == 0.0:
+        return
+    for k in range(groups * LANES):
+        real = batch.carry[i, first_kept(m) + k]
+        imaginary = batch.carry[i, first_kept(m) + groups * LANES + k]
+        if real == 0.0 and imaginary == 0.0:
+            continue
+        for g in range(groups):
+            row = first + int(behind) + 4 * (k * groups + g)
+            x, y = load(m.column, g, LANES), load(m.column, groups + g, LANES)
+            for partner in range(2):
+                sign = 1.0 - 2.0 * partner
+                if partner == 1 and number(m.modes, modes + groups, k) == 0.0:
+                    continue
+                a, b = divided(modes, g, k, sign, h, m)
+                p, q = (
+                    load(m.varied, row + 2 * partner, LANES),
+                    load(m.varied, row + 2 * partner + 1, LANES),
+                )
+                a, b = fma(a, p, -(b * q)), fma(a, q, b * p)
+                x, y = (
+                    fma(a, real, fma(b, -sign * imaginary, x)),
+                    fma(b, real, fma(a, sign * imaginary, y)),
+                )
+            store(m.column, g, x)
+            store(m.column, groups + g, y)
+
+
 @kernel
 def columns_after(i, at, tau, h, batch, m):
     """The derivative a time h after it was moved last in a contact state, to `columns`. Sets
@@ -106,9 +202,13 @@ def columns_after(i, at, tau, h, batch, m):
                     m.column, m,
                 )  # fmt: skip
             move_block(modes, h, m.column, m.column, m)
+            if c >= states:
+                mix_modes(i, at, c, h, batch, m)
             state_of(modes, m.column, m)
         for r in range(states):
             m.columns[r, c] = m.state[r // LANES, r % LANES]
+    for s in range(m.sizes[STATE_GROUPS]):  # a column without a closed form is NaN, the rest isn't
+        store(m.state, s, splat(0.0, LANES))
 
 
 @kernel
@@ -225,8 +325,10 @@ def slope_along(r, modes, m):
 
 @kernel
 def enter_columns(i, at, tau, batch, m):
-    """The jump of the derivative at the boundary just crossed, behind which the amplitudes are `y`:
-    by the first of several whose crossing makes the rates jump. Needs `angle`.
+    """The jump of the derivative at the boundary just crossed, behind which the amplitudes are `y`.
+    The instant moves with the first of several boundaries whose crossing makes the rates jump, and
+    with that of the first landing where landings cause others at once: their own gaps and rates
+    become as small as rounding. Needs `angle`.
     """
     modes, first = m.links[at, MODES], first_rate(m)
     states, columns = m.sizes[STATES], m.sizes[TANGENTS]
@@ -240,12 +342,25 @@ def enter_columns(i, at, tau, batch, m):
     rates_of(modes, m.links[at, STEADY], int(batch.carry[i, SET]), m.y, m)
     for r in range(states):
         batch.carry[i, first + r] = m.state[r // LANES, r % LANES] - batch.carry[i, first + r]
-    share = m.sign_of[g] / batch.carry[i, first + states + g]
+    if batch.carry[i, DATED] == 0.0:
+        date_landing(i, g, modes, tau, batch, m)
     for c in range(columns):
+        early = batch.carry[i, first_date(m) + c]
+        for r in range(states):
+            batch.state[i, states + columns * r + c] += batch.carry[i, first + r] * early
+
+
+@kernel
+def date_landing(i, g, modes, tau, batch, m):
+    """By how much earlier the boundary of a guard is met, for each column: (dg/dz Y + dg/dp) / g'.
+    Needs `angle`.
+    """
+    rate = batch.carry[i, first_rate(m) + m.sizes[STATES] + g]
+    for c in range(m.sizes[TANGENTS]):
         load_column(i, c, batch, m)
         amplitudes_of(modes, m.column, m)
-        slope = slope_along(m.row_of[g], modes, m) * share
-        if c >= states:
-            slope += gap_slope(i, g, c, tau, batch, m) / batch.carry[i, first + states + g]
-        for r in range(states):
-            batch.state[i, states + columns * r + c] += batch.carry[i, first + r] * slope
+        slope = slope_along(m.row_of[g], modes, m) * m.sign_of[g]
+        if c >= m.sizes[STATES]:
+            slope += gap_slope(i, g, c, tau, batch, m)
+        batch.carry[i, first_date(m) + c] = slope / rate
+    batch.carry[i, DATED] = 1.0
