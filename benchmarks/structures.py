@@ -5,10 +5,12 @@ tip at 1.1 of its first natural frequency, with soft stops on both sides of up t
 trajectory from rest; CPU time of one pinned core, a process for each cell. The programs follow the
 same motion: numbers of contacts are given side by side. heyoka has a callback in Python at each
 contact; its compact mode compiles in less time. A cell that isn't done after LIMIT seconds says
-so. Then many trajectories from different starts, by one call.
+so. Then many trajectories from different starts, by one call. Then frequency responses from rest,
+over a range of frequencies or at one at which the motion never repeats, with what they found.
 
     python benchmarks/structures.py               the tables
     python benchmarks/structures.py 60 8          one row: 60 modes, 8 stops
+    python benchmarks/structures.py responses     the last table
 """
 
 from __future__ import annotations
@@ -37,6 +39,9 @@ NODES = (30, 15, 20, 25, 10, 28, 22, 18, 13, 7)
 ROWS = ((5, 1), (10, 1), (20, 1), (20, 2), (40, 1), (60, 1), (60, 2), (60, 8), (128, 10))
 #: Modes, stops and trajectories of each batch.
 BATCHES = ((20, 2, 256),)
+#: Modes, stops, and frequencies of each response: first and last in units of the first natural
+#: frequency, and how many.
+RESPONSES = ((10, 2, (0.5, 12.0, 41)), (40, 1, (0.5, 12.0, 41)), (10, 8, (1.1, 1.1, 1)))
 #: Time that a program has for a cell, compiling included [s], and how many cells it had.
 LIMIT = 300.0
 CELLS = {"saltus": 4, "heyoka": 2, "compact": 2, "scipy": 1}
@@ -186,6 +191,20 @@ def measured(program: str, modes: int, stops: int) -> tuple[str, str]:
     return cells, contacts
 
 
+def by_response(modes: int, stops: int, band: tuple[float, float, int]) -> str:
+    """Time of a frequency response and of each frequency, and what it found, as cells."""
+    system, made = structure(modes, stops), []
+    first = float(structure(1, 0).values["frequency"]) / 1.1
+    frequencies = first * np.linspace(*band)
+    kw = {"progress": False, "threads": 1}
+    sl.frequency_response(system, [20.0 * first], **kw)  # compiles
+    each = seconds(lambda: made.append(sl.frequency_response(system, frequencies, **kw)))
+    kinds, counts = np.unique(made[0].type.values, return_counts=True)
+    found = ", ".join(f"{count} {kind}" for kind, count in zip(kinds, counts, strict=True))
+    events = made[0].sizes.get("event", 0)
+    return f"{each:.1f} | {each / len(frequencies):.2f} | {found} | {events}"
+
+
 def row(modes: int, stops: int) -> str:
     """One row of the table."""
     found = {program: measured(program, modes, stops) for program in CELLS}
@@ -205,12 +224,23 @@ def one_cell(program: str, modes: int, stops: int) -> None:
     print(cells, contacts, sep=";")
 
 
+def responses() -> None:
+    """Print the table of frequency responses."""
+    print("| modes | stops | f/f1 | CPU [s] | of each frequency [s] | motions | events |\n" +
+          "|" + "---|" * 7, flush=True)  # fmt: skip
+    for modes, stops, band in RESPONSES:
+        cells = by_response(modes, stops, band)
+        print(f"| {modes} | {stops} | {band[0]:g} to {band[1]:g} | {cells} |", flush=True)
+
+
 def main(arguments: list[str]) -> None:
     """Print the tables."""
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
     if arguments and arguments[0] in CELLS:
         return one_cell(arguments[0], *map(int, arguments[1:]))
+    if arguments == ["responses"]:
+        return responses()
     rows = [(int(arguments[0]), int(arguments[1]))] if arguments else ROWS
     print("| modes | stops | contacts saltus / heyoka | saltus: first result [s] | a period [ms] | "
           "again [ms] | memory [MB] | heyoka: compile [s] | a period [ms] | compact: compile [s] | "
@@ -223,6 +253,8 @@ def main(arguments: list[str]) -> None:
               "one alone [ms] |\n" + "|" + "---|" * 6, flush=True)  # fmt: skip
         for batch in BATCHES:
             print(f"| {' | '.join(map(str, batch))} | {by_batch(*batch)} |", flush=True)
+        print()
+        responses()
     return None
 
 

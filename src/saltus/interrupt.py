@@ -168,8 +168,25 @@ class Stop:
 _CURRENT: ContextVar[Stop | None] = ContextVar("stop", default=None)
 
 
+#: What is called while long work goes on, and the thread that it is called in.
+_HEARTBEAT: ContextVar[tuple[int, Callable[[], None]] | None] = ContextVar("beat", default=None)
+
+
+@contextmanager
+def heartbeat(beat: Callable[[], None]) -> Iterator[None]:
+    """Within, ``beat`` is called in this thread wherever long work can be stopped."""
+    token = _HEARTBEAT.set((threading.get_ident(), beat))
+    try:
+        yield
+    finally:
+        _HEARTBEAT.reset(token)
+
+
 def check_stop() -> None:
     """Raise Interrupted if the work that this thread does a part of was asked to stop."""
+    beat = _HEARTBEAT.get()
+    if beat is not None and beat[0] == threading.get_ident():
+        beat[1]()
     current = _CURRENT.get()
     if current is not None and current.is_set():
         raise Interrupted

@@ -1,9 +1,10 @@
 """Progress of long work: a callable of the user's, a bar on a terminal, or lines elsewhere. Bar and
-lines appear only if the work lasts.
+lines appear only if the work lasts, and then also where no share of it is reported.
 """
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 import time
@@ -14,9 +15,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.errors import ParameterError
+from saltus.interrupt import heartbeat
 
 if TYPE_CHECKING:
     from rich.progress import Progress
+
+#: Time without a report after which the last one is shown again [s].
+BEAT = 0.5
 
 
 @contextmanager
@@ -37,13 +42,33 @@ def reporting(
     elif progress is not None and not progress:
         yield None
     elif progress is None and not os.isatty(2) and not _in_notebook():
-        yield LogLines(_to_stderr).show
+        with _alive(LogLines(_to_stderr).show) as show:
+            yield show
     else:
         bar = _NotebookBar() if _in_notebook() else _Bar()
         try:
-            yield bar.show
+            with _alive(bar.show) as show:
+                yield show
         finally:
             bar.close()
+
+
+@contextmanager
+def _alive(show: Callable[[float], None]) -> Iterator[Callable[[float], None]]:
+    """``show``, which is called with the last share again while none is reported."""
+    last, shown = 0.0, time.monotonic()
+
+    def report(share: float) -> None:
+        nonlocal last, shown
+        last, shown = share, time.monotonic()
+        show(share)
+
+    def beat() -> None:
+        if time.monotonic() - shown > BEAT:
+            report(last)
+
+    with heartbeat(beat):
+        yield report
 
 
 def stage(
@@ -59,7 +84,7 @@ def _to_stderr(text: str) -> None:
 
 
 class LogLines:
-    """Lines for a log: at 25, 50 and 75 %, and at least one in five minutes, once the work lasts.
+    """Lines for a log: once the work lasts, at 25, 50 and 75 %, and at least one in five minutes.
 
     Parameters
     ----------
@@ -69,13 +94,13 @@ class LogLines:
         The time [s].
     """
 
-    PATIENCE, EVERY = 10.0, 300.0
+    PATIENCE, EVERY = 2.0, 300.0
 
     def __init__(
         self, write: Callable[[str], None], clock: Callable[[], float] = time.monotonic
     ) -> None:
         self._write, self._clock = write, clock
-        self._begun = self._written = clock()
+        self._begun, self._written = clock(), -math.inf
         self._passed = 0
         self._first: tuple[float, float] | None = None
 

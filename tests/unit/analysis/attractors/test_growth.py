@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
-from saltus.analysis.attractors import aperiodic
+from saltus.analysis.attractors import aperiodic, grid_responses
 from saltus.analysis.attractors.find_responses import KEPT_ITERATES, find_responses
 from saltus.analysis.attractors.growth import BUDGET, by_neighbours, growth_rates, tangent_cost
 from saltus.analysis.solve.tolerances import ROUND
@@ -83,6 +83,19 @@ def test_a_neighbour_tells_chaos_at_the_rate_that_the_tangent_flow_tells(monkeyp
     assert abs(kind[1] - rates.mean()) < 5 * error
 
 
+@pytest.mark.parametrize("damping", [0.0, 0.02])
+def test_a_neighbour_along_the_past_comes_nearer_as_damping_says(damping, spent):
+    """The motion itself isn't moved again: each block costs its neighbour alone."""
+    map_ = Stroboscope(oscillators(damping), sl.Taylor(), threads=1)
+    past = map_.launch(start(), 1601).advance(1601)
+    spent.clear()
+    scale = np.array([[0.1, 0.1, 0.1, 1.0, 1.0, 1.0]])
+    end, rates = growth_rates(map_, past[:, -1], scale, 200, past)
+    assert rates.mean() == pytest.approx(-damping, abs=2.0 / (8 * len(rates)))
+    assert sum(spent) == 200 * 8
+    assert (end == past[:, -1]).all()
+
+
 @pytest.mark.parametrize("most", [200, 400])
 def test_a_motion_that_nothing_tells_costs_what_its_budget_allows(spent, monkeypatch, most):
     monkeypatch.setattr(aperiodic, "kind_of_growth", lambda _: None)
@@ -144,3 +157,21 @@ def test_a_motion_that_rests_on_a_stop_goes_on_where_no_deviation_is_left():
     assert np.isfinite(state).all()
     assert np.isneginf(rates).any()
     assert not np.isnan(rates).any()
+
+
+def test_ctrl_c_does_not_wait_for_numbers(monkeypatch):
+    """Those of the frequencies that are done were computed when these were found."""
+    system = oscillators(0.5)
+
+    def press(share):
+        if share >= 0.75:
+            raise KeyboardInterrupt
+
+    frequencies = np.linspace(1.0, 2.0, 4)
+    whole = sl.frequency_response(system, frequencies, threads=1, progress=False)
+    with pytest.raises(sl.Interrupted) as stop:
+        sl.frequency_response(system, frequencies, start="sweep_up", threads=1, progress=press)
+    monkeypatch.setattr(grid_responses, "numbers_of", None)
+    part = stop.value.partial
+    assert (part.type.values != "not_computed").sum() >= 3
+    np.testing.assert_allclose(part.rms.values[:3], whole.rms.values[:3], rtol=1e-9)

@@ -6,7 +6,9 @@ import pytest
 import saltus as sl
 from saltus.analysis.inputs.verb import verb
 from saltus.announce import announce
+from saltus.flow import progress
 from saltus.flow.progress import LogLines, reporting
+from saltus.interrupt import check_stop
 
 rig = sl.models.delangre("b")
 
@@ -169,6 +171,7 @@ def told(shares_at):
 
 def test_a_log_has_a_line_for_each_quarter_of_long_work():
     assert told([(t, t / 100) for t in range(101)]) == [
+        "2% done in 2 s, about 98 s left",
         "25% done in 25 s, about 75 s left",
         "50% done in 50 s, about 50 s left",
         "75% done in 75 s, about 25 s left",
@@ -176,16 +179,34 @@ def test_a_log_has_a_line_for_each_quarter_of_long_work():
 
 
 def test_short_work_says_nothing_and_slow_work_says_that_it_lives():
-    assert told([(t / 10, t / 90) for t in range(91)]) == []
-    assert told([(t, 0.0) for t in range(0, 701, 10)]) == ["0% done in 300 s", "0% done in 600 s"]
+    assert told([(t / 10, t / 19) for t in range(20)]) == []
+    assert told([(t, 0.0) for t in range(0, 701, 10)]) == [
+        "0% done in 10 s", "0% done in 310 s", "0% done in 610 s"
+    ]  # fmt: skip
 
 
 def test_the_time_left_does_not_count_what_came_before_the_work():
     compiled = 100.0
-    assert told([(compiled, 0.0), (compiled + 10, 0.25), (compiled + 20, 0.5)])[-1] == (
-        "50% done in 120 s, about 20 s left"
-    )
+    assert told([(compiled, 0.0), (compiled + 10, 0.25), (compiled + 20, 0.5)]) == [
+        "0% done in 100 s",
+        "25% done in 110 s, about 30 s left",
+        "50% done in 120 s, about 20 s left",
+    ]
     assert told([(compiled, 0.3)]) == ["30% done in 100 s"]
+
+
+def test_a_part_of_the_work_that_reports_nothing_is_not_silent(monkeypatch, capfd):
+    """A line is written where work can be stopped: once, since no share is reported."""
+    monkeypatch.setattr(LogLines, "PATIENCE", 0.0)
+    monkeypatch.setattr(progress, "BEAT", 0.0)
+    with reporting(None) as show:
+        show(0.3)
+        assert "30% done" in capfd.readouterr().err
+        monkeypatch.setattr(LogLines, "EVERY", 0.0)
+        check_stop()
+        assert "30% done" in capfd.readouterr().err
+    check_stop()
+    assert capfd.readouterr().err == ""
 
 
 def test_what_progress_may_be():
