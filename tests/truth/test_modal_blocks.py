@@ -124,6 +124,7 @@ CASES = {
     "critical everywhere": {"damper": 2.0, "force": 3.0},
     "overdamped": {"damper": 20.0, "force": 30.0, "loss": 50.0},
     "growing": {"damper": -0.05},
+    "a very stiff stop": {"stiffness": 1e12, "damper": 0.01},
     "a body under its weight": {"spring": 0.0, "dead": 1.0, "stiffness": 1e6},
     "a weak spring under a weight": {"spring": 1e-9, "dead": 1.0, "stiffness": 1e6},
     "a body with a damper": {"spring": 0.0, "damper": 0.1, "dead": 1.0, "stiffness": 1e3},
@@ -273,3 +274,49 @@ def test_two_free_bodies_that_bounce_keep_their_energy():
     end = [float(run[f"end_{name}"]) for name in "xyvw"]
     allowed = 4 * 2.2e-16 * run.sizes["contact"]
     assert energy(*end) == pytest.approx(energy(*start), rel=allowed)
+
+
+def two(*stops, force=3.0):
+    """Two bodies on springs, driven, with stops."""
+    return sl.structure(
+        np.diag([1.0, 2.0]), np.array([[500.0, -200.0], [-200.0, 400.0]]), damping_ratio=0.01,
+        modes=2, contacts=stops, forces=[sl.Force("x1", force)], frequency=2.3,
+    )  # fmt: skip
+
+
+STOPS = {
+    "two at one place": [
+        sl.Contact("x1", stiffness=3e3, gap=0.01, name="first"),
+        sl.Contact("x1", stiffness=9e4, gap=0.014, name="second"),
+    ],
+    "between two parts": [sl.Contact("x1", to="x2", stiffness=2e4, gap=0.005, side="both")],
+    "pressed on at rest": [sl.Contact("x1", stiffness=2e4, gap=0.001, preload=2.0)],
+    "touching at the start": [
+        sl.Contact("x1", stiffness=2e4, gap=0.0),
+        sl.Contact("x2", stiffness=2e4, gap=0.001, side="lower"),
+    ],
+    "an interference": [sl.Contact("x2", stiffness=2e4, gap=-0.002)],
+}
+
+
+@pytest.mark.parametrize("stops", STOPS)
+def test_stops_of_all_places_are_met_where_matrix_exponentials_say(stops):
+    system, start = two(*STOPS[stops], force=6.0), np.zeros(4)
+    run = moved(system, start, periods=12)
+    assert str(run.status.values) == "ok"
+    assert check_contacts(system, start, run, 12, 1e-12 / 2.3) > 7
+
+
+def test_the_phase_is_kept_over_a_million_periods_without_a_contact():
+    """An undamped oscillator and its drive: x = a cos W t + b cos w t, w/W = sqrt(2)."""
+    system = struck.with_values(spring=2.0, gap=1e3, force=0.1)
+    periods = 1_000_000
+    run = sl.stroboscope(system, (0.4, 0.0), periods, keep=1, method=sl.Modal(), progress=False)
+    with mp.workdps(30):
+        rate = 2 * mp.pi * mp.mpf(system.values["frequency"])
+        answer = mp.mpf(0.1) / (2 - rate**2)
+        t, own = periods / mp.mpf(system.values["frequency"]), mp.sqrt(2)
+        free = mp.mpf(0.4) - answer
+        x, v = free * mp.cos(own * t) + answer, -own * free * mp.sin(own * t)
+    assert float(run["x"].values.ravel()[-1]) == pytest.approx(float(x), abs=1e-9)
+    assert float(run["v"].values.ravel()[-1]) == pytest.approx(float(v), abs=1e-9)

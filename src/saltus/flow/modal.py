@@ -247,14 +247,14 @@ class Modal(Method):
     """The exact flow in each contact state of a system that is linear between its contacts: modes
     go their own ways, and no step is as short as the fastest of them would ask.
 
-    Drives are harmonic, or polynomials of time between breaks: records, square waves, saw-teeth,
-    pulses. Modes that don't go their own ways - critical damping, rigid bodies, resonance - go
-    together. The modes of one system take 1 GB at most.
+    Drives are harmonic, or any function of time alone that ends in a polynomial or in what repeats:
+    records, square waves, pulses, swept sines. Modes that don't go their own ways - critical
+    damping, rigid bodies, resonance - go together. The modes of one system take 1 GB at most.
 
     A gap is followed by the modes that matter and bounded by the others, so that no contact is
     missed; the instant of a contact is a zero of all modes, to rounding. At a rigid stop
     (:func:`saltus.impact`) impacts, rest and release follow the rules of :class:`saltus.Taylor`.
-    Systems that it doesn't serve - nonlinear forces, friction, jumps, swept drives - are moved by
+    Systems that it doesn't serve - nonlinear forces, friction, jumps - are moved by
     :class:`saltus.Taylor`.
 
     Parameters
