@@ -326,8 +326,10 @@ def pieces(g, degree, fresh, error, whole, slope_error, noise, shortest, m):
         else:
             halve(m.bern, m.bounds, top, degree)
             top += 1
+    if decided == 0.0:
+        return OPEN
     m.found[g, DECIDED] = decided
-    return CLEAR if decided > 0.0 else OPEN
+    return CLEAR
 
 
 @kernel
