@@ -156,7 +156,7 @@ def written(call: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
     return made
 
 
-#: What isn't said to a picture but to its axes.
+#: Words that belong to the axes of a picture, not to the picture.
 _OF_AXES = dict.fromkeys(
     ("xlim", "ylim", "title", "xlabel", "ylabel", "grid", "xscale", "yscale", "log", "logx",
         "logy", "figsize", "color", "c", "lw", "linewidth", "marker", "label", "show", "save",

@@ -30,8 +30,8 @@ KEY = 100
 #: Largest whole numbers allowed: of periods, whose times keep some digits; of objects in memory.
 MOST_PERIODS, MOST_COUNT = 10**12, 2**31 - 1
 
-#: What a terminal or a file would obey, not show: control characters but tab and line ends, and
-#: those that turn the direction of text.
+#: Characters that a terminal or a file would obey, not show: control characters but tab and line
+#: ends, and those that turn the direction of text.
 _CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 _TOKENS = re.compile(
     r"""("(?:[^"\\\n]|\\[^\n])*"|'[^'\n]*'|[^.,=\[\]{}\n"'#]+)|(\#[^\n]*|[,=\[\]{}\n])|(\.)|."""

@@ -5,7 +5,7 @@ import pytest
 
 import saltus as sl
 from saltus.analysis.branches.criticality import first_lyapunov
-from saltus.analysis.branches.rests import Rests
+from saltus.analysis.branches.equilibrium_curves import EquilibriumCurves
 
 
 @sl.system(states="x y")
@@ -37,9 +37,9 @@ def events(system, vary, start, kind):
 def coefficient(system, name, state, scale=None):
     """The first Lyapunov coefficient at a Hopf point."""
     scale = np.ones(len(state) + 1) if scale is None else np.append(scale, 1.0)
-    rests, z = Rests(system, name, scale[None]), np.append(state, system.values[name])
-    rests.accepted(z[None], np.zeros(1, np.int64))
-    return first_lyapunov(rests, 0, z)
+    curves, z = EquilibriumCurves(system, name, scale[None]), np.append(state, system.values[name])
+    curves.accepted(z[None], np.zeros(1, np.int64))
+    return first_lyapunov(curves, 0, z)
 
 
 def test_the_hopf_point_of_the_valve():

@@ -4,10 +4,21 @@ samples.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from saltus.flow.waves import WaveLegs, deviations, harmonics, largest, least_turn, means, turns
+from saltus.flow import waves
+from saltus.flow.waves import (
+    WaveLegs,
+    deviations,
+    extremes,
+    harmonics,
+    least_turns,
+    means,
+    turns,
+)
 
 
 def legs(rng, waves, count):
@@ -49,12 +60,15 @@ def test_sums_of_random_waves(seed):
     np.testing.assert_allclose(deviations([one], means([one])), np.sqrt(square), rtol=2e-4)
     wave = integral(lambda t, q: q * np.exp(-3j * t)[:, None]) * 2 / total
     np.testing.assert_allclose(harmonics([one], 3.0), wave, atol=2e-4 * np.abs(wave).max())
-    top = np.max([q.max(axis=0) for _, q in dense], axis=0)
-    found = largest([one])
-    assert (found >= top).all()
-    assert (found - top < 1e-4 * np.abs(top).max()).all()
+    seen = np.array(
+        [np.min([q.min(axis=0) for _, q in dense], axis=0),
+         np.max([q.max(axis=0) for _, q in dense], axis=0)]
+    )  # fmt: skip
+    beyond = (extremes([one]) - seen) * [[-1.0], [1.0]]
+    assert (beyond >= 0.0).all()
+    assert (beyond < 1e-4 * np.abs(seen).max()).all()
     for leg, (t, q) in enumerate(dense):
-        places, times = turns(one, 0)
+        places, _, times = turns(one, np.array([0]))
         signs = np.sign(np.diff(q[:, 0]))
         seen = t[1:-1][signs[1:] != signs[:-1]]
         mine = np.sort(times[places == leg])
@@ -69,10 +83,54 @@ def test_a_cosine():
         np.array([1j * w, 0.0]), np.array([[3.0 + 0j, 0.5]]),
         np.array([[np.exp(1j * phi), 1.0]]), np.zeros(1), np.array([2 * np.pi / w]),
     )  # fmt: skip
-    assert largest([one])[0] == pytest.approx(3.5, abs=1e-13)
+    np.testing.assert_allclose(extremes([one]), [[-2.5], [3.5]], atol=1e-13)
     assert means([one])[0] == pytest.approx(0.5, abs=1e-14)
     assert deviations([one], means([one]))[0] == pytest.approx(3 / np.sqrt(2), abs=1e-13)
     np.testing.assert_allclose(harmonics([one], w), [3.0 * np.exp(1j * phi)], atol=1e-13)
-    _, when = turns(one, 0)
+    *_, when = turns(one, np.array([0]))
     np.testing.assert_allclose(np.sort(when), (np.array([1, 2]) * np.pi - phi) / w, atol=1e-12)
-    assert least_turn([one], 0, 1e-3) == pytest.approx(2.5, abs=1e-13)
+    least = least_turns([one], np.array([0]), np.array([1e-3]))
+    np.testing.assert_allclose(least, [2.5], atol=1e-13)
+
+
+@pytest.mark.parametrize("together", [0, 10**9])
+def test_many_quantities_together_or_one_by_one(together, monkeypatch):
+    """Extremes are the same, and as large as any that a turning point or an end has."""
+    monkeypatch.setattr(waves, "FEW", together)
+    one = legs(np.random.default_rng(8), 6, 4)
+    every = np.arange(4)
+    leg, row, time = turns(one, np.arange(3))
+    at = [one.values(leg, time)[np.arange(len(row)), row]]
+    ends = [one.values(every, end) for end in (0.0 * one.length, one.length)]
+    for quantity, (low, high) in enumerate(extremes([one]).T):
+        values = np.concatenate([at[0][row == quantity], *(end[:, quantity] for end in ends)])
+        assert low == pytest.approx(values.min(), abs=1e-12)
+        assert high == pytest.approx(values.max(), abs=1e-12)
+
+
+def test_a_wave_that_dies_out_at_once():
+    """e^{-a t} cos(w t) has its least value at its first turn: w t = pi - atan(a/w)."""
+    a, w = 4000.0, 3000.0
+    one = WaveLegs(
+        np.array([-a + 1j * w, 0.0]), np.ones((1, 2), complex), np.array([[1.0, 0.0]]),
+        np.zeros(1), np.ones(1),
+    )  # fmt: skip
+    time = (np.pi - np.arctan(a / w)) / w
+    least = np.exp(-a * time) * np.cos(w * time)
+    np.testing.assert_allclose(extremes([one])[:, 0], [least, 1.0], rtol=1e-12)
+
+
+def test_mean_squares_of_waves_of_every_speed():
+    """Products whose rates add up to nothing, or to much: against Gauss's rule on each leg."""
+    rng = np.random.default_rng(3)
+    one = legs(rng, 4, 40)
+    rates = np.array([-1e-8 + 2j, 2.0000001j, 3000j, -500 + 40j, 0.0])
+    one = replace(one, rates=rates, length=10 ** rng.uniform(-4, 0, 40))
+    nodes, weights = np.polynomial.legendre.leggauss(20)
+    places = (np.arange(400)[:, None] + 0.5 * (nodes + 1.0)).ravel() / 400
+    total = np.zeros(3)
+    for leg, length in enumerate(one.length):
+        q = one.values(np.full(len(places), leg), length * places)
+        total += length / 800 * np.tile(weights, 400) @ (q - 0.25) ** 2
+    found = deviations([one], np.full(3, 0.25))
+    np.testing.assert_allclose(found, np.sqrt(total / one.length.sum()), rtol=1e-12)

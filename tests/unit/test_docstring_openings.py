@@ -1,6 +1,9 @@
-"""Docstrings begin with the verb or the thing, not with a question word."""
+"""Docstrings, and the lines above constants, begin with the verb or the thing, not with a question
+word.
+"""
 
 import ast
+import re
 from pathlib import Path
 
 import pytest
@@ -9,17 +12,20 @@ import saltus
 
 ROOT = Path(saltus.__file__).parent
 QUESTION_WORDS = {"What", "Whether", "How", "Where", "Which", "When", "Who", "Whose", "Why", "That"}
+#: The first of the lines ``#:`` above a constant.
+FIRST_LINES = re.compile(r"(?:^|\n)(?! *#:)[^\n]*\n *#: ([^\n]+)")
 DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 
 
 def questions(source: str) -> list[str]:
-    """First lines of the docstrings that begin with a question word."""
+    """First lines of docstrings, and above constants, that begin with a question word."""
     found = [ast.get_docstring(node) for node in ast.walk(ast.parse(source))
              if isinstance(node, DOCUMENTED)]  # fmt: skip
+    found += FIRST_LINES.findall(source)
     return [text.splitlines()[0] for text in found if text and text.split()[0] in QUESTION_WORDS]
 
 
-def test_no_docstring_begins_with_a_question_word():
+def test_nothing_that_is_documented_begins_with_a_question_word():
     found = {}
     for file in sorted(ROOT.rglob("*.py")):
         if asked := questions(file.read_text(encoding="utf-8")):
@@ -34,6 +40,8 @@ def test_no_docstring_begins_with_a_question_word():
         ('"""What is here.\n\nMore."""\nclass C:\n    """Contacts."""', ["What is here."]),
         ('async def f():\n    """True if it is so."""', []),
         ("x = 'What is no docstring'", []),
+        ("x = 1\n#: How often it is tried.\nN = 3", ["How often it is tried."]),
+        ("x = 1\n#: Trials of a step\n#: Which fails.\nN = 3", []),
     ],
 )
 def test_a_question_would_be_seen(text, expected):

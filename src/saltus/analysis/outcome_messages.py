@@ -9,7 +9,7 @@ import warnings
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.inputs.starts import Span
+from saltus.analysis.inputs.spans import Span
 from saltus.contact.guards import is_hold
 from saltus.errors import SaltusWarning
 from saltus.kernels import status as st
@@ -47,12 +47,12 @@ _ADVICE = {
     st.NOT_COMPUTED: "The run was stopped; start it again.",
 }
 
-#: What ends a run in steps of a fixed length most often.
+#: The most frequent reason why a run in steps of a fixed length ends.
 _GROWN = (
     "Errors of steps that are too long grow: take them well below 1/(the fastest rate of the "
     "system), in contact too, or sl.Taylor(). "
 )
-#: What may have ended a run of such a method long before the motion met anything.
+#: A reason why such a run may end long before the motion meets anything.
 _BELOW_A_ROOT = (
     " A trial step of {method} that goes below a root ends it too: end the law before it, as "
     "sl.piecewise((-c*sl.sqrt(h), h > 1e-9), otherwise=0.0) does."

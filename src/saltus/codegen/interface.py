@@ -29,7 +29,7 @@ class Interface:
     layout : str
         The template that says what the work arrays hold, by the sizes alone; "" if there are none.
     templates : tuple of str
-        The kernels that stand below the head and the layout, in this order.
+        The kernels that stand below the head and the layout, in this order: files of kernels/.
     sizes, flags : tuple of str
         Whole numbers and truth values that the head supplies.
     tables : mapping
@@ -72,9 +72,9 @@ _TAYLOR_WORK = (_F2,) * 14 + (_I2,) + (_F1, _F2, _F2, _F1, _F1, _F1, _F1, _F2, _
 TAYLOR = Interface(
     entry="propagate",
     arguments=BATCH + _TAYLOR_WORK,
-    layout="taylor_layout",
-    templates=("clocks", "taylor_singular", "taylor_crossings", "taylor_step", "taylor_contacts",
-        "impacts", "taylor_laws", "taylor_together", "taylor_lanes"),
+    layout="taylor/layout",
+    templates=("clocks", "taylor/singular", "taylor/crossings", "taylor/step", "taylor/contacts",
+        "impacts", "taylor/laws", "taylor/together", "taylor/trajectories"),
     sizes=(
         "NSTATES", "NGUARDS", "ORDER", "NCONST", "NTURNS", "CLOCK_ROW", "GAP_ROW", "SCALE_ROW",
         "CALM_ROW", "ROWS", "NMOVED", "NSINGULAR",
@@ -125,7 +125,6 @@ _OF_RATES = MappingProxyType(
 _TABLEAU = ("STAGE_TIME", "WEIGHT", "ERROR_WEIGHT", "DENSE_WEIGHT")
 
 
-_RUNGE_KUTTA = ("clocks", "rates", "runge_kutta")
 _MATLAB = ("odezero", "matlab")
 
 
@@ -135,12 +134,19 @@ def _one_by_one(
     sizes: tuple[str, ...] = (),
     functions: Mapping[str, tuple[str, ...]] = _OF_RATES,
 ) -> Interface:
-    """The interface of a method that runs one trajectory after the other."""
+    """The interface of a method that runs one trajectory after the other, by these templates of
+    kernels/stepping.
+    """
     return Interface(
         entry="propagate",
         arguments=(*BATCH, _F1),
-        layout="steps_layout",
-        templates=(*templates, "impacts", "steps_laws", "trajectory"),
+        layout="stepping/layout",
+        templates=(
+            "clocks",
+            *(f"stepping/{one}" for one in ("rates", *templates)),
+            "impacts",
+            *("stepping/laws", "stepping/trajectory"),
+        ),
         sizes=(
             "NSTATES",
             "NMOVED",
@@ -165,14 +171,12 @@ def _one_by_one(
 
 
 #: Runge-Kutta pairs with MATLAB's rules, and Runge-Kutta steps of a fixed length.
-PAIR = _one_by_one((*_RUNGE_KUTTA, *_MATLAB, "step_control"), *_TABLEAU, "RULES", sizes=("STAGES",))
-FIXED_STEP = _one_by_one((*_RUNGE_KUTTA, "fixed_step", "landing"), *_TABLEAU, sizes=("STAGES",))
+PAIR = _one_by_one(("runge_kutta", *_MATLAB, "step_control"), *_TABLEAU, "RULES", sizes=("STAGES",))
+FIXED_STEP = _one_by_one(("runge_kutta", "fixed_step", "landing"), *_TABLEAU, sizes=("STAGES",))
 #: Adams' formulas of orders 1 to 13.
-ADAMS = _one_by_one(("clocks", "rates", *_MATLAB, "adams"))
+ADAMS = _one_by_one((*_MATLAB, "adams"))
 #: Numerical differentiation formulas, which need the Jacobian.
-NDF = _one_by_one(
-    ("clocks", "rates", *_MATLAB, "ndf"), functions=_OF_RATES | {"jacobian": (REAL,) + (ARRAY,) * 5}
-)
+NDF = _one_by_one((*_MATLAB, "ndf"), functions=_OF_RATES | {"jacobian": (REAL,) + (ARRAY,) * 5})
 
 #: The test of capture, which doesn't depend on an equation.
 CAPTURE = Interface(
@@ -197,16 +201,16 @@ _MODAL_WORK = (_F2,) * 6 + (_F1, _F2, _F2, _F1, _F1) + (_F2,) * 15 + (_F1,)
 MODAL = Interface(
     entry="propagate",
     arguments=(*BATCH, *_MODAL_TABLES, *_MODAL_WORK),
-    layout="modal_layout",
+    layout="modal/layout",
     templates=(
-        "modal_records",
-        "modal_blocks",
-        "modal_series",
-        "modal_gaps",
-        "modal_laws",
-        "modal_impacts",
-        "modal_tangents",
-        "modal_steps",
+        "modal/records",
+        "modal/blocks",
+        "modal/series",
+        "modal/gaps",
+        "modal/laws",
+        "modal/impacts",
+        "modal/tangents",
+        "modal/steps",
     ),
     sizes=(),
     flags=(),

@@ -40,7 +40,7 @@ def _plain(head: str) -> ModuleType:
     names |= {"kernel": marks.kernel, "inner": marks.inner, "math": math, "np": np}
     names |= {"sincos": trigonometry.sincos, "turned": trigonometry.turned}
     exec(compile(head, "<generated head>", "exec"), names)
-    for name in ("taylor_layout", "clocks", "taylor_step"):
+    for name in ("taylor/layout", "clocks", "taylor/step"):
         exec(templates.layout_code(name), names)
     # rows of `side`; no term is left out of these series
     names["SINGULAR"], names["NSINGULAR"] = names["NSINGULAR"], 0

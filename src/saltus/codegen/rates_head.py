@@ -154,8 +154,8 @@ def never_held(system: System) -> System:
 
 
 def rates_head(system: System, numbers: Mapping[str, Constant], jacobian: bool = False) -> Head:
-    """The head that kernels/trajectory.py and the templates of a method expect; ``numbers`` are
-    those of the method (codegen/tableaux.py).
+    """The head that kernels/stepping/trajectory.py and the templates of a method expect;
+    ``numbers`` are those of the method (codegen/tableaux.py).
     """
     system = never_held(system)
     laws = tables_of_laws(system)

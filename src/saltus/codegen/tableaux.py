@@ -1,4 +1,4 @@
-"""The coefficients of Runge-Kutta methods, as the heads of kernels/runge_kutta.py hold them.
+"""The coefficients of Runge-Kutta methods, for the templates of kernels/stepping.
 
 Every method's last stage is its rate at the end of the step, so the last row of weights is the
 method itself. Interpolants are cubic or quartic polynomials that keep both ends and their rates.
@@ -15,7 +15,7 @@ def rooms(
     rows: int, numbers: int, *, matrices: int = 0, multistep: bool = False
 ) -> dict[str, Constant]:
     """Sizes of a method's work: vectors of states, numbers and matrices, and 1 if it is a multistep
-    method (kernels/steps_layout.py).
+    method (kernels/stepping/layout.py).
     """
     return {
         "ROWS": rows,
@@ -90,9 +90,9 @@ CLASSICAL = _tableau(
     dense=((-3 / 2, 2 / 3), (1, -2 / 3), (1, -2 / 3), (1 / 2, -1 / 3), (-1, 1)),
 )
 
-#: Work of kernels/adams.py: the rate at both ends, 14 differences, a state; seven arrays of 14,
-#: five numbers.
+#: Work of kernels/stepping/adams.py: the rate at both ends, 14 differences, a state; seven arrays
+#: of 14, five numbers.
 ADAMS = rooms(17, 103, multistep=True)
-#: Work of kernels/ndf.py: the rate at both ends, seven differences, seven vectors; eleven numbers
-#: and two matrices of 6 by 6; the Jacobian and its factors.
+#: Work of kernels/stepping/ndf.py: the rate at both ends, seven differences, seven vectors; eleven
+#: numbers and two matrices of 6 by 6; the Jacobian and its factors.
 NDF = rooms(16, 83, matrices=2, multistep=True)

@@ -28,7 +28,7 @@ from saltus.system import System
 from saltus.system.quantity import is_remembered
 from saltus.system.tangent import first_column
 
-#: Rows of the clock before the phases of harmonics (kernels/taylor_layout.py: TAU, BASE).
+#: Rows of the clock before the phases of harmonics (kernels/taylor/layout.py: TAU, BASE).
 FIRST_TURN = 2
 
 
@@ -157,7 +157,7 @@ def _gap_form(
 
 
 def taylor_head(system: System, order: int, lanes: int) -> Head:
-    """The head that kernels/taylor_*.py expect above them."""
+    """The head that kernels/taylor expects above it."""
     clocks = Clocks(system)
     aside = set_aside(system.field, system.guards)
     sums = long_sums(aside.field, aside.gaps, system.states) if not system.tangent_of else None

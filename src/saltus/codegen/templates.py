@@ -9,6 +9,7 @@ import hashlib
 import json
 import lzma
 import threading
+from dataclasses import replace
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -41,7 +42,7 @@ BITCODE_VERSION = 2
 
 @cache
 def text(name: str) -> str:
-    """The text of a template, or of a kernel that templates import."""
+    """The text of a template, such as ``"taylor/step"``, or of a kernel that templates import."""
     source = resources.files("saltus.kernels").joinpath(f"{name}.py").read_text(encoding="utf-8")
     return source.replace("from __future__ import annotations\n", "\n")
 
@@ -56,8 +57,9 @@ def _texts(name: str) -> list[str]:
 
 def _hash(name: str, texts: list[str]) -> str:
     interface, lanes = BITCODE[name]
+    open_names = replace(interface, layout="", templates=())  # their texts count, not their places
     return hashlib.sha256(
-        "\0".join([*texts, repr(interface), str(lanes), str(BITCODE_VERSION)]).encode()
+        "\0".join([*texts, repr(open_names), str(lanes), str(BITCODE_VERSION)]).encode()
     ).hexdigest()
 
 
@@ -183,4 +185,4 @@ def open_names_of(interface: Interface) -> tuple[str, ...]:
 @cache
 def layout_code(name: str) -> Any:
     """A layout, compiled as Python: it computes the work arrays for the sizes of a head."""
-    return compile(text(name), f"<saltus.kernels.{name}>", "exec")
+    return compile(text(name), f"<saltus/kernels/{name}.py>", "exec")

@@ -6,8 +6,9 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from saltus.contact.boundaries import number_of
 from saltus.contact.contacts import find_contacts, renamed
-from saltus.contact.guards import Guard, Law, number_of
+from saltus.contact.guards import Guard, Law
 from saltus.language import expression as ex
 from saltus.language.expression import And, Bit, Condition, Expr, Friction, Not, Or, Relation
 from saltus.language.functions import atan, piecewise, sqrt, tanh

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from saltus.contact.boundaries import find_guards, relations
 from saltus.contact.declared import FACING, FRICTION, SLIP, Declared, Impact, Jump, weight
-from saltus.contact.guards import Guard, Law, bits_in, equation_of, find_guards, is_hold, relations
+from saltus.contact.guards import Guard, Law, bits_in, equation_of, is_hold
 from saltus.contact.reduction import Elimination, Held, held_contact, hold_gap, with_pivots
 from saltus.contact.singular import check_finite, check_gaps, lifted
 from saltus.contact.surfaces import (

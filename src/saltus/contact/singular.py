@@ -3,7 +3,7 @@ gap d is zero.
 
 Such a term is analytic on either side of its boundary, and small near it. :func:`set_aside` finds
 these terms and gives each a bit that switches it off: a step off the boundary, or onto it, uses the
-rest of the equations only (kernels/taylor_singular.py). :func:`check_finite` refuses terms that are
+rest of the equations only (kernels/taylor/singular.py). :func:`check_finite` refuses terms that are
 infinite there. Both use the *order* of an expression on a boundary: the power of the gap with which
 it goes to zero.
 """

@@ -48,7 +48,7 @@ class RK4(OneByOne):
     Kutta, Z. Math. Phys. 46 (1901) 435-453; Henon, Physica D 5 (1982) 412-414.
     """
 
-    #: In the order of kernels/landing.py.
+    #: In the order of kernels/stepping/landing.py.
     EVENTS: ClassVar[tuple[str, ...]] = ("ignore", "henon", "inverse", "bisect")
 
     step: float | str

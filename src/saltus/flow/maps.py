@@ -281,12 +281,14 @@ class Stroboscope:
             outcome = self.run(start, count)
             return outcome.state, outcome.status
         key = threading.get_ident(), k, periods
-        if key not in self._shots:
+        shots = self._shots.get(key)
+        if shots is None:
             if len(self._shots) >= KEPT:
                 self._shots.clear()
             period = np.broadcast_to(self.period, k)
-            self._shots[key] = Shots(self.system, self.method, self.parameters, period, periods)
-        return self._shots[key].run(start, count)
+            shots = Shots(self.system, self.method, self.parameters, period, periods)
+            self._shots[key] = shots
+        return shots.run(start, count)
 
     @functools.cached_property
     def _shots(self) -> dict[tuple[int, int, int], Shots]:

@@ -17,10 +17,10 @@ from saltus.flow.counts import whole
 from saltus.flow.method import Method, explain_unknown_options, step_budget
 from saltus.flow.modal_tables import Tables, ValueSet
 from saltus.flow.taylor import Taylor
-from saltus.kernels import modal_layout as layout
 from saltus.kernels import status as st
 from saltus.kernels.batch import Batch
 from saltus.kernels.isolation import DEEPEST, MOST_TOUCHES
+from saltus.kernels.modal import layout
 from saltus.system import System
 from saltus.system.linear import linear_pieces
 from saltus.system.quantity import remembered
@@ -195,7 +195,7 @@ class ModalFlow:
         rounding.
         """
         given = self.tables.sets[which]
-        piece = self.tables.linear.piece(given.values, mode)
+        piece = self.tables.piece_of(given, mode)
         values, sizes = self._drives_at(which, time)
         rate, size, steady = state, np.abs(state), piece.constant
         open_, bits = set(np.flatnonzero(zero).tolist()), 0

@@ -32,7 +32,7 @@ class Block:
         Number of each drive in it (0: the constant 1; the harmonic ones; the courses), its first
         amplitude, its scale, and by what each derivative of a course is divided [1/s].
     limit : float
-        alpha of kernels/modal_blocks.py [1/s].
+        alpha of kernels/modal/blocks.py [1/s].
     """
 
     matrix: np.ndarray
@@ -185,7 +185,7 @@ def _limit(matrix: np.ndarray) -> float:
 def table_of(
     block: Block | None, gaps: np.ndarray, lanes: int, state_groups: int
 ) -> Iterator[np.ndarray]:
-    """The table of a block, as kernels/modal_blocks.py reads it; rows of gaps float64[R, N]."""
+    """The table of a block, as kernels/modal/blocks.py reads it; rows of gaps float64[R, N]."""
     if block is None:
         yield np.zeros(lanes)
         return

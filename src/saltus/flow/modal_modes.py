@@ -133,14 +133,35 @@ def slots_of(values: np.ndarray) -> np.ndarray:
 def eigen_of(matrix: np.ndarray) -> Eigen:
     """Eigenvalues, eigenvectors and the inverse of these, large where they coincide."""
     values, vectors = np.linalg.eig(matrix)
-    if not len(values) or np.linalg.cond(vectors) < 1 / ROUNDING:
-        inverse = np.linalg.inv(vectors)
-        inverse += inverse @ (np.eye(len(matrix)) - vectors @ inverse)
+    inverse = _real_inverse(values, vectors)
+    if inverse is not None:
         return values, vectors, inverse
     size = np.maximum(np.abs(vectors).max(axis=1, keepdims=True), ROUNDING)
     left, parts, right = np.linalg.svd(vectors / size)
     least = np.maximum(parts, ROUNDING * parts[0])
     return values, vectors, (right.conj().T / least) @ left.conj().T / size.T
+
+
+def _real_inverse(values: np.ndarray, vectors: np.ndarray) -> np.ndarray | None:
+    """The inverse of eigenvectors of a real matrix, computed by their real and imaginary parts,
+    four times as cheap; None if they nearly coincide.
+    """
+    pairs = np.flatnonzero(values.imag > 0)  # LAPACK has the conjugate behind each
+    parts = vectors.real.copy()
+    parts[:, pairs + 1] = vectors[:, pairs].imag
+    try:
+        back = np.linalg.inv(parts)
+    except np.linalg.LinAlgError:
+        return None
+    # of columns that are 1 at most
+    losses = np.abs(parts).max(axis=0, initial=0.0) * np.abs(back).max(axis=1, initial=0.0)
+    if not losses.max(initial=0.0) < 1 / ROUNDING:
+        return None
+    back += back @ (np.eye(len(parts)) - parts @ back)
+    inverse = back.astype(complex)
+    inverse[pairs] = (back[pairs] - 1j * back[pairs + 1]) / 2
+    inverse[pairs + 1] = inverse[pairs].conj()
+    return inverse
 
 
 def _together(

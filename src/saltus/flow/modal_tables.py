@@ -5,6 +5,7 @@ made when a motion first comes to them.
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,7 @@ from saltus.codegen.module import MODAL_LANES as LANES
 from saltus.contact.guards import is_hold
 from saltus.flow.modal_blocks import table_of
 from saltus.flow.modal_modes import Eigen, StateModes, eigen_of, modes_of, slots_of, spread_over
-from saltus.kernels import modal_layout as layout
+from saltus.kernels.modal import layout
 from saltus.kernels.status import LAW_KINDS, NO_LAW
 from saltus.language.expression import Expr, walk
 from saltus.system import System
@@ -123,6 +124,7 @@ class Tables:
         self._sets: dict[bytes, int] = {}
         self.sets: list[ValueSet] = []
         self._equations: dict[tuple[object, ...], _Equations] = {}
+        self._pieces: dict[tuple[float, ...], Callable[[int], LinearPiece]] = {}
         self._fast: dict[tuple[float, ...], float] = {}
         self._smooth: dict[tuple[object, ...], bool] = {}
         self._known: dict[tuple[int, bytes], int] = {}
@@ -274,12 +276,20 @@ class Tables:
         )
         return spread_over(modes, free, len(given.rates)) if held else modes
 
+    def piece_of(self, given: ValueSet, mode: int) -> LinearPiece:
+        """The matrices of a contact state."""
+        used = tuple(given.values[name] for name in self.linear.parameters)
+        if used not in self._pieces:
+            self._pieces[used] = self.linear.every_piece(given.values)
+            self._held += getattr(self._pieces[used], "nbytes", 0)
+        return self._pieces[used](mode)
+
     def _equations_of(self, given: ValueSet, mode: int, free: Constrained) -> _Equations:
         """The equations of a contact state, read off once for all rates of the drives."""
         used = tuple(given.values[name] for name in self.linear.parameters)
         key = mode, used, free.spread.tobytes()
         if key not in self._equations:
-            piece = self.linear.piece(given.values, mode)
+            piece = self.piece_of(given, mode)
             fastest = self._fastest(given, used) if piece.constant.any() else 0.0
             eigen = eigen_of(piece.matrix[free.kept] @ free.spread)
             self._equations[key] = _Equations(piece, eigen, fastest)
@@ -292,7 +302,7 @@ class Tables:
         """
         if used not in self._fast:
             every = int(np.sum((1 << np.arange(len(self.holds)))[~self.holds]))
-            matrices = [self.linear.piece(given.values, mode).matrix for mode in (0, every)]
+            matrices = [self.piece_of(given, mode).matrix for mode in (0, every)]
             self._fast[used] = max(float(np.abs(np.linalg.eigvals(one)).max()) for one in matrices)
         return self._fast[used]
 

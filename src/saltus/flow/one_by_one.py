@@ -15,7 +15,7 @@ from saltus.system import System
 
 
 class OneByOne(Method):
-    """A method with the kernels of kernels/trajectory.py."""
+    """A method with the kernels of kernels/stepping/trajectory.py."""
 
     #: Ways of crossing a boundary, ``"ignore"`` among them.
     EVENTS: ClassVar[tuple[str, ...]]

@@ -1,7 +1,7 @@
 """Series of motions near a boundary on which a law has no Taylor series, such as ``d**1.5`` where a
 contact begins.
 
-As in kernels/taylor_singular.py, in NumPy and without the flow's care for its last digits: the flow
+As in kernels/taylor/singular.py, in NumPy and without the flow's care for its last digits: the flow
 knows the states at contacts already. Behind the boundary a series reaches at most as far as the
 boundary is away. On it the terms without a series are set aside, for a time in which they change
 nothing.

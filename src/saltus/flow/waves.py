@@ -4,12 +4,13 @@ whose mean, mean square, largest value and turning points are exact.
 On a leg, q(t) = Re(sum_e r_e a_e e^{mu_e t}): the waves are the modes of the contact state, a
 constant (mu = 0) and the drives (mu = i rate). Largest values and turning points are found by
 halving: an interval is left out once bounds of the waves show that it can't hold one. A wave that
-is slow in an interval is bounded by its slope and curvature there, a fast one by its size.
+is slow in an interval is bounded by its slope and curvature there, a fast one by its size. Where
+these bounds show that a quantity turns at most once, Newton's method finds the place.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,10 +19,23 @@ import numpy as np
 TOLERANCE = 1e-14
 #: A step of Newton's method that is rounding, relative to the time.
 SETTLED = 4e-16
+#: One that is the last, relative to an interval in which a quantity turns once.
+LAST = 1e-8
 #: Most halvings of a leg.
 DEEPEST = 60
 #: Numbers that an evaluation holds at a time: some 60 MB.
 HELD = 2**22
+#: The product of two waves that goes less far than this in a leg of mean length [rad] is integrated
+#: leg by leg: the difference of its values at both ends has lost digits.
+SLOW = 1.0
+#: Share of all quantities in all intervals, and number of them, below which those that may hold
+#: what is looked for are looked at one by one.
+FEW_SHARE, FEW = 0.03, 1024
+#: Legs int64[m], quantities int64[m], middles float64[m] and half lengths float64[m] [s].
+Intervals = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+#: Whether quantities int64[m] whose values are float64[m], or differ by float64[m] at most, are
+#: looked for, bool[m].
+Wanted = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -46,14 +60,25 @@ class WaveLegs:
     begin: np.ndarray
     length: np.ndarray
 
-    def values(
-        self, leg: np.ndarray, time: np.ndarray, row: np.ndarray | None = None
-    ) -> np.ndarray:
-        """Waves of some quantities int64[m] (default: of all, added up) on legs int64[m] at times
-        float64[m] since their beginnings: complex128[m, E]; float64[m, R].
+    def waves(self, leg: np.ndarray, time: np.ndarray) -> np.ndarray:
+        """The waves on legs int64[m] at times float64[m] since their beginnings: complex128[m,
+        E].
         """
-        waves = self.amplitudes[leg] * np.exp(self.rates * time[:, None])
-        found: np.ndarray = (waves @ self.rows.T).real if row is None else waves * self.rows[row]
+        found: np.ndarray = self.amplitudes[leg] * np.exp(self.rates * time[:, None])
+        return found
+
+    def values(self, leg: np.ndarray, time: np.ndarray) -> np.ndarray:
+        """All quantities on legs int64[m] at times float64[m] since their beginnings,
+        float64[m, R].
+        """
+        return _real_product(self.waves(leg, time), self.rows.T)
+
+    def sizes(self, leg: np.ndarray, middle: np.ndarray, half: np.ndarray) -> np.ndarray:
+        """Largest size of each wave in intervals, float64[m, E]."""
+        rates = self.rates.real
+        found: np.ndarray = np.abs(self.amplitudes)[leg] * np.exp(
+            rates * middle[:, None] + np.abs(rates) * half[:, None]
+        )
         return found
 
     def integrals(self, rates: np.ndarray) -> np.ndarray:
@@ -63,6 +88,12 @@ class WaveLegs:
             mean = np.where(at == 0.0, 1.0, np.expm1(at) / at)
         result: np.ndarray = mean * self.length.reshape(-1, *(1,) * rates.ndim)
         return result
+
+
+def _real_product(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """The real part of a product of complex matrices."""
+    product: np.ndarray = np.hstack([left.real, left.imag]) @ np.vstack([right.real, -right.imag])
+    return product
 
 
 # -- means -----------------------------------------------------------------------------------------
@@ -79,23 +110,33 @@ def deviations(parts: Sequence[WaveLegs], mean: np.ndarray) -> np.ndarray:
     total = np.zeros(len(mean))
     for one in parts:
         at = np.flatnonzero(one.rates == 0.0)[0]  # the constant, of amplitude 1
-        rows, size = one.rows.copy(), len(one.rates)
+        rows = one.rows.copy()
         rows[:, at] -= mean
-        products = np.zeros((2, size, size), complex)
-        step = max(1, HELD // size**2)
-        for first in range(0, len(one.length), step):
-            some = replace(
-                one,
-                amplitudes=one.amplitudes[first : first + step],
-                length=one.length[first : first + step],
-            )
-            a = some.amplitudes
-            for k, (other, rates) in enumerate(((a, one.rates), (a.conj(), one.rates.conj()))):
-                integrals = some.integrals(one.rates[:, None] + rates)
-                products[k] += np.einsum("pj,pk,pjk->jk", a, other, integrals, optimize=True)
-        for product, other in zip(products, (rows, rows.conj()), strict=True):
-            total += 0.5 * ((rows @ product) * other).sum(axis=1).real
+        end = one.waves(np.arange(len(one.length)), one.length)
+        for other in (np.asarray, np.conj):
+            product = _products(one, end, other)
+            total += 0.5 * ((rows @ product) * other(rows)).sum(axis=1).real
     return np.asarray(np.sqrt(np.maximum(total, 0.0) / _duration(parts)))
+
+
+def _products(
+    one: WaveLegs, end: np.ndarray, other: Callable[[np.ndarray], np.ndarray]
+) -> np.ndarray:
+    """Integrals of the product of each wave with each one, or with its conjugate, over all legs,
+    complex128[E, E]: the difference of the products at the ends complex128[p, E] and at the
+    beginnings, divided by their rates.
+    """
+    begin, rates = one.amplitudes, one.rates[:, None] + other(one.rates)
+    slow = np.abs(rates) * one.length.mean() < SLOW
+    difference = end.T @ other(end) - begin.T @ other(begin)
+    result: np.ndarray = np.where(slow, 0.0, difference / np.where(slow, 1.0, rates))
+    first, second = np.nonzero(slow)
+    step = max(1, HELD // (4 * len(first)))
+    for leg in range(0, len(begin), step):
+        some = replace(one, amplitudes=begin[leg : leg + step], length=one.length[leg : leg + step])
+        both = some.amplitudes[:, first] * other(some.amplitudes[:, second])
+        result[first, second] += (both * some.integrals(rates[slow])).sum(axis=0)
+    return result
 
 
 def harmonics(parts: Sequence[WaveLegs], rate: float) -> np.ndarray:
@@ -115,86 +156,78 @@ def _duration(parts: Sequence[WaveLegs]) -> float:
     return float(sum(one.length.sum() for one in parts))
 
 
-# -- largest values --------------------------------------------------------------------------------
-def largest(parts: Sequence[WaveLegs]) -> np.ndarray:
-    """Largest value of each quantity, float64[R]."""
-    best = np.full(len(parts[0].rows), -np.inf)
+# -- largest and smallest values -------------------------------------------------------------------
+def extremes(parts: Sequence[WaveLegs]) -> np.ndarray:
+    """Smallest and largest value of each quantity, float64[2, R]."""
+    found = np.full((len(parts[0].rows), 2), [np.inf, -np.inf]).T
+    every = np.arange(found.shape[1])
     for one in parts:
         legs = np.arange(len(one.length))
         for time in (0.0 * one.length, 0.5 * one.length, one.length):
-            best = np.maximum(best, one.values(legs, time).max(axis=0, initial=-np.inf))
+            _see_all(found, every, one.values(legs, time))
     for one in parts:
-        _raise(one, best)
-    return best
+        legs = np.arange(len(one.length))
+        sizes = one.sizes(legs, 0.5 * one.length, 0.5 * one.length)
+        tolerance = TOLERANCE * (sizes @ np.abs(one.rows).T).max(axis=0, initial=0.0)
+
+        def beyond(row: np.ndarray, value: np.ndarray, room: np.ndarray) -> np.ndarray:
+            low, high = found[0] - tolerance, found[1] + tolerance  # noqa: B023
+            new: np.ndarray = (value - room < low[row]) | (value + room > high[row])
+            return new
+
+        block = max(1, HELD // (64 * len(every)))
+        for first in range(0, len(legs), block):
+            open_ = _open(one, legs[first : first + block], found, beyond)
+            leg, row, time = _turns(one, open_, beyond)
+            _see(found, row, _derivatives(one, leg, row, time)[:, 0])
+    return found
 
 
-def _raise(one: WaveLegs, best: np.ndarray) -> None:
-    """Raise ``best`` to the largest values on some legs."""
-    still, size = one.rates == 0.0, np.abs(one.amplitudes) * _growth(one.rates, one.length)
-    most = (one.amplitudes[:, still] @ one.rows[:, still].T).real
-    swing = size[:, ~still] @ np.abs(one.rows[:, ~still]).T
-    tolerance = TOLERANCE * (swing.max(axis=0) + np.abs(most).max(axis=0))
-    leg, row = np.nonzero(most + swing > best + tolerance)
-    waiting, block = [(leg, row, 0.5 * one.length[leg], 0.5 * one.length[leg])], _block(one)
-    for _ in range(DEEPEST):
-        ahead = []
-        for leg, row, middle, half in waiting:
-            for first in range(0, len(leg), block):
-                part = slice(first, first + block)
-                at = leg[part], row[part], middle[part], half[part]
-                value, room = _bounds(one, *at)
-                np.maximum.at(best, at[1], value)
-                on = value + room > best[at[1]] + tolerance[at[1]]
-                if on.any():
-                    ahead.append(_halves(*(each[on] for each in at)))
-        waiting = ahead
-        if not waiting:
-            return
+def _see(found: np.ndarray, row: np.ndarray, value: np.ndarray) -> None:
+    """Put values float64[m] of quantities int64[m] into the extremes float64[2, R]."""
+    np.minimum.at(found[0], row, value)
+    np.maximum.at(found[1], row, value)
 
 
-def _bounds(
-    one: WaveLegs, leg: np.ndarray, row: np.ndarray, middle: np.ndarray, half: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Quantities int64[m] on legs int64[m] at times float64[m], and :func:`_room` there: what the
-    quantities share is computed once.
+def _see_all(found: np.ndarray, row: np.ndarray, value: np.ndarray) -> None:
+    """Put values float64[m, r] of quantities int64[r] into the extremes float64[2, R]."""
+    found[0, row] = np.minimum(found[0, row], value.min(axis=0, initial=np.inf))
+    found[1, row] = np.maximum(found[1, row], value.max(axis=0, initial=-np.inf))
+
+
+def _open(one: WaveLegs, leg: np.ndarray, found: np.ndarray, wanted: Wanted) -> Intervals:
+    """Intervals of legs in which quantities may be wanted, after some halvings: all quantities are
+    looked at together while they are many. What is seen on the way is put into ``found``.
     """
-    _, first, same = np.unique(leg + 1j * middle, return_index=True, return_inverse=True)
-    waves = one.amplitudes[leg[first]] * np.exp(one.rates * middle[first, None])
-    parts = _parts_of_room(np.abs(waves), one.rates, half[first])
-    rows, sizes = one.rows[row], np.abs(one.rows)[row]
-    slopes = np.where(parts[0], one.rates * waves, 0.0)
-    value, slope = (np.einsum("me,me->m", rows, each[same]).real for each in (waves, slopes))
-    return value, np.abs(slope) * half + np.einsum("me,me->m", sizes, parts[1][same])
+    middle, half = 0.5 * one.length[leg], 0.5 * one.length[leg]
+    open_ = np.ones((len(leg), len(one.rows)), bool)
+    while open_.sum() > max(FEW_SHARE * open_.size, FEW):
+        row = np.flatnonzero(open_.any(axis=0))
+        rows, waves, reach = one.rows[row].T, one.waves(leg, middle), _reach(one, half)
+        slow = np.where(reach < 1.0, waves, 0.0)
+        value, slope = (_real_product(each, rows) for each in (slow, slow * one.rates))
+        rest = one.sizes(leg, middle, half) * _remainder(reach)
+        room = np.abs(slope) * half[:, None] + rest @ np.abs(rows)
+        _see_all(found, row, _real_product(waves, rows))
+        open_[:, row] &= wanted(row, value, room)
+        on = open_.any(axis=1)
+        leg, _, middle, half = _halves(leg[on], leg[on], middle[on], half[on])
+        open_ = np.tile(open_[on], (2, 1))
+    at, row = np.nonzero(open_)
+    return leg[at], row, middle[at], half[at]
 
 
-def _growth(rates: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Largest factor by which waves grow on the way, float64[.., E]."""
-    return np.asarray(np.exp(np.maximum(rates.real * time[:, None], 0.0)))
+def _reach(one: WaveLegs, half: np.ndarray) -> np.ndarray:
+    """How far waves go in half lengths float64[m], float64[m, E] [rad]."""
+    return np.asarray(np.abs(one.rates) * half[:, None])
 
 
-def _room(waves: np.ndarray, rates: np.ndarray, half: np.ndarray) -> np.ndarray:
-    """Most by which the sum of waves complex128[m, E] changes within a time float64[m] before or
-    after.
-    """
-    slow, rest = _parts_of_room(np.abs(waves), rates, half)
-    slope = np.abs(np.where(slow, rates * waves, 0.0).real.sum(axis=1)) * half
-    return np.asarray(slope + rest.sum(axis=1))
+def _remainder(reach: np.ndarray) -> np.ndarray:
+    """What is left of waves of unit size that are followed by their slope, or not at all."""
+    return np.where(reach < 1.0, 0.5 * reach**2, 1.0)
 
 
-def _parts_of_room(
-    size: np.ndarray, rates: np.ndarray, half: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Waves that are bounded by their slopes, bool[m, E], and what waves of sizes float64[m, E] add
-    besides: the slow ones by their curvature, the others by what they are.
-    """
-    reach = np.abs(rates) * half[:, None]
-    grown, slow = size * np.exp(np.abs(rates.real) * half[:, None]), reach < 1.0
-    return slow, np.where(slow, 0.5 * grown * reach**2, grown + size)
-
-
-def _halves(
-    leg: np.ndarray, row: np.ndarray, middle: np.ndarray, half: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _halves(leg: np.ndarray, row: np.ndarray, middle: np.ndarray, half: np.ndarray) -> Intervals:
     quarter = 0.5 * half
     return (
         np.tile(leg, 2), np.tile(row, 2),
@@ -202,72 +235,111 @@ def _halves(
     )  # fmt: skip
 
 
-def _block(one: WaveLegs) -> int:
-    return max(1, HELD // (4 * len(one.rates)))
-
-
 # -- turning points --------------------------------------------------------------------------------
-def least_turn(parts: Sequence[WaveLegs], row: int, near: float) -> float:
-    """Smallest magnitude of a quantity where it turns, inf if it never does. Those up to ``near``
-    are looked for first.
+def least_turns(parts: Sequence[WaveLegs], rows: np.ndarray, near: np.ndarray) -> np.ndarray:
+    """Smallest magnitude of quantities int64[r] where they turn, float64[r], inf of those that
+    never do. Magnitudes up to ``near`` float64[r] are looked for first.
     """
-    for below in (near, np.inf):
-        found = [one.values(*turns(one, row, below))[:, row] for one in parts]
-        least = np.abs(np.concatenate(found)).min(initial=np.inf)
-        if least <= below:
+    least, open_ = np.array(near), np.ones(len(rows), bool)
+    for last in (False, True):
+        below, found = np.full((2, len(parts[0].rows)), np.inf)
+        below[rows] = least
+
+        def low(row: np.ndarray, value: np.ndarray, room: np.ndarray) -> np.ndarray:
+            return np.asarray(np.abs(value) - room <= below[row])  # noqa: B023
+
+        for one in parts:
+            leg, row, time = turns(one, rows[open_], low)
+            np.minimum.at(found, row, np.abs(_derivatives(one, leg, row, time)[:, 0]))
+        least[open_] = found[rows[open_]]
+        open_ &= least > near
+        if last or not open_.any():
             break
-    return float(least)
+    return least
 
 
-def turns(one: WaveLegs, row: int, below: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
-    """Legs int64[r] and times float64[r] since their beginnings at which a quantity turns, between
-    their ends; those where its magnitude is more than ``below`` may be left out.
+def turns(
+    one: WaveLegs, rows: np.ndarray, wanted: Wanted | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Legs int64[t], quantities int64[t] among ``rows`` int64[r], and times float64[t] since the
+    beginnings of the legs at which they turn, between the ends of the legs; those that aren't
+    ``wanted`` may be left out.
     """
-    legs, found = np.arange(len(one.length)), []
-    at = legs, np.full(len(legs), row), 0.5 * one.length, 0.5 * one.length
+    leg, row = np.repeat(np.arange(len(one.length)), len(rows)), np.tile(rows, len(one.length))
+    return _turns(one, (leg, row, 0.5 * one.length[leg], 0.5 * one.length[leg]), wanted)
+
+
+def _turns(
+    one: WaveLegs, at: Intervals, wanted: Wanted | None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """As :func:`turns`, in some intervals."""
+    once, block = [tuple(each[:0] for each in at)], max(1, HELD // (8 * len(one.rates)))
     for _ in range(DEEPEST):
-        waves = one.values(at[0], at[2], at[1])
-        if below < np.inf:
-            near = np.abs(waves.real.sum(axis=1)) <= below + _room(waves, one.rates, at[3])
-            at, waves = tuple(each[near] for each in at), waves[near]
-        rates = waves * one.rates
-        bends = rates * one.rates
-        slope, bend = rates.real.sum(axis=1), bends.real.sum(axis=1)
-        may = np.abs(slope) <= _room(rates, one.rates, at[3])
-        once = may & (np.abs(bend) > _room(bends, one.rates, at[3]))
-        found.append([each[once] for each in at])
-        on = may & ~once & (at[3] > TOLERANCE * one.length[at[0]])
-        if not on.any():
+        ahead = []
+        for first in range(0, len(at[0]), block):
+            part = tuple(each[first : first + block] for each in at)
+            value, room = _bounds(one, *part)
+            may = np.abs(value[:, 1]) <= room[:, 1]
+            if wanted is not None:
+                may &= wanted(part[1], value[:, 0], room[:, 0])
+            single = may & (np.abs(value[:, 2]) > room[:, 2])
+            once.append(tuple(each[single] for each in part))
+            on = may & ~single & (part[3] > TOLERANCE * one.length[part[0]])
+            ahead.append(_halves(*(each[on] for each in part)))
+        if not any(len(part[0]) for part in ahead):
             break
-        at = _halves(*(each[on] for each in at))
-    leg, rows, middle, half = (np.concatenate(each) for each in zip(*found, strict=True))
-    return _zeros(one, leg, rows, middle - half, middle + half)
+        at = tuple(np.concatenate(each) for each in zip(*ahead, strict=True))
+    leg, row, middle, half = (np.concatenate(each) for each in zip(*once, strict=True))
+    return _zeros(one, leg, row, middle - half, middle + half)
+
+
+def _bounds(
+    one: WaveLegs, leg: np.ndarray, row: np.ndarray, middle: np.ndarray, half: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Quantities, their slopes and bends at the middles of intervals, by the waves that are slow
+    there, and how far from it they are in the intervals at most; both float64[m, 3].
+    """
+    reach, powers = _reach(one, half), np.vander(one.rates, 4, increasing=True)
+    slow = np.where(reach < 1.0, one.waves(leg, middle) * one.rows[row], 0.0)
+    rest = one.sizes(leg, middle, half) * np.abs(one.rows)[row] * _remainder(reach)
+    value = _real_product(slow, powers)
+    room = np.abs(value[:, 1:]) * half[:, None] + rest @ np.abs(powers[:, :3])
+    return value[:, :3], room
+
+
+def _derivatives(one: WaveLegs, leg: np.ndarray, row: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """Quantities, their slopes and bends at times, float64[m, 3]."""
+    powers = np.vander(one.rates, 3, increasing=True)
+    return _real_product(one.waves(leg, time) * one.rows[row], powers)
 
 
 def _zeros(
     one: WaveLegs, leg: np.ndarray, row: np.ndarray, low: np.ndarray, high: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Legs and times of the turning points in intervals that hold one or none, by Newton's method
-    inside a shrinking bracket.
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Legs, quantities and times of the turning points in intervals that hold one or none, by
+    Newton's method inside a shrinking bracket.
     """
-
-    def slopes(time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        rates = one.values(leg, time, row) * one.rates
-        return rates.real.sum(axis=1), (rates * one.rates).real.sum(axis=1)
-
-    first, _ = slopes(low)
-    turned = first * slopes(high)[0] < 0.0
+    first, last = (_derivatives(one, leg, row, end)[:, 1] for end in (low, high))
+    turned = first * last < 0.0
     leg, row, low, high, first = (each[turned] for each in (leg, row, low, high, first))
-    time = 0.5 * (low + high)
+    time, near, going = 0.5 * (low + high), LAST * (high - low), np.arange(len(leg))
     for _ in range(DEEPEST):
-        slope, bend = slopes(time)
-        before = slope * first > 0.0
-        low, high = np.where(before, time, low), np.where(before, high, time)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            new = time - slope / bend
-        new = np.where((new > low) & (new < high), new, 0.5 * (low + high))
-        settled = np.abs(new - time) <= SETTLED * (np.abs(time) + high - low)
-        time = np.where(slope == 0.0, time, new)
-        if settled.all():
+        if not len(going):
             break
-    return leg, time
+        now = time[going]
+        _, slope, bend = _derivatives(one, leg[going], row[going], now).T
+        before = slope * first[going] > 0.0
+        low[going], high[going] = (
+            np.where(before, now, low[going]),
+            np.where(before, high[going], now),
+        )
+        left, right = low[going], high[going]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            new = now - slope / bend
+        inside = (new >= left) & (new <= right)
+        new = np.where(inside, new, 0.5 * (left + right))
+        time[going] = new = np.where(slope == 0.0, now, new)
+        enough = np.where(inside, near[going], 0.0)
+        rounding = SETTLED * (np.abs(now) + right - left)
+        going = going[np.abs(new - now) > np.maximum(rounding, enough)]
+    return leg, row, time

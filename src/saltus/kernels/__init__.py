@@ -1,3 +1,6 @@
 """Templates of kernels and their pure helpers: functions of numbers that allocate nothing in a loop
 and raise nothing.
+
+A folder holds the templates of a kind of flow: ``taylor``, ``modal``, ``stepping`` (all other
+methods). What several flows share stands beside the folders.
 """

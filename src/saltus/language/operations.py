@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-#: How strongly a text holds together: where its strength is less than asked for, it is bracketed.
+#: Strengths with which a text holds together: one weaker than asked for is bracketed.
 ATOM, POWER, NEGATIVE, PRODUCT, SUM = 5, 4, 3, 2, 1
 
 

@@ -22,13 +22,13 @@ from saltus.results.dataset.schema import (
     sample_name,
 )
 
-#: What the vertical axis shows, by what was sampled.
+#: Label of the vertical axis, by kind of sample.
 _SHOWN = {
     "turning_points": "{} at turning points",
     "contacts": "{} at the contacts",
     "stroboscope": "{} at the Poincaré points",
 }
-#: What is drawn of branches where turning points are drawn of responses.
+#: Numbers of branches that are drawn beside turning points of responses.
 _EXTREMES = ("maximum", "minimum")
 _DOTS = curves.Dots(
     ((1000, 2.4), (5000, 1.6), (40_000, 1.1), (np.inf, 0.7)), 0.5, 1.8, marked=False
@@ -129,7 +129,7 @@ def _limits_and_gaps(
     ax: Axes, drawn: Sequence[curves.Curves], state: str, up: Scale, across: Scale
 ) -> None:
     """Set limits around all dots, and draw the gaps near them."""
-    first = drawn[0].one
+    first = drawn[0].shown
     values = np.concatenate([np.ravel(each.dots) for each in drawn if each.dots is not None])
     varied, fixed = _boundaries(first.ds, state)
     marks = [boundary.value * up.factor for boundary in fixed.boundaries] if fixed else []

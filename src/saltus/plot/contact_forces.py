@@ -15,7 +15,7 @@ from saltus.plot.palette import hues
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, display_scale
 
-#: What a stem can show, the first that the result has.
+#: Heights of the stems: the first of these that the result has.
 _HEIGHTS = ("contact_peak_force", "contact_impulse")
 #: Words for each on the axis.
 _WORDS = {"contact_peak_force": "peak force", "contact_impulse": "impulse"}

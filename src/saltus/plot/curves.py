@@ -51,7 +51,7 @@ class Height(NamedTuple):
 
     values: np.ndarray
     unit: str
-    of: str
+    quantity: str
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Curves:
 
     Attributes
     ----------
-    one : Shown
+    shown : Shown
         The Dataset, with the responses that are shown.
     dots : array of float, shape (response,) or (response, sample), optional
         Heights of its responses [SI].
@@ -68,7 +68,7 @@ class Curves:
         Heights of the points of its branches [SI], each a set of curves.
     """
 
-    one: points.Shown
+    shown: points.Shown
     dots: np.ndarray | None
     along: Sequence[np.ndarray] = ()
 
@@ -82,7 +82,7 @@ class Curves:
     def events_above(self) -> bool:
         """True if events stand above the picture, not on the branches."""
         return self.dots is not None and bool(
-            self.one.name or not self.one.ds.attrs.get("unstable")
+            self.shown.name or not self.shown.ds.attrs.get("unstable")
         )
 
 
@@ -183,23 +183,23 @@ def frame(
     """Draw Datasets over their parameter. Give the Axes and the display unit of the parameter to
     the caller, who draws more and names the vertical axis. Then mark events and name the colours.
     """
-    datasets = [drawing.one for drawing in drawn]
+    datasets = [drawing.shown for drawing in drawn]
     with draw.panels(ax, 1, (6.3, tall)) as (panel,):
         across = points.parameter_axis(panel, datasets)
         named: dict[str, Any] = {}
         for drawing in drawn:
             if drawing.dots is not None and look is not None:
-                named |= (_compare if drawing.one.name else _kinds)(
+                named |= (_compare if drawing.shown.name else _kinds)(
                     panel, drawing, look, across, up
                 )
             for curve in drawing.along:
-                named |= draw_branches(panel, drawing.one.ds, curve, across, up)
+                named |= draw_branches(panel, drawing.shown.ds, curve, across, up)
                 if events and not drawing.events_above:
-                    draw_marks(panel, drawing.one.ds, curve, across, up)
+                    draw_marks(panel, drawing.shown.ds, curve, across, up)
         yield panel, across
         if events:
             points.draw_events(
-                panel, [drawing.one for drawing in drawn if drawing.events_above], across
+                panel, [drawing.shown for drawing in drawn if drawing.events_above], across
             )
         if legend:
             points.legend(panel, named, _BESIDE_NAMES if panel.texts else _BESIDE)
@@ -209,11 +209,11 @@ def frame(
 
 # -- responses -------------------------------------------------------------------------------------
 def _flat(
-    one: points.Shown, heights: np.ndarray, mask: np.ndarray, across: Scale, up: Scale
+    shown: points.Shown, heights: np.ndarray, mask: np.ndarray, across: Scale, up: Scale
 ) -> tuple[np.ndarray, np.ndarray]:
     """Dots of the responses of ``mask`` in one row; padding is left out."""
     y = heights[mask].reshape(int(mask.sum()), -1) * up.factor
-    x = np.broadcast_to(one.values[mask][:, None] * across.factor, y.shape)
+    x = np.broadcast_to(shown.values[mask][:, None] * across.factor, y.shape)
     there = np.isfinite(y)
     return x[there], y[there]
 
@@ -222,7 +222,7 @@ def _kinds(ax: Axes, drawn: Curves, look: Dots, across: Scale, up: Scale) -> dic
     """Draw each kind of motion in its colour: dots, and lines along branches without points of
     their own. Chaos lies under the others.
     """
-    shown, dots = drawn.one, np.asarray(drawn.dots)
+    shown, dots = drawn.shown, np.asarray(drawn.dots)
     kinds = motion_colors.of(shown.ds)
     for code in np.unique(kinds).tolist():
         mine, repeats, color = kinds == code, motion_colors.repeats(code), motion_colors.color(code)
@@ -247,7 +247,7 @@ def _kinds(ax: Axes, drawn: Curves, look: Dots, across: Scale, up: Scale) -> dic
 
 def _compare(ax: Axes, drawn: Curves, look: Dots, across: Scale, up: Scale) -> dict[str, Any]:
     """Draw one of several Datasets in one colour. The first lies below, in larger dots."""
-    shown, dots = drawn.one, np.asarray(drawn.dots)
+    shown, dots = drawn.shown, np.asarray(drawn.dots)
     x, y = _flat(shown, dots, np.ones(len(dots), dtype=bool), across, up)
     color, marker = points.dataset_color(shown), points.MARKERS[shown.rank] if look.marked else "o"
     hollow = look.marked and shown.rank == 0

@@ -17,7 +17,7 @@ _BELOW = (OKABE_ITO["blue"], OKABE_ITO["sky blue"])
 _FREE = OKABE_ITO["green"]
 #: Sets of touching contacts with a colour each; of more sets the number of contacts is told apart.
 _OWN_SETS = 5
-#: How the guards end that say whether a contact is held.
+#: Last words of the names of hold guards.
 _HELD = (" at rest", " held")
 
 

@@ -15,7 +15,7 @@ from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
 from saltus.results.dataset.schema import outputs_in, states_of, told_of
 
-#: What can stand on an axis besides the states: variable and name.
+#: Axes besides the states: variable and name.
 _OTHERS = {
     "phase": ("crossing_phase", "phase of the forcing, t/T mod 1"),
     "time": ("crossing_time", "time"),

@@ -16,7 +16,7 @@ from saltus.results.dataset.kinds import Kind
 from saltus.results.dataset.schema import parameters_of, start_name, states_of
 from saltus.units import from_si
 
-#: Where a start settles to nothing: white and pale greys, as chaos is dark.
+#: Colours of starts that settle to nothing: white and pale greys, as chaos is dark.
 _PALE = {
     Kind.ESCAPED: "#FFFFFF",
     Kind.UNCONVERGED: "#D2D2D2",

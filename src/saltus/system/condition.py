@@ -15,7 +15,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
-from saltus.contact.guards import bits_in, join_guards
+from saltus.contact.boundaries import join_guards
+from saltus.contact.guards import bits_in
 from saltus.errors import ParameterError, TraceError, UnitError, nearest, shown
 from saltus.language.dimensions import DimensionCheck
 from saltus.language.expression import (

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+from saltus.contact.boundaries import number_of
 from saltus.contact.contacts import renamed
-from saltus.contact.guards import equation_of, is_hold, number_of
+from saltus.contact.guards import equation_of, is_hold
 from saltus.errors import TraceError, shown
 from saltus.language.expression import Condition, Relation
 from saltus.language.names import why_no_title

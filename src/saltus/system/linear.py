@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -94,6 +94,11 @@ class LinearSystem:
         return self.system.states[: len(self._field)]
 
     @functools.cached_property
+    def _driving(self) -> tuple[str, ...]:
+        """The names that drives have in the equations: the harmonic ones, then the courses."""
+        return tuple(_name(i) for i in range(len(self._names)))
+
+    @functools.cached_property
     def parameters(self) -> tuple[str, ...]:
         """The parameters of the equations between contacts, those of the drives' rates left
         out.
@@ -105,7 +110,7 @@ class LinearSystem:
     def of(self, quantities: tuple[Expr, ...]) -> tuple[Expr, ...] | None:
         """Quantities as functions of the states and the drives; None if one isn't linear."""
         found = ex.all_substituted(quantities, self._names)
-        return found if _are_affine(found, len(self._names)) else None
+        return found if _are_affine(found, self._driving) else None
 
     def rows(
         self, quantities: tuple[Expr, ...], values: Mapping[str, float], mode: int
@@ -118,6 +123,31 @@ class LinearSystem:
         """The equations of a contact state, bit i the side of guard i."""
         bits = [bool(mode >> i & 1) for i in range(len(self.system.guards))]
         return LinearPiece(*self._coefficients(self._field, values, bits))
+
+    def every_piece(self, values: Mapping[str, float]) -> Callable[[int], LinearPiece]:
+        """The equations of any contact state, as of :meth:`piece`, read off the equations once for
+        all of them, if these are linear in the terms that ask for contacts.
+        """
+        if self._terms is None:
+            return functools.partial(self.piece, values)
+        asked, entries = self._terms
+        names = (*self._driving, *map(_term, range(len(asked))))
+        read = LinearPiece(*self._coefficients(entries, values, [], names))
+        counts = len(self.system.guards), len(self.states), len(self._driving)
+        return EveryPiece(asked, *counts, read)
+
+    @functools.cached_property
+    def _terms(self) -> tuple[tuple[Expr, ...], tuple[Expr, ...]] | None:
+        """The terms that ask for contacts, each as 1 or 0, and entries as functions of them: those
+        of the equations, then both branches of each term. None if one isn't linear in them.
+        """
+        terms = tuple(node for node in ex.walk(*self._field) if node.op == "select")
+        names = {node: ex.parameter(_term(i)) for i, node in enumerate(terms)}
+        branches = [branch for node in terms for branch in node.args]
+        entries = ex.all_substituted((*self._field, *branches), names)
+        asked = tuple(ex.select(node.payload, 1.0, 0.0) for node in terms)
+        moving = (*self._driving, *map(_term, range(len(terms))))
+        return (asked, entries) if _are_affine(entries, moving) else None
 
     def gaps(self, values: Mapping[str, float], mode: int = 0) -> LinearPiece:
         """a, c and e of all guards in a contact state, float64[guards, N], float64[guards],
@@ -138,15 +168,22 @@ class LinearSystem:
         return pairs[:, 0], pairs[:, 1] + [d.lag for d in self.drives]
 
     def _coefficients(
-        self, entries: tuple[Expr, ...], values: Mapping[str, float], bits: list[bool]
+        self,
+        entries: tuple[Expr, ...],
+        values: Mapping[str, float],
+        bits: list[bool],
+        names: Sequence[str] | None = None,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Coefficients of the states, constants, and coefficients of the drives."""
-        n, m = len(self.states), len(self.drives) + len(self.courses)
+        """Coefficients of the states, constants, and coefficients of the drives, or of parameters
+        of other names.
+        """
+        names = self._driving if names is None else names
+        n, m = len(self.states), len(names)
         probes = np.zeros((n + m, 1 + 2 * (n + m)))
         probes[:, 1 : 1 + n + m] = PROBE * np.eye(n + m)
         probes[:, 1 + n + m :] = -PROBE * np.eye(n + m)
         states = dict(zip(self.states, probes[:n], strict=True))
-        known = {**values, **{_name(d): probes[n + d] for d in range(m)}}
+        known = {**values, **dict(zip(names, probes[n:], strict=True))}
         found = np.array(
             [
                 np.broadcast_to(one, probes.shape[1])
@@ -154,11 +191,58 @@ class LinearSystem:
             ]
         ).reshape(len(entries), probes.shape[1])
         slopes = (found[:, 1 : 1 + n + m] - found[:, 1 + n + m :]) / (2 * PROBE)
-        return slopes[:, :n], found[:, 0], slopes[:, n:]
+        return slopes[:, :n].copy(), found[:, 0].copy(), slopes[:, n:].copy()
+
+
+@dataclass(frozen=True)
+class EveryPiece:
+    """The equations of all contact states for one set of parameter values: what they share, and
+    terms that ask for contacts.
+
+    Attributes
+    ----------
+    asked : tuple of Expr
+        1 or 0 for each term, by the sides of the guards.
+    guards, states, drives : int
+        How many there are; courses count as drives.
+    read : LinearPiece
+        Rows of the equations, then two for each term: its branches. Behind the drives are the
+        coefficients of the terms.
+    """
+
+    asked: tuple[Expr, ...]
+    guards: int
+    states: int
+    drives: int
+    read: LinearPiece
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of its arrays."""
+        return self.read.matrix.nbytes + self.read.driven.nbytes
+
+    def __call__(self, mode: int) -> LinearPiece:
+        """The equations of one contact state, bit i the side of guard i."""
+        size, first = self.states, self.states + 1 + self.drives
+        bits = [bool(mode >> i & 1) for i in range(self.guards)]
+        chosen = np.array(evaluate(self.asked, bits=bits)) == 0
+        at = np.r_[:size, size + 2 * np.arange(len(self.asked)) + chosen]
+        rows = np.column_stack([self.read.matrix[at], self.read.constant[at], self.read.driven[at]])
+        for term in np.flatnonzero(rows[size:, first:].any(axis=1)):  # those within come first
+            rows[size + term, :first] += rows[size + term, first:] @ rows[size:, :first]
+        used = np.flatnonzero(rows[size:, :first].any(axis=1))
+        found = rows[:size, :first] + rows[:size, first + used] @ rows[size + used, :first]
+        return LinearPiece(
+            found[:, :size].copy(), found[:, size].copy(), found[:, size + 1 :].copy()
+        )
 
 
 def _name(drive: int) -> str:
     return f"drive {drive}"
+
+
+def _term(number: int) -> str:
+    return f"term {number}"
 
 
 @functools.lru_cache(maxsize=256)
@@ -200,7 +284,7 @@ def linear_pieces(system: System) -> LinearSystem | str:
     )
     if any(ex.depends_on(one, ("select",)) for one in (*(gaps[i] for i in plain), *laws)):
         return "a boundary of it moves when another is crossed"
-    if not _are_affine((*field, *gaps, *laws), len(names)):
+    if not _are_affine((*field, *gaps, *laws), [_name(i) for i in range(len(names))]):
         return "it isn't linear between its contacts"
     linear = LinearSystem(system, tuple(drives.values()), tuple(courses), field, gaps, names)
     if not all(_only_reverses(linear, law) for law in stops):
@@ -261,11 +345,10 @@ def _missing(system: System, size: int) -> str | None:
     return None
 
 
-def _are_affine(roots: Sequence[Expr], drives: int) -> bool:
-    """True if expressions are linear in the states and drives, whichever sides their conditions
-    choose.
+def _are_affine(roots: Sequence[Expr], moving: Collection[str]) -> bool:
+    """True if expressions are linear in the states and in parameters of some names, whichever sides
+    their conditions choose.
     """
-    moving = {_name(i) for i in range(drives)}
     degree: dict[Expr, float] = {}
     for node in ex.walk(*roots):
         below = [degree[one] for one in node.args]

@@ -10,7 +10,8 @@ import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from saltus.contact.guards import Guard, Law, bits_in, expressions_of, surface_guard
+from saltus.contact.boundaries import surface_guard
+from saltus.contact.guards import Guard, Law, bits_in, expressions_of
 from saltus.errors import ParameterError, among, shown, unknown
 from saltus.language.derivatives import gradient, time_derivative
 from saltus.language.expression import (

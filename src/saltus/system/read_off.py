@@ -12,7 +12,8 @@ import inspect
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from saltus.contact.guards import Guard, bits_in, join_guards
+from saltus.contact.boundaries import join_guards
+from saltus.contact.guards import Guard, bits_in
 from saltus.contact.singular import lifted
 from saltus.contact.surfaces import with_held_signs
 from saltus.errors import TraceError, nearest, shown

@@ -6,7 +6,8 @@ import numpy as np
 import xarray as xr
 
 import saltus as sl
-from saltus.analysis.inputs.starts import ensemble, span
+from saltus.analysis.inputs.spans import span
+from saltus.analysis.inputs.starts import ensemble
 from saltus.analysis.outcome_messages import messages
 
 

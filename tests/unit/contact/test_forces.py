@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from saltus.contact import freeplay
-from saltus.contact.guards import find_guards
+from saltus.contact.boundaries import find_guards
 from saltus.errors import TraceError
 from saltus.language import expression as ex
 from saltus.language import piecewise

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import saltus as sl
-from saltus.contact.guards import find_guards
+from saltus.contact.boundaries import find_guards
 from saltus.language import expression as ex
 from saltus.language.derivatives import gradient
 from saltus.language.evaluate import evaluate

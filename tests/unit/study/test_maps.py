@@ -216,7 +216,7 @@ def test_the_code_is_part_of_the_identity(tmp_path, monkeypatch):
     before = code.code_hash.__wrapped__()
     assert before == code.code_hash.__wrapped__() == job().identity()["code"]
     for target in (
-        "taylor_step.py",
+        "taylor/step.py",
         "labels.py",
         "engine.py",
         "trace.py",

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from saltus.contact.guards import find_guards
+from saltus.contact.boundaries import find_guards
 from saltus.errors import SaltusError, TraceError
 from saltus.language import abs, cos, max, pi, piecewise
 from saltus.language import expression as ex

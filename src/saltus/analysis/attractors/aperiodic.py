@@ -204,6 +204,7 @@ def kinds_of(
     scale: np.ndarray,
     groups: Sequence[Sequence[int]],
     budget: float = math.inf,
+    past: np.ndarray | None = None,
 ) -> tuple[np.ndarray, list[tuple[str, float, float] | None]]:
     """Classify motions that never repeat by their largest Lyapunov exponent. It is measured for
     longer while its sign is unclear and the budget lasts.
@@ -218,6 +219,8 @@ def kinds_of(
         Trajectories that are on one attractor.
     budget : float
         What the exponents of a trajectory may cost (see growth.py) [iterates].
+    past : float64[k, m, D], optional
+        Iterates that led to the starts: a first look is taken along the last of these.
 
     Returns
     -------
@@ -228,11 +231,13 @@ def kinds_of(
         don't say even then, None if they say that deviations die out, or where there are none.
     """
     state, rates = np.array(start), [np.zeros(0)] * len(start)
+    past = past if past is not None and past.shape[1] > FIRST_LOOK * BLOCK else None
     kinds: list[tuple[str, float, float] | None] = [None] * len(groups)
     again = list(range(len(groups)))
     for blocks in _measurements(map_, start.shape[1], budget):
         rows = np.concatenate([groups[n] for n in again])
-        state[rows], more = growth_rates(map_.rows(rows), state[rows], scale[rows], blocks)
+        before = past[rows] if past is not None and blocks == FIRST_LOOK else None
+        state[rows], more = growth_rates(map_.rows(rows), state[rows], scale[rows], blocks, before)
         for i, one in zip(rows.tolist(), more.T, strict=True):
             rates[i] = np.append(rates[i], one)
         for n in again:

@@ -36,7 +36,7 @@ FIRST = 4
 NEAR = 1e-2
 #: Farthest that its orbit lies from there.
 BESIDE = 0.1
-#: How far beside the orbit, along its unstable direction, both sides are looked at.
+#: Distance from the orbit, along its unstable direction, at which both sides are looked at.
 ASIDE = 1e-6
 
 

@@ -155,12 +155,13 @@ def _pieces(count: int, states: int, threads: int) -> list[np.ndarray]:
 
 def _settle(map_: Stroboscope, start: np.ndarray, most: int, result: SettledMotions) -> None:
     """One piece, on one thread."""
-    who = _follow(map_, start, np.arange(len(start)), most, result, SETTLED, FOLLOWED)
+    past = np.full((len(start), KEPT_ITERATES, start.shape[1]), np.nan)
+    who = _follow(map_, start, np.arange(len(start)), most, result, SETTLED, FOLLOWED, past)
     if len(who):
         result.scale[who] = motion_range(map_.rows(who), result.end[who])
-        who = _follow(map_, result.end, who, ROUND, result, NEAR, FOLLOWED)
+        who = _follow(map_, result.end, who, ROUND, result, NEAR, FOLLOWED, past)
     if len(who):
-        who, open_ = _classify_aperiodic(map_, result.end, who, most, result)
+        who, open_ = _classify_aperiodic(map_, who, most, result, past[who])
     if len(who):  # neither a recurrence nor an exponent: once more as long, and from farther away
         who = _follow(map_, result.end, who, most, result, NEAR, 1.0)
         _leave_open(map_, who, open_, result)
@@ -174,15 +175,18 @@ def _follow(
     result: SettledMotions,
     near: float,
     share: float,
+    past: np.ndarray | None = None,
 ) -> np.ndarray:
     """Follow trajectories until they settle on an orbit, or this share of the work is done; writes
-    what is known, returns those that haven't.
+    what is known, and their last iterates into ``past``, returns those that haven't.
     """
     flight, begun = map_.rows(who).launch(start[who], most + ROUND), result.share[who]
     purse = np.zeros(len(start))
     while len(who) and flight.age < most:
         points = flight.advance(ROUND)
         going = flight.going
+        if past is not None:
+            past[who] = np.concatenate([past[who, ROUND:], points], axis=1)
         result.end[who] = flight.state
         ended = who[~going]
         result.kind[ended] = np.where(
@@ -254,15 +258,17 @@ def _settled_unforced(
 
 
 def _classify_aperiodic(
-    map_: Stroboscope, start: np.ndarray, who: np.ndarray, most: int, result: SettledMotions
+    map_: Stroboscope, who: np.ndarray, most: int, result: SettledMotions, past: np.ndarray
 ) -> tuple[np.ndarray, dict[int, tuple[float, float]]]:
     """Classify trajectories that don't recur by their exponents; writes what is known, returns
     those that stay unclear, and the exponents, with their errors, that don't say what a motion is.
+    ``past``: their last iterates, float64[k, KEPT_ITERATES, D].
     """
-    maps, groups = map_.rows(who), [[i] for i in range(len(who))]
-    state, kinds = kinds_of(maps, start[who], result.scale[who], groups, BUDGET * most)
+    maps, groups, start = map_.rows(who), [[i] for i in range(len(who))], result.end[who]
+    known = past if np.isfinite(past).all() else None
+    state, kinds = kinds_of(maps, start, result.scale[who], groups, BUDGET * most, known)
     result.share[who] = MEASURED
-    iterates, recurs = _watched(maps, state, who, result)
+    iterates, recurs = _watched(maps, state, who, result, past)
     result.share[who], unclear = KEPT, np.ones(len(who), bool)
     if autonomous(map_.system):  # a limit cycle that is reached slowly, and no torus
         recurs |= unforced.nearly_recurs(maps, result.end[who], ROUND * float(map_.period[0]))
@@ -282,14 +288,21 @@ def _classify_aperiodic(
 
 
 def _watched(
-    maps: Stroboscope, state: np.ndarray, who: np.ndarray, result: SettledMotions
+    maps: Stroboscope,
+    state: np.ndarray,
+    who: np.ndarray,
+    result: SettledMotions,
+    past: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Iterates float64[k, KEPT_ITERATES, D] from states on, and which of them nearly recur by their
-    end, bool[k].
+    end, bool[k]. Those that led to a state, ``past``, are taken if it is still there.
     """
-    flight = maps.launch(state, KEPT_ITERATES)
-    iterates = flight.advance(KEPT_ITERATES)
-    result.end[who] = flight.state
+    iterates = np.full((len(who), KEPT_ITERATES, state.shape[1]), np.nan) if past is None else past
+    new = np.flatnonzero((iterates[:, -1] != state).any(axis=1) | np.isnan(iterates[:, 0, 0]))
+    if len(new):
+        flight = maps.rows(new).launch(state[new], KEPT_ITERATES)
+        iterates[new] = flight.advance(KEPT_ITERATES)
+        result.end[who[new]] = flight.state
     apart = recurrence(iterates[:, -ROUND:], result.scale[who])[1]
     return iterates, apart < np.maximum(NEAR, maps.noise_of(result.scale[who]))
 

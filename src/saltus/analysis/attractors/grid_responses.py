@@ -14,7 +14,7 @@ from saltus.analysis.attractors.find_responses import SettledMotions, find_respo
 from saltus.analysis.attractors.grid import Grid
 from saltus.analysis.closed.cycles import ASIDE
 from saltus.analysis.closed.measures import Measures, measure
-from saltus.analysis.closed.unforced import multipliers_and_eigenvalues, rest
+from saltus.analysis.closed.unforced import measure_equilibria, multipliers_and_eigenvalues
 from saltus.analysis.inputs.outputs import Outputs
 from saltus.analysis.solve.tolerances import SAME
 from saltus.flow.maps import Stroboscope
@@ -41,14 +41,14 @@ class GridResponses:
         A trajectory that settled to the response.
     place : int64[m]
         Where on the grid it is.
-    of : int64[places, s]
+    response_of : int64[places, s]
         Response of every trajectory, or a code below zero.
     """
 
     motions: SettledMotions
     row: np.ndarray
     place: np.ndarray
-    of: np.ndarray
+    response_of: np.ndarray
     complete: bool = True
     table: AttractorTable | None = field(default=None, repr=False)
 
@@ -157,7 +157,7 @@ def _gathered(
     result: SettledMotions, places: int, count: int, tolerance: np.ndarray, complete: bool
 ) -> GridResponses:
     """Group the trajectories of each value by the response they settled to."""
-    of = result.kind.copy()
+    response_of = result.kind.copy()
     rows: list[int] = []
     for place in range(places):
         here = [row for row in range(place * count, (place + 1) * count) if result.kind[row] >= 0]
@@ -176,10 +176,12 @@ def _gathered(
             else:
                 home.append(row)
         for group in sorted(groups, key=lambda group: _order(result, group[0])):
-            of[group] = len(rows)
+            response_of[group] = len(rows)
             rows.append(group[0])
     chosen = np.array(rows, np.int64)
-    return GridResponses(result, chosen, chosen // count, of.reshape(places, count), complete)
+    return GridResponses(
+        result, chosen, chosen // count, response_of.reshape(places, count), complete
+    )
 
 
 def _same(result: SettledMotions, a: int, b: int, tolerance: float) -> bool:
@@ -223,9 +225,11 @@ def numbers_of(
         spans_of(found),
         outputs=outputs,
     )
-    rests = np.flatnonzero(found.kind == Kind.EQUILIBRIUM)
-    if len(rests):
-        rest(map_.rows(rests), found.start()[rests], rests, numbers, outputs)
+    equilibria = np.flatnonzero(found.kind == Kind.EQUILIBRIUM)
+    if len(equilibria):
+        measure_equilibria(
+            map_.rows(equilibria), found.start()[equilibria], equilibria, numbers, outputs
+        )
     return numbers
 
 
@@ -237,7 +241,7 @@ def table_of(found: GridResponses, numbers: Measures, grid: Grid, method: Method
     multipliers, eigenvalues = multipliers_and_eigenvalues(
         s.orbits.multipliers[found.row], kind == Kind.EQUILIBRIUM
     )
-    hits = np.bincount(found.of[found.of >= 0], minlength=len(found))
+    hits = np.bincount(found.response_of[found.response_of >= 0], minlength=len(found))
     low, high = wilson(hits, len(grid.starts))
     shares = (hits / len(grid.starts), low, high) if grid.drawn else None
     return AttractorTable(

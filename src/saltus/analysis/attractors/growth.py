@@ -28,7 +28,7 @@ MOST_STATES = 4
 APART = 1e-8
 #: Iterates of the tangent flow that closing an orbit of period 1 takes, its multipliers included.
 NEWTON = 5
-#: What telling the kind of a motion may cost at most, in multiples of the iterates that it was
+#: Most iterates that telling the kind of a motion may take, in multiples of those that it was
 #: followed for: four measurements of a motion of two states.
 BUDGET = 10
 
@@ -57,16 +57,24 @@ def by_neighbours(map_: Map, size: int) -> bool:
 
 
 def growth_rates(
-    map_: Map, start: np.ndarray, scale: np.ndarray, blocks: int = BLOCKS
+    map_: Map,
+    start: np.ndarray,
+    scale: np.ndarray,
+    blocks: int = BLOCKS,
+    past: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Ends float64[k, D] of trajectories, and growth rates per iterate of their largest direction,
-    block by block, float64[blocks, k]: those after it has found its way.
+    block by block, float64[blocks, k]: those after it has found its way. With ``past``
+    float64[k, m, D], iterates that led to the starts, along the last of these: neighbours go alone.
     """
     stretched = _neighbours if by_neighbours(map_, start.shape[1]) else _tangents
     state, begin, growths = start, scale / math.sqrt(start.shape[1]), []
-    direction = begin
-    for _ in range(blocks):
-        state, image = stretched(map_, state, direction)
+    direction, known = begin, None
+    for left in range(blocks, 0, -1):
+        if past is not None:
+            state = past[:, -1 - left * BLOCK]
+            known = past[:, -1 - (left - 1) * BLOCK]
+        state, image = stretched(map_, state, direction, known)
         length = np.linalg.norm(image / scale, axis=1)
         with np.errstate(all="ignore"):
             growths.append(np.log(length) / BLOCK)
@@ -75,7 +83,12 @@ def growth_rates(
     return state, np.array(growths[blocks // ALIGNING :])
 
 
-def _tangents(map_: Map, start: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _tangents(
+    map_: Map,
+    start: np.ndarray,
+    direction: np.ndarray,
+    end: np.ndarray | None,  # noqa: ARG001
+) -> tuple[np.ndarray, np.ndarray]:
     """States after a block from float64[k, D], and the image of a direction of each."""
     k, size = start.shape
     directions = np.zeros((k, size, size))
@@ -85,11 +98,16 @@ def _tangents(map_: Map, start: np.ndarray, direction: np.ndarray) -> tuple[np.n
 
 
 def _neighbours(
-    map_: Map, start: np.ndarray, direction: np.ndarray
+    map_: Map, start: np.ndarray, direction: np.ndarray, end: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """As :func:`_tangents`, by the distance from a neighbour."""
-    k = len(start)
-    pairs = map_.rows(np.tile(np.arange(k), 2))
-    both = np.concatenate([start, start + APART * direction])
-    ends = pairs.launch(both, BLOCK).advance(BLOCK)[:, -1]
-    return ends[:k], (ends[k:] - ends[:k]) / APART
+    """As :func:`_tangents`, by the distance from a neighbour; where the states after the block are
+    known, float64[k, D], the neighbour alone is moved.
+    """
+    aside, k = start + APART * direction, len(start)
+    if end is None:
+        pairs = map_.rows(np.tile(np.arange(k), 2))
+        ends = pairs.launch(np.concatenate([start, aside]), BLOCK).advance(BLOCK)[:, -1]
+        end, beside = ends[:k], ends[k:]
+    else:
+        beside = map_.launch(aside, BLOCK).advance(BLOCK)[:, -1]
+    return end, (beside - end) / APART

@@ -17,7 +17,7 @@ from saltus.analysis.closed.cycles import ASIDE
 from saltus.analysis.closed.field_zeros import autonomous, find_equilibria
 from saltus.analysis.closed.measures import Measures, measure, unknown
 from saltus.analysis.closed.motions import ClosedMotion
-from saltus.analysis.closed.unforced import rest
+from saltus.analysis.closed.unforced import measure_equilibria
 from saltus.analysis.inputs.outputs import outputs_of
 from saltus.flow.maps import Map, Stroboscope
 from saltus.results import AttractorTable
@@ -89,7 +89,7 @@ def _exponents(every: Sequence[ClosedMotion | SampledMotion]) -> np.ndarray:
 
 def _unforced(map_: Stroboscope, found: AttractorSet) -> AttractorTable:
     """The table of a system without forcing: equilibria, limit cycles, and what never repeats."""
-    size, rests, every = len(map_.states), len(found.orbits), found.every
+    size, equilibria, every = len(map_.states), len(found.orbits), found.every
     kind = np.array(
         [*(Kind.EQUILIBRIUM.word for _ in found.orbits), *(one.kind for one in found.sampled)],
         dtype=np.str_,
@@ -104,12 +104,14 @@ def _unforced(map_: Stroboscope, found: AttractorSet) -> AttractorTable:
         *np.full((2, len(kind), size), np.nan + 0j),
     )
     exponent, error = _exponents(every) / map_.period
-    still = find_equilibria(map_.rows(np.arange(rests)), start[:rests], np.ones((rests, size)))
-    for i in range(rests):
+    still = find_equilibria(
+        map_.rows(np.arange(equilibria)), start[:equilibria], np.ones((equilibria, size))
+    )
+    for i in range(equilibria):
         points[i] = start[i : i + 1] = still.points[i, :1] if still.period[i] else start[i : i + 1]
         eigenvalues[i], exponent[i] = still.multipliers[i], still.multipliers[i, 0].real
     for i in np.flatnonzero(kind == Kind.LIMIT_CYCLE.word).tolist():
-        one = cycle_of(map_, found.sampled[i - rests])
+        one = cycle_of(map_, found.sampled[i - equilibria])
         cycle[i], multipliers[i], points[i], start[i] = (
             one.time[0],
             one.multipliers[0],
@@ -122,7 +124,9 @@ def _unforced(map_: Stroboscope, found: AttractorSet) -> AttractorTable:
     closed = np.isin(kind, (Kind.EQUILIBRIUM.word, Kind.LIMIT_CYCLE.word)).astype(np.int64)
     asked = outputs_of(map_.system)
     numbers = measure(own, start, closed, APERIODIC_PERIODS, asked)
-    rest(map_.rows(np.arange(rests)), start[:rests], np.arange(rests), numbers, asked)
+    measure_equilibria(
+        map_.rows(np.arange(equilibria)), start[:equilibria], np.arange(equilibria), numbers, asked
+    )
     return AttractorTable(
         **numbers.columns(np.zeros(len(kind), np.int64)),
         kind=kind.tolist(),

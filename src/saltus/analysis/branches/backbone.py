@@ -14,9 +14,9 @@ from saltus.analysis.branches.forced_vibration import Forcing, QuadratureOrbits,
 from saltus.analysis.branches.free_vibration import (
     LONGEST,
     FreeOrbits,
+    equilibrium_near_zero,
     free_system,
     linear_mode,
-    place_of_rest,
 )
 from saltus.analysis.branches.special_points import zeros
 from saltus.analysis.dataset_parts import provenance, subject
@@ -48,7 +48,7 @@ STABLE = 1.0 + 1e-6
 NODE = 1e-9
 #: Shortest period, as a share of that of small vibrations.
 SHORTEST = 1e-3
-#: How far behind its last step the end of a range may lie, in units of the scale.
+#: Distance behind its last step at which the end of a range may lie, in units of the scale.
 BEHIND = 0.02
 
 
@@ -181,7 +181,7 @@ def _free_start(
     """The undamped system, the equations of its vibrations, and a small one float64[1, z]."""
     low, high = limits
     free, name = free_system(system)
-    equilibrium = place_of_rest(free)
+    equilibrium = equilibrium_near_zero(free)
     period, shape, column = linear_mode(free, equilibrium, mode)
     slopes = _slopes(free, state, equilibrium)
     sizes, size = _relative(shape, slopes, state, mode), np.abs(slopes @ shape)

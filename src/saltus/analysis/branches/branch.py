@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from saltus.analysis.branches.equilibrium_curves import EquilibriumCurves
 from saltus.analysis.branches.events import Event
 from saltus.analysis.branches.piece import Piece, in_order
-from saltus.analysis.branches.rests import Rests
 from saltus.analysis.branches.sequence_changes import contact_points
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.special_points import outside
 
-#: What a branch knows of each of its points.
+#: Data of each point of a branch.
 _COLUMNS = ("z", "tangent", "derivative", "length", "multipliers")
 #: Events at which orbits lose stability, before those at which they may.
 _LOSES_STABILITY = ("fold", "branch_point", "period_doubling", "neimark_sacker", "hopf")
@@ -37,7 +37,7 @@ class Branch(Piece):
         The branch and its event that it leaves.
     """
 
-    orbits: PeriodicOrbits | Rests
+    orbits: PeriodicOrbits | EquilibriumCurves
     ends: tuple[str, str]
     parent: tuple[int, int] | None = None
     limits: tuple[float, float] = (np.nan, np.nan)
@@ -55,7 +55,7 @@ class Branch(Piece):
     def _contacts(self) -> list[Event]:
         """Events at which the contact sequence changes."""
         orbits = self.orbits
-        if isinstance(orbits, Rests):
+        if isinstance(orbits, EquilibriumCurves):
             return []
         return contact_points(orbits, self.row, self.z, self.tangent)
 

@@ -10,8 +10,8 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.branches.branch import Branch
+from saltus.analysis.branches.equilibrium_curves import EquilibriumCurves
 from saltus.analysis.branches.resolution import resolve
-from saltus.analysis.branches.rests import Rests
 from saltus.analysis.branches.same_branch import has_twin
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.special_points import outside
@@ -26,7 +26,7 @@ from saltus.results.dataset import schema
 from saltus.results.dataset.attractors import padded
 from saltus.system import System
 
-Orbits = PeriodicOrbits | Rests
+Orbits = PeriodicOrbits | EquilibriumCurves
 #: Samples of a period by which branches are resolved.
 SAMPLES = 64
 #: Multipliers nearer to the unit circle than this don't count as inside: the orbit may not attract.
@@ -82,8 +82,10 @@ def values_of(
     begins = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
     multipliers = stacked([branch.multipliers for branch in branches], size)
     event_multipliers = stacked([event.multipliers[None] for _, event in events], size)
-    at_rest = np.array([isinstance(branch.orbits, Rests) for branch, _ in points], bool)
-    event_at_rest = np.array([isinstance(branch.orbits, Rests) for branch, _ in at_events], bool)
+    at_rest = np.array([isinstance(branch.orbits, EquilibriumCurves) for branch, _ in points], bool)
+    event_at_rest = np.array(
+        [isinstance(branch.orbits, EquilibriumCurves) for branch, _ in at_events], bool
+    )
     eigenvalues = _eigenvalues(points, size)
     event_eigenvalues = _eigenvalues(at_events, size)
     periods = np.array([branch.orbits.n for branch, _ in points], np.int64)
@@ -147,14 +149,14 @@ def _eigenvalues(points: Sequence[tuple[Branch, np.ndarray]], size: int) -> np.n
     """Eigenvalues of equilibria [1/s], NaN of orbits, complex128[.., size]."""
     result = np.full((len(points), size), np.nan + 0j)
     for row, (branch, z) in zip(result, points, strict=True):
-        if isinstance(branch.orbits, Rests):
+        if isinstance(branch.orbits, EquilibriumCurves):
             row[:] = branch.orbits.eigenvalues(z[None], np.array([branch.row]))[0]
     return result
 
 
 def _kind(branch: Branch) -> str:
     """Kind of the orbits on a branch: ``equilibrium``, ``limit_cycle`` or ``periodic``."""
-    if isinstance(branch.orbits, Rests):
+    if isinstance(branch.orbits, EquilibriumCurves):
         return "equilibrium"
     return "limit_cycle" if branch.orbits.free else "periodic"
 
@@ -165,7 +167,8 @@ def _branches(branches: Sequence[Branch]) -> dict[str, Any]:
         "branch": np.arange(len(branches)),
         "branch_kind": [_kind(branch) for branch in branches],
         "branch_periods": np.array(
-            [0 if isinstance(one.orbits, Rests) else one.orbits.n for one in branches], np.int64
+            [0 if isinstance(one.orbits, EquilibriumCurves) else one.orbits.n for one in branches],
+            np.int64,
         ),
         "branch_closed": np.array([branch.closed for branch in branches], bool),
         "branch_parent": np.array(
@@ -184,7 +187,7 @@ def _sampled_peaks(system: System, method: Method, branch: Branch, z: np.ndarray
     """Largest magnitude of the first state of orbits float64[r, z] of a branch, nearly: at samples,
     to say where more orbits are needed.
     """
-    if isinstance(branch.orbits, Rests):
+    if isinstance(branch.orbits, EquilibriumCurves):
         return np.asarray(np.abs(z[:, 0]))
     n = branch.orbits.n if system.forced_at is not None else 1
     map_ = _map_of(system, method, [(branch.orbits, one) for one in z])
@@ -227,7 +230,7 @@ def numbers_of(
     periods = periods if system.forced_at is not None else np.ones_like(periods)
     numbers = measure(_map_of(system, method, points), starts, periods, outputs=outputs)
     for i, (orbits, z) in enumerate(points):
-        if isinstance(orbits, Rests):
+        if isinstance(orbits, EquilibriumCurves):
             numbers.margin[i], numbers.contacts[i] = orbits.margin(z), 0.0
             numbers.itinerary[i] = ""
     return numbers

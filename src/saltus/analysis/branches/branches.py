@@ -15,11 +15,11 @@ from saltus.analysis.attractors.grid import Grid, check_grid, grid_of
 from saltus.analysis.attractors.grid_responses import find
 from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.branch_table import table_of
+from saltus.analysis.branches.equilibrium_branches import trace_equilibria
 from saltus.analysis.branches.plans import LONGEST_DOUBLED, POINTS, SWITCHES, plan_of
-from saltus.analysis.branches.rest_branches import trace_rests
 from saltus.analysis.branches.seeds import (
-    resting_between,
-    resting_seeds,
+    equilibria_between,
+    equilibrium_seeds,
     scaled,
     seeds_at,
     seeds_of,
@@ -188,13 +188,13 @@ def branches(
             equilibria: list[Seed] = []
             if isinstance(start, xr.Dataset):
                 begins = seeds_of(system, name, start)
-                equilibria = [] if system.forced_at else resting_seeds(system, name, start)
+                equilibria = [] if system.forced_at else equilibrium_seeds(system, name, start)
             else:
                 check_grid(system, whole(at, "at", 1), start)
                 places = np.linspace(*limits, int(at) + 2)[1:-1]
                 grid = grid_of(system, {name: places}, start, box, None, seed, None, every)
                 if autonomous(system):
-                    equilibria = resting_between(system, name, limits, grid.starts)
+                    equilibria = equilibria_between(system, name, limits, grid.starts)
                 begins = _found_in(grid, method, periods, threads)
             begins = scaled(system, name, _inside(begins, limits), method)
             equilibria = _inside(equilibria, limits)
@@ -208,7 +208,7 @@ def branches(
                     )
                 )
             plan = plan_of(system, name, limits, method, threads, points, longest, chosen)
-            born = trace_rests(plan, system, name, equilibria, done) if equilibria else []
+            born = trace_equilibria(plan, system, name, equilibria, done) if equilibria else []
             born = born if "hopf" in chosen else []
             trace(plan, [*born, *begins], done, stage(show, 0.0, 0.9))
         except KeyboardInterrupt:
@@ -250,7 +250,7 @@ def _kinds(switch: Any) -> Sequence[str]:
 
 
 def _inside(seeds: list[Seed], limits: tuple[float, float]) -> list[Seed]:
-    return [seed for seed in seeds if limits[0] <= seed.own[-1] <= limits[1]]
+    return [seed for seed in seeds if limits[0] <= seed.others[-1] <= limits[1]]
 
 
 def _found_in(grid: Grid, method: Method, periods: int, threads: int | None) -> list[Seed]:

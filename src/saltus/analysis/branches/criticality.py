@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.analysis.branches.rests import Rests
+from saltus.analysis.branches.equilibrium_curves import EquilibriumCurves
 
 #: A Lyapunov coefficient smaller than this, in units of the frequency, has no sign.
 NEUTRAL = 1e-9
@@ -16,24 +16,24 @@ NEUTRAL = 1e-9
 MOST_STATES = 8
 
 
-def criticality(rests: Rests, row: int, z: np.ndarray) -> str:
+def criticality(curves: EquilibriumCurves, row: int, z: np.ndarray) -> str:
     """``supercritical`` where the cycles born at the Hopf point float64[z] are stable,
     ``subcritical`` where they aren't; empty where the coefficient has no sign, or isn't known.
     """
-    if rests.size > MOST_STATES:
+    if curves.size > MOST_STATES:
         return ""
-    coefficient, frequency = first_lyapunov(rests, row, z)
+    coefficient, frequency = first_lyapunov(curves, row, z)
     if not abs(coefficient) > NEUTRAL * frequency:
         return ""
     return "supercritical" if coefficient < 0 else "subcritical"
 
 
-def first_lyapunov(rests: Rests, row: int, z: np.ndarray) -> tuple[float, float]:
+def first_lyapunov(curves: EquilibriumCurves, row: int, z: np.ndarray) -> tuple[float, float]:
     """The first Lyapunov coefficient at a Hopf point float64[z], equation (5.62), for an
     eigenvector of unit length in units of the scale, and the angular frequency [rad/s] of the cycle
     born there.
     """
-    one, two, three = rests.derivatives(z, row)
+    one, two, three = curves.derivatives(z, row)
     values, vectors = np.linalg.eig(one)
     here = np.argmin(np.where(values.imag > 0, np.abs(values.real), np.inf))
     omega, q = float(values[here].imag), vectors[:, here]

@@ -18,8 +18,8 @@ from scipy.optimize import brentq
 from saltus.analysis.branches.free_vibration import (
     LONGEST,
     FreeOrbits,
+    equilibrium_near_zero,
     free_system,
-    place_of_rest,
 )
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.closed.field_zeros import jacobian_of
@@ -200,7 +200,7 @@ def small_vibration(
         If there is none.
     """
     assert system.forced_at is not None
-    rest = place_of_rest(system.with_values(**{force.name: 0.0}))
+    rest = equilibrium_near_zero(system.with_values(**{force.name: 0.0}))
     values = {name: np.array([value]) for name, value in system.values.items()}
     matrix = jacobian_of(system, rest[None], values)[0]
     roots = np.linalg.eigvals(matrix)

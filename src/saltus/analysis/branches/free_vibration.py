@@ -145,7 +145,7 @@ class FreeOrbits(PeriodicOrbits):
         """The condition on the phase stays."""
 
 
-def place_of_rest(system: System) -> np.ndarray:
+def equilibrium_near_zero(system: System) -> np.ndarray:
     """Locate an equilibrium, where the field vanishes, by Newton's method from zero."""
     values = {name: np.array([value]) for name, value in system.values.items()}
     zero, units = np.zeros((1, len(system.states))), np.ones((1, len(system.states)))

@@ -13,7 +13,7 @@ import numpy as np
 
 #: Rungs by which a ladder is known: three ratios of steps, and so three estimates of the limit.
 RUNGS = 5
-#: How far the last two steps may move the limit, in parts of the way that is left to it.
+#: Shift of the limit by the last two steps, in parts of the way that is left to it.
 STEADY = 0.05
 
 

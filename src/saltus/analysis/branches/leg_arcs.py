@@ -20,7 +20,7 @@ from saltus.analysis.branches.tracing import halved
 
 #: Contact sequences of one branch in one direction.
 MOST_PIECES = 40
-#: How far a branch may pass its start sideways, over the step that passes it.
+#: Distance at which a branch may pass its start sideways, over the step that passes it.
 SIDEWAYS = 0.3
 #: Distance of the last point of an arc from the event behind it, in steps.
 NEXT_TO = 1e-3

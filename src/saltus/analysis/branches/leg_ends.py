@@ -17,11 +17,12 @@ from saltus.analysis.branches.grazes import ContactChange, corner, graze
 from saltus.analysis.branches.legs import Legs
 from saltus.kernels import status as st
 
-#: How often the last interval of a branch is halved to see why it ends.
+#: Halvings of the last interval of a branch to see why it ends.
 HALVINGS = 40
-#: How far outside of that interval the reason may lie, in intervals.
+#: Distance from that interval at which the reason may lie, in intervals.
 OUTSIDE = 0.05
-#: How far beyond an event the free flow is asked for the new contacts, in units of the scale.
+#: Distances beyond an event at which the free flow is asked for the new contacts, in units of the
+#: scale.
 BEYOND = (1e-3, 1e-4, 1e-5, 1e-6)
 #: Contacts of the free flow and of a virtual orbit that are the same differ less, in periods.
 SAME_TIME = 1e-6

@@ -30,12 +30,10 @@ def parametric_map(
     flow that the method has for the system.
     """
     own, extended = (method.serving(one.origin) for one in (system, with_parameters.system))
-    kind = Stroboscope if own == extended else ParametricStroboscope
+    if own != extended:
+        return ParametricStroboscope(system, with_parameters, method, threads)
     every = 1.0 if with_parameters.timed else None
-    map_ = kind(with_parameters.system, method, every=every, threads=threads)
-    if isinstance(map_, ParametricStroboscope):
-        map_.base, map_.timed, map_.names = system, with_parameters.timed, with_parameters.names
-    return map_
+    return Stroboscope(with_parameters.system, method, every=every, threads=threads)
 
 
 class ParametricStroboscope(Stroboscope):
@@ -52,9 +50,12 @@ class ParametricStroboscope(Stroboscope):
         The parameters.
     """
 
-    base: System
-    timed: bool
-    names: tuple[str, ...]
+    def __init__(
+        self, base: System, parametric: Parametric, method: Method, threads: int | None
+    ) -> None:
+        every = 1.0 if parametric.timed else None
+        super().__init__(parametric.system, method, every=every, threads=threads)
+        self.base, self.timed, self.names = base, parametric.timed, parametric.names
 
     # -- the flow of the system --------------------------------------------------------------------
     def _below(self, start: np.ndarray) -> Stroboscope:

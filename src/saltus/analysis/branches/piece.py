@@ -19,7 +19,7 @@ from saltus.analysis.branches.special_points import COMPLEX, locate, outside, te
 VERTEX = 1e-4
 #: Shortest interval that is halved, in units of the scale.
 LEAST = 1e-9
-#: What is smaller at the zero of a test vanishes there.
+#: A quantity smaller than this at the zero of a test vanishes there.
 VANISHES = 1e-6
 #: Below this the parameter's entry in the unit tangent is rounding: the branch is vertical.
 STILL = 1e-8
@@ -196,7 +196,7 @@ def _ahead(piece: Piece, point: Event) -> float:
     return float(step @ piece.tangent[point.after])
 
 
-#: How many multipliers cross the unit circle at each kind of event.
+#: Multipliers that cross the unit circle at each kind of event.
 _CROSSING = {"fold": 1, "branch_point": 1, "period_doubling": 1, "neimark_sacker": 2}
 
 

@@ -13,7 +13,7 @@ from saltus.analysis.branches.piece import refine
 CHANGE = 0.08
 #: Changes smaller than this share of the largest orbit can't be seen.
 SEEN = 0.005
-#: How often an interval is halved for it.
+#: Halvings of an interval.
 ROUNDS = 4
 
 #: Sizes float64[r] of orbits float64[r, z] of a branch.

@@ -30,7 +30,7 @@ _PREFIX = {
     schema.RESPONSES: "response", schema.ATTRACTORS: "attractor", schema.BASINS: "attractor",
     schema.ORBITS: "orbit",
 }  # fmt: skip
-#: How variables that hold their points are named.
+#: Names of the variables that hold their points.
 _POINTS = {
     "response": schema.response_name,
     "attractor": schema.attractor_name,
@@ -93,7 +93,7 @@ def _values(system: System, name: str, found: xr.Dataset, prefix: str, kind: str
     return np.where(np.isfinite(values), values, _own_value(system, name, found))
 
 
-def resting_seeds(system: System, name: str, found: xr.Dataset) -> list[Seed]:
+def equilibrium_seeds(system: System, name: str, found: xr.Dataset) -> list[Seed]:
     """The equilibria of a Dataset, off boundaries, as seeds of branches over ``name``."""
     kind = schema.kind_of(found)
     names: Callable[[str], str] = schema.equilibrium_name
@@ -109,10 +109,10 @@ def resting_seeds(system: System, name: str, found: xr.Dataset) -> list[Seed]:
     values = _values(system, name, found, prefix, kind)
     columns = [found[names(one)].values.reshape(len(values), -1)[:, 0] for one in system.states]
     places, here = np.stack(columns, axis=1), resting.values
-    return rests_at(places[here], values[here])
+    return equilibria_at(places[here], values[here])
 
 
-def rests_at(
+def equilibria_at(
     places: np.ndarray, values: np.ndarray, starts: np.ndarray | None = None
 ) -> list[Seed]:
     """Seeds at equilibria float64[k, D] of the parameter's values float64[k]; their common unit is
@@ -126,7 +126,7 @@ def rests_at(
     return [Seed(one[None], np.array([v]), unit) for one, v in zip(places, values, strict=True)]
 
 
-def resting_between(
+def equilibria_between(
     system: System, name: str, limits: tuple[float, float], starts: np.ndarray
 ) -> list[Seed]:
     """Seeds at the equilibria that Newton's method finds at some values of the parameter, from
@@ -145,7 +145,7 @@ def resting_between(
         equilibria = [one.state for one in found if one.place == "region" and not one.dimension]
         places += equilibria
         values += [float(value)] * len(equilibria)
-    return rests_at(np.reshape(places, (-1, len(system.states))), np.array(values), starts)
+    return equilibria_at(np.reshape(places, (-1, len(system.states))), np.array(values), starts)
 
 
 def seeds_at(
@@ -176,7 +176,7 @@ def scaled(system: System, name: str, seeds: list[Seed], method: Method) -> list
     if not unknown:
         return seeds
     rows = np.tile(np.array(list(system.values.values())), (len(unknown), 1))
-    rows[:, list(system.values).index(name)] = [seeds[i].own[-1] for i in unknown]
+    rows[:, list(system.values).index(name)] = [seeds[i].others[-1] for i in unknown]
     starts = np.array([seeds[i].points[0] for i in unknown])
     periods = np.array([len(seeds[i].points) for i in unknown])
     numbers = measure(Stroboscope(system, method, rows), starts, periods)

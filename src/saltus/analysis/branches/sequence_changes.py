@@ -23,14 +23,14 @@ from saltus.analysis.branches.legs import Legs
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.system.leg import has_legs
 
-#: How often an interval is halved in which the change isn't one graze, one corner, or several
-#: grazes at once.
+#: Halvings of an interval in which the change isn't one graze, one corner, or several grazes at
+#: once.
 HALVINGS = 24
 #: Grazes at one interval of a branch that are told apart without halving it.
 MOST_AT_ONCE = 4
 #: Shortest contacts among which they are sought.
 SHORTEST = 16
-#: How far outside of its interval an event may lie, in intervals.
+#: Distance from its interval at which an event may lie, in intervals.
 OUTSIDE = 0.02
 #: Grazes nearer than this, in units of the scale, come at once.
 AT_ONCE = 1e-9

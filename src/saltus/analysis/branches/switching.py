@@ -23,7 +23,7 @@ class Seed:
     ----------
     points : float64[n, D]
         An orbit.
-    own : float64[..]
+    others : float64[..]
         The other unknowns: its period [s] if the system isn't forced, and the parameter.
     scale : float64[D]
         Ranges of the states.
@@ -34,7 +34,7 @@ class Seed:
     """
 
     points: np.ndarray
-    own: np.ndarray
+    others: np.ndarray
     scale: np.ndarray
     along: np.ndarray | None = None
     parent: tuple[int, int] | None = None
@@ -42,7 +42,7 @@ class Seed:
     @property
     def z(self) -> np.ndarray:
         """All unknowns."""
-        return np.concatenate([self.points.ravel(), self.own])
+        return np.concatenate([self.points.ravel(), self.others])
 
 
 def children(branch: Branch, number: int, switch: frozenset[str], longest: int) -> Iterator[Seed]:

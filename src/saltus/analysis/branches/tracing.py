@@ -28,7 +28,7 @@ from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.special_points import unstable
 from saltus.analysis.branches.switching import Seed, children, ends_there
 
-#: How far a new branch begins from the point where it leaves another, in units of the scale: the
+#: Distances from the point where a branch leaves another, in units of the scale: it begins at the
 #: first of these at which Newton's method finds it.
 ASIDE = (1e-3, 2e-4, 4e-5)
 #: Radius of a limit cycle that is lost because it shrinks to an equilibrium, in units of the scale.
@@ -120,7 +120,7 @@ def _abreast(waiting: list[Seed]) -> list[Seed]:
     leaves at the first.
     """
     first = waiting[0]
-    free = len(first.own) > 1
+    free = len(first.others) > 1
     most = 1 if free and first.along is None else max(ABREAST // first.points.size**2, 1)
     taken, left = list[Seed](), list[Seed]()
     for place, seed in enumerate(waiting):
@@ -230,7 +230,7 @@ class Start:
         no orbit.
         """
         n, z = len(seed.points), seed.z
-        scale = np.concatenate([np.tile(seed.scale, n), np.abs(seed.own)])
+        scale = np.concatenate([np.tile(seed.scale, n), np.abs(seed.others)])
         scale[-1] = plan.limits[1] - plan.limits[0]
         row, orbits = np.zeros(1, np.int64), plan.make(n, scale[None])
         up = np.eye(len(z))[-1]

@@ -96,7 +96,7 @@ def all_equilibria(system: System, starts: np.ndarray, scale: np.ndarray) -> lis
         piece = ModeEquations(system, mode, scale)
         equilibria: list[Equilibrium] = []
         for state in piece.zeros(starts):
-            equilibrium = _rest(piece, state)
+            equilibrium = _equilibrium(piece, state)
             if equilibrium is None:
                 continue
             if equilibrium.dimension and equilibrium.place != "boundary":
@@ -145,7 +145,7 @@ def _modes(guards: Sequence[Guard]) -> list[tuple[bool, ...]]:
     return modes
 
 
-def _rest(piece: ModeEquations, state: np.ndarray) -> Equilibrium | None:
+def _equilibrium(piece: ModeEquations, state: np.ndarray) -> Equilibrium | None:
     """The equilibrium at a zero of the field; None where the mode doesn't hold."""
     state = piece.cleaned(state)
     touched, margin = [], np.inf

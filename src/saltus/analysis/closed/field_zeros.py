@@ -128,25 +128,25 @@ def find_equilibria(map_: Stroboscope, start: np.ndarray, scale: np.ndarray) -> 
     return result
 
 
-def _jacobians(map_: Stroboscope, rests: ClosedMotions) -> Iterator[tuple[int, np.ndarray]]:
+def _jacobians(map_: Stroboscope, equilibria: ClosedMotions) -> Iterator[tuple[int, np.ndarray]]:
     """The Jacobian at each equilibrium where it is known, and its row."""
-    rows = np.flatnonzero(rests.period)
-    matrices = jacobian_of(map_.system, rests.points[rows, 0], map_.rows(rows).values)
+    rows = np.flatnonzero(equilibria.period)
+    matrices = jacobian_of(map_.system, equilibria.points[rows, 0], map_.rows(rows).values)
     for row, matrix in zip(rows.tolist(), matrices, strict=True):
         if np.isfinite(matrix).all():
             yield row, matrix
 
 
 def captured(
-    map_: Stroboscope, rests: ClosedMotions, state: np.ndarray, scale: np.ndarray
+    map_: Stroboscope, equilibria: ClosedMotions, state: np.ndarray, scale: np.ndarray
 ) -> np.ndarray:
     """True where a state of float64[k, D] lies where its equilibrium is known to capture, bool[k];
     float64[k, D] is the range of each state.
     """
     result, scale = np.zeros(len(state), bool), np.maximum(scale, DECAYED)
-    for i, matrix in _jacobians(map_, rests):
-        if rests.multipliers[i, 0].real < -MARGINAL * np.linalg.norm(matrix, 2):
-            values, place = map_.rows(np.array([i])).values, rests.points[i, 0]
+    for i, matrix in _jacobians(map_, equilibria):
+        if equilibria.multipliers[i, 0].real < -MARGINAL * np.linalg.norm(matrix, 2):
+            values, place = map_.rows(np.array([i])).values, equilibria.points[i, 0]
             reach = _reach(map_.system, values, place, matrix, scale[i])
             result[i] = np.linalg.norm(reach @ (state[i] - place)) <= 1.0
     return result

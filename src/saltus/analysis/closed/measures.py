@@ -23,7 +23,7 @@ from saltus.flow.motion_series import Pieces
 from saltus.flow.pieces import nodes_of, pieces
 from saltus.flow.request import Outcome
 from saltus.flow.threads import on_threads
-from saltus.flow.waves import WaveLegs, deviations, harmonics, largest, least_turn, means, turns
+from saltus.flow.waves import WaveLegs, deviations, extremes, harmonics, least_turns, means, turns
 from saltus.kernels import status as st
 
 #: Forcing periods of a motion that never repeats from which its numbers are taken, where there are
@@ -236,20 +236,17 @@ def _measured_by_waves(
     for i, parts in enumerate(motions):
         if not parts:
             continue
-        both = [replace(part, rows=np.vstack([part.rows, -part.rows])) for part in parts]
-        high, low = np.split(largest(both), 2)
+        low, high = extremes(parts)
         wanted = [replace(part, rows=part.rows[own]) for part in parts]
         mean = means(wanted)
-        result.maximum[i], result.minimum[i], result.mean[i] = high[own], -low[own], mean
+        result.maximum[i], result.minimum[i], result.mean[i] = high[own], low[own], mean
         result.deviation[i] = deviations(wanted, mean)
         if map_.system.forced_at is not None:
             rate = 2.0 * np.pi / float(map_.period[i])
             result.harmonic[i] = harmonics(wanted, rate)
-        spans = (high + low)[gaps]
-        margins = [
-            least_turn(parts, outputs + g, NEAR * span) for g, span in enumerate(spans.tolist())
-        ]
-        result.margin[i], result.span[i] = min(margins, default=np.inf), spans.max(initial=0.0)
+        spans = (high - low)[gaps]
+        margins = least_turns(parts, outputs + np.arange(len(spans)), NEAR * spans)
+        result.margin[i], result.span[i] = margins.min(initial=np.inf), spans.max(initial=0.0)
         result.turning[i] = _turning_states(parts, size, closed)
     return result
 
@@ -260,9 +257,9 @@ def _turning_states(parts: list[WaveLegs], size: int, closed: bool) -> np.ndarra
     """
     times, states, ends = [], [], []
     for part in parts:
-        leg, time = turns(part, 0)
+        leg, _, time = turns(part, np.zeros(1, np.int64))
         times.append(part.begin[leg] + time)
-        states.append(part.values(leg, time)[:, :size])
+        states.append(replace(part, rows=part.rows[:size]).values(leg, time))
         legs, moving = np.arange(len(part.length)), replace(part, rows=part.rows[:1] * part.rates)
         first, last = (moving.values(legs, at)[:, 0] for at in (0.0 * part.length, part.length))
         ends.append(np.column_stack([part.begin, first, last, part.values(legs, 0.0 * first)]))

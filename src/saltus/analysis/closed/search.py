@@ -26,14 +26,14 @@ from saltus.analysis.solve.deflation import Known
 from saltus.flow.maps import Travel
 from saltus.kernels import status as st
 
-#: Iterates that starts are followed before Newton's method begins, in turn: none, so that motions
-#: are found which nothing comes near; some, so that a chaotic set is reached.
+#: Iterates before Newton's method begins, in rotation: 0 finds motions that repel, more iterates
+#: reach the chaotic set.
 AGES = (0, 4, 8, 12)
 #: Guesses that a search with known motions deflated begins with.
 DEFLATED_STARTS = 64
 #: Steps of such a search: most guesses lead nowhere.
 DEFLATED_STEPS = 40
-#: How far beside known motions it begins too, in units of their range.
+#: Distances from known motions at which it begins too, in units of their range.
 BESIDE = np.repeat([0.01, 0.1, 0.3], 6)
 
 

@@ -79,7 +79,7 @@ def runs_away(iterates: np.ndarray) -> np.ndarray:
         return np.asarray((np.diff(sizes, axis=0) > 0).all(axis=0) & (sizes[-1] > GROWN * sizes[0]))
 
 
-def rest(
+def measure_equilibria(
     map_: Stroboscope, place: np.ndarray, rows: np.ndarray, numbers: Measures,
     outputs: Outputs | None = None,
 ) -> None:  # fmt: skip
@@ -108,13 +108,13 @@ def rest(
 
 
 def multipliers_and_eigenvalues(
-    values: np.ndarray, rests: np.ndarray
+    values: np.ndarray, equilibria: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Floquet multipliers, and eigenvalues [1/s] of what rests, complex128[m, D]; each NaN where it
     is the other.
     """
-    return np.where(rests[:, None], np.nan + 0j, values), np.where(
-        rests[:, None], values, np.nan + 0j
+    return np.where(equilibria[:, None], np.nan + 0j, values), np.where(
+        equilibria[:, None], values, np.nan + 0j
     )
 
 
@@ -123,9 +123,11 @@ def close_again(
 ) -> ClosedMotions:
     """Equilibria (time 0) and limit cycles (their period) from those at other parameter values."""
     result = ClosedMotions.none(len(start), start.shape[1])
-    rests, turns = np.flatnonzero(time == 0), np.flatnonzero(time > 0)
-    if len(rests):
-        result.put(rests, find_equilibria(map_.rows(rests), start[rests], scale[rests]))
+    equilibria, turns = np.flatnonzero(time == 0), np.flatnonzero(time > 0)
+    if len(equilibria):
+        result.put(
+            equilibria, find_equilibria(map_.rows(equilibria), start[equilibria], scale[equilibria])
+        )
     if len(turns):
         result.put(turns, find_cycles(map_.rows(turns), start[turns], time[turns], scale[turns])[0])
     return result

@@ -4,7 +4,7 @@ alone, in ranges, and for many trajectories.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -23,5 +23,7 @@ Axis: TypeAlias = Sequence[Value] | np.ndarray | xr.DataArray
 #: A value for each state; a mapping of states to values; an array (n, states); words such as
 #: "random 20".
 Starts: TypeAlias = Sequence[Values] | Mapping[str, Values] | np.ndarray | xr.DataArray | str
-#: What is read off a motion: a function, or it with its unit.
+#: A condition that ends a motion: a text, or a function of the names of the system.
+UntilTrue: TypeAlias = str | Callable[..., object]
+#: A quantity that is read off a motion: a function, or it with its unit.
 Reading: TypeAlias = Quantity | tuple[Quantity, str]

@@ -33,7 +33,7 @@ class Outputs:
         Of the functions; conditions hold bits.
     guards : tuple of Guard
         The guards of these bits: those of the system, then those that only the functions need.
-    own : int
+    own_guards : int
         Number of the guards of the system.
     """
 
@@ -41,7 +41,7 @@ class Outputs:
     units: tuple[str, ...]
     formulas: tuple[Expr, ...]
     guards: tuple[Guard, ...]
-    own: int = 0
+    own_guards: int = 0
 
     def __len__(self) -> int:
         return len(self.names)
@@ -71,9 +71,9 @@ class Outputs:
             return states
         names = self.names[: states.shape[-1]]
         known = dict(zip(names, np.moveaxis(states, -1, 0), strict=True))
-        bits: list[Any] = [(np.asarray(mode) >> i) & 1 == 1 for i in range(self.own)]
+        bits: list[Any] = [(np.asarray(mode) >> i) & 1 == 1 for i in range(self.own_guards)]
         about: dict[str, Any] = {"t": t, "states": known, "values": parameters}
-        for guard in self.guards[self.own :]:
+        for guard in self.guards[self.own_guards :]:
             (gap,) = evaluate([guard.gap], **about, bits=bits)
             bits.append(gap > 0)
         there = np.isfinite(states).all(axis=-1)

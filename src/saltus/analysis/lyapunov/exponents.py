@@ -80,7 +80,7 @@ class Exponents(Algorithm):
                 flow, self._start[rows], self._periods, self._transient, self._every is None, show
             )
             if self._every is not None and autonomous(self.map.system):
-                _rest(found, flow, self._start[rows], self._every)
+                _of_equilibria(found, flow, self._start[rows], self._every)
             self._keep(rows, flow, found)
 
     def _keep(self, rows: np.ndarray, flow: TangentFlow, found: Spectrum) -> None:
@@ -161,7 +161,7 @@ class Exponents(Algorithm):
         }
 
 
-def _rest(found: Spectrum, flow: TangentFlow, start: np.ndarray, every: float) -> None:
+def _of_equilibria(found: Spectrum, flow: TangentFlow, start: np.ndarray, every: float) -> None:
     """Replace the exponents of motions that have come to an equilibrium by the real parts of the
     eigenvalues of the Jacobian, exact but for rounding.
 

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.analysis.inputs.starts import Ensemble, Span
+from saltus.analysis.inputs.spans import Span
+from saltus.analysis.inputs.starts import Ensemble
 from saltus.analysis.motion.sample_times import NO_SAMPLES, SampleTimes, evenly, planned
 from saltus.errors import ParameterError, SaltusWarning
 from saltus.flow import engine
@@ -44,7 +45,7 @@ class Ending:
         With the system that has its guards.
     until : Until
         The same as the engine reads it.
-    own : int
+    own_guards : int
         Guards of the user's system, before those of the condition.
     first_mode : int64[n]
         Sides of all guards at the start, as bits.
@@ -52,7 +53,7 @@ class Ending:
 
     condition: EndCondition
     until: Until
-    own: int
+    own_guards: int
     first_mode: np.ndarray
 
     def asked(self, request: Request) -> Request:
@@ -106,8 +107,8 @@ class Ending:
 
     def of_the_user(self, outcome: Outcome, errors: np.ndarray) -> tuple[Outcome, np.ndarray]:
         """The outcome, and the errors of its contact times, without the guards of the condition."""
-        table, own = outcome.contacts, (1 << self.own) - 1
-        added = table.guard >= self.own
+        table, own = outcome.contacts, (1 << self.own_guards) - 1
+        added = table.guard >= self.own_guards
         crossed = table.trajectory[added & (table.kind == st.CROSSING)]
         counters = outcome.counters.copy()
         counters[:, st.EVENTS] -= np.bincount(crossed, minlength=len(counters))
@@ -129,7 +130,7 @@ class Ending:
         rows = np.nonzero(at_end)[0]
         samples[at_end] = outcome.state[rows, : samples.shape[2]]
         modes[at_end] = np.where(outcome.mode < 0, self.first_mode, outcome.mode)[rows]
-        return samples, np.where(modes < 0, modes, modes & ((1 << self.own) - 1))
+        return samples, np.where(modes < 0, modes, modes & ((1 << self.own_guards) - 1))
 
     def warn_of_starts(self) -> None:
         """Say which trajectories end where they start, at the line of the user's call."""

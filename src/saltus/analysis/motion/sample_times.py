@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.analysis.inputs.starts import Ensemble, Span
+from saltus.analysis.inputs.spans import Span
+from saltus.analysis.inputs.starts import Ensemble
 from saltus.errors import ParameterError, shown
 from saltus.flow.counts import whole
 from saltus.flow.request import Outcome, Request, Schedule
@@ -55,7 +56,7 @@ class SampleTimes:
             times=times,
         )
 
-    def kept(self, outcome: Outcome) -> np.ndarray | slice:
+    def reached(self, outcome: Outcome) -> np.ndarray | slice:
         """The samples that were reached, in the order of the result: places in the outcome's."""
         if self.given is None:
             return slice(outcome.reached())
@@ -72,7 +73,7 @@ class SampleTimes:
         value.
         """
         own = forced and bool(np.ptp(length.period) > 0)
-        kept = self.kept(outcome)
+        kept = self.reached(outcome)
         if self.given is not None:
             time = np.sort(self.given)[kept]
             return time, None if own else (time - length.t_start) / length.period[0]

@@ -11,7 +11,9 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis import dataset_parts
-from saltus.analysis.inputs.starts import Ensemble, Span, check_system, ensemble, span, trajectories
+from saltus.analysis.inputs.given import Starts, UntilTrue, Values
+from saltus.analysis.inputs.spans import Span, span
+from saltus.analysis.inputs.starts import Ensemble, check_system, ensemble, trajectories
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion import time_errors as measure
 from saltus.analysis.motion.sample_times import (
@@ -44,17 +46,17 @@ if TYPE_CHECKING:
 @verb
 def simulate(
     system: System,
-    start: Any = None,
+    start: Starts | None = None,
     periods: int | None = None,
     t_end: float | str | None = None,
     *,
     t_start: float | str = 0.0,
     method: Method | None = None,
     samples: int | None = None,
-    at: Any = None,
-    until: Any = None,
+    at: Values | None = None,
+    until: UntilTrue | None = None,
     keep: int | None = None,
-    values: Mapping[str, Any] | None = None,
+    values: Mapping[str, Values] | None = None,
     time_errors: str = "measured",
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
@@ -235,7 +237,7 @@ def _dataset(asked: _Asked, outcome: Outcome, errors: np.ndarray) -> xr.Dataset:
     forced = system.forced_at is not None
     own_periods = forced and bool(np.ptp(length.period) > 0)
     time, period = plan.of_result(outcome, length, forced)
-    kept = plan.kept(outcome)
+    kept = plan.reached(outcome)
     samples, modes = outcome.samples[:, kept, : len(system.states)], outcome.sample_mode[:, kept]
     attrs: dict[str, Any] = {"sample_times": "given"} if asked.given else {}
     if asked.end is not None:

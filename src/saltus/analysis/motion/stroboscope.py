@@ -10,7 +10,8 @@ import xarray as xr
 
 from saltus.analysis import dataset_parts
 from saltus.analysis.inputs.given import Starts, Values
-from saltus.analysis.inputs.starts import check_system, ensemble, span, trajectories
+from saltus.analysis.inputs.spans import span
+from saltus.analysis.inputs.starts import check_system, ensemble, trajectories
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion.window import computed
 from saltus.analysis.outcome_messages import warn

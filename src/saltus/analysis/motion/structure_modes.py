@@ -28,7 +28,7 @@ def structure_modes(
     stiffness: Any = None,
     modes: int | None = None,
     *,
-    at: Any = None,
+    at: str | Sequence[str | tuple[str, str]] | None = None,
     names: Sequence[str] | str | None = None,
 ) -> xr.Dataset:
     """The lowest modes of a structure, and their share of the static flexibility.
@@ -79,7 +79,7 @@ def structure_modes(
     known = modes_of(mass, stiffness, count)
     places, vectors = _directions(at, degrees if known.shapes.shape[1] == size else [], degrees)
     total, residual = flexibility(stiffness, known, count, vectors)
-    kept = known.kept(count)
+    kept = known.lowest(count)
     with np.errstate(invalid="ignore"):  # a rigid body moves, or nothing does
         share = np.where(np.isfinite(total), 1 - residual / total, np.nan)
 

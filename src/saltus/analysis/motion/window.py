@@ -12,7 +12,8 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis import dataset_parts
-from saltus.analysis.inputs.starts import Ensemble, Span, ensemble, span
+from saltus.analysis.inputs.spans import Span, span
+from saltus.analysis.inputs.starts import Ensemble, ensemble
 from saltus.errors import ParameterError, shown
 from saltus.flow import engine
 from saltus.flow.counts import whole

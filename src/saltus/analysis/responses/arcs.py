@@ -24,10 +24,10 @@ from saltus.analysis.attractors.grid import Grid
 from saltus.analysis.attractors.grid_responses import GridResponses
 from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.branch_table import attributes_of, values_of
+from saltus.analysis.branches.equilibrium_branches import trace_equilibria
 from saltus.analysis.branches.plans import LONGEST_DOUBLED, POINTS, SWITCHES, plan_of
-from saltus.analysis.branches.rest_branches import trace_rests
 from saltus.analysis.branches.same_branch import on_branch
-from saltus.analysis.branches.seeds import rests_at, scaled, seeds_at
+from saltus.analysis.branches.seeds import equilibria_at, scaled, seeds_at
 from saltus.analysis.branches.tracing import Plan, trace
 from saltus.analysis.closed.motions import ClosedMotions, phase_distances
 from saltus.analysis.closed.orbits import find_orbits
@@ -53,7 +53,7 @@ class Arcs:
     ----------
     branches : list of Branch
         Those that were followed, in the order of their first responses.
-    of : int64[m]
+    branch_of : int64[m]
         Branch of each response; -1 of those on none.
     unstable : bool
         Whether unstable orbits are followed too, and branches that leave others.
@@ -62,7 +62,7 @@ class Arcs:
     """
 
     branches: list[Branch] = field(default_factory=list)
-    of: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
+    branch_of: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
     unstable: bool = False
     refused: str = ""
 
@@ -114,7 +114,7 @@ def follow_arcs(
         grid.system, name, (float(values[0]), float(values[-1])), exact, threads, POINTS,
         LONGEST_DOUBLED, SWITCHES if arcs.unstable else (), stable=not arcs.unstable, twins=True,
     )  # fmt: skip
-    arcs.of = np.full(len(found), -1, np.int64)
+    arcs.branch_of = np.full(len(found), -1, np.int64)
     try:
         parametric(grid.system, (name,))
     except ParameterError as error:
@@ -124,26 +124,26 @@ def follow_arcs(
         return
     orbits = _exact_orbits(found, grid, method, threads)
     try:
-        _follow_rests(found, orbits, grid, plan, arcs)
+        _follow_equilibria(found, orbits, grid, plan, arcs)
         _follow_orbits(found, orbits, grid, plan, exact, arcs, progress)
     finally:
         _in_order(arcs)
 
 
-def _follow_rests(
+def _follow_equilibria(
     found: GridResponses, orbits: ClosedMotions, grid: Grid, plan: Plan, arcs: Arcs
 ) -> None:
     """Follow the branches of equilibria, and those of limit cycles born at Hopf points if unstable
     orbits are followed.
     """
-    rests = np.flatnonzero((found.kind == Kind.EQUILIBRIUM) & (orbits.period > 0))
-    if not len(rests):
+    equilibria = np.flatnonzero((found.kind == Kind.EQUILIBRIUM) & (orbits.period > 0))
+    if not len(equilibria):
         return
     ((name, values),) = grid.axes.items()
-    usual = np.concatenate([grid.starts, found.motions.scale[found.row[rests]]])
-    seeds = rests_at(orbits.points[rests, 0], values[found.place[rests]], usual)
-    born = trace_rests(plan, grid.system, name, seeds, arcs.branches)
-    _number(found, orbits, grid, plan, rests, arcs, 0)
+    usual = np.concatenate([grid.starts, found.motions.scale[found.row[equilibria]]])
+    seeds = equilibria_at(orbits.points[equilibria, 0], values[found.place[equilibria]], usual)
+    born = trace_equilibria(plan, grid.system, name, seeds, arcs.branches)
+    _number(found, orbits, grid, plan, equilibria, arcs, 0)
     if "hopf" in plan.switch:
         trace(plan, born, arcs.branches)
 
@@ -184,7 +184,7 @@ def _follow_orbits(
             trace(plan, beginnings, arcs.branches, None if plan.stable else progress)
         finally:  # also with the results so far, when interrupted
             _number(found, orbits, grid, plan, np.append(some, left), arcs, known)
-        left, known = left[arcs.of[left] < 0], len(arcs.branches)
+        left, known = left[arcs.branch_of[left] < 0], len(arcs.branches)
         if progress is not None:
             progress(1.0 - len(left) / number)
 
@@ -218,10 +218,10 @@ def _number(
             arcs.branches += others
     for z, n, which in _unknowns(found, orbits, values, some):
         for number, branch in enumerate(arcs.branches[known:], known):
-            mine = which[arcs.of[which] < 0]
+            mine = which[arcs.branch_of[which] < 0]
             if len(mine):
-                here = on_branch(z[arcs.of[which] < 0], n, branch)
-                arcs.of[mine[here]] = number
+                here = on_branch(z[arcs.branch_of[which] < 0], n, branch)
+                arcs.branch_of[mine[here]] = number
 
 
 def _unknowns(
@@ -245,12 +245,12 @@ def _unknowns(
 
 def _in_order(arcs: Arcs) -> None:
     """Number branches in the order of their first responses; those without a response come last."""
-    first = np.full(len(arcs.branches), len(arcs.of))
-    for response in np.flatnonzero(arcs.of >= 0)[::-1]:
-        first[arcs.of[response]] = response
+    first = np.full(len(arcs.branches), len(arcs.branch_of))
+    for response in np.flatnonzero(arcs.branch_of >= 0)[::-1]:
+        first[arcs.branch_of[response]] = response
     order = np.argsort(first, kind="stable")
     rank = np.argsort(order)
-    arcs.of = np.where(arcs.of >= 0, np.append(rank, -1)[arcs.of], -1)
+    arcs.branch_of = np.where(arcs.branch_of >= 0, np.append(rank, -1)[arcs.branch_of], -1)
     arcs.branches[:] = [arcs.branches[i] for i in order]
     for branch in arcs.branches:
         if branch.parent is not None:

@@ -73,8 +73,8 @@ def _dataset(
     numbers = numbers_of(found, outputs, grid, method, threads)
     table = table_of(found, numbers, grid, method)
     on, branch = np.full(len(found), -1, np.int64), np.full(len(found), -1, np.int64)
-    on[: len(arcs.of)] = arcs.of
-    if len(grid.axes) == 1 and (found.complete or len(arcs.of)):
+    on[: len(arcs.branch_of)] = arcs.branch_of
+    if len(grid.axes) == 1 and (found.complete or len(arcs.branch_of)):
         branch = matched(found, on, grid.places, len(arcs.branches))
     followed, about_branches = arc_values(arcs, grid, method, outputs)
     system, size = grid.system, len(grid.system.states)
@@ -89,7 +89,7 @@ def _dataset(
         "start": np.arange(len(grid.starts)),
         **({"start_direction": list(grid.sweeps)} if grid.sweeps else {}),
         "start_<state>": grid.starts,
-        **grid_values(found.of.reshape(*grid.shape, len(grid.starts)), table),
+        **grid_values(found.response_of.reshape(*grid.shape, len(grid.starts)), table),
         **response_values(table, branch, at, size),
         "output": list(outputs.names),
         "output_units": list(outputs.units),

@@ -54,7 +54,7 @@ class CurveQuestion(OneVerb):
 
     def check(self, table: Any, setting: Setting) -> None:  # noqa: ARG002
         """Read the event, and the branches that it is on."""
-        self.kind, self.near, self.of = table.event, table.near, table.branches
+        self.kind, self.near, self.branches_named = table.event, table.near, table.branches
 
     def join(self, asked: Sequence[Question]) -> None:
         """Find the branches among the questions of the study."""
@@ -64,17 +64,17 @@ class CurveQuestion(OneVerb):
                 f"[{self.place}] begins at a bifurcation of branches. Give the study a table "
                 "[branches]."
             )
-        if self.of is None and len(known) > 1:
+        if self.branches_named is None and len(known) > 1:
             raise StudyError(
                 f"[{self.place}] needs the name of one of {len(known)} [[branches]]: branches = "
                 f'"{next(iter(known))}".'
             )
-        if self.of is not None and self.of not in known:
+        if self.branches_named is not None and self.branches_named not in known:
             raise StudyError(
-                f"[{self.place}] no [branches] are called {shown(self.of)}. "
-                f"{nearest(self.of, known)}"
+                f"[{self.place}] no [branches] are called {shown(self.branches_named)}. "
+                f"{nearest(self.branches_named, known)}"
             )
-        branches = known[self.of or next(iter(known))]
+        branches = known[self.branches_named or next(iter(known))]
         self.needs = (branches.stem,)
         self.parent = to_json(branches.identity())
         (name,) = branches.arguments["vary"]

@@ -37,7 +37,7 @@ _LEFT_OUT = ("state", "at", "until", "keep", "time_errors", "surface", "directio
 class OfMotions(OneVerb):
     """Question on motions from given starts, of given length after a transient."""
 
-    #: Whether its picture draws some trajectories of a batch.
+    #: True if its picture draws some trajectories of a batch.
     several: ClassVar[bool] = False
 
     def check_first(self, table: Any) -> None:

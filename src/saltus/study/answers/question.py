@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from saltus.study.tables.signature import Generated
     from saltus.study.tables.study import Study
 
-#: What makes the questions of a table of a study.
+#: A function that makes the questions of a table of a study.
 Make = Callable[[Any, "Setting"], "list[Question]"]
 M = TypeVar("M", bound="Make | type[OneVerb]")
 

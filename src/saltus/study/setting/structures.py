@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 _PLACE = "system.structure"
 #: A quantity: a number, alone or with a unit. Everything else is a formula.
 _QUANTITY = re.compile(r"\s*[+-]?[\d.]+([eE][+-]?\d+)?\s*([A-Za-zµμΩ°%].*)?")
-#: What the formula of a drive may hold.
+#: Names that the formula of a drive may hold.
 _HELD = ("t", drives.FREQUENCY)
 
 

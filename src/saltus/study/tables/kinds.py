@@ -141,7 +141,7 @@ KINDS = {
         None,
     ),
 }
-#: What a motion is asked for besides its samples.
+#: Keys of a motion besides its samples.
 OF_MOTION = KINDS | {
     "at": WrittenAs(
         Annotated[list[Quantity], Field(min_length=1)],

@@ -19,7 +19,7 @@ from saltus.fence import MOST_COUNT
 from saltus.study.tables.parts import Named, Quantity, StudyTable
 from saltus.study.tables.toml import TABLES, toml
 
-#: What a question leaves to the study: the system, and how it is run.
+#: Arguments that a question leaves to the study: the system, and how it is run.
 _OF_THE_STUDY = ("system", "run", "threads", "progress")
 _ENTRY = re.compile(r"^(\S[^\n]*)\n((?:    [^\n]*\n?)+)", re.MULTILINE)
 _AS_FOR = re.compile(r"As for :func:`saltus\.(\w+)`")
@@ -63,7 +63,7 @@ class Generated(StudyTable):
     #: Its name in the file, and the function that answers it.
     place: ClassVar[str] = ""
     function: ClassVar[str] = ""
-    #: How each key that is an argument of the function is written.
+    #: Kinds of the keys that are arguments of the function.
     kinds: ClassVar[dict[str, WrittenAs]] = {}
 
 

@@ -33,7 +33,7 @@ class Modes:
     angular: np.ndarray
     shapes: np.ndarray
 
-    def kept(self, count: int) -> Modes:
+    def lowest(self, count: int) -> Modes:
         """The lowest ``count`` modes."""
         return Modes(self.angular[:count], self.shapes[:, :count])
 
@@ -112,7 +112,7 @@ def flexibility(
     residual : float64[m]
         The part that the other modes would carry.
     """
-    first, kept = int((modes.angular <= RIGID * modes.angular.max()).sum()), modes.kept(count)
+    first, kept = int((modes.angular <= RIGID * modes.angular.max()).sum()), modes.lowest(count)
     parts = (at @ kept.shapes[:, first:]) ** 2 / kept.angular[first:] ** 2
     moves = np.abs(at @ kept.shapes[:, :first]).max(axis=1, initial=0.0) > RIGID
     if modes.shapes.shape[1] == modes.shapes.shape[0]:

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from saltus.arguments import checked
+from saltus.contact.boundaries import number_of
 from saltus.contact.contacts import renamed
-from saltus.contact.guards import number_of
 from saltus.errors import ParameterError, SaltusWarning, among, must_be, shown
 from saltus.system.structures import matrices, told
 from saltus.system.structures.equations import UNITS, Coordinates, Loads, traced
@@ -188,7 +188,7 @@ def structure(
     else:
         if damping is not None and damping_ratio is None:
             damping = modal_damping(damping, known, count)
-        moving = _modal(known.kept(count), damping)
+        moving = _modal(known.lowest(count), damping)
         words = told.reduced(mass, stiffness, known, count, degrees, loads, unit)
     angular = known.angular if known is not None else _angular(moving, stiffness)
     told.doubt(angular)

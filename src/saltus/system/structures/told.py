@@ -47,7 +47,7 @@ def reduced(
     words += _kept_at_contacts(stiffness, modes, count, degrees, loads.contacts, compliance)
     for label, drive in loads.drives:
         if isinstance(drive, Base):
-            words += _moved(label, mass, modes.kept(count), direction(drive, degrees), inertia)
+            words += _moved(label, mass, modes.lowest(count), direction(drive, degrees), inertia)
     return words
 
 

@@ -46,7 +46,7 @@ def test_tables_of_results_are_made_in_the_files_of_their_kinds_only():
     """
     others = {
         "study/answers/compare.py", "study/run/status.py", "cli/demo.py",
-        "cli/doctor.py", "cli/commands.py", "replication/tables.py",
+        "cli/doctor.py", "cli/commands.py", "cli/cache_commands.py", "replication/tables.py",
     }  # fmt: skip
     makers = {
         str(path.relative_to(HOUSE).as_posix())

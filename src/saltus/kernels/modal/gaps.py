@@ -1,4 +1,4 @@
-"""Template, 4 of 8 of the modal flow: what the gaps do over one step.
+"""Template of the modal flow: what the gaps do over one step.
 
 Where the amplitudes stand each row of gaps is a sum of waves, whose sizes bound what a step leaves
 out. Modes that are too fast for a step are bounded: they add at most their amplitudes to a gap, and

@@ -1,4 +1,4 @@
-"""Template, 7 of 7 of the modal flow: steps that are proven to cross no boundary, or just one, and
+"""Template of the modal flow: steps that are proven to cross no boundary, or just one, and
 the life of a trajectory.
 
 A step is tried and halved until every gap is decided. Modes that are too fast for it are bounded:

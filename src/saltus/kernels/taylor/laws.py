@@ -1,4 +1,4 @@
-"""Template, 6 of 8 of the Taylor flow: laws of contact of one lane - impacts, jumps, contacts that
+"""Template of the Taylor flow: laws of contact of one lane - impacts, jumps, contacts that
 are held: at rest, stuck, sliding along a boundary.
 
 A contact that is held has a guard of its own, the hold guard: on its positive side the equations

@@ -1,4 +1,4 @@
-"""Template, 8 of 8 of the Taylor flow: the life of a lane - filled, attended to at contacts,
+"""Template of the Taylor flow: the life of a lane - filled, attended to at contacts,
 samples and ends of periods, emptied.
 """
 

@@ -1,4 +1,4 @@
-"""Template, 1 of 7 of the modal flow: drives that are polynomials of the time between breaks.
+"""Template of the modal flow: drives that are polynomials of the time between breaks.
 
 Each is a course: instants at which its pieces begin, and the coefficients of each piece in the time
 since then. A course that repeats holds one cycle. Steps end at breaks, so a step sees one piece of

@@ -28,7 +28,7 @@ STEEP = 50.0
 SLOWEST = 1e-3
 
 
-class Rests:
+class EquilibriumCurves:
     """Curves of equilibria over one parameter; a ``CurveEquations``, and what a branch asks
     of the equations of its orbits.
 
@@ -154,14 +154,14 @@ class Rests:
             largest = np.abs(slopes * self.scale[rows][:, None]).max(axis=2)
             self._weight[rows] = np.where(largest > 0, largest, 1.0)
 
-    def near(self, z: np.ndarray, rows: np.ndarray) -> Rests:  # noqa: ARG002
+    def near(self, z: np.ndarray, rows: np.ndarray) -> EquilibriumCurves:  # noqa: ARG002
         """The equations whose row i is curve rows[i], int64[r]."""
         other = copy.copy(self)
         other.scale, other.modes = self.scale[rows], self.modes[rows].copy()
         other._weight = self._weight[rows]
         return other
 
-    def across(self, z: np.ndarray, row: int, guard: int) -> Rests:
+    def across(self, z: np.ndarray, row: int, guard: int) -> EquilibriumCurves:
         """The equations of the mode beyond a boundary, in one row, at float64[z]."""
         other = self.near(z[None], np.array([row]))
         other.modes[0, guard] = not other.modes[0, guard]

@@ -1,10 +1,10 @@
-"""Template, 1 of 8 of the Taylor flow: layout of its work arrays. codegen puts a generated head
+"""Template of the Taylor flow: layout of its work arrays. codegen puts a generated head
 before the templates.
 
-One step of all lanes reads: jets -> step length (taylor_step.py) -> locate contacts
-(taylor_crossings.py) -> advance and land (taylor_step.py), then attend to the lanes where more
-happened: a contact to be recorded or hard to settle (taylor_contacts.py), the end of a period, a
-sample, the end (taylor_lanes.py). Steps are arithmetic on lanes without branches on their contents,
+One step of all lanes reads: jets -> step length (step.py) -> locate contacts
+(crossings.py) -> advance and land (step.py), then attend to the lanes where more
+happened: a contact to be recorded or hard to settle (contacts.py), the end of a period, a
+sample, the end (trajectories.py). Steps are arithmetic on lanes without branches on their contents,
 or with branches that only skip work; so a trajectory's digits don't depend on its neighbours.
 
 Symbols
@@ -157,7 +157,7 @@ TURN_FOUND = 2.0**-20
 #: Least step, as a share of the stretch.
 LEAST_SHARE = 2.0**-40
 
-# -- laws without a series on a boundary (taylor_singular.py) --
+# -- laws without a series on a boundary (singular.py) --
 #: Relative effect on a state below which terms without a series are left out of a step.
 NEGLIGIBLE = 2.0**-50
 #: Longest other step, as a share of the way to the boundary.

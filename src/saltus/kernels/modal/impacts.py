@@ -1,6 +1,6 @@
-"""Template, 5 of 7 of the modal flow: several impacts at one instant. They are taken one after the
+"""Template of the modal flow: several impacts at one instant. They are taken one after the
 other until none closes; if what comes out depends on the order, the equations don't say what
-happens. See impacts.py.
+happens. See kernels/impacts.py.
 """
 
 from saltus.kernels.status import AMBIGUOUS_IMPACT, INVALID_RESTITUTION, RUNNING

@@ -1,8 +1,8 @@
-"""Template, 3 of 8 of the Taylor flow: crossings of gaps within a step, in all lanes at once.
+"""Template of the Taylor flow: crossings of gaps within a step, in all lanes at once.
 
 `locate` bounds the series, classifies each gap and chooses the first crossing. What is proven to
 cross is refined by Newton's method. What stays open is tried on a shorter step (`settle_sooner`),
-then left to the slow path (taylor_contacts.py). docs/decisions/0004, 0023.
+then left to the slow path (contacts.py). docs/decisions/0004, 0023.
 """
 
 import math

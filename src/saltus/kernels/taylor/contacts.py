@@ -1,4 +1,4 @@
-"""Template, 5 of 8 of the Taylor flow: contacts of one lane - the slow path after the quadratic
+"""Template of the Taylor flow: contacts of one lane - the slow path after the quadratic
 bound, landing, recording. The first crossing of a step is found before, by `locate` in
 taylor_crossings.
 """

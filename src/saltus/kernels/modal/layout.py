@@ -10,8 +10,8 @@ Symbols
 -------
 N states; G groups of LANES modes, ascending by |lambda|; S groups of LANES states; R rows of gaps,
 of which guards are plus or minus one, and an offset; H drives Re(e^{i (rate t + phase)}). Modes
-that don't go their own ways go together in a block: see modal_blocks.py. Drives that are
-polynomials between breaks are courses: see modal_records.py.
+that don't go their own ways go together in a block: see blocks.py. Drives that are
+polynomials between breaks are courses: see records.py.
 """
 
 from collections import namedtuple
@@ -60,15 +60,16 @@ KIND, PARTNER, LEVEL = range(3)
 AT_FIRST, BY_GUARDS, WAY = range(3)
 # Columns of `options`.
 MOST_STEPS, MOST_CONTACTS = range(2)
-# What is known of a guard in a step. Columns of `found`, for each guard: the place of its crossing as
-# a part of the step, whether that is final, whether it is ridden, touches of the step (first row),
-# the part of the step that is decided, the end of the bracket of the crossing.
+# What is known of a guard in a step.
 CLEAR, CROSSES, OPEN = range(3)
+# Columns of `found`, for each guard: the place of its crossing as a part of the step, whether that is
+# final, whether it is ridden, touches of the step (first row), the part of the step that is decided,
+# the end of the bracket of the crossing.
 PLACE, FINAL, RIDDEN, TOUCHED, DECIDED, BRACKET = range(6)
-# Columns of `stood`, for each row of gaps where the amplitudes stand: value and rate, the size of its
-# terms, what its fifth derivative is at most; then for each group of modes the sizes of all terms
-# from it on, and those of their rates. Rows of `waves`, for each row of gaps and group of modes: its
-# real and imaginary part, its rate, its size.
+# Columns of `stood`, for each row of gaps where the amplitudes stand: value and rate, the size of
+# its terms, what its fifth derivative is at most; then for each group of modes the sizes of all
+# terms from it on, and those of their rates. Rows of `waves`, for each row of gaps and group of
+# modes: its real and imaginary part, its rate, its size.
 HERE, SLOPE, SIZE, FIFTH, BEYOND = range(5)
 # Columns of `spans`, for each row of gaps over a step: bounds of the gap without what its series
 # leaves out; whether the series is known; its first and its last Bernstein coefficient, the least

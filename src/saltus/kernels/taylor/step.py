@@ -1,4 +1,4 @@
-"""Template, 4 of 8 of the Taylor flow: one step of all lanes, as arithmetic on lanes: its length
+"""Template of the Taylor flow: one step of all lanes, as arithmetic on lanes: its length
 and its execution.
 """
 

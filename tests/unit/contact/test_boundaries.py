@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from saltus.contact.guards import bits_in, find_guards
+from saltus.contact.boundaries import find_guards
+from saltus.contact.guards import bits_in
 from saltus.errors import TraceError
 from saltus.language import abs, cos, max, min, piecewise
 from saltus.language import expression as ex

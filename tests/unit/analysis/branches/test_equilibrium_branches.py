@@ -13,31 +13,31 @@ import saltus as sl
 
 @sl.system(states="x")
 def pitchfork(t, x, *, load=0.0):
-    """Rests at 0 and at the square roots of the load."""
+    """Equilibria at 0 and at the square roots of the load."""
     return load * x - x**3
 
 
 @sl.system(states="x")
 def cusped(t, x, *, load=0.0, left=2.0, right=3.0):
-    """Rests at load/left below the boundary, and at load/right beyond it."""
+    """Equilibria at load/left below the boundary, and at load/right beyond it."""
     return load - sl.piecewise((right * x, x > 0), otherwise=left * x)
 
 
 @sl.system(states="x v")
 def brusselator(t, x, v, *, feed=1.0, excess=2.5):
-    """Rests at (feed, excess/feed); a Hopf point at excess = 1 + feed**2, of frequency feed."""
+    """At rest at (feed, excess/feed); a Hopf point at excess = 1 + feed**2, of frequency feed."""
     return feed - (excess + 1.0) * x + x**2 * v, excess * x - x**2 * v
 
 
 @sl.system(states="x v")
 def bistable(t, x, v, *, load=0.0):
-    """Rests where load = x**3 - x: folds at x**2 = 1/3."""
+    """Equilibria where load = x**3 - x: folds at x**2 = 1/3."""
     return v, load + x - x**3 - 0.4 * v
 
 
 @sl.system(states="x")
 def wrinkled(t, x, *, load=0.0, width=0.0005):
-    """Rests on an S, with a loop near x = 0 that is far narrower than a step."""
+    """Equilibria on an S, with a loop near x = 0 that is far narrower than a step."""
     return load - x + x**3 + 2 * width * sl.tanh(x / width)
 
 

@@ -1,4 +1,4 @@
-"""Template, 4 of 7 of the modal flow: laws of contact - impacts, contacts at rest, their release.
+"""Template of the modal flow: laws of contact - impacts, contacts at rest, their release.
 
 A contact at rest has a guard of its own, the hold guard (docs/decisions/0040): its bit names the
 contact state in which the contact is held, and its gap there is the acceleration with which the
@@ -320,7 +320,7 @@ def rest_or_go(i, now, modes, steady, batch, m):
 @inner
 def too_short(i, now, restitution, second, third, fourth, batch):
     """Duration of a chatter [s] below which it is completed: the remainder changes the acceleration
-    by less than 1e-8, so the time of its end is accurate to rounding. See taylor_laws.py.
+    by less than 1e-8, so the time of its end is accurate to rounding. See taylor/laws.py.
     """
     scale = end_of(i, batch)
     if second < scale * third:
@@ -377,7 +377,7 @@ def terms_of_gap(r, modes, steady, which, m):
 @inner
 def is_hidden(i, g, rebound, pressing, batch, m):
     """True if a flight stays within the rounding of its gap, which counts in two steps, where
-    another boundary may put a node into the flight. See taylor_laws.py.
+    another boundary may put a node into the flight. See taylor/laws.py.
     """
     height = 0.5 * rebound * rebound / pressing
     size = 2.0 * size_of(m.acts, law_row(i, g, batch, m), 0, m)

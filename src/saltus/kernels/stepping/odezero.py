@@ -11,7 +11,7 @@ ode45 applies them to terminal events in either direction.
 Symbols
 -------
 t_left, t_right the bracket; t_try the last place tried, after a move: the end that was given up;
-LEFT, RIGHT, TRY in `work` (steps_layout.py): the gaps at these three. Only the signs and ratios of
+LEFT, RIGHT, TRY in `work` (layout.py): the gaps at these three. Only the signs and ratios of
 gaps matter, so halved values do no harm.
 """
 

@@ -1,4 +1,4 @@
-"""Template, 2 of 8 of the Taylor flow: forces without a Taylor series on a boundary, such as d**1.5
+"""Template of the Taylor flow: forces without a Taylor series on a boundary, such as d**1.5
 where a contact begins or ends.
 
 Off the boundary such a force is analytic; its series converges as far as the boundary is away. So

@@ -1,4 +1,4 @@
-"""Template, 3 of 7 of the modal flow: amplitudes on their way, and what they say of gaps."""
+"""Template of the modal flow: amplitudes on their way, and what they say of gaps."""
 
 import math
 

@@ -1,5 +1,5 @@
-"""Template, 7 of 8 of the Taylor flow: several impacts at one instant, and starts on boundaries
-that don't decide the motion. impacts.py compares their orders.
+"""Template of the Taylor flow: several impacts at one instant, and starts on boundaries
+that don't decide the motion. kernels/impacts.py compares their orders.
 """
 
 from saltus.kernels.status import IMPACT_LAW, INVALID_RESTITUTION, OK, SURFACE_LAW

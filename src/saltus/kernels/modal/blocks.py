@@ -1,4 +1,4 @@
-"""Template, 2 of 7 of the modal flow: modes that don't go their own ways go together, in a block.
+"""Template of the modal flow: modes that don't go their own ways go together, in a block.
 
 The block of a contact state is v' = T v: amplitudes of an invariant subspace, and of the drives
 that it resonates with. Its table: a row (groups, alpha, drives); T, column by column; L and V; for
@@ -12,7 +12,7 @@ from saltus.kernels.lanes import fma, larger, load, magnitude, splat, store
 
 #: Terms of exp(T h) v with alpha h <= 1: the next one is 1/19! = 8e-18.
 BLOCK_TERMS = 18
-#: What the terms of a gap's series beyond the last one add up to, in units of the first of them:
+#: Sum of the terms of a gap's series beyond the last one, in units of the first of them:
 #: 1 + 6/17 + 6^2/(17*18) + ..., since alpha h <= FOLLOWED.
 TAIL = 1.6
 

@@ -18,9 +18,9 @@ import numpy as np
 from saltus.analysis.branches.arclength import Arc, tangents
 from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.criticality import criticality
+from saltus.analysis.branches.equilibrium_curves import EquilibriumCurves
 from saltus.analysis.branches.events import Event
 from saltus.analysis.branches.piece import refine
-from saltus.analysis.branches.rests import Rests
 from saltus.analysis.branches.switching import Seed, crossing
 from saltus.analysis.branches.tracing import Plan, both_ways, trace
 from saltus.analysis.solve.newton import newton
@@ -31,14 +31,14 @@ ENDING = 0.02
 #: Rates that vanish on one side of a boundary and are smaller than this on the other, in units of
 #: their derivatives, vanish there too.
 CONTINUOUS = 1e-9
-#: How often the interval around a change of stability is halved.
+#: Halvings of the interval around a change of stability.
 CLOSER = 6
 #: Two events nearer than this, in units of the scale, are one.
 ONE = 1e-8
 
 
 @dataclass
-class RestBranch(Branch):
+class EquilibriumBranch(Branch):
     """A branch of equilibria in one mode.
 
     Attributes
@@ -49,7 +49,7 @@ class RestBranch(Branch):
         The direction in which the branch in the mode behind each begins, in units of the scale.
     """
 
-    orbits: Rests
+    orbits: EquilibriumCurves
     borders: list[Event | None] = field(default_factory=lambda: [None, None])
     beyond: list[np.ndarray | None] = field(default_factory=lambda: [None, None])
 
@@ -79,7 +79,7 @@ class RestBranch(Branch):
 
 
 def _leave(
-    branch: RestBranch,
+    branch: EquilibriumBranch,
     number: int,
     switch: frozenset[str],
     longest: int,  # noqa: ARG001
@@ -98,7 +98,7 @@ def _leave(
                 yield Seed(points, own, unit, beyond, (number, index))
 
 
-def trace_rests(
+def trace_equilibria(
     plan: Plan, system: System, name: str, seeds: Sequence[Seed], branches: list[Branch]
 ) -> list[Seed]:
     """Add the branches of equilibria that seeds lie on, and those that leave them, to a list.
@@ -121,33 +121,33 @@ def trace_rests(
     list of Seed
         Of the limit cycles that are born at Hopf points.
     """
-    follow = functools.partial(both_ways, ends=_left, kind=RestBranch)
+    follow = functools.partial(both_ways, ends=_left, kind=EquilibriumBranch)
 
     def make(_: int, scale: np.ndarray) -> Any:
-        return Rests(system, name, scale)
+        return EquilibriumCurves(system, name, scale)
 
     mine = replace(plan, make=make, follow=follow, leave=_leave, crossed=True)
     trace(mine, seeds, branches)
-    rests = [(i, one) for i, one in enumerate(branches) if isinstance(one, RestBranch)]
+    equilibria = [(i, one) for i, one in enumerate(branches) if isinstance(one, EquilibriumBranch)]
     known: list[Event] = []
-    for _, branch in rests:
+    for _, branch in equilibria:
         branch.events = [event for event in branch.events if not _told(branch, event, known)]
         known += [event for event in branch.events if event.kind == "boundary_equilibrium"]
     return [
         _born(branch, event, (number, index))
-        for number, branch in rests
+        for number, branch in equilibria
         for index, event in enumerate(branch.events)
         if event.kind == "hopf"
     ]
 
 
-def _left(orbits: Rests, curve: Arc) -> str:
+def _left(orbits: EquilibriumCurves, curve: Arc) -> str:
     """``boundary_equilibrium`` if a curve has just left its mode."""
     ends = orbits.sides(np.stack([curve.z[0], curve.z[-1]]))
     return "boundary_equilibrium" if (ends[0] != ends[1]).any() else ""
 
 
-def _told(branch: RestBranch, event: Event, known: Sequence[Event]) -> bool:
+def _told(branch: EquilibriumBranch, event: Event, known: Sequence[Event]) -> bool:
     """True if an event is a boundary equilibrium that is already known from the branch on its other
     side.
     """
@@ -157,14 +157,14 @@ def _told(branch: RestBranch, event: Event, known: Sequence[Event]) -> bool:
 
 
 # -- Hopf points -----------------------------------------------------------------------------------
-def _named(branch: RestBranch, event: Event) -> Event:
+def _named(branch: EquilibriumBranch, event: Event) -> Event:
     """An event by the name that it has of equilibria."""
     if event.kind != "neimark_sacker":
         return event
     return replace(event, kind="hopf", outcome=criticality(branch.orbits, branch.row, event.z))
 
 
-def _born(branch: RestBranch, event: Event, parent: tuple[int, int]) -> Seed:
+def _born(branch: EquilibriumBranch, event: Event, parent: tuple[int, int]) -> Seed:
     """The limit cycle that is born at a Hopf point."""
     orbits, size, unit = branch.orbits, branch.orbits.size, branch.scale
     matrix = orbits.jacobian(event.z[None], orbits.modes[[branch.row]])[0, :, :size]
@@ -178,7 +178,7 @@ def _born(branch: RestBranch, event: Event, parent: tuple[int, int]) -> Seed:
 
 
 # -- boundaries ------------------------------------------------------------------------------------
-def _meet_boundary(branch: RestBranch, side: int, place: int) -> None:
+def _meet_boundary(branch: EquilibriumBranch, side: int, place: int) -> None:
     """Put the boundary equilibrium before the first or behind the last point of a branch."""
     orbits, row, z = branch.orbits, branch.row, branch.z[place]
     out = branch.tangent[place] * (1.0 if side else -1.0)
@@ -213,7 +213,9 @@ def _meet_boundary(branch: RestBranch, side: int, place: int) -> None:
     branch.length = branch.length - branch.length[0]
 
 
-def _on_boundary(orbits: Rests, row: int, z: np.ndarray, guard: int) -> np.ndarray | None:
+def _on_boundary(
+    orbits: EquilibriumCurves, row: int, z: np.ndarray, guard: int
+) -> np.ndarray | None:
     """The equilibrium near another float64[z] at which the gap of a guard vanishes, float64[z]."""
 
     def equations(z: np.ndarray, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -230,7 +232,7 @@ def _on_boundary(orbits: Rests, row: int, z: np.ndarray, guard: int) -> np.ndarr
 
 
 def _behind(
-    branch: RestBranch, z: np.ndarray, guard: int, out: np.ndarray
+    branch: EquilibriumBranch, z: np.ndarray, guard: int, out: np.ndarray
 ) -> tuple[str, np.ndarray | None]:
     """Continuation of the equilibria behind a boundary, and its direction in units of the scale;
     empty and None if there is none.

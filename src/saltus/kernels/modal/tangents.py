@@ -1,4 +1,4 @@
-"""Template, 6 of 7 of the modal flow: the derivative of the state with respect to the state at the
+"""Template of the modal flow: the derivative of the state with respect to the state at the
 start.
 
 In a contact state it is moved by e^{A h}, whatever the motion does, so it waits until the motion
