@@ -142,6 +142,9 @@ def bound_row(r, modes, steady, which, h, near, m):
     for d in range(m.sizes[DRIVES]):
         a, b = number(m.steady, first, at + 1 + 2 * d), number(m.steady, first, at + 2 + 2 * d)
         most += (abs(a) + abs(b)) * min(abs(m.rate[which, d]) * h, 2.0)
+    most += course_way(first, at + 1 + 2 * m.sizes[DRIVES], h, m)
+    if block_groups(modes, m) > 0:
+        most = HUGE
     m.spans[r, LEAST], m.spans[r, MOST] = m.stood[r, HERE] - most, m.stood[r, HERE] + most
     m.spans[r, KNOWN] = 0.0
 
@@ -419,11 +422,8 @@ def look(i, tau, h, modes, steady, batch, m):
     """Decide all gaps over a step: (OPEN, 0, 0) if a shorter one must tell, (CLEAR, d, 0) if no gap
     crosses in a time d, or CROSSES with the time after tau and the guards (bits).
     """
-    which, near, margin = (
-        int(batch.carry[i, SET]),
-        followed(modes, h, m),
-        batch.minima[i, GAP_MARGIN],
-    )
+    which, near = int(batch.carry[i, SET]), followed(modes, h, m)
+    margin = batch.minima[i, GAP_MARGIN]
     follow_block(modes, h, m)
     for r in range(m.sizes[GAP_ROWS]):
         bound_row(r, modes, steady, which, h, near, m)
@@ -484,20 +484,20 @@ def place_of(i, g, tau, h, modes, steady, batch, m):
             low = d
         else:
             high = d
-        way = -value / rate if rate < 0.0 else h
+        way, left = -value / rate if rate < 0.0 else h, value
         for _ in range(4):
             bend = m.near[2] + way * (m.near[3] + way * m.near[4])
-            steep = rate + sign * way * (
-                2.0 * m.near[2] + way * (3.0 * m.near[3] + 4.0 * way * m.near[4])
-            )
-            if steep < 0.0:
-                way -= (value + way * (rate + sign * way * bend)) / steep
+            twist = 2.0 * m.near[2] + way * (3.0 * m.near[3] + 4.0 * way * m.near[4])
+            steep = rate + sign * way * twist
+            left = value + way * (rate + sign * way * bend)
+            if steep < 0.0 and abs(left) > 0.1 * noise:
+                way -= left / steep
         new = d + way
         if not low <= new <= high:
             new = 0.5 * (low + high)
         change, d = abs(new - d), new
         square = change * change
-        left = m.stood[r, FIFTH] * (square * square * change) * (1.0 / 120.0)
+        left = abs(left) + m.stood[r, FIFTH] * (square * square * change) * (1.0 / 120.0)
         if block_groups(modes, m) == 0 and left <= noise:
             break
         if change <= 2.3e-16 * d or change * abs(rate) <= noise:
@@ -538,16 +538,10 @@ def gap_after(r, h, modes, steady, which, m):
     first, at = numbers_of_gap(r, steady, m)
     value, rate = steady_gap(first, at, which, m)
     m.near[0], m.near[1] = m.near[0] + value, m.near[1] + rate
-    for d in range(m.sizes[DRIVES]):
-        a, b, w = (
-            number(m.steady, first, at + 1 + 2 * d),
-            number(m.steady, first, at + 2 + 2 * d),
-            m.rate[which, d],
-        )
-        real, imaginary = (
-            a * m.angle[d, 1] - b * m.angle[d, 2],
-            a * m.angle[d, 2] + b * m.angle[d, 1],
-        )
+    for j in range(m.sizes[DRIVES]):
+        u, v = number(m.steady, first, at + 1 + 2 * j), number(m.steady, first, at + 2 + 2 * j)
+        real, w = u * m.angle[j, 1] - v * m.angle[j, 2], m.rate[which, j]
+        imaginary = u * m.angle[j, 2] + v * m.angle[j, 1]
         m.near[2] -= w * w * real
         m.near[3] += w * w * w * imaginary
         m.near[4] += w * w * w * w * real

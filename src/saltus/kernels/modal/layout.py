@@ -62,9 +62,9 @@ AT_FIRST, BY_GUARDS, WAY = range(3)
 MOST_STEPS, MOST_CONTACTS = range(2)
 # What is known of a guard in a step.
 CLEAR, CROSSES, OPEN = range(3)
-# Columns of `found`, for each guard: the place of its crossing as a part of the step, whether that is
-# final, whether it is ridden, touches of the step (first row), the part of the step that is decided,
-# the end of the bracket of the crossing.
+# Columns of `found`, for each guard: the place of its crossing as a part of the step, whether that
+# is final, whether it is ridden, touches of the step (first row), the part of the step that is
+# decided, the end of the bracket of the crossing.
 PLACE, FINAL, RIDDEN, TOUCHED, DECIDED, BRACKET = range(6)
 # Columns of `stood`, for each row of gaps where the amplitudes stand: value and rate, the size of
 # its terms, what its fifth derivative is at most; then for each group of modes the sizes of all
