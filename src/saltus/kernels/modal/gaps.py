@@ -380,6 +380,7 @@ def decide(i, g, batch, m):
     exact, known = error <= noise, known_zeros(i, g, batch)
     fresh, degree, whole = known > 0, ORDER - known, error
     if fresh:
+        whole += abs(m.p[0])  # what the bounded modes add to the gap where it is zero
         for k in range(ORDER + 1):
             m.p[k] = m.p[k + known] if k <= degree else 0.0
         error = slope_error
@@ -494,7 +495,7 @@ def place_of(i, g, tau, h, modes, steady, batch, m):
                 way -= left / steep
         new = d + way
         if not low <= new <= high:
-            new = 0.5 * (low + high)
+            new, left = 0.5 * (low + high), HUGE
         change, d = abs(new - d), new
         square = change * change
         left = abs(left) + m.stood[r, FIFTH] * (square * square * change) * (1.0 / 120.0)

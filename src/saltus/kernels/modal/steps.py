@@ -213,7 +213,7 @@ def keep_on(i, h, batch, m):
     batch.fresh[i] = fresh
     batch.carry[i, TWICE], batch.carry[i, THRICE] = float(twice & fresh), float(thrice & fresh)
     batch.carry[i, RIDES] = float(int(batch.carry[i, RIDES]) & fresh)
-    batch.carry[i, NEXT_STEP] = 2.0 * h
+    batch.carry[i, NEXT_STEP] = 4.0 * h
     batch.minima[i, GAP_MARGIN] = m.out[MARGIN]
 
 
