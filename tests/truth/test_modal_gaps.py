@@ -12,18 +12,22 @@ from saltus.system.linear import linear_pieces
 
 
 def spread(seed, degrees, contacts):
-    """A structure whose frequencies are as far apart as those of a beam, with soft stops."""
+    """A structure whose frequencies are as far apart as those of a beam, with soft stops; at the
+    first, which is driven, all modes have one size, as at the tip of a beam.
+    """
     rng = np.random.default_rng(seed)
-    turn = np.linalg.qr(rng.normal(size=(degrees, degrees)))[0]
+    columns = rng.normal(size=(degrees, degrees))
+    columns[:, 0] = 1.0
+    turn = np.linalg.qr(columns)[0].T
     rates = 20.0 * np.arange(1, degrees + 1) ** 2
     stops = [
-        sl.Contact(f"x{place + 1}", stiffness=float(10 ** rng.uniform(3.5, 5)), gap=1e-3,
+        sl.Contact(f"x{place + 1}", stiffness=float(10 ** rng.uniform(4.5, 5.5)), gap=1e-3,
                    side="both")
         for place in range(contacts)
     ]  # fmt: skip
     return sl.structure(
         np.eye(degrees), turn @ np.diag(rates**2) @ turn.T, damping_ratio=0.01, modes=degrees,
-        contacts=stops, forces=[sl.Force("x1", 8.0)], frequency=1.1 * rates[0] / (2 * np.pi),
+        contacts=stops, forces=[sl.Force("x1", 40.0)], frequency=1.1 * rates[0] / (2 * np.pi),
     )  # fmt: skip
 
 

@@ -248,14 +248,13 @@ def side_of(g, mode):
 
 
 @inner
-def least_and_noise(i, g, batch, m):
-    """What the span of its row says of the gap of a guard on its side: the least that it can be,
-    its rounding.
-    """
+def is_far(i, g, batch, m):
+    """True if the gap of a guard is clear by the bounds of its row, before its series is known."""
     r, side = m.row_of[g], side_of(g, batch.mode[i])
-    away, size = side * m.offset[int(batch.carry[i, SET]), g], m.stood[r, SIZE]
-    least = m.spans[r, LEAST] if side * m.sign_of[g] > 0.0 else -m.spans[r, MOST]
-    return least + away, ROUNDED * (size + abs(away))
+    away, up = side * m.offset[int(batch.carry[i, SET]), g], side * m.sign_of[g] > 0.0
+    least = (m.spans[r, LEAST] if up else -m.spans[r, MOST]) + away
+    noise = ROUNDED * (m.stood[r, SIZE] + abs(away))
+    return known_zeros(i, g, batch) == 0 and least > noise and least >= m.out[MARGIN]
 
 
 @kernel
@@ -434,11 +433,10 @@ def look(i, tau, h, modes, steady, batch, m):
         m.found[g, RIDDEN], m.found[g, DECIDED] = 0.0, 1.0
         if not is_watched(g, batch.mode[i], m):
             continue
-        least, noise = least_and_noise(i, g, batch, m)
-        if known_zeros(i, g, batch) == 0 and least > noise and least >= m.out[MARGIN]:
-            continue
         r = m.row_of[g]
         if m.spans[r, KNOWN] == 0.0:
+            if is_far(i, g, batch, m):
+                continue
             series_of(r, modes, steady, which, h, near, m)
         answer = glance(i, g, batch, m)
         if answer == OPEN:
