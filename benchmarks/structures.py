@@ -1,11 +1,13 @@
 """Structures of many modes with stops: saltus beside heyoka and SciPy, same work, same run.
 
-A cantilever of 30 beam elements by its lowest modes, forced at its tip at 1.1 of its first natural
-frequency, with soft stops on both sides of up to eight nodes. One trajectory from rest; CPU time of
-one pinned core. The programs follow the same motion: numbers of contacts are given side by side.
-heyoka has a callback in Python at each contact; its compact mode compiles in a bounded time.
+A cantilever of 30 beam elements (more for more than 60 modes) by its lowest modes, forced at its
+tip at 1.1 of its first natural frequency, with soft stops on both sides of up to ten nodes. One
+trajectory from rest; CPU time of one pinned core, a process for each cell. The programs follow the
+same motion: numbers of contacts are given side by side. heyoka has a callback in Python at each
+contact; its compact mode compiles in less time. A cell that isn't done after LIMIT seconds says
+so. Then many trajectories from different starts, by one call.
 
-    python benchmarks/structures.py               the table
+    python benchmarks/structures.py               the tables
     python benchmarks/structures.py 60 8          one row: 60 modes, 8 stops
 """
 
@@ -13,6 +15,7 @@ from __future__ import annotations
 
 import os
 import resource
+import subprocess
 import sys
 import time
 from collections.abc import Callable
@@ -29,15 +32,23 @@ import saltus as sl  # noqa: E402
 
 GAP, STIFFNESS, FORCE, RATIO = 1e-3, 5e4, 2.0, 0.01
 #: Nodes with stops, in the order in which they are taken.
-NODES = (30, 15, 20, 25, 10, 28, 22, 18)
+NODES = (30, 15, 20, 25, 10, 28, 22, 18, 13, 7)
 #: Modes and stops of each row.
-ROWS = ((5, 1), (10, 1), (20, 1), (40, 1), (60, 1), (60, 2), (60, 8))
-#: Most modes for which a program is asked: it takes minutes for more.
-MOST_SCIPY, MOST_HEYOKA = 5, 40
+ROWS = ((5, 1), (10, 1), (20, 1), (20, 2), (40, 1), (60, 1), (60, 2), (60, 8), (128, 10))
+#: Modes, stops and trajectories of each batch.
+BATCHES = ((20, 2, 256),)
+#: Time that a program has for a cell, compiling included [s], and how many cells it had.
+LIMIT = 300.0
+CELLS = {"saltus": 4, "heyoka": 2, "compact": 2, "scipy": 1}
 PERIODS = 40
 
 
-def beam(elements: int = 30) -> tuple[np.ndarray, np.ndarray]:
+def elements_for(modes: int) -> int:
+    """Elements of a beam that has so many modes: all nodes stay where they are."""
+    return 30 * -(-modes // 60)
+
+
+def beam(elements: int) -> tuple[np.ndarray, np.ndarray]:
     """Mass and stiffness of a cantilever of steel, 1 m by 20 mm by 5 mm: Euler-Bernoulli."""
     length, area, inertia = 1.0 / elements, 1e-4, 0.02 * 0.005**3 / 12
     a, m = 2.1e11 * inertia / length**3, 7850.0 * area * length / 420
@@ -60,8 +71,9 @@ def beam(elements: int = 30) -> tuple[np.ndarray, np.ndarray]:
 
 def structure(modes: int, stops: int) -> sl.System:
     """The beam with stops."""
-    mass, stiffness = beam()
-    names = [f"{kind}{i // 2 + 1}" for i, kind in enumerate("wr" * (len(mass) // 2))]
+    mass, stiffness = beam(elements_for(modes))
+    fine = len(mass) // 60
+    names = [f"{kind}{(i // 2 + 1) / fine:g}" for i, kind in enumerate("wr" * (len(mass) // 2))]
     first = sl.structure_modes(mass, stiffness, 1).frequency.values[0]
     contacts = [
         sl.Contact(f"w{node}", STIFFNESS, GAP, side="both", name=f"stop_{node}")
@@ -75,13 +87,14 @@ def structure(modes: int, stops: int) -> sl.System:
 
 def matrices(modes: int, stops: int) -> tuple[np.ndarray, ...]:
     """Squares, damping, shapes at the stops and loads of the modes."""
-    mass, stiffness = beam()
+    mass, stiffness = beam(elements_for(modes))
     found = sl.structure_modes(mass, stiffness, modes)
     shapes = found.shape.values
     shapes = shapes if shapes.shape[0] == modes else shapes.T
     omega = 2 * np.pi * found.frequency.values
-    at = np.array([2 * node - 2 for node in NODES[:stops]])
-    return omega**2, 2 * RATIO * omega, shapes[:, at].T, FORCE * shapes[:, 58]
+    fine = len(mass) // 60
+    at = np.array([2 * fine * node - 2 for node in NODES[:stops]])
+    return omega**2, 2 * RATIO * omega, shapes[:, at].T, FORCE * shapes[:, 60 * fine - 2]
 
 
 def seconds(work: Callable[[], object]) -> float:
@@ -92,7 +105,9 @@ def seconds(work: Callable[[], object]) -> float:
 
 
 def by_saltus(modes: int, stops: int) -> tuple[str, int]:
-    """First result and time of a period, as cells; contacts."""
+    """First result, time of a period with contact states that are new and with known ones, memory,
+    as cells; contacts.
+    """
     runs: list = []
 
     def first() -> None:
@@ -107,6 +122,20 @@ def by_saltus(modes: int, stops: int) -> tuple[str, int]:
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     cells = f"{beginning:.2f} | {1e3 * each / PERIODS:.2f} | {1e3 * again / PERIODS:.2f}"
     return f"{cells} | {memory:.0f}", int(runs[1].sizes["contact"])
+
+
+def by_batch(modes: int, stops: int, count: int) -> str:
+    """Time of a period of each of many trajectories, with contact states that are new and with
+    known ones, and of the first one alone, as cells [ms].
+    """
+    system, kw = structure(modes, stops), {"keep": 1, "progress": False, "threads": 1}
+    starts = np.random.default_rng(1).normal(0, 1e-4, (count, 2 * modes))
+    sl.stroboscope(system, starts[0], 1, **kw)
+    cells = []
+    for some in (starts, starts, starts[0]):
+        each = seconds(lambda: sl.stroboscope(system, some, PERIODS, **kw))  # noqa: B023
+        cells.append(f"{1e3 * each / PERIODS / (some.size / (2 * modes)):.3f}")
+    return " | ".join(cells)
 
 
 def by_heyoka(modes: int, stops: int, compact: bool) -> tuple[str, int]:
@@ -124,8 +153,8 @@ def by_heyoka(modes: int, stops: int, compact: bool) -> tuple[str, int]:
     return f"{compiled:.1f} | {1e3 * each / PERIODS:.2f}", made[0].contacts
 
 
-def by_scipy(modes: int, stops: int) -> str:
-    """Time of a period, as a cell: DOP853 at rtol = 1e-10, contacts not located."""
+def by_scipy(modes: int, stops: int) -> tuple[str, int]:
+    """Time of a period, as a cell: DOP853 at rtol = 1e-10, contacts not located or counted."""
     omega2, damping, shapes, push = matrices(modes, stops)
     rate = 2 * np.pi * float(structure(1, 0).values["frequency"])
 
@@ -139,24 +168,49 @@ def by_scipy(modes: int, stops: int) -> str:
     each = seconds(
         lambda: solve_ivp(rates, (0, end), np.zeros(2 * modes), "DOP853", rtol=1e-10, atol=1e-14)
     )
-    return f"{1e3 * each / PERIODS:.1f}"
+    return f"{1e3 * each / PERIODS:.1f}", 0
+
+
+def measured(program: str, modes: int, stops: int) -> tuple[str, str]:
+    """Cells and contacts of a program, found by a process of its own."""
+    command = [sys.executable, __file__, program, str(modes), str(stops)]
+    try:
+        done = subprocess.run(
+            command, stdout=subprocess.PIPE, text=True, timeout=LIMIT, check=True, env=os.environ
+        )
+    except subprocess.SubprocessError as failure:
+        late = isinstance(failure, subprocess.TimeoutExpired)
+        why = f"> {LIMIT:.0f} s" if late else "failed"
+        return " | ".join([why, *["-"] * (CELLS[program] - 1)]), "-"
+    cells, contacts = done.stdout.strip().splitlines()[-1].split(";")
+    return cells, contacts
 
 
 def row(modes: int, stops: int) -> str:
     """One row of the table."""
-    own, contacts = by_saltus(modes, stops)
-    cells, seen = ["- | -", "- | -"], "-"
-    if modes <= MOST_HEYOKA:
-        found = [by_heyoka(modes, stops, compact) for compact in (False, True)]
-        cells, seen = [cell for cell, _ in found], str(found[0][1])
-    scipy = by_scipy(modes, stops) if modes <= MOST_SCIPY else "-"
-    return f"| {modes} | {stops} | {contacts} / {seen} | {own} | {' | '.join(cells)} | {scipy} |"
+    found = {program: measured(program, modes, stops) for program in CELLS}
+    contacts = f"{found['saltus'][1]} / {found['compact'][1]}"
+    return f"| {modes} | {stops} | {contacts} | {' | '.join(one for one, _ in found.values())} |"
+
+
+def one_cell(program: str, modes: int, stops: int) -> None:
+    """Print what :func:`measured` reads."""
+    match program:
+        case "saltus":
+            cells, contacts = by_saltus(modes, stops)
+        case "scipy":
+            cells, contacts = by_scipy(modes, stops)
+        case _:
+            cells, contacts = by_heyoka(modes, stops, program == "compact")
+    print(cells, contacts, sep=";")
 
 
 def main(arguments: list[str]) -> None:
-    """Print the table."""
+    """Print the tables."""
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+    if arguments and arguments[0] in CELLS:
+        return one_cell(arguments[0], *map(int, arguments[1:]))
     rows = [(int(arguments[0]), int(arguments[1]))] if arguments else ROWS
     print("| modes | stops | contacts saltus / heyoka | saltus: first result [s] | a period [ms] | "
           "again [ms] | memory [MB] | heyoka: compile [s] | a period [ms] | compact: compile [s] | "
@@ -164,6 +218,12 @@ def main(arguments: list[str]) -> None:
     print("|" + "---|" * 12, flush=True)
     for modes, stops in rows:
         print(row(modes, stops), flush=True)
+    if not arguments:
+        print("\n| modes | stops | trajectories | a period of each [ms] | again [ms] | "
+              "one alone [ms] |\n" + "|" + "---|" * 6, flush=True)  # fmt: skip
+        for batch in BATCHES:
+            print(f"| {' | '.join(map(str, batch))} | {by_batch(*batch)} |", flush=True)
+    return None
 
 
 if __name__ == "__main__":

@@ -13,12 +13,6 @@ from saltus.flow.maps import Stroboscope
 from two_flows import structure
 
 
-@pytest.fixture(autouse=True)
-def also_of_several_stops(monkeypatch):
-    """The modal flow's own derivatives, where Taylor's are taken for a few states."""
-    monkeypatch.setattr("saltus.flow.modal.FEW_STATES", 0)
-
-
 def compared(system, start, periods):
     """Derivatives by Taylor's method and by modes, at the same ends."""
     assert isinstance(sl.Modal().serving(sl.Modal().tangents(system)), sl.Modal)
@@ -92,6 +86,32 @@ def test_bodies_that_stay_together_share_their_momentum(restitution):
     assert "hold" in run.contact_kind.values
     found, exact = compared(pair, start, 1)
     np.testing.assert_allclose(found, exact, rtol=0, atol=1e-9 * np.abs(exact).max())
+
+
+@pytest.mark.nojit
+@pytest.mark.parametrize(
+    ("restitutions", "inertia"), [((0.8, 0.2), 1.0), ((0.99, 0.9), 3.0), ((0.0, 0.0), 0.2)]
+)
+def test_impacts_that_cause_each_other_move_together(restitutions, inertia):
+    """A body strikes one that rests on a wall, by which that one is struck, and so on at the same
+    instant: three times, or more often than are followed one by one. Differences of the flow.
+    """
+
+    @sl.system(states="x y v u", forced_at="w", units={"w": "rad/s"})
+    def pair(t, x, y, v, u, *, w=9.0, gap=0.1, wall=0.5):
+        masses = {"v": 1.0, "u": inertia}
+        body = sl.impact(x < y + gap, v - u, restitution=restitutions[0], inertia=masses)
+        law = sl.impact(y < wall, u, restitution=restitutions[1])
+        push = 2.0 - 0.3 * y + 0.2 * sl.cos(w * t)
+        return v, u, 3.0 * sl.cos(w * t) - 4.0 * x, push, body, law
+
+    start, map_ = np.array([[-0.5, 0.5, 2.2, 0.0]]), Stroboscope(pair, sl.Modal())
+    _, found = map_.tangent(start, 1)
+    for j in (0, 2):
+        near = start + 1e-4 * np.array([[-2.0], [-1.0], [1.0], [2.0]]) * np.eye(4)[j]
+        ends, _ = map_.rows(np.zeros(4, int)).ends(near, 1)
+        expected = np.array([1.0, -8.0, 8.0, -1.0]) @ ends / 12e-4
+        np.testing.assert_allclose(found[0, :, j], expected, atol=1e-8 * np.abs(found).max())
 
 
 def test_impacts_at_resonance_have_the_derivatives_of_taylor():

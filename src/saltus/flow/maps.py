@@ -236,7 +236,7 @@ class Stroboscope:
 
     def _with(self, **changed: object) -> Stroboscope:
         other = copy.copy(self)  # the checked arguments don't change
-        for derived in ("exact_map", "_tangent_map", "_shots"):
+        for derived in ("exact_map", "_tangent_maps", "_shots"):
             other.__dict__.pop(derived, None)
         other.__dict__.update(changed)
         return other
@@ -299,14 +299,36 @@ class Stroboscope:
         self, start: np.ndarray, count: np.ndarray | int, directions: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """See :class:`Map`."""
-        map_, (k, size) = self._tangent_map, start.shape
-        if map_ is None:
+        if self._tangent_map(()) is None:
             return self._by_differences(start, count, directions)
-        state, status = map_.ends(_with_tangent(start, directions), count)
+        return self._tangent_ends(start, count, directions, ())
+
+    def tangent_by(
+        self, start: np.ndarray, count: np.ndarray | int, names: tuple[str, ...]
+    ) -> tuple[np.ndarray, np.ndarray] | None:
+        """The result of :meth:`tangent`, with a column more for each of some parameters, float64[k,
+        D, D + names]: at the same times, whatever the forcing's period is. NaN where a flow can't
+        carry such a column; None if it never can.
+        """
+        if self._tangent_map(names) is None:
+            return None
+        return self._tangent_ends(start, count, None, names)
+
+    def _tangent_ends(
+        self,
+        start: np.ndarray,
+        count: np.ndarray | int,
+        directions: np.ndarray | None,
+        names: tuple[str, ...],
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Ends and derivatives by the flow that carries them."""
+        map_, (k, size) = self._tangent_map(names), start.shape
+        assert map_ is not None
+        state, status = map_.ends(_with_tangent(start, directions, len(names)), count)
         stopped = (status != st.OK) & (status != st.GRAZE_UNRESOLVED)
         if stopped.any():
             state[stopped] = np.nan
-        return state[:, :size], state[:, size:].reshape(k, size, size)
+        return state[:, :size], state[:, size:].reshape(k, size, size + len(names))
 
     def _by_differences(
         self, start: np.ndarray, count: np.ndarray | int, directions: np.ndarray | None
@@ -346,16 +368,24 @@ class Stroboscope:
         """States at the times of a schedule, float64[k, M, D], by the flow that :meth:`tangent`
         runs, so that no other flow is compiled.
         """
-        map_ = self._tangent_map
+        map_ = self._tangent_map(())
         assert map_ is not None
         outcome = map_.run(_with_tangent(start, None), count, schedule)
         return outcome.samples[:, :, : start.shape[1]]
 
+    def _tangent_map(self, names: tuple[str, ...]) -> Stroboscope | None:
+        """The same rows of the system with its tangents, and the derivatives with respect to some
+        parameters; None if only differences give these.
+        """
+        if names not in self._tangent_maps:
+            system = self.method.tangents(self.system, names)
+            self._tangent_maps[names] = None if system is None else self.of_system(system)
+        return self._tangent_maps[names]
+
     @functools.cached_property
-    def _tangent_map(self) -> Stroboscope | None:
-        """The same rows of the system with its tangents; None if only differences give these."""
-        system = self.method.tangents(self.system)
-        return None if system is None else self.of_system(system)
+    def _tangent_maps(self) -> dict[tuple[str, ...], Stroboscope | None]:
+        """Maps of the system with its tangents made before, by the parameters."""
+        return {}
 
     def sequences(self, start: np.ndarray, count: int) -> tuple[np.ndarray, list[np.ndarray]]:
         """See :class:`Map`."""
@@ -374,10 +404,11 @@ class Stroboscope:
         return outcome.state, np.split(codes, contacts.begins(len(start))[1:-1])
 
 
-def _with_tangent(start: np.ndarray, directions: np.ndarray | None) -> np.ndarray:
-    """States of the system with its tangents, float64[k, D + D D]."""
+def _with_tangent(
+    start: np.ndarray, directions: np.ndarray | None, parameters: int = 0
+) -> np.ndarray:
+    """States of the system with its tangents, float64[k, D + D (D + parameters)]."""
     k, size = start.shape
-    extended = np.empty((k, size + size**2))
-    extended[:, :size] = start
-    extended[:, size:] = (np.eye(size) if directions is None else directions).reshape(-1, size**2)
-    return extended
+    columns = np.zeros((k, size, size + parameters))
+    columns[..., :size] = np.eye(size) if directions is None else directions
+    return np.hstack([start, columns.reshape(k, -1)])

@@ -118,11 +118,11 @@ class Method:
         """The method that moves a system: this one, or the one that stands in for it."""
         return self
 
-    def tangents(self, system: System) -> System | None:
+    def tangents(self, system: System, names: tuple[str, ...] = ()) -> System | None:
         """The system whose flow carries the derivative of the state with respect to the state at
-        the start; None if only differences give it.
+        the start, and to some parameters; None if only differences give them.
         """
-        return None if system.is_steep else tangent_system(system)
+        return None if names or system.is_steep else tangent_system(system)
 
     def suited_to(self, count: int) -> Method:  # noqa: ARG002  (unused by most methods)
         """The fastest variant of the method for ``count`` trajectories; its results are the same to

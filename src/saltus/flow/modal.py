@@ -15,6 +15,7 @@ from saltus.codegen.module import Flow, modal_module
 from saltus.errors import ParameterError
 from saltus.flow.counts import whole
 from saltus.flow.method import Method, explain_unknown_options, step_budget
+from saltus.flow.modal_parameters import varies_by
 from saltus.flow.modal_tables import Tables, ValueSet
 from saltus.flow.taylor import Taylor
 from saltus.kernels import status as st
@@ -56,15 +57,19 @@ class ModalFlow:
     tangents : bool
         Whether the states are followed by the derivative of the state with respect to the state at
         the start, row by row.
+    names : tuple of str, optional
+        Parameters with respect to which it is carried too.
     """
 
-    def __init__(self, tables: Tables, tangents: bool = False) -> None:
+    def __init__(self, tables: Tables, tangents: bool = False, names: tuple[str, ...] = ()) -> None:
         self.tables, self._kernel, self._tangents = tables, modal_module(), tangents
         self._lanes, self._memory = self.tables.modes.table.shape[1], threading.local()
         size, _, _, _, guards, _, rows, *_ = tables.sizes.tolist()
         self._states, self._sizes = size, tables.sizes.copy()
-        self._sizes[layout.TANGENTS] = tangents
-        self.CARRY = layout.AMPLITUDES + rows * self._lanes + tangents * (size + guards)
+        self._names, columns = names, size + len(names) if tangents else 0
+        self._sizes[layout.TANGENTS] = columns
+        self.CARRY = layout.AMPLITUDES + rows * self._lanes + tangents * (size + guards) + columns
+        self.CARRY += 2 * tables.groups * self._lanes if names else 0
         self.STEP_RECORDS = 2 * guards + MOST_TOUCHES
 
     def workspace(self) -> tuple[np.ndarray, ...]:
@@ -82,7 +87,7 @@ class ModalFlow:
         with self.tables.lock:
             self._begin(batch)
             self._look_up(batch)
-            tables = self._sizes, *self.tables.arrays()
+            tables = self._sizes, *self.tables.arrays(self._names)
         answer: int = self._kernel.propagate(*batch, budget, *tables, *self._work())
         return answer
 
@@ -101,6 +106,8 @@ class ModalFlow:
                 return
             which = tables.set_of(batch.param[i if batch.stride else 0])
             at = tables.state_of(which, int(batch.mode[i]))
+            if self._names:
+                tables.by(self._names).need(at, which, int(batch.mode[i]))
             batch.carry[i, [layout.AT, layout.SET, layout.TABLES]] = at, which, tables.generation
 
     def _work(self) -> tuple[np.ndarray, ...]:
@@ -110,7 +117,7 @@ class ModalFlow:
                 size, groups, states, rows, guards, drives, amplitudes, courses, *_,
             ) = self._sizes.tolist()  # fmt: skip
             terms, lanes, empty = layout.ORDER + 1, self._lanes, np.zeros
-            columns = size if self._tangents else 1
+            columns = int(self._sizes[layout.TANGENTS]) or 1
             self._memory.arrays = (
                 empty((amplitudes, lanes)), empty((amplitudes, lanes)), empty((groups, lanes)),
                 empty((terms + 3, lanes)),
@@ -119,8 +126,8 @@ class ModalFlow:
                 empty((MOST_TOUCHES, 2)), empty((states, lanes)), empty((states, lanes)),
                 empty((max(drives, 1), 4)), empty((max(guards, 1), 6)),
                 empty(((terms + 2) * self.tables.block_groups, lanes)),
-                empty((max(courses, 1), layout.VALUE + layout.COURSE_TERMS)),
-                empty((2 * groups, lanes)), empty((amplitudes, lanes)), empty((columns, columns)),
+                empty((max(courses, 1), layout.VALUE + self.tables.linear.terms)),
+                empty((2 * groups, lanes)), empty((amplitudes, lanes)), empty((size, columns)),
                 empty((3, size)), bernstein_table(lanes),
                 empty((max(rows, 1), layout.BEYOND + 2 * groups + 2)),
                 empty((4 * groups * max(rows, 1), lanes)), empty((max(rows, 1), 11)), empty(5),
@@ -144,6 +151,13 @@ class ModalFlow:
         """The same for trajectories with one set of parameter values."""
         given, state = self.tables.sets[which], batch.state[who, : self._states]
         time = batch.origin[who] + batch.count[who] * batch.period[who] + batch.phase[who]
+        earliest = max((course.earliest for course in given.courses), default=-np.inf)
+        if (time < earliest).any():
+            raise ParameterError(
+                f"a motion begins at {time.min():g} s, and sl.Modal knows a drive of "
+                f"{self.tables.linear.system.name} from {earliest:g} s on: ask for "
+                f"method=sl.Taylor(), or begin later."
+            )
         drives = np.column_stack(
             [
                 np.cos(given.rates * time[:, None] + given.lags),
@@ -226,19 +240,17 @@ class ModalFlow:
         waves = np.exp(1j * (given.rates * time + given.lags)) * (1j * given.rates) ** orders
         courses = np.zeros((WAYS + 1, len(given.courses)))
         for p, course in enumerate(given.courses):
-            courses[: layout.COURSE_TERMS, p] = course.at(np.array(time))
+            known = course.at(np.array(time))[: WAYS + 1]
+            courses[: len(known), p] = known
         return np.hstack([waves.real, courses]), np.hstack([np.abs(waves), np.abs(courses)])
-
-
-#: States of a system with several rigid stops whose derivatives are Taylor's.
-FEW_STATES = 16
 
 
 @functools.lru_cache(maxsize=64)
 def modal_flow(system: System) -> ModalFlow:
     """The modal flow of a system. Raises ParameterError, with the reason, if it has none."""
     if system.tangent_of is not None:
-        return ModalFlow(modal_flow(system.tangent_of.origin).tables, tangents=True)
+        tables = modal_flow(system.tangent_of.origin).tables
+        return ModalFlow(tables, tangents=True, names=system.tangent_by)
     linear = linear_pieces(system)
     if isinstance(linear, str):
         raise ParameterError(f"sl.Modal doesn't serve {system.name}: {linear}.")
@@ -289,16 +301,14 @@ class Modal(Method):
         """The modal flow."""
         return modal_flow(system)
 
-    def tangents(self, system: System) -> System | None:
-        """The states alone: the modes of a contact state move the derivative too. That of impacts
-        on several stops is Taylor's, unless the states are many: where one impact causes another at
-        the same instant, the modal flow's doesn't always agree with it.
-        """
-        stops = sum(guard.law is not None and guard.law.kind == "impact" for guard in system.guards)
-        few = stops > 1 and len(system.states) <= FEW_STATES
-        if self.serving(system.origin) is not self or remembered(system) or few:
-            return super().tangents(system)
-        return tangent_states(system)
+    def tangents(self, system: System, names: tuple[str, ...] = ()) -> System | None:
+        """The states alone: the modes of a contact state move the derivative too."""
+        if self.serving(system.origin) is not self or remembered(system):
+            return super().tangents(system, names)
+        linear = linear_pieces(system.origin)
+        if isinstance(linear, str) or not all(varies_by(linear, name) for name in names):
+            return None
+        return tangent_states(system, names)
 
     def numbers(self, periods: float) -> np.ndarray:
         """Step budget, event budget."""

@@ -30,6 +30,7 @@ class EquationsOfMotion:
     description: str = ""
     made: int = 0
     tangent_of: EquationsOfMotion | None = None
+    tangent_by: tuple[str, ...] = ()
     outputs: NamedOutputs = NO_OUTPUTS
 
     def period(self, values: Mapping[str, Any] | None = None) -> Any:

@@ -11,15 +11,16 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from saltus.contact.guards import Law, is_hold
 from saltus.language import expression as ex
+from saltus.language.derivatives import differentiate
 from saltus.language.evaluate import evaluate
 from saltus.language.expression import Expr
-from saltus.system.courses import reason_against
+from saltus.system.courses import TERMS, reason_against, terms_of
 from saltus.system.periodic import rate_of
 from saltus.system.quantity import is_remembered, remembered
 from saltus.system.system import System
@@ -94,6 +95,11 @@ class LinearSystem:
         return self.system.states[: len(self._field)]
 
     @functools.cached_property
+    def terms(self) -> int:
+        """Coefficients of the pieces of its courses."""
+        return max((terms_of(node) for node in self.courses), default=TERMS)
+
+    @functools.cached_property
     def _driving(self) -> tuple[str, ...]:
         """The names that drives have in the equations: the harmonic ones, then the courses."""
         return tuple(_name(i) for i in range(len(self._names)))
@@ -107,10 +113,29 @@ class LinearSystem:
         used = {node.payload for node in nodes if node.op == "param"}
         return tuple(name for name in self.system.values if name in used)
 
+    @property
+    def own_gaps(self) -> tuple[Expr, ...]:
+        """The gaps, as functions of the states and the drives."""
+        return self._gaps
+
     def of(self, quantities: tuple[Expr, ...]) -> tuple[Expr, ...] | None:
         """Quantities as functions of the states and the drives; None if one isn't linear."""
         found = ex.all_substituted(quantities, self._names)
         return found if _are_affine(found, self._driving) else None
+
+    def by(self, name: str) -> LinearSystem:
+        """The derivative of the equations, the gaps and the drives' rates and phases with respect
+        to a parameter, as a system of the same states and drives.
+        """
+        along = ex.parameter(name)
+        drives = tuple(
+            Drive(differentiate(d.rate, along), differentiate(d.phase, along), 0.0)
+            for d in self.drives
+        )
+        field, gaps = (
+            tuple(differentiate(one, along) for one in given) for given in (self._field, self._gaps)
+        )
+        return replace(self, drives=drives, _field=field, _gaps=gaps)
 
     def rows(
         self, quantities: tuple[Expr, ...], values: Mapping[str, float], mode: int
@@ -262,15 +287,15 @@ def linear_pieces(system: System) -> LinearSystem | str:
     gaps = tuple(guard.gap for guard in system.guards)
     drives, courses = dict[Expr, Drive](), dict[Expr, None]()
     for node in _driving(*system.field[:size], *gaps, *laws):
-        if node.op in ("sin", "cos"):
-            rate = rate_of(node.args[0])
-            if rate is None:
-                return "a sine in it isn't one of a rate times the time"
+        rate = rate_of(node.args[0]) if node.op in ("sin", "cos") else None
+        if rate is not None:
             phase = ex.substituted(node.args[0], {ex.TIME: ex.constant(0.0)})
             if ex.depends_on(phase, ("state",)):
                 return "the phase of a sine in it depends on the state"
             drives[node] = Drive(rate, phase, -math.pi / 2 if node.op == "sin" else 0.0)
-        elif reason := reason_against(node):
+        elif node.bits or ex.depends_on(node, ("state",)):
+            return "a sine in it isn't one of the time alone"
+        elif reason := reason_against(node, system.values):
             return reason
         else:
             courses[node] = None

@@ -49,6 +49,8 @@ class System(EquationsOfMotion):
     tangent_of : System or None
         The system whose variational equations this one carries (see tangent.py); None for any
         other.
+    tangent_by : tuple of str
+        The parameters with respect to which it carries the derivative of the state as well.
     outputs : NamedOutputs
         Named functions of the motion, which results hold besides the states (see
         :meth:`with_outputs`).

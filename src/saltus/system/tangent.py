@@ -54,18 +54,21 @@ def tangent_system(system: System) -> System:
 
 
 @functools.lru_cache(maxsize=256)
-def tangent_states(system: System) -> System:
+def tangent_states(system: System, names: tuple[str, ...] = ()) -> System:
     """The tangent system with the equations of the D states only, for a flow that needs no others;
-    cached.
+    cached. The derivatives with respect to some parameters are further columns of Y: zero at the
+    start.
     """
     if system.origin is not system:
-        return tangent_states(system.origin).with_values(**system.values)
-    names = tuple(derivative_name(a, b) for a in system.states for b in system.states)
+        return tangent_states(system.origin, names).with_values(**system.values)
+    columns = (*(f"{name}(0)" for name in system.states), *names)
+    more = tuple(f"d{row}/d{column}" for row in system.states for column in columns)
     return replace(
         system,
-        states=(*system.states, *names),
-        units={**system.units, **dict.fromkeys(names, "")},
+        states=(*system.states, *more),
+        units={**system.units, **dict.fromkeys(more, "")},
         tangent_of=system,
+        tangent_by=names,
     )
 
 

@@ -1,5 +1,5 @@
 """The stroboscope of a parametric system by a flow of the system itself, whose parameters are
-numbers: derivatives with respect to them are differences.
+numbers: derivatives with respect to them are columns that the flow carries, or differences.
 """
 
 from __future__ import annotations
@@ -125,23 +125,45 @@ class ParametricStroboscope(Stroboscope):
         """See :class:`Map`."""
         below, (k, width), size = self._below(start), start.shape, len(self.base.states)
         first = start[:, :size]
-        state, by_state = below.tangent(first, count)
+        state, by_state, by_parameter = self._derivatives(below, first, count)
         matrix = np.broadcast_to(np.eye(width), (k, width, width)).copy()
         matrix[:, :size, :size] = by_state
         for j, name in enumerate(self._others, size + self.timed):
-            matrix[:, :size, j] = self._by_parameter(below, first, count, name)
+            matrix[:, :size, j] = by_parameter[name]
         if self.timed:  # the end moves, and the forcing is slower
             late = field_of(self.base, state, below.values) * np.reshape(count, (-1, 1))
             forced = self.base.forced_at
             if forced is not None:
-                slower = self._by_parameter(below, first, count, forced)
-                late -= slower * (below.values[forced] / below.period)[:, None]
+                late -= by_parameter[forced] * (below.values[forced] / below.period)[:, None]
             matrix[:, :size, size] = late
         ends = np.append(state, start[:, size:], axis=1)
         return ends, matrix if directions is None else matrix @ directions
 
+    def _derivatives(
+        self, below: Stroboscope, start: np.ndarray, count: np.ndarray | int
+    ) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
+        """Ends float64[k, D], their derivatives with respect to the starts float64[k, D, D], and
+        with respect to each parameter, float64[k, D] each; the time to the end is kept.
+        """
+        size, forced = len(self.base.states), self.base.forced_at
+        wanted = {*self._others, *((forced,) if self.timed and forced is not None else ())}
+        names = tuple(name for name in self.base.values if name in wanted)
+        carried = below.tangent_by(start, count, names)
+        if carried is None:
+            state, matrix = below.tangent(start, count)
+            found = np.full((len(start), size, len(names)), np.nan)
+        else:
+            (state, matrix), found = carried, carried[1][..., size:]
+        lost = np.isfinite(state).all(axis=1) & ~np.isfinite(found).all(axis=(1, 2))
+        if lost.any():
+            rows, counts = below.rows(lost), np.broadcast_to(count, len(start))[lost]
+            for j, name in enumerate(names):
+                found[lost, :, j] = self._by_shifts(rows, start[lost], counts, name)
+        by_parameter = {name: found[..., j] for j, name in enumerate(names)}
+        return state, matrix[..., :size], by_parameter
+
     @staticmethod
-    def _by_parameter(
+    def _by_shifts(
         below: Stroboscope, start: np.ndarray, count: np.ndarray | int, name: str
     ) -> np.ndarray:
         """The derivative of the ends with respect to a parameter, float64[k, D], by central

@@ -473,6 +473,8 @@ def place_of(i, g, tau, h, modes, steady, batch, m):
     sign, away = side * m.sign_of[g], side * m.offset[which, g]
     low, high, d = 0.0, m.found[g, BRACKET] * h, m.found[g, PLACE] * h
     noise = 2.3e-16 * (m.errors[r, 2] + abs(away))
+    cubic = m.sizes[COURSES] == 0 or m.sizes[TERMS] <= 4
+    bounded = cubic and block_groups(modes, m) == 0  # FIFTH holds all that has a fifth derivative
     for _ in range(60):
         drive(i, tau + d, batch, m)
         gap_after(r, d, modes, steady, which, m)
@@ -497,7 +499,7 @@ def place_of(i, g, tau, h, modes, steady, batch, m):
         change, d = abs(new - d), new
         square = change * change
         left = abs(left) + m.stood[r, FIFTH] * (square * square * change) * (1.0 / 120.0)
-        if block_groups(modes, m) == 0 and left <= noise:
+        if bounded and left <= noise:
             break
         if change <= 2.3e-16 * d or change * abs(rate) <= noise:
             break
@@ -545,8 +547,9 @@ def gap_after(r, h, modes, steady, which, m):
         m.near[3] += w * w * w * imaginary
         m.near[4] += w * w * w * w * real
     for p in range(m.sizes[COURSES]):
-        numbers = at + 1 + 2 * m.sizes[DRIVES] + COURSE_TERMS * p
-        for k in range(2):
-            m.near[2] += number(m.steady, first, numbers + k) * m.record[p, VALUE + 2 + k]
-        m.near[3] += number(m.steady, first, numbers) * m.record[p, VALUE + 3]
+        numbers = at + 1 + 2 * m.sizes[DRIVES] + m.sizes[TERMS] * p
+        for order in range(2, 5):
+            for k in range(m.sizes[TERMS] - order):
+                part = number(m.steady, first, numbers + k) * m.record[p, VALUE + order + k]
+                m.near[order] += part
     m.near[2], m.near[3], m.near[4] = m.near[2] / 2.0, m.near[3] / 6.0, m.near[4] / 24.0

@@ -26,10 +26,10 @@ def exchange(row, m):
 
 
 @kernel
-def take_impacts(i, stops, backwards, least, batch, m):
+def take_impacts(i, stops, backwards, least, now, columns, batch, m):
     """Take all impacts of this instant, in the order of the guards or against it, until none closes
-    faster than `least`. Returns RUNNING, or the status that ends the motion; impacts without end
-    have no order.
+    faster than `least`; if `columns`, let them act on the derivative as well. Returns RUNNING, or
+    the status that ends the motion; impacts without end have no order.
     """
     guards, first = m.sizes[GUARDS], 2 * width_of(m)
     for _ in range(MOST_IMPACTS):
@@ -41,6 +41,8 @@ def take_impacts(i, stops, backwards, least, batch, m):
                 struck = closing > least
                 if struck and not -PART <= e <= 1.0 + PART:
                     return INVALID_RESTITUTION
+                if struck and columns:
+                    strike_columns(i, g, now, batch, m)
                 if struck:
                     push(i, g, -(1.0 + e) * closing, batch, m)
                     for j in range(m.sizes[STATES]):
@@ -66,10 +68,10 @@ def order_of_impacts(i, stops, batch, m):
     for j in range(states):
         m.struck[AT_FIRST, j], m.struck[WAY, j] = m.state[j // LANES, j % LANES], 0.0
         m.struck[BY_GUARDS, j] = m.struck[AT_FIRST, j]
-    status = take_impacts(i, stops, False, ENDED * fastest, batch, m)
+    status = take_impacts(i, stops, False, ENDED * fastest, 0.0, False, batch, m)
     exchange(BY_GUARDS, m)
     if status == RUNNING:
-        status = take_impacts(i, stops, True, ENDED * fastest, batch, m)
+        status = take_impacts(i, stops, True, ENDED * fastest, 0.0, False, batch, m)
     for j in range(states):
         least = FELT * (m.struck[WAY, j] + abs(m.struck[AT_FIRST, j]))
         apart = abs(m.state[j // LANES, j % LANES] - m.struck[BY_GUARDS, j])
@@ -80,17 +82,27 @@ def order_of_impacts(i, stops, batch, m):
 
 
 @kernel
-def end_impacts(i, stops, batch, m):
+def end_impacts(i, stops, now, batch, m):
     """Complete impacts that cause each other without end at one instant; what neither closes nor
-    opens then is known to stand. True if one closed.
+    opens then is known to stand. True if one closed; the state before is kept then.
     """
     fastest = fastest_of(i, stops, batch, m)
     if fastest <= 0.0:
         return False
-    take_impacts(i, stops, False, CLOSED * fastest, batch, m)
+    for j in range(m.sizes[STATES]):
+        m.struck[AT_FIRST, j] = m.state[j // LANES, j % LANES]
+    take_impacts(i, stops, False, CLOSED * fastest, now, False, batch, m)
+    batch.carry[i, CROSSED] = float(stops)
     for g in range(m.sizes[GUARDS]):
         if (stops >> g) & 1 and (batch.mode[i] >> m.laws[g, PARTNER]) & 1 == 0:
             snap(i, g, batch, m)
             stands = abs(closing_of(i, g, batch, m)) <= FELT * fastest
             know_zeros(i, g, 2 if stands else 1, batch)
     return True
+
+
+@kernel
+def repeat_impacts(i, stops, now, batch, m):
+    """Let impacts that were completed act on the derivative, from the state before them."""
+    exchange(AT_FIRST, m)
+    take_impacts(i, stops, False, CLOSED * fastest_of(i, stops, batch, m), now, True, batch, m)

@@ -59,6 +59,7 @@ def know_nothing(i, batch):
     """Time has passed: no gap is known to be zero, and the start is over."""
     batch.fresh[i] = 0
     batch.carry[i, TWICE], batch.carry[i, THRICE], batch.carry[i, STARTS] = 0.0, 0.0, 0.0
+    batch.carry[i, DATED] = 0.0
 
 
 # -- linear functions of the state -----------------------------------------------------------------
@@ -165,18 +166,21 @@ def act(i, g, tau, d, hits, modes, steady, batch, m):
         jumps = d == 0.0 and m.laws[other, KIND] == HOLD_LAW  # what presses it isn't zero
         if (hits >> other) & 1 and not jumps:
             know_zeros(i, other, max(1, known_zeros(i, other, batch)), batch)
-    before, status = batch.mode[i], RUNNING
+    before, at = batch.mode[i], int(batch.carry[i, AT])
+    status, endless = RUNNING, 0
     if m.laws[g, KIND] == HOLD_LAW:
         release(i, g, tau + d, 3 if d > 0.0 else 2, batch, m)
     else:
-        status = impacts(i, g, tau + d, hits, modes, steady, batch, m)
+        status, endless = impacts(i, g, tau + d, hits, modes, steady, batch, m)
     leave(i, before, batch, m)
     if m.sizes[TANGENTS] != 0:
         batch.carry[i, WAITED] += d
         struck = int(batch.carry[i, CROSSED])
-        leave_columns(i, struck, modes, steady, batch, m)
-        if struck != 0:
-            strike_columns(i, g, batch, m)
+        leave_columns(i, struck, at, tau + d, batch, m)
+        if endless != 0:
+            repeat_impacts(i, endless, tau + d, batch, m)
+        elif struck != 0:
+            strike_columns(i, g, tau + d, batch, m)
     slides = count_landing(i, tau + d, batch)
     return slides if status == RUNNING else status
 
@@ -232,8 +236,8 @@ def clock_error(i, now, batch):
 # -- impacts ---------------------------------------------------------------------------------------
 @kernel
 def impacts(i, g, now, hits, modes, steady, batch, m):
-    """Apply an impact, after the test that the order of several doesn't matter. Returns the
-    status.
+    """Apply an impact, after the test that the order of several doesn't matter. Returns the status,
+    and the stops (bits) whose impacts without end were completed; 0: none.
     """
     stops = 0
     for other in range(m.sizes[GUARDS]):
@@ -244,11 +248,11 @@ def impacts(i, g, now, hits, modes, steady, batch, m):
     if stops & (stops - 1) != 0 and known_zeros(i, g, batch) < 2:
         status = order_of_impacts(i, stops, batch, m)
         if status != RUNNING:
-            return status
+            return status, 0
         endless = has_just_landed(i, now, batch) and batch.carry[i, LANDINGS] >= MOST_STRIKES
-        if endless and end_impacts(i, stops, batch, m):
-            return RUNNING
-    return strike(i, g, now, modes, steady, batch, m)
+        if endless and end_impacts(i, stops, now, batch, m):
+            return RUNNING, stops
+    return strike(i, g, now, modes, steady, batch, m), 0
 
 
 @kernel
@@ -314,7 +318,7 @@ def rest_or_go(i, now, modes, steady, batch, m):
         hold(i, g, now, later, batch, m)
         leave(i, before, batch, m)
         if m.sizes[TANGENTS] != 0:
-            settle_columns(i, g, batch, m)
+            settle_columns(i, g, now, batch, m)
 
 
 @inner
@@ -365,7 +369,7 @@ def terms_of_gap(r, modes, steady, which, m):
         third += w * w * w * imaginary
         fourth += w * w * w * w * real
     for p in range(m.sizes[COURSES]):
-        numbers = at + 1 + 2 * drives + COURSE_TERMS * p
+        numbers = at + 1 + 2 * drives + m.sizes[TERMS] * p
         for k in range(3):
             rate += abs(number(m.steady, first, numbers + k) * m.record[p, VALUE + 1 + k])
         for k in range(2):

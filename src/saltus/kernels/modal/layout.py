@@ -23,30 +23,31 @@ FACTORIAL = 20922789888000.0
 #: its own series is at most its amplitude there.
 FOLLOWED = 6.0
 # Columns of `sizes`; ROWS are the rows of amplitudes: those of the modes, real parts then imaginary
-# ones, then those of a block; TANGENTS is 1 where the derivative of the state is carried;
-# REMEMBERED are the states behind the others that hold others of before the last impact, whose
-# numbers are in `remembers`.
+# ones, then those of a block; TANGENTS are the columns of the derivative of the state that is
+# carried: one for each state at the start, then one for each parameter; 0: none. REMEMBERED are the
+# states behind the others that hold others of before the last impact, whose numbers are in
+# `remembers`; TERMS are the coefficients of the pieces of courses, 4 or 16.
 STATES, MODE_GROUPS, STATE_GROUPS, GAP_ROWS, GUARDS, DRIVES, ROWS, COURSES = range(8)
-TANGENTS, REMEMBERED = range(8, 10)
+TANGENTS, REMEMBERED, TERMS = range(8, 11)
 # Columns of `record`: the time of a course at the beginning of the period, the times of the period
 # at which its piece begins and ends [s], the row of that piece, its value and derivatives.
 BASE, SINCE, UNTIL, PIECE, VALUE = range(5)
-#: Value and derivatives of a course.
-COURSE_TERMS = 4
 # Columns of `links`: first row of the modes' table, first row of the drives' table, guards where
-# the rates don't jump (bits); then for each guard the contact state behind its boundary, -1 where
-# it hasn't been made yet.
-MODES, STEADY, SMOOTH, BEHIND = range(4)
+# the rates don't jump (bits), first row of the derivatives by parameters; then for each guard the
+# contact state behind its boundary, -1 where it hasn't been made yet.
+MODES, STEADY, SMOOTH, SLOPES, BEHIND = range(5)
 # Columns of `carry`: the contact state (-1: to be looked up), whether its amplitudes must be made
 # of the state, the next step [s], the time of the last landing, landings there since, guards that
 # the state has ridden from its start on (bits), the set of parameter values, the generation of the
 # tables in which these numbers stand; with tangents the time for which they haven't been moved [s]
 # and the boundaries just crossed (bits); gaps whose rate is known to be zero too, and those whose
 # acceleration is (bits), whether no time has passed since the start, the contact that was struck
-# (one more than its number; 0: none); then the amplitudes, and with tangents the rates of the
-# states and the gaps before these boundaries.
+# (one more than its number; 0: none), whether it is known how the instant of a landing moves; then
+# the amplitudes, and with tangents the rates of the states and the gaps before these boundaries,
+# how that instant moves with each column, and with parameters the amplitudes when the derivative
+# was moved last.
 AT, ENTERS, NEXT_STEP, LANDED_AT, LANDINGS, RIDES, SET, TABLES, WAITED, CROSSED = range(10)
-TWICE, THRICE, STARTS, ASKS, AMPLITUDES = range(10, 15)
+TWICE, THRICE, STARTS, ASKS, DATED, AMPLITUDES = range(10, 16)
 # Columns of `laws`, for each guard: the kind of its law (status.py), its hold guard (of a hold
 # guard: its contact's), the state that its gap is a level of; -1 where there is none.
 KIND, PARTNER, LEVEL = range(3)
@@ -97,6 +98,6 @@ HUGE = 1.0e300
 Modal = namedtuple(
     "Modal",
     "sizes row_of sign_of offset rate lag modes steady links course pieces laws acts presses "
-    "remembers y moved size sums q errors p bern bounds slopes out touches state answer angle "
-    "found chain record factor column columns struck bernstein stood waves spans near",
+    "remembers varied shifts y moved size sums q errors p bern bounds slopes out touches state "
+    "answer angle found chain record factor column columns struck bernstein stood waves spans near",
 )

@@ -123,9 +123,10 @@ def write_samples(i, tau, until, modes, steady, batch, m):
         for j in range(states, states + m.sizes[REMEMBERED]):
             batch.samples[i, k, j] = batch.state[i, j]
         if m.sizes[TANGENTS] != 0:
-            columns_after(i, modes, batch.carry[i, WAITED] + (due - tau), batch, m)
-            for j in range(states * states):
-                batch.samples[i, k, states + j] = m.columns[j // states, j % states]
+            at, columns = int(batch.carry[i, AT]), m.sizes[TANGENTS]
+            columns_after(i, at, due, batch.carry[i, WAITED] + (due - tau), batch, m)
+            for j in range(states * columns):
+                batch.samples[i, k, states + j] = m.columns[j // columns, j % columns]
         batch.sample_mode[i, k] = batch.mode[i]
         k += 1
     batch.cursor[i] = k
@@ -144,7 +145,8 @@ def enter(i, tau, batch, m):
     amplitudes_of(m.links[at, MODES], m.y, m)
     set_block_drives(m.links[at, MODES], m)
     if m.sizes[TANGENTS] != 0:
-        enter_columns(i, at, batch, m)
+        enter_columns(i, at, tau, batch, m)
+        keep_amplitudes(i, batch, m)
     batch.carry[i, ENTERS] = 0.0
 
 
@@ -174,6 +176,7 @@ def land(i, tau, d, hits, modes, steady, batch, m):
     Returns the status.
     """
     which, before, law = int(batch.carry[i, SET]), batch.mode[i], first_law(hits, m)
+    at = int(batch.carry[i, AT])
     if law >= 0:
         return act(i, law, tau, d, hits, modes, steady, batch, m)
     state_after(i, tau, d, modes, steady, batch, m)
@@ -197,7 +200,7 @@ def land(i, tau, d, hits, modes, steady, batch, m):
     leave(i, before, batch, m)
     if m.sizes[TANGENTS] != 0:
         batch.carry[i, WAITED] += d
-        leave_columns(i, hits, modes, steady, batch, m)
+        leave_columns(i, hits, at, tau + d, batch, m)
     return count_landing(i, tau + d, batch)
 
 
@@ -335,7 +338,8 @@ def put_back(i, tau, status, batch, m):
         for k in range(m.sizes[ROWS] * LANES):
             batch.carry[i, AMPLITUDES + k] = m.y[k // LANES, k % LANES]
         keep_state(i, tau, batch, m)
-        move_columns(i, m.links[at, MODES], batch, m)
+        move_columns(i, at, tau, batch, m)
+        keep_amplitudes(i, batch, m)
     batch.phase[i], batch.status[i] = tau, status
 
 
@@ -344,9 +348,9 @@ def propagate(
     period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count,
     end_phase, counters, minima, sample_count, sample_fraction, cursor, samples, sample_mode,
     rec_first, rec_i, rec_f, rec_used, options, data, budget, sizes, row_of, sign_of, offset, rate,
-    lag, modes, steady, links, course, pieces, laws, acts, presses, remembers, y, moved, size, sums,
-    q, errors, p, bern, bounds, slopes, out, touches, place, answer, angle, found, chain, follows,
-    factor, column, columns, struck, bernstein, stood, waves, spans, near,
+    lag, modes, steady, links, course, pieces, laws, acts, presses, remembers, varied, shifts, y,
+    moved, size, sums, q, errors, p, bern, bounds, slopes, out, touches, place, answer, angle,
+    found, chain, follows, factor, column, columns, struck, bernstein, stood, waves, spans, near,
 ):  # fmt: skip
     """Move every trajectory whose status is RUNNING and whose contact state has been made, `budget`
     steps at most. See kernels/batch.py for the arrays.
@@ -358,9 +362,9 @@ def propagate(
     )  # fmt: skip
     m = Modal(
         sizes, row_of, sign_of, offset, rate, lag, modes, steady, links, course, pieces, laws, acts,
-        presses, remembers, y, moved, size, sums, q, errors, p, bern, bounds, slopes, out, touches,
-        place, answer, angle, found, chain, follows, factor, column, columns, struck,
-        bernstein, stood, waves, spans, near,
+        presses, remembers, varied, shifts, y, moved, size, sums, q, errors, p, bern, bounds,
+        slopes, out, touches, place, answer, angle, found, chain, follows, factor, column, columns,
+        struck, bernstein, stood, waves, spans, near,
     )  # fmt: skip
     waits = False
     for i in range(status.shape[0]):

@@ -1,0 +1,188 @@
+"""Derivatives of the contact states of a modal flow with respect to parameters, as tables.
+
+In a contact state the motion is ``z = s + V e^(Lambda h) y``, with s its steady answer. With
+respect to a parameter p its derivative w obeys ``w' = A w + A_p z + ...``; the derivative s_p of
+the steady answer is one solution of it, so that ``w - s_p`` is moved as a column of the tangent is,
+but for what A_p makes of the modes. Each drive Re(r e^(i theta)) of s gives s_p two parts: that of
+its amplitude, Re(r_p e^(i theta)), and that of its phase, theta_p Re(i r e^(i theta)), which grows
+with the time where p is a frequency. A state whose derivative has no such form has NaN there.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from saltus.codegen.module import MODAL_LANES as LANES
+from saltus.contact.guards import is_hold
+from saltus.flow.modal_blocks import MOST_LOSS, MOST_SPREAD
+from saltus.flow.modal_eigen import both_of_each_pair
+from saltus.flow.modal_modes import StateModes
+from saltus.flow.modal_rows import Rows
+from saltus.language import expression as ex
+from saltus.system.linear import LinearPiece, LinearSystem
+
+if TYPE_CHECKING:
+    from saltus.flow.modal_tables import Tables, ValueSet
+
+
+@functools.lru_cache(maxsize=256)
+def varies_by(linear: LinearSystem, name: str) -> bool:
+    """True if the derivative with respect to a parameter has a closed form: its boundaries keep
+    their slopes, its laws of contact don't change, and no drive is a record.
+    """
+    if linear.courses:
+        return False
+    guards = linear.system.guards
+    laws = [
+        one
+        for guard in guards
+        if guard.law is not None and not is_hold(guard)
+        for one in (
+            *(guard.gap, guard.law.constraint, guard.law.restitution),
+            *(*guard.law.settled, *guard.law.reset),
+        )
+        if one is not None
+    ]
+    used = ex.walk(*(linear.of(tuple(laws)) or ()))
+    if any(node.op == "param" and node.payload == name for node in used):
+        return False
+    gaps = linear.by(name).own_gaps
+    return not any(
+        ex.depends_on(gap, ("state", "select"))
+        for guard, gap in zip(guards, gaps, strict=True)
+        if not is_hold(guard)
+    )
+
+
+class ParameterTables:
+    """The derivatives of the tables of a system with respect to some parameters.
+
+    Parameters
+    ----------
+    tables : Tables
+        Its contact states.
+    names : tuple of str
+        The parameters.
+    """
+
+    def __init__(self, tables: Tables, names: tuple[str, ...]) -> None:
+        self._tables = tables
+        self._linear = [tables.linear.by(name) for name in names]
+        drives, guards = len(tables.linear.drives), len(tables.linear.system.guards)
+        #: Numbers of each set of values, for each parameter.
+        self._width = 2 * drives + guards * (1 + 2 * drives)
+        self.rows, self.shifts = Rows(), Rows(max(len(names) * self._width, 1))
+        #: Derivatives of the equations, by the parameters and the values that they depend on.
+        self._pieces: dict[tuple[float, ...], Callable[[int], LinearPiece]] = {}
+        #: First row of each contact state, -1 where it has none yet.
+        self._first = np.zeros(0, np.int64)
+
+    @property
+    def first(self) -> np.ndarray:
+        """First row of each contact state that the tables hold, -1 where it has none yet."""
+        more = len(self._tables.made) - len(self._first)
+        self._first = np.append(self._first, np.full(more, -1))
+        return self._first
+
+    def need(self, at: int, which: int, mode: int) -> None:
+        """Make the derivatives of a contact state and of its set of values."""
+        while self.shifts.used <= which:
+            self.shifts.add(self._shifts_of(self._tables.sets[self.shifts.used]))
+        if self.first[at] < 0:
+            given, (_, modes) = self._tables.sets[which], self._tables.made[at]
+            parts = [self._slopes_of(j, given, modes, mode) for j in range(len(self._linear))]
+            answers, mixing = zip(*parts, strict=True)
+            behind = np.cumsum([sum(map(len, answers)), *map(len, mixing)])
+            for one, more, place in zip(answers, mixing, behind, strict=False):
+                one[0, 0] = place if len(more) else 0
+            self._first[at] = self.rows.add(np.concatenate([*answers, *mixing]))
+
+    def _shifts_of(self, given: ValueSet) -> np.ndarray:
+        """Of each parameter: what it does to the rate and the phase of each drive; of each guard
+        what it does to the constant and the drives in its gap, and these drives themselves.
+        """
+        found = list[np.ndarray]()
+        for linear in self._linear:
+            rates, phases = linear.rates(given.values)
+            gaps = linear.gaps(given.values)
+            rows = np.column_stack([gaps.constant, gaps.driven, given.gaps.driven])
+            found += [rates, phases, rows.ravel()]
+        return np.concatenate(found)
+
+    def _slopes_of(
+        self, parameter: int, given: ValueSet, modes: StateModes, mode: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The derivative of the steady answer behind a row of its own, and what mixes the modes:
+        rows of the table.
+        """
+        linear = self._linear[parameter]
+        slow, _ = linear.rates(given.values)
+        key = parameter, *(given.values[name] for name in linear.parameters)
+        if key not in self._pieces:
+            self._pieces[key] = linear.every_piece(given.values)
+        piece = self._pieces[key](mode)
+        answers = slopes_of(piece, given.rates, slow, modes)
+        padded = np.zeros((len(answers.T), LANES * self._tables.state_groups), complex)
+        padded[:, : len(answers)] = answers.T
+        parts = [padded[0].real, *(part for one in padded[1:] for part in (one.real, one.imag))]
+        rows = np.concatenate([np.zeros(LANES), *parts]).reshape(-1, LANES)
+        if modes.block is not None or not piece.matrix.any():
+            return rows, np.zeros((0, LANES))
+        return rows, mixing_of(piece.matrix, modes, self._tables.groups)
+
+
+def slopes_of(
+    piece: LinearPiece, rates: np.ndarray, slow: np.ndarray, modes: StateModes
+) -> np.ndarray:
+    """Derivatives of the amplitudes of a steady answer: complex128[N, 1 + D].
+
+    Parameters
+    ----------
+    piece : LinearPiece
+        Derivatives of the equations of the contact state.
+    rates, slow : float64[D]
+        Rates of the drives [rad/s], and the derivatives of these.
+    modes : StateModes
+        Its modes and its steady answer.
+
+    Returns
+    -------
+    complex128[N, 1 + D]
+        For the constant and for each drive. NaN where it has no closed form: modes go together in a
+        block, or are so slow that a constant force moves them without end.
+    """
+    every, changes = np.append(0.0, rates), np.append(0.0, slow)
+    values, vectors, inverse = both_of_each_pair((modes.values, modes.vectors, modes.inverse))
+    loads = np.column_stack([piece.constant, piece.driven]) + piece.matrix @ modes.answers
+    loads = inverse @ (loads - 1j * changes * modes.answers)
+    sizes = np.abs(values)[:, None]
+    far = 1j * every - values[:, None]
+    scale = max(sizes.max(initial=0.0), np.abs(every).max())
+    lost = MOST_LOSS * np.abs(far) <= np.maximum(np.abs(every), sizes)
+    lost[:, 0] |= MOST_SPREAD * sizes[:, 0] <= scale
+    if modes.block is not None or (lost & (loads != 0)).any():
+        return np.full(modes.answers.shape, np.nan, complex)
+    with np.errstate(all="ignore"):
+        answers: np.ndarray = vectors @ np.where(loads == 0, 0, loads / far)
+    return answers
+
+
+def mixing_of(matrix: np.ndarray, modes: StateModes, groups: int) -> np.ndarray:
+    """What a change of the matrix of a contact state makes of its modes, as rows of LANES modes.
+
+    The derivative of e^(A h) is V (G * D) L, with G = L A_p V and the divided differences D_jk of
+    e^(lambda h) (Higham, Functions of Matrices (2008), theorem 3.9). For each kept mode k: by
+    groups of modes j the real and the imaginary part of G_jk, then those for its complex partner.
+    """
+    count, paired = len(modes.values), modes.values.imag > 0
+    mixed = np.zeros((2, LANES * groups, LANES * groups), complex)
+    left = modes.inverse @ matrix
+    mixed[0, :count, :count] = left @ modes.vectors
+    mixed[1, :count, :count] = left @ (modes.vectors.conj() * paired)
+    parts = np.stack([mixed[0].real, mixed[0].imag, mixed[1].real, mixed[1].imag])
+    # [part, j, k] -> [k, group, part, lane]
+    return parts.reshape(4, groups, LANES, -1).transpose(3, 1, 0, 2).reshape(-1, LANES)

@@ -1,0 +1,26 @@
+"""Tables of the modal flow that grow as motions come to new contact states."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from saltus.codegen.module import MODAL_LANES as LANES
+
+
+class Rows:
+    """A table that grows: [rows, width]."""
+
+    def __init__(self, width: int = LANES, kind: type = float) -> None:
+        self.used = 0
+        self.table: np.ndarray = np.zeros((64, width), kind)
+
+    def add(self, numbers: np.ndarray) -> int:
+        """Append rows; returns the first."""
+        first, rows = self.used, numbers.reshape(-1, self.table.shape[1])
+        if first + len(rows) > len(self.table):
+            grown = np.zeros((2 * (first + len(rows)), self.table.shape[1]), self.table.dtype)
+            grown[:first] = self.table[:first]
+            self.table = grown
+        self.used += len(rows)
+        self.table[first : self.used] = rows
+        return first
