@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -31,6 +32,20 @@ from saltus.system.tangent import tangent_states
 FIRST_STEP = 1.0 / 64
 #: Terms of a gap's series by which the way from a boundary is told.
 WAYS = 6
+
+
+def bernstein_table(lanes: int) -> np.ndarray:
+    """Bernstein coefficients of the powers of x on [0, 1], and the differences of two that follow
+    one another, in the rows of the kernel: float64[2 * 16 * 16 / lanes, lanes].
+    """
+    order = layout.ORDER
+    table = np.array(
+        [[math.comb(i, k) / math.comb(order, k) for i in range(order + 1)]
+         for k in range(order + 1)]
+    )  # fmt: skip
+    steps = np.diff(table, axis=1)
+    steps = np.append(steps, steps[:, -1:], axis=1)
+    return np.concatenate([table, steps]).reshape(-1, lanes)
 
 
 class ModalFlow:
@@ -110,11 +125,13 @@ class ModalFlow:
                 empty((max(rows, 1), terms)), empty((max(rows, 1), 3)), empty(terms),
                 empty((DEEPEST + 2, terms)), empty((DEEPEST + 2, 2)), empty(terms), empty(2),
                 empty((MOST_TOUCHES, 2)), empty((states, lanes)), empty((states, lanes)),
-                empty((max(drives, 1), 4)), empty((max(guards, 1), 4)),
+                empty((max(drives, 1), 4)), empty((max(guards, 1), 6)),
                 empty(((terms + 2) * self.tables.block_groups, lanes)),
                 empty((max(courses, 1), layout.VALUE + self.tables.linear.terms)),
                 empty((2 * groups, lanes)), empty((amplitudes, lanes)), empty((size, columns)),
-                empty((3, size)),
+                empty((3, size)), bernstein_table(lanes),
+                empty((max(rows, 1), layout.BEYOND + 2 * groups + 2)),
+                empty((4 * groups * max(rows, 1), lanes)), empty((max(rows, 1), 11)), empty(5),
             )  # fmt: skip
         arrays: tuple[np.ndarray, ...] = self._memory.arrays
         return arrays

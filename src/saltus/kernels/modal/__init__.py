@@ -4,7 +4,8 @@
 layout            its tables and work arrays
 records           drives that are polynomials of the time between breaks
 blocks            modes that go together
-series            amplitudes on their way, and what they say of gaps
+series            amplitudes on their way, states, and gaps there
+gaps              what the gaps do over a step, and where they cross
 laws              impacts, contacts at rest, their release
 impacts           several impacts at one instant
 tangents          the derivative of the state with respect to the start and to parameters

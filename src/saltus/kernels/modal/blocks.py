@@ -83,6 +83,8 @@ def times_block(modes, groups, source, h, target, m):
 def move_block(modes, h, y, to, m):
     """The amplitudes y of a block after a time h: exp(T h) v."""
     groups, first = block_groups(modes, m), 2 * m.sizes[MODE_GROUPS]
+    if groups == 0:
+        return
     parts = int(block_limit(modes, m) * h) + 1
     for g in range(groups):
         store(to, first + g, load(y, first + g, LANES))
@@ -212,16 +214,32 @@ def block_terms(r, modes, y, m):
 
 
 @kernel
-def add_block_gap(r, modes, m):
-    """Add a block's part of a gap and of its rate, by `moved`, to `sums`."""
+def add_block_gap(r, modes, y, m):
+    """Add a block's part of a gap and of its rate, by its amplitudes y, to `sums`."""
     groups, first = block_groups(modes, m), 2 * m.sizes[MODE_GROUPS]
     if groups == 0:
         return
     row = block_waves(modes, groups, m) + groups * r
     value, rate = load(m.sums, 0, LANES), load(m.sums, 1, LANES)
     for g in range(groups):
-        part = load(m.moved, first + g, LANES)
+        part = load(y, first + g, LANES)
         value = fma(load(m.modes, row + g, LANES), part, value)
         rate = fma(load(m.modes, row + groups * m.sizes[GAP_ROWS] + g, LANES), part, rate)
     store(m.sums, 0, value)
     store(m.sums, 1, rate)
+
+
+@kernel
+def add_block_terms(r, modes, y, m):
+    """Add a block's part of a gap and of its derivatives up to the fourth, by its amplitudes y, to
+    `sums`.
+    """
+    groups, first = block_groups(modes, m), 2 * m.sizes[MODE_GROUPS]
+    row = block_waves(modes, groups, m) + groups * r
+    for g in range(groups):
+        store(m.chain, g, load(y, first + g, LANES))
+    for k in range(5):
+        for g in range(groups):
+            part = load(m.chain, k * groups + g, LANES)
+            store(m.sums, k, fma(load(m.modes, row + g, LANES), part, load(m.sums, k, LANES)))
+        times_block(modes, groups, k * groups, 1.0, (k + 1) * groups, m)

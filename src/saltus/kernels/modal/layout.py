@@ -63,6 +63,22 @@ AT_FIRST, BY_GUARDS, WAY = range(3)
 MOST_STEPS, MOST_CONTACTS = range(2)
 # What is known of a guard in a step.
 CLEAR, CROSSES, OPEN = range(3)
+# Columns of `found`, for each guard: the place of its crossing as a part of the step, whether that
+# is final, whether it is ridden, touches of the step (first row), the part of the step that is
+# decided, the end of the bracket of the crossing.
+PLACE, FINAL, RIDDEN, TOUCHED, DECIDED, BRACKET = range(6)
+# Columns of `stood`, for each row of gaps where the amplitudes stand: value and rate, the size of
+# its terms, what its fifth derivative is at most; then for each group of modes the sizes of all
+# terms from it on, and those of their rates. Rows of `waves`, for each row of gaps and group of
+# modes: its real and imaginary part, its rate, its size.
+HERE, SLOPE, SIZE, FIFTH, BEYOND = range(5)
+# Columns of `spans`, for each row of gaps over a step: bounds of the gap without what its series
+# leaves out; whether the series is known; its first and its last Bernstein coefficient, the least
+# and the largest difference of two, those that rise and that fall (bits), coefficients below and
+# above the first one.
+LEAST, MOST, KNOWN, FIRST, LAST, DROP, RISE, RISES, FALLS, BELOW, ABOVE = range(11)
+#: Shortest part of a step by which a gap is decided.
+SHORTEST_PIECE = 0.125
 #: Landings at one instant before they count as sliding.
 MOST_LANDINGS = 100
 #: Landings at one instant after which impacts that cause each other are completed at once, least
@@ -83,5 +99,5 @@ Modal = namedtuple(
     "Modal",
     "sizes row_of sign_of offset rate lag modes steady links course pieces laws acts presses "
     "remembers varied shifts y moved size sums q errors p bern bounds slopes out touches state "
-    "answer angle found chain record factor column columns struck",
+    "answer angle found chain record factor column columns struck bernstein stood waves spans near",
 )

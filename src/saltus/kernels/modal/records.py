@@ -131,3 +131,16 @@ def course_gap(first, at, m):
             if k + 1 < m.sizes[TERMS]:
                 rate += factor * m.record[p, VALUE + k + 1]
     return value, rate
+
+
+@kernel
+def course_way(first, at, h, m):
+    """The most by which the courses' part of a row of gaps can change in a time h."""
+    most = 0.0
+    for p in range(m.sizes[COURSES]):
+        for k in range(m.sizes[TERMS]):
+            factor, power = abs(number(m.steady, first, at + m.sizes[TERMS] * p + k)), 1.0
+            for j in range(1, m.sizes[TERMS] - k):
+                power *= h / j
+                most += factor * abs(m.record[p, VALUE + k + j]) * power
+    return most

@@ -7,7 +7,6 @@ from saltus.kernels.lanes import (
     fma,
     load,
     nearest_integer,
-    root,
     splat,
     store,
 )
@@ -55,6 +54,7 @@ def begin_period(i, batch, m):
             + turned(rate, batch.origin[i], 1)
             + turned(rate, batch.period[i], batch.count[i])
         )
+        m.angle[d, 3] = math.inf  # its cosine isn't known at any time of this period
     begin_courses(i, batch, m)
 
 
@@ -63,8 +63,9 @@ def drive(i, tau, batch, m):
     """Cosine and sine of each drive at a time of the period, to `angle`; the courses there."""
     which = int(batch.carry[i, SET])
     for d in range(m.sizes[DRIVES]):
-        at = m.angle[d, 0] + m.rate[which, d] * tau
-        m.angle[d, 1], m.angle[d, 2] = math.cos(at), math.sin(at)
+        if m.angle[d, 3] != tau:
+            at = m.angle[d, 0] + m.rate[which, d] * tau
+            m.angle[d, 1], m.angle[d, 2], m.angle[d, 3] = math.cos(at), math.sin(at), tau
     courses_at(tau, m)
 
 
@@ -182,9 +183,9 @@ def move(modes, h, m):
 
 
 @inner
-def keep_moved(m):
+def keep_moved(modes, m):
     """Make `moved` the amplitudes."""
-    for g in range(m.sizes[ROWS]):
+    for g in range(2 * m.sizes[MODE_GROUPS] + block_groups(modes, m)):
         store(m.y, g, load(m.moved, g, LANES))
 
 
@@ -196,89 +197,9 @@ def total_of(rows, row):
 
 
 @kernel
-def followed(modes, h, m):
-    """Number of groups of modes that are followed over a time h."""
-    groups = m.sizes[MODE_GROUPS]
-    sizes = modes + 2 * groups - 1
-    while groups > 0 and m.modes[sizes + groups, LANES - 1] * h > FOLLOWED:
-        groups -= 1
-    return groups
-
-
-@kernel
-def series_of(r, modes, steady, which, h, m):
-    """Terms of a row of gaps on [0, 1] for a step h, to q[r]. To errors[r]: what they leave out at
-    most, of the gap and of its slope; the size of its terms.
-    """
-    groups, drives = m.sizes[MODE_GROUPS], m.sizes[DRIVES]
-    near = followed(modes, h, m)
-    row = modes + groups * (3 + 2 * LANES * m.sizes[STATE_GROUPS])
-    row += 2 * LANES * groups * m.sizes[STATE_GROUPS] + 3 * groups * r
-    for k in range(ORDER + 1):
-        store(m.sums, k, splat(0.0, LANES))
-    left, slope, size = splat(0.0, LANES), splat(0.0, LANES), splat(0.0, LANES)
-    for g in range(groups):
-        real, imaginary = load(m.y, g, LANES), load(m.y, groups + g, LANES)
-        reach = load(m.modes, modes + 2 * groups + g, LANES) * h
-        bound = root(fma(real, real, imaginary * imaginary))
-        bound = bound * load(m.modes, row + 2 * groups + g, LANES)
-        size = size + bound
-        if g >= near:
-            left, slope = left + bound, fma(bound, reach, slope)
-            continue
-        squared = reach * reach
-        fourth = squared * squared
-        eighth = fourth * fourth
-        rest = bound * (eighth * eighth) * (1.0 / FACTORIAL)
-        left, slope = left + rest, fma(rest, 16.0, slope)
-        a, b = load(m.modes, row + g, LANES), load(m.modes, row + groups + g, LANES)
-        real, imaginary = fma(-b, imaginary, a * real), fma(b, real, a * imaginary)
-        a, b = load(m.modes, modes + g, LANES) * h, load(m.modes, modes + groups + g, LANES) * h
-        for k in range(ORDER + 1):
-            store(m.sums, k, load(m.sums, k, LANES) + real)
-            real, imaginary = fma(-b, imaginary, a * real), fma(b, real, a * imaginary)
-    store(m.sums, ORDER + 1, left)
-    store(m.sums, ORDER + 2, slope)
-    store(m.sums, ORDER + 3, size)
-    add_block_series(r, modes, h, m)
-    for k in range(ORDER + 1):
-        m.q[r, k] = total_of(m.sums, k)
-    e0, e1, scale = (
-        total_of(m.sums, ORDER + 1),
-        total_of(m.sums, ORDER + 2),
-        total_of(m.sums, ORDER + 3),
-    )
-    first, at = numbers_of_gap(r, steady, m)
-    m.q[r, 0] += number(m.steady, first, at)
-    scale += abs(number(m.steady, first, at))
-    for d in range(drives):
-        a, b = number(m.steady, first, at + 1 + 2 * d), number(m.steady, first, at + 2 + 2 * d)
-        cosine, sine = m.angle[d, 1], m.angle[d, 2]
-        real, imaginary = a * cosine - b * sine, a * sine + b * cosine
-        reach, size_of = m.rate[which, d] * h, abs(a) + abs(b)
-        scale += size_of
-        power = abs(reach)
-        for _ in range(4):
-            power *= power
-        e0 += size_of * power / FACTORIAL
-        e1 += 16.0 * size_of * power / FACTORIAL
-        for k in range(ORDER + 1):
-            m.q[r, k] += real
-            real, imaginary = -imaginary * reach, real * reach
-    scale += add_course_series(r, first, at + 1 + 2 * drives, h, m)
-    share = 1.0
-    for k in range(2, ORDER + 1):
-        share /= k
-        m.q[r, k] *= share
-    m.errors[r, 0], m.errors[r, 1], m.errors[r, 2] = e0, e1, scale
-
-
-@kernel
 def gap_of_moved(r, modes, steady, which, m):
     """Value and rate of a row of gaps by the amplitudes in `moved`, the drives in `angle`."""
-    groups, drives = m.sizes[MODE_GROUPS], m.sizes[DRIVES]
-    row = modes + groups * (3 + 2 * LANES * m.sizes[STATE_GROUPS])
-    row += 2 * LANES * groups * m.sizes[STATE_GROUPS] + 3 * groups * r
+    groups, row = m.sizes[MODE_GROUPS], waves_of(r, modes, m)
     value, rate = splat(0.0, LANES), splat(0.0, LANES)
     for g in range(groups):
         real, imaginary = load(m.moved, g, LANES), load(m.moved, groups + g, LANES)
@@ -289,13 +210,22 @@ def gap_of_moved(r, modes, steady, which, m):
         rate = fma(-load(m.modes, modes + groups + g, LANES), imaginary, rate)
     store(m.sums, 0, value)
     store(m.sums, 1, rate)
-    add_block_gap(r, modes, m)
+    add_block_gap(r, modes, m.moved, m)
     v, w = total_of(m.sums, 0), total_of(m.sums, 1)
     first, at = numbers_of_gap(r, steady, m)
-    v += number(m.steady, first, at)
-    for d in range(drives):
+    more, faster = steady_gap(first, at, which, m)
+    return v + more, w + faster
+
+
+@kernel
+def steady_gap(first, at, which, m):
+    """The part of a row of gaps that is its steady answer to the drives in `angle`, whose numbers
+    stand in the rows from `first` on, from `at` on: its value and its rate.
+    """
+    v, w = number(m.steady, first, at), 0.0
+    for d in range(m.sizes[DRIVES]):
         a, b = number(m.steady, first, at + 1 + 2 * d), number(m.steady, first, at + 2 + 2 * d)
         v += a * m.angle[d, 1] - b * m.angle[d, 2]
         w -= (a * m.angle[d, 2] + b * m.angle[d, 1]) * m.rate[which, d]
-    value_of, rate_of = course_gap(first, at + 1 + 2 * drives, m)
+    value_of, rate_of = course_gap(first, at + 1 + 2 * m.sizes[DRIVES], m)
     return v + value_of, w + rate_of

@@ -10,20 +10,8 @@ to end below zero. The place is then found by Newton's method on the modes thems
 import math
 
 from saltus.kernels.batch import Batch
-from saltus.kernels.isolation import AT as PLACE
-from saltus.kernels.isolation import (
-    MARGIN,
-    MOST_TOUCHES,
-    TOUCH_AT,
-    TOUCH_GUARD,
-    first_crossing,
-    is_rounding,
-    leading_sign,
-    refine,
-    side_of_leaving,
-    to_bernstein,
-)
-from saltus.kernels.lanes import fma, load, root, store
+from saltus.kernels.isolation import MARGIN, MOST_TOUCHES, TOUCH_AT, TOUCH_GUARD
+from saltus.kernels.lanes import load, magnitude, splat, store
 from saltus.kernels.status import (
     BUDGET_EVENTS,
     BUDGET_STEPS,
@@ -34,8 +22,6 @@ from saltus.kernels.status import (
     GAP_MARGIN,
     GRAZE_SHALLOW,
     GRAZE_UNRESOLVED,
-    HOLD_LAW,
-    MODE_VIOLATION,
     NONFINITE,
     OK,
     PAUSED,
@@ -57,185 +43,6 @@ from saltus.kernels.status import (
     STEPS,
     UNRESOLVED,
 )
-
-
-# -- one gap over one step -------------------------------------------------------------------------
-@inner
-def side_of(g, mode):
-    """+1 where the gap of a guard is positive, -1 where it is negative."""
-    return 1.0 if (mode >> g) & 1 else -1.0
-
-
-@kernel
-def terms_of(i, g, side, batch, m):
-    """Terms of the gap of a guard on its side, on [0, 1], to p; returns its rounding error."""
-    r, sign = m.row_of[g], side * m.sign_of[g]
-    away = m.offset[int(batch.carry[i, SET]), g]
-    for k in range(ORDER + 1):
-        m.p[k] = sign * m.q[r, k]
-    m.p[0] += side * away
-    return ROUNDED * (m.errors[r, 2] + abs(away))
-
-
-@kernel
-def decide(i, g, batch, m):
-    """Outcome of a gap over the step: CLEAR, CROSSES, or OPEN: a shorter step must tell. The place
-    of a crossing goes to found[g, 0]; found[g, 1] says whether that is final.
-    """
-    side = side_of(g, batch.mode[i])
-    noise = terms_of(i, g, side, batch, m)
-    error, slope_error = m.errors[m.row_of[g], 0], m.errors[m.row_of[g], 1]
-    exact, known = error <= noise, known_zeros(i, g, batch)
-    fresh, degree = known > 0, ORDER - known
-    if fresh:
-        for k in range(ORDER + 1):
-            m.p[k] = m.p[k + known] if k <= degree else 0.0
-        error = slope_error
-        if known > 1 and not exact:
-            return OPEN
-        if exact and is_rounding(m.p, degree, noise):
-            m.found[g, 2] = 1.0  # it is ridden
-            return CLEAR
-        if exact and leading_sign(m.p, degree) < 0:
-            m.found[g, 0], m.found[g, 1] = 0.0, 1.0
-            return CROSSES
-        if not exact and m.p[0] <= error:
-            return OPEN
-    elif not exact and m.p[0] <= error:
-        return OPEN
-    elif m.p[0] <= noise:
-        if m.p[0] < -noise and m.laws[g, KIND] != HOLD_LAW:
-            batch.status[i] = MODE_VIOLATION
-            return CLEAR
-        # what presses a contact at rest jumps where the state does
-        if m.p[0] < -noise or side_of_leaving(m.p, degree, False, noise) < 0:
-            m.found[g, 0], m.found[g, 1] = 0.0, 1.0
-            return CROSSES
-    to_bernstein(m.p, degree, m.bern[0])
-    least, falls, turns = m.bern[0, 0], True, False
-    for k in range(degree):
-        change = m.bern[0, k + 1] - m.bern[0, k]
-        least = min(least, m.bern[0, k + 1])
-        turns = turns or (change > 0.0 and least < m.bern[0, 0])
-        falls = falls and degree * change + slope_error < 0.0
-    clear = least > error + noise
-    if clear and (fresh or not turns or least - error >= m.out[MARGIN]):
-        return CLEAR
-    last = m.bern[0, degree]
-    if not fresh and falls and last - error > noise:
-        return CLEAR
-    if not fresh and falls and last + error < -noise:
-        m.found[g, 0], m.found[g, 1] = refine(m.p, degree, 0.0, 1.0, True), 0.0
-        return CROSSES
-    if not exact:
-        return OPEN
-    crosses, touched = first_crossing(
-        m.p, degree, fresh, noise, g, m.bern, m.bounds, m.slopes, m.out, m.touches,
-        min(int(m.found[0, 3]), MOST_TOUCHES - 1),
-    )  # fmt: skip
-    m.found[0, 3] = min(touched, MOST_TOUCHES - 1)
-    m.found[g, 0], m.found[g, 1] = m.out[PLACE], 1.0
-    return CROSSES if crosses else CLEAR
-
-
-@kernel
-def place_of(i, g, tau, h, modes, steady, batch, m):
-    """Time after tau at which a gap that falls all the way crosses, by Newton's method on the modes
-    inside a shrinking bracket.
-    """
-    which, side = int(batch.carry[i, SET]), side_of(g, batch.mode[i])
-    sign, away = side * m.sign_of[g], side * m.offset[which, g]
-    low, high, d = 0.0, h, m.found[g, 0] * h
-    size = m.errors[m.row_of[g], 2] + abs(away)
-    for _ in range(60):
-        move(modes, d, m)
-        drive(i, tau + d, batch, m)
-        value, rate = gap_of_moved(m.row_of[g], modes, steady, which, m)
-        value, rate = sign * value + away, sign * rate
-        if value == 0.0:
-            break
-        if value > 0.0:
-            low = d
-        else:
-            high = d
-        new = d - value / rate if rate < 0.0 else 0.5 * (low + high)
-        if not low <= new <= high:
-            new = 0.5 * (low + high)
-        change, d = abs(new - d), new
-        if change <= 2.3e-16 * d or change * abs(rate) <= 2.3e-16 * size:
-            break
-    return d
-
-
-@kernel
-def reach(i, tau, h, modes, steady, batch, m):
-    """The part of a step that is worth trying: as long as the modes that it follows leave less than
-    half of each gap, or of its rate where that decides, to those that it bounds.
-    """
-    groups, which, most = m.sizes[MODE_GROUPS], int(batch.carry[i, SET]), 0
-    for g in range(groups):
-        real, imaginary = load(m.y, g, LANES), load(m.y, groups + g, LANES)
-        store(m.moved, g, real)
-        store(m.moved, groups + g, imaginary)
-        store(m.size, g, root(fma(real, real, imaginary * imaginary)))
-    for g in range(2 * groups, m.sizes[ROWS]):
-        store(m.moved, g, load(m.y, g, LANES))
-    waves = modes + groups * (3 + 4 * LANES * m.sizes[STATE_GROUPS])
-    for g in range(m.sizes[GUARDS]):
-        if not is_watched(g, batch.mode[i], m):
-            continue
-        r, side = m.row_of[g], side_of(g, batch.mode[i])
-        value, rate = gap_of_moved(r, modes, steady, which, m)
-        value, rate = side * (m.sign_of[g] * value + m.offset[which, g]), side * m.sign_of[g] * rate
-        fresh = (batch.fresh[i] >> g) & 1 == 1
-        slow = 0.5 * abs(rate) if fresh == (rate > 0.0) else 0.0
-        value = 0.0 if fresh else 0.5 * value
-        near, left, slope = groups, 0.0, 0.0
-        while near > most:
-            size = load(m.size, near - 1, LANES)
-            size = size * load(m.modes, waves + 3 * groups * r + 2 * groups + near - 1, LANES)
-            store(m.sums, 0, size)
-            store(m.sums, 1, size * load(m.modes, modes + 2 * groups + near - 1, LANES))
-            left, slope = left + total_of(m.sums, 0), slope + total_of(m.sums, 1)
-            if left > value and slope > slow:
-                break
-            near -= 1
-        most = max(most, near)
-    fastest = m.modes[modes + 2 * groups + most - 1, LANES - 1] if most > 0 else 0.0
-    fastest = max(fastest, block_limit(modes, m))
-    return FOLLOWED / fastest if h * fastest > FOLLOWED else h
-
-
-@kernel
-def look(i, tau, h, modes, steady, batch, m):
-    """Decide all gaps over a step: (OPEN, 0, 0) if a shorter one must tell, (CLEAR, h, 0), or
-    CROSSES with the time after tau and the guards (bits).
-    """
-    which = int(batch.carry[i, SET])
-    drive(i, tau, batch, m)
-    follow_block(modes, h, m)
-    for r in range(m.sizes[GAP_ROWS]):
-        series_of(r, modes, steady, which, h, m)
-    m.out[MARGIN], m.found[0, 3] = batch.minima[i, GAP_MARGIN], 0.0
-    crossing, hits, first = 0, 0, h
-    for g in range(m.sizes[GUARDS]):
-        m.found[g, 2] = 0.0
-        answer = decide(i, g, batch, m) if is_watched(g, batch.mode[i], m) else CLEAR
-        if answer == OPEN:
-            return OPEN, 0.0, 0
-        if answer == CROSSES:
-            crossing |= 1 << g
-    for g in range(m.sizes[GUARDS]):
-        if (crossing >> g) & 1:
-            d = m.found[g, 0] * h
-            if m.found[g, 1] == 0.0:
-                d = place_of(i, g, tau, h, modes, steady, batch, m)
-            together = abs(d - first) <= COINCIDENT * (batch.origin[i] + tau)
-            if hits != 0 and together:
-                hits |= 1 << g
-            elif hits == 0 or d < first:
-                hits, first = 1 << g, d
-    return (CROSSES if hits != 0 else CLEAR), first, hits
 
 
 # -- records ---------------------------------------------------------------------------------------
@@ -275,7 +82,7 @@ def record(i, g, tau, kind, direction, velocity, after, error, batch, m):
 @kernel
 def note_touches(i, tau, h, until, modes, steady, batch, m):
     """Count and record the tangencies of a step up to a time of it."""
-    for j in range(int(m.found[0, 3])):
+    for j in range(int(m.found[0, TOUCHED])):
         d, g = m.touches[j, TOUCH_AT] * h, int(m.touches[j, TOUCH_GUARD])
         if d > until:
             continue
@@ -402,14 +209,14 @@ def keep_on(i, h, batch, m):
     """Take a step without a contact: boundaries that were ridden go on to be."""
     fresh = 0
     for g in range(m.sizes[GUARDS]):
-        if m.found[g, 2] > 0.5:
+        if m.found[g, RIDDEN] > 0.5:
             fresh |= 1 << g
     twice, thrice = int(batch.carry[i, TWICE]), int(batch.carry[i, THRICE])
     know_nothing(i, batch)
     batch.fresh[i] = fresh
     batch.carry[i, TWICE], batch.carry[i, THRICE] = float(twice & fresh), float(thrice & fresh)
     batch.carry[i, RIDES] = float(int(batch.carry[i, RIDES]) & fresh)
-    batch.carry[i, NEXT_STEP] = 2.0 * h
+    batch.carry[i, NEXT_STEP] = 4.0 * h
     batch.minima[i, GAP_MARGIN] = m.out[MARGIN]
 
 
@@ -428,13 +235,13 @@ def at_the_end(i, batch):
 
 
 @inner
-def is_lost(i, batch, m):
+def is_lost(modes, m):
     """True if the amplitudes are no numbers any more."""
-    total = 0.0
-    for g in range(m.sizes[ROWS]):
-        for k in range(LANES):
-            total += abs(m.y[g, k])
-    return not total < HUGE
+    total = splat(0.0, LANES)
+    for g in range(2 * m.sizes[MODE_GROUPS] + block_groups(modes, m)):
+        total = total + magnitude(load(m.y, g, LANES))
+    store(m.sums, 0, total)
+    return not total_of(m.sums, 0) < HUGE
 
 
 @kernel
@@ -450,11 +257,12 @@ def advance(i, budget, batch, m):
     else:
         for k in range(rows * LANES):
             m.y[k // LANES, k % LANES] = batch.carry[i, AMPLITUDES + k]
-    status = RUNNING
+    status, stands = RUNNING, False
     while status == RUNNING and budget > 0 and batch.carry[i, AT] >= 0.0 and has_room(batch, m):
         at = int(batch.carry[i, AT])
         modes, steady = m.links[at, MODES], m.links[at, STEADY]
         if batch.carry[i, ASKS] > 0.5:
+            stands = False
             rest_or_go(i, tau, modes, steady, batch, m)
             if batch.carry[i, ENTERS] > 0.5 and batch.carry[i, AT] >= 0.0:
                 enter(i, tau, batch, m)
@@ -462,6 +270,7 @@ def advance(i, budget, batch, m):
         write_samples(i, tau, tau, modes, steady, batch, m)
         end = end_of(i, batch)
         if tau >= end:
+            stands = False
             if batch.count[i] < batch.end_count[i]:
                 if m.sizes[COURSES] > 0:
                     keep_state(i, tau, batch, m)
@@ -476,22 +285,26 @@ def advance(i, budget, batch, m):
         budget -= 1
         following, wanted = next_break(m), batch.carry[i, NEXT_STEP]
         h = min(wanted, end - tau, following - tau)
-        drive(i, tau, batch, m)
-        set_block_drives(modes, m)
-        h = reach(i, tau, h, modes, steady, batch, m)
+        if not stands:
+            drive(i, tau, batch, m)
+            set_block_drives(modes, m)
+            stand(modes, steady, int(batch.carry[i, SET]), m)
+        h = reach(i, h, modes, batch, m)
         answer, d, hits = look(i, tau, h, modes, steady, batch, m)
         if batch.status[i] != RUNNING:
             status = batch.status[i]
         elif answer == OPEN:
             batch.counters[i, REJECTED] += 1
-            batch.carry[i, NEXT_STEP] = 0.5 * h
+            batch.carry[i, NEXT_STEP], stands = 0.5 * h, True
         else:
+            stands = False
             batch.counters[i, STEPS] += 1
             write_samples(i, tau, tau + d, modes, steady, batch, m)
             note_touches(i, tau, h, d, modes, steady, batch, m)
             if answer == CLEAR:
+                h = d
                 move(modes, h, m)
-                keep_moved(m)
+                keep_moved(modes, m)
                 keep_on(i, h, batch, m)
                 batch.carry[i, WAITED] += h
                 if h == following - tau:
@@ -502,7 +315,7 @@ def advance(i, budget, batch, m):
                 if is_break(i, tau, batch, m):
                     keep_state(i, tau, batch, m)
                     take_up(i, tau, batch, m)
-                status = NONFINITE if is_lost(i, batch, m) else RUNNING
+                status = NONFINITE if is_lost(modes, m) else RUNNING
             else:
                 status = land(i, tau, d, hits, modes, steady, batch, m)
                 tau += d
@@ -537,7 +350,7 @@ def propagate(
     rec_first, rec_i, rec_f, rec_used, options, data, budget, sizes, row_of, sign_of, offset, rate,
     lag, modes, steady, links, course, pieces, laws, acts, presses, remembers, varied, shifts, y,
     moved, size, sums, q, errors, p, bern, bounds, slopes, out, touches, place, answer, angle,
-    found, chain, follows, factor, column, columns, struck,
+    found, chain, follows, factor, column, columns, struck, bernstein, stood, waves, spans, near,
 ):  # fmt: skip
     """Move every trajectory whose status is RUNNING and whose contact state has been made, `budget`
     steps at most. See kernels/batch.py for the arrays.
@@ -551,7 +364,7 @@ def propagate(
         sizes, row_of, sign_of, offset, rate, lag, modes, steady, links, course, pieces, laws, acts,
         presses, remembers, varied, shifts, y, moved, size, sums, q, errors, p, bern, bounds,
         slopes, out, touches, place, answer, angle, found, chain, follows, factor, column, columns,
-        struck,
+        struck, bernstein, stood, waves, spans, near,
     )  # fmt: skip
     waits = False
     for i in range(status.shape[0]):

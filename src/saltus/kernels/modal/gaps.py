@@ -1,0 +1,555 @@
+"""Template of the modal flow: what the gaps do over one step.
+
+Where the amplitudes stand each row of gaps is a sum of waves, whose sizes bound what a step leaves
+out. Modes that are too fast for a step are bounded: they add at most their amplitudes to a gap, and
+at most |lambda| times these to its rate. The others are a polynomial. A gap is clear if it is less
+that bound; it crosses once if it is proven to fall all the way and to end below zero. Where neither
+is proven over the step, its parts are looked at, from the first on.
+"""
+
+from saltus.kernels.isolation import AT as ROOT_AT
+from saltus.kernels.isolation import (
+    MARGIN,
+    MOST_TOUCHES,
+    first_crossing,
+    halve,
+    is_rounding,
+    leading_sign,
+    polynomial,
+    side_of_leaving,
+    slope,
+    to_bernstein,
+)
+from saltus.kernels.lanes import bits, fma, larger, load, lowest_bit, root, smaller, splat, store
+from saltus.kernels.status import GAP_MARGIN, HOLD_LAW, MODE_VIOLATION
+
+
+# -- where the amplitudes stand --------------------------------------------------------------------
+@kernel
+def stand(modes, steady, which, m):
+    """What the amplitudes in `y` say of all gaps, to `stood` and `waves`. Needs `angle`."""
+    groups = m.sizes[MODE_GROUPS]
+    for g in range(groups):
+        real, imaginary = load(m.y, g, LANES), load(m.y, groups + g, LANES)
+        store(m.size, g, root(fma(real, real, imaginary * imaginary)))
+    for r in range(m.sizes[GAP_ROWS]):
+        row, at = waves_of(r, modes, m), 4 * groups * r
+        value, rate, fifth = splat(0.0, LANES), splat(0.0, LANES), splat(0.0, LANES)
+        size, speed = splat(0.0, LANES), splat(0.0, LANES)
+        m.stood[r, BEYOND + groups], m.stood[r, BEYOND + 2 * groups + 1] = 0.0, 0.0
+        for g in range(groups - 1, -1, -1):
+            real, imaginary = load(m.y, g, LANES), load(m.y, groups + g, LANES)
+            a, b = load(m.modes, row + g, LANES), load(m.modes, row + groups + g, LANES)
+            real, imaginary = fma(-b, imaginary, a * real), fma(b, real, a * imaginary)
+            a, b = load(m.modes, modes + g, LANES), load(m.modes, modes + groups + g, LANES)
+            going, fast = fma(-b, imaginary, a * real), load(m.modes, modes + 2 * groups + g, LANES)
+            bound = load(m.size, g, LANES) * load(m.modes, row + 2 * groups + g, LANES)
+            store(m.waves, at + 4 * g, real)
+            store(m.waves, at + 4 * g + 1, imaginary)
+            store(m.waves, at + 4 * g + 2, going)
+            store(m.waves, at + 4 * g + 3, bound)
+            value, rate = value + real, rate + going
+            size, speed, square = size + bound, fma(bound, fast, speed), fast * fast
+            fifth = fma(bound * fast, square * square, fifth)
+            store(m.sums, 0, size)
+            store(m.sums, 1, speed)
+            m.stood[r, BEYOND + g] = total_of(m.sums, 0)
+            m.stood[r, BEYOND + groups + 1 + g] = total_of(m.sums, 1)
+        store(m.sums, 0, value)
+        store(m.sums, 1, rate)
+        store(m.sums, 2, fifth)
+        add_block_gap(r, modes, m.y, m)
+        stand_row(r, steady, which, m)
+
+
+@inner
+def stand_row(r, steady, which, m):
+    """Add the drives to what the modes say of a row of gaps, in `sums`."""
+    value, rate, fifth = total_of(m.sums, 0), total_of(m.sums, 1), total_of(m.sums, 2)
+    first, at = numbers_of_gap(r, steady, m)
+    more, faster = steady_gap(first, at, which, m)
+    size = m.stood[r, BEYOND] + abs(number(m.steady, first, at))
+    for d in range(m.sizes[DRIVES]):
+        a, b = number(m.steady, first, at + 1 + 2 * d), number(m.steady, first, at + 2 + 2 * d)
+        size += abs(a) + abs(b)
+        fifth += (abs(a) + abs(b)) * abs(m.rate[which, d]) ** 5
+    m.stood[r, HERE], m.stood[r, SLOPE] = value + more, rate + faster
+    m.stood[r, SIZE], m.stood[r, FIFTH] = size, fifth
+
+
+@inner
+def waves_of(r, modes, m):
+    """First row of the amplitudes of a row of gaps in the table of modes."""
+    groups = m.sizes[MODE_GROUPS]
+    return modes + groups * (3 + 4 * LANES * m.sizes[STATE_GROUPS]) + 3 * groups * r
+
+
+@inner
+def here(i, g, batch, m):
+    """Value and rate of the gap of a guard on its side, where the amplitudes stand."""
+    r, side = m.row_of[g], side_of(g, batch.mode[i])
+    away = m.offset[int(batch.carry[i, SET]), g]
+    return side * (m.sign_of[g] * m.stood[r, HERE] + away), side * m.sign_of[g] * m.stood[r, SLOPE]
+
+
+@kernel
+def reach(i, h, modes, batch, m):
+    """The part of a step that is worth trying: as long as the modes that it follows leave less than
+    half of each gap, or of its rate where that decides, to those that it bounds.
+    """
+    groups, most = m.sizes[MODE_GROUPS], 0
+    for g in range(m.sizes[GUARDS]):
+        if not is_watched(g, batch.mode[i], m):
+            continue
+        r, fresh = m.row_of[g], (batch.fresh[i] >> g) & 1 == 1
+        value, rate = here(i, g, batch, m)
+        slow = 0.5 * abs(rate) if fresh == (rate > 0.0) else 0.0
+        value = 0.0 if fresh else 0.5 * value
+        while most < groups:
+            left, speed = m.stood[r, BEYOND + most], m.stood[r, BEYOND + groups + 1 + most]
+            if left <= value or speed <= slow:
+                break
+            most += 1
+    fastest = m.modes[modes + 2 * groups + most - 1, LANES - 1] if most > 0 else 0.0
+    fastest = max(fastest, block_limit(modes, m))
+    return FOLLOWED / fastest if h * fastest > FOLLOWED else h
+
+
+# -- a row of gaps over a step ---------------------------------------------------------------------
+@kernel
+def followed(modes, h, m):
+    """Number of groups of modes that are followed over a time h."""
+    groups = m.sizes[MODE_GROUPS]
+    sizes = modes + 2 * groups - 1
+    while groups > 0 and m.modes[sizes + groups, LANES - 1] * h > FOLLOWED:
+        groups -= 1
+    return groups
+
+
+@kernel
+def bound_row(r, modes, steady, which, h, near, m):
+    """Bounds of a row of gaps over a step, by the ways that its waves can go: quick, and enough for
+    a gap that is far from its boundary.
+    """
+    groups, way = m.sizes[MODE_GROUPS], splat(0.0, LANES)
+    for g in range(near):
+        bound = load(m.waves, 4 * (groups * r + g) + 3, LANES)
+        part = load(m.modes, modes + 2 * groups + g, LANES) * h
+        way = fma(bound, smaller(part, splat(2.0, LANES)), way)
+    store(m.sums, 0, way)
+    most = total_of(m.sums, 0) + 2.0 * m.stood[r, BEYOND + near]
+    first, at = numbers_of_gap(r, steady, m)
+    for d in range(m.sizes[DRIVES]):
+        a, b = number(m.steady, first, at + 1 + 2 * d), number(m.steady, first, at + 2 + 2 * d)
+        most += (abs(a) + abs(b)) * min(abs(m.rate[which, d]) * h, 2.0)
+    most += course_way(first, at + 1 + 2 * m.sizes[DRIVES], h, m)
+    if block_groups(modes, m) > 0:
+        most = HUGE
+    m.spans[r, LEAST], m.spans[r, MOST] = m.stood[r, HERE] - most, m.stood[r, HERE] + most
+    m.spans[r, KNOWN] = 0.0
+
+
+@kernel
+def series_of(r, modes, steady, which, h, near, m):
+    """Terms of a row of gaps on [0, 1] for a step h that follows some groups of modes, to q[r]. To
+    errors[r]: what they leave out at most, of the gap and of its slope; the size of its terms.
+    """
+    groups, drives = m.sizes[MODE_GROUPS], m.sizes[DRIVES]
+    for k in range(ORDER + 1):
+        store(m.sums, k, splat(0.0, LANES))
+    rest = splat(0.0, LANES)
+    for g in range(near):
+        at = 4 * (groups * r + g)
+        part = load(m.modes, modes + 2 * groups + g, LANES) * h
+        # Re(lambda^(k+1) y) = 2 Re(lambda) Re(lambda^k y) - |lambda|^2 Re(lambda^(k-1) y)
+        twice, squared = load(m.modes, modes + g, LANES) * (2.0 * h), part * part
+        term, following = load(m.waves, at, LANES), load(m.waves, at + 2, LANES) * h
+        for k in range(ORDER + 1):
+            store(m.sums, k, load(m.sums, k, LANES) + term)
+            term, following = following, fma(twice, following, -(squared * term))
+        fourth = squared * squared
+        eighth = fourth * fourth
+        rest = fma(load(m.waves, at + 3, LANES), eighth * eighth, rest)
+    store(m.sums, ORDER + 1, rest * (1.0 / FACTORIAL))
+    store(m.sums, ORDER + 2, rest * (16.0 / FACTORIAL))
+    store(m.sums, ORDER + 3, splat(0.0, LANES))
+    add_block_series(r, modes, h, m)
+    for k in range(ORDER + 1):
+        m.q[r, k] = total_of(m.sums, k)
+    e0 = total_of(m.sums, ORDER + 1) + m.stood[r, BEYOND + near]
+    e1 = total_of(m.sums, ORDER + 2) + m.stood[r, BEYOND + groups + 1 + near] * h
+    size = total_of(m.sums, ORDER + 3) + m.stood[r, SIZE]
+    first, at = numbers_of_gap(r, steady, m)
+    m.q[r, 0] += number(m.steady, first, at)
+    for d in range(drives):
+        a, b = number(m.steady, first, at + 1 + 2 * d), number(m.steady, first, at + 2 + 2 * d)
+        cosine, sine, way = m.angle[d, 1], m.angle[d, 2], m.rate[which, d] * h
+        term, following = a * cosine - b * sine, -(a * sine + b * cosine) * way
+        squared = way * way
+        power = (squared * squared) * (squared * squared)
+        power *= power * (abs(a) + abs(b)) / FACTORIAL
+        e0, e1 = e0 + power, e1 + 16.0 * power
+        for k in range(ORDER + 1):
+            m.q[r, k] += term
+            term, following = following, -squared * term
+    size += add_course_series(r, first, at + 1 + 2 * drives, h, m)
+    share = 1.0
+    for k in range(2, ORDER + 1):
+        share /= k
+        m.q[r, k] *= share
+    m.errors[r, 0], m.errors[r, 1], m.errors[r, 2] = e0, e1, size
+    span_of(r, m)
+
+
+@kernel
+def span_of(r, m):
+    """Bernstein coefficients of a row of gaps, and what they say of it, to `spans`."""
+    rows, terms = (ORDER + 1) // LANES, ORDER + 1
+    value = m.q[r, 0]
+    low, high = splat(value, LANES), splat(value, LANES)
+    drop, rise = splat(HUGE, LANES), splat(-HUGE, LANES)
+    rises, falls, below, above = 0, 0, 0, 0
+    for i in range(rows):
+        a, b = splat(0.0, LANES), splat(0.0, LANES)
+        for k in range(min((i + 1) * LANES + 1, terms)):
+            a = fma(load(m.bernstein, k * rows + i, LANES), m.q[r, k], a)
+            b = fma(load(m.bernstein, (terms + k) * rows + i, LANES), m.q[r, k], b)
+        low, high = smaller(low, a), larger(high, a)
+        drop, rise = smaller(drop, b), larger(rise, b)
+        rises |= bits(b > 0.0) << (i * LANES)
+        falls |= bits(b < 0.0) << (i * LANES)
+        below |= bits(a < value) << (i * LANES)
+        above |= bits(a > value) << (i * LANES)
+    store(m.sums, 0, low)
+    store(m.sums, 1, -high)
+    store(m.sums, 2, drop)
+    store(m.sums, 3, -rise)
+    m.spans[r, LEAST], m.spans[r, MOST] = least_of(m.sums, 0), -least_of(m.sums, 1)
+    m.spans[r, DROP], m.spans[r, RISE] = least_of(m.sums, 2), -least_of(m.sums, 3)
+    m.spans[r, RISES], m.spans[r, FALLS] = float(rises), float(falls)
+    m.spans[r, BELOW], m.spans[r, ABOVE] = float(below), float(above)
+    last = 0.0
+    for k in range(terms):
+        last += m.q[r, k]
+    m.spans[r, FIRST], m.spans[r, LAST], m.spans[r, KNOWN] = value, last, 1.0
+
+
+@inner
+def least_of(rows, row):
+    """The least lane of a row."""
+    return min(min(rows[row, 0], rows[row, 1]), min(rows[row, 2], rows[row, 3]))
+
+
+# -- one gap over a step ---------------------------------------------------------------------------
+@inner
+def side_of(g, mode):
+    """+1 where the gap of a guard is positive, -1 where it is negative."""
+    return 1.0 if (mode >> g) & 1 else -1.0
+
+
+@inner
+def is_far(i, g, batch, m):
+    """True if the gap of a guard is clear by the bounds of its row, before its series is known."""
+    r, side = m.row_of[g], side_of(g, batch.mode[i])
+    away, up = side * m.offset[int(batch.carry[i, SET]), g], side * m.sign_of[g] > 0.0
+    least = (m.spans[r, LEAST] if up else -m.spans[r, MOST]) + away
+    noise = ROUNDED * (m.stood[r, SIZE] + abs(away))
+    return known_zeros(i, g, batch) == 0 and least > noise and least >= m.out[MARGIN]
+
+
+@kernel
+def glance(i, g, batch, m):
+    """Outcome of a gap over the step by the Bernstein coefficients of its row: CLEAR, CROSSES with
+    the place to found[g], or OPEN if more must be asked.
+    """
+    r, side = m.row_of[g], side_of(g, batch.mode[i])
+    away, sign = side * m.offset[int(batch.carry[i, SET]), g], side * m.sign_of[g]
+    error, slope_error, size = m.errors[r, 0], m.errors[r, 1], m.errors[r, 2]
+    noise, up = ROUNDED * (size + abs(away)), sign > 0.0
+    if known_zeros(i, g, batch) > 0 or sign * m.spans[r, FIRST] + away <= max(error, noise):
+        return OPEN
+    least = (m.spans[r, LEAST] if up else -m.spans[r, MOST]) + away
+    below = int(m.spans[r, BELOW] if up else m.spans[r, ABOVE])
+    rises = int(m.spans[r, RISES] if up else m.spans[r, FALLS])
+    turns = below != 0 and (rises >> lowest_bit(below)) != 0
+    if least > error + noise and (not turns or least - error >= m.out[MARGIN]):
+        return CLEAR
+    steepest = m.spans[r, RISE] if up else -m.spans[r, DROP]
+    if ORDER * steepest + slope_error < 0.0:
+        last = sign * m.spans[r, LAST] + away
+        if last - error > noise:
+            return CLEAR
+        if last + error < -noise:
+            terms_of(i, g, side, batch, m)
+            first = sign * m.spans[r, FIRST] + away
+            place_root(g, ORDER, 0.0, 1.0, first / (first - last), m)
+            return CROSSES
+    return OPEN
+
+
+@kernel
+def place_root(g, degree, low, high, guess, m):
+    """Place of a crossing in a part of the step, roughly: by a few steps of Newton's method."""
+    x = guess
+    for _ in range(3):
+        rate = slope(m.p, degree, x)
+        x = x - polynomial(m.p, degree, x) / rate if rate != 0.0 else x
+        x = min(max(x, low), high)
+    m.found[g, PLACE], m.found[g, FINAL], m.found[g, BRACKET] = x, 0.0, high
+
+
+@kernel
+def terms_of(i, g, side, batch, m):
+    """Terms of the gap of a guard on its side, on [0, 1], to p; returns its rounding error."""
+    r, sign = m.row_of[g], side * m.sign_of[g]
+    away = m.offset[int(batch.carry[i, SET]), g]
+    for k in range(ORDER + 1):
+        m.p[k] = sign * m.q[r, k]
+    m.p[0] += side * away
+    return ROUNDED * (m.errors[r, 2] + abs(away))
+
+
+@kernel
+def pieces(g, degree, fresh, error, whole, slope_error, noise, shortest, m):
+    """Outcome of a gap by the parts of its step, from the first on, as far as they tell: the whole
+    step, its halves, their halves, down to the shortest.
+    """
+    top, decided = 0, 0.0
+    m.bounds[0, 0], m.bounds[0, 1] = 0.0, 1.0
+    while top >= 0:
+        answer = judge(g, top, degree, fresh, error, whole, slope_error, noise, m)
+        if answer == CROSSES:
+            return CROSSES
+        if answer == CLEAR:
+            decided = m.bounds[top, 1]
+            top -= 1
+        elif m.bounds[top, 1] - m.bounds[top, 0] <= shortest:
+            break
+        else:
+            halve(m.bern, m.bounds, top, degree)
+            top += 1
+    if decided == 0.0:
+        return OPEN
+    m.found[g, DECIDED] = decided
+    return CLEAR
+
+
+@kernel
+def judge(g, top, degree, fresh, error, whole, slope_error, noise, m):
+    """Outcome of a gap in a part of the step, whose Bernstein coefficients are a row of `bern`: of
+    the gap over x, if it is zero where the step begins.
+    """
+    low, high, row, terms = m.bounds[top, 0], m.bounds[top, 1], top, degree
+    first = fresh and low == 0.0
+    if fresh and not first:  # times x: the gap itself
+        row, terms, error = top + 1, degree + 1, whole
+        m.bern[row, 0] = low * m.bern[top, 0]
+        for k in range(1, degree + 1):
+            part = (terms - k) * low * m.bern[top, k] + k * high * m.bern[top, k - 1]
+            m.bern[row, k] = part / terms
+        m.bern[row, terms] = high * m.bern[top, degree]
+    begin, least, turns, steepest = m.bern[row, 0], m.bern[row, 0], False, -HUGE
+    for k in range(terms):
+        change = m.bern[row, k + 1] - m.bern[row, k]
+        least = min(least, m.bern[row, k + 1])
+        turns = turns or (change > 0.0 and least < begin)
+        steepest = max(steepest, change)
+    if least > error + noise and (first or not turns or least - error >= m.out[MARGIN]):
+        return CLEAR
+    if first or not terms * steepest + slope_error * (high - low) < 0.0:
+        return OPEN
+    last = m.bern[row, terms]
+    if last - error > noise:
+        return CLEAR
+    if last + error < -noise:
+        guess = low + (high - low) * min(max(begin / (begin - last), 0.0), 1.0)
+        place_root(g, degree, low, high, guess, m)
+        return CROSSES
+    return OPEN
+
+
+@kernel
+def decide(i, g, batch, m):
+    """Outcome of a gap over the step: CLEAR over the part DECIDED, CROSSES, or OPEN: a shorter step
+    must tell. The place of a crossing goes to found[g, PLACE]; FINAL says whether that is final.
+    """
+    side = side_of(g, batch.mode[i])
+    noise = terms_of(i, g, side, batch, m)
+    error, slope_error = m.errors[m.row_of[g], 0], m.errors[m.row_of[g], 1]
+    exact, known = error <= noise, known_zeros(i, g, batch)
+    fresh, degree, whole = known > 0, ORDER - known, error
+    if fresh:
+        whole += abs(m.p[0])  # what the bounded modes add to the gap where it is zero
+        for k in range(ORDER + 1):
+            m.p[k] = m.p[k + known] if k <= degree else 0.0
+        error = slope_error
+        if known > 1 and not exact:
+            return OPEN
+        if exact and is_rounding(m.p, degree, noise):
+            m.found[g, RIDDEN] = 1.0
+            return CLEAR
+        if exact and leading_sign(m.p, degree) < 0:
+            m.found[g, PLACE], m.found[g, FINAL] = 0.0, 1.0
+            return CROSSES
+        if not exact and m.p[0] <= error:
+            return OPEN
+    elif not exact and m.p[0] <= error:
+        return OPEN
+    elif m.p[0] <= noise:
+        if m.p[0] < -noise and m.laws[g, KIND] != HOLD_LAW:
+            batch.status[i] = MODE_VIOLATION
+            return CLEAR
+        # what presses a contact at rest jumps where the state does
+        if m.p[0] < -noise or side_of_leaving(m.p, degree, False, noise) < 0:
+            m.found[g, PLACE], m.found[g, FINAL] = 0.0, 1.0
+            return CROSSES
+    to_bernstein(m.p, degree, m.bern[0])
+    shortest = 1.0 if exact else SHORTEST_PIECE
+    answer = pieces(g, degree, fresh, error, whole, slope_error, noise, shortest, m)
+    if answer != OPEN or not exact:
+        return answer
+    crosses, touched = first_crossing(
+        m.p, degree, fresh, noise, g, m.bern, m.bounds, m.slopes, m.out, m.touches,
+        min(int(m.found[0, TOUCHED]), MOST_TOUCHES - 1),
+    )  # fmt: skip
+    m.found[0, TOUCHED] = min(touched, MOST_TOUCHES - 1)
+    m.found[g, PLACE], m.found[g, FINAL] = m.out[ROOT_AT], 1.0
+    return CROSSES if crosses else CLEAR
+
+
+@kernel
+def look(i, tau, h, modes, steady, batch, m):
+    """Decide all gaps over a step: (OPEN, 0, 0) if a shorter one must tell, (CLEAR, d, 0) if no gap
+    crosses in a time d, or CROSSES with the time after tau and the guards (bits).
+    """
+    which, near = int(batch.carry[i, SET]), followed(modes, h, m)
+    margin = batch.minima[i, GAP_MARGIN]
+    follow_block(modes, h, m)
+    for r in range(m.sizes[GAP_ROWS]):
+        bound_row(r, modes, steady, which, h, near, m)
+    m.out[MARGIN], m.found[0, TOUCHED] = margin, 0.0
+    crossing, hits, first, until = 0, 0, h, 1.0
+    for g in range(m.sizes[GUARDS]):
+        m.found[g, RIDDEN], m.found[g, DECIDED] = 0.0, 1.0
+        if not is_watched(g, batch.mode[i], m):
+            continue
+        r = m.row_of[g]
+        if m.spans[r, KNOWN] == 0.0:
+            if is_far(i, g, batch, m):
+                continue
+            series_of(r, modes, steady, which, h, near, m)
+        answer = glance(i, g, batch, m)
+        if answer == OPEN:
+            answer = decide(i, g, batch, m)
+        if answer == OPEN:
+            return OPEN, 0.0, 0
+        if answer == CROSSES:
+            crossing |= 1 << g
+        until = min(until, m.found[g, DECIDED])
+    if until < 1.0 and m.out[MARGIN] != margin:
+        return OPEN, 0.0, 0
+    for g in range(m.sizes[GUARDS]):
+        if (crossing >> g) & 1:
+            d = m.found[g, PLACE] * h
+            if m.found[g, FINAL] == 0.0:
+                d = place_of(i, g, tau, h, modes, steady, batch, m)
+            together = abs(d - first) <= COINCIDENT * (batch.origin[i] + tau)
+            if hits != 0 and together:
+                hits |= 1 << g
+            elif hits == 0 or d < first:
+                hits, first = 1 << g, d
+    if first > until * h:
+        return CLEAR, until * h, 0
+    return (CROSSES if hits != 0 else CLEAR), first, hits
+
+
+# -- the place of a crossing -----------------------------------------------------------------------
+@kernel
+def place_of(i, g, tau, h, modes, steady, batch, m):
+    """Time after tau at which a gap that falls all the way crosses, by Newton's method on the modes
+    inside a shrinking bracket: each step goes to a zero of the terms up to the fourth.
+    """
+    which, side, r = int(batch.carry[i, SET]), side_of(g, batch.mode[i]), m.row_of[g]
+    sign, away = side * m.sign_of[g], side * m.offset[which, g]
+    low, high, d = 0.0, m.found[g, BRACKET] * h, m.found[g, PLACE] * h
+    noise = 2.3e-16 * (m.errors[r, 2] + abs(away))
+    cubic = m.sizes[COURSES] == 0 or m.sizes[TERMS] <= 4
+    bounded = cubic and block_groups(modes, m) == 0  # FIFTH holds all that has a fifth derivative
+    for _ in range(60):
+        drive(i, tau + d, batch, m)
+        gap_after(r, d, modes, steady, which, m)
+        value, rate = sign * m.near[0] + away, sign * m.near[1]
+        if value == 0.0:
+            break
+        if value > 0.0:
+            low = d
+        else:
+            high = d
+        way, left = -value / rate if rate < 0.0 else h, value
+        for _ in range(4):
+            bend = m.near[2] + way * (m.near[3] + way * m.near[4])
+            twist = 2.0 * m.near[2] + way * (3.0 * m.near[3] + 4.0 * way * m.near[4])
+            steep = rate + sign * way * twist
+            left = value + way * (rate + sign * way * bend)
+            if steep < 0.0 and abs(left) > 0.1 * noise:
+                way -= left / steep
+        new = d + way
+        if not low <= new <= high:
+            new, left = 0.5 * (low + high), HUGE
+        change, d = abs(new - d), new
+        square = change * change
+        left = abs(left) + m.stood[r, FIFTH] * (square * square * change) * (1.0 / 120.0)
+        if bounded and left <= noise:
+            break
+        if change <= 2.3e-16 * d or change * abs(rate) <= noise:
+            break
+    return d
+
+
+@kernel
+def gap_after(r, h, modes, steady, which, m):
+    """Terms up to the fourth of a row of gaps a time h after where the amplitudes stand, to `near`.
+    Needs `angle`.
+    """
+    groups = m.sizes[MODE_GROUPS]
+    a, b, c = splat(0.0, LANES), splat(0.0, LANES), splat(0.0, LANES)
+    d, e = splat(0.0, LANES), splat(0.0, LANES)
+    for g in range(groups):
+        at = 4 * (groups * r + g)
+        cosine, sine = factor_of(modes, g, h, m)
+        real, imaginary = load(m.waves, at, LANES), load(m.waves, at + 1, LANES)
+        real, imaginary = fma(-imaginary, sine, real * cosine), fma(imaginary, cosine, real * sine)
+        grow, size = load(m.modes, modes + g, LANES), load(m.modes, modes + 2 * groups + g, LANES)
+        turns, twice, squared = load(m.modes, modes + groups + g, LANES), 2.0 * grow, size * size
+        rate = fma(-turns, imaginary, grow * real)
+        second = fma(twice, rate, -(squared * real))
+        third = fma(twice, second, -(squared * rate))
+        a, b, c, d = a + real, b + rate, c + second, d + third
+        e = fma(twice, third, fma(-squared, second, e))
+    store(m.sums, 0, a)
+    store(m.sums, 1, b)
+    store(m.sums, 2, c)
+    store(m.sums, 3, d)
+    store(m.sums, 4, e)
+    if block_groups(modes, m) > 0:
+        move_block(modes, h, m.y, m.moved, m)
+        add_block_terms(r, modes, m.moved, m)
+    for k in range(5):
+        m.near[k] = total_of(m.sums, k)
+    first, at = numbers_of_gap(r, steady, m)
+    value, rate = steady_gap(first, at, which, m)
+    m.near[0], m.near[1] = m.near[0] + value, m.near[1] + rate
+    for j in range(m.sizes[DRIVES]):
+        u, v = number(m.steady, first, at + 1 + 2 * j), number(m.steady, first, at + 2 + 2 * j)
+        real, w = u * m.angle[j, 1] - v * m.angle[j, 2], m.rate[which, j]
+        imaginary = u * m.angle[j, 2] + v * m.angle[j, 1]
+        m.near[2] -= w * w * real
+        m.near[3] += w * w * w * imaginary
+        m.near[4] += w * w * w * w * real
+    for p in range(m.sizes[COURSES]):
+        numbers = at + 1 + 2 * m.sizes[DRIVES] + m.sizes[TERMS] * p
+        for order in range(2, 5):
+            for k in range(m.sizes[TERMS] - order):
+                part = number(m.steady, first, numbers + k) * m.record[p, VALUE + order + k]
+                m.near[order] += part
+    m.near[2], m.near[3], m.near[4] = m.near[2] / 2.0, m.near[3] / 6.0, m.near[4] / 24.0
