@@ -16,13 +16,14 @@ from saltus.flow.modal_blocks import table_of
 from saltus.flow.modal_modes import Eigen, StateModes, eigen_of, modes_of, slots_of, spread_over
 from saltus.flow.modal_parameters import ParameterTables
 from saltus.flow.modal_rows import Rows
+from saltus.flow.modal_values import ValueSet
 from saltus.kernels.modal import layout
 from saltus.kernels.status import LAW_KINDS, NO_LAW
 from saltus.language.expression import Expr, walk
 from saltus.system import System
 from saltus.system.courses import TERMS, Course, course_of
 from saltus.system.linear import LinearPiece, LinearSystem
-from saltus.system.linear_laws import Constrained, Impacts, constrained, impacts_of, rows_of
+from saltus.system.linear_laws import Constrained, constrained, impacts_of, rows_of
 from saltus.system.quantity import remembered
 
 #: Memory of the tables of one system [bytes]. Beyond it all are dropped, as soon as no trajectory
@@ -44,18 +45,6 @@ class _Equations:
     piece: LinearPiece
     eigen: Eigen
     fastest: float
-
-
-@dataclass(frozen=True)
-class ValueSet:
-    """Gaps and drives for one set of parameter values, in any contact state."""
-
-    values: dict[str, float]
-    gaps: LinearPiece
-    rates: np.ndarray
-    lags: np.ndarray
-    courses: tuple[Course, ...]
-    impacts: Impacts
 
 
 class Tables:
@@ -158,7 +147,8 @@ class Tables:
     def by(self, names: tuple[str, ...]) -> ParameterTables:
         """The derivatives with respect to some parameters."""
         if names not in self._by:
-            self._by[names] = ParameterTables(self, names)
+            widths = self.groups, self.state_groups
+            self._by[names] = ParameterTables(self.linear, names, *widths, self.sets, self.made)
         return self._by[names]
 
     def arrays(self, names: tuple[str, ...] = ()) -> tuple[np.ndarray, ...]:
