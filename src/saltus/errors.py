@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import linecache
+import re
 import traceback
 import unicodedata
 from collections.abc import Iterable
@@ -15,6 +16,8 @@ from saltus.sentences import shown as shown
 LONGEST = 2000
 #: Most names that a message lists.
 MOST_NAMES = 24
+#: Most names with successive numbers that it lists one by one.
+MOST_IN_A_ROW = 6
 
 
 class SaltusError(Exception):
@@ -164,10 +167,31 @@ def nearest(
             )
     if close := closest(name, known, cutoff):
         return f"Did you mean {close!r}?"
-    return f"Known: {_listed(known)}." if otherwise is None else otherwise
+    return f"Known: {listed(known)}." if otherwise is None else otherwise
 
 
-def _listed(names: list[str]) -> str:
-    if len(names) <= MOST_NAMES:
-        return ", ".join(names)
-    return f"{', '.join(names[: MOST_NAMES // 2])}, ..., {names[-1]} ({len(names)} in all)"
+def listed(names: Iterable[str]) -> str:
+    """Names in a row, those that are numbered one after the other by the first and the last: ``x,
+    q1 ... q40``. Shortened if there are many.
+    """
+    rows: list[list[str]] = []
+    for name in names:
+        if rows and name == _after(rows[-1][-1]):
+            rows[-1].append(name)
+        else:
+            rows.append([name])
+    words = [
+        word
+        for row in rows
+        for word in ([f"{row[0]} ... {row[-1]}"] if len(row) > MOST_IN_A_ROW else row)
+    ]
+    if len(words) <= MOST_NAMES:
+        return ", ".join(words)
+    count = sum(map(len, rows))
+    return f"{', '.join(words[: MOST_NAMES // 2])}, ..., {words[-1]} ({count} in all)"
+
+
+def _after(name: str) -> str | None:
+    """The name with the next number: ``q10_rate`` after ``q9_rate``; None if it has no number."""
+    found = re.fullmatch(r"(\D*)(\d{1,9})(\D*)", name)
+    return f"{found[1]}{int(found[2]) + 1}{found[3]}" if found else None

@@ -49,6 +49,7 @@ def test_a_run_imports_what_it_needs(start):
         "inputs",
         "inputs.axes",
         "inputs.outputs",
+        "inputs.spans",
         "inputs.starts",
         "inputs.verb",
         "dataset_parts",

@@ -114,7 +114,8 @@ def motion_values(
     states = states[..., : len(system.states)]
     if not len(system.outputs):
         return states
-    own = group.parameters if rows is None else group.parameters[rows]
+    alike = rows is None or len(group.parameters) == 1
+    own = group.parameters if alike else group.parameters[rows]
     shape = (len(own), *(1,) * (states.ndim - 2))
     # a level of a section stands behind the parameters of the system
     values = dict(zip(system.values, (one.reshape(shape) for one in own.T), strict=False))

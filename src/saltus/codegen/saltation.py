@@ -201,7 +201,7 @@ def levels_function(system: System, clocks: Clocks) -> str:
     known.lines.append(f"out[0] = {may}")
     for i, (hold, level, _) in enumerate(levels):
         code = ScalarCode(leaf, side=_bit_in("mode"), prefix=f"of{i}_", switch=clocks.side)
-        value = code.value(ex.add(level, ex.mul(_LEVEL_ROUNDING, _size_of_terms(level))))
+        value = code.value(ex.add(level, ex.mul(_LEVEL_ROUNDING, size_of_terms(level))))
         code.lines.append(f"least = {value} if {value} < least else least")
         acts = [f"if ((mode >> {hold}) & 1) == 1:", *("    " + line for line in code.lines)]
         lines += acts if hold >= 0 else code.lines
@@ -210,7 +210,7 @@ def levels_function(system: System, clocks: Clocks) -> str:
     return f"{head}{indented([*known.lines, *lines, 'out[0] = least'])}\n"
 
 
-def _size_of_terms(root: Expr) -> Expr:
+def size_of_terms(root: Expr) -> Expr:
     """The size of an expression if none of its terms cancelled."""
     sizes: dict[Expr, Expr] = {}
     for node in ex.walk(root, conditions=False):

@@ -15,6 +15,7 @@ from saltus.codegen.saltation import (
     levels_of,
     reset_function,
     settle_function,
+    size_of_terms,
 )
 from saltus.codegen.scalar import ScalarCode, indented, parameter_leaf
 from saltus.codegen.series import Linear, SeriesBuilder, is_constant
@@ -66,7 +67,9 @@ def gaps_function(system: System, clocks: Clocks) -> str:
             if guard.law.kind == "impact":
                 rough = guard.law.remaining is not None
                 pivot = guard.law.remaining if rough else ex.constant(1.0)
-            behind = (guard.law.drive, pivot, guard.law.constraint)
+            constraint = guard.law.constraint
+            sizes = () if constraint is None else map(size_of_terms, (guard.gap, constraint))
+            behind = (guard.law.drive, pivot, constraint, *sizes)
             held += [
                 f"out[{(1 + block) * count + i}] = {code.value(value)}"
                 for block, value in enumerate(behind)

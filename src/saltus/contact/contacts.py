@@ -10,7 +10,14 @@ import numpy as np
 from saltus.contact.boundaries import find_guards, relations
 from saltus.contact.declared import FACING, FRICTION, SLIP, Declared, Impact, Jump, weight
 from saltus.contact.guards import Guard, Law, bits_in, equation_of, is_hold
-from saltus.contact.reduction import Elimination, Held, held_contact, hold_gap, with_pivots
+from saltus.contact.reduction import (
+    Elimination,
+    Held,
+    held_contact,
+    hold_gap,
+    unit_force,
+    with_pivots,
+)
 from saltus.contact.singular import check_finite, check_gaps, lifted
 from saltus.contact.surfaces import (
     OnSurface,
@@ -240,6 +247,7 @@ def _held_contacts(
             ex.add(by, ex.select(Bit(holds[one.guard]), _ZERO, more)) if more is not _ZERO else by
             for by, more in zip(directions[one.contact], slides, strict=True)
         )
+    strengths = dict.fromkeys(order, _ONE)
     alone = {number: _moved_alone(number, field) for number in surfaces}
     for number in surfaces:
         if number in of_contacts:
@@ -258,7 +266,11 @@ def _held_contacts(
             else tuple(averaged(entry, number, holds[number], on_surface) for entry in direction)
             for other, direction in directions.items()
         }
-        directions[number] = surface.halves
+        strengths = {
+            other: averaged(one, number, holds[number], on_surface)
+            for other, one in strengths.items()
+        }
+        directions[number], strengths[number] = unit_force(surface.halves)
         new = held_at(free, surface, holds[number])
         field = tuple(
             ex.select(Bit(holds[number]), assuming(now, holds[number], True), before)
@@ -270,7 +282,8 @@ def _held_contacts(
     for number in order:
         constraint = laws[number].constraint
         assert constraint is not None
-        held.append(held_contact(number, holds[number], constraint, directions[number], states))
+        own = directions[number], strengths[number]
+        held.append(held_contact(number, holds[number], constraint, *own, states))
     return with_pivots(held), field
 
 

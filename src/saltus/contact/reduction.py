@@ -45,6 +45,8 @@ class Held:
         Partial derivative of w with respect to t.
     direction : tuple of Expr
         Change of the field by a unit of its force.
+    strength : Expr
+        Of a surface: the two-valued force, in that unit.
     pivot : int or None
         The state whose rate follows from the constraint, exactly.
     """
@@ -55,11 +57,17 @@ class Held:
     normal: tuple[Expr, ...]
     drift: Expr
     direction: tuple[Expr, ...]
+    strength: Expr = _ONE
     pivot: int | None = None
 
 
 def held_contact(
-    owner: int, hold: int, constraint: Expr, direction: Sequence[Expr], states: Sequence[str]
+    owner: int,
+    hold: int,
+    constraint: Expr,
+    direction: Sequence[Expr],
+    strength: Expr,
+    states: Sequence[str],
 ) -> Held:
     """A contact that can be held; its pivot is chosen later."""
     return Held(
@@ -69,7 +77,22 @@ def held_contact(
         gradient(constraint, states),
         time_derivative(constraint),
         tuple(direction),
+        strength,
     )
+
+
+def unit_force(direction: Sequence[Expr]) -> tuple[tuple[Expr, ...], Expr]:
+    """A direction as another one of parameters alone, and the strength by which that is multiplied:
+    a friction may vanish, and what it would hold is still known. As it is, with strength 1, where
+    there is none.
+    """
+    canonical = Canonical()
+    strength = next((one for one in direction if one is not _ZERO), _ONE)
+    if not ex.varies(strength):
+        return tuple(direction), _ONE
+    units = [one if one is _ZERO else canonical.share(one, strength) for one in direction]
+    known = tuple(unit for unit in units if unit is not None)
+    return (known, strength) if len(known) == len(units) else (tuple(direction), _ONE)
 
 
 def with_pivots(contacts: Sequence[Held]) -> list[Held]:
@@ -128,14 +151,15 @@ class Elimination:
 
     def own(self, contact: Held) -> tuple[Expr, Expr, tuple[Expr, ...]]:
         """(N, P, D) of a contact, with all other held contacts eliminated: the rate of its
-        constraint without its own force, the change of that rate by a unit of force, and the change
-        of the field.
+        constraint without its own force, the change of that rate by its force, and the change of
+        the field by a unit of force.
         """
         field, directions = self._without(contact)
         field = tuple(assuming(entry, contact.hold, True) for entry in field)
         direction = tuple(assuming(x, contact.hold, True) for x in directions[contact.hold])
         drive = ex.add(dot(contact.normal, field), contact.drift)
-        return drive, dot(contact.normal, direction), direction
+        strength = assuming(contact.strength, contact.hold, True)
+        return drive, ex.mul(strength, dot(contact.normal, direction)), direction
 
     def _without(
         self, left_out: Held | None

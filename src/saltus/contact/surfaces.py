@@ -161,7 +161,8 @@ def _jumps(
             at = {name: at[name] - step * one for name, one in zip(states, slope, strict=True)}
     terms = [node for node in ex.walk(jump) if node.op in ("add", "sub", "mul", "div")] or [jump]
     found, *sizes = evaluate([jump, *terms], t=t, states=at, values=values, bits=sides([jump]))
-    size = np.max([np.abs(np.broadcast_to(one, (_PLACES,))) for one in sizes], axis=0)
+    # a power of a negative depth is no number, where its piece doesn't act
+    size = np.fmax.reduce([np.abs(np.broadcast_to(one, (_PLACES,))) for one in sizes])
     with np.errstate(invalid="ignore"):
         return bool(np.any(np.abs(found) > _ROUNDING * size))
 

@@ -112,7 +112,7 @@ class ModalFlow:
                 empty((MOST_TOUCHES, 2)), empty((states, lanes)), empty((states, lanes)),
                 empty((max(drives, 1), 4)), empty((max(guards, 1), 4)),
                 empty(((terms + 2) * self.tables.block_groups, lanes)),
-                empty((max(courses, 1), layout.VALUE + layout.COURSE_TERMS)),
+                empty((max(courses, 1), layout.VALUE + self.tables.linear.terms)),
                 empty((2 * groups, lanes)), empty((amplitudes, lanes)), empty((size, columns)),
                 empty((3, size)),
             )  # fmt: skip
@@ -135,6 +135,13 @@ class ModalFlow:
         """The same for trajectories with one set of parameter values."""
         given, state = self.tables.sets[which], batch.state[who, : self._states]
         time = batch.origin[who] + batch.count[who] * batch.period[who] + batch.phase[who]
+        earliest = max((course.earliest for course in given.courses), default=-np.inf)
+        if (time < earliest).any():
+            raise ParameterError(
+                f"a motion begins at {time.min():g} s, and sl.Modal knows a drive of "
+                f"{self.tables.linear.system.name} from {earliest:g} s on: ask for "
+                f"method=sl.Taylor(), or begin later."
+            )
         drives = np.column_stack(
             [
                 np.cos(given.rates * time[:, None] + given.lags),
@@ -217,7 +224,8 @@ class ModalFlow:
         waves = np.exp(1j * (given.rates * time + given.lags)) * (1j * given.rates) ** orders
         courses = np.zeros((WAYS + 1, len(given.courses)))
         for p, course in enumerate(given.courses):
-            courses[: layout.COURSE_TERMS, p] = course.at(np.array(time))
+            known = course.at(np.array(time))[: WAYS + 1]
+            courses[: len(known), p] = known
         return np.hstack([waves.real, courses]), np.hstack([np.abs(waves), np.abs(courses)])
 
 

@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from saltus.flow.modal_eigen import ROUNDING
+
 #: Most that rounding may be multiplied by: 2^10 * 2.2e-16 = 2.3e-13 of the motion.
 MOST_LOSS = 2.0**10
 #: The same for each of two modes that coincide: their losses are multiplied.
@@ -14,8 +16,6 @@ MOST_LOSS_OF_TWO = 2.0**5
 #: Times that the slowest pair of modes may be slower than the fastest: its amplitudes hold speeds
 #: over its rate, and its vectors rounding of the others.
 MOST_SPREAD = 2.0**14
-#: Rounding of an eigenvalue, in units of the largest.
-ROUNDING = 64 * 2.220446049250313e-16
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class ModalLoads:
     ----------
     rates : float64[1 + D]
         Of the constant, 0, and of the harmonic drives [rad/s].
-    speeds : float64[C, 4]
+    speeds : float64[C, K]
         Derivatives of the courses, in units of their values.
     loads : float64[N, 1 + D + C]
         Their factors in the equations.
@@ -141,7 +141,7 @@ def _generator(drive: int, speed: float, acts: ModalLoads) -> np.ndarray:
         return np.zeros((1, 1))
     if drive < len(acts.rates):
         return np.array([[0.0, -1.0], [1.0, 0.0]]) * float(acts.rates[drive])
-    return np.array(speed * np.eye(4, k=1))
+    return np.array(speed * np.eye(acts.speeds.shape[1], k=1))
 
 
 def _speed(speeds: np.ndarray) -> float:
@@ -170,9 +170,10 @@ def _answer(
         away = 1j * acts.rates[drive] * np.eye(len(load)) - space.matrix
         answers[:, drive] += space.right @ np.linalg.solve(away, load)
         return
-    for k in range(4):
+    terms = acts.speeds.shape[1]
+    for k in range(terms):
         load = np.linalg.solve(space.matrix, load) * (-1.0 if k == 0 else 1.0)
-        answers[:, harmonic + 4 * (drive - harmonic) + k] += space.right @ load
+        answers[:, harmonic + terms * (drive - harmonic) + k] += space.right @ load
 
 
 def _limit(matrix: np.ndarray) -> float:

@@ -16,20 +16,25 @@ from saltus.flow.modal_blocks import (
     MOST_LOSS,
     MOST_LOSS_OF_TWO,
     MOST_SPREAD,
-    ROUNDING,
     Block,
     ModalLoads,
     Subspace,
     block_of,
     loss_of,
 )
+from saltus.flow.modal_eigen import (
+    ROUNDING,
+    Eigen,
+    both_of_each_pair,
+    eigen_of,
+    one_of_each_pair,
+    slots_of,
+)
 from saltus.system.linear import LinearPiece
 from saltus.system.linear_laws import Constrained
 
 #: Rate of growth that is none, in units of the largest eigenvalue.
 NO_GROWTH = 1e-12
-#: Eigenvalues, eigenvectors, and the inverse of these.
-Eigen = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -39,10 +44,11 @@ class StateModes:
     Attributes
     ----------
     values, vectors, inverse : complex128[M], complex128[N, M], complex128[M, N]
-        Eigenvalues [1/s], V and L of the modes that go their own ways.
+        Eigenvalues [1/s], V and L of the modes that go their own ways: of each pair the one that
+        :func:`slots_of` keeps.
     block : Block or None
         Those that don't.
-    answers : complex128[N, 1 + D + 4 * C]
+    answers : complex128[N, 1 + D + K * C]
         Steady answers to the constant, to each harmonic drive, and to each derivative of each
         course, as far as they aren't in the block.
     """
@@ -71,19 +77,18 @@ def modes_of(
         Its equations; the gaps.
     rates : float64[D]
         Rates of the harmonic drives [rad/s].
-    speeds : float64[C, 4]
+    speeds : float64[C, K]
         Derivatives of the courses, in units of their values [1/s^k].
     most : int
         Modes that may go their own ways; of a pair one counts.
     eigen : tuple
-        :func:`eigen_of` the matrix.
+        :func:`saltus.flow.modal_eigen.half_of` the matrix.
     fastest : float
         Size of the largest eigenvalue of other contact states [1/s]: they tell how slow a mode is.
     """
-    values, vectors, inverse = eigen
-    if not len(values):  # contacts at rest hold all states
-        answers = np.zeros((0, 1 + len(rates) + 4 * len(speeds)), complex)
-        return StateModes(values, vectors, inverse, None, answers)
+    if not len(eigen[0]):  # contacts at rest hold all states
+        return StateModes(*eigen, None, np.zeros((0, 1 + len(rates) + speeds.size), complex))
+    whole = both_of_each_pair(eigen)
     every = np.concatenate([[0.0], rates])
     acts = ModalLoads(
         every,
@@ -91,17 +96,16 @@ def modes_of(
         np.column_stack([piece.constant, piece.driven]),
         gaps.matrix,
         gaps.constant,
-        float(max(np.abs(values).max(), np.abs(every).max())),
+        float(max(np.abs(eigen[0]).max(), np.abs(every).max())),
         fastest,
     )
-    if not _together(values, vectors, inverse, acts).any() and len(slots_of(values)) <= most:
-        return StateModes(values, vectors, inverse, None, _answers(values, vectors, inverse, acts))
-    spaces, values, vectors, inverse = _parted(piece.matrix, acts, most)
-    answers = _answers(values, vectors, inverse, acts)
+    if not _together(*whole, acts).any() and len(eigen[0]) <= most:
+        return StateModes(*eigen, None, _answers(*whole, acts))
+    spaces, whole = _parted(piece.matrix, acts, most)
+    eigen, answers = one_of_each_pair(whole), _answers(*whole, acts)
     if not spaces:  # states that the equations keep apart aren't mixed any more
-        return StateModes(values, vectors, inverse, None, answers)
-    block, answers = block_of(spaces, acts, answers)
-    return StateModes(values, vectors, inverse, block, answers)
+        return StateModes(*eigen, None, answers)
+    return StateModes(*eigen, *block_of(spaces, acts, answers))
 
 
 def spread_over(modes: StateModes, free: Constrained, drives: int) -> StateModes:
@@ -109,59 +113,20 @@ def spread_over(modes: StateModes, free: Constrained, drives: int) -> StateModes
     drives.
     """
     states, harmonic = len(free.spread), 1 + drives
+    courses = free.base.shape[1] - harmonic
     inverse = np.zeros((len(modes.values), states), complex)
     inverse[:, free.kept] = modes.inverse
     answers = free.spread @ modes.answers
     answers[:, :harmonic] += free.base[:, :harmonic]
-    answers[:, harmonic::4] += free.base[:, harmonic:]
+    if courses:
+        terms = (answers.shape[1] - harmonic) // courses
+        answers[:, harmonic::terms] += free.base[:, harmonic:]
     block = modes.block
     if block is not None:
         left = np.zeros((len(block.matrix), states))
         left[:, free.kept] = block.left
         block = replace(block, right=free.spread @ block.right, left=left)
     return StateModes(modes.values, free.spread @ modes.vectors, inverse, block, answers)
-
-
-def slots_of(values: np.ndarray) -> np.ndarray:
-    """Indices of one of each pair of complex eigenvalues and of all real ones, ascending by
-    size.
-    """
-    kept = np.flatnonzero(values.imag >= 0)
-    return kept[np.argsort(np.abs(values[kept]), kind="stable")]
-
-
-def eigen_of(matrix: np.ndarray) -> Eigen:
-    """Eigenvalues, eigenvectors and the inverse of these, large where they coincide."""
-    values, vectors = np.linalg.eig(matrix)
-    inverse = _real_inverse(values, vectors)
-    if inverse is not None:
-        return values, vectors, inverse
-    size = np.maximum(np.abs(vectors).max(axis=1, keepdims=True), ROUNDING)
-    left, parts, right = np.linalg.svd(vectors / size)
-    least = np.maximum(parts, ROUNDING * parts[0])
-    return values, vectors, (right.conj().T / least) @ left.conj().T / size.T
-
-
-def _real_inverse(values: np.ndarray, vectors: np.ndarray) -> np.ndarray | None:
-    """The inverse of eigenvectors of a real matrix, computed by their real and imaginary parts,
-    four times as cheap; None if they nearly coincide.
-    """
-    pairs = np.flatnonzero(values.imag > 0)  # LAPACK has the conjugate behind each
-    parts = vectors.real.copy()
-    parts[:, pairs + 1] = vectors[:, pairs].imag
-    try:
-        back = np.linalg.inv(parts)
-    except np.linalg.LinAlgError:
-        return None
-    # of columns that are 1 at most
-    losses = np.abs(parts).max(axis=0, initial=0.0) * np.abs(back).max(axis=1, initial=0.0)
-    if not losses.max(initial=0.0) < 1 / ROUNDING:
-        return None
-    back += back @ (np.eye(len(parts)) - parts @ back)
-    inverse = back.astype(complex)
-    inverse[pairs] = (back[pairs] - 1j * back[pairs + 1]) / 2
-    inverse[pairs + 1] = inverse[pairs].conj()
-    return inverse
 
 
 def _together(
@@ -194,7 +159,7 @@ def _together(
 def _answers(
     values: np.ndarray, vectors: np.ndarray, inverse: np.ndarray, acts: ModalLoads
 ) -> np.ndarray:
-    """Steady answers of modes that go their own ways: complex128[N, 1 + D + 4 * C]."""
+    """Steady answers of modes that go their own ways: complex128[N, 1 + D + K * C]."""
     harmonic = len(acts.rates)
     far = 1j * acts.rates[:, None] - values[None]
     parts = inverse @ acts.loads
@@ -203,7 +168,7 @@ def _answers(
             parts[:, :harmonic] == 0, 0, parts[:, :harmonic] / far.T
         )
         # -A^-(k+1) B of the k-th derivative
-        powers = -((1 / values[:, None]) ** np.arange(1, 5))
+        powers = -((1 / values[:, None]) ** np.arange(1, acts.speeds.shape[1] + 1))
         courses = [
             vectors @ np.where(part[:, None] == 0, 0, part[:, None] * powers)
             for part in parts.T[harmonic:]
@@ -212,9 +177,7 @@ def _answers(
 
 
 # -- parting -----------------------------------------------------------------------------------
-def _parted(
-    matrix: np.ndarray, acts: ModalLoads, most: int
-) -> tuple[list[Subspace], np.ndarray, np.ndarray, np.ndarray]:
+def _parted(matrix: np.ndarray, acts: ModalLoads, most: int) -> tuple[list[Subspace], Eigen]:
     """Subspaces whose modes go together, and the other modes. States that the equations keep apart
     stay apart: a rigid body isn't rounded by the stiffest mode.
     """
@@ -236,8 +199,7 @@ def _parted(
         inverse = np.zeros((len(modes[0]), size), complex)
         vectors[one], inverse[:, one] = modes[1], modes[2]
         found.append((modes[0], vectors, inverse))
-    return (
-        spaces,
+    return spaces, (
         np.concatenate([one[0] for one in found]),
         np.concatenate([one[1] for one in found], axis=1),
         np.concatenate([one[2] for one in found]),

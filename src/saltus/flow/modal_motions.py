@@ -11,7 +11,6 @@ import numpy as np
 from saltus.contact.guards import Guard
 from saltus.flow.maps import Stroboscope
 from saltus.flow.modal import Modal, modal_flow
-from saltus.flow.modal_modes import slots_of
 from saltus.flow.modal_tables import Tables
 from saltus.flow.request import Outcome
 from saltus.flow.waves import WaveLegs
@@ -147,16 +146,15 @@ def _waves_of(
     if modes.block is not None:
         return None
     asked = tables.linear.rows(quantities, given.values, mode)
-    kept, size = slots_of(modes.values), len(modes.vectors)
-    weight = np.where(modes.values[kept].imag > 0, 2.0, 1.0)
+    size, weight = len(modes.vectors), np.where(modes.values.imag > 0, 2.0, 1.0)
     rows = np.vstack([np.eye(size), asked.matrix, given.gaps.matrix])
     direct = np.zeros((len(rows), modes.answers.shape[1]))
     direct[size:, 0] = np.append(asked.constant, given.gaps.constant)
     direct[size:, 1:] = np.vstack([asked.driven, given.gaps.driven])
     return _Waves(
-        np.concatenate([modes.values[kept], [0.0], 1j * given.rates]),
-        np.hstack([rows @ (modes.vectors[:, kept] * weight), rows @ modes.answers + direct]),
-        modes.inverse[kept],
+        np.concatenate([modes.values, [0.0], 1j * given.rates]),
+        np.hstack([rows @ (modes.vectors * weight), rows @ modes.answers + direct]),
+        modes.inverse,
         modes.answers,
         given.rates,
         given.lags,

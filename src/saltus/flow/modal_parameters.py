@@ -18,7 +18,8 @@ import numpy as np
 from saltus.codegen.module import MODAL_LANES as LANES
 from saltus.contact.guards import is_hold
 from saltus.flow.modal_blocks import MOST_LOSS, MOST_SPREAD
-from saltus.flow.modal_modes import StateModes, slots_of
+from saltus.flow.modal_eigen import both_of_each_pair
+from saltus.flow.modal_modes import StateModes
 from saltus.flow.modal_rows import Rows
 from saltus.flow.modal_values import ValueSet
 from saltus.language import expression as ex
@@ -164,17 +165,18 @@ def slopes_of(
         block, or are so slow that a constant force moves them without end.
     """
     every, changes = np.append(0.0, rates), np.append(0.0, slow)
+    values, vectors, inverse = both_of_each_pair((modes.values, modes.vectors, modes.inverse))
     loads = np.column_stack([piece.constant, piece.driven]) + piece.matrix @ modes.answers
-    loads = modes.inverse @ (loads - 1j * changes * modes.answers)
-    sizes = np.abs(modes.values)[:, None]
-    far = 1j * every - modes.values[:, None]
+    loads = inverse @ (loads - 1j * changes * modes.answers)
+    sizes = np.abs(values)[:, None]
+    far = 1j * every - values[:, None]
     scale = max(sizes.max(initial=0.0), np.abs(every).max())
     lost = MOST_LOSS * np.abs(far) <= np.maximum(np.abs(every), sizes)
     lost[:, 0] |= MOST_SPREAD * sizes[:, 0] <= scale
     if modes.block is not None or (lost & (loads != 0)).any():
         return np.full(modes.answers.shape, np.nan, complex)
     with np.errstate(all="ignore"):
-        answers: np.ndarray = modes.vectors @ np.where(loads == 0, 0, loads / far)
+        answers: np.ndarray = vectors @ np.where(loads == 0, 0, loads / far)
     return answers
 
 
@@ -185,13 +187,11 @@ def mixing_of(matrix: np.ndarray, modes: StateModes, groups: int) -> np.ndarray:
     e^(lambda h) (Higham, Functions of Matrices (2008), theorem 3.9). For each kept mode k: by
     groups of modes j the real and the imaginary part of G_jk, then those for its complex partner.
     """
-    kept = slots_of(modes.values)
+    count, paired = len(modes.values), modes.values.imag > 0
     mixed = np.zeros((2, LANES * groups, LANES * groups), complex)
-    vectors = modes.vectors[:, kept]
-    paired = modes.values[kept].imag > 0
-    left = modes.inverse[kept] @ matrix
-    mixed[0, : len(kept), : len(kept)] = left @ vectors
-    mixed[1, : len(kept), : len(kept)] = left @ (vectors.conj() * paired)
+    left = modes.inverse @ matrix
+    mixed[0, :count, :count] = left @ modes.vectors
+    mixed[1, :count, :count] = left @ (modes.vectors.conj() * paired)
     parts = np.stack([mixed[0].real, mixed[0].imag, mixed[1].real, mixed[1].imag])
     # [part, j, k] -> [k, group, part, lane]
     return parts.reshape(4, groups, LANES, -1).transpose(3, 1, 0, 2).reshape(-1, LANES)

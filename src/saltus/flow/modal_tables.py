@@ -13,7 +13,8 @@ import numpy as np
 from saltus.codegen.module import MODAL_LANES as LANES
 from saltus.contact.guards import is_hold
 from saltus.flow.modal_blocks import table_of
-from saltus.flow.modal_modes import Eigen, StateModes, eigen_of, modes_of, slots_of, spread_over
+from saltus.flow.modal_eigen import Eigen, half_of, slots_of
+from saltus.flow.modal_modes import StateModes, modes_of, spread_over
 from saltus.flow.modal_parameters import ParameterTables
 from saltus.flow.modal_rows import Rows
 from saltus.flow.modal_values import ValueSet
@@ -21,7 +22,7 @@ from saltus.kernels.modal import layout
 from saltus.kernels.status import LAW_KINDS, NO_LAW
 from saltus.language.expression import Expr, walk
 from saltus.system import System
-from saltus.system.courses import TERMS, Course, course_of
+from saltus.system.courses import Course, course_of
 from saltus.system.linear import LinearPiece, LinearSystem
 from saltus.system.linear_laws import Constrained, constrained, impacts_of, rows_of
 from saltus.system.quantity import remembered
@@ -38,8 +39,8 @@ ROUNDED = 16 * np.finfo(float).eps
 
 @dataclass(frozen=True)
 class _Equations:
-    """The equations of a contact state, the eigenvalues and -vectors of their matrix, and the
-    fastest eigenvalue of other states [1/s]: the same for all rates of the drives.
+    """The equations of a contact state, one of each pair of eigenvalues and -vectors of their
+    matrix, and the fastest eigenvalue of other states [1/s]: the same for all rates of the drives.
     """
 
     piece: LinearPiece
@@ -81,10 +82,10 @@ class Tables:
         self.groups, self.state_groups = -(-slots // LANES), -(-n // LANES)
         drives = len(linear.drives)
         courses = len(linear.courses)
-        self.block_groups = -(-(n + 1 + 2 * drives + TERMS * courses) // LANES)
+        self.block_groups = -(-(n + 1 + 2 * drives + linear.terms * courses) // LANES)
         self.rows = 2 * self.groups + self.block_groups
         counts = n, self.groups, self.state_groups, rows, guards, drives, self.rows, courses
-        self.sizes = np.array([*counts, 0, len(self._remembers)], np.int64)
+        self.sizes = np.array([*counts, 0, len(self._remembers), linear.terms], np.int64)
 
     def clear(self) -> None:
         """Drop all sets and contact states: their numbers are of a new generation. Arrays that
@@ -107,7 +108,7 @@ class Tables:
         drives, guards = max(len(self.linear.drives), 1), len(self.linear.system.guards)
         self._offset, self._rate, self._lag = Rows(max(guards, 1)), Rows(drives), Rows(drives)
         self._links = Rows(layout.BEHIND + guards, int)
-        self._course = Rows(max(4 * len(self.linear.courses), 1))
+        self._course = Rows(max(5 * len(self.linear.courses), 1))
         states = len(self.linear.states)
         width = states + 1 + len(self.linear.drives) + len(self.linear.courses)
         self._acts, self._presses = Rows(2 * width + states + 1), Rows(width)
@@ -206,10 +207,10 @@ class Tables:
         asked = [one.payload for one in walk(node) if one.op == "param"]
         key = (node, np.array([values[name] for name in asked]).tobytes())
         if key not in self._courses:
-            course = course_of(node, values)
+            course = course_of(node, values, self.linear.terms)
             begins = np.concatenate([course.begins, np.zeros(-len(course.begins) % LANES)])
             first = self.pieces.add(np.concatenate([begins, course.terms.ravel()]))
-            row = [first, len(course.begins), course.cycle, len(begins) // LANES]
+            row = [first, len(course.begins), course.cycle, len(begins) // LANES, course.tail]
             self._courses[key] = course, row
             self._held += course.begins.nbytes + course.terms.nbytes
         return self._courses[key]
@@ -253,7 +254,7 @@ class Tables:
         self, known: _Equations, given: ValueSet, shown: LinearPiece, free: Constrained
     ) -> StateModes:
         """The modes of a contact state, of those states that contacts at rest allow."""
-        speeds = np.array([one.speeds for one in given.courses]).reshape(-1, TERMS)
+        speeds = np.array([one.speeds for one in given.courses]).reshape(-1, self.linear.terms)
         held = len(free.kept) < len(free.spread)
         piece, gaps = (
             (free.reduced(known.piece), free.seen(shown)) if held else (known.piece, shown)
@@ -278,9 +279,11 @@ class Tables:
         if key not in self._equations:
             piece = self.piece_of(given, mode)
             fastest = self._fastest(given, used) if piece.constant.any() else 0.0
-            eigen = eigen_of(piece.matrix[free.kept] @ free.spread)
+            eigen = half_of(piece.matrix[free.kept] @ free.spread)
             self._equations[key] = _Equations(piece, eigen, fastest)
-            self._held += 8 * piece.matrix.nbytes
+            self._held += piece.matrix.nbytes + 2 * sum(
+                one.nbytes for one in eigen
+            )  # at most two copies
         return self._equations[key]
 
     def _fastest(self, given: ValueSet, used: tuple[float, ...]) -> float:
@@ -312,17 +315,15 @@ class Tables:
 
     def _table(self, modes: StateModes, gaps: np.ndarray) -> np.ndarray:
         """The table of some modes: lambda, its size, L, V, amplitudes of the gaps; the block."""
-        values, vectors, inverse = modes.values, modes.vectors, modes.inverse
-        slots, states = slots_of(values), len(vectors)
+        values, states, slots = modes.values, len(modes.vectors), len(modes.values)
         width, count = LANES * self.groups, LANES * self.state_groups
-        weight = np.where(values[slots].imag > 0, 2.0, 1.0)
+        weight = np.where(values.imag > 0, 2.0, 1.0)
         lam, size = np.zeros(width, complex), np.zeros(width)
-        lam[: len(slots)] = values[slots]
-        size[: len(slots)] = np.abs(values[slots])
-        size[len(slots) :] = size[: len(slots)].max(initial=0.0)
+        lam[:slots], size[:slots] = values, np.abs(values)
+        size[slots:] = size[:slots].max(initial=0.0)
         to_modes, to_states = np.zeros((width, count), complex), np.zeros((count, width), complex)
-        to_modes[: len(slots), :states] = inverse[slots]
-        to_states[:states, : len(slots)] = vectors[:, slots] * weight
+        to_modes[:slots, :states] = modes.inverse
+        to_states[:states, :slots] = modes.vectors * weight
         # L: by groups of modes, real parts then imaginary ones, each for all states
         left = to_modes.reshape(self.groups, LANES, count).transpose(0, 2, 1)
         left = np.concatenate([left.real, left.imag])
@@ -342,13 +343,13 @@ class Tables:
         harmonic drive, to each derivative of each course.
         """
         harmonic, first = 1 + len(given.rates), self.first_guard
-        answers = modes.answers.T  # [1 + drives + TERMS * courses, N]
+        answers = modes.answers.T  # [1 + drives + terms * courses, N]
         padded = np.zeros((len(answers), LANES * self.state_groups), complex)
         padded[:, : answers.shape[1]] = answers
         gaps = shown.matrix[first] @ answers.T
         gaps[:, 0] += np.where(self.holds, shown.constant, 0.0)[first]
         gaps[:, 1:harmonic] += shown.driven[first, : harmonic - 1]
-        gaps[:, harmonic::TERMS] += shown.driven[first, harmonic - 1 :]
+        gaps[:, harmonic :: self.linear.terms] += shown.driven[first, harmonic - 1 :]
         # only the harmonic ones have an imaginary part
         states = [padded[0].real]
         numbers = [gaps[:, 0].real]

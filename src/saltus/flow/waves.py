@@ -33,7 +33,7 @@ SLOW = 1.0
 FEW_SHARE, FEW = 0.03, 1024
 #: Legs int64[m], quantities int64[m], middles float64[m] and half lengths float64[m] [s].
 Intervals = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-#: Whether quantities int64[m] whose values are float64[m], or differ by float64[m] at most, are
+#: True where quantities int64[m] whose values are float64[m], or differ by float64[m] at most, are
 #: looked for, bool[m].
 Wanted = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 
@@ -218,12 +218,12 @@ def _open(one: WaveLegs, leg: np.ndarray, found: np.ndarray, wanted: Wanted) -> 
 
 
 def _reach(one: WaveLegs, half: np.ndarray) -> np.ndarray:
-    """How far waves go in half lengths float64[m], float64[m, E] [rad]."""
+    """Angles that waves go in half lengths float64[m], float64[m, E] [rad]."""
     return np.asarray(np.abs(one.rates) * half[:, None])
 
 
 def _remainder(reach: np.ndarray) -> np.ndarray:
-    """What is left of waves of unit size that are followed by their slope, or not at all."""
+    """Remainder of waves of unit size that are followed by their slope, or not at all."""
     return np.where(reach < 1.0, 0.5 * reach**2, 1.0)
 
 
@@ -273,7 +273,8 @@ def _turns(
     one: WaveLegs, at: Intervals, wanted: Wanted | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """As :func:`turns`, in some intervals."""
-    once, block = [tuple(each[:0] for each in at)], max(1, HELD // (8 * len(one.rates)))
+    once: list[tuple[np.ndarray, ...]] = [tuple(each[:0] for each in at)]
+    block = max(1, HELD // (8 * len(one.rates)))
     for _ in range(DEEPEST):
         ahead = []
         for first in range(0, len(at[0]), block):
@@ -288,7 +289,8 @@ def _turns(
             ahead.append(_halves(*(each[on] for each in part)))
         if not any(len(part[0]) for part in ahead):
             break
-        at = tuple(np.concatenate(each) for each in zip(*ahead, strict=True))
+        leg, row, middle, half = (np.concatenate(each) for each in zip(*ahead, strict=True))
+        at = leg, row, middle, half
     leg, row, middle, half = (np.concatenate(each) for each in zip(*once, strict=True))
     return _zeros(one, leg, row, middle - half, middle + half)
 

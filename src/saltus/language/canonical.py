@@ -10,7 +10,7 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Any
 
-from saltus.language.expression import Expr, walk
+from saltus.language.expression import Expr, constant, mul, parameter, power, walk
 from saltus.language.roots import with_root
 
 #: A monomial: numbers of atoms with their exponents.
@@ -64,6 +64,25 @@ class Canonical:
                 if key[0] == "state" and moving[0] == frozenset([(number, 1)]):
                     return key[1], float(polynomial[moving[0]])
         return None, 0.0
+
+    def share(self, a: Expr, b: Expr) -> Expr | None:
+        """c in ``a = c b``, a number times powers of parameters; None if there is none."""
+        first, second = self.polynomial(a), self.polynomial(b)
+        factor = common_factor(first, second)
+        if factor is None:
+            return None
+        names = {number: key for key, number in self._atoms.items()}
+        whole = {_merged(monomial, factor): value for monomial, value in second.items()}
+        if proportion(first, whole) == 0:
+            return None
+        monomial = next(iter(first))
+        found = constant(float(first[monomial] / whole[monomial]))
+        for atom, exponent in sorted(factor):
+            kind, name = names[atom][:2]
+            if kind != "param":
+                return None
+            found = mul(found, power(parameter(name), float(exponent)))
+        return found
 
     # -- one node ----------------------------------------------------------------------------------
     def _normal(self, node: Expr) -> Polynomial:
@@ -164,20 +183,27 @@ def proportion(a: Polynomial, b: Polynomial) -> int:
     return 1 if first > 0 else -1
 
 
-def is_multiple(a: Polynomial, b: Polynomial) -> bool:
-    """True if ``a = m b`` with a monomial m: a gap times, or over, quantities that it doesn't
-    hold.
-    """
+def common_factor(a: Polynomial, b: Polynomial) -> Monomial | None:
+    """The monomial m if there is a number c with ``a = c m b``; None if there can't be one."""
     if len(a) != len(b) or not a:
-        return False
+        return None
     apart: dict[int, int] = {}  # exponents in all of a, less those in all of b: len(a) times m
     for polynomial, sign in ((a, 1), (b, -1)):
         for monomial in polynomial:
             for atom, exponent in monomial:
                 apart[atom] = apart.get(atom, 0) + sign * exponent
     if any(exponent % len(a) for exponent in apart.values()):
+        return None
+    return frozenset((atom, total // len(a)) for atom, total in apart.items() if total)
+
+
+def is_multiple(a: Polynomial, b: Polynomial) -> bool:
+    """True if ``a = m b`` with a monomial m: a gap times, or over, quantities that it doesn't
+    hold.
+    """
+    factor = common_factor(a, b)
+    if factor is None:
         return False
-    factor = frozenset((atom, total // len(a)) for atom, total in apart.items() if total)
     atoms = {atom for monomial in b for atom, _ in monomial}
     if not all(exponent > 0 or atom not in atoms for atom, exponent in factor):
         return False

@@ -5,6 +5,7 @@ breaks follow from their parameters by a formula, so steps end there and nothing
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -187,8 +188,8 @@ class Record:
 
 
 def recorded(
-    times: Any,
-    values: Any,
+    times: Sequence[float] | np.ndarray,
+    values: Sequence[float] | np.ndarray,
     unit: str = "",
     *,
     time_unit: str = "s",

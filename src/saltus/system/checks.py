@@ -11,7 +11,7 @@ from saltus.contact.declared import outside, pushes_on
 from saltus.contact.dry_friction import drives, sticks_less
 from saltus.contact.guards import Law
 from saltus.contact.overlaps import overlapping
-from saltus.errors import ParameterError, TraceError
+from saltus.errors import ParameterError, TraceError, listed
 from saltus.language.evaluate import evaluate
 from saltus.language.expression import varies
 from saltus.system.equations_of_motion import EquationsOfMotion
@@ -125,7 +125,7 @@ def point(system: EquationsOfMotion, t: Any, y: Any) -> tuple[np.ndarray, np.nda
     ParameterError
         If they are something else.
     """
-    known = ", ".join(system.states)
+    known = listed(system.states)
     try:
         time, states = (np.asarray(given, dtype=np.float64) for given in (t, y))
     except (TypeError, ValueError, OverflowError):

@@ -20,7 +20,7 @@ from saltus.language import expression as ex
 from saltus.language.derivatives import differentiate
 from saltus.language.evaluate import evaluate
 from saltus.language.expression import Expr
-from saltus.system.courses import reason_against
+from saltus.system.courses import TERMS, reason_against, terms_of
 from saltus.system.periodic import rate_of
 from saltus.system.quantity import is_remembered, remembered
 from saltus.system.system import System
@@ -93,6 +93,11 @@ class LinearSystem:
     def states(self) -> tuple[str, ...]:
         """The states that the equations move: those that hold past values left out."""
         return self.system.states[: len(self._field)]
+
+    @functools.cached_property
+    def terms(self) -> int:
+        """Coefficients of the pieces of its courses."""
+        return max((terms_of(node) for node in self.courses), default=TERMS)
 
     @functools.cached_property
     def _driving(self) -> tuple[str, ...]:
@@ -282,15 +287,15 @@ def linear_pieces(system: System) -> LinearSystem | str:
     gaps = tuple(guard.gap for guard in system.guards)
     drives, courses = dict[Expr, Drive](), dict[Expr, None]()
     for node in _driving(*system.field[:size], *gaps, *laws):
-        if node.op in ("sin", "cos"):
-            rate = rate_of(node.args[0])
-            if rate is None:
-                return "a sine in it isn't one of a rate times the time"
+        rate = rate_of(node.args[0]) if node.op in ("sin", "cos") else None
+        if rate is not None:
             phase = ex.substituted(node.args[0], {ex.TIME: ex.constant(0.0)})
             if ex.depends_on(phase, ("state",)):
                 return "the phase of a sine in it depends on the state"
             drives[node] = Drive(rate, phase, -math.pi / 2 if node.op == "sin" else 0.0)
-        elif reason := reason_against(node):
+        elif node.bits or ex.depends_on(node, ("state",)):
+            return "a sine in it isn't one of the time alone"
+        elif reason := reason_against(node, system.values):
             return reason
         else:
             courses[node] = None

@@ -16,7 +16,7 @@ from saltus.contact.boundaries import join_guards
 from saltus.contact.guards import Guard, bits_in
 from saltus.contact.singular import lifted
 from saltus.contact.surfaces import with_held_signs
-from saltus.errors import TraceError, nearest, shown
+from saltus.errors import MOST_IN_A_ROW, TraceError, nearest, shown
 from saltus.language.expression import TIME, Expr, as_expr, parameter, state
 from saltus.system.equations_of_motion import EquationsOfMotion
 from saltus.system.explained import explained, place
@@ -96,7 +96,7 @@ def called(
     :func:`quantity` does.
     """
     if not callable(function) or isinstance(function, EquationsOfMotion):
-        names = ", ".join(("t", *_own_states(system)))
+        names = ", ".join(("t", *_own_states(system)[:MOST_IN_A_ROW]))
         raise TraceError(
             f"{what} must be a function such as `lambda {names}: ...`, not {shown(function)}. "
             f"Parameters are further arguments, by name."

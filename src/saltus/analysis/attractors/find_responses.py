@@ -114,13 +114,15 @@ def find_responses(
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
     result: SettledMotions | None = None,
+    then: Callable[[np.ndarray, SettledMotions], None] | None = None,
 ) -> SettledMotions:
     """Find the motion that each trajectory settles to. Start i, of float64[k, D], takes row i of
     the map and is followed for ``most`` iterates at most.
 
     What is known when Ctrl-C ends it stands in ``result``, if that is given. The result doesn't
     depend on the other trajectories, nor on threads. ``progress`` counts trajectories, and of each
-    the stages that it went through.
+    the stages that it went through. ``then`` is called with the rows int64[m] of trajectories that
+    were followed together and what they settled to, on the thread that followed them.
     """
     result = SettledMotions.empty(*start.shape) if result is None else result
     pieces = _pieces(len(start), start.shape[1], threads or usable_processors())
@@ -130,6 +132,8 @@ def find_responses(
         piece = pieces[number]
         try:
             _settle(map_.rows(piece, threads=1), start[piece], most, parts[number])
+            if then is not None:
+                then(piece, parts[number])
             parts[number].share[:] = 1.0
         finally:  # each writes to rows of its own
             result.put(piece, parts[number])

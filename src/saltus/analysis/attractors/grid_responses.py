@@ -5,7 +5,7 @@ which lead to the same response.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from saltus.analysis.attractors.aperiodic import SampledMotion, alike
 from saltus.analysis.attractors.find_responses import SettledMotions, find_responses
 from saltus.analysis.attractors.grid import Grid
 from saltus.analysis.closed.cycles import ASIDE
-from saltus.analysis.closed.measures import Measures, measure
+from saltus.analysis.closed.measures import Measures, measure, unknown
 from saltus.analysis.closed.unforced import measure_equilibria, multipliers_and_eigenvalues
 from saltus.analysis.inputs.outputs import Outputs
 from saltus.analysis.solve.tolerances import SAME
@@ -50,7 +50,7 @@ class GridResponses:
     place: np.ndarray
     response_of: np.ndarray
     complete: bool = True
-    table: AttractorTable | None = field(default=None, repr=False)
+    measured: GridNumbers | None = field(default=None, repr=False)
 
     def __len__(self) -> int:
         return len(self.row)
@@ -77,6 +77,16 @@ class GridResponses:
         time: np.ndarray = self.motions.orbits.time[self.row]
         return time
 
+    @property
+    def numbers(self) -> Measures:
+        """Numbers of each response: of the outputs that were asked for."""
+        assert self.measured is not None
+        return self.measured.of(self)
+
+    def part(self, which: np.ndarray) -> GridResponses:
+        """Some of the responses, bool[m]."""
+        return replace(self, row=self.row[which], place=self.place[which])
+
     def points(self, response: int) -> np.ndarray:
         """Its stroboscopic points, float64[n, D]."""
         row = int(self.row[response])
@@ -100,26 +110,73 @@ def find(
     most: int,
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
+    outputs: Outputs | None = None,
 ) -> GridResponses:
-    """The responses of a grid; on Ctrl-C those that are known, with ``complete`` False."""
+    """The responses of a grid, with the numbers of ``outputs``; on Ctrl-C those that are known,
+    with ``complete`` False.
+    """
     map_, count = grid.map(method, threads), len(grid.starts)
     result = SettledMotions.empty(grid.places * count, grid.starts.shape[1])
-    complete = True
+    place, complete = np.repeat(np.arange(grid.places), count), True
+    numbers = None if outputs is None else GridNumbers(grid, map_, place, outputs)
     try:
         if grid.sweeps:
-            _sweep(grid, map_, most, result, threads, progress)
+            _sweep(grid, map_, most, result, threads, progress, numbers)
         else:
-            find_responses(
-                map_.rows(np.repeat(np.arange(grid.places), count)),
-                np.tile(grid.starts, (grid.places, 1)),
-                most,
-                threads,
-                progress,
-                result,
-            )
+            starts = np.tile(grid.starts, (grid.places, 1))
+            then = None if numbers is None else numbers.add
+            find_responses(map_.rows(place), starts, most, threads, progress, result, then)
     except KeyboardInterrupt:
         complete = False
-    return _gathered(result, grid.places, count, 4.0 * map_.noise_of(result.scale), complete)
+        if numbers is not None:  # to measure motions that don't repeat would keep Ctrl-C waiting
+            many = (result.kind >= 0) & ~np.isin(result.kind, CLOSED)
+            result.kind[many & ~numbers.done] = Kind.NOT_COMPUTED
+    found = _gathered(result, place, 4.0 * map_.noise_of(result.scale), complete)
+    return replace(
+        found, response_of=found.response_of.reshape(grid.places, count), measured=numbers
+    )
+
+
+class GridNumbers:
+    """Numbers of the responses of a grid, computed as these are found.
+
+    Parameters
+    ----------
+    grid, map_ : Grid, Stroboscope
+        The grid, and its map.
+    place : int64[k]
+        Where on the grid each trajectory is.
+    outputs : Outputs
+        What is asked about.
+
+    Attributes
+    ----------
+    done : bool[k]
+        Trajectories whose responses have numbers.
+    """
+
+    def __init__(self, grid: Grid, map_: Stroboscope, place: np.ndarray, outputs: Outputs) -> None:
+        self._grid, self._map, self._place, self._outputs = grid, map_, place, outputs
+        self._every = unknown(len(place), grid.starts.shape[1], len(outputs))
+        self._own, self.done = np.zeros((2, len(place)), bool)
+
+    def add(self, rows: np.ndarray, settled: SettledMotions) -> None:
+        """Those of what trajectories int64[m] settled to: of each response once."""
+        noise = 4.0 * self._map.noise_of(settled.scale)
+        self._measure(_gathered(settled, self._place[rows], noise), rows)
+        self.done[rows] = True
+
+    def of(self, found: GridResponses) -> Measures:
+        """Those of all responses."""
+        new = found.part(~self._own[found.row])
+        if len(new):  # alike is who is like the first of its kind, and this may be another one now
+            self._measure(new, np.arange(len(self._place)))
+        return self._every.rows(found.row)
+
+    def _measure(self, found: GridResponses, rows: np.ndarray) -> None:
+        numbers = numbers_of(found, self._outputs, self._grid, self._map)
+        self._every.put(rows[found.row], numbers)
+        self._own[rows[found.row]] = True
 
 
 def _sweep(
@@ -129,6 +186,7 @@ def _sweep(
     result: SettledMotions,
     threads: int | None,
     progress: Callable[[float], None] | None,
+    numbers: GridNumbers | None,
 ) -> None:
     """Each start along the axis: where it stands at one value is where it starts at the next."""
     count = len(grid.starts)
@@ -139,28 +197,30 @@ def _sweep(
             place, before = (k, k - 1) if way == "up" else (grid.places - 1 - k, grid.places - k)
             start = result.end[before * count + who] if k else grid.starts[who]
             rows = place * count + who
-            result.put(
-                rows,
-                find_responses(
-                    map_.rows(np.full(len(who), place)),
-                    np.where(np.isfinite(start), start, 0.0),
-                    most,
-                    threads,
-                    stage(progress, (k + n / len(ways)) / grid.places, (k + 1) / grid.places),
-                ),
+            found = find_responses(
+                map_.rows(np.full(len(who), place)),
+                np.where(np.isfinite(start), start, 0.0),
+                most,
+                threads,
+                stage(progress, (k + n / len(ways)) / grid.places, (k + 1) / grid.places),
             )
+            if numbers is not None:
+                numbers.add(rows, found)
+            result.put(rows, found)
         if progress:
             progress((k + 1) / grid.places)
 
 
 def _gathered(
-    result: SettledMotions, places: int, count: int, tolerance: np.ndarray, complete: bool
+    result: SettledMotions, place: np.ndarray, tolerance: np.ndarray, complete: bool = True
 ) -> GridResponses:
-    """Group the trajectories of each value by the response they settled to."""
+    """Group the trajectories of each value, which are at ``place`` int64[k] in ascending order, by
+    the response they settled to.
+    """
     response_of = result.kind.copy()
     rows: list[int] = []
-    for place in range(places):
-        here = [row for row in range(place * count, (place + 1) * count) if result.kind[row] >= 0]
+    for every in np.split(np.arange(len(place)), np.flatnonzero(np.diff(place)) + 1):
+        here = [row for row in every.tolist() if result.kind[row] >= 0]
         groups: list[list[int]] = []
         for row in here:
             home = next(
@@ -179,9 +239,7 @@ def _gathered(
             response_of[group] = len(rows)
             rows.append(group[0])
     chosen = np.array(rows, np.int64)
-    return GridResponses(
-        result, chosen, chosen // count, response_of.reshape(places, count), complete
-    )
+    return GridResponses(result, chosen, place[chosen], response_of, complete)
 
 
 def _same(result: SettledMotions, a: int, b: int, tolerance: float) -> bool:
@@ -214,11 +272,9 @@ def _order(result: SettledMotions, row: int) -> tuple[float, ...]:
     return (int(result.kind[row]), int(period), *(float(size) for size in sizes))
 
 
-def numbers_of(
-    found: GridResponses, outputs: Outputs, grid: Grid, method: Method, threads: int | None = None
-) -> Measures:
-    """The numbers of each response."""
-    map_, times = grid.map(method, threads).rows(found.place), own_times(found, grid)
+def numbers_of(found: GridResponses, outputs: Outputs, grid: Grid, every: Stroboscope) -> Measures:
+    """The numbers of each response; ``every``: the map of the grid."""
+    map_, times = every.rows(found.place, threads=1), own_times(found, grid)
     numbers = measure(
         map_ if times is None else map_.with_period(times),
         found.start(aside=True),

@@ -158,12 +158,12 @@ class ParametricStroboscope(Stroboscope):
         if lost.any():
             rows, counts = below.rows(lost), np.broadcast_to(count, len(start))[lost]
             for j, name in enumerate(names):
-                found[lost, :, j] = self._differences(rows, start[lost], counts, name)
+                found[lost, :, j] = self._by_shifts(rows, start[lost], counts, name)
         by_parameter = {name: found[..., j] for j, name in enumerate(names)}
         return state, matrix[..., :size], by_parameter
 
     @staticmethod
-    def _differences(
+    def _by_shifts(
         below: Stroboscope, start: np.ndarray, count: np.ndarray | int, name: str
     ) -> np.ndarray:
         """The derivative of the ends with respect to a parameter, float64[k, D], by central

@@ -24,6 +24,7 @@ from saltus.flow.pieces import nodes_of, pieces
 from saltus.flow.request import Outcome
 from saltus.flow.threads import on_threads
 from saltus.flow.waves import WaveLegs, deviations, extremes, harmonics, least_turns, means, turns
+from saltus.interrupt import check_stop
 from saltus.kernels import status as st
 
 #: Forcing periods of a motion that never repeats from which its numbers are taken, where there are
@@ -115,9 +116,14 @@ class Measures:
             "margin": self.margin,
         }
 
-    def rows(self, which: slice) -> Measures:
-        """Those of some of the motions."""
-        return Measures(*(getattr(self, field.name)[which] for field in fields(self)))
+    def rows(self, which: slice | np.ndarray) -> Measures:
+        """Those of some of the motions, int64[n]."""
+        index = np.arange(len(self.margin))[which].tolist()
+
+        def some(column: Any) -> Any:
+            return column[which] if isinstance(column, np.ndarray) else [column[i] for i in index]
+
+        return Measures(*(some(getattr(self, field.name)) for field in fields(self)))
 
     def put(self, rows: np.ndarray, other: Measures) -> None:
         """Write another's numbers to the rows int64[n]."""
@@ -234,6 +240,7 @@ def _measured_by_waves(
     _count_contacts(map_, outcome, span, closed, result)
     own, gaps = slice(0, outputs), slice(outputs, None)
     for i, parts in enumerate(motions):
+        check_stop()
         if not parts:
             continue
         low, high = extremes(parts)

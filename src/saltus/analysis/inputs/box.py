@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.errors import ParameterError, must_be, shown
+from saltus.errors import ParameterError, listed, must_be, shown
 from saltus.system import System
 from saltus.units import to_si
 
@@ -29,7 +29,7 @@ def box_ranges(system: System, box: Mapping[str, Any]) -> dict[str, tuple[float,
         ranges[name] = (low, high)
     if not ranges:
         raise ParameterError(
-            f"give a range for at least one state of {', '.join(system.states)}: "
+            f"give a range for at least one state of {listed(system.states)}: "
             f'{system.states[0]}=("-1 mm", "1 mm").'
         )
     return ranges

@@ -10,11 +10,22 @@ import numpy as np
 
 from saltus.analysis.inputs.axes import along, axes_of, count_along
 from saltus.analysis.inputs.outputs import check_outputs
-from saltus.errors import ParameterError, SaltusError, among, must_be, shown, unknown
+from saltus.analysis.inputs.sensed import sensed
+from saltus.errors import (
+    MOST_IN_A_ROW,
+    ParameterError,
+    SaltusError,
+    among,
+    listed,
+    must_be,
+    shown,
+    unknown,
+)
 from saltus.flow.room import check_room
 from saltus.language import expression as ex
 from saltus.sentences import Word
 from saltus.system import System, check_values
+from saltus.system.structures.told import by_modes
 from saltus.units import to_si
 
 #: Most trajectories of a single call: the starts of more would fill the memory.
@@ -93,13 +104,7 @@ def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> En
             f"values of {deep[0]} must be one number or a one-dimensional array, "
             f"one for each trajectory."
         )
-    sizes = {name: np.size(array) for name, array in {**columns, **given}.items() if np.ndim(array)}
-    count = max(sizes.values(), default=1)
-    wrong = [f"{name} has {size}" for name, size in sizes.items() if size not in (1, count)]
-    if wrong:
-        raise ParameterError(
-            f"starts and values must have one length: {', '.join(wrong)}, the longest has {count}."
-        )
+    count = _length({**columns, **given})
     states = np.stack(
         [np.broadcast_to(np.ravel(columns[name]), count) for name in system.states], axis=1
     ).astype(float)
@@ -116,7 +121,22 @@ def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> En
         _check_period_of_each(system, shared, varied, count)
         rows = [varied.get(name, np.full(count, value)) for name, value in shared.items()]
         return Ensemble(states, np.stack(rows, axis=1), varied, True)
-    return Ensemble(states, np.array([list(shared.values())]), {}, bool(sizes))
+    batch = any(np.ndim(one) for one in (*columns.values(), *given.values()))
+    return Ensemble(states, np.array([list(shared.values())]), {}, batch)
+
+
+def _length(columns: Mapping[str, Any]) -> int:
+    """Number of trajectories that columns of numbers are for; 1 if all are single numbers. Raises
+    ParameterError if their lengths don't match.
+    """
+    sizes = {name: np.size(array) for name, array in columns.items() if np.ndim(array)}
+    count = max(sizes.values(), default=1)
+    wrong = [f"{name} has {size}" for name, size in sizes.items() if size not in (1, count)]
+    if wrong:
+        raise ParameterError(
+            f"starts and values must have one length: {', '.join(wrong)}, the longest has {count}."
+        )
+    return count
 
 
 def trajectories(start: Any, values: Any) -> int:
@@ -318,19 +338,24 @@ def range_of(system: System, name: Any, ends: Any) -> tuple[float, float]:
 def _columns(system: System, start: Any) -> dict[str, np.ndarray]:
     """Each state's start [SI], a scalar or an array."""
     if isinstance(start, Mapping):
+        if start and by_modes(system) and not any(among(name, system.states) for name in start):
+            units = dict(zip(system.outputs.names, system.outputs.units, strict=True))
+            shown_by = {name: _numbers(units.get(name, ""), name, start[name]) for name in start}
+            _length(shown_by)
+            return sensed(system, shown_by)
         strange = [name for name in start if name not in system.states]
         if strange:
             raise unknown(f"{system.name} has no state", strange[0], system.states)
         start = {**dict.fromkeys(_made(system), 0.0), **start}
         missing = [name for name in system.states if name not in start]
         if missing:
+            example: dict[Any, Any] = dict.fromkeys(system.states[:MOST_IN_A_ROW], 0.0)
+            if len(system.states) > MOST_IN_A_ROW:
+                example = {**example, Word("..."): Word("...")}
             raise ParameterError(
-                lambda say: (
-                    f"the start gives no {missing[0]!r}. Write "
-                    f"{say.key(start=dict.fromkeys(system.states, 0.0))}."
-                )
+                lambda say: f"the start gives no {missing[0]!r}. Write {say.key(start=example)}."
             )
-        return {name: _numbers(system, name, start[name]) for name in system.states}
+        return {name: _numbers(system.units[name], name, start[name]) for name in system.states}
     rows = start if isinstance(start, np.ndarray) else _as_array(start)
     if system.made and rows.shape and rows.shape[-1] == len(system.states) - system.made:
         rows = np.concatenate([rows, np.zeros((*rows.shape[:-1], system.made))], axis=-1)
@@ -344,10 +369,13 @@ def _columns(system: System, start: Any) -> dict[str, np.ndarray]:
         )
         raise ParameterError(
             f"a start of {system.name} is {len(system.states)} numbers "
-            f"({', '.join(system.states)}), or an array of such rows; "
+            f"({listed(system.states)}), or an array of such rows; "
             f"this one {this}.{drawn}"
         )
-    return {name: _numbers(system, name, rows[..., i]) for i, name in enumerate(system.states)}
+    return {
+        name: _numbers(system.units[name], name, rows[..., i])
+        for i, name in enumerate(system.states)
+    }
 
 
 def _made(system: System) -> tuple[str, ...]:
@@ -364,19 +392,17 @@ def _as_array(start: Any) -> np.ndarray:
         raise ParameterError("a start must be a row of numbers, or rows of one length.") from None
 
 
-def _numbers(system: System, name: str, value: Any) -> np.ndarray:
+def _numbers(unit: str, name: str, value: Any) -> np.ndarray:
     if isinstance(value, tuple):
         example = {"start": Word(f'{{"{name}": (0.0, 1.0, 20), ...}}')}
-        return along(
-            name, value, lambda one: to_si(one, system.units[name], name), "starts", example
-        )
+        return along(name, value, lambda one: to_si(one, unit, name), "starts", example)
     array = np.asarray(value) if isinstance(value, np.ndarray) else _as_array(value)
     if array.size == 0:
         raise ParameterError(f"the start of {name} is empty. Give at least one number.")
     if array.dtype.kind in "OUS":
-        array = np.array(
-            [to_si(item, system.units[name], name) for item in np.ravel(array).tolist()]
-        ).reshape(array.shape)
+        array = np.array([to_si(item, unit, name) for item in np.ravel(array).tolist()]).reshape(
+            array.shape
+        )
     if array.dtype.kind not in "fiu" or array.ndim > 1:
         raise ParameterError(
             f"the start of {name} must be a number or a one-dimensional array of numbers."

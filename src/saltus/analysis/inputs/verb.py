@@ -15,7 +15,7 @@ import numpy as np
 
 from saltus.announce import silent
 from saltus.arguments import Kinds
-from saltus.errors import ParameterError, closest, nearest, shown
+from saltus.errors import MOST_IN_A_ROW, ParameterError, closest, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.engine import MOST_THREADS, RunInterrupted
 from saltus.interrupt import Interrupted, no_ctrl_c_is_lost
@@ -211,10 +211,9 @@ def _instead(
         by = f"values={{{word!r}: ...}} or " if "values" in known else ""
         return f"It is a parameter of {system.name}: give it by {by}system.with_values({word}=...)."
     if isinstance(system, System) and word in system.states and "start" in known:
-        return (
-            f"It is a state of {system.name}: give it by "
-            f"start={{{', '.join(f'{state!r}: ...' for state in system.states)}}}."
-        )
+        more = ", ..." if len(system.states) > MOST_IN_A_ROW else ""
+        start = ", ".join(f"{state!r}: ..." for state in system.states[:MOST_IN_A_ROW])
+        return f"It is a state of {system.name}: give it by start={{{start}{more}}}."
     if word.rstrip("s") in known:  # a plural of an argument
         return nearest(word, known)
     there = _ELSEWHERE.get(word.lower(), f"{word}=" if word in _LENGTHS else "")

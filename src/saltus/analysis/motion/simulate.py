@@ -11,7 +11,6 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis import dataset_parts
-from saltus.analysis.inputs.given import Starts, UntilTrue, Values
 from saltus.analysis.inputs.spans import Span, span
 from saltus.analysis.inputs.starts import Ensemble, check_system, ensemble, trajectories
 from saltus.analysis.inputs.verb import verb
@@ -40,6 +39,7 @@ from saltus.system import System
 from saltus.system.quantity import remembering
 
 if TYPE_CHECKING:
+    from saltus.analysis.inputs.given import Starts, UntilTrue, Values
     from saltus.analysis.motion.ending import Ending
 
 
@@ -69,7 +69,9 @@ def simulate(
         Equations, contacts and parameter values.
     start : sequence, mapping or array
         State at the start: ``(0.0, 0.0)``, ``("1 mm", 0)``, ``{"x": [...], "v": [...]}`` or an
-        array (trajectory, state). Numbers are SI. Default: all zero.
+        array (trajectory, state). Numbers are SI. Default: all zero. Of a structure by its modes
+        also deflections and velocities that sensors show, ``{"tip": "1 mm"}``: the state of least
+        energy that shows them.
     periods : int
         Whole forcing periods to run.
     t_end : float or str

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.attractors.grid import Grid
-from saltus.analysis.attractors.grid_responses import GridResponses, find, numbers_of, table_of
+from saltus.analysis.attractors.grid_responses import GridResponses, find, table_of
 from saltus.analysis.dataset_parts import guards_over, provenance, subject
 from saltus.analysis.inputs.outputs import Outputs, outputs_of
 from saltus.analysis.responses.arcs import Arcs, arc_values, check_unstable, follow_arcs
@@ -42,12 +42,11 @@ def respond(
     method, periods = check_method(method, grid.system), whole(periods, "periods")
     check_unstable(unstable, grid, method)
     arcs = Arcs(unstable=unstable)
-    part = functools.partial(
-        _dataset, grid, method, periods, sample, outputs_of(grid.system, outputs), threads, arcs
-    )
+    asked = outputs_of(grid.system, outputs)
+    part = functools.partial(_dataset, grid, method, periods, sample, asked, threads, arcs)
     share = 0.4 if unstable else 0.8
     with reporting(progress) as show:
-        found = find(grid, method, periods, threads, stage(show, 0.0, share))
+        found = find(grid, method, periods, threads, stage(show, 0.0, share), asked)
         if not found.complete:
             raise Interrupted(lambda: part(found))
         try:
@@ -70,7 +69,7 @@ def _dataset(
     arcs: Arcs,
     found: GridResponses,
 ) -> xr.Dataset:
-    numbers = numbers_of(found, outputs, grid, method, threads)
+    numbers = found.numbers
     table = table_of(found, numbers, grid, method)
     on, branch = np.full(len(found), -1, np.int64), np.full(len(found), -1, np.int64)
     on[: len(arcs.branch_of)] = arcs.branch_of

@@ -61,7 +61,7 @@ def set_block_drives(modes, m):
             m.y[first + k // LANES, k % LANES] = scale * m.angle[d - 1, 1]
             m.y[first + (k + 1) // LANES, (k + 1) % LANES] = scale * m.angle[d - 1, 2]
         else:
-            for j in range(COURSE_TERMS):
+            for j in range(m.sizes[TERMS]):
                 value = scale * m.record[d - 1 - m.sizes[DRIVES], VALUE + j]
                 m.y[first + (k + j) // LANES, (k + j) % LANES] = value
                 scale /= m.modes[row + e, 3]

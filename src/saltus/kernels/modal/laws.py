@@ -369,7 +369,7 @@ def terms_of_gap(r, modes, steady, which, m):
         third += w * w * w * imaginary
         fourth += w * w * w * w * real
     for p in range(m.sizes[COURSES]):
-        numbers = at + 1 + 2 * drives + COURSE_TERMS * p
+        numbers = at + 1 + 2 * drives + m.sizes[TERMS] * p
         for k in range(3):
             rate += abs(number(m.steady, first, numbers + k) * m.record[p, VALUE + 1 + k])
         for k in range(2):

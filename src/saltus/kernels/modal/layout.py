@@ -26,14 +26,12 @@ FOLLOWED = 6.0
 # ones, then those of a block; TANGENTS are the columns of the derivative of the state that is
 # carried: one for each state at the start, then one for each parameter; 0: none. REMEMBERED are the
 # states behind the others that hold others of before the last impact, whose numbers are in
-# `remembers`.
+# `remembers`; TERMS are the coefficients of the pieces of courses, 4 or 16.
 STATES, MODE_GROUPS, STATE_GROUPS, GAP_ROWS, GUARDS, DRIVES, ROWS, COURSES = range(8)
-TANGENTS, REMEMBERED = range(8, 10)
+TANGENTS, REMEMBERED, TERMS = range(8, 11)
 # Columns of `record`: the time of a course at the beginning of the period, the times of the period
 # at which its piece begins and ends [s], the row of that piece, its value and derivatives.
 BASE, SINCE, UNTIL, PIECE, VALUE = range(5)
-#: Value and derivatives of a course.
-COURSE_TERMS = 4
 # Columns of `links`: first row of the modes' table, first row of the drives' table, guards where
 # the rates don't jump (bits), first row of the derivatives by parameters; then for each guard the
 # contact state behind its boundary, -1 where it hasn't been made yet.

@@ -5,8 +5,8 @@ since then. A course that repeats holds one cycle. Steps end at breaks, so a ste
 each. The piece is a function of the time alone: a run that is paused goes on with the same one.
 
 Columns of `course`: first row, number of pieces, cycle [s] (0: it doesn't repeat), rows of
-instants. Rows of `pieces`: the instants, a row of LANES of them after the other; then a row of
-coefficients for each piece.
+instants, the first piece that repeats: those before hold once. Rows of `pieces`: the instants, a
+row of LANES of them after the other; then the coefficients of each piece, LANES in a row.
 """
 
 import math
@@ -24,8 +24,8 @@ def begin_courses(i, batch, m):
     """Times of the courses at the beginning of the trajectory's period, to BASE."""
     which = int(batch.carry[i, SET])
     for p in range(m.sizes[COURSES]):
-        cycle = m.course[which, 4 * p + 2]
-        if cycle == 0.0:
+        cycle = m.course[which, 5 * p + 2]
+        if cycle == 0.0 or m.course[which, 5 * p + 4] > 0.0:
             place = batch.origin[i] + batch.count[i] * batch.period[i]
         else:
             rate = TURN / cycle
@@ -44,12 +44,13 @@ def follow_courses(i, tau, batch, m):
     base = batch.origin[i] + batch.count[i] * batch.period[i]
     until = tau + SAME_BREAK * (abs(tau) + abs(base))
     for p in range(m.sizes[COURSES]):
-        first, count = int(m.course[which, 4 * p]), int(m.course[which, 4 * p + 1])
-        cycle, place = m.course[which, 4 * p + 2], m.record[p, BASE]
-        shift = -place
-        if cycle > 0.0:
-            shift += cycle * math.floor((place + until - m.pieces[first, 0]) / cycle)
-        low, high = 0, count - 1
+        first, count = int(m.course[which, 5 * p]), int(m.course[which, 5 * p + 1])
+        cycle, place = m.course[which, 5 * p + 2], m.record[p, BASE]
+        tail, shift = int(m.course[which, 5 * p + 4]), -place
+        begin, low, high = number(m.pieces, first, tail), 0, count - 1
+        if cycle > 0.0 and (tail == 0 or place + until >= begin):
+            shift += cycle * math.floor((place + until - begin) / cycle)
+            low = tail
         while low < high:  # the last piece that has begun
             middle = (low + high + 1) // 2
             if number(m.pieces, first, middle) + shift <= until:
@@ -59,13 +60,16 @@ def follow_courses(i, tau, batch, m):
         if low + 1 < count:
             end = number(m.pieces, first, low + 1) + shift
         else:
-            end = number(m.pieces, first, 0) + cycle + shift if cycle > 0.0 else math.inf
+            end = begin + cycle + shift if cycle > 0.0 else math.inf
         if end <= until:  # by rounding of the cycle
-            low, shift = 0, shift + cycle
-            end = number(m.pieces, first, 1 % count) + shift + (cycle if count == 1 else 0.0)
+            low, shift = tail, shift + cycle
+            end = begin + cycle + shift
+            if tail + 1 < count:
+                end = number(m.pieces, first, tail + 1) + shift
         m.record[p, SINCE] = number(m.pieces, first, low) + shift
         m.record[p, UNTIL] = end
-        m.record[p, PIECE] = first + m.course[which, 4 * p + 3] + low
+        rows = m.sizes[TERMS] // LANES
+        m.record[p, PIECE] = first + m.course[which, 5 * p + 3] + low * rows
 
 
 @kernel
@@ -88,13 +92,15 @@ def is_break(i, tau, batch, m):
 def courses_at(tau, m):
     """Value and derivatives of each course at a time of the period, to VALUE and behind."""
     for p in range(m.sizes[COURSES]):
-        row, since = int(m.record[p, PIECE]), tau - m.record[p, SINCE]
-        a, b = m.pieces[row, 0], m.pieces[row, 1]
-        c, d = m.pieces[row, 2], m.pieces[row, 3]
-        m.record[p, VALUE] = a + since * (b + since * (c + since * d))
-        m.record[p, VALUE + 1] = b + since * (2.0 * c + since * (3.0 * d))
-        m.record[p, VALUE + 2] = 2.0 * c + since * (6.0 * d)
-        m.record[p, VALUE + 3] = 6.0 * d
+        row, since, terms = int(m.record[p, PIECE]), tau - m.record[p, SINCE], m.sizes[TERMS]
+        for k in range(terms):
+            m.record[p, VALUE + k] = number(m.pieces, row, k)
+        factorial = 1.0
+        for k in range(terms):
+            for j in range(terms - 2, k - 1, -1):
+                m.record[p, VALUE + j] += since * m.record[p, VALUE + j + 1]
+            m.record[p, VALUE + k] *= factorial
+            factorial *= k + 1
 
 
 @kernel
@@ -105,10 +111,10 @@ def add_course_series(r, first, at, h, m):
     """
     size = 0.0
     for p in range(m.sizes[COURSES]):
-        for k in range(COURSE_TERMS):
-            factor, power = number(m.steady, first, at + COURSE_TERMS * p + k), 1.0
+        for k in range(m.sizes[TERMS]):
+            factor, power = number(m.steady, first, at + m.sizes[TERMS] * p + k), 1.0
             size += abs(factor * m.record[p, VALUE + k])
-            for j in range(COURSE_TERMS - k):
+            for j in range(m.sizes[TERMS] - k):
                 m.q[r, j] += factor * m.record[p, VALUE + k + j] * power
                 power *= h
     return size
@@ -119,9 +125,9 @@ def course_gap(first, at, m):
     """The courses' part of a gap and of its rate."""
     value, rate = 0.0, 0.0
     for p in range(m.sizes[COURSES]):
-        for k in range(COURSE_TERMS):
-            factor = number(m.steady, first, at + COURSE_TERMS * p + k)
+        for k in range(m.sizes[TERMS]):
+            factor = number(m.steady, first, at + m.sizes[TERMS] * p + k)
             value += factor * m.record[p, VALUE + k]
-            if k + 1 < COURSE_TERMS:
+            if k + 1 < m.sizes[TERMS]:
                 rate += factor * m.record[p, VALUE + k + 1]
     return value, rate

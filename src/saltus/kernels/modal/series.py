@@ -79,8 +79,8 @@ def answer_now(steady, m):
             total = fma(load(m.steady, row, LANES), m.angle[d, 1], total)
             total = fma(load(m.steady, row + groups, LANES), -m.angle[d, 2], total)
         for p in range(m.sizes[COURSES]):
-            row = steady + (1 + 2 * m.sizes[DRIVES] + COURSE_TERMS * p) * groups + s
-            for k in range(COURSE_TERMS):
+            row = steady + (1 + 2 * m.sizes[DRIVES] + m.sizes[TERMS] * p) * groups + s
+            for k in range(m.sizes[TERMS]):
                 part = load(m.steady, row + k * groups, LANES)
                 total = fma(part, m.record[p, VALUE + k], total)
         store(m.answer, s, total)
@@ -97,8 +97,8 @@ def answer_rate(steady, which, m):
             total = fma(load(m.steady, row, LANES), -rate * m.angle[d, 2], total)
             total = fma(load(m.steady, row + groups, LANES), -rate * m.angle[d, 1], total)
         for p in range(m.sizes[COURSES]):
-            row = steady + (1 + 2 * m.sizes[DRIVES] + COURSE_TERMS * p) * groups + s
-            for k in range(COURSE_TERMS - 1):
+            row = steady + (1 + 2 * m.sizes[DRIVES] + m.sizes[TERMS] * p) * groups + s
+            for k in range(m.sizes[TERMS] - 1):
                 part = load(m.steady, row + k * groups, LANES)
                 total = fma(part, m.record[p, VALUE + k + 1], total)
         store(m.answer, s, total)
@@ -107,7 +107,7 @@ def answer_rate(steady, which, m):
 @inner
 def numbers_of_gap(r, steady, m):
     """Place of the steady answer of a row of gaps: the first row of numbers, the first of them."""
-    numbers = 1 + 2 * m.sizes[DRIVES] + COURSE_TERMS * m.sizes[COURSES]
+    numbers = 1 + 2 * m.sizes[DRIVES] + m.sizes[TERMS] * m.sizes[COURSES]
     return steady + numbers * m.sizes[STATE_GROUPS], r * numbers
 
 

@@ -10,6 +10,7 @@ from saltus.kernels.isolation import (
     MARGIN,
     MOST_TOUCHES,
     ROUNDING,
+    SAME_TOUCH,
     TOUCH_AT,
     TOUCH_GUARD,
     first_crossing,
@@ -90,7 +91,8 @@ def first_place(lanes, lane, g, h, slow, count):
         return 2.0 * h, count
     noise = scaled_gap(lanes, lane, g, h, slow)
     fresh = lanes.fresh[g, lane] > 0.5
-    if fresh and abs(lanes.work[GAP_ROW + g, lane]) > allowed_beside(lanes, lane, g):
+    stays_on = fresh and LAW[g] != HOLD_LAW
+    if stays_on and abs(lanes.work[GAP_ROW + g, lane]) > allowed_beside(lanes, lane, g):
         lanes.memo[lane, FAULT] = MODE_VIOLATION
         return 2.0 * h, count
     sign = leading_sign(slow.q, ORDER)
@@ -100,6 +102,9 @@ def first_place(lanes, lane, g, h, slow, count):
         sign = side_of_leaving(slow.q, ORDER, True, noise)
     elif not fresh and sign < 0 and slow.q[0] > -noise:  # it may have reversed at the node
         sign = 1 if side_of_leaving(slow.q, ORDER, False, noise) > 0 else -1
+    holds = LAW[g] == HOLD_LAW and not sets_aside(lanes, lane)
+    if sign == 0 and holds and LAW[PARTNER[g]] == SURFACE_LAW:
+        return 0.0, count  # its force has gone: it holds nothing
     if sign == 0:
         lanes.memo[lane, RESTS] |= 1 << g  # it is ridden
         return 2.0 * h, count
@@ -247,6 +252,9 @@ def note_touch(lanes, lane, batch, slow, g, d, start):
     """
     support = SUPPORT[PARTNER[g]] if LAW[g] == HOLD_LAW else -1
     if support >= 0 and (lanes.memo[lane, HITS] >> support) & 1:
+        return
+    ends = lanes.found[DELTA, lane] - d <= SAME_TOUCH * lanes.run[STEP, lane]
+    if LAW[g] == HOLD_LAW and lanes.memo[lane, HITS] != 0 and ends:
         return
     who, kind = (
         lanes.memo[lane, WHO],
@@ -508,6 +516,10 @@ def change_side(lanes, lane, batch, g, rate, before, crossed, slow):
     who = lanes.memo[lane, WHO]
     velocity = rate * lanes.side[g, lane]
     lanes.side[g, lane] = -lanes.side[g, lane]
+    flipped, started = int(lanes.run[FLIPPED, lane]), lanes.run[STARTING, lane] < 0.5
+    counted_again = ((flipped >> g) & 1) << NGUARDS
+    counted_again = counted_again if started and lanes.run[BOUNCES, lane] <= 1.5 else 0
+    lanes.run[FLIPPED, lane] = flipped | (1 << g) | counted_again
     # the side at the start is an initial condition, no event; a sample taken there had to guess it
     if lanes.run[STARTING, lane] > 0.5:
         for m in range(batch.cursor[who]):
@@ -519,8 +531,6 @@ def change_side(lanes, lane, batch, g, rate, before, crossed, slow):
         saltate(lanes, lane, batch, crossed, before, slow)
     if lanes.run[BOUNCES, lane] > 1.5:
         return  # a return with no time passed was recorded when it came first
-    flipped = int(lanes.run[FLIPPED, lane])
-    lanes.run[FLIPPED, lane] = flipped | (1 << g) | (((flipped >> g) & 1) << NGUARDS)
     shallow = crossed == g and is_shallow(lanes, lane, g, rate)
     lanes.run[MET, lane] += 1.0
     if shallow:

@@ -9,6 +9,7 @@ it isn't. docs/decisions/0040.
 
 import math
 
+from saltus.kernels.isolation import ROUNDING
 from saltus.kernels.status import (
     CROSSING,
     HOLD,
@@ -112,7 +113,7 @@ def strike(lanes, lane, batch, g, rate, slow):
     """Apply a jump of the state at a boundary that it may not pass. Rebounds too small to be
     followed end at rest.
     """
-    who, mode = lanes.memo[lane, WHO], mode_of(lanes, lane)
+    who, mode, known = lanes.memo[lane, WHO], mode_of(lanes, lane), lanes.fresh[g, lane]
     if LAW[g] == IMPACT_LAW or not carried_over(lanes, lane, g):
         snap(lanes, lane, g)
     for i in range(NSTATES):
@@ -153,7 +154,9 @@ def strike(lanes, lane, batch, g, rate, slow):
         if later <= too_short(lanes, lane, g, restitution) or is_hidden(
             lanes, lane, g, rebound, pressing
         ):
-            hold(lanes, lane, batch, g, later, slow)
+            hold(lanes, lane, batch, g, later, 0.0, slow)
+    elif rebound <= 0.0 and known > 1.5:
+        hold(lanes, lane, batch, g, 0.0, 1.0, slow)  # what presses it begins at zero
     elif rebound <= 0.0:
         lanes.fresh[g, lane] = 2.0  # it leaves at once: gap and rate are known to be zero
         ask_for_paradox(lanes, lane, g, slow)
@@ -219,7 +222,7 @@ def loosen(lanes, lane, batch, struck, closing, slow):
     for g in range(NGUARDS):
         if g != struck and PARTNER[g] >= 0 and LAW[g] != HOLD_LAW:
             left = slow.gaps[3 * NGUARDS + g]
-            feels = abs(left) > FELT * closing
+            feels = abs(left) > FELT * closing + ROUNDING * slow.gaps[5 * NGUARDS + g]
             if feels and (mode >> PARTNER[g]) & 1 == 0:
                 if LAW[g] == IMPACT_LAW and lanes.fresh[g, lane] > 1.5:
                     lanes.fresh[g, lane] = 1.0
@@ -290,13 +293,17 @@ def caught(lanes, lane, batch, g, slow):
         return False  # it jumped over the surface
     snap(lanes, lane, g)
     gaps_here(lanes, lane, batch, slow)
-    if slow.gaps[NGUARDS + g] == 0.0 and slow.gaps[2 * NGUARDS + g] == 0.0:
+    back_again = lanes.run[BOUNCES, lane] > 1.5 and (int(lanes.run[FLIPPED, lane]) >> g) & 1 == 1
+    if slow.gaps[NGUARDS + g] == 0.0 and slow.gaps[2 * NGUARDS + g] == 0.0 and not back_again:
         # another contact may hold what this one could
-        return lanes.fresh[g, lane] != RIDDEN and holds_any(lanes, lane)
+        first = lanes.fresh[g, lane] != RIDDEN and lanes.run[BOUNCES, lane] <= 1.5
+        return first and holds_any(lanes, lane)
     if slow.gaps[2 * NGUARDS + g] < 0.0 and slow.gaps[PARTNER[g]] > 0.0:
-        hold(lanes, lane, batch, g, 0.0, slow)
+        hold(lanes, lane, batch, g, 0.0, 0.0, slow)
         return True
-    return False
+    if back_again:  # both sides push onto it as soon as time passes: its force begins at zero
+        hold(lanes, lane, batch, g, 0.0, 2.0, slow)
+    return back_again
 
 
 @inner
@@ -337,22 +344,24 @@ def strays(lanes, lane, batch, slow):
     away = False
     for g in range(NGUARDS):
         held = PARTNER[g] >= 0 and LAW[g] != HOLD_LAW and lanes.side[PARTNER[g], lane] > 0.0
-        near = KEPT * lanes.prior[PRIOR_ROWS * g + NEW, lane]
+        near = KEPT * (lanes.prior[PRIOR_ROWS * g + NEW, lane] + slow.gaps[4 * NGUARDS + g])
         away = away or (held and not abs(slow.gaps[g]) <= near)
     return away
 
 
 @kernel
-def hold(lanes, lane, batch, g, later, slow):
+def hold(lanes, lane, batch, g, later, known, slow):
     """Begin to hold a contact: state and tangent go onto its constraint, at most `later` [s] after
-    now.
+    now. Of the margin to its release so many zeros are known.
     """
     who, before, h = lanes.memo[lane, WHO], mode_of(lanes, lane), PARTNER[g]
-    lanes.side[h, lane], lanes.fresh[h, lane] = 1.0, 0.0
+    lanes.side[h, lane], lanes.fresh[h, lane] = 1.0, known
+    if known > 0.0:
+        lanes.prior[PRIOR_ROWS * h + NEW, lane] = 0.0
     watch(lanes, lane)
     if LAW[g] == IMPACT_LAW:
         rub(lanes, lane, batch, h, slow)
-    if TANGENT and LAW[g] == SURFACE_LAW and lanes.run[STARTING, lane] < 0.5:
+    if TANGENT and LAW[g] == SURFACE_LAW and known == 0.0 and lanes.run[STARTING, lane] < 0.5:
         saltate(lanes, lane, batch, g, before, slow)
     for i in range(NSTATES):
         slow.state[i] = lanes.y[i, lane]
@@ -426,6 +435,8 @@ def watch_friction(lanes, batch, slow):
     for lane in range(LANES):
         watched = lanes.run[ACTIVE, lane] > 0.5 and lanes.memo[lane, MAY_PUSH] == 1
         whole = lanes.clock[TAU, lane] - lanes.run[START, lane]
+        if watched and crossing_guards(lanes, lane) != 0:
+            whole *= JUST_BEFORE  # a friction that ends there is zero but for rounding
         for look in range(LOOKS if watched else 0):
             d = whole * ((look + 1) / LOOKS)
             if (found >> lane) & 1 == 0 and pushes_on_at(lanes, lane, batch, d, slow):

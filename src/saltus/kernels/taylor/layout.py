@@ -112,6 +112,8 @@ TRIED, AT_FIRST, BY_GUARDS, WAY = (NSTATES * row for row in range(1, 5))
 #: Times in each step at which a force of friction is tested; halvings that find where it becomes
 #: negative.
 LOOKS, HALVINGS = 4, 60
+#: Share of a step that ends at a contact within which a force of friction is tested.
+JUST_BEFORE = 1.0 - 2.0**-20
 #: Share of a contact's effect left by friction, at which a contact is given up rather than
 #: released.
 PARADOX = 1.0e-9
@@ -210,7 +212,7 @@ def workspace():
     slow = Slow(
         q=np.zeros(ORDER + 1), b=np.zeros((DEEPEST + 2, ORDER + 1)),
         bounds=np.zeros((DEEPEST + 2, 2)), rates=np.zeros(ORDER + 1),
-        out=np.zeros(2), gaps=np.zeros(4 * guards), state=np.zeros((5 if LAWS else 1) * NSTATES),
+        out=np.zeros(2), gaps=np.zeros(6 * guards), state=np.zeros((5 if LAWS else 1) * NSTATES),
         touches=np.zeros((MOST_TOUCHES, 2)),
         held=np.zeros(HELD * NCLOCKS), numbers=np.zeros((NUMBERS + 1) * NCLOCKS),
     )  # fmt: skip

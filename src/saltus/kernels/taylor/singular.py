@@ -33,6 +33,7 @@ from saltus.kernels.lanes import (
     splat,
     store,
 )
+from saltus.kernels.status import SURFACE_LAW
 
 
 @inner
@@ -159,10 +160,9 @@ def negligible_step(lanes, h, j, wanted):
         magnitude(load(lanes.work, GUARD_ROW[g] + 1, LANES)),
         magnitude(load(lanes.work, GUARD_ROW[g] + 2, LANES)),
     )
-    longest = h
-    floor = smaller(
-        larger(2.0 * goal / (rate + root(rate * rate + 4.0 * bend * goal)), SHORTEST), longest
-    )
+    longest, speed = h, rate + root(rate * rate + 4.0 * bend * goal)
+    leaves = select(speed > 0.0, 2.0 * goal / speed, 0.0)
+    floor = smaller(larger(leaves, SHORTEST), longest)
     power, before, log_before = splat(USUAL_POWER, LANES), splat(2000.0, LANES), splat(0.0, LANES)
     # logs of a step short enough, and of one too long
     low, high = coarse_log2(floor), coarse_log2(longest)
@@ -196,6 +196,8 @@ def left_out(lanes, h, j):
     turn = smaller(-0.5 * rate / bend, h)
     rising = rate + 2.0 * bend * h >= 0.0
     widest = select(rising, select(fma(bend, h, rate) > 0.0, h, 0.0), select(rate > 0.0, turn, 0.0))
+    # from rest a gap may begin with its third power
+    widest = select(gap_at(lanes, g, h) > gap_at(lanes, g, widest), h, widest)
     look_with(lanes, widest, j)
     worst = splat(0.0, LANES)
     for i in range(NMOVED):
@@ -233,8 +235,31 @@ def gap_at(lanes, g, d):
 
 
 @inner
+def sets_aside(lanes, lane):
+    """True if terms of a lane are set aside in this step."""
+    aside = False
+    for j in range(NSINGULAR):
+        aside = aside or lanes.side[NGUARDS + j, lane] > 0.0
+    return aside
+
+
+@inner
+def hold_ridden(lanes, side):
+    """Set the hold guards of the surfaces that this step rides: what was left out holds them, and
+    leads off neither side.
+    """
+    for lane in range(LANES):
+        rides = lanes.memo[lane, RESTS] if lanes.memo[lane, DECIDED] == 1 else 0
+        for g in range(NGUARDS):
+            if LAW[g] == SURFACE_LAW and (rides >> g) & 1 == 1:
+                lanes.side[PARTNER[g], lane] = side
+
+
+@inner
 def add_what_was_left_out(lanes, d):
     """Add to the states at d the integral of the terms that were set aside."""
+    if LAWS:
+        hold_ridden(lanes, 1.0)
     for j in range(NSINGULAR):
         aside = (
             (load(lanes.side, NGUARDS + j, LANES) > 0.0)
@@ -256,6 +281,8 @@ def add_what_was_left_out(lanes, d):
                 gained = integral(lanes, i, d, starts, ends)
                 value = load(lanes.y, i, LANES)
                 store(lanes.y, i, select(aside & (magnitude(gained) < HUGE), value + gained, value))
+    if LAWS:
+        hold_ridden(lanes, -1.0)
 
 
 @inner

@@ -74,7 +74,7 @@ def rest_or_leave(lanes, lane, batch, g, slow):
     """
     face(lanes, lane, batch, g, slow)
     if slow.gaps[NGUARDS + g] > 0.0:
-        hold(lanes, lane, batch, g, 0.0, slow)
+        hold(lanes, lane, batch, g, 0.0, 0.0, slow)
     else:
         lanes.fresh[g, lane] = 2.0
         ask_for_paradox(lanes, lane, g, slow)

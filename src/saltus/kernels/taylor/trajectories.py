@@ -183,11 +183,14 @@ def periods_behind(lanes, lane, batch):
 
 @inner
 def ride(lanes, lane):
-    """Mark the boundaries to which a lane has kept in this step as known: it rides them."""
+    """Mark the boundaries to which a lane has kept in this step as known: it rides them. A margin
+    without the terms that were set aside says nothing.
+    """
     if lanes.memo[lane, DECIDED] == 0:
         lanes.memo[lane, RESTS] = 0
+    aside = sets_aside(lanes, lane)
     for g in range(NGUARDS):
-        if (lanes.memo[lane, RESTS] >> g) & 1:
+        if (lanes.memo[lane, RESTS] >> g) & 1 and not (aside and LAW[g] == HOLD_LAW):
             lanes.fresh[g, lane] = RIDDEN if LAWS else 1.0
     lanes.memo[lane, ALWAYS] &= lanes.memo[lane, RESTS]
 

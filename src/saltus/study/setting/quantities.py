@@ -7,8 +7,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from saltus.errors import ParameterError, StudyError, UnitError, nearest
+from saltus.errors import ParameterError, StudyError, UnitError, listed, nearest
 from saltus.study.tables.toml import fault
+from saltus.system.structures.told import by_modes
 from saltus.units import to_si
 
 if TYPE_CHECKING:
@@ -84,24 +85,28 @@ def levels(system: System, table: Mapping[str, Quantity], place: str) -> dict[st
 def start(
     system: System, table: Mapping[str, Start], place: str = "simulate"
 ) -> dict[str, float | list[float]]:
-    """Start in SI: a number for each state, or a list for a batch.
+    """Start in SI: a number for each state, or for some sensors of a structure by its modes; or a
+    list for a batch.
 
     Raises
     ------
     StudyError
         If a state is missing or unknown, lists differ in length, or a unit is missing.
     """
-    missing = [state for state in system.states if state not in table]
-    if missing:
+    known, units = system.states, dict(system.units)
+    if table and by_modes(system) and not any(name in known for name in table):
+        known = system.outputs.names
+        units = dict(zip(known, system.outputs.units, strict=True))
+    elif missing := [state for state in known if state not in table]:
         raise StudyError(
-            f"[{place}] start lacks {', '.join(missing)}. {system.name} has the "
-            f"states {', '.join(system.states)}."
+            f"[{place}] start lacks {listed(missing)}. {system.name} has the states "
+            f"{listed(known)}."
         )
     is_batch(table, place=place)
-    return {
-        state: _numbers(system, state, value, system.states, f"{place}.start")
-        for state, value in table.items()
-    }
+    place = f"{place}.start"
+    for name in table:
+        _unit(system, name, known, place)
+    return {name: _numbers(value, units[name], place, name) for name, value in table.items()}
 
 
 def starts(
@@ -197,15 +202,10 @@ def is_batch(*tables: Mapping[str, Start], place: str = "simulate") -> bool:
     return bool(lengths)
 
 
-def _numbers(
-    system: System, state: str, value: Start, known: tuple[str, ...], place: str
-) -> float | list[float]:
-    unit = _unit(system, state, known, place)
-    return (
-        [number(one, unit, place, state) for one in value]
-        if isinstance(value, list)
-        else number(value, unit, place, state)
-    )
+def _numbers(value: Start, unit: str, place: str, key: str) -> float | list[float]:
+    if isinstance(value, list):
+        return [number(one, unit, place, key) for one in value]
+    return number(value, unit, place, key)
 
 
 def _unit(

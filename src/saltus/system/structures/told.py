@@ -10,6 +10,7 @@ import numpy as np
 
 from saltus.errors import SaltusWarning
 from saltus.system.display import STRUCTURE
+from saltus.system.equations_of_motion import EquationsOfMotion
 from saltus.system.structures.parts import Base, direction
 from saltus.system.structures.reduction import RIGID, Modes, flexibility
 
@@ -49,6 +50,11 @@ def reduced(
         if isinstance(drive, Base):
             words += _moved(label, mass, modes.lowest(count), direction(drive, degrees), inertia)
     return words
+
+
+def by_modes(system: EquationsOfMotion) -> bool:
+    """True for a structure whose states are the coordinates of modes, which no user knows."""
+    return system.states[0] == "q1" and system.description.startswith(STRUCTURE)
 
 
 def _kept_at_contacts(
