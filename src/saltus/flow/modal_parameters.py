@@ -44,8 +44,8 @@ def varies_by(linear: LinearSystem, name: str) -> bool:
         )
         if one is not None
     ]
-    used = ex.walk(*(linear.of(tuple(laws)) or ()))
-    if any(node.op == "param" and node.payload == name for node in used):
+    known = linear.of(tuple(laws))
+    if known is None or any(node is ex.parameter(name) for node in ex.walk(*known)):
         return False
     gaps = linear.by(name).own_gaps
     return not any(
