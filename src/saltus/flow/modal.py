@@ -16,8 +16,8 @@ from saltus.errors import ParameterError
 from saltus.flow.counts import whole
 from saltus.flow.method import Method, explain_unknown_options, step_budget
 from saltus.flow.modal_parameters import varies_by
-from saltus.flow.modal_rows import ValueSet
 from saltus.flow.modal_tables import Tables
+from saltus.flow.modal_values import ValueSet
 from saltus.flow.taylor import Taylor
 from saltus.kernels import status as st
 from saltus.kernels.batch import Batch

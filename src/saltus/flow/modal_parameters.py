@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Sequence
-from typing import Protocol
 
 import numpy as np
 
@@ -21,22 +20,10 @@ from saltus.contact.guards import is_hold
 from saltus.flow.modal_blocks import MOST_LOSS, MOST_SPREAD
 from saltus.flow.modal_eigen import both_of_each_pair
 from saltus.flow.modal_modes import StateModes
-from saltus.flow.modal_rows import Rows, ValueSet
+from saltus.flow.modal_rows import Rows
+from saltus.flow.modal_values import ValueSet
 from saltus.language import expression as ex
 from saltus.system.linear import LinearPiece, LinearSystem
-
-
-class ContactStates(Protocol):
-    """The part of the tables of a system (modal_tables.py) that its derivatives need."""
-
-    linear: LinearSystem
-    sets: list[ValueSet]
-    groups: int
-    state_groups: int
-
-    @property
-    def made(self) -> Sequence[tuple[object, StateModes]]:
-        """Equations and modes of each contact state."""
 
 
 @functools.lru_cache(maxsize=256)
@@ -57,8 +44,8 @@ def varies_by(linear: LinearSystem, name: str) -> bool:
         )
         if one is not None
     ]
-    used = ex.walk(*(linear.of(tuple(laws)) or ()))
-    if any(node.op == "param" and node.payload == name for node in used):
+    known = linear.of(tuple(laws))
+    if known is None or any(node is ex.parameter(name) for node in ex.walk(*known)):
         return False
     gaps = linear.by(name).own_gaps
     return not any(
@@ -73,16 +60,28 @@ class ParameterTables:
 
     Parameters
     ----------
-    tables : ContactStates
-        Its contact states.
+    linear : LinearSystem
+        The system.
     names : tuple of str
         The parameters.
+    groups, state_groups : int
+        Groups of LANES modes, and of states.
+    sets, made : sequence
+        Its sets of parameter values; equations and modes of its contact states. Both grow.
     """
 
-    def __init__(self, tables: ContactStates, names: tuple[str, ...]) -> None:
-        self._tables = tables
-        self._linear = [tables.linear.by(name) for name in names]
-        drives, guards = len(tables.linear.drives), len(tables.linear.system.guards)
+    def __init__(
+        self,
+        linear: LinearSystem,
+        names: tuple[str, ...],
+        groups: int,
+        state_groups: int,
+        sets: Sequence[ValueSet],
+        made: Sequence[tuple[object, StateModes]],
+    ) -> None:
+        self._groups, self._state_groups, self._sets, self._made = groups, state_groups, sets, made
+        self._linear = [linear.by(name) for name in names]
+        drives, guards = len(linear.drives), len(linear.system.guards)
         #: Numbers of each set of values, for each parameter.
         self._width = 2 * drives + guards * (1 + 2 * drives)
         self.rows, self.shifts = Rows(), Rows(max(len(names) * self._width, 1))
@@ -94,16 +93,16 @@ class ParameterTables:
     @property
     def first(self) -> np.ndarray:
         """First row of each contact state that the tables hold, -1 where it has none yet."""
-        more = len(self._tables.made) - len(self._first)
+        more = len(self._made) - len(self._first)
         self._first = np.append(self._first, np.full(more, -1))
         return self._first
 
     def need(self, at: int, which: int, mode: int) -> None:
         """Make the derivatives of a contact state and of its set of values."""
         while self.shifts.used <= which:
-            self.shifts.add(self._shifts_of(self._tables.sets[self.shifts.used]))
+            self.shifts.add(self._shifts_of(self._sets[self.shifts.used]))
         if self.first[at] < 0:
-            given, (_, modes) = self._tables.sets[which], self._tables.made[at]
+            given, (_, modes) = self._sets[which], self._made[at]
             parts = [self._slopes_of(j, given, modes, mode) for j in range(len(self._linear))]
             answers, mixing = zip(*parts, strict=True)
             behind = np.cumsum([sum(map(len, answers)), *map(len, mixing)])
@@ -136,13 +135,13 @@ class ParameterTables:
             self._pieces[key] = linear.every_piece(given.values)
         piece = self._pieces[key](mode)
         answers = slopes_of(piece, given.rates, slow, modes)
-        padded = np.zeros((len(answers.T), LANES * self._tables.state_groups), complex)
+        padded = np.zeros((len(answers.T), LANES * self._state_groups), complex)
         padded[:, : len(answers)] = answers.T
         parts = [padded[0].real, *(part for one in padded[1:] for part in (one.real, one.imag))]
         rows = np.concatenate([np.zeros(LANES), *parts]).reshape(-1, LANES)
         if modes.block is not None or not piece.matrix.any():
             return rows, np.zeros((0, LANES))
-        return rows, mixing_of(piece.matrix, modes, self._tables.groups)
+        return rows, mixing_of(piece.matrix, modes, self._groups)
 
 
 def slopes_of(

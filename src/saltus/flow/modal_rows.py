@@ -1,17 +1,10 @@
-"""Parts of the tables of the modal flow: rows that grow as motions come to new contact states, and
-sets of parameter values.
-"""
+"""Tables of the modal flow that grow as motions come to new contact states."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 
 from saltus.codegen.module import MODAL_LANES as LANES
-from saltus.system.courses import Course
-from saltus.system.linear import LinearPiece
-from saltus.system.linear_laws import Impacts
 
 
 class Rows:
@@ -31,15 +24,3 @@ class Rows:
         self.used += len(rows)
         self.table[first : self.used] = rows
         return first
-
-
-@dataclass(frozen=True)
-class ValueSet:
-    """Gaps and drives for one set of parameter values, in any contact state."""
-
-    values: dict[str, float]
-    gaps: LinearPiece
-    rates: np.ndarray
-    lags: np.ndarray
-    courses: tuple[Course, ...]
-    impacts: Impacts

@@ -16,7 +16,8 @@ from saltus.flow.modal_blocks import table_of
 from saltus.flow.modal_eigen import Eigen, half_of, slots_of
 from saltus.flow.modal_modes import StateModes, modes_of, spread_over
 from saltus.flow.modal_parameters import ParameterTables
-from saltus.flow.modal_rows import Rows, ValueSet
+from saltus.flow.modal_rows import Rows
+from saltus.flow.modal_values import ValueSet
 from saltus.kernels.modal import layout
 from saltus.kernels.status import LAW_KINDS, NO_LAW
 from saltus.language.expression import Expr, walk
@@ -147,7 +148,8 @@ class Tables:
     def by(self, names: tuple[str, ...]) -> ParameterTables:
         """The derivatives with respect to some parameters."""
         if names not in self._by:
-            self._by[names] = ParameterTables(self, names)
+            widths = self.groups, self.state_groups
+            self._by[names] = ParameterTables(self.linear, names, *widths, self.sets, self.made)
         return self._by[names]
 
     def arrays(self, names: tuple[str, ...] = ()) -> tuple[np.ndarray, ...]:
