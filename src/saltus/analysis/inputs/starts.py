@@ -10,7 +10,6 @@ import numpy as np
 
 from saltus.analysis.inputs.axes import along, axes_of, count_along
 from saltus.analysis.inputs.outputs import check_outputs
-from saltus.analysis.inputs.sensed import sensed
 from saltus.errors import (
     MOST_IN_A_ROW,
     ParameterError,
@@ -339,6 +338,8 @@ def _columns(system: System, start: Any) -> dict[str, np.ndarray]:
     """Each state's start [SI], a scalar or an array."""
     if isinstance(start, Mapping):
         if start and by_modes(system) and not any(among(name, system.states) for name in start):
+            from saltus.analysis.inputs.sensed import sensed
+
             units = dict(zip(system.outputs.names, system.outputs.units, strict=True))
             shown_by = {name: _numbers(units.get(name, ""), name, start[name]) for name in start}
             _length(shown_by)
