@@ -260,16 +260,13 @@ def _held_contacts(
         }
         free = tuple(_known(entry, apart, False) for entry in field)
         surface = split(number, free, on_surface)
-        directions = {
-            other: direction
-            if holds[other] in apart
-            else tuple(averaged(entry, number, holds[number], on_surface) for entry in direction)
-            for other, direction in directions.items()
-        }
-        strengths = {
-            other: averaged(one, number, holds[number], on_surface)
-            for other, one in strengths.items()
-        }
+        for other, direction in directions.items():
+            if holds[other] not in apart:
+                *means, strengths[other] = (
+                    averaged(entry, number, holds[number], on_surface)
+                    for entry in (*direction, strengths[other])
+                )
+                directions[other] = tuple(means)
         directions[number], strengths[number] = unit_force(surface.halves)
         new = held_at(free, surface, holds[number])
         field = tuple(

@@ -411,4 +411,4 @@ def _with_tangent(
     k, size = start.shape
     columns = np.zeros((k, size, size + parameters))
     columns[..., :size] = np.eye(size) if directions is None else directions
-    return np.hstack([start, columns.reshape(k, -1)])
+    return np.hstack([start, columns.reshape(k, size * (size + parameters))])

@@ -1,4 +1,4 @@
-"""What the contact states of the modal flow share for one set of parameter values."""
+"""Gaps, drives and laws that all contact states share for one set of parameter values."""
 
 from __future__ import annotations
 

@@ -99,7 +99,7 @@ def lane_jets(system: System, states, times, values, order=ORDER, period=1.0):
         clock[TAU, lane], clock[BASE, lane] = times[lane] - count * period, count * period
         head["constants"](values[lane], constants, lane)
         head["turns"](values[lane], 0.0, period, count, lane, clock)
-        gaps = -np.ones(4 * max(guards, 1))  # no contact is held
+        gaps = -np.ones(6 * max(guards, 1))  # no contact is held
         head["gaps"](times[lane], states[:, lane], values[lane], np.zeros(0), gaps)
         side[:guards, lane] = np.where(gaps < 0, -1.0, 1.0)[:guards]
         side[[i for i in range(guards) if is_hold(system.guards[i])], lane] = -1.0

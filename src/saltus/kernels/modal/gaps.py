@@ -27,7 +27,7 @@ from saltus.kernels.status import GAP_MARGIN, HOLD_LAW, MODE_VIOLATION
 # -- where the amplitudes stand --------------------------------------------------------------------
 @kernel
 def stand(modes, steady, which, m):
-    """What the amplitudes in `y` say of all gaps, to `stood` and `waves`. Needs `angle`."""
+    """Put what the amplitudes in `y` say of all gaps to `stood` and `waves`. Needs `angle`."""
     groups = m.sizes[MODE_GROUPS]
     for g in range(groups):
         real, imaginary = load(m.y, g, LANES), load(m.y, groups + g, LANES)
