@@ -89,10 +89,11 @@ def test_bodies_that_stay_together_share_their_momentum(restitution):
 
 
 @pytest.mark.nojit
+@pytest.mark.parametrize("method", [sl.Taylor(), sl.Modal()], ids=lambda method: method.name)
 @pytest.mark.parametrize(
     ("restitutions", "inertia"), [((0.8, 0.2), 1.0), ((0.99, 0.9), 3.0), ((0.0, 0.0), 0.2)]
 )
-def test_impacts_that_cause_each_other_move_together(restitutions, inertia):
+def test_impacts_that_cause_each_other_move_together(restitutions, inertia, method):
     """A body strikes one that rests on a wall, by which that one is struck, and so on at the same
     instant: three times, or more often than are followed one by one. Differences of the flow.
     """
@@ -105,7 +106,7 @@ def test_impacts_that_cause_each_other_move_together(restitutions, inertia):
         push = 2.0 - 0.3 * y + 0.2 * sl.cos(w * t)
         return v, u, 3.0 * sl.cos(w * t) - 4.0 * x, push, body, law
 
-    start, map_ = np.array([[-0.5, 0.5, 2.2, 0.0]]), Stroboscope(pair, sl.Modal())
+    start, map_ = np.array([[-0.5, 0.5, 2.2, 0.0]]), Stroboscope(pair, method)
     _, found = map_.tangent(start, 1)
     for j in (0, 2):
         near = start + 1e-4 * np.array([[-2.0], [-1.0], [1.0], [2.0]]) * np.eye(4)[j]

@@ -129,12 +129,14 @@ def strike(lanes, lane, batch, g, rate, slow):
         for i in range(NSTATES):
             lanes.probe_y[i, lane], lanes.y[i, lane] = lanes.y[i, lane], slow.state[i]
         behind = mode_behind(lanes, lane, batch, g, slow)
-        if TANGENT and behind != mode:
-            for i in range(NSTATES):
-                slow.state[i] = lanes.probe_y[i, lane]
-            reset(now, slow.state, parameters, slow.held, mode, behind, g, slow.out)
-            for i in range(NSTATES):
-                lanes.y[i, lane] = slow.state[i]
+        if TANGENT:
+            loose = loosened(lanes, lane, batch, g, closing, behind, slow)
+            if loose != mode:
+                for i in range(NSTATES):
+                    slow.state[i] = lanes.probe_y[i, lane]
+                reset(now, slow.state, parameters, slow.held, mode, loose, g, slow.out)
+                for i in range(NSTATES):
+                    lanes.y[i, lane] = slow.state[i]
         for i in range(NSTATES):
             slow.state[i] = lanes.y[i, lane]
         velocity = rate * lanes.side[g, lane]
@@ -208,6 +210,30 @@ def face(lanes, lane, batch, g, slow):
 
 
 @kernel
+def feels(lanes, lane, g, struck, closing, slow):
+    """True if a contact feels an impact: its gap opens or closes. The gaps are in slow.gaps."""
+    if g == struck or PARTNER[g] < 0 or LAW[g] == HOLD_LAW:
+        return False
+    left = slow.gaps[3 * NGUARDS + g]
+    return abs(left) > FELT * closing + ROUNDING * slow.gaps[5 * NGUARDS + g]
+
+
+@kernel
+def loosened(lanes, lane, batch, struck, closing, mode, slow):
+    """A mode behind an impact without the contacts that it releases: the rates there are those
+    that its derivative needs.
+    """
+    gaps_here(lanes, lane, batch, slow)
+    for g in range(NGUARDS):
+        if feels(lanes, lane, g, struck, closing, slow) and (mode >> PARTNER[g]) & 1:
+            side = slow.gaps[3 * NGUARDS + g] if LAW[g] == SURFACE_LAW else LAW_SIDE[g]
+            mode &= ~(1 << PARTNER[g]) & ~(1 << g)
+            if side > 0.0:
+                mode |= 1 << g
+    return mode
+
+
+@kernel
 def loosen(lanes, lane, batch, struck, closing, slow):
     """Release the held contacts that feel the impact of another: their surfaces slide then, their
     stops are struck or left. A free stop whose gap and rate were known to be zero closes or opens
@@ -220,13 +246,12 @@ def loosen(lanes, lane, batch, struck, closing, slow):
         return
     gaps_here(lanes, lane, batch, slow)
     for g in range(NGUARDS):
-        if g != struck and PARTNER[g] >= 0 and LAW[g] != HOLD_LAW:
-            left = slow.gaps[3 * NGUARDS + g]
-            feels = abs(left) > FELT * closing + ROUNDING * slow.gaps[5 * NGUARDS + g]
-            if feels and (mode >> PARTNER[g]) & 1 == 0:
+        if feels(lanes, lane, g, struck, closing, slow):
+            if (mode >> PARTNER[g]) & 1 == 0:
                 if LAW[g] == IMPACT_LAW and lanes.fresh[g, lane] > 1.5:
                     lanes.fresh[g, lane] = 1.0
-            elif feels:
+            else:
+                left = slow.gaps[3 * NGUARDS + g]
                 lanes.side[PARTNER[g], lane] = -1.0
                 let_go(lanes, lane, batch, PARTNER[g], slow)
                 if LAW[g] == SURFACE_LAW:
