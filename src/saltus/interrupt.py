@@ -168,7 +168,7 @@ class Stop:
 _CURRENT: ContextVar[Stop | None] = ContextVar("stop", default=None)
 
 
-#: What is called while long work goes on, and the thread that it is called in.
+#: Function that is called while long work goes on, and the thread that calls it.
 _HEARTBEAT: ContextVar[tuple[int, Callable[[], None]] | None] = ContextVar("beat", default=None)
 
 
