@@ -46,6 +46,12 @@ def chosen(run: xr.Dataset, trajectory: Any) -> list[int]:
     ParameterError
         If a label is unknown, or there are more than :data:`MOST` and none was chosen.
     """
+    if isinstance(trajectory, str) and trajectory in run:
+        name = shown(trajectory)
+        raise ParameterError(
+            f"{name} is a quantity of this run, not a trajectory. Write state={name} in a history, "
+            "or the name of the argument that it is meant for."
+        )
     if "trajectory" not in run.dims:
         if trajectory not in (None, 0):
             raise ParameterError(

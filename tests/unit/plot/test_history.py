@@ -343,3 +343,9 @@ def test_more_contacts_than_can_be_told_apart_are_counted(run):
     words = [text.get_text() for text in history(many).get_legend().get_texts()]
     assert f"{count} contacts, too many to mark" in words
     assert "contact" in [text.get_text() for text in history(run).get_legend().get_texts()]
+
+
+def test_a_quantity_given_as_trajectory_is_named():
+    run = sl.simulate(sl.models.delangre("b"), (0.0, 0.0), periods=1, progress=False)
+    with pytest.raises(ParameterError, match="Write state='x' in a history"):
+        history(run, "x")
