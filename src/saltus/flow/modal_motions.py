@@ -94,6 +94,28 @@ def _legs(
     return parts
 
 
+def modal_rates(map_: Stroboscope, states: np.ndarray) -> np.ndarray | None:
+    """The rates at states float64[k, D] at a whole period, row i by row i of the map, float64[k, D];
+    None if another method moves this system, or a contact has a law.
+    """
+    system = map_.system
+    if not isinstance(map_.method.serving(system.origin), Modal):
+        return None
+    tables = modal_flow(system.origin).tables
+    if not tables.plain.all() or len(tables.linear.states) != states.shape[1]:
+        return None
+    found = np.empty_like(states)
+    with tables.lock:
+        for i, state in enumerate(states):
+            given = tables.sets[tables.set_of(map_.parameters[i if len(map_) > 1 else 0])]
+            loads = [np.cos(given.lags), *(np.ravel(one.at(np.zeros(()))[0]) for one in given.courses)]
+            drives = np.concatenate(loads)
+            gap = given.gaps.matrix @ state + given.gaps.constant + given.gaps.driven @ drives
+            piece = tables.piece_of(given, int((gap > 0) @ (1 << np.arange(len(gap)))))
+            found[i] = piece.matrix @ state + piece.constant + piece.driven @ drives
+    return found
+
+
 @dataclass(frozen=True)
 class _Waves:
     """The waves of a contact state: its modes, a constant and the drives; see flow/waves.py.

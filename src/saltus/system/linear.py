@@ -176,10 +176,16 @@ class LinearSystem:
 
     def gaps(self, values: Mapping[str, float], mode: int = 0) -> LinearPiece:
         """a, c and e of all guards in a contact state, float64[guards, N], float64[guards],
-        float64[guards, D]; only those of hold guards depend on it.
+        float64[guards, D]; only those of hold guards depend on it. The arrays belong to all that
+        have asked for them.
         """
-        bits = [bool(mode >> i & 1) for i in range(len(self.system.guards))]
-        return LinearPiece(*self._coefficients(self._gaps, values, bits))
+        return _gaps_of(self, tuple((name, values[name]) for name in self._of_gaps), mode)
+
+    @functools.cached_property
+    def _of_gaps(self) -> tuple[str, ...]:
+        """The parameters of the gaps."""
+        used = {node.payload for node in ex.walk(*self._gaps) if node.op == "param"}
+        return tuple(name for name in self.system.values if name in used)
 
     def pieces_of(self, entries: Sequence[Expr], values: Mapping[str, float]) -> LinearPiece:
         """Coefficients of other linear functions of the states and drives of the system."""
@@ -217,6 +223,15 @@ class LinearSystem:
         ).reshape(len(entries), probes.shape[1])
         slopes = (found[:, 1 : 1 + n + m] - found[:, 1 + n + m :]) / (2 * PROBE)
         return slopes[:, :n].copy(), found[:, 0].copy(), slopes[:, n:].copy()
+
+
+@functools.lru_cache(maxsize=256)
+def _gaps_of(
+    linear: LinearSystem, values: tuple[tuple[str, float], ...], mode: int
+) -> LinearPiece:
+    """The gaps in a contact state, by the parameters in them."""
+    bits = [bool(mode >> i & 1) for i in range(len(linear.system.guards))]
+    return LinearPiece(*linear._coefficients(linear._gaps, dict(values), bits))
 
 
 @dataclass(frozen=True)
