@@ -161,9 +161,7 @@ def complete(
     if not len(opened):
         return found
     size = affordable(most + SURVEY_ITERATES, len(scale), min(SAMPLE, len(opened)))
-    sample = np.sort(
-        np.random.default_rng(0).choice(opened, min(size, len(opened)), replace=False)
-    )
+    sample = np.sort(np.random.default_rng(0).choice(opened, min(size, len(opened)), replace=False))
     half = stage(progress, 0.0, 0.5)
     wider, _, _ = find_attractors(map_, result.end[sample], scale, most, found, half)
     _renumber(result.label, found, wider)
