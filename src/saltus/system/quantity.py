@@ -141,12 +141,11 @@ def turning_surface(system: System, name: str) -> System:
 
 def with_turning_surfaces(
     system: System, names: Iterable[str], admits: Callable[[System], bool]
-) -> tuple[System, dict[int, str]]:
+) -> tuple[System, dict[int, str], list[str]]:
     """The system with surfaces on which states and outputs turn, as many as it has room for.
 
     One that contacts switch, such as the force of a stop, has a surface for each of their sides: it
-    jumps where they do, and a surface that jumps would have no side between. One that more than
-    :data:`MOST_SIDES` contacts switch, or boundaries of its own, has none.
+    jumps where they do, and a surface that jumps would have no side between.
 
     Parameters
     ----------
@@ -159,10 +158,15 @@ def with_turning_surfaces(
 
     Returns
     -------
-    System, dict of int to str
+    System
+    dict of int to str
         The state or output of each new guard by its number. The gap of a guard is the rate.
+    list of str
+        The names that turn on these surfaces only, or never. The others turn at times of their own,
+        on surfaces that were left out, or are switched by more than :data:`MOST_SIDES` contacts or
+        by boundaries of their own.
     """
-    found, of = system, {}
+    found, of, complete = system, {}, []
     for name in names:
         formula, guards = formula_of(system, name)
         bits = sorted(bits_in([formula]))
@@ -172,14 +176,20 @@ def with_turning_surfaces(
         for sides in itertools.product((False, True), repeat=len(bits)):
             rate = rate_of(system, _on_sides(formula, bits, sides))
             gaps[_on_sides(rate, bits, sides)] = None
+        left_out = False
         for gap in gaps:
-            if not depends_on(gap, ("state",)) or len(found.guards) >= MOST_GUARDS:
+            if not depends_on(gap, ("state",)):
+                left_out |= depends_on(gap, ("time",))
                 continue
             more = _with_guard(found, gap, found.guards, f"{name} turns")
-            if admits(more):
-                of[len(found.guards)] = name
-                found = more
-    return found, of
+            if len(found.guards) >= MOST_GUARDS or not admits(more):
+                left_out = True
+                continue
+            of[len(found.guards)] = name
+            found = more
+        if not left_out:
+            complete.append(name)
+    return found, of, complete
 
 
 def _on_sides(formula: Expr, bits: Iterable[int], sides: Iterable[bool]) -> Expr:

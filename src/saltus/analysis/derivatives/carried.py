@@ -22,6 +22,10 @@ from saltus.system import System
 from saltus.system.modes import field
 from saltus.system.parametric import parametric
 
+#: Kinds of contacts at which a motion begins to be held: behind them its rates aren't those of the
+#: equations.
+HELD = ("hold",)
+
 
 @dataclass(frozen=True)
 class Places:
@@ -149,18 +153,21 @@ class CarriedDerivatives:
     def contacts(
         self, outcome: Outcome, group: Ensemble, length: Span, run: Callable[[Request], Outcome]
     ) -> Places:
-        """The contacts: behind them where the flow records its derivatives there, else on either
-        side of each, by a second ``run`` with samples at their times.
+        """The contacts: behind them, before them where the motion is held from there on. What the
+        flow doesn't record comes from a second ``run`` with samples at their times.
         """
         table = outcome.contacts
         unit = length.period[table.trajectory] if self.timed else 1.0
-        rows, mode = table.state, table.mode_after
-        if self._own:
-            rows, mode = np.empty_like(rows), np.empty_like(mode)
+        rows, mode = table.state.copy(), table.mode_after.copy()
+        held = np.isin(table.kind_name, HELD)
+        again = np.full(len(held), True) if self._own else held
+        if again.any():
             whole = self.request(group, length, NO_SAMPLES)
-            for i in np.unique(table.trajectory):
-                here = table.trajectory == i
-                times, place = np.unique(table.time[here] - length.t_start, return_inverse=True)
+            before = 4.0 * np.spacing(np.maximum(np.abs(table.time), abs(whole.origin)))
+            since = np.maximum(table.time - whole.origin - np.where(held, before, 0.0), 0.0)
+            for i in np.unique(table.trajectory[again]):
+                here = again & (table.trajectory == i)
+                times, place = np.unique(since[here], return_inverse=True)
                 found = run(_alone(whole, i, times))
                 rows[here], mode[here] = found.samples[0, place], found.sample_mode[0, place]
         return self._places(rows, table.time * unit, mode, table.trajectory, group, length)

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis import dataset_parts
-from saltus.analysis.derivatives.carried import CarriedDerivatives, Places
+from saltus.analysis.derivatives.carried import HELD, CarriedDerivatives, Places
 from saltus.analysis.inputs.given import Starts, Values
 from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.inputs.spans import Span, span
@@ -28,6 +28,7 @@ from saltus.analysis.motion.sample_times import (
 from saltus.analysis.outcome_messages import warn
 from saltus.errors import ParameterError, among, must_be, unknown
 from saltus.flow import engine
+from saltus.flow.contact_table import ContactTable
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporting
 from saltus.flow.request import Outcome, Request
@@ -43,8 +44,8 @@ from saltus.system.read_off import Quantity
 
 #: Counters that are kept.
 COUNTED = ("steps", "rejected_steps", "mode_violations", "grazes_unresolved")
-#: Rate of a gap behind a contact, in those before it, below which the contact's time is that of
-#: another condition than the gap: the motion rests there, or goes along the boundary.
+#: Rate of a gap at a contact, in the largest at its contacts, below which the contact's time isn't
+#: that of a zero of the gap: the motion rests there, or goes along the boundary.
 LEAVES = 1e-9
 
 
@@ -56,7 +57,7 @@ def sensitivity(
     t_end: float | str | None = None,
     *,
     to: str | Sequence[str],
-    of: Mapping[str, Quantity] | None = None,
+    outputs: Mapping[str, Quantity] | None = None,
     extremes: bool = True,
     t_start: float | str = 0.0,
     samples: int | None = None,
@@ -81,12 +82,13 @@ def sensitivity(
         As for :func:`saltus.simulate`.
     to : str or sequence of str
         Parameters, and states at the start as ``"x(0)"``: what the derivatives are with respect to.
-    of : mapping of str to callable, or to (callable, unit)
-        More outputs, functions of (t, states, parameters) by name, as ``outputs=`` elsewhere.
+    outputs : mapping of str to callable, or to (callable, unit)
+        More outputs by name, functions of (t, states, parameters).
         States and named outputs of the system are taken without being asked for.
     extremes : bool
         Largest and smallest values with their derivatives. Each costs a surface that the flow
-        looks for. Of a structure by its modes: of its outputs alone.
+        looks for. Of a structure by its modes: of its outputs alone. NaN for what turns at times of
+        its own, such as a drive, and in the modal flow for what a damped contact switches.
 
     Returns
     -------
@@ -122,9 +124,9 @@ def sensitivity(
     """
     check_system(system)
     method = check_method(method, system)
-    asked = _Columns.of(system, to)
-    if of is not None:
-        system = replace(system, outputs=with_more(system, of))
+    asked = Columns.of(system, to)
+    if outputs is not None:
+        system = replace(system, outputs=with_more(system, outputs))
     group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
     times = None if at is None else times_of(system, group.size, at)
     if times is not None and samples is not None:
@@ -134,7 +136,7 @@ def sensitivity(
     if times is not None and periods is None and t_end is None:
         t_end = last_of(times, t_start)
     length = span(system, group, periods, t_end, t_start)
-    turning = _turning(system, method) if extremes else _Turning(system, {})
+    turning = _turning(system, method) if extremes else _Turning(system, {}, [])
     flow = CarriedDerivatives(turning.system, method, asked.parameters)
     plan = (
         planned(system, group, length, samples, keep, 2 * len(flow.flown.states))
@@ -155,7 +157,7 @@ def sensitivity(
 
 # -- what is asked for -----------------------------------------------------------------------------
 @dataclass(frozen=True)
-class _Columns:
+class Columns:
     """The columns of derivatives that were asked for.
 
     Attributes
@@ -173,7 +175,7 @@ class _Columns:
     places: list[int]
 
     @classmethod
-    def of(cls, system: System, to: Any) -> _Columns:
+    def of(cls, system: System, to: Any) -> Columns:
         """The columns of a user's ``to``."""
         given = [to] if isinstance(to, str) else to
         if (
@@ -216,10 +218,13 @@ class _Turning:
         The surfaces are guards of it behind those of the system.
     of : mapping of int to int
         The output of each of these guards.
+    known : list of int
+        The outputs that turn there only.
     """
 
     system: System
     of: Mapping[int, int]
+    known: list[int]
 
 
 def _turning(system: System, method: Method) -> _Turning:
@@ -229,10 +234,14 @@ def _turning(system: System, method: Method) -> _Turning:
     served = method.serving(system.origin)
     names = (*system.states, *system.outputs.names)
     wanted = names[len(system.states) :] if system.outputs.first else names
-    found, of = with_turning_surfaces(
+    found, of, known = with_turning_surfaces(
         system, wanted, lambda more: method.serving(more.origin) == served
     )
-    return _Turning(found, {guard: names.index(name) for guard, name in of.items()})
+    return _Turning(
+        found,
+        {guard: names.index(name) for guard, name in of.items()},
+        [names.index(name) for name in known],
+    )
 
 
 # -- the answer ------------------------------------------------------------------------------------
@@ -288,12 +297,18 @@ class _Run:
             own += gradients[..., -1:] * moved[:, None]
         return np.concatenate([states, own], axis=1)
 
-    def contact_times(self, at: Places, guard: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+    def contact_times(self, at: Places, table: ContactTable) -> np.ndarray:
         """Derivatives of the times of contacts, float64[m, C]: the gap of each stays zero. NaN
-        where it is zero behind the contact too.
+        where it is zero beside the contact too.
         """
         moved = np.full((len(at.time), at.slopes.shape[2]), np.nan)
         rates, system = self.flow.rates(at, self.group), self.turning.system
+        begins = np.isin(table.kind_name, HELD)
+        met = np.arange(len(system.guards))  # where a contact begins to be held
+        for number, one in enumerate(system.guards):
+            if one.law is not None and one.law.kind == "hold":
+                met[number] = one.law.partner
+        guard = np.where(begins, met[table.guard], table.guard)
         for number in np.unique(guard):
             here = guard == number
             gap = system.guards[number].gap
@@ -310,7 +325,7 @@ class _Run:
             change = np.einsum("mi,mic->mc", slopes[:, :size], at.slopes[here])
             change[:, size:] += slopes[:, size:-1]
             rate = np.einsum("mi,mi->m", slopes[:, :size], rates[here]) + slopes[:, -1]
-            leaves_it = np.abs(rate) > LEAVES * np.abs(velocity[here])
+            leaves_it = np.abs(rate) > LEAVES * np.abs(rate).max()
             with np.errstate(divide="ignore", invalid="ignore"):
                 moved[here] = np.where(leaves_it[:, None], -change / rate[:, None], np.nan)
         return moved
@@ -320,9 +335,9 @@ def _slope(formula: Expr, leaf: Expr) -> Expr:
     return time_derivative(formula) if leaf is TIME else differentiate(formula, leaf)
 
 
-def _dataset(run: _Run, asked: _Columns, outcome: Outcome) -> xr.Dataset:
+def _dataset(run: _Run, asked: Columns, outcome: Outcome) -> xr.Dataset:
     """The Dataset of a run."""
-    system, group, length = run.system, run.group, run.length
+    system, group, length, turning = run.system, run.group, run.length, run.turning
     n, forced = group.size, system.forced_at is not None
     unit = length.period if run.flow.timed else np.ones(n)
     time, _ = run.plan.of_result(outcome, length, forced)
@@ -336,7 +351,7 @@ def _dataset(run: _Run, asked: _Columns, outcome: Outcome) -> xr.Dataset:
     table = outcome.contacts
     touch = run.flow.contacts(outcome, group, length, run.again)
     speed = table.velocity / unit[table.trajectory]
-    moved = run.contact_times(touch, table.guard, speed)
+    moved = run.contact_times(touch, table)
     mine = np.flatnonzero(table.guard < len(system.guards))
     names = np.array([guard.name for guard in system.guards] or [""], dtype=np.str_)
     end = run.flow.ends(outcome, group, length)
@@ -367,7 +382,7 @@ def _dataset(run: _Run, asked: _Columns, outcome: Outcome) -> xr.Dataset:
             "contact_kind": table.kind_name[mine],
             "contact_velocity": speed[mine],
             "contact_trajectory": table.trajectory[mine],
-            **(_extremes(run, outcome, touch, moved, at, end, columns) if run.turning.of else {}),
+            **(_extremes(run, outcome, touch, moved, at, end, columns) if turning.known else {}),
             "end_derivative": run.slopes(end)[..., columns],
             **dataset_parts.endings(outcome, COUNTED),
             "end_time": end.time,
@@ -396,7 +411,6 @@ def _extremes(
     who = np.concatenate([at.trajectory for at, _, _ in parts])
     of = np.full(len(time), -1)
     of[: 2 * len(guard)] = np.tile([run.turning.of.get(int(one), -1) for one in guard], 2)
-    known = sorted(set(run.turning.of.values()))
     width = value.shape[1]
     found = {
         f"{word}{part}": np.full((n, width, *more), np.nan)
@@ -405,7 +419,7 @@ def _extremes(
     }
     for i in range(n):
         mine = np.flatnonzero(who == i)
-        for k in known:
+        for k in run.turning.known:
             here = mine[(of[mine] == k) | (of[mine] < 0)]
             here = here[np.isfinite(value[here, k])]
             if not len(here):

@@ -1,0 +1,78 @@
+"""Derivatives of a motion with respect to parameters, over the time."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+
+from saltus.errors import among, unknown
+from saltus.plot import axes as draw
+from saltus.plot import selection
+from saltus.plot.picture import picture
+from saltus.plot.style import CYCLE, display_scale
+
+
+@picture()
+def sensitivity(
+    ds: xr.Dataset,
+    output: str | None = None,
+    trajectory: int | None = None,
+    ax: Axes | None = None,
+    *,
+    legend: bool = True,
+) -> Axes:
+    """Change of a state or an output for one per cent more of each parameter, over the time.
+
+    A parameter that is zero, and a start that is zero, is drawn for one unit of it.
+
+    Parameters
+    ----------
+    ds : Dataset
+        Result of ``sensitivity``.
+    output : str, optional
+        Which state or output; by default the first output, or the first state if there is none.
+    trajectory : int, optional
+        Trajectory of a batch; the first one by default.
+    ax : Axes, optional
+        Axes to draw into; a new figure by default.
+    legend : bool
+        Whether to name the curves.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ParameterError
+        If ``ds`` is not from ``sensitivity``, or there is no such output or trajectory.
+    """
+    if "trajectory" in ds.dims:
+        first = int(ds["trajectory"].values[0])
+        ds = ds.sel(trajectory=selection.chosen(ds, first if trajectory is None else trajectory)[0])
+    names = ds["output"].values.tolist()
+    states = str(ds.attrs["states"]).split()
+    name = output if output is not None else next((o for o in names if o not in states), names[0])
+    if not among(name, names):
+        raise unknown("the result has no state or output", name, names)
+    one = ds.sel(output=name)
+    values = one["to_value"].values
+    parts = np.where(values == 0.0, 1.0, 0.01 * values)
+    change = one["derivative"].values * parts
+    unit = str(one["output_units"].item())
+    scale = display_scale(unit, float(np.nanmax(np.abs(change), initial=0.0)))
+    with draw.panels(ax, 1, (6.0, 2.8)) as (panel,):
+        for k, (to, value) in enumerate(zip(ds["to"].values, values, strict=True)):
+            label = f"1 % of {to}" if value else f"1 {one['to_units'].values[k]} of {to}"
+            color = CYCLE[k % len(CYCLE)]
+            panel.plot(
+                one["time"].values, change[:, k] * scale.factor, color=color, lw=1.0, label=label
+            )
+        panel.axhline(0.0, color="0.7", lw=0.6, zorder=0)
+        panel.set_xlabel("time [s]")
+        panel.set_ylabel(scale.label(f"change of {name}"))
+        if legend:
+            panel.legend(loc="upper left", bbox_to_anchor=(1.02, 1))
+        draw.note_status(panel, ds)
+    return panel
