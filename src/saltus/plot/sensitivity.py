@@ -24,7 +24,8 @@ def sensitivity(
 ) -> Axes:
     """Change of a state or an output for one per cent more of each parameter, over the time.
 
-    A parameter that is zero, and a start that is zero, is drawn for one unit of it.
+    A start is changed by one per cent of the range of its state. A parameter that is zero isn't
+    drawn: nothing says how much of it is little.
 
     Parameters
     ----------
@@ -56,18 +57,24 @@ def sensitivity(
     name = output if output is not None else next((o for o in names if o not in states), names[0])
     if not among(name, names):
         raise unknown("the result has no state or output", name, names)
-    one = ds.sel(output=name)
-    values = one["to_value"].values
-    parts = np.where(values == 0.0, 1.0, 0.01 * values)
-    change = one["derivative"].values * parts
-    unit = str(one["output_units"].item())
-    scale = display_scale(unit, float(np.nanmax(np.abs(change), initial=0.0)))
+    one, parts = ds.sel(output=name), ds["to_value"].values.copy()
+    for k, to in enumerate(ds["to"].values):
+        if to.endswith("(0)"):
+            parts[k] = np.ptp(ds["value"].sel(output=to[:-3]).values)
+    change = 0.01 * one["derivative"].values * parts
+    scale = display_scale(
+        str(one["output_units"].item()), float(np.nanmax(np.abs(change), initial=0.0))
+    )
     with draw.panels(ax, 1, (6.0, 2.8)) as (panel,):
-        for k, (to, value) in enumerate(zip(ds["to"].values, values, strict=True)):
-            label = f"1 % of {to}" if value else f"1 {one['to_units'].values[k]} of {to}"
-            color = CYCLE[k % len(CYCLE)]
+        for k in np.flatnonzero(parts):
+            to = ds["to"].values[k]
+            label = f"{to}: 1 % of its range" if to.endswith("(0)") else f"1 % of {to}"
             panel.plot(
-                one["time"].values, change[:, k] * scale.factor, color=color, lw=1.0, label=label
+                one["time"].values,
+                change[:, k] * scale.factor,
+                color=CYCLE[k % len(CYCLE)],
+                lw=1.0,
+                label=label,
             )
         panel.axhline(0.0, color="0.7", lw=0.6, zorder=0)
         panel.set_xlabel("time [s]")
