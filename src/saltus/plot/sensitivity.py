@@ -6,11 +6,12 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from saltus.errors import among, unknown
 from saltus.plot import axes as draw
 from saltus.plot import selection
+from saltus.plot.curves import of_output
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, display_scale
+from saltus.results.dataset.schema import first_of
 
 
 @picture()
@@ -32,7 +33,7 @@ def sensitivity(
     ds : Dataset
         Result of ``sensitivity``.
     output : str, optional
-        Which state or output; by default the first output, or the first state if there is none.
+        Which state or output; by default the first that pictures show.
     trajectory : int, optional
         Trajectory of a batch; the first one by default.
     ax : Axes, optional
@@ -52,19 +53,14 @@ def sensitivity(
     if "trajectory" in ds.dims:
         first = int(ds["trajectory"].values[0])
         ds = ds.sel(trajectory=selection.chosen(ds, first if trajectory is None else trajectory)[0])
-    names = ds["output"].values.tolist()
-    states = str(ds.attrs["states"]).split()
-    name = output if output is not None else next((o for o in names if o not in states), names[0])
-    if not among(name, names):
-        raise unknown("the result has no state or output", name, names)
-    one, parts = ds.sel(output=name), ds["to_value"].values.copy()
+    name = first_of(ds) if output is None else output
+    one, unit = of_output(ds, name)
+    parts = ds["to_value"].values.copy()
     for k, to in enumerate(ds["to"].values):
         if to.endswith("(0)"):
             parts[k] = np.ptp(ds["value"].sel(output=to[:-3]).values)
     change = 0.01 * one["derivative"].values * parts
-    scale = display_scale(
-        str(one["output_units"].item()), float(np.nanmax(np.abs(change), initial=0.0))
-    )
+    scale = display_scale(unit, float(np.nanmax(np.abs(change), initial=0.0)))
     with draw.panels(ax, 1, (6.0, 2.8)) as (panel,):
         for k in np.flatnonzero(parts):
             to = ds["to"].values[k]

@@ -31,5 +31,5 @@ def test_each_curve_is_the_change_for_a_per_cent(derivatives):
 
 
 def test_an_unknown_output_is_refused(derivatives):
-    with pytest.raises(ParameterError, match="no state or output 'y'"):
+    with pytest.raises(ParameterError, match="no output 'y'"):
         sl.plot.sensitivity(derivatives, output="y")
