@@ -62,7 +62,7 @@ def sensitivity(
     change = 0.01 * one["derivative"].values * parts
     scale = display_scale(unit, float(np.nanmax(np.abs(change), initial=0.0)))
     with draw.panels(ax, 1, (6.0, 2.8)) as (panel,):
-        for k in np.flatnonzero(parts):
+        for k in np.flatnonzero(parts).tolist():
             to = ds["to"].values[k]
             label = f"{to}: 1 % of its range" if to.endswith("(0)") else f"1 % of {to}"
             panel.plot(
