@@ -6,10 +6,15 @@ from __future__ import annotations
 
 import gc
 import math
+import os
 import warnings
 from pathlib import Path
 
 import pytest
+
+# A process a core runs the tests: threads of linear algebra would wait for one another. Before
+# NumPy is imported, and for all processes that tests start.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 #: Files in which tests take longest, longest first: no process is to begin one of them when all
 #: others have ended.
