@@ -60,12 +60,13 @@ saltus.analysis.basins.pipeline.CHUNK = 24
 saltus.analysis.basins.pipeline.SCOUTS, saltus.analysis.basins.pipeline.CHECKED = 64, 64
 
 if __name__ == "__main__":  # a process of --workers computes chunks only
-    import saltus.plot, saltus.study.run.maps, saltus.study.read, saltus.study.run.study
+    import saltus.plot, saltus.results.files.export, saltus.study.run.maps, saltus.study.read, saltus.study.run.study
     from saltus.cli import main
     from saltus.results.store.store import Store
 
     saltus.study.run.maps.CHUNK = 24
     saltus.study.run.maps.LARGE = 100  # nobody asks how long it will take
+    saltus.results.files.export._has = lambda _: False  # netCDF-3 is written sooner
     commit = Store.commit
     committed = []
 
