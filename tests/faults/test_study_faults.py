@@ -60,7 +60,8 @@ saltus.analysis.basins.pipeline.CHUNK = 24
 saltus.analysis.basins.pipeline.SCOUTS, saltus.analysis.basins.pipeline.CHECKED = 64, 64
 
 if __name__ == "__main__":  # a process of --workers computes chunks only
-    import saltus.plot, saltus.results.files.export, saltus.study.run.maps, saltus.study.read, saltus.study.run.study
+    import saltus.plot, saltus.study.run.maps, saltus.study.read, saltus.study.run.study
+    import saltus.results.files.export
     from saltus.cli import main
     from saltus.results.store.store import Store
 
