@@ -92,9 +92,9 @@ def test_bodies_that_stay_together_share_their_momentum(restitution):
 @pytest.mark.parametrize(
     ("restitutions", "inertia"),
     [
-        pytest.param((0.8, 0.2), 1.0, marks=pytest.mark.nojit),
-        pytest.param((0.99, 0.9), 3.0, marks=pytest.mark.nojit),
-        ((0.0, 0.0), 0.2),
+        ((0.8, 0.2), 1.0),
+        ((0.99, 0.9), 3.0),
+        pytest.param((0.0, 0.0), 0.2, marks=pytest.mark.nojit),
     ],
 )
 def test_impacts_that_cause_each_other_move_together(restitutions, inertia, method):
