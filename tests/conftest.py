@@ -135,6 +135,16 @@ def netcdf_3(request):
         yield
 
 
+@pytest.fixture(scope="module")
+def few_scouts():
+    """Maps of some ten cells, before which no thousand starts look for attractors."""
+    from saltus.analysis.basins import pipeline
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pipeline, "SCOUTS", 64)
+        yield
+
+
 @pytest.fixture
 def ctrl_c_may_leave_files_open():
     """What a Ctrl-C that comes while a file is opened leaves to the collector is collected here,

@@ -15,12 +15,13 @@ import pytest
 import xarray as xr
 
 import saltus as sl
-from saltus.analysis.basins import pipeline
 from saltus.results.dataset import schema
 from saltus.results.dataset.result import Result
 from saltus.results.files import export
 from saltus.results.provenance import file_hash, to_json, versions
 from saltus.system import System
+
+pytestmark = pytest.mark.usefixtures("few_scouts")
 
 RIG = sl.models.delangre("a", force="4 N", frequency="17 Hz")
 #: The same start, numbers and names with units; and the same box.
@@ -38,14 +39,6 @@ FORCE = {"in SI": (3.9, 4.1), "in units": ("3.9 N", "4.1 N")}
 
 
 SIZES = {"in SI": (2e-4, 6e-4), "in units": ("0.2 mm", "0.6 mm")}
-
-
-@pytest.fixture(autouse=True, scope="module")
-def few_scouts():
-    """Maps of 4 x 4 cells need no thousand scouts."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pipeline, "SCOUTS", 64)
-        yield
 
 
 @cache

@@ -6,9 +6,11 @@ from functools import cache
 
 import numpy as np
 import pytest
-from tests.conformance.test_every_verb import CALLS, few_scouts, takes  # noqa: F401
+from tests.conformance.test_every_verb import CALLS, takes
 
 import saltus as sl
+
+pytestmark = pytest.mark.usefixtures("few_scouts")
 
 OUTPUTS = {
     "stop force": lambda x, contact_stiffness, upper_gap: (

@@ -93,7 +93,7 @@ def by_hand(t, x, v, f, *, w=0.9):
     return v, 1.5 * sl.cos(w * t) - 0.2 * x - 0.05 * v - f, rates
 
 
-def test_the_same_by_hand_in_every_verb():
+def test_the_same_by_hand_in_every_verb(few_scouts):
     ours, hand = (sl.simulate(one, (0.5, 0.0, 0.0), periods=30) for one in (joint, by_hand))
     short = sl.simulate(joint, (0.5, 0.0), periods=30)
     assert short.end_x.item() == ours.end_x.item()
