@@ -35,17 +35,18 @@ WAYS = 6
 
 
 def bernstein_table(lanes: int) -> np.ndarray:
-    """Bernstein coefficients of the powers of x on [0, 1], and the differences of two that follow
-    one another, in the rows of the kernel: float64[2 * 16 * 16 / lanes, lanes].
+    """Bernstein coefficients of the powers of x on [0, 1], the differences of two that follow one
+    another, and the coefficients where the degree is one less, in the rows of the kernel:
+    float64[3 * 16 * 16 / lanes, lanes].
     """
-    order = layout.ORDER
-    table = np.array(
-        [[math.comb(i, k) / math.comb(order, k) for i in range(order + 1)]
-         for k in range(order + 1)]
-    )  # fmt: skip
+    terms, order = range(layout.ORDER + 1), layout.ORDER
+    table, less = (
+        np.array([[math.comb(i, k) / max(math.comb(n, k), 1) for i in terms] for k in terms])
+        for n in (order, order - 1)
+    )
     steps = np.diff(table, axis=1)
     steps = np.append(steps, steps[:, -1:], axis=1)
-    return np.concatenate([table, steps]).reshape(-1, lanes)
+    return np.concatenate([table, steps, less]).reshape(-1, lanes)
 
 
 class ModalFlow:
@@ -130,8 +131,10 @@ class ModalFlow:
                 empty((max(courses, 1), layout.VALUE + self.tables.linear.terms)),
                 empty((2 * groups, lanes)), empty((amplitudes, lanes)), empty((size, columns)),
                 empty((3, size)), bernstein_table(lanes),
-                empty((max(rows, 1), layout.BEYOND + 2 * groups + 2)),
-                empty((4 * groups * max(rows, 1), lanes)), empty((max(rows, 1), 11)), empty(5),
+                empty((max(rows, 1), layout.FIFTH + 1)),
+                empty((layout.WAVES * (groups + 1) * max(rows, 1), lanes)),
+                empty((max(rows, 1), 11)), empty(5),
+                empty((layout.QUEUE * (2 * groups + states), lanes)), np.zeros(1, np.int64),
             )  # fmt: skip
         arrays: tuple[np.ndarray, ...] = self._memory.arrays
         return arrays
