@@ -43,8 +43,8 @@ CLOCK_ROWS = CLOCK_ROW + HELD * NCLOCKS
 # counted again); the number of steps at which its pace is looked at next, and the periods behind it
 # when that was done last; the phase of the next break of a clock, and from which on it counts as
 # reached; log2 of the tolerance, and the contacts that the trajectory may make; the guard whose
-# boundary the state came to at the last landing's instant (-1: none); whether there was an impact at
-# that instant (0/1), and by how much earlier it came, for each column of a tangent.
+# boundary the state came to at the last landing's instant (-1: none); whether there was an impact
+# at that instant (0/1), and by how much earlier it came, for each column of a tangent.
 (
     END,
     DUE,
@@ -218,7 +218,8 @@ def workspace():
     slow = Slow(
         q=np.zeros(ORDER + 1), b=np.zeros((DEEPEST + 2, ORDER + 1)),
         bounds=np.zeros((DEEPEST + 2, 2)), rates=np.zeros(ORDER + 1),
-        out=np.zeros(OUT_DATES + NCOLUMNS), gaps=np.zeros(6 * guards), state=np.zeros((5 if LAWS else 1) * NSTATES),
+        out=np.zeros(OUT_DATES + NCOLUMNS), gaps=np.zeros(6 * guards),
+        state=np.zeros((5 if LAWS else 1) * NSTATES),
         touches=np.zeros((MOST_TOUCHES, 2)),
         held=np.zeros(HELD * NCLOCKS), numbers=np.zeros((NUMBERS + 1) * NCLOCKS),
     )  # fmt: skip
