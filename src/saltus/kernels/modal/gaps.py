@@ -386,6 +386,9 @@ def decide(i, g, batch, m):
         if known > 1 and not exact:
             return OPEN
         if exact and is_rounding(m.p, degree, noise):
+            if m.laws[g, KIND] == HOLD_LAW:  # the force that holds has gone
+                m.found[g, PLACE], m.found[g, FINAL] = 0.0, 1.0
+                return CROSSES
             m.found[g, RIDDEN] = 1.0
             return CLEAR
         if exact and leading_sign(m.p, degree) < 0:
@@ -400,7 +403,8 @@ def decide(i, g, batch, m):
             batch.status[i] = MODE_VIOLATION
             return CLEAR
         # what presses a contact at rest jumps where the state does
-        if m.p[0] < -noise or side_of_leaving(m.p, degree, False, noise) < 0:
+        least = 0 if m.laws[g, KIND] == HOLD_LAW and m.laws[g, SECOND] >= 0 else -1
+        if m.p[0] < -noise or side_of_leaving(m.p, degree, False, noise) <= least:
             m.found[g, PLACE], m.found[g, FINAL] = 0.0, 1.0
             return CROSSES
     to_bernstein(m.p, degree, m.bern[0])
