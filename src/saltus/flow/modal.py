@@ -175,6 +175,8 @@ class ModalFlow:
         size = np.abs(state) @ np.abs(given.gaps.matrix.T)
         zero = np.abs(gap) <= layout.ROUNDED * (size + np.abs(parts[1]) + np.abs(parts[2]))
         bits, allowed, plain = 1 << np.arange(gap.shape[1]), self.tables.allowed, self.tables.plain
+        beyond = ((gap * self.tables.limits > 0) & ~zero).any(axis=1)
+        batch.status[who[beyond]] = st.INVALID
         rubs = zero & self.tables.rubs
         zero &= plain | (allowed != 0) | rubs
         up = np.where(zero, allowed > 0, gap > 0) & ~self.tables.holds

@@ -43,10 +43,8 @@ class Rubbing:
                 margins = self._of(self.tables.shown(self._given, mode))
                 upper, lower = margins[one.hold], -margins[one.second]
                 mode &= ~(1 << one.hold | 1 << one.guard)
-                if upper > 0 and lower > 0:
-                    mode |= 1 << one.hold
-                elif upper < lower:
-                    mode |= 1 << one.guard
+                mode |= int(upper > 0 and lower > 0) << one.hold
+                mode |= int(upper < lower) << one.guard
             if mode == before:
                 break
         return mode

@@ -24,7 +24,7 @@ from saltus.language.expression import Expr, walk
 from saltus.system import System
 from saltus.system.courses import Course, course_of
 from saltus.system.linear import LinearPiece, LinearSystem
-from saltus.system.linear_friction import is_idle, is_ridden
+from saltus.system.linear_friction import is_idle, limit_side
 from saltus.system.linear_laws import Constrained, constrained, impacts_of, rows_of
 from saltus.system.quantity import remembered
 
@@ -71,6 +71,7 @@ class Tables:
             sides[g] = guard.law.side if guard.law else 0
         self.holds, self.plain = kinds == HOLD_LAW, kinds == NO_LAW
         self.rubs, self.allowed = kinds == SURFACE_LAW, sides
+        self.limits = self._laws[:, layout.LIMITS]
         self._remembers = np.array(remembered(linear.system), np.int64)
         self._impacts = impacts_of(linear, linear.system.values)
         self.generation = 0
@@ -226,7 +227,8 @@ class Tables:
     def _make(self, which: int, mode: int) -> None:
         given = self.sets[which]
         shown = self.shown(given, mode)
-        free = constrained(self.linear.system, mode, given.gaps, given.impacts)
+        stays = [g for g in np.flatnonzero(self.limits).tolist() if self.stays(given, mode, g)]
+        free = constrained(self.linear.system, mode, given.gaps, given.impacts, stays)
         known = self._equations_of(given, mode, free)
         modes = self._state_modes(known, given, shown, free)
         number, guards = len(self.made), len(self.linear.system.guards)
@@ -267,6 +269,14 @@ class Tables:
             piece, gaps, given.rates, speeds, LANES * self.groups, known.eigen, known.fastest
         )
         return spread_over(modes, free, len(given.rates)) if held else modes
+
+    def stays(self, given: ValueSet, mode: int, g: int) -> bool:
+        """True if a memory stays at its limit in a contact state, the boundary of a guard."""
+        if (self.limits[g] > 0) != bool(mode >> g & 1):
+            return False
+        normal = given.gaps.matrix[g]
+        rates = [normal @ rows_of(self.piece_of(given, one)) for one in (mode, mode ^ 1 << g)]
+        return not rates[0].any() and bool(rates[1].any()) and not given.gaps.driven[g].any()
 
     def piece_of(self, given: ValueSet, mode: int) -> LinearPiece:
         """The matrices of a contact state."""
@@ -368,16 +378,17 @@ class Tables:
 
 
 def laws_of(linear: LinearSystem) -> np.ndarray:
-    """What the kernel reads of the law of each gap, see layout.KIND: int64[gaps, 6]."""
+    """What the kernel reads of the law of each gap, see layout.KIND: int64[gaps, LAW_COLUMNS]."""
     guards, sticking = linear.system.guards, linear.sticking
     table = np.full((len(linear.own_gaps), layout.LAW_COLUMNS), -1, np.int64)
-    table[:, layout.KIND] = NO_LAW
+    table[:, layout.KIND], table[:, layout.LIMITS] = NO_LAW, 0
     for g, guard in enumerate(guards):
         if guard.state is not None:
             table[g, layout.LEVEL] = linear.system.states.index(guard.state)
-        if is_idle(guards, guard, sticking):
+        table[g, layout.LIMITS] = limit_side(guard)
+        if is_idle(guards, guard):
             table[g, layout.KIND] = HOLD_LAW
-        elif guard.law is not None and not is_ridden(g, guard, sticking):
+        elif guard.law is not None and limit_side(guard) == 0:
             holds = g if is_hold(guard) else guard.law.partner
             kind, partner = LAW_KINDS[guard.law.kind], guard.law.partner
             table[g, [layout.KIND, layout.PARTNER, layout.HOLDER]] = kind, partner, holds

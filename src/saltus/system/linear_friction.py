@@ -49,13 +49,11 @@ class Sticking:
 
 
 def sticking_of(system: System) -> tuple[Sticking, ...]:
-    """The boundaries of a system on which friction may hold the motion. Those that are ridden,
-    because nothing leads away from them on one side, aren't among them: limits of a memory.
-    """
+    """The boundaries of a system on which friction may hold the motion."""
     found = list[Sticking]()
     for number, guard in enumerate(system.guards):
         law = guard.law
-        if law is None or law.kind != "surface" or _never_holds(law):
+        if law is None or law.kind != "surface" or limit_side(guard) != 0:
             continue
         assert law.drive is not None
         assert law.pivot is not None
@@ -72,7 +70,7 @@ def gaps_of(system: System, sticking: Sequence[Sticking]) -> tuple[Expr, ...]:
     minus the second margin of each.
     """
     gaps = [
-        ex.constant(0.0) if is_idle(system.guards, guard, sticking) else guard.gap
+        ex.constant(0.0) if is_idle(system.guards, guard) else guard.gap
         for guard in system.guards
     ]
     for one in sticking:
@@ -80,33 +78,29 @@ def gaps_of(system: System, sticking: Sequence[Sticking]) -> tuple[Expr, ...]:
     return (*gaps, *(ex.neg(one.margins[1]) for one in sticking))
 
 
-def is_ridden(number: int, guard: Guard, sticking: Sequence[Sticking]) -> bool:
-    """True for a boundary that the motion may ride, but never is held on."""
-    surface = guard.law is not None and guard.law.kind == "surface"
-    return surface and all(one.guard != number for one in sticking)
-
-
-def is_idle(guards: Sequence[Guard], guard: Guard, sticking: Sequence[Sticking]) -> bool:
-    """True for the hold guard of such a boundary."""
-    if guard.law is None or guard.law.kind != "hold":
-        return False
-    return is_ridden(guard.law.partner, guards[guard.law.partner], sticking)
-
-
-def _never_holds(law: Law) -> bool:
-    """True if a surface is never held: in all contact states one of its sides doesn't lead away
-    from it, or both lead on alike.
+def limit_side(guard: Guard) -> int:
+    """1 or -1 for the limit of a memory, on which it stays while its input pushes on: the side of
+    the boundary to which that leads; 0 for any other boundary.
     """
+    law = guard.law
+    if law is None or law.kind != "surface":
+        return 0
     assert law.drive is not None
     assert law.pivot is not None
-    bits = sorted(bits_in([law.drive, law.pivot]))
+    bits, found, canonical = sorted(bits_in([law.drive, law.pivot])), set[int](), Canonical()
     if len(bits) > _MOST_BITS:
-        return False
-    canonical = Canonical()
+        return 0
     for sides in itertools.product((False, True), repeat=len(bits)):
         drive, pivot = law.drive, law.pivot
         for bit, side in zip(bits, sides, strict=True):
             drive, pivot = assuming(drive, bit, side), assuming(pivot, bit, side)
-        if all(canonical.polynomial(x) for x in (pivot, ex.add(drive, pivot), ex.sub(drive, pivot))):
-            return False
-    return True
+        if canonical.polynomial(pivot):
+            rests = [not canonical.polynomial(one(drive, pivot)) for one in (ex.add, ex.sub)]
+            found.add(rests[0] - rests[1])
+    return found.pop() if len(found) == 1 else 0
+
+
+def is_idle(guards: Sequence[Guard], guard: Guard) -> bool:
+    """True for the hold guard of the limit of a memory, on which nothing is held."""
+    held = guard.law is not None and guard.law.kind == "hold"
+    return held and limit_side(guards[guard.law.partner]) != 0

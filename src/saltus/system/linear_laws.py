@@ -9,7 +9,7 @@ its own force changes its sign.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -97,13 +97,17 @@ def impacts_of(linear: LinearSystem, values: Mapping[str, float]) -> Impacts:
     return Impacts(closing, push, restitution)
 
 
-def constrained(system: System, mode: int, gaps: LinearPiece, impacts: Impacts) -> Constrained:
-    """The states that the contacts held in a mode (bits) allow."""
+def constrained(
+    system: System, mode: int, gaps: LinearPiece, impacts: Impacts, stays: Sequence[int] = ()
+) -> Constrained:
+    """The states that the contacts held in a mode (bits) allow, and memories that stay at the
+    boundaries of some guards.
+    """
     n = gaps.matrix.shape[1]
     held = [
         g.law.partner for i, g in enumerate(system.guards) if g.law and is_hold(g) and mode >> i & 1
     ]
-    rows = np.vstack([rows_of(gaps)[held], rows_of(impacts.closing)[held]])
+    rows = np.vstack([rows_of(gaps)[[*held, *stays]], rows_of(impacts.closing)[held]])
     if not len(rows):
         return Constrained(np.arange(n), np.eye(n), np.zeros((n, rows.shape[1] - n)))
     pivots = np.sort(_independent(rows[:, :n]))

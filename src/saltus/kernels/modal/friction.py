@@ -105,3 +105,13 @@ def date_rubbing(i, g, modes, tau, moved, batch, m):
         if not moved and m.laws[g, KIND] == HOLD_LAW:
             for c in range(m.sizes[TANGENTS]):
                 batch.carry[i, first_date(m) + c] = 0.0
+
+
+@kernel
+def date_limits(i, hits, modes, tau, batch, m):
+    """Find how the instant moves at which a memory comes to its limit, if it isn't known: in the
+    contact state behind it stays there whatever the start was. Needs the rates before, and `angle`.
+    """
+    for g in range(m.sizes[GUARDS]):
+        if (hits >> g) & 1 and m.laws[g, LIMITS] != 0 and batch.carry[i, DATED] == 0.0:
+            date_landing(i, g, modes, tau, batch, m)

@@ -191,6 +191,7 @@ def land(i, tau, d, hits, modes, steady, batch, m):
             batch.counters[i, EVENTS] += 1
             batch.minima[i, CONTACT_SPEED] = min(batch.minima[i, CONTACT_SPEED], abs(rate))
             record(i, g, tau + d, CROSSING, direction, rate, after, error, batch, m)
+    arrives = hits if d > 0.0 else hits & ~batch.fresh[i]
     if d > 0.0:
         know_rides(i, batch, m)
     for g in range(m.sizes[GUARDS]):
@@ -201,6 +202,7 @@ def land(i, tau, d, hits, modes, steady, batch, m):
     if m.sizes[TANGENTS] != 0:
         batch.carry[i, WAITED] += d
         leave_columns(i, hits, at, tau + d, batch, m)
+        date_limits(i, arrives, modes, tau + d, batch, m)
     return count_landing(i, tau + d, batch)
 
 
