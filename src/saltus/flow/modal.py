@@ -282,9 +282,10 @@ class Modal(Method):
 
     A gap is followed by the modes that matter and bounded by the others, so that no contact is
     missed; the instant of a contact is a zero of all modes, to rounding. At a rigid stop
-    (:func:`saltus.impact`) impacts, rest and release follow the rules of :class:`saltus.Taylor`.
-    Systems that it doesn't serve - nonlinear forces, friction, jumps - are moved by
-    :class:`saltus.Taylor`.
+    (:func:`saltus.impact`) impacts, rest and release follow the rules of :class:`saltus.Taylor`. So
+    do dry friction whose force in motion is linear in the states, and memories
+    (:func:`saltus.slider`), which begin within their limits. Systems that it doesn't serve -
+    nonlinear forces, friction beside rigid stops, jumps - are moved by :class:`saltus.Taylor`.
 
     Parameters
     ----------

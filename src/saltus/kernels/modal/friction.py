@@ -108,6 +108,20 @@ def date_rubbing(i, g, modes, tau, moved, batch, m):
 
 
 @kernel
+def turns_here(i, g, noise, batch, m):
+    """True if the rate of a gap is the rounding of its terms where the amplitudes stand: a memory
+    leaves its limit where its input turns. Needs the terms of the gap in `p`.
+    """
+    r, which, total = m.row_of[g], int(batch.carry[i, SET]), 0.0
+    first, at = numbers_of_gap(r, m.links[int(batch.carry[i, AT]), STEADY], m)
+    for d in range(m.sizes[DRIVES]):
+        a, b = number(m.steady, first, at + 1 + 2 * d), number(m.steady, first, at + 2 + 2 * d)
+        total += (abs(a) + abs(b)) * abs(m.rate[which, d])
+    total += m.stood[r, BEYOND + m.sizes[MODE_GROUPS] + 1]
+    return abs(m.stood[r, SLOPE]) <= ROUNDED * total or abs(m.p[1]) <= noise
+
+
+@kernel
 def date_limits(i, hits, modes, tau, batch, m):
     """Find how the instant moves at which a memory comes to its limit, if it isn't known: in the
     contact state behind it stays there whatever the start was. Needs the rates before, and `angle`.

@@ -377,6 +377,8 @@ def decide(i, g, batch, m):
     noise = terms_of(i, g, side, batch, m)
     error, slope_error = m.errors[m.row_of[g], 0], m.errors[m.row_of[g], 1]
     exact, known = error <= noise, known_zeros(i, g, batch)
+    if known == 1 and m.laws[g, LIMITS] != 0 and turns_here(i, g, noise, batch, m):
+        known = 2
     fresh, degree, whole = known > 0, ORDER - known, error
     if fresh:
         whole += abs(m.p[0])  # what the bounded modes add to the gap where it is zero
