@@ -209,6 +209,7 @@ MODAL = Interface(
         "modal/gaps",
         "modal/laws",
         "modal/impacts",
+        "modal/friction",
         "modal/tangents",
         "modal/steps",
     ),
