@@ -129,6 +129,7 @@ CALLS = {
     "periodic_orbits": started(periods=1),
     "poincare": started(surface="x turns", periods=5),
     "regularisation_widths": started(points=2, transient=20, widths=[1e-4, 1e-5]),
+    "sensitivity": started(periods=3, to=["upper_gap"]),
     "settled": of_result("simulate"),
     "simulate": started(periods=40),
     "spectrum": of_result("simulate", state="x"),
