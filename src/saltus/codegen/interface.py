@@ -77,7 +77,7 @@ TAYLOR = Interface(
         "impacts", "taylor/laws", "taylor/together", "taylor/trajectories"),
     sizes=(
         "NSTATES", "NGUARDS", "ORDER", "NCONST", "NTURNS", "CLOCK_ROW", "GAP_ROW", "SCALE_ROW",
-        "CALM_ROW", "ROWS", "NMOVED", "NSINGULAR",
+        "CALM_ROW", "ROWS", "NMOVED", "NSINGULAR", "NCOLUMNS",
         "NEWTON_DEGREE_1", "NEWTON_DEGREE_2", "NSERIES", "NCLOCKS",
     ),
     flags=("PROBED", "TANGENT", "LAWS", "LEVELS"),
@@ -209,6 +209,7 @@ MODAL = Interface(
         "modal/gaps",
         "modal/laws",
         "modal/impacts",
+        "modal/friction",
         "modal/tangents",
         "modal/steps",
     ),

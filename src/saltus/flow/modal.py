@@ -16,6 +16,7 @@ from saltus.errors import ParameterError
 from saltus.flow.counts import whole
 from saltus.flow.method import Method, explain_unknown_options, step_budget
 from saltus.flow.modal_parameters import varies_by
+from saltus.flow.modal_rubbing import Rubbing
 from saltus.flow.modal_tables import Tables
 from saltus.flow.modal_values import ValueSet
 from saltus.flow.taylor import Taylor
@@ -180,11 +181,22 @@ class ModalFlow:
         size = np.abs(state) @ np.abs(given.gaps.matrix.T)
         zero = np.abs(gap) <= layout.ROUNDED * (size + np.abs(parts[1]) + np.abs(parts[2]))
         bits, allowed, plain = 1 << np.arange(gap.shape[1]), self.tables.allowed, self.tables.plain
-        zero &= plain | (allowed != 0)
+        beyond = ((gap * self.tables.limits > 0) & ~zero).any(axis=1)
+        batch.status[who[beyond]] = st.INVALID
+        rubs = zero & self.tables.rubs
+        zero &= plain | (allowed != 0) | rubs
         up = np.where(zero, allowed > 0, gap > 0) & ~self.tables.holds
         mode = up @ bits if gap.shape[1] else np.zeros(len(who), np.int64)
         fresh = zero @ bits if gap.shape[1] else mode
         zero &= plain
+        for i in np.flatnonzero(rubs.any(axis=1)).tolist():
+            begin = Rubbing(self.tables, which, state[i], drives[i])
+            mode[i] = begin.mode(int(mode[i]), rubs[i])
+            held = begin.held(int(mode[i]))
+            fresh[i] &= ~sum(1 << one.guard for one in held)
+            if held and self._tangents:
+                rows = batch.state[who[i], self._states :].reshape(self._states, -1)
+                rows[:] = begin.projection(int(mode[i]), held) @ rows
         for i in np.flatnonzero(zero.any(axis=1)).tolist():
             mode[i] |= self._ways(which, int(mode[i]), zero[i], state[i], time[i])
         batch.mode[who], batch.fresh[who] = mode, fresh
@@ -276,9 +288,10 @@ class Modal(Method):
 
     A gap is followed by the modes that matter and bounded by the others, so that no contact is
     missed; the instant of a contact is a zero of all modes, to rounding. At a rigid stop
-    (:func:`saltus.impact`) impacts, rest and release follow the rules of :class:`saltus.Taylor`.
-    Systems that it doesn't serve - nonlinear forces, friction, jumps - are moved by
-    :class:`saltus.Taylor`.
+    (:func:`saltus.impact`) impacts, rest and release follow the rules of :class:`saltus.Taylor`. So
+    do dry friction whose force in motion is linear in the states, and memories
+    (:func:`saltus.slider`), which begin within their limits. Systems that it doesn't serve -
+    nonlinear forces, friction beside rigid stops, jumps - are moved by :class:`saltus.Taylor`.
 
     Parameters
     ----------

@@ -402,6 +402,8 @@ def decide(i, g, batch, m):
     noise = terms_of(i, g, side, batch, m)
     error, slope_error = m.errors[m.row_of[g], 0], m.errors[m.row_of[g], 1]
     exact, known = error <= noise, known_zeros(i, g, batch)
+    if known == 1 and m.laws[g, LIMITS] != 0 and turns_here(i, g, noise, batch, m):
+        known = 2
     fresh, degree, whole = known > 0, ORDER - known, error
     if fresh:
         whole += abs(m.p[0])  # what the bounded modes add to the gap where it is zero
@@ -411,6 +413,9 @@ def decide(i, g, batch, m):
         if known > 1 and not exact:
             return OPEN
         if exact and is_rounding(m.p, degree, noise):
+            if m.laws[g, KIND] == HOLD_LAW:  # the force that holds has gone
+                m.found[g, PLACE], m.found[g, FINAL] = 0.0, 1.0
+                return CROSSES
             m.found[g, RIDDEN] = 1.0
             return CLEAR
         if exact and leading_sign(m.p, degree) < 0:
@@ -425,7 +430,8 @@ def decide(i, g, batch, m):
             batch.status[i] = MODE_VIOLATION
             return CLEAR
         # what presses a contact at rest jumps where the state does
-        if m.p[0] < -noise or side_of_leaving(m.p, degree, False, noise) < 0:
+        least = 0 if m.laws[g, KIND] == HOLD_LAW and m.laws[g, SECOND] >= 0 else -1
+        if m.p[0] < -noise or side_of_leaving(m.p, degree, False, noise) <= least:
             m.found[g, PLACE], m.found[g, FINAL] = 0.0, 1.0
             return CROSSES
     bernstein_of(degree, m)

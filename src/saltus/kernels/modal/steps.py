@@ -231,8 +231,9 @@ def land(i, tau, d, hits, modes, steady, batch, m):
             batch.counters[i, EVENTS] += 1
             batch.minima[i, CONTACT_SPEED] = min(batch.minima[i, CONTACT_SPEED], abs(rate))
             record(i, g, tau + d, CROSSING, direction, rate, after, error, batch, m)
+    arrives = hits if d > 0.0 else hits & ~batch.fresh[i]
     if d > 0.0:
-        know_nothing(i, batch)
+        know_rides(i, batch, m)
     for g in range(m.sizes[GUARDS]):
         if (hits >> g) & 1:
             know_zeros(i, g, 1, batch)
@@ -241,21 +242,15 @@ def land(i, tau, d, hits, modes, steady, batch, m):
     if m.sizes[TANGENTS] != 0:
         batch.carry[i, WAITED] += d
         leave_columns(i, hits, at, tau + d, batch, m)
+        date_limits(i, arrives, modes, tau + d, batch, m)
     return count_landing(i, tau + d, batch)
 
 
 @inner
 def keep_on(i, h, batch, m):
     """Take a step without a contact: boundaries that were ridden go on to be."""
-    fresh = 0
-    for g in range(m.sizes[GUARDS]):
-        if m.found[g, RIDDEN] > 0.5:
-            fresh |= 1 << g
-    twice, thrice = int(batch.carry[i, TWICE]), int(batch.carry[i, THRICE])
-    know_nothing(i, batch)
-    batch.fresh[i] = fresh
-    batch.carry[i, TWICE], batch.carry[i, THRICE] = float(twice & fresh), float(thrice & fresh)
-    batch.carry[i, RIDES] = float(int(batch.carry[i, RIDES]) & fresh)
+    know_rides(i, batch, m)
+    batch.carry[i, RIDES] = float(int(batch.carry[i, RIDES]) & batch.fresh[i])
     batch.carry[i, NEXT_STEP] = 4.0 * h
     batch.minima[i, GAP_MARGIN] = m.out[MARGIN]
 
