@@ -32,7 +32,7 @@ class Rows:
 
 
 def runs_of(filled: np.ndarray) -> np.ndarray:
-    """Where the rows of bool[rows, places] are true: the first place of a run and the one behind
+    """Runs in which the rows of bool[rows, places] are true: the first place of one and that behind
     it, then those of a second run behind the widest gap, float64[rows, 4].
     """
     runs = np.zeros((len(filled), 4))
