@@ -21,7 +21,6 @@ from saltus.flow.modal_values import ValueSet
 from saltus.kernels.modal import layout
 from saltus.kernels.status import HOLD_LAW, LAW_KINDS, NO_LAW, SURFACE_LAW
 from saltus.language.expression import Expr, walk
-from saltus.system import System
 from saltus.system.courses import Course, course_of
 from saltus.system.linear import LinearPiece, LinearSystem
 from saltus.system.linear_friction import is_idle, limit_side
