@@ -89,3 +89,10 @@ def test_study_files_give_such_starts():
         quantities.start(system, {"y6": "1 mm"}, "simulate")
     with pytest.raises(StudyError, match="start lacks q2"):
         quantities.start(system, {"q1": 0.0}, "simulate")
+
+
+def test_sensors_and_coordinates_of_modes_are_not_mixed():
+    """The message names both."""
+    system, _, _ = structure(3)
+    with pytest.raises(ParameterError, match=r"x2, which a sensor shows, and q1, the coordinate"):
+        sl.simulate(system, {"q1": 0.0, "x2": 1e-3}, periods=1)
