@@ -16,7 +16,7 @@ from saltus.flow.modal_blocks import table_of
 from saltus.flow.modal_eigen import Eigen, half_of, slots_of
 from saltus.flow.modal_modes import StateModes, modes_of, spread_over
 from saltus.flow.modal_parameters import ParameterTables
-from saltus.flow.modal_rows import Rows
+from saltus.flow.modal_rows import Rows, runs_of
 from saltus.flow.modal_values import ValueSet
 from saltus.kernels.modal import layout
 from saltus.kernels.status import HOLD_LAW, LAW_KINDS, NO_LAW, SURFACE_LAW
@@ -398,21 +398,6 @@ class Tables:
 def _numbers(matrix: np.ndarray) -> np.ndarray:
     """A matrix with zeros where formulas give no numbers."""
     return np.where(np.isfinite(matrix), matrix, 0.0)
-
-
-def runs_of(filled: np.ndarray) -> np.ndarray:
-    """Where the rows of bool[rows, places] are true: the first place of a run and the one behind
-    it, then those of a second run behind the widest gap, float64[rows, 4].
-    """
-    runs = np.zeros((len(filled), 4))
-    for run, row in zip(runs, filled, strict=True):
-        places = np.flatnonzero(row)
-        if len(places):
-            apart = np.diff(places)
-            cut = int(np.argmax(apart)) + 1 if apart.max(initial=1) > 1 else len(places)
-            for part, own in enumerate((places[:cut], places[cut:])):
-                run[2 * part : 2 * part + 2] = (own[0], own[-1] + 1) if len(own) else 0
-    return runs
 
 
 def laws_of(linear: LinearSystem) -> np.ndarray:
