@@ -20,8 +20,8 @@ from saltus.flow.modal_rows import Rows
 from saltus.flow.modal_values import ValueSet
 from saltus.kernels.modal import layout
 from saltus.kernels.status import HOLD_LAW, LAW_KINDS, NO_LAW, SURFACE_LAW
+from saltus.language.evaluate import evaluate
 from saltus.language.expression import Expr, walk
-from saltus.system import System
 from saltus.system.courses import Course, course_of
 from saltus.system.linear import LinearPiece, LinearSystem
 from saltus.system.linear_friction import is_idle, limit_side
@@ -198,7 +198,8 @@ class Tables:
                         ]
                     )
                 )
-            self.sets.append(ValueSet(values, gaps, rates, lags, courses, impacts))
+            pushes = any(level < 0 for level in evaluate(self.linear.levels, values=values))
+            self.sets.append(ValueSet(values, gaps, rates, lags, courses, impacts, pushes))
             self._sets[key] = len(self.sets) - 1
             self._held += SET_BYTES + self.sets[-1].gaps.matrix.nbytes
         return self._sets[key]
