@@ -329,7 +329,9 @@ class Tables:
         return self._known[key]
 
     def _table(self, modes: StateModes, gaps: np.ndarray) -> np.ndarray:
-        """The table of some modes: lambda, its size, L, V, amplitudes of the gaps; the block."""
+        """The table of some modes: lambda, its size, L, V, amplitudes of the gaps; where L and V
+        aren't zero; the block.
+        """
         values, states, slots = modes.values, len(modes.vectors), len(modes.values)
         width, count = LANES * self.groups, LANES * self.state_groups
         weight = np.where(values.imag > 0, 2.0, 1.0)
@@ -349,8 +351,16 @@ class Tables:
         rows = gaps @ to_states[:states]
         waves = np.stack([rows.real, rows.imag, np.abs(rows)], axis=1)
         block = table_of(modes.block, gaps, LANES, self.state_groups)
+        sides = (
+            (to_modes, self.groups, self.state_groups),
+            (to_states, self.state_groups, self.groups),
+        )
+        runs = [
+            runs_of((side != 0).reshape(rows, LANES, columns, LANES).any(axis=(1, 3)))
+            for side, rows, columns in sides
+        ]
         return np.concatenate(
-            [one.ravel() for one in (lam.real, lam.imag, size, left, right, waves, *block)]
+            [one.ravel() for one in (lam.real, lam.imag, size, left, right, waves, *runs, *block)]
         )
 
     def _steady_of(self, modes: StateModes, given: ValueSet, shown: LinearPiece) -> int:
@@ -376,6 +386,21 @@ class Tables:
         flat = np.array(numbers).T.ravel()
         flat = np.concatenate([flat, np.zeros(-len(flat) % LANES)])
         return self.steady.add(np.concatenate([*states, flat]))
+
+
+def runs_of(filled: np.ndarray) -> np.ndarray:
+    """Where the rows of bool[rows, places] are true: the first place of a run and the one behind
+    it, then those of a second run behind the widest gap, float64[rows, 4].
+    """
+    runs = np.zeros((len(filled), 4))
+    for run, row in zip(runs, filled, strict=True):
+        places = np.flatnonzero(row)
+        if len(places):
+            apart = np.diff(places)
+            cut = int(np.argmax(apart)) + 1 if apart.max(initial=1) > 1 else len(places)
+            for part, own in enumerate((places[:cut], places[cut:])):
+                run[2 * part : 2 * part + 2] = (own[0], own[-1] + 1) if len(own) else 0
+    return runs
 
 
 def laws_of(linear: LinearSystem) -> np.ndarray:

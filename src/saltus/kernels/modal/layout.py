@@ -73,10 +73,15 @@ CLEAR, CROSSES, OPEN = range(3)
 # decided, the end of the bracket of the crossing.
 PLACE, FINAL, RIDDEN, TOUCHED, DECIDED, BRACKET = range(6)
 # Columns of `stood`, for each row of gaps where the amplitudes stand: value and rate, the size of
-# its terms, what its fifth derivative is at most; then for each group of modes the sizes of all
-# terms from it on, and those of their rates. Rows of `waves`, for each row of gaps and group of
-# modes: its real and imaginary part, its rate, its size.
-HERE, SLOPE, SIZE, FIFTH, BEYOND = range(5)
+# its terms, what its fifth derivative is at most.
+HERE, SLOPE, SIZE, FIFTH = range(4)
+# Rows of `waves`, for each row of gaps: of each group of modes its real and imaginary part, its
+# rate, its size, the sizes of all terms from it on, and those of their rates; then these two once
+# more, 0. The last two are lanes whose numbers add up to them.
+REAL, IMAGINARY, GOING, BOUND, BEYOND, FASTER, WAVES = range(7)
+#: Samples that wait for one product with the modes of their contact state. Rows of `queue`, for
+#: each: its amplitudes, the steady answer.
+QUEUE = 8
 # Columns of `spans`, for each row of gaps over a step: bounds of the gap without what its series
 # leaves out; whether the series is known; its first and its last Bernstein coefficient, the least
 # and the largest difference of two, those that rise and that fall (bits), coefficients below and
@@ -104,5 +109,6 @@ Modal = namedtuple(
     "Modal",
     "sizes row_of sign_of offset rate lag modes steady links course pieces laws acts presses "
     "remembers varied shifts y moved size sums q errors p bern bounds slopes out touches state "
-    "answer angle found chain record factor column columns struck bernstein stood waves spans near",
+    "answer angle found chain record factor column columns struck bernstein stood waves spans near "
+    "queue queued",
 )
