@@ -116,7 +116,7 @@ def turns_here(i, g, noise, batch, m):
     for d in range(m.sizes[DRIVES]):
         a, b = number(m.steady, first, at + 1 + 2 * d), number(m.steady, first, at + 2 + 2 * d)
         total += (abs(a) + abs(b)) * abs(m.rate[which, d])
-    total += m.stood[r, BEYOND + m.sizes[MODE_GROUPS] + 1]
+    total += total_of(m.waves, first_wave(r, m) + FASTER)
     return abs(m.stood[r, SLOPE]) <= ROUNDED * total or abs(m.p[1]) <= noise
 
 
