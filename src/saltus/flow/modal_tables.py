@@ -16,7 +16,7 @@ from saltus.flow.modal_eigen import Eigen, half_of, slots_of
 from saltus.flow.modal_laws import laws_of
 from saltus.flow.modal_modes import StateModes, modes_of, spread_over
 from saltus.flow.modal_parameters import ParameterTables
-from saltus.flow.modal_rows import Rows
+from saltus.flow.modal_rows import Rows, runs_of
 from saltus.flow.modal_values import ValueSet
 from saltus.kernels.modal import layout
 from saltus.kernels.status import HOLD_LAW, NO_LAW, SURFACE_LAW
@@ -385,21 +385,6 @@ class Tables:
         flat = np.array(numbers).T.ravel()
         flat = np.concatenate([flat, np.zeros(-len(flat) % LANES)])
         return self.steady.add(np.concatenate([*states, flat]))
-
-
-def runs_of(filled: np.ndarray) -> np.ndarray:
-    """Where the rows of bool[rows, places] are true: the first place of a run and the one behind
-    it, then those of a second run behind the widest gap, float64[rows, 4].
-    """
-    runs = np.zeros((len(filled), 4))
-    for run, row in zip(runs, filled, strict=True):
-        places = np.flatnonzero(row)
-        if len(places):
-            apart = np.diff(places)
-            cut = int(np.argmax(apart)) + 1 if apart.max(initial=1) > 1 else len(places)
-            for part, own in enumerate((places[:cut], places[cut:])):
-                run[2 * part : 2 * part + 2] = (own[0], own[-1] + 1) if len(own) else 0
-    return runs
 
 
 def _is_smooth(one: LinearPiece, other: LinearPiece, gaps: LinearPiece, g: int) -> bool:
