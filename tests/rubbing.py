@@ -91,7 +91,8 @@ def random_rubbing(rng, degrees, frictions, stops=0, *, kinds=("ground", "belt")
     stiffness = 200.0 * (root @ root.T / n + np.eye(n))
     damping = rng.choice([0.0, 0.3, 2.0]) * np.eye(n) + rng.choice([0, 0.002]) * stiffness
     force, lag = rng.uniform(5, 30, (2, n)), rng.uniform(0, 6, (2, n))
-    w, told = float(rng.uniform(5, 30)), [k for k in kinds if k != "rough" and (k != "pair" or n > 1)]
+    w = float(rng.uniform(5, 30))
+    told = [kind for kind in kinds if kind != "rough" and (kind != "pair" or n > 1)]
     chosen = [(str(rng.choice(told)), int(i), *rng.uniform(0.2, 1.5, 3).tolist())
         for i in rng.permutation(n)[:frictions]]  # fmt: skip
     walls = [(int(rng.integers(n)), *rng.uniform([0.003, 200, 0], [0.05, 3000, 20]).tolist())
@@ -104,87 +105,91 @@ def random_rubbing(rng, degrees, frictions, stops=0, *, kinds=("ground", "belt")
     return Rubbing(stiffness, damping, force, lag, w, chosen, walls, table, rough)
 
 
+class _Exponentials:
+    """The equations of a structure with friction alone in its contact states: 1 or -1 for each
+    friction that slides, 0 where it sticks.
+    """
+
+    def __init__(self, given):
+        n = given.degrees
+        self.n, self.count, self.size = n, len(given.frictions), 2 * n + 5
+        self.free = np.zeros((self.size, self.size))
+        self.free[:n, n : 2 * n] = np.eye(n)
+        self.free[n : 2 * n, : 2 * n] = np.hstack([-given.stiffness, -given.damping])
+        for m in (0, 1):
+            c, rate = 2 * n + 1 + 2 * m, (m + 1) * given.w
+            self.free[n : 2 * n, c] = given.force[m] * np.cos(given.lag[m])
+            self.free[n : 2 * n, c + 1] = -given.force[m] * np.sin(given.lag[m])
+            self.free[c, c + 1], self.free[c + 1, c] = -rate, rate
+        self.slides, self.normals = np.zeros((self.count, self.size)), np.zeros((self.count, n))
+        for k, (kind, i, _, more, speed) in enumerate(given.frictions):
+            j, (mean, sway, phase) = given.pair(kind, i), given.belt(kind, more, speed)
+            self.normals[k, i] = 1.0
+            if j != i:
+                self.normals[k, j] = -1.0
+            self.slides[k, n : 2 * n] = self.normals[k]
+            belt = mean, sway * math.cos(phase), -sway * math.sin(phase)
+            self.slides[k, 2 * n : 2 * n + 3] = -np.array(belt)
+        self.slip = np.array([10 * limit for _, _, limit, *_ in given.frictions])
+        static = [1.2 if kind == "static" else 1.0 for kind, *_ in given.frictions]
+        self.stick = self.slip * static
+
+    def equations(self, state):
+        """A, and the rows of the forces of all frictions."""
+        forces, held = np.zeros((self.count, self.size)), [k for k, s in enumerate(state) if not s]
+        forces[:, 2 * self.n] = np.array(state) * self.slip
+        matrix, rates = self.free.copy(), slice(self.n, 2 * self.n)
+        matrix[rates] -= self.normals.T @ forces
+        if held:
+            own = self.normals[held]
+            forces[held] = np.linalg.solve(own @ own.T, self.slides[held] @ matrix)
+            matrix[rates] -= own.T @ forces[held]
+        return matrix, forces
+
+    def left(self, z, state, forces):
+        """What is left of each friction until it changes: of its sliding, or of its limit."""
+        way, rest = np.array(state) * (self.slides @ z), self.stick - np.abs(forces @ z)
+        return np.where(np.array(state) == 0, rest, way)
+
+    def settle(self, z, state, asked, found, t):
+        """Change some frictions; each that sticks holds afterwards."""
+        for k in asked:
+            before, kind = state[k], "crossing"
+            state[k] = 0
+            needed = self.equations(state)[1][k] @ z
+            if before == 0:
+                state[k], kind = int(np.sign(needed)), "release"
+            elif abs(needed) < self.stick[k]:
+                normal = self.normals[k]
+                z[self.n : 2 * self.n] -= normal * (self.slides[k] @ z) / (normal @ normal)
+                kind = "hold"
+            else:
+                state[k] = -before
+            found.append((t, kind, k))
+            forces = self.equations(state)[1]
+            over = [j for j in range(self.count)
+                if not state[j] and abs(forces[j] @ z) > self.stick[j]]  # fmt: skip
+            if kind == "hold":
+                self.settle(z, state, over, found, t)
+
+
 def by_exponentials(given, start, t_end, steps=400):
     """The changes of a structure with friction alone, as (time, kind, friction), and its state at
     the end. Between them the states and the drives are linear with constant coefficients: a step is
     a matrix exponential, a change is found by halving.
     """
-    n, w = given.degrees, given.w
-    size = 2 * n + 5
-    free = np.zeros((size, size))
-    free[:n, n:2 * n] = np.eye(n)
-    free[n:2 * n, :n], free[n:2 * n, n:2 * n] = -given.stiffness, -given.damping
-    for m in (0, 1):
-        c = 2 * n + 1 + 2 * m
-        free[n:2 * n, c] = given.force[m] * np.cos(given.lag[m])
-        free[n:2 * n, c + 1] = -given.force[m] * np.sin(given.lag[m])
-        free[c, c + 1], free[c + 1, c] = -(m + 1) * w, (m + 1) * w
-    slides, normals, slip, stick = [], [], [], []
-    for kind, i, limit, more, speed in given.frictions:
-        j, (mean, sway, phase) = given.pair(kind, i), given.belt(kind, more, speed)
-        normal, row = np.zeros(n), np.zeros(size)
-        normal[i] += 1.0
-        if j != i:
-            normal[j] -= 1.0
-        row[n:2 * n], row[2 * n] = normal, -mean
-        row[2 * n + 1], row[2 * n + 2] = -sway * math.cos(phase), sway * math.sin(phase)
-        slides.append(row)
-        normals.append(normal)
-        slip.append(10 * limit)
-        stick.append((12 if kind == "static" else 10) * limit)
-    slides, normals, count = np.array(slides), np.array(normals), len(slides)
-
-    def equations(state):
-        """A and the rows of the forces of all frictions in a state: 1, -1, or 0 where it sticks."""
-        forces, held = np.zeros((count, size)), [k for k in range(count) if state[k] == 0]
-        for k in range(count):
-            forces[k, 2 * n] = state[k] * slip[k]
-        matrix = free.copy()
-        matrix[n:2 * n] -= normals.T @ forces
-        if held:
-            forces[held] = np.linalg.solve(normals[held] @ normals[held].T, slides[held] @ matrix)
-            matrix[n:2 * n] -= normals[held].T @ forces[held]
-        return matrix, forces
-
-    def left(z, state, forces):
-        """What is left of each friction until it changes: of its sliding, or of its limit."""
-        return np.array([state[k] * (slides[k] @ z) if state[k] else stick[k] - abs(forces[k] @ z)
-            for k in range(count)])  # fmt: skip
-
-    def settled(z, state, asked, found, t):
-        """The state behind a change of some frictions; every friction that sticks holds there."""
-        for k in asked:
-            before = state[k]
-            if before == 0:
-                state[k] = int(np.sign(equations(state)[1][k] @ z))
-                found.append((t, "release", k))
-                continue
-            state[k] = 0
-            if abs(equations(state)[1][k] @ z) < stick[k]:
-                z[n:2 * n] -= normals[k] * (slides[k] @ z) / (normals[k] @ normals[k])
-                found.append((t, "hold", k))
-                forces = equations(state)[1]
-                over = [j for j in range(count) if not state[j] and abs(forces[j] @ z) > stick[j]]
-                settled(z, state, over, found, t)
-            else:
-                state[k] = -before
-                found.append((t, "crossing", k))
-
-    z = np.concatenate([start, [1, 1, 0, 1, 0]])
-    state = [1 if slides[k] @ z > 0 else -1 for k in range(count)]
-    for k in range(count):
-        if slides[k] @ z == 0:
-            settled(z, state, [k], [], 0.0)
-    t, found, known, h, young = 0.0, [], {}, 2 * math.pi / w / steps, []
+    one, z = _Exponentials(given), np.concatenate([start, [1, 1, 0, 1, 0]])
+    state = [1 if row @ z > 0 else -1 for row in one.slides]
+    t, found, known, h, young = 0.0, [], {}, 2 * math.pi / given.w / steps, []
     while t < t_end - 1e-12:
         key = tuple(state)
         if key not in known:
-            matrix, forces = equations(state)
+            matrix, forces = one.equations(state)
             known[key] = [expm(matrix * h / 2**k) for k in range(40)], forces
         powers, forces = known[key]
 
         def stays(z, but=young, state=state, forces=forces):
-            ended = left(z, state, forces) <= 0
+            ended = one.left(z, state, forces) <= 0
             ended[but] = False  # a velocity that has just begun to grow
             return not ended.any()
 
@@ -197,9 +202,8 @@ def by_exponentials(given, start, t_end, steps=400):
         for finer in range(k + 1, 40):
             if stays(ahead := powers[finer] @ z):
                 z, t = ahead, t + h / 2**finer
-        z, t, young = powers[39] @ z, t + h / 2**39, []
-        ended = np.flatnonzero(left(z, state, forces) <= 0).tolist()
-        before = len(found)
-        settled(z, state, ended, found, t)
+        z, t, before = powers[39] @ z, t + h / 2**39, len(found)
+        ended = np.flatnonzero(one.left(z, state, forces) <= 0).tolist()
+        one.settle(z, state, ended, found, t)
         young = [k for _, kind, k in found[before:] if kind == "release"]
-    return found, z[:2 * n]
+    return found, z[: 2 * given.degrees]

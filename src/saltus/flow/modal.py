@@ -187,6 +187,8 @@ class ModalFlow:
         bits, allowed, plain = 1 << np.arange(gap.shape[1]), self.tables.allowed, self.tables.plain
         beyond = ((gap * self.tables.limits > 0) & ~zero).any(axis=1)
         batch.status[who[beyond]] = st.INVALID
+        if given.pushes:
+            batch.status[who] = st.INVALID_FRICTION
         rubs = zero & self.tables.rubs
         zero &= plain | (allowed != 0) | rubs
         up = np.where(zero, allowed > 0, gap > 0) & ~self.tables.holds
@@ -196,6 +198,8 @@ class ModalFlow:
         for i in np.flatnonzero(rubs.any(axis=1)).tolist():
             begin = Rubbing(self.tables, which, state[i], drives[i])
             mode[i] = begin.mode(int(mode[i]), rubs[i])
+            if not begin.is_unique(int(mode[i]), rubs[i]):
+                batch.status[who[i]] = st.NONUNIQUE
             held = begin.held(int(mode[i]))
             fresh[i] &= ~sum(1 << one.guard for one in held)
             if held and self._tangents:

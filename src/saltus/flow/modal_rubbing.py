@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from saltus.flow.modal_tables import Tables
+from saltus.flow.modal_values import ValueSet
 from saltus.system.linear import LinearPiece
 from saltus.system.linear_friction import Sticking
 from saltus.system.linear_laws import rows_of
@@ -43,11 +44,17 @@ class Rubbing:
                 margins = self._of(self.tables.shown(self._given, mode))
                 upper, lower = margins[one.hold], -margins[one.second]
                 mode &= ~(1 << one.hold | 1 << one.guard)
-                mode |= int(upper > 0 and lower > 0) << one.hold
-                mode |= int(upper < lower) << one.guard
+                holds = upper > 0 and lower > 0
+                mode |= int(holds) << one.hold | int(holds or upper < lower) << one.guard
             if mode == before:
                 break
         return mode
+
+    def is_unique(self, mode: int, zero: np.ndarray) -> bool:
+        """False if both sides of a boundary lead away from it in a contact state."""
+        margins = self._of(self.tables.shown(self._given, mode))
+        asked = [one for one in self.tables.linear.sticking if zero[one.guard]]
+        return not any(margins[one.hold] < 0 < margins[one.second] for one in asked)
 
     def held(self, mode: int) -> list[Sticking]:
         """The frictions that stick in a contact state."""
@@ -70,7 +77,7 @@ class Rubbing:
         return found
 
     @property
-    def _given(self):  # type: ignore[no-untyped-def]
+    def _given(self) -> ValueSet:
         return self.tables.sets[self.which]
 
     def _of(self, piece: LinearPiece) -> np.ndarray:

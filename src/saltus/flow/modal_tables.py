@@ -11,19 +11,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from saltus.codegen.module import MODAL_LANES as LANES
-from saltus.contact.guards import is_hold
 from saltus.flow.modal_blocks import table_of
 from saltus.flow.modal_eigen import Eigen, half_of, slots_of
+from saltus.flow.modal_laws import laws_of
 from saltus.flow.modal_modes import Known, StateModes, modes_of, spread_over
 from saltus.flow.modal_parameters import ParameterTables
 from saltus.flow.modal_rows import Links, Rows, runs_of
 from saltus.flow.modal_values import ValueSet
 from saltus.kernels.modal import layout
-from saltus.kernels.status import HOLD_LAW, LAW_KINDS, NO_LAW, SURFACE_LAW
+from saltus.kernels.status import HOLD_LAW, NO_LAW, SURFACE_LAW
+from saltus.language.evaluate import evaluate
 from saltus.language.expression import Expr, walk
 from saltus.system.courses import Course, course_of
 from saltus.system.linear import LinearPiece, LinearSystem
-from saltus.system.linear_friction import is_idle, limit_side
 from saltus.system.linear_laws import Constrained, constrained, impacts_of, rows_of
 from saltus.system.quantity import remembered
 
@@ -198,7 +198,8 @@ class Tables:
                         ]
                     )
                 )
-            self.sets.append(ValueSet(values, gaps, rates, lags, courses, impacts))
+            pushes = any(level < 0 for level in evaluate(self.linear.levels, values=values))
+            self.sets.append(ValueSet(values, gaps, rates, lags, courses, impacts, pushes))
             self._sets[key] = len(self.sets) - 1
             self._held += SET_BYTES + self.sets[-1].gaps.matrix.nbytes
         return self._sets[key]
@@ -401,30 +402,6 @@ class Tables:
 def _numbers(matrix: np.ndarray) -> np.ndarray:
     """A matrix with zeros where formulas give no numbers."""
     return np.where(np.isfinite(matrix), matrix, 0.0)
-
-
-def laws_of(linear: LinearSystem) -> np.ndarray:
-    """What the kernel reads of the law of each gap, see layout.KIND: int64[gaps, LAW_COLUMNS]."""
-    guards, sticking = linear.system.guards, linear.sticking
-    table = np.full((len(linear.own_gaps), layout.LAW_COLUMNS), -1, np.int64)
-    table[:, layout.KIND], table[:, layout.LIMITS] = NO_LAW, 0
-    for g, guard in enumerate(guards):
-        if guard.state is not None:
-            table[g, layout.LEVEL] = linear.system.states.index(guard.state)
-        table[g, layout.LIMITS] = limit_side(guard)
-        if is_idle(guards, guard):
-            table[g, layout.KIND] = HOLD_LAW
-        elif guard.law is not None and limit_side(guard) == 0:
-            holds = g if is_hold(guard) else guard.law.partner
-            kind, partner = LAW_KINDS[guard.law.kind], guard.law.partner
-            table[g, [layout.KIND, layout.PARTNER, layout.HOLDER]] = kind, partner, holds
-    for one in sticking:
-        fades = int(one.fades)
-        table[one.second, [layout.KIND, layout.PARTNER]] = HOLD_LAW, one.guard
-        table[[one.guard, one.hold, one.second], layout.HOLDER] = one.hold
-        table[[one.guard, one.hold, one.second], layout.SECOND] = one.second
-        table[[one.guard, one.hold, one.second], layout.FADES] = fades
-    return table
 
 
 def _is_smooth(one: LinearPiece, other: LinearPiece, gaps: LinearPiece, g: int) -> bool:

@@ -13,7 +13,9 @@ from saltus.system.linear_laws import Impacts
 
 @dataclass(frozen=True)
 class ValueSet:
-    """Gaps and drives for one set of parameter values, in any contact state."""
+    """Gaps and drives for one set of parameter values, in any contact state; whether a friction
+    would be negative.
+    """
 
     values: dict[str, float]
     gaps: LinearPiece
@@ -21,3 +23,4 @@ class ValueSet:
     lags: np.ndarray
     courses: tuple[Course, ...]
     impacts: Impacts
+    pushes: bool

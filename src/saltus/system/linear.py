@@ -21,7 +21,7 @@ from saltus.language.derivatives import differentiate
 from saltus.language.evaluate import evaluate
 from saltus.language.expression import Expr
 from saltus.system.courses import TERMS, reason_against, terms_of
-from saltus.system.linear_friction import Sticking, gaps_of, sticking_of
+from saltus.system.linear_friction import Sticking, gaps_of, levels_of, sticking_of
 from saltus.system.periodic import rate_of
 from saltus.system.quantity import is_remembered, remembered
 from saltus.system.system import System
@@ -83,12 +83,15 @@ class LinearSystem:
         The drives in it that are polynomials of the time between breaks.
     sticking : tuple of Sticking
         The boundaries on which friction may hold the motion.
+    levels : tuple of Expr
+        Of parameters alone: none is negative, or a friction would be.
     """
 
     system: System
     drives: tuple[Drive, ...]
     courses: tuple[Expr, ...]
     sticking: tuple[Sticking, ...]
+    levels: tuple[Expr, ...]
     _field: tuple[Expr, ...]
     _gaps: tuple[Expr, ...]
     _names: Mapping[Expr, Expr]
@@ -317,8 +320,6 @@ def linear_pieces(system: System) -> LinearSystem | str:
         if one is not None
     )
     sticking = sticking_of(system)
-    if sticking and stops:
-        return "it has friction beside rigid stops"
     gaps = gaps_of(system, sticking)
     drives, courses = dict[Expr, Drive](), dict[Expr, None]()
     for node in _driving(*system.field[:size], *gaps, *laws):
@@ -346,14 +347,19 @@ def linear_pieces(system: System) -> LinearSystem | str:
         return "a boundary of it moves when another is crossed"
     if not _are_affine((*field, *gaps, *laws), [_name(i) for i in range(len(names))]):
         return "it isn't linear between its contacts"
-    found = tuple(drives.values()), tuple(courses), sticking
+    found = tuple(drives.values()), tuple(courses), sticking, levels_of(system) or ()
     linear = LinearSystem(system, *found, field, gaps, names)
+    return _misfit(linear, stops) or linear
+
+
+def _misfit(linear: LinearSystem, stops: Sequence[Law]) -> str | None:
+    """The reason why the laws of a system aren't carried, by their numbers; None if they are."""
     if not all(_only_reverses(linear, law) for law in stops):
         return "an impact of it changes more than velocities"
-    rows = linear.gaps(system.values).matrix[[one.guard for one in sticking]]
+    rows = linear.gaps(linear.system.values).matrix[[one.guard for one in linear.sticking]]
     if len(rows) and np.linalg.matrix_rank(rows) < len(rows):
         return "frictions of it that may stick at once depend on one another"
-    return linear
+    return None
 
 
 def _driving(*roots: Expr) -> Iterator[Expr]:
@@ -406,6 +412,10 @@ def _missing(system: System, size: int) -> str | None:
             return "a rigid stop of it has friction"
         if law.restitution is not None and ex.varies(law.restitution):
             return "a restitution of it isn't a number"
+    if levels_of(system) is None:
+        return "a friction of it may become negative on the way"
+    if any(guard.law and guard.law.kind == "impact" for guard in system.guards):
+        return "it has friction beside rigid stops" if sticking_of(system) else None
     return None
 
 

@@ -14,7 +14,8 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from saltus.contact.guards import Guard, Law, bits_in
+from saltus.contact.guards import Guard, bits_in
+from saltus.contact.signs import never_negative_if
 from saltus.language import expression as ex
 from saltus.language.canonical import Canonical
 from saltus.language.expression import Expr
@@ -70,12 +71,25 @@ def gaps_of(system: System, sticking: Sequence[Sticking]) -> tuple[Expr, ...]:
     minus the second margin of each.
     """
     gaps = [
-        ex.constant(0.0) if is_idle(system.guards, guard) else guard.gap
-        for guard in system.guards
+        ex.constant(0.0) if is_idle(system.guards, guard) else guard.gap for guard in system.guards
     ]
     for one in sticking:
         gaps[one.hold] = one.margins[0]
     return (*gaps, *(ex.neg(one.margins[1]) for one in sticking))
+
+
+def levels_of(system: System) -> tuple[Expr, ...] | None:
+    """Expressions of parameters of which one is negative if a friction becomes so; None if that
+    depends on the motion.
+    """
+    found = list[Expr]()
+    for guard in system.guards:
+        for level in guard.law.levels if guard.law else ():
+            conditions = never_negative_if(level, system.guards)
+            if conditions is None:
+                return None
+            found += conditions
+    return tuple(found)
 
 
 def limit_side(guard: Guard) -> int:
@@ -102,5 +116,5 @@ def limit_side(guard: Guard) -> int:
 
 def is_idle(guards: Sequence[Guard], guard: Guard) -> bool:
     """True for the hold guard of the limit of a memory, on which nothing is held."""
-    held = guard.law is not None and guard.law.kind == "hold"
-    return held and limit_side(guards[guard.law.partner]) != 0
+    law = guard.law
+    return law is not None and law.kind == "hold" and limit_side(guards[law.partner]) != 0

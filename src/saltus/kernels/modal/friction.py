@@ -1,9 +1,10 @@
 """Template of the modal flow: friction that sticks and slides.
 
-The boundary of a friction is the zero of a velocity w. Where the motion comes to it, w' is the drive
-N without the force, which changes it by P at most: the motion sticks if both margins, P - N and P +
-N, are positive, else w changes its sign. While it sticks the contact state has one mode less, and
-each margin is a gap: at the end of the first one w becomes positive, of the second one negative.
+The boundary of a friction is the zero of a velocity w. Where the motion comes to it, w' is the
+drive N without the force, which changes it by P at most: the motion sticks if both margins, P - N
+and P + N, are positive, else w changes its sign. While it sticks the contact state has one mode
+less, and each margin is a gap: at the end of the first one w becomes positive, of the second one
+negative.
 See system/linear_friction.py.
 """
 
@@ -81,9 +82,7 @@ def let_slide(i, margin, now, moved, batch, m):
     """
     g, h = m.laws[margin, PARTNER], m.laws[margin, HOLDER]
     upper, lower = margins_of(i, g, batch, m)
-    fades = m.laws[g, FADES] == 1 and (
-        moved or min(upper, lower) >= -margin_noise(i, g, batch, m)
-    )
+    fades = m.laws[g, FADES] == 1 and (moved or min(upper, lower) >= -margin_noise(i, g, batch, m))
     batch.carry[i, CROSSED] = 0.0 if fades else float(1 << margin)
     know_zeros(i, h, 0, batch)
     know_zeros(i, m.laws[h, SECOND], 0, batch)
@@ -117,7 +116,7 @@ def turns_here(i, g, noise, batch, m):
     for d in range(m.sizes[DRIVES]):
         a, b = number(m.steady, first, at + 1 + 2 * d), number(m.steady, first, at + 2 + 2 * d)
         total += (abs(a) + abs(b)) * abs(m.rate[which, d])
-    total += m.stood[r, BEYOND + m.sizes[MODE_GROUPS] + 1]
+    total += total_of(m.waves, first_wave(r, m) + FASTER)
     return abs(m.stood[r, SLOPE]) <= ROUNDED * total or abs(m.p[1]) <= noise
 
 

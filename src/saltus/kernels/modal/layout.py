@@ -43,7 +43,8 @@ MODES, STEADY, SMOOTH, SLOPES, BEHIND = range(5)
 # and the boundaries just crossed (bits); gaps whose rate is known to be zero too, and those whose
 # acceleration is (bits), whether no time has passed since the start, the contact that was struck
 # (one more than its number; 0: none), whether it is known how the instant of a landing moves, the
-# frictions whose sliding has been reversed at this instant (bits); then the amplitudes, and with tangents the rates of the states and the gaps before these boundaries,
+# frictions whose sliding has been reversed at this instant (bits); then the
+# amplitudes, and with tangents the rates of the states and the gaps before these boundaries,
 # how that instant moves with each column, and with parameters the amplitudes when the derivative
 # was moved last.
 AT, ENTERS, NEXT_STEP, LANDED_AT, LANDINGS, RIDES, SET, TABLES, WAITED, CROSSED = range(10)
@@ -51,9 +52,9 @@ TWICE, THRICE, STARTS, ASKS, DATED, REVERSED, AMPLITUDES = range(10, 17)
 # Columns of `laws`, for each guard: the kind of its law (status.py), its hold guard (of a hold
 # guard: its contact's), the state that its gap is a level of; the guard whose bit says that the
 # contact is held; of a friction, and of what holds it, the number of the second margin, and whether
-# nothing jumps at its release; -1 where there is none; the side to which the input
-# leads on at the limit of a memory, 0 at other boundaries. Second margins are guards behind those of
-# the system, whose bits are never set: their gaps are minus the margins.
+# nothing jumps at its release; -1 where there is none; the side to which the
+# input leads on at the limit of a memory, 0 at other boundaries. Second margins are guards behind
+# those of the system, whose bits are never set: their gaps are minus the margins.
 KIND, PARTNER, LEVEL, HOLDER, SECOND, FADES, LIMITS, LAW_COLUMNS = range(8)
 # Rows of `acts`, where a guard has a law: guards, set by set. Columns: the gap and the closing
 # velocity as functions of the state - N slopes, a constant, slopes for the cosines of the H drives
