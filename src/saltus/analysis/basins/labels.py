@@ -229,7 +229,7 @@ def complete(
         np.random.default_rng(0).choice(opened, min(SAMPLE, len(opened)), replace=False)
     )
     wider, _, _ = find_attractors(map_, result.end[sample], scale, most, found)
-    _renumber(result.label, found, wider)
+    renumber(result.label, wider.ids(found))
     more = settle_all(map_, result.end[opened], wider, most, threads)
     more.periods[more.periods >= 0] += most
     more.unresolved[:] += result.unresolved[opened]
@@ -239,7 +239,7 @@ def complete(
     return wider
 
 
-def _renumber(label: np.ndarray, before: AttractorSet, after: AttractorSet) -> None:
-    ids = np.array([*map(after.index, before.orbits), *map(after.index, before.sampled)], np.int64)
+def renumber(label: np.ndarray, ids: np.ndarray) -> None:
+    """Give labels new ids of their attractors, int64[m]. Changes ``label``."""
     if len(ids):
         label[label >= 0] = ids[label[label >= 0]]
