@@ -16,7 +16,8 @@ from queue import Empty, SimpleQueue
 import numpy as np
 
 from saltus.analysis.attractors.attractor_set import AttractorSet
-from saltus.analysis.basins.labels import OPEN, Settling, Wanderers, complete, renumber
+from saltus.analysis.basins.basins import compiled
+from saltus.analysis.basins.labels import OPEN, Settling, Wanderers, complete, fewer, renumber
 from saltus.analysis.basins.levels import stride_of
 from saltus.analysis.basins.pipeline import BasinPlan
 from saltus.analysis.closed.capture import Neighbourhoods
@@ -24,7 +25,8 @@ from saltus.flow.maps import Stroboscope
 from saltus.flow.threads import on_threads, usable_processors
 from saltus.results.dataset.kinds import Kind
 
-#: Starts that one thread follows at a time: fewer leave lanes empty, more delay the first cells.
+#: Starts of up to seven states that one thread follows at a time: fewer leave lanes empty, more
+#: delay the first cells.
 POOL = 1024
 #: New starts are sent off when a pool has shrunk to this share.
 REFILL = 0.75
@@ -133,8 +135,7 @@ def grow(
         result = Settling.empty(plan.cells, len(plan.system.states))
     resume = finest == 1 if resume is None else resume
     work = _Work(plan, found, result, finest, patience, resume)
-    map_ = plan.map(1)
-    map_.launch(plan.starts(plan.cells_of(0)[:1]), 1)  # compiles before threads ask for it
+    map_ = compiled(plan)
     handed = _Handed(work, take)
     try:
         on_threads(
@@ -261,9 +262,10 @@ class _Work:
     def follow(self, map_: Stroboscope) -> None:
         """Follow starts until none is left; the work of one thread."""
         plan = self.plan
-        pool = Wanderers(map_, self.found, plan.periods, len(plan.system.states))
+        states = len(plan.system.states)
+        pool, size = Wanderers(map_, self.found, plan.periods, states), fewer(POOL, states)
         while True:
-            if len(pool) <= REFILL * POOL and len(more := self.take(POOL - len(pool))):
+            if len(pool) <= REFILL * size and len(more := self.take(size - len(pool))):
                 pool.add(more, plan.starts(more))
             if not len(pool):
                 return
