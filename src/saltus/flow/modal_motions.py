@@ -124,10 +124,7 @@ def modal_rates(map_: Stroboscope, states: np.ndarray) -> np.ndarray | None:
     with tables.lock:
         for i, state in enumerate(states):
             given = tables.sets[tables.set_of(map_.parameters[i if len(map_) > 1 else 0])]
-            loads = [
-                np.cos(given.lags),
-                *(np.ravel(one.at(np.zeros(()))[0]) for one in given.courses),
-            ]
+            loads = [np.cos(given.lags), *(np.ravel(one.at(np.zeros(()))[0]) for one in given.courses)]
             drives = np.concatenate(loads)
             gap = given.gaps.matrix @ state + given.gaps.constant + given.gaps.driven @ drives
             piece = tables.piece_of(given, int((gap > 0) @ (1 << np.arange(len(gap)))))
