@@ -20,7 +20,6 @@ from saltus.analysis.basins.basins import compiled
 from saltus.analysis.basins.labels import OPEN, Settling, Wanderers, complete, fewer, renumber
 from saltus.analysis.basins.levels import stride_of
 from saltus.analysis.basins.pipeline import BasinPlan
-from saltus.analysis.closed.capture import Neighbourhoods
 from saltus.flow.maps import Stroboscope
 from saltus.flow.threads import on_threads, usable_processors
 from saltus.results.dataset.kinds import Kind
@@ -156,7 +155,7 @@ def grow_all(
 ) -> tuple[AttractorSet, Settling]:
     """A whole map from nothing, or from some of its attractors, with a first picture early.
 
-    1. Attractors are looked for from a few starts.
+    1. Where none is known, attractors are looked for from a few starts.
     2. Coarse levels are labelled by what is known, while attractors are looked for from as many
        starts as :func:`saltus.basins` looks from.
     3. The other cells are labelled, and those that nothing had captured.
@@ -189,9 +188,8 @@ def grow_all(
         On Ctrl-C, or a :class:`saltus.Stop`.
     """
     result = Settling.empty(plan.cells, len(plan.system.states))
-    found = replace(plan, scouts=min(FEW_SCOUTS, plan.scouts)).scout(threads, known=known)
-    none = AttractorSet(Neighbourhoods.none(len(plan.system.states)))
-    take(KnownAttractors(found, found.ids(known or none)))
+    found = known or replace(plan, scouts=min(FEW_SCOUTS, plan.scouts)).scout(threads)
+    take(KnownAttractors(found, np.arange(len(known or ()))))
     wider = found
 
     def look() -> None:
