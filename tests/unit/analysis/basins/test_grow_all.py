@@ -9,6 +9,7 @@ import saltus as sl
 from saltus.analysis.attractors.followed import followed
 from saltus.analysis.basins import growing
 from saltus.analysis.basins.growing import Grown, KnownAttractors, grow_all
+from saltus.analysis.basins.labels import Settling
 from saltus.analysis.basins.pipeline import basin_plan
 from saltus.analysis.closed.motions import same
 from saltus.flow.methods import ODE45
@@ -110,12 +111,22 @@ def test_a_limit_cycle_is_followed():
     assert before.every[came_from[len(known.orbits)]].kind == "limit_cycle"
 
 
-def test_a_stopped_map_ends_all_its_work():
+def test_a_stopped_map_ends_all_its_work_and_goes_on_where_it_stood(monkeypatch):
     stop, plan = sl.Stop(), plan_at(14.0, 256)
+    monkeypatch.setattr(growing, "POOL", 32)
+    result, found = Settling.empty(plan.cells, 2), plan.scout(1)
 
     def take(one):
-        if isinstance(one, Grown):
+        if isinstance(one, Grown) and one.known > 99:
             stop.set()
 
     with pytest.raises(sl.Interrupted), stop:
-        grow_all(plan, take, threads=2)
+        grow_all(plan, take, found, threads=2, result=result, scouted=True)
+    settled = result.label >= 0
+    assert 99 < settled.sum() < plan.cells
+    page = Page(plan)
+    grow_all(plan, page, found, threads=2, result=result, scouted=True)
+    assert len(page.told) == 1
+    assert (page.label[settled] == Kind.NOT_COMPUTED).all()  # they are known, and aren't told again
+    whole = growing.grow(plan, found, lambda _: None, threads=2)
+    np.testing.assert_array_equal(result.label, whole.label)
