@@ -6,55 +6,81 @@ from __future__ import annotations
 
 import gc
 import math
+import os
 import warnings
 from pathlib import Path
 
 import pytest
 
+# A process a core runs the tests: threads of linear algebra would wait for one another. Before
+# NumPy is imported, and for all processes that tests start.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 #: Files in which tests take longest, longest first: no process is to begin one of them when all
 #: others have ended.
 LONGEST = (
-    "faults/test_study_faults.py",
     "truth/test_basins.py",
-    "conformance/test_every_verb.py",
-    "conformance/test_every_method.py",
-    "paper/test_figures.py",
-    "conformance/test_tiers.py",
-    "truth/test_wolf.py",
-    "unit/analysis/branches/test_bifurcation_curve.py",
-    "unit/analysis/branches/test_graze_curves.py",
+    "faults/test_study_faults.py",
     "unit/analysis/branches/test_branches.py",
-    "unit/analysis/branches/test_backbone.py",
-    "truth/test_order.py",
-    "test_examples.py",
-    "truth/test_attractors.py",
-    "truth/test_lyapunov.py",
-    "unit/study/test_questions.py",
-    "unit/study/test_maps_run.py",
+    "paper/test_figures.py",
+    "truth/test_modal_blocks.py",
+    "conformance/test_tiers.py",
+    "conformance/test_every_verb.py",
+    "truth/test_long_sums.py",
+    "conformance/test_every_method.py",
+    "unit/analysis/responses/test_arcs.py",
     "truth/test_responses.py",
-    "unit/results/files/test_files.py",
-    "faults/test_result_files.py",
-    "unit/analysis/attractors/test_aperiodic.py",
+    "test_examples.py",
+    "truth/test_lyapunov.py",
+    "truth/test_impact_branches.py",
+    "truth/test_attractors.py",
+    "truth/test_wolf.py",
+    "truth/test_modal_impact_derivatives.py",
     "oracles/test_oracles.py",
-    "truth/test_unforced.py",
-    "truth/test_unstable_cycles.py",
-    "unit/study/test_branches.py",
-    "unit/cli/test_cli_maps.py",
-    "unit/cli/test_cli.py",
-    "test_docs.py",
-    "test_docstrings.py",
-    "test_readme.py",
-    "unit/codegen/test_compiled.py",
-    "unit/codegen/test_machine.py",
-    "unit/replication/test_run.py",
-    "unit/analysis/responses/test_responses.py",
-    "unit/analysis/attractors/test_noisy.py",
-    "unit/codegen/test_jets.py",
-    "unit/study/test_followed.py",
+    "conformance/test_long_equations.py",
     "unit/plot/test_responses.py",
-    "conformance/test_lanes.py",
-    "conformance/test_time.py",
+    "truth/test_modal_motions.py",
+    "truth/test_modal_laws.py",
+    "unit/test_startup.py",
+    "truth/test_random_diagrams.py",
+    "unit/analysis/branches/test_backbone.py",
+    "unit/analysis/branches/test_graze_curves.py",
+    "unit/analysis/attractors/test_aperiodic.py",
+    "unit/analysis/branches/test_equilibrium_branches.py",
+    "unit/cli/test_cli.py",
+    "unit/analysis/branches/test_bifurcation_curve.py",
+    "truth/test_unstable_cycles.py",
+    "conformance/test_outputs.py",
+    "unit/study/test_maps_run.py",
+    "truth/test_unforced.py",
+    "truth/test_modal.py",
+    "truth/test_basin_measures.py",
+    "unit/study/test_questions.py",
+    "unit/codegen/test_jets.py",
+    "truth/test_elements.py",
+    "unit/test_benchmarks.py",
+    "faults/test_result_files.py",
+    "truth/test_order.py",
+    "unit/results/files/test_files.py",
+    "unit/cli/test_cli_maps.py",
+    "unit/analysis/attractors/test_noisy.py",
+    "truth/test_contact_peaks.py",
+    "unit/analysis/branches/test_ladders.py",
+    "test_docs.py",
+    "truth/test_impacts_by_method.py",
+    "truth/test_modal_sweeps.py",
+    "truth/test_modal_laws_blocks.py",
+    "unit/codegen/test_cache.py",
     "faults/test_interrupted_runs.py",
+)
+
+#: Where results are written as users write them, as netCDF-4.
+NETCDF_4 = (
+    "conformance/test_every_verb.py",
+    "faults/test_result_files.py",
+    "test_readme.py",
+    "unit/results",
+    "unit/study/test_run.py",
 )
 
 
@@ -105,6 +131,30 @@ def compiled_here():
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(building, "OTHER_PROCESS", math.inf)
+        yield
+
+
+@pytest.fixture(autouse=True, scope="module")
+def netcdf_3(request):
+    """Elsewhere they are written as if [io] weren't installed: in a fifteenth of the time."""
+    here = Path(__file__).parent
+    if any(request.path.is_relative_to(here / name) for name in NETCDF_4):
+        yield
+        return
+    from saltus.results.files import export
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(export, "_has", lambda _: False)
+        yield
+
+
+@pytest.fixture(scope="module")
+def few_scouts():
+    """Maps of some ten cells, before which no thousand starts look for attractors."""
+    from saltus.analysis.basins import pipeline
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pipeline, "SCOUTS", 64)
         yield
 
 

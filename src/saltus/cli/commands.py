@@ -51,6 +51,7 @@ class PictureKind(StrEnum):
     impacts = "impacts"
     contact_forces = "contact_forces"
     energy = "energy"
+    sensitivity = "sensitivity"
     exponents = "exponents"
     methods = "methods"
 
