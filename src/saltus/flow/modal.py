@@ -112,6 +112,9 @@ class ModalFlow:
             if tables.full:
                 return
             which = tables.set_of(batch.param[i if batch.stride else 0])
+            if not tables.is_finite(which, int(batch.mode[i])):
+                batch.status[i] = st.NONFINITE
+                continue
             at = tables.state_of(which, int(batch.mode[i]))
             if self._names:
                 tables.by(self._names).need(at, which, int(batch.mode[i]))

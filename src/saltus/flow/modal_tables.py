@@ -80,7 +80,7 @@ class Tables:
         rows = int(self.row_of.max(initial=-1)) + 1
         self.first_guard = [int(np.flatnonzero(self.row_of == r)[0]) for r in range(rows)]
         values = dict(linear.system.values)
-        slots = len(slots_of(np.linalg.eigvals(linear.piece(values, 0).matrix))) + rows
+        slots = len(slots_of(np.linalg.eigvals(_numbers(linear.piece(values, 0).matrix)))) + rows
         self.groups, self.state_groups = -(-slots // LANES), -(-n // LANES)
         drives = len(linear.drives)
         courses = len(linear.courses)
@@ -218,6 +218,15 @@ class Tables:
             self._held += course.begins.nbytes + course.terms.nbytes
         return self._courses[key]
 
+    def is_finite(self, which: int, mode: int) -> bool:
+        """True if the equations of a contact state are made of numbers, whatever formulas say."""
+        given = self.sets[which]
+        pieces = self.piece_of(given, mode), given.gaps, given.impacts.closing
+        parts = [part for one in pieces for part in (one.matrix, one.constant, one.driven)]
+        parts += [given.rates, given.lags, given.impacts.push, given.impacts.restitution]
+        parts += [one.terms for one in given.courses]
+        return all(bool(np.isfinite(part).all()) for part in parts)
+
     def state_of(self, which: int, mode: int) -> int:
         """Number of a contact state, made if it isn't known."""
         if (which, mode) not in self._states:
@@ -308,7 +317,7 @@ class Tables:
         """
         if used not in self._fast:
             every = int(np.sum((1 << np.arange(len(self.holds)))[~self.holds]))
-            matrices = [self.piece_of(given, mode).matrix for mode in (0, every)]
+            matrices = [_numbers(self.piece_of(given, mode).matrix) for mode in (0, every)]
             self._fast[used] = max(float(np.abs(np.linalg.eigvals(one)).max()) for one in matrices)
         return self._fast[used]
 
@@ -387,6 +396,11 @@ class Tables:
         flat = np.array(numbers).T.ravel()
         flat = np.concatenate([flat, np.zeros(-len(flat) % LANES)])
         return self.steady.add(np.concatenate([*states, flat]))
+
+
+def _numbers(matrix: np.ndarray) -> np.ndarray:
+    """A matrix with zeros where formulas give no numbers."""
+    return np.where(np.isfinite(matrix), matrix, 0.0)
 
 
 def laws_of(linear: LinearSystem) -> np.ndarray:
