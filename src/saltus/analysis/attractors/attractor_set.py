@@ -49,9 +49,13 @@ class AttractorSet:
     def __len__(self) -> int:
         return len(self.orbits) + len(self.sampled)
 
-    def add(self, map_: Map, orbit: ClosedMotion, scale: np.ndarray) -> None:
-        """One more periodic attractor, and where it captures."""
-        self.near = self.near.joined(neighbourhoods(map_, orbit, len(self.orbits), scale))
+    def add(
+        self, map_: Map, orbit: ClosedMotion, scale: np.ndarray, like: Neighbourhoods | None = None
+    ) -> None:
+        """One more periodic attractor, and where it captures; ``like`` as for
+        :func:`saltus.analysis.closed.capture.neighbourhoods`.
+        """
+        self.near = self.near.joined(neighbourhoods(map_, orbit, len(self.orbits), scale, like))
         self.orbits.append(orbit)
 
     def add_sampled(self, one: SampledMotion) -> None:
@@ -69,6 +73,10 @@ class AttractorSet:
             if other is one or (isinstance(one, ClosedMotion) and is_about(other, one)):
                 return i
         raise AssertionError("an attractor that wasn't found")
+
+    def ids(self, before: AttractorSet) -> np.ndarray:
+        """The id that each of fewer attractors has among these, int64[m]."""
+        return np.array([self.index(one) for one in before.every], np.int64)
 
     def ordered(self, scale: np.ndarray) -> AttractorSet:
         """The same with ids that don't depend on the order of discovery: by period, then by size,

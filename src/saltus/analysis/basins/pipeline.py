@@ -21,6 +21,7 @@ from saltus.analysis.attractors.noisy import stray_attrs
 from saltus.analysis.attractors.portrait import portraits
 from saltus.analysis.basins import uncertainty
 from saltus.analysis.basins.labels import OPEN, Settling, complete, settle
+from saltus.analysis.basins.levels import GridLevel, levels_of
 from saltus.analysis.basins.scouting import SCOUTS, scouted
 from saltus.analysis.closed.spread import spread
 from saltus.analysis.closed.turns import ASKED, looks_every
@@ -144,14 +145,21 @@ class BasinPlan:
         """Cells of a chunk, int64[k]."""
         return np.arange(chunk * CHUNK, min((chunk + 1) * CHUNK, self.cells))
 
+    def levels(self) -> list[GridLevel]:
+        """Its cells coarse to fine, each level from the middle of the map outwards."""
+        return levels_of(self.shape)
+
     # -- the three stages --------------------------------------------------------------------------
-    def scout(self, threads: int | None = None) -> AttractorSet:
-        """The attractors that a fixed quasi-random sample of the box leads to."""
-        *_, found = self.scouted(threads)
+    def scout(self, threads: int | None = None, known: AttractorSet | None = None) -> AttractorSet:
+        """The attractors that a fixed quasi-random sample of the box leads to, and known ones."""
+        *_, found = self.scouted(threads, known=known)
         return found
 
     def scouted(
-        self, threads: int | None = None, progress: Callable[[float], None] | None = None
+        self,
+        threads: int | None = None,
+        progress: Callable[[float], None] | None = None,
+        known: AttractorSet | None = None,
     ) -> Iterator[AttractorSet]:
         """The same, more and more of them."""
         unit = halton(self.scouts, 2)
@@ -160,7 +168,7 @@ class BasinPlan:
         )
         drawn = dict(zip(self.axes, (low + (high - low) * unit).T, strict=True))
         start = self._states(drawn)
-        return scouted(self.map(threads), start, self.scale, self.periods, progress)
+        return scouted(self.map(threads), start, self.scale, self.periods, progress, known)
 
     def sample(self, count: int) -> np.ndarray:
         """Indices of cells drawn at random, the same each time: int64[count at most], ascending."""

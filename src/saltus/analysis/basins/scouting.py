@@ -36,17 +36,19 @@ def scouted(
     scale: np.ndarray,
     most: int,
     progress: Callable[[float], None] | None = None,
+    known: AttractorSet | None = None,
 ) -> Iterator[AttractorSet]:
     """The attractors that some of the starts float64[k, D] lead to, more and more of them: those of
     the first ones, then of as many as their cost allows. Followed for ``most`` iterates each.
+    ``known`` ones are among them.
     """
     count, states = start.shape
     whole = affordable(most + SURVEY_ITERATES, states, count) >= count
     first = count if whole else min(FEWEST, count)
-    yield AttractorSet(Neighbourhoods.none(states))
-    found, _, settled = find_attractors(
-        map_, start[:first], scale, most, progress=stage(progress, 0.0, 1.0 if whole else 0.5)
-    )
+    found = known or AttractorSet(Neighbourhoods.none(states))
+    yield found
+    half = stage(progress, 0.0, 1.0 if whole else 0.5)
+    found, _, settled = find_attractors(map_, start[:first], scale, most, found, half)
     yield found
     cost = np.where(settled < 0, most + SURVEY_ITERATES, settled).mean()
     more = affordable(float(cost), states, count)
