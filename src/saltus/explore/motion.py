@@ -26,7 +26,7 @@ MOST_CONTACTS = 2000
 #: Two motions have parted where they differ by this share of the range.
 PARTED = 0.01
 #: Statuses of a motion that reached its end.
-_REACHED = (st.OK, st.GRAZE_UNRESOLVED)
+REACHED = (st.OK, st.GRAZE_UNRESOLVED)
 
 
 @dataclass(frozen=True)
@@ -172,14 +172,14 @@ def _columns(system: System) -> tuple[str, ...]:
 
 def _each(what: str, names: Sequence[str], values: np.ndarray) -> dict[str, np.ndarray]:
     """Columns of float64[n, k] under their names."""
-    return {
-        f"{what}:{name}": column.astype("f4") for name, column in zip(names, values.T, strict=True)
-    }
+    with np.errstate(over="ignore"):  # what has left the picture may be infinite
+        columns = values.T.astype("f4")
+    return {f"{what}:{name}": column for name, column in zip(names, columns, strict=True)}
 
 
 def _bits(mode: np.ndarray, guards: int) -> np.ndarray:
     """Modes in the smallest type that holds a bit for each guard, 0 where nothing is known."""
-    known = np.maximum(mode, 0)
+    known: np.ndarray = np.maximum(mode, 0)
     return known.astype("u1" if guards <= 8 else "u2" if guards <= 16 else "u4")
 
 
@@ -187,7 +187,11 @@ def _in_columns(time: np.ndarray, values: np.ndarray, names: Sequence[str]) -> d
     """The whole of a long motion: the least and the most of each column of pixels."""
     edges = np.unique(np.linspace(0, len(time), COLUMNS + 1).astype(int))[:-1]
     least, most = (by.reduceat(values, edges, axis=0) for by in (np.minimum, np.maximum))
-    return {"column_time": time[edges], **_each("least", names, least), **_each("most", names, most)}
+    return {
+        "column_time": time[edges],
+        **_each("least", names, least),
+        **_each("most", names, most),
+    }
 
 
 def _words(found: MotionArrays, status: int) -> list[str]:
@@ -195,7 +199,7 @@ def _words(found: MotionArrays, status: int) -> list[str]:
     if status == st.OK:
         return []
     name, meaning = STATUS[status]
-    if status in _REACHED:
+    if status in REACHED:
         return [f"{name}: {meaning}."]
     return [f"It ended at {from_si(float(found.outcome.time[0]), 's')}: {name}, {meaning}."]
 

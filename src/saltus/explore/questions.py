@@ -9,7 +9,8 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import MISSING, dataclass, field, fields
-from typing import Any, ClassVar, TypeAlias
+from functools import cache
+from typing import Annotated, Any, ClassVar, TypeAlias, get_type_hints
 
 from saltus.errors import ParameterError, SaltusError, among, listed, nearest, shown
 
@@ -147,17 +148,8 @@ def _point(given: Any, name: str) -> list[float]:
     return [float(_number(one, f"{name}.{i}")) for i, one in enumerate(given)]
 
 
-def _given(read: Callable[[Any, str], Any], **default: Any) -> Any:
-    """A field, and what reads it from JSON. Null stands for the default of an optional one."""
-    return field(metadata={"read": read}, **default)
-
-
-def _optional(read: Callable[[Any, str], Any]) -> Any:
-    return _given(read, default=None)
-
-
-def _values() -> Any:
-    return _given(_numbers, default_factory=dict)
+#: Numbers by name.
+Numbers: TypeAlias = Annotated[Mapping[str, Number], _numbers]
 
 
 # -- the questions ---------------------------------------------------------------------------------
@@ -166,7 +158,7 @@ class Question:
     """What a page asks. Numbers are SI or text with a unit; names are those of the system."""
 
     ask: ClassVar[str] = ""
-    id: int = _given(_whole(0, MOST_ID))
+    id: Annotated[int, _whole(0, MOST_ID)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -174,9 +166,9 @@ class Hello(Question):
     """The first one of a page: its token, its version of the frames, the desk that it knew."""
 
     ask = "hello"
-    token: str = _given(_text)
-    wire: int = _given(_whole(0, 2**31))
-    desk: str = _given(_text, default="")
+    token: Annotated[str, _text]
+    wire: Annotated[int, _whole(0, 2**31)]
+    desk: Annotated[str, _text] = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -191,7 +183,7 @@ class Open(Question):
     """Another of saltus's models, where no system was named."""
 
     ask = "open"
-    model: str = _given(_text)
+    model: Annotated[str, _text]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -199,15 +191,15 @@ class MotionQuestion(Question):
     """The motion from a start; ``against`` a second method."""
 
     ask = "motion"
-    start: Start = _given(_start)
-    values: Mapping[str, Number] = _values()
-    periods: int = _given(_whole(1, MOST_PERIODS), default=60)
-    t_end: Number | None = _optional(_number)
-    method: str | None = _optional(_text)
-    samples: int | None = _optional(_whole(2, MOST_SAMPLES))
-    errors: str = _given(_one_of("local", "measured"), default="measured")
-    against: str | None = _optional(_text)
-    quantities: tuple[str, ...] | None = _optional(_names)
+    start: Annotated[Start, _start]
+    values: Numbers = field(default_factory=dict)
+    periods: Annotated[int, _whole(1, MOST_PERIODS)] = 60
+    t_end: Annotated[Number | None, _number] = None
+    method: Annotated[str | None, _text] = None
+    samples: Annotated[int | None, _whole(2, MOST_SAMPLES)] = None
+    errors: Annotated[str, _one_of("local", "measured")] = "measured"
+    against: Annotated[str | None, _text] = None
+    quantities: Annotated[tuple[str, ...] | None, _names] = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -215,9 +207,9 @@ class Settle(Question):
     """What a start settles to."""
 
     ask = "settle"
-    start: Start = _given(_start)
-    values: Mapping[str, Number] = _values()
-    method: str | None = _optional(_text)
+    start: Annotated[Start, _start]
+    values: Numbers = field(default_factory=dict)
+    method: Annotated[str | None, _text] = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -225,11 +217,11 @@ class Track(Question):
     """An orbit known at the values ``source``, at other values: by its key, or a point on it."""
 
     ask = "track"
-    values: Mapping[str, Number] = _values()
-    source: Mapping[str, Number] = _given(_numbers)
-    key: int | None = _optional(_whole(0, 127))
-    point: list[float] | None = _optional(_point)
-    period: int = _given(_whole(1, 64), default=1)
+    values: Numbers = field(default_factory=dict)
+    source: Annotated[Mapping[str, Number], _numbers]
+    key: Annotated[int | None, _whole(0, 127)] = None
+    point: Annotated[list[float] | None, _point] = None
+    period: Annotated[int, _whole(1, 64)] = 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -237,13 +229,13 @@ class MapQuestion(Question):
     """The attractor that each start of a grid leads to."""
 
     ask = "map"
-    axes: Mapping[str, tuple[Number, Number]] = _given(_axes)
-    size: tuple[int, int] = _given(_size)
-    values: Mapping[str, Number] = _values()
-    at: Mapping[str, Number] = _values()
-    method: str | None = _optional(_text)
-    coarse: bool = _given(_flag, default=False)
-    periods: int = _given(_whole(1, MOST_PERIODS), default=2000)
+    axes: Annotated[Mapping[str, tuple[Number, Number]], _axes]
+    size: Annotated[tuple[int, int], _size]
+    values: Numbers = field(default_factory=dict)
+    at: Numbers = field(default_factory=dict)
+    method: Annotated[str | None, _text] = None
+    coarse: Annotated[bool, _flag] = False
+    periods: Annotated[int, _whole(1, MOST_PERIODS)] = 2000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -251,10 +243,10 @@ class ResponsesQuestion(Question):
     """Orbits over a parameter, stable or not."""
 
     ask = "responses"
-    parameter: str = _given(_text)
-    range: tuple[Number, Number] = _given(_pair)
-    values: Mapping[str, Number] = _values()
-    quantity: str | None = _optional(_text)
+    parameter: Annotated[str, _text]
+    range: Annotated[tuple[Number, Number], _pair]
+    values: Numbers = field(default_factory=dict)
+    quantity: Annotated[str | None, _text] = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -262,11 +254,11 @@ class OrbitQuestion(Question):
     """One orbit: an attractor by its key, or a point or an event of responses."""
 
     ask = "orbit"
-    values: Mapping[str, Number] = _values()
-    attractor: int | None = _optional(_whole(0, 127))
-    responses: int | None = _optional(_whole(0, 2**31))
-    point: int | None = _optional(_whole(0, 2**31))
-    event: int | None = _optional(_whole(0, 2**31))
+    values: Numbers = field(default_factory=dict)
+    attractor: Annotated[int | None, _whole(0, 127)] = None
+    responses: Annotated[int | None, _whole(0, 2**31)] = None
+    point: Annotated[int | None, _whole(0, 2**31)] = None
+    event: Annotated[int | None, _whole(0, 2**31)] = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -274,11 +266,11 @@ class Save(Question):
     """A file of what is seen."""
 
     ask = "save"
-    what: str = _given(_one_of("study", "script", "picture", "data"))
-    format: str = _given(_one_of("toml", "py", "png", "svg", "pdf", "nc", "csv", "mat"))
-    view: Mapping[str, Any] = _given(_mapping)
-    parts: tuple[str, ...] = _given(_names, default=())
-    name: str = _given(_text, default="")
+    what: Annotated[str, _one_of("study", "script", "picture", "data")]
+    format: Annotated[str, _one_of("toml", "py", "png", "svg", "pdf", "nc", "csv", "mat")]
+    view: Annotated[Mapping[str, Any], _mapping]
+    parts: Annotated[tuple[str, ...], _names] = ()
+    name: Annotated[str, _text] = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -286,7 +278,7 @@ class StopWork(Question):
     """Request to end what is under way, or that of one kind."""
 
     ask = "stop"
-    of: str | None = _optional(_text)
+    of: Annotated[str | None, _text] = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -301,7 +293,7 @@ class Show(Question):
     """What the page shows now."""
 
     ask = "show"
-    view: Mapping[str, Any] = _given(_mapping)
+    view: Annotated[Mapping[str, Any], _mapping]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -309,7 +301,7 @@ class Pause(Question):
     """Notice that nobody looks, so that maps wait."""
 
     ask = "pause"
-    on: bool = _given(_flag)
+    on: Annotated[bool, _flag]
 
 
 QUESTIONS: Mapping[str, type[Question]] = {
@@ -351,18 +343,29 @@ def question_of(ask: str, data: Mapping[str, Any]) -> Question:
     if not among(ask, QUESTIONS):
         raise QuestionError(f"there is no question {shown(ask)}. {nearest(ask, QUESTIONS)}", "ask")
     kind = QUESTIONS[ask]
-    known = {one.name: one for one in fields(kind)}
+    known = _readers(ask)
     for name in data:
         if name not in known:
             raise QuestionError(f"{ask} has no field {shown(name)}. {nearest(name, known)}", name)
+    needed = {
+        one.name
+        for one in fields(kind)
+        if one.default is MISSING and one.default_factory is MISSING
+    }
     given = {}
-    for name, one in known.items():
-        needed = one.default is MISSING and one.default_factory is MISSING
-        if name not in data and needed:
+    for name, reads in known.items():
+        if name in needed and name not in data:
             raise QuestionError(f"{ask} needs {name}. Its fields: {listed(known)}.", name)
-        if name in data and (needed or data[name] is not None):
-            given[name] = one.metadata["read"](data[name], name)
+        if name in needed or data.get(name) is not None:
+            given[name] = reads(data[name], name)
     return kind(**given)
+
+
+@cache
+def _readers(ask: str) -> dict[str, Callable[[Any, str], Any]]:
+    """What reads each field of a kind of question."""
+    hints = get_type_hints(QUESTIONS[ask], include_extras=True)
+    return {one.name: hints[one.name].__metadata__[0] for one in fields(QUESTIONS[ask])}
 
 
 def _refuse(constant: str) -> None:

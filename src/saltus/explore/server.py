@@ -114,6 +114,7 @@ class Server:
         self._policy = _POLICY + (" ".join(framed_by) or "'none'")
         self.token, self.desk = secrets.token_urlsafe(24), secrets.token_hex(8)
         self.sessions: list[Session] = []
+        self._sockets = 0
         self._alone_since = time.monotonic()
         self._socket = socket.socket()
         self._socket.bind(("127.0.0.1", 0))
@@ -182,11 +183,18 @@ class Server:
     # -- WebSocket ---------------------------------------------------------------------------------
     async def _page(self, page: WebSocket) -> None:
         await page.accept()
-        if len(self.sessions) >= MOST_PAGES:
+        if self._sockets >= MOST_PAGES:
             await page.close(TOO_MANY)
             return
-        if not await self._known(page):
-            return
+        self._sockets += 1
+        try:
+            if await self._known(page):
+                await self._serve(page)
+        finally:
+            self._sockets -= 1
+
+    async def _serve(self, page: WebSocket) -> None:
+        """Hear a page's questions until it goes."""
         loop, ready = asyncio.get_running_loop(), asyncio.Event()
 
         def tell() -> None:
@@ -210,15 +218,14 @@ class Server:
     async def _known(self, page: WebSocket) -> bool:
         """True if a page's first words are its token, in time, and it is of this version."""
         try:
-            question = read(await asyncio.wait_for(_heard(page), HELLO) or "")
+            async with asyncio.timeout(HELLO):
+                question: Any = read(await _heard(page) or "")
         except TimeoutError:
             await page.close(SLOW)
             return False
         except QuestionError:
             question = None
-        if not isinstance(question, Hello) or not secrets.compare_digest(
-            question.token.encode(), self.token.encode()
-        ):
+        if not isinstance(question, Hello) or not self._is_token(question.token):
             with contextlib.suppress(RuntimeError):  # it went by itself
                 await page.close(WRONG_TOKEN)
             return False
@@ -232,6 +239,9 @@ class Server:
         about |= {"version": metadata.version("saltus"), "desk": self.desk, "same": same}
         await page.send_bytes(packed({**about, "kind": "hello"}, {}))
         return True
+
+    def _is_token(self, given: str) -> bool:
+        return secrets.compare_digest(given.encode("utf-8", "replace"), self.token.encode())
 
 
 async def _heard(page: WebSocket) -> str | None:

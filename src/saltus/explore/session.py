@@ -10,7 +10,7 @@ import threading
 import time
 import traceback
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from typing import Any, Protocol
@@ -47,7 +47,7 @@ LOOK = 0.1
 class AnswersQuestions(Protocol):
     """A desk: it answers a question by one answer or several, while it works."""
 
-    def answers(self, question: Question) -> Iterator[Answer]:
+    def answers(self, question: Question) -> Generator[Answer]:
         """The answers."""
 
 
@@ -258,7 +258,7 @@ class Session:
         finally:
             self._windows.pop(question.id, None)
 
-    def _answers(self, question: Question) -> Iterator[Answer]:
+    def _answers(self, question: Question) -> Generator[Answer]:
         if isinstance(question, Open):
             if self._opened is None:
                 raise QuestionError("the system was chosen where the explorer was started.")
