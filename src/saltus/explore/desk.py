@@ -150,7 +150,9 @@ class Desk:
     def _settle(self, question: asked.Settle) -> Answer:
         system, method = self.system_at(question.values), self.method_of(question.method)
         known = self.known_at(self.plan_of(system, method))
-        return settle(known, self.start_of(system, question.start), method, self.quantities_of(None))
+        return settle(
+            known, self.start_of(system, question.start), method, self.quantities_of(None)
+        )
 
     def _orbit(self, question: asked.OrbitQuestion) -> Answer:
         system, method = self.system_at(question.values), self.opening.method

@@ -138,7 +138,7 @@ def grow_map(
     growing.begin()
     growing.take_over(maps.beside(plan))
     if coarse or known.scouts < plan.scouts:
-        growing.grow(COARSE, threads)
+        growing.grow(min(COARSE, plan.levels()[0].stride), threads)
     if coarse:
         growing.end({"coarse": True})
         return
