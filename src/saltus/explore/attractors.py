@@ -12,6 +12,7 @@ import xarray as xr
 from saltus.analysis.attractors.aperiodic import SampledMotion
 from saltus.analysis.attractors.attractor_set import AttractorSet
 from saltus.analysis.attractors.attractors import attractors_dataset
+from saltus.analysis.attractors.limit_cycles import cycle_of
 from saltus.analysis.attractors.portrait import portraits
 from saltus.analysis.closed.capture import Neighbourhoods
 from saltus.analysis.closed.motions import ClosedMotion, orbit_distance, same
@@ -19,6 +20,7 @@ from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.solve.tolerances import SAME
 from saltus.flow.maps import Stroboscope
 from saltus.results import AttractorTable
+from saltus.results.dataset.kinds import Kind
 from saltus.results.dataset.schema import kind_text
 
 Attractor: TypeAlias = ClosedMotion | SampledMotion
@@ -104,6 +106,15 @@ class KnownAttractors:
         with self.lock:
             every = enumerate(self._members)
             return [(key, one) for key, one in every if isinstance(one, ClosedMotion)]
+
+    def closed(self, key: int) -> ClosedMotion | None:
+        """The attractor of a key, closed by Newton's method; None if there is none, or it never
+        repeats.
+        """
+        one = self._members[key] if key < len(self._members) else None
+        if isinstance(one, SampledMotion) and one.kind == Kind.LIMIT_CYCLE.word:
+            return cycle_of(self.map, one)[0]
+        return one if isinstance(one, ClosedMotion) else None
 
     def dataset(self) -> xr.Dataset:
         """All of them, as :func:`saltus.attractors` returns them."""

@@ -20,7 +20,7 @@ from saltus.explore.frames import Answer, Emit
 from saltus.explore.map import FIRST_SCOUTS, KeptMaps, grow_map, look, plan_of_map
 from saltus.explore.motion import AskedRun, motion
 from saltus.explore.opening import Opening
-from saltus.explore.orbits import MOST_PERIODS, attractor_orbit, settle
+from saltus.explore.orbits import MOST_PERIODS, attractor_orbit, orbit_of, settle, tracked
 from saltus.explore.questions import QuestionError, about
 from saltus.explore.responses import KeptResponses, respond, response_orbit
 from saltus.flow.methods import METHODS, Method
@@ -58,6 +58,7 @@ class Desk:
             asked.MotionQuestion: self._motion,
             asked.Settle: self._settle,
             asked.OrbitQuestion: self._orbit,
+            asked.Track: self._track,
         }
 
     def answer(self, question: asked.Question, emit: Emit) -> None:
@@ -180,6 +181,21 @@ class Desk:
                 f"no attractor {question.attractor} is known at these values.", "attractor"
             )
         return attractor_orbit(known, question.attractor, method, quantities)
+
+    def _track(self, question: asked.Track) -> Answer:
+        with about("source"):
+            source = self.system_at(question.source)
+        system, method = self.system_at(question.values), self.opening.method
+        known = self.known_at(self.plan_of(source, method))
+        old = None
+        if question.key is not None:
+            old = known.closed(question.key)
+        elif question.point is not None:
+            old = orbit_of(known.map, self.start_of(source, list(question.point)), question.period)
+        if old is None:
+            raise QuestionError("no orbit is known there: it needs key, or point.", "key")
+        quantities = self.quantities_of(None)
+        return tracked(old, source, system, method, self.period_of, quantities)
 
     def _respond(self, question: asked.ResponsesQuestion, emit: Emit) -> None:
         system, method = self.system_at(question.values), self.opening.method

@@ -5,21 +5,24 @@ from __future__ import annotations
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.branches.branches import branches
+from saltus.analysis.branches.branch import Branch
+from saltus.analysis.branches.branch_table import table_of
+from saltus.analysis.branches.branches import follow_all, seeds_between
+from saltus.analysis.branches.plans import LONGEST_DOUBLED, POINTS, SWITCHES, plan_of
 from saltus.analysis.inputs.halton import halton
-from saltus.errors import ParameterError, unknown
+from saltus.analysis.inputs.outputs import outputs_of
+from saltus.errors import unknown
 from saltus.explore.attractors import KnownAttractors, pairs
 from saltus.explore.frames import Answer, Emit
 from saltus.explore.motion import AskedRun
 from saltus.explore.orbits import orbit
 from saltus.explore.questions import QuestionError
-from saltus.flow.methods import Method
+from saltus.flow.methods import Method, exact_method
 from saltus.results.dataset import schema
 from saltus.system import System
 
@@ -99,18 +102,23 @@ def respond(
         emit(*_answer(known, kept.get(number)[1], number, quantity, 1.0))
         return
     told = _Told(emit, parameter, limits, quantity)
-    given: dict[str, Any] = {"method": method, "threads": threads}
-    vary = {parameter: limits}
-    if len(known):
-        with suppress(ParameterError):  # nothing known repeats: starts may
-            first = branches(
-                system, vary, known.dataset(), progress=told.between(0.0, FIRST), **given
-            )
-            emit(*_answer(known, first, kept.put(None, system, first), quantity, FIRST))
-    starts = _starts(known, box)
-    every = branches(
-        system, vary, starts, at=VALUES, progress=told.between(FIRST, 1.0), **given
+    method, done = exact_method(method, system, "responses"), list[Branch]()
+    plan = plan_of(
+        system, parameter, limits, method, threads, POINTS, LONGEST_DOUBLED, frozenset(SWITCHES)
     )
+    wanted = outputs_of(system)
+    if len(known):
+        seeds = seeds_between(system, parameter, limits, known.dataset(), method=method)
+        follow_all(plan, system, parameter, *seeds, done, told.between(0.0, FIRST))
+        first = table_of(system, parameter, limits, done, wanted, method)
+        emit(*_answer(known, first, kept.put(None, system, first), quantity, FIRST))
+    seeds = seeds_between(
+        system, parameter, limits, _starts(known, box), at=VALUES, method=method, threads=threads
+    )
+    follow_all(plan, system, parameter, *seeds, done, told.between(FIRST, 1.0))
+    if not done:
+        raise QuestionError(f"nothing that repeats is known for this range of {parameter}.")
+    every = table_of(system, parameter, limits, done, wanted, method)
     emit(*_answer(known, every, kept.put(question, system, every), quantity, 1.0))
 
 
