@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -26,6 +27,8 @@ from saltus.results.dataset.schema import kind_text
 Attractor: TypeAlias = ClosedMotion | SampledMotion
 #: Two orbits of neighbouring values are one response if they are nearer than this share of the box.
 NEIGHBOUR = 0.25
+#: An equilibrium nearer to zero than this share of the box is there.
+_AT_ZERO = 1e-9
 #: Most points of an attractor that the page draws.
 POINTS = 64
 #: Labels are signed bytes: most attractors that a map can show.
@@ -112,7 +115,10 @@ class Legend:
         one = self._members[key] if key < len(self._members) else None
         if isinstance(one, SampledMotion) and one.kind == Kind.LIMIT_CYCLE.word:
             return cycle_of(self.map, one)[0]
-        return one if isinstance(one, ClosedMotion) else None
+        if not isinstance(one, ClosedMotion) or self.map.system.forced_at is not None:
+            return one if isinstance(one, ClosedMotion) else None
+        still = np.where(np.abs(one.points) > _AT_ZERO * self.scale, one.points, 0.0)
+        return replace(one, points=still)
 
     def dataset(self) -> xr.Dataset:
         """All of them, as :func:`saltus.attractors` returns them."""

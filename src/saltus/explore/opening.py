@@ -58,6 +58,8 @@ class Opening:
         What a study asks for first, in the fields of questions.
     results : mapping of str to Dataset
         Results of a finished study, by the stems of their files.
+    system_table : mapping
+        The table [system] of a study.
     """
 
     system: System
@@ -71,6 +73,7 @@ class Opening:
     responses: Mapping[str, Any] | None = None
     view: Mapping[str, Any] = field(default_factory=dict)
     results: Mapping[str, Any] = field(default_factory=dict)
+    system_table: Mapping[str, Any] = field(default_factory=dict)
 
 
 def opening_of(system: System, method: Method | None = None, **known: Any) -> Opening:

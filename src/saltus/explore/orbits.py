@@ -11,7 +11,6 @@ import numpy as np
 from saltus.analysis.attractors.find_attractors import find_attractors
 from saltus.analysis.basins.labels import OPEN
 from saltus.analysis.basins.labels import settle as follow
-from saltus.analysis.closed.field_zeros import jacobian_of
 from saltus.analysis.closed.motions import ClosedMotion
 from saltus.analysis.closed.track import track
 from saltus.explore.attractors import Legend, pairs
@@ -138,7 +137,7 @@ def tracked(
     about = {
         "name": kind_text("equilibrium" if rests else one.kind, n),
         "stable": now.stable,
-        "multipliers": pairs(_eigenvalues(there, one.points[0]) if rests else one.multipliers),
+        "multipliers": pairs(one.multipliers),
         "eigenvalues": rests,
         "seconds": one.time if cycle else n * turn or None,
     }
@@ -146,11 +145,3 @@ def tracked(
     head, arrays = orbit(run, quantities, about)
     words = [now.lost] if now.lost else []
     return {**head, "kind": "track", "lost": now.lost or None, "words": words}, arrays
-
-
-def _eigenvalues(system: System, state: np.ndarray) -> np.ndarray:
-    """Eigenvalues of the equations at an equilibrium [1/s], the largest real part first."""
-    values = {name: np.array([value]) for name, value in system.values.items()}
-    (matrix,) = jacobian_of(system, state[None], values)
-    found = np.linalg.eigvals(matrix)
-    return np.asarray(found[np.argsort(-found.real)])

@@ -113,7 +113,13 @@ def respond(
         first = table_of(system, parameter, limits, done, wanted, method)
         emit(*_answer(known, first, kept.put(None, system, first), quantity, FIRST))
     seeds = seeds_between(
-        system, parameter, limits, _starts(known, box), at=VALUES, method=method, threads=threads
+        system,
+        parameter,
+        limits,
+        starts_from(known, box),
+        at=VALUES,
+        method=method,
+        threads=threads,
     )
     follow_all(plan, system, parameter, *seeds, done, told.between(FIRST, 1.0))
     if not done:
@@ -187,7 +193,7 @@ class _Told:
         return told
 
 
-def _starts(known: Legend, box: Mapping[str, tuple[float, float]]) -> np.ndarray:
+def starts_from(known: Legend, box: Mapping[str, tuple[float, float]]) -> np.ndarray:
     """Starts in a box, and a point of each known attractor, float64[k, D]."""
     states = known.map.system.states
     starts = np.zeros((STARTS, len(states)))
