@@ -13,6 +13,7 @@ import xarray as xr
 from saltus.analysis.attractors.aperiodic import SampledMotion
 from saltus.analysis.attractors.attractor_set import AttractorSet
 from saltus.analysis.attractors.attractors import attractors_dataset
+from saltus.analysis.attractors.followed import followed
 from saltus.analysis.attractors.limit_cycles import cycle_of
 from saltus.analysis.attractors.portrait import portraits
 from saltus.analysis.closed.capture import Neighbourhoods
@@ -63,9 +64,22 @@ class Legend:
         self._before = (
             [] if before is None else list(zip(before._members, before._hues, strict=True))
         )
+        self._old = None if before is None else before.found
+        self._followed = False
 
     def __len__(self) -> int:
         return len(self._members)
+
+    def follow(self) -> bool:
+        """Close the orbits of the values shown before at these, by Newton's method; once. True if
+        there were any.
+        """
+        with self.lock:
+            if self._old and not self._followed:
+                self.grow(followed(self.map, self._old, self.scale)[0])
+                self._followed = len(self) > 0
+            self._old = None
+            return self._followed
 
     def grow(self, found: AttractorSet) -> bool:
         """Take what was found meanwhile; True if an attractor is new. What others found while that

@@ -121,8 +121,8 @@ class Desk:
         system = self.opening.system
         if names is None:
             few = 2 if system.outputs.first else MOST_STATES
-            mine, others = set(self.opening.axes), system.states
-            states = [*self.opening.axes, *(name for name in others if name not in mine)][:few]
+            axes = [name for name in self.opening.axes if name in system.states]
+            states = list(dict.fromkeys([*axes, *system.states]))[:few]
             return (*states, *system.outputs.names[:MOST_OUTPUTS])
         known = (*system.states, *system.outputs.names)
         for name in names:
@@ -220,7 +220,7 @@ class Desk:
         quantity = self.quantities_of((question.quantity or first[0],))[0]
         look(plan, known, self.threads)
         respond(
-            known, method, question.parameter, limits, quantity, self.opening.axes,
+            known, method, question.parameter, limits, quantity, plan,
             self._responses, emit, self.threads,
         )  # fmt: skip
 
@@ -260,8 +260,9 @@ class Desk:
         if (responses := shown.get("responses")) is not None:
             limits = range_of(system, responses.parameter, responses.range)
             given["vary"] = responses.parameter, *limits
-            legend = self.legend_at(self.plan_of(system, method))
-            given["starts"] = starts_of(system.states, starts_from(legend, self.opening.axes))
+            plan = self.plan_of(system, method)
+            starts = starts_from(self.legend_at(plan), plan)
+            given["starts"] = starts_of(system.states, starts)
             given["values_tried"] = VALUES
             found["responses"] = partial(self._answered, system, method, responses, limits)
         return View(self.opening, system, method, **given), found

@@ -40,15 +40,12 @@ def settled(known: Legend, start: Sequence[float]) -> tuple[int, int]:
     label, periods = int(followed.label[0]), int(followed.periods[0])
     if label != OPEN:
         return (int(keys[label]) if label >= 0 else label), periods
-    with known.lock:
-        wider, ids, _ = find_attractors(
-            known.map, followed.end, known.scale, MOST_PERIODS, known.found
-        )
-        known.grow(wider)
-        if ids[0] < 0:
-            return int(Kind.UNCONVERGED), -1
-        again = follow(known.map, begin, wider, MOST_PERIODS)
-        return int(known.keys()[ids[0]]), int(again.periods[0])
+    wider, ids, _ = find_attractors(known.map, followed.end, known.scale, MOST_PERIODS, found)
+    known.grow(wider)
+    if ids[0] < 0:
+        return int(Kind.UNCONVERGED), -1
+    again = follow(known.map, begin, wider, MOST_PERIODS)
+    return int(known.keys(wider)[ids[0]]), int(again.periods[0])
 
 
 def settle(
