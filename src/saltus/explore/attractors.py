@@ -13,8 +13,7 @@ import xarray as xr
 from saltus.analysis.attractors.aperiodic import SampledMotion
 from saltus.analysis.attractors.attractor_set import AttractorSet
 from saltus.analysis.attractors.attractors import attractors_dataset
-from saltus.analysis.attractors.followed import followed
-from saltus.analysis.attractors.limit_cycles import cycle_of
+from saltus.analysis.attractors.followed import cycle_on, followed
 from saltus.analysis.attractors.portrait import portraits
 from saltus.analysis.closed.capture import Neighbourhoods
 from saltus.analysis.closed.motions import ClosedMotion, orbit_distance, same
@@ -128,7 +127,7 @@ class Legend:
         """
         one = self._members[key] if key < len(self._members) else None
         if isinstance(one, SampledMotion) and one.kind == Kind.LIMIT_CYCLE.word:
-            return cycle_of(self.map, one)[0]
+            return cycle_on(self.map, one)
         if not isinstance(one, ClosedMotion) or self.map.system.forced_at is not None:
             return one if isinstance(one, ClosedMotion) else None
         still = np.where(np.abs(one.points) > _AT_ZERO * self.scale, one.points, 0.0)
