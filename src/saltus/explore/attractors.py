@@ -50,9 +50,17 @@ class Legend:
         Range of each state.
     before : Legend, optional
         Those of the values shown before.
+    branches : sequence of (ClosedMotion, int), optional
+        Orbits at these values that lie on branches with a hue.
     """
 
-    def __init__(self, map_: Stroboscope, scale: np.ndarray, before: Legend | None = None) -> None:
+    def __init__(
+        self,
+        map_: Stroboscope,
+        scale: np.ndarray,
+        before: Legend | None = None,
+        branches: Sequence[tuple[ClosedMotion, int]] = (),
+    ) -> None:
         self.map, self.scale = map_, scale
         self.found = AttractorSet(Neighbourhoods.none(len(map_.states)))
         self.scouts = 0  # starts that were looked through for them
@@ -63,6 +71,7 @@ class Legend:
         self._before = (
             [] if before is None else list(zip(before._members, before._hues, strict=True))
         )
+        self._before += branches
         self._old = None if before is None else before.found
         self._followed = False
 
