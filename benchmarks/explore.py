@@ -28,6 +28,8 @@ from saltus.explore.frames import unpacked
 BOX = {"x": [-5e-3, 5e-3], "v": [-1.0, 1.0]}
 ARGUMENTS = ("delangre", "case=b", "force=4 N", "frequency=15 Hz", "--no-browser")
 CLICKS = 100
+#: Time between two questions [s]: the server refuses more than 200 a second.
+PACE = 0.006
 TICK = os.sysconf("SC_CLK_TCK")
 
 
@@ -105,6 +107,7 @@ def clicks(page: Page, ask: str, fields: Callable[[int], dict[str, Any]]) -> str
     """Median and 95th percentile of the wall time of questions, and CPU time of each [ms]."""
     waits, begun, size = [], page.cpu(), 0
     for number in range(CLICKS):
+        time.sleep(PACE)
         start = time.perf_counter()
         for _, count in page.answers(page.ask(ask, **fields(number))):
             size = count
@@ -157,7 +160,8 @@ def main() -> None:
         slider = {"start": at[0], "errors": "local"}
         told = clicks(page, "motion", lambda i: slider | {"values": {"force": 3.5 + 0.01 * i}})
         print(f"slider, motion              {told}")
-        (settled,) = [head for head, _ in page.answers(page.ask("settle", start={"x": "1 mm", "v": 0}))]
+        begin = {"x": "1 mm", "v": 0}
+        (settled,) = [head for head, _ in page.answers(page.ask("settle", start=begin))]
         key = settled["attractor"]["key"]
         told = clicks(
             page, "track",
