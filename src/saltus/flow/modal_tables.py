@@ -150,8 +150,9 @@ class Tables:
         """The derivatives with respect to some parameters."""
         if names not in self._by:
             widths = self.groups, self.state_groups
-            known = self.sets, self.made, self._links
-            self._by[names] = ParameterTables(self.linear, names, *widths, *known)
+            self._by[names] = ParameterTables(
+                self.linear, names, *widths, self.sets, self.made, self._links
+            )
         return self._by[names]
 
     def arrays(self, names: tuple[str, ...] = ()) -> tuple[np.ndarray, ...]:
