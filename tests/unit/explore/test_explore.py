@@ -35,7 +35,7 @@ periods = 7
 axes.x = { first = "-5 mm", last = "5 mm", count = 16 }
 axes.v = { first = "-1 m/s", last = "1 m/s", count = 17 }
 [branches]
-vary.frequency = ["15 Hz", "15.05 Hz"]
+vary.frequency = ["15 Hz", "15.02 Hz"]
 start = { x = "1 mm", v = "0 m/s" }
 at = 1
 """
@@ -179,7 +179,7 @@ def test_a_study_opens_with_its_values_axes_and_start(opened, tmp_path):
     assert head["size"] == [16, 17]
     assert head["start"] == {"x": 1e-3, "v": 0.0}
     assert head["view"]["motion"] == {"periods": 7}
-    assert head["panels"]["response"]["range"] == [15.0, 15.05]
+    assert head["panels"]["response"]["range"] == [15.0, 15.02]
 
 
 def test_finished_results_are_there_at_once(tmp_path, monkeypatch):
@@ -190,7 +190,7 @@ def test_finished_results_are_there_at_once(tmp_path, monkeypatch):
     (out / "study.toml").write_text(STUDY)
     box = {"x": ("-5 mm", "5 mm", 16), "v": ("-1 m/s", "1 m/s", 17)}
     sl.save(sl.basins(RIG, **box), out / "basins.nc")
-    curves = sl.branches(RIG, {"frequency": (15.0, 15.05)}, {"x": 1e-3, "v": 0.0}, at=1)
+    curves = sl.branches(RIG, {"frequency": (15.0, 15.02)}, {"x": 1e-3, "v": 0.0}, at=1)
     sl.save(curves, out / "branches-of-periodic-orbits.nc")
     desk = studies.desk_of_results(out)
     monkeypatch.setattr(growing, "grow", None)  # nothing is computed
