@@ -43,6 +43,7 @@ from saltus.contact import lankarani_nikravesh as lankarani_nikravesh
 from saltus.contact import play as play
 from saltus.contact import slider as slider
 from saltus.errors import SaltusError as SaltusError
+from saltus.explore import explore as explore
 from saltus.flow import ODE23 as ODE23
 from saltus.flow import ODE45 as ODE45
 from saltus.flow import ODE113 as ODE113
