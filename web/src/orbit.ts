@@ -1,0 +1,56 @@
+/** The numbers of an orbit, and the legend of the map's attractors. */
+import { type About, type Attractor, plain, unitOf } from "./about";
+import { digits, spoken } from "./axes";
+import type { Head } from "./link";
+import { $, cells, element, notes } from "./words";
+
+const MOST_MULTIPLIERS = 6;
+
+/** A multiplier: `0.31 ± 0.2i` of a pair, its size behind it. */
+function multiplier([re, im]: [number, number]): string {
+  const size = Math.hypot(re, im);
+  return im ? `${digits(re, 3)} ± ${digits(Math.abs(im), 3)}i (size ${digits(size, 3)})` : digits(re, 3);
+}
+
+/** Orbit panel: kind, stability, multipliers, margins, peak. */
+export function showOrbit(about: About, head: Head, text: string): void {
+  const one: Partial<Attractor> & Head = { ...head, ...(head.attractor ?? {}) };
+  const rows: [string, string][] = [];
+  if (one.seconds ?? (head.kind !== "settle" ? head.period : null)) rows.push(["period", spoken((one.seconds ?? head.period) as number, "s", 5)]);
+  for (const [name, peak] of Object.entries(one.peak ?? {}).slice(0, 6)) if (peak !== null) rows.push([`peak of ${plain(name)}`, spoken(peak, unitOf(about, name))]);
+  const sorted = [...(one.multipliers ?? [])].filter(m => m[1] >= 0).sort((p, q) => Math.hypot(...q) - Math.hypot(...p));
+  sorted.slice(0, MOST_MULTIPLIERS).forEach((m, i) => rows.push([i ? "" : "multipliers", multiplier(m)]));
+  if (sorted.length > MOST_MULTIPLIERS) rows.push(["", `and ${sorted.length - MOST_MULTIPLIERS} smaller ones`]);
+  for (const [guard, margin] of Object.entries(one.margin ?? {})) {
+    if (margin === null) continue;
+    const quantity = about.guards.find(g => g.name === guard)?.quantity;
+    rows.push([`margin to ${plain(guard)}`, spoken(margin, quantity ? unitOf(about, quantity) : "", 3)]);
+  }
+  $("orbit-what").textContent = text;
+  $("orbit-numbers").replaceChildren(...rows.flatMap(([name, value]) => [element("dt", name), element("dd", value)]));
+  notes($("orbit-words"), head.words);
+}
+export function clearOrbit(text: string): void { $("orbit-what").textContent = text; $("orbit-numbers").replaceChildren(); notes($("orbit-words"), []); }
+
+/** Stability in a word, where it is known. */
+export const stability = (stable: boolean | null | undefined): string => (stable === true ? "stable" : stable === false ? "unstable" : "");
+
+/** The legend: a row each attractor, in the order of the desk; a row's button leaves the hue to it alone. */
+export function showLegend(about: About, attractors: Attractor[], codes: [string, number[], string][], chosen: number | null, choose: (key: number) => void): void {
+  const first = about.quantities[0], body = $("legend").querySelector("tbody")!, focused = document.activeElement?.getAttribute("data-key");
+  const rows = [...attractors].sort((a, b) => a.order - b.order).map(one => {
+    const row = cells("td", ["", first && one.peak[first.name] != null ? spoken(one.peak[first.name], first.unit, 3) : "", share(one), stability(one.stable)]), button = element("button");
+    button.type = "button"; button.dataset.key = String(one.key); button.setAttribute("aria-pressed", String(chosen === one.key)); button.title = "show this orbit, the others grey";
+    button.append(swatch(about.hues[one.hue % about.hues.length]), one.name); button.onclick = () => choose(one.key); row.cells[0].append(button);
+    return row;
+  });
+  for (const [name, colour, text] of codes) { const row = cells("td", ["", "", text, ""]), box = element("span"); box.append(swatch(colour), ` ${name}`); row.cells[0].append(box); rows.push(row); }
+  body.replaceChildren(...rows);
+  if (focused) body.querySelector<HTMLElement>(`[data-key="${CSS.escape(focused)}"]`)?.focus();
+}
+function swatch(rgb: number[]): HTMLElement { const box = element("span", "", "swatch"); box.style.background = `rgb(${rgb})`; return box; }
+function share(one: Attractor): string {
+  if (one.fraction === null || one.fraction === undefined) return "";
+  const percent = (v: number) => digits(100 * v, 3);
+  return `${percent(one.fraction)} %${one.low != null && one.high != null ? ` (${percent(one.low)} to ${percent(one.high)})` : ""}`;
+}
