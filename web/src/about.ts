@@ -11,7 +11,7 @@ export interface Parameter {
 export interface About extends Head {
   system: { name: string; description: string; text: string; source?: string } | null;
   forced: boolean; forced_at: string | null; method: string; methods: string[];
-  quantities: Quantity[]; parameters: Parameter[]; guards: { name: string; quantity: string | null }[];
+  quantities: Quantity[]; parameters: Parameter[]; guards: { name: string; quantity: string | null; unit: string }[]; turn: number;
   axes: Record<string, Range>; at: Record<string, number>; size: [number, number]; choices: string[];
   panels: { history: string[]; phase: string[]; response: { parameter: string; range: Range; quantity: string } | null };
   start: Record<string, number> | null; view: Record<string, any>; results: { name: string; kind: string; words: string }[];
@@ -20,7 +20,7 @@ export interface About extends Head {
 }
 export interface Attractor {
   key: number; hue: number; period: number; name: string; kind: string; peak: Record<string, number>; seconds: number | null;
-  multipliers: [number, number][]; stable: boolean | null; margin: Record<string, number>; points: number[][];
+  multipliers: [number, number][]; stable: boolean | null; margin: number | null; eigenvalues?: boolean; contacts?: number | null; exponent?: number | null; rms?: Record<string, number>; points: number[][];
   fraction: number | null; low: number | null; high: number | null; order: number;
 }
 

@@ -1,5 +1,5 @@
 /** The table of contacts: rows are made as they are scrolled to. */
-import { type About, plain, unitOf } from "./about";
+import { type About, plain } from "./about";
 import { axisText, digits, scaleOf } from "./axes";
 import type { Motion } from "./motion";
 import { $, cells } from "./words";
@@ -23,10 +23,6 @@ export class Contacts {
     for (const other of this.body.querySelectorAll(".chosen")) other.classList.remove("chosen");
     row.classList.add("chosen"); this.choose(row.sectionRowIndex);
   }
-  private speedUnit(guard: string): string {
-    const quantity = this.about.guards.find(g => g.name === guard)?.quantity, unit = quantity ? unitOf(this.about, quantity) : "";
-    return unit ? `${unit}/s` : "";
-  }
   show(motion: Motion): void {
     this.motion = motion; this.made = 0; this.body.replaceChildren(); this.scroll.scrollTop = 0;
     const columns = $("contacts").querySelectorAll("th");
@@ -34,7 +30,7 @@ export class Contacts {
     this.more();
   }
   private scale(): { factor: number; unit: string } {
-    const speeds = this.motion!.arrays.contact_velocity, units = new Set(this.about.guards.map(g => this.speedUnit(g.name)));
+    const speeds = this.motion!.arrays.contact_velocity, units = new Set(this.about.guards.map(g => (g.unit ? `${g.unit}/s` : "")));
     let most = 0; for (let i = 0; i < (speeds?.length ?? 0); i++) most = Math.max(most, Math.abs(speeds[i]));
     return units.size === 1 ? scaleOf([...units][0], most) : { factor: 1, unit: "" };
   }
@@ -43,7 +39,7 @@ export class Contacts {
     const from = (motion.head.contacts_from ?? 0) + 1, { factor } = this.scale(), rows: HTMLElement[] = [];
     for (let i = this.made; i < to; i++) {
       const guard = this.about.guards[motion.arrays.contact_guard[i]]?.name ?? "";
-      const texts = [String(i + from), time[i].toFixed(7), error ? digits(error[i], 2) : "", `${plain(guard)}${direction ? (direction[i] > 0 ? " ↑" : " ↓") : ""}`, speed ? digits(speed[i] * factor, 4) : ""];
+      const texts = [String(i + from), time[i].toFixed(7), error ? digits(error[i], 2) : "", `${plain(guard)}${direction ? (direction[i] > 0 ? " ↑" : " ↓") : ""}`, speed ? (speed[i] * factor).toPrecision(4).replace("-", "−") : ""];
       if (motion.period) texts.push((time[i] / motion.period).toFixed(3));
       rows.push(cells("td", texts));
     }

@@ -15,7 +15,8 @@ import { type Box, firstView, fromAddress, toAddress, Undo, type View } from "./
 import { Values } from "./values";
 import { $, differing, marked, notes, options, type Says, type Status } from "./words";
 
-interface Change { drag?: boolean; past?: boolean; still?: string[] }
+/** drag: the finger is down; past: from the list of undo; shown: the motion and the curves are of it already. */
+interface Change { drag?: boolean; past?: boolean; shown?: boolean }
 /** Milliseconds: rest before a start is settled, before a map of another view, between coarse maps of a drag, before a view is kept for undo. */
 const SETTLE = 300, REST = 150, COARSE = 250, KEEP = 400;
 const SIZES = [50, 100, 160, 250, 400, 700, 1000], ALL_POINTS = 1000;
@@ -51,24 +52,29 @@ export class Explorer {
 
   // -- what is looked at ------------------------------------------------------------------------------------------------------
   /** Look at something else: ask what it needs, and keep it for undo once it rests. */
-  go(change: Partial<View>, { drag = false, past = false, still = [] }: Change = {}): void {
+  go(change: Partial<View>, { drag = false, past = false, shown = false }: Change = {}): void {
     const before = this.view, next = (this.view = { ...before, ...structuredClone(change) });
-    const other = (...keys: (keyof View)[]) => keys.some(k => !still.includes(k) && JSON.stringify(before[k]) !== JSON.stringify(next[k])), released = this.dragging && !drag;
+    const other = (...keys: (keyof View)[]) => keys.some(k => JSON.stringify(before[k]) !== JSON.stringify(next[k])), released = this.dragging && !drag;
     this.dragging = drag;
     if (past && other("axes")) this.whole = this.wholeOf(next.axes);
     this.show();
     const values = other("values");
-    if (values && next.orbit && !past && !other("orbit")) this.track(); else if (other("values", "start", "periods", "method", "against", "orbit", "history", "phase") || released) this.askMotion();
-    if (values && !next.orbit) this.track();
-    if (!next.orbit && (other("values", "start", "method") || released)) this.later("settle", SETTLE, () => this.settleNow(), drag);
+    if (!shown) this.askMotions(values, other("values", "start", "periods", "method", "against", "orbit", "history", "phase") || released, other("start", "method") || released, past || other("orbit"));
     const others = states(this.about).some(name => !next.axes.includes(name) && before.start[name] !== next.start[name]);
     if (values && drag) this.askCoarse();
     else if (values || other("method", "size", "axes") || others) this.askMap();
     else if (other("box")) { this.pickSheet(); this.later("map", REST, () => this.askMap()); } else if (released) this.askMap();
     const apart = Object.keys(next.values).some(name => name !== next.over && next.values[name] !== before.values[name]);
-    if (drag) { if (apart) this.askedValues = ""; } else if (apart || other("over", "range", "quantity") || released) this.askResponses();
+    if (!drag && !shown && (apart || other("over", "range", "quantity") || released)) this.askResponses();
     if (!past) this.later("keep", KEEP, () => this.keep(), drag);
     else this.kept = toAddress(next, this.first);
+  }
+  private askMotions(values: boolean, motion: boolean, start: boolean, orbit: boolean): void {
+    if (values && this.view.orbit && !orbit) return this.track();
+    if (motion) this.askMotion();
+    if (this.view.orbit) return;
+    if (values) this.track();
+    if (values || start) this.later("settle", SETTLE, () => this.settleNow(), this.dragging);
   }
   private later(name: string, wait: number, what: () => void, hold = false): void { clearTimeout(this.timers[name]); if (!hold) this.timers[name] = window.setTimeout(what, wait); }
   private keep(): void {
@@ -168,7 +174,7 @@ export class Explorer {
   }
   private orbitOf(choice: { point?: number; event?: number }): void { const key = this.responses.head?.key; if (key !== undefined) this.go({ orbit: { responses: key, ...choice } }); }
   private attractor(key: number): void { this.go({ orbit: this.view.orbit?.attractor === key ? null : { attractor: key } }); }
-  leaveOrbit(): void { this.go({ orbit: null }); }
+  leaveOrbit(): void { this.go({ orbit: null }); this.status.say("the motion from the start"); }
   stop(): void { for (const name of ["map", "settle"]) clearTimeout(this.timers[name]); this.link.tell("stop"); this.askedValues = ""; this.status.say("stopped"); }
   back(): void { this.undo.undo(); }
   forth(): void { this.undo.redo(); }
@@ -235,8 +241,9 @@ export class Explorer {
     const { key } = this.typed!, group = key.startsWith("values.") ? "values" : "start";
     this.typed = null;
     if (head.kind !== "motion") { this.values.refuse(key, String(head.why ?? "")); return; }
-    this.values.accept(key); this.go({ [group]: { ...this.view[group], ...head[group] }, ...(group === "start" ? { orbit: null } : {}) });
+    this.values.accept(key); this.go({ [group]: group === "values" ? this.known(head.values) : { ...this.view.start, ...head.start }, ...(group === "start" ? { orbit: null } : {}) });
   }
+  private known(values: Record<string, number>): Record<string, number> { return Object.fromEntries(this.about.parameters.map(p => [p.name, values[p.name] ?? this.view.values[p.name]])); }
   private refused(head: Head): void {
     const why = String(head.why), field: string = head.field ?? "";
     if (head.ask === "save" && this.save.shown) return this.save.refuse(why);
@@ -254,15 +261,14 @@ export class Explorer {
   private motionText(): string {
     const head = this.motion?.head, n = this.about.forced ? "periods" : "turns";
     if (!head) return "";
-    if (this.motion!.orbit) return `${head.name ?? "orbit"}${stability(head.stable) ? `, ${stability(head.stable)}` : ""}, repeated: nothing is integrated on`;
+    if (this.motion!.orbit) return `${head.name ?? "orbit"}${stability(head.stable) ? `, ${stability(head.stable)}` : ""}, ${head.repeats === false ? "some periods of it" : "repeated: nothing is integrated on"}`;
     const from = Object.entries(head.start as Record<string, number>).slice(0, 3).map(([name, v]) => `${plain(name)} = ${spoken(v, unitOf(this.about, name))}`).join(", ");
     const parts = [`from ${from}`, `${head.periods} ${n}`, `${head.contacts} ${head.contacts === 1 ? "contact" : "contacts"}`];
     if (this.settled && !this.dragging) parts.push(this.settledText(this.settled));
     return parts.join(" · ") + (head.against ? `. ${head.against.words}` : "");
   }
   private settledText(head: Head): string {
-    if (!head.attractor) return this.about.codes[String(head.code)] ?? "not settled";
-    return `settles to ${head.attractor.name}${this.about.forced && head.periods != null ? ` after ${head.periods} periods` : ""}`;
+    return head.words?.[0] ?? (head.attractor ? `settles to ${head.attractor.name}` : this.about.codes[String(head.code)] ?? "not settled");
   }
   private heardSettle(head: Head, arrays: Arrays): void {
     if (this.view.orbit) return;
@@ -286,12 +292,12 @@ export class Explorer {
     if (!this.view.orbit) return;
     this.orbit = head; this.settled = null; this.phase.over(null);
     showOrbit(this.about, head, `${head.name ?? "orbit"}${stability(head.stable) ? `, ${stability(head.stable)}` : ""}`); this.showMotion(head, arrays);
-    if (question.responses !== undefined) this.go({ values: { ...this.view.values, ...head.values }, start: { ...this.view.start, ...head.start } }, { still: ["values-motion"] });
+    if (question.responses !== undefined) this.go({ values: this.known(head.values), start: { ...this.view.start, ...head.start } }, { shown: true });
     this.status.say($("motion-what").textContent!);
   }
   private heardResponses(head: Head, arrays: Arrays): void {
     this.responses.show(head, arrays); notes($("responses-words"), head.words);
-    if (JSON.stringify(head.range) !== JSON.stringify(this.view.range) || head.quantity !== this.view.quantity) this.go({ range: head.range, quantity: head.quantity }, { still: ["range", "quantity"] });
+    if (JSON.stringify(head.range) !== JSON.stringify(this.view.range) || head.quantity !== this.view.quantity) this.go({ range: head.range, quantity: head.quantity }, { shown: true });
     $("responses-under").textContent = head.done === false ? `followed to ${Math.round(100 * (head.share ?? 0))} %` : "click a point: that orbit. Solid: stable; dashed: unstable";
     if ($("responses-table").getAttribute("aria-pressed") === "true") this.responses.table($("points").querySelector("thead")!, $("points").querySelector("tbody")!, ALL_POINTS);
     this.marks();

@@ -4,7 +4,7 @@ import { axisText, colours, digits, fitted, frame, onResize, type Plot, place, t
 import type { Motion } from "./motion";
 
 /** Contacts on the screen above which each is a small square. */
-const MANY = 300;
+const MANY = 150;
 type Line = ArrayLike<number>;
 
 export class History {
@@ -45,17 +45,18 @@ export class History {
     const c = fitted(this.canvas), motion = this.motion;
     if (!motion) return;
     const { ink, quiet, contact, second, accent } = colours(), rx = this.span(), ry = this.held ?? this.range, scale = scaleFor(unitOf(this.about, this.of), ry), shown: Range = [ry[0] * scale.factor, ry[1] * scale.factor];
-    const p = (this.plot = place(this.canvas, rx, ry)), right = p.left + p.width;
-    frame(c, place(this.canvas, rx, shown), rx, shown, ["time [s]", axisText(plain(this.of), scale.unit)]);
-    c.save(); c.beginPath(); c.rect(p.left, p.top, p.width, p.height); c.clip();
-    const gaps = this.gaps(), lowest = Math.min(...gaps.map(g => g.value));
-    c.strokeStyle = c.fillStyle = quiet; c.textAlign = "right"; c.font = "11px system-ui, sans-serif";
-    for (const gap of gaps) {
-      const y = Math.round(p.Y(gap.value)) + 0.5, under = gap.value === lowest && gaps.length > 1;
-      c.setLineDash([6, 5]); c.beginPath(); c.moveTo(p.left, y); c.lineTo(right, y); c.stroke();
-      c.textBaseline = under ? "top" : "bottom"; c.fillText(plain(gap.guard), right - 4, y + (under ? 3 : -2));
+    const gaps = this.gaps(), names = gaps.map(g => plain(g.guard)), small = "11px system-ui, sans-serif"; c.font = small;
+    const margin = { left: 58, right: 12 + Math.max(0, ...names.map(name => c.measureText(name).width)), top: 10, bottom: 40 }, p = (this.plot = place(this.canvas, rx, ry, margin)), right = p.left + p.width;
+    frame(c, place(this.canvas, rx, shown, margin), rx, shown, ["time [s]", axisText(plain(this.of), scale.unit)]);
+    c.strokeStyle = c.fillStyle = quiet; c.textAlign = "left"; c.textBaseline = "middle"; c.font = small; c.setLineDash([6, 5]);
+    let above = -Infinity;
+    for (const [gap, name] of gaps.map((g, i) => [g, names[i]] as const).sort((a, b) => b[0].value - a[0].value)) {
+      const y = Math.round(p.Y(gap.value)) + 0.5;
+      if (y < p.top || y > p.top + p.height) continue;
+      above = Math.max(y, above + 12); c.fillText(name, right + 5, above);
+      c.beginPath(); c.moveTo(p.left, y); c.lineTo(right, y); c.stroke();
     }
-    c.setLineDash([]);
+    c.setLineDash([]); c.save(); c.beginPath(); c.rect(p.left, p.top, p.width, p.height); c.clip();
     const [t, y] = this.line(); trace(c, p, t, y, rx, ink, 1.1);
     for (const other of this.other()) { c.setLineDash([7, 4]); trace(c, p, motion.time, other, rx, second, 1.4); c.setLineDash([]); }
     this.contacts(c, p, rx, contact);
@@ -70,7 +71,7 @@ export class History {
     for (let i = 0; i < times.length; i++) {
       if (times[i] < from || times[i] > to) continue;
       const x = p.X(times[i]), y = p.Y(values[i]);
-      if (inside > MANY) c.fillRect(x - 1.3, y - 1.3, 2.6, 2.6);
+      if (inside > MANY) c.fillRect(x - 1, y - 1, 2, 2);
       else { c.beginPath(); c.arc(x, y, 2.6, 0, 7); if (guards[i] % 2) c.fill(); else c.stroke(); }       // rings and dots: boundaries without colour
       if (i === this.chosen) { c.beginPath(); c.arc(x, y, 8, 0, 7); c.stroke(); }
     }
@@ -102,7 +103,7 @@ export class History {
     at.addEventListener("pointerup", () => { this.grip = null; });
     at.addEventListener("pointerleave", () => { this.cursor = null; this.said(""); this.draw(); });
     at.addEventListener("dblclick", () => { this.seen = null; this.draw(); });
-    at.addEventListener("wheel", e => { if (!this.motion) return; e.preventDefault(); this.zoom(Math.exp(0.002 * e.deltaY), this.at(e.offsetX)); }, { passive: false });
+    at.addEventListener("wheel", e => { if (!this.motion || document.activeElement !== at && !e.ctrlKey) return; e.preventDefault(); this.zoom(Math.exp(0.002 * e.deltaY), this.at(e.offsetX)); }, { passive: false });
     at.addEventListener("keydown", e => {
       if (!this.motion || e.ctrlKey || e.metaKey || e.altKey) return;
       const [a, b] = this.span(), by = (b - a) / 10;

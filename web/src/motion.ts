@@ -12,8 +12,8 @@ export interface Motion {
 }
 
 export function motionOf(head: Head, arrays: Arrays): Motion {
-  const orbit = head.kind !== "motion", count: number = head.count, times = orbit ? REPEATS : 1, span = (count - 1) * head.dt;
-  const total = orbit && count > 1 ? (count - 1) * times + 1 : count, time = new Float64Array(total);
+  const orbit = head.kind !== "motion", count: number = head.count, times = orbit && head.repeats !== false ? REPEATS : 1, span = (count - 1) * head.dt;
+  const total = times > 1 && count > 1 ? (count - 1) * times + 1 : count, time = new Float64Array(total);
   for (let i = 0; i < total; i++) time[i] = head.t0 + i * head.dt;
   const known = new Map<string, Numbers>(), each = Math.max(count - 1, 1);
   const sample = (name: string): Numbers => {

@@ -6,29 +6,26 @@ import { $, cells, element, notes } from "./words";
 
 const MOST_MULTIPLIERS = 6;
 
-/** A multiplier: `0.31 ± 0.2i` of a pair, its size behind it. */
-function multiplier([re, im]: [number, number]): string {
-  const size = Math.hypot(re, im);
-  return im ? `${digits(re, 3)} ± ${digits(Math.abs(im), 3)}i (size ${digits(size, 3)})` : digits(re, 3);
-}
+/** A multiplier: `0.31 ± 0.2i` of a pair. */
+const multiplier = ([re, im]: [number, number]): string => (im ? `${digits(re, 3)} ± ${digits(Math.abs(im), 3)}i` : digits(re, 3));
 
 /** Orbit panel: kind, stability, multipliers, margins, peak. */
 export function showOrbit(about: About, head: Head, text: string): void {
   const one: Partial<Attractor> & Head = { ...head, ...(head.attractor ?? {}) };
   const rows: [string, string][] = [];
-  if (one.seconds ?? (head.kind !== "settle" ? head.period : null)) rows.push(["period", spoken((one.seconds ?? head.period) as number, "s", 5)]);
+  if (one.seconds) rows.push(["period", spoken(one.seconds, "s", 5)]);
   for (const [name, peak] of Object.entries(one.peak ?? {}).slice(0, 6)) if (peak !== null) rows.push([`peak of ${plain(name)}`, spoken(peak, unitOf(about, name))]);
   const sorted = [...(one.multipliers ?? [])].filter(m => m[1] >= 0).sort((p, q) => Math.hypot(...q) - Math.hypot(...p));
-  sorted.slice(0, MOST_MULTIPLIERS).forEach((m, i) => rows.push([i ? "" : "multipliers", multiplier(m)]));
+  sorted.slice(0, MOST_MULTIPLIERS).forEach((m, i) => rows.push([i ? "" : one.eigenvalues ? "eigenvalues [1/s]" : "multipliers", multiplier(m)]));
+  if (sorted.length && !one.eigenvalues) rows.push(["largest size", digits(Math.hypot(...sorted[0]), 4)]);
   if (sorted.length > MOST_MULTIPLIERS) rows.push(["", `and ${sorted.length - MOST_MULTIPLIERS} smaller ones`]);
-  for (const [guard, margin] of Object.entries(one.margin ?? {})) {
-    if (margin === null) continue;
-    const quantity = about.guards.find(g => g.name === guard)?.quantity;
-    rows.push([`margin to ${plain(guard)}`, spoken(margin, quantity ? unitOf(about, quantity) : "", 3)]);
-  }
+  const units = new Set(about.guards.map(g => g.unit));
+  if (typeof one.margin === "number") rows.push(["nearest boundary", spoken(one.margin, units.size === 1 ? [...units][0] : "", 3)]);
+  if (typeof one.contacts === "number") rows.push([about.forced ? "contacts in a period" : "contacts", digits(one.contacts, 4)]);
+  if (typeof one.exponent === "number" && !sorted.length) rows.push(["Lyapunov exponent", spoken(one.exponent, "1/s", 3)]);
   $("orbit-what").textContent = text;
   $("orbit-numbers").replaceChildren(...rows.flatMap(([name, value]) => [element("dt", name), element("dd", value)]));
-  notes($("orbit-words"), head.words);
+  notes($("orbit-words"), head.kind === "settle" ? [] : head.words);
 }
 export function clearOrbit(text: string): void { $("orbit-what").textContent = text; $("orbit-numbers").replaceChildren(); notes($("orbit-words"), []); }
 

@@ -6,13 +6,19 @@ import { cells } from "./words";
 
 export interface ResponseEvents { orbit(choice: { point?: number; event?: number }): void; hover(text: string): void }
 const REACH = 22, EVENT_REACH = 12;
+/** Events above which their marks are smaller. */
+const MANY = 25;
 
 export class Responses {
   head: Head | null = null; chosen = -1; now = NaN;
-  private a: Arrays = {}; private plot: Plot | null = null;
+  private a: Arrays = {}; private plot: Plot | null = null; private seen: [Range, Range] | null = null; private whole: [Range, Range] = [[0, 1], [0, 1]];
   constructor(private canvas: HTMLCanvasElement, private about: About, private events: ResponseEvents) { onResize(canvas, () => this.draw()); this.listen(); }
 
-  show(head: Head, arrays: Arrays): void { if (this.head?.key !== head.key || this.chosen >= (arrays.point_peak?.length ?? 0)) this.chosen = -1; this.head = head; this.a = arrays; this.draw(); }
+  show(head: Head, arrays: Arrays): void {
+    if (this.head?.key !== head.key || this.chosen >= (arrays.point_peak?.length ?? 0)) this.chosen = -1;
+    if (this.head?.parameter !== head.parameter || this.head?.quantity !== head.quantity || String(this.head?.range) !== String(head.range)) this.seen = null;
+    this.head = head; this.a = arrays; this.draw();
+  }
 
   private get x(): Numbers { return this.a.point_parameter; }
   private get y(): Numbers { return this.a.point_peak; }
@@ -22,7 +28,9 @@ export class Responses {
     if (!head) return;
     const { ink, quiet, accent, panel } = colours(), { point_stable: stable, point_branch: branch, point_hue: hue } = this.a, x = this.x, y = this.y, n = x?.length ?? 0;
     const ux = parameterOf(this.about, head.parameter)?.unit ?? "", uy = unitOf(this.about, head.quantity), [low, high] = head.range as Range;
-    const pad = 0.02 * (high - low), rx: Range = [low - pad, high + pad], own = n ? reach([y]) : ([0, 1] as Range), ry: Range = own[0] > 0 && own[0] < 0.5 * own[1] ? [0, own[1]] : own;
+    const pad = 0.02 * (high - low), own = n ? reach([y]) : ([0, 1] as Range);
+    this.whole = [[low - pad, high + pad], own[0] > 0 && own[0] < 0.5 * own[1] ? [0, own[1]] : own];
+    const [rx, ry] = this.seen ?? this.whole;
     const sx = scaleFor(ux, rx), sy = scaleFor(uy, ry), p = (this.plot = place(this.canvas, rx, ry));
     const fx: Range = [rx[0] * sx.factor, rx[1] * sx.factor], fy: Range = [ry[0] * sy.factor, ry[1] * sy.factor];
     frame(c, place(this.canvas, fx, fy), fx, fy, [axisText(plain(head.parameter), sx.unit), axisText(`peak of ${plain(head.quantity)}`, sy.unit)]);
@@ -39,7 +47,8 @@ export class Responses {
       if (branch[i] === branch[i - 1] || branch[i] === branch[i + 1]) continue;
       c.fillStyle = ink; c.beginPath(); c.arc(p.X(x[i]), p.Y(y[i]), 2.5, 0, 7); c.fill();
     }
-    (head.events as string[]).forEach((kind, i) => { mark(c, kind, p.X(this.a.event_parameter[i]), p.Y(this.a.event_peak[i]), ink, panel); });
+    const size = head.events.length > MANY && !this.seen ? 0.65 : 1;
+    (head.events as string[]).forEach((kind, i) => { mark(c, kind, p.X(this.a.event_parameter[i]), p.Y(this.a.event_peak[i]), size, ink, panel); });
     if (this.chosen >= 0) { c.strokeStyle = accent; c.lineWidth = 2.4; c.beginPath(); c.arc(p.X(x[this.chosen]), p.Y(y[this.chosen]), 7, 0, 7); c.stroke(); }
     if (!n) { c.fillStyle = quiet; c.textAlign = "center"; c.fillText(head.done === false ? "the branches are being followed" : "no branch was found in this range", p.left + p.width / 2, p.top + p.height / 2); }
     c.restore();
@@ -69,11 +78,26 @@ export class Responses {
     this.chosen = choice.event !== undefined ? this.a.event_point[choice.event] : choice.point!; this.draw(); this.events.hover(this.text(choice));
     if (ask) this.events.orbit(choice);
   }
+  private zoom(factor: number, px: number, py: number): void {
+    const p = this.plot!, [rx, ry] = this.seen ?? this.whole, x = rx[0] + (rx[1] - rx[0]) * (px - p.left) / p.width, y = ry[1] - (ry[1] - ry[0]) * (py - p.top) / p.height;
+    const near = ([a, b]: Range, v: number): Range => [v + (a - v) * factor, v + (b - v) * factor], next: [Range, Range] = [near(rx, x), near(ry, y)];
+    this.seen = next[0][1] - next[0][0] >= this.whole[0][1] - this.whole[0][0] ? null : next; this.draw();
+  }
   private listen(): void {
-    const at = this.canvas; let event = -1;
-    at.addEventListener("pointermove", e => { const near = this.nearest(e.offsetX, e.offsetY); this.events.hover(near ? this.text(near) : ""); });
+    const at = this.canvas; let event = -1, grip: { x: number; y: number; seen: [Range, Range] } | null = null, moved = 0;
+    at.addEventListener("pointerdown", e => { if (e.button || !this.plot) return; grip = { x: e.offsetX, y: e.offsetY, seen: this.seen ?? this.whole }; moved = 0; at.setPointerCapture(e.pointerId); });
+    at.addEventListener("pointerup", () => { grip = null; });
+    at.addEventListener("wheel", e => { if (!this.plot || document.activeElement !== at && !e.ctrlKey) return; e.preventDefault(); this.zoom(Math.exp(0.002 * e.deltaY), e.offsetX, e.offsetY); }, { passive: false });
+    at.addEventListener("dblclick", () => { this.seen = null; this.draw(); });
+    at.addEventListener("pointermove", e => {
+      if (grip) {
+        const { seen: [rx, ry] } = grip, dx = (grip.x - e.offsetX) / this.plot!.width * (rx[1] - rx[0]), dy = (e.offsetY - grip.y) / this.plot!.height * (ry[1] - ry[0]);
+        moved = Math.max(moved, Math.hypot(grip.x - e.offsetX, grip.y - e.offsetY));
+        if (moved > 4) { this.seen = [[rx[0] + dx, rx[1] + dx], [ry[0] + dy, ry[1] + dy]]; this.draw(); return; }
+      }
+      const near = this.nearest(e.offsetX, e.offsetY); this.events.hover(near ? this.text(near) : ""); });
     at.addEventListener("pointerleave", () => this.events.hover(""));
-    at.addEventListener("click", e => { const near = this.nearest(e.offsetX, e.offsetY); if (near) this.choose(near, true); });
+    at.addEventListener("click", e => { const near = moved > 4 ? null : this.nearest(e.offsetX, e.offsetY); if (near) this.choose(near, true); });
     at.addEventListener("keydown", e => {
       const n = this.x?.length ?? 0, branch = this.a.point_branch, i = Math.max(this.chosen, 0);
       if (!n || e.ctrlKey || e.metaKey || e.altKey) return;
@@ -83,6 +107,8 @@ export class Responses {
         const starts = Array.from({ length: n }, (_, k) => k).filter(k => branch[k] !== branch[k - 1]), own = starts.filter(k => k <= i).length - 1;
         this.choose({ point: starts[(own + (e.key === "]" ? 1 : starts.length - 1)) % starts.length] }, false);
       } else if (e.key === "e") { const count = this.head!.events.length; if (count) { event = (event + 1) % count; this.choose({ event }, false); } }
+      else if (e.key === "+" || e.key === "=" || e.key === "-") { const p = this.plot!, about = this.chosen < 0 ? [p.left + p.width / 2, p.top + p.height / 2] : [p.X(this.x[i]), p.Y(this.y[i])]; this.zoom(e.key === "-" ? 1 / 0.7 : 0.7, about[0], about[1]); }
+      else if (e.key === "0") { this.seen = null; this.draw(); }
       else if (e.key === "Enter") this.choose({ point: i }, true);
       else return;
       e.preventDefault();
@@ -106,12 +132,12 @@ export class Responses {
 }
 
 /** An event by its shape: a fold is a triangle, a doubling a diamond, a graze a triangle upwards, all else a square. */
-function mark(c: CanvasRenderingContext2D, kind: string, x: number, y: number, fill: string, edge: string): void {
+function mark(c: CanvasRenderingContext2D, kind: string, x: number, y: number, size: number, fill: string, edge: string): void {
   const shapes: [RegExp, [number, number][]][] = [
     [/fold/, [[-4, -5], [6, 0], [-4, 5]]], [/doubling/, [[0, -6], [6, 0], [0, 6], [-6, 0]]], [/graz/, [[-5, 4], [0, -6], [5, 4]]],
     [/branch point/, [[-5, -3], [-3, -5], [0, -2], [3, -5], [5, -3], [2, 0], [5, 3], [3, 5], [0, 2], [-3, 5], [-5, 3], [-2, 0]]],
     [/corner|two contacts/, [[-5, -4], [0, 6], [5, -4]]], [/Neimark|Hopf/, [[-3, -5], [3, -5], [6, 0], [3, 5], [-3, 5], [-6, 0]]],
   ];
   const shape = shapes.find(([pattern]) => pattern.test(kind.replaceAll("_", " ")))?.[1] ?? [[-4, -4], [4, -4], [4, 4], [-4, 4]];
-  c.beginPath(); for (const [u, v] of shape) c.lineTo(x + u, y + v); c.closePath(); c.fillStyle = fill; c.fill(); c.strokeStyle = edge; c.lineWidth = 1; c.stroke();
+  c.beginPath(); for (const [u, v] of shape) c.lineTo(x + size * u, y + size * v); c.closePath(); c.fillStyle = fill; c.fill(); c.strokeStyle = edge; c.lineWidth = 1; c.stroke();
 }

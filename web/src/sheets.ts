@@ -3,11 +3,12 @@ import type { About, Attractor } from "./about";
 import type { Arrays } from "./link";
 import type { Box } from "./state";
 
-const SHADES = 5, GREY = [150, 156, 162];
+/** A label and its age make a place in the table of colours: so many ages a label. */
+const AGES = 16, GREY = [150, 156, 162];
 /** Cells of all sheets that are kept: some 45 MB. */
 const MOST_CELLS = 4_000_000;
-/** Periods to settle become a shade: a step for each factor of four. `age` is log2 of the periods, rounded up. */
-const shadeOf = (age: number): number => (age === 255 ? 2 : Math.min(SHADES - 1, age >> 1));
+/** `age` is log2 of the periods to settle, rounded up; 255 where it isn't known. */
+const shadeOf = (age: number): number => Math.min(AGES - 1, age);
 
 export interface Place { cell: [number, number]; at: [number, number]; label: number; age: number; stride: number }
 
@@ -53,7 +54,7 @@ export class Sheet {
       let covered = true;
       for (let j = 0; j < m; j++) for (let i = 0, to = (m - 1 - j) * n; i < n; i++, to++) {
         const at = i * m + j;
-        if (rank[at]) pixels[to] = table[(label[at] & 255) * SHADES + shadeOf(age[at])]; else { pixels[to] = 0; covered = false; }
+        if (rank[at]) pixels[to] = table[(label[at] & 255) * AGES + shadeOf(age[at])]; else { pixels[to] = 0; covered = false; }
       }
       this.canvas.getContext("2d")!.putImageData(this.image, 0, 0); this.covered = covered; this.dirty = false;
     }
@@ -65,16 +66,16 @@ export class Sheet {
 
 /** Colours of labels: a table of words, one for each label and shade. `only` leaves the hue to one attractor. */
 export function colourTable(about: About, attractors: Attractor[], only: number | null): Uint32Array {
-  const table = new Uint32Array(256 * SHADES), word = ([r, g, b]: number[]) => (0xff000000 | (b << 16) | (g << 8) | r) >>> 0;
+  const table = new Uint32Array(256 * AGES), word = ([r, g, b]: number[]) => (0xff000000 | (b << 16) | (g << 8) | r) >>> 0;
   table.fill(word(GREY));
-  for (const [code, rgb] of Object.entries(about.code_colors)) for (let s = 0; s < SHADES; s++) table[(+code & 255) * SHADES + s] = word(rgb);
+  for (const [code, rgb] of Object.entries(about.code_colors)) for (let s = 0; s < AGES; s++) table[(+code & 255) * AGES + s] = word(rgb);
   for (const one of attractors) {
     const shades = about.hue_shades[one.hue % about.hue_shades.length];
-    for (let s = 0; s < SHADES; s++) {
-      const rgb = shades[s];
-      if (only === null || only === one.key) { table[(one.key & 255) * SHADES + s] = word(rgb); continue; }
+    for (let s = 0; s < AGES; s++) {
+      const rgb = shades[s === AGES - 1 ? shades.length >> 1 : Math.min(s, shades.length - 1)];
+      if (only === null || only === one.key) { table[(one.key & 255) * AGES + s] = word(rgb); continue; }
       const grey = Math.round(0.6 * (0.3 * rgb[0] + 0.6 * rgb[1] + 0.1 * rgb[2]) + 0.4 * 214);
-      table[(one.key & 255) * SHADES + s] = word([grey, grey, grey]);
+      table[(one.key & 255) * AGES + s] = word([grey, grey, grey]);
     }
   }
   return table;

@@ -58,7 +58,7 @@ export class Values {
   show(values: Record<string, number>, start: Record<string, number>): void {
     for (const [key, { text, range, parameter }] of this.fields) {
       const [group, name] = [key.slice(0, key.indexOf(".")), key.slice(key.indexOf(".") + 1)], value = (group === "values" ? values : start)[name], shown = this.own[key];
-      const spoken = `${digits(value * shown.factor, 6)} ${pretty(shown.unit)}`.trim();
+      const spoken = `${digits(value * shown.factor, range ? 6 : 5)} ${pretty(shown.unit)}`.trim();
       if (document.activeElement !== text) text.value = spoken;
       if (!range || !parameter) continue;
       const p = parameter, u = p.scale === "log" ? Math.log(value / p.low) / Math.log(p.high / p.low) : (value - p.low) / (p.high - p.low);
