@@ -11,6 +11,7 @@ from saltus.analysis.branches.backbone import backbone as backbone
 from saltus.analysis.branches.bifurcation_curve import bifurcation_curve as bifurcation_curve
 from saltus.analysis.branches.branches import branches as branches
 from saltus.analysis.closed.equilibria import equilibria as equilibria
+from saltus.explore import explore as explore
 from saltus.analysis.closed.periodic_orbits import periodic_orbits as periodic_orbits
 from saltus.analysis.lyapunov.lyapunov import lyapunov as lyapunov
 from saltus.analysis.methods.compare_methods import compare_methods as compare_methods

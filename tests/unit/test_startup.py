@@ -43,6 +43,7 @@ def test_a_run_imports_what_it_needs(start):
     assert not modules & HEAVY
     rooms = {
         "motion",
+        "motion.motion_arrays",
         "motion.sample_times",
         "motion.simulate",
         "motion.time_errors",

@@ -1,5 +1,5 @@
 """From what a flow computed to the parts of a Dataset that all analyses share: guards, counters,
-provenance, contacts and their errors.
+provenance.
 """
 
 from __future__ import annotations
@@ -156,42 +156,6 @@ def gap_unit(system: System) -> str:
     """Unit of the gaps of all guards, ``""`` if they differ or aren't known."""
     units = set(gap_units(system))
     return units.pop() if len(units) == 1 else ""
-
-
-def contacts(
-    system: System, group: Ensemble, outcome: Outcome, time_error: np.ndarray
-) -> dict[str, Any]:
-    """The table of contacts; with the states before them, if the run has been that of the system
-    that remembers what jumps.
-    """
-    table = outcome.contacts
-    names = np.array([guard.name for guard in system.guards] or [""], dtype=np.str_)
-    columns = ("direction", "velocity", "kind", "mode_before", "mode_after", "steps", "trajectory")
-    values = {
-        "contact_time": table.time,
-        "contact_time_error": time_error,
-        "contact_guard": names[table.guard],
-        **{
-            f"contact_{name}": table.kind_name if name == "kind" else getattr(table, name)
-            for name in columns
-        },
-        "contact_<state>": motion_values(
-            system, group, table.time, table.state, table.mode_after, table.trajectory
-        ),
-    }
-    jumps = bool(jumping_states(system))
-    if jumps or len(system.outputs):  # an output may jump where no state does
-        before = before_jumps(system, table) if jumps else table.state
-        every = motion_values(
-            system, group, table.time, before, table.mode_before, table.trajectory
-        )
-        known = (*system.states, *system.outputs.names)
-        values["contact_<state>_before"] = {
-            name: column
-            for name, column in zip(known, every.T, strict=True)
-            if jumps or name in system.outputs.names
-        }
-    return values
 
 
 def before_jumps(system: System, table: ContactTable) -> np.ndarray:

@@ -12,6 +12,7 @@ import typer
 
 from saltus.cli.app import app as app
 from saltus.cli.cache_commands import cache
+from saltus.cli.explore_command import explore as explore
 from saltus.errors import StudyError
 
 if TYPE_CHECKING:

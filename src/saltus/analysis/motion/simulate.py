@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -11,36 +11,22 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis import dataset_parts
-from saltus.analysis.inputs.spans import Span, span
-from saltus.analysis.inputs.starts import Ensemble, check_system, ensemble, trajectories
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.motion import time_errors as measure
-from saltus.analysis.motion.sample_times import (
-    NO_SAMPLES,
-    SampleTimes,
-    at_times,
-    check_samples,
-    first_kept,
-    last_of,
-    least_samples,
-    planned,
-    times_of,
-)
+from saltus.analysis.motion.motion_arrays import AskedMotion, MotionArrays, asked_motion
 from saltus.analysis.outcome_messages import warn
-from saltus.errors import ParameterError, among, must_be
 from saltus.flow import engine
-from saltus.flow.methods import Method, check_method
+from saltus.flow.methods import Method
 from saltus.flow.progress import reporting
 from saltus.flow.request import Outcome
 from saltus.interrupt import Interrupted
 from saltus.results import build
 from saltus.results.dataset import schema
 from saltus.system import System
-from saltus.system.quantity import remembering
+from saltus.system.quantity import jumping_states
 
 if TYPE_CHECKING:
     from saltus.analysis.inputs.given import Starts, UntilTrue, Values
-    from saltus.analysis.motion.ending import Ending
 
 
 @verb
@@ -141,110 +127,37 @@ def simulate(
     >>> run.sizes["contact"], bool(run["contact_time_error"].max() < 1e-12)
     (21, True)
     """
-    method = check_method(method, system)
-    check_system(system)
-    many = trajectories(start, values)
-    times = None if at is None else _given_times(system, many, at, samples)
-    if times is not None and periods is None and t_end is None:
-        t_end = last_of(times, t_start)
-    if times is None and until is None:
-        check_samples(system, many, least_samples(system, many, periods, samples, keep))
-    group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
-    length = span(system, group, periods, t_end, t_start)
-    end = None if until is None else _ending(system, method, group, length, until, keep)
-    flown = remembering(system if end is None else end.condition.system)
-    if not among(time_errors, ("measured", "local")):
-        raise must_be("time_errors", '"measured" or "local"', time_errors)
-    plan = NO_SAMPLES
-    if times is not None:
-        plan = at_times(length, first_kept(system, length, keep), times)
-    elif end is None:
-        plan = planned(system, group, length, samples, keep, len(flown.states))
-    asked = _Asked(system, method, group, length, plan, times is not None, end)
+    asked = asked_motion(
+        system, start, periods, t_end, t_start=t_start, method=method, samples=samples, at=at,
+        until=until, keep=keep, values=values, time_errors=time_errors,
+    )  # fmt: skip
 
     def so_far(outcome: Outcome) -> xr.Dataset:
-        return _dataset(asked, outcome, measure.local(outcome))
+        return _dataset(asked, asked.arrays(outcome, measure.local(outcome)))
 
-    outcome = None
+    outcome, end = None, asked.end
     with reporting(progress) as show:
         try:
-            if end is not None and times is None:
-                plan = end.plan(system, method, group, length, samples, threads, show)
-                asked, show = replace(asked, plan=plan), end.afterwards(show)
-            outcome, errors = asked.run(flown, time_errors == "measured", threads, show)
-            result = _dataset(asked, outcome, errors)
+            if end is not None and not asked.given:
+                asked, show = asked.with_end(threads, show), end.afterwards(show)
+            outcome, errors = asked.run(threads, show)
+            result = _dataset(asked, asked.arrays(outcome, errors))
         except KeyboardInterrupt as stop:
             if outcome is not None:
                 raise Interrupted(partial(so_far, outcome)) from None
             raise stop.then(so_far) if isinstance(stop, engine.RunInterrupted) else stop from None
     if end is not None:
         end.warn_of_starts()
-    warn(result, length, system)
+    warn(result, asked.length, system)
     return result
 
 
-def _ending(
-    system: System, method: Method, group: Ensemble, length: Span, until: Any, keep: Any
-) -> Ending:
-    from saltus.analysis.motion.ending import ending  # few runs need it
-
-    return ending(system, method, group, length, until, keep)
-
-
-def _given_times(system: System, trajectories: int, at: Any, samples: Any) -> np.ndarray:
-    """The times that are asked for, in place of samples."""
-    if samples is not None:
-        raise ParameterError(
-            lambda say: (
-                f"give {say.key('at')} (times) or {say.key('samples')} (how many), and only one of "
-                f"them."
-            )
-        )
-    return times_of(system, trajectories, at)
-
-
-@dataclass(frozen=True)
-class _Asked:
-    """The arguments of a run, as they were read."""
-
-    system: System
-    method: Method
-    group: Ensemble
-    length: Span
-    plan: SampleTimes
-    given: bool
-    end: Ending | None
-
-    def run(
-        self,
-        flown: System,
-        measured: bool,
-        threads: int | None,
-        show: Callable[[float], None] | None,
-    ) -> tuple[Outcome, np.ndarray]:
-        """The outcome of the system ``flown``, and the errors of its contact times [s]."""
-        request = self.plan.request(self.group, self.length, len(flown.states))
-        if self.end is not None:
-            request = self.end.asked(request)
-        if measured and self.system.guards and self.method.records_contacts:
-            return measure.measured(flown, self.method, request, threads, show)
-        method = self.method.suited_to(self.group.size)
-        outcome = engine.run(flown, method, request, threads, show)
-        return outcome, measure.local(outcome)
-
-
-def _dataset(asked: _Asked, outcome: Outcome, errors: np.ndarray) -> xr.Dataset:
+def _dataset(asked: AskedMotion, arrays: MotionArrays) -> xr.Dataset:
     """The Dataset of a run."""
-    system, group, length, plan = asked.system, asked.group, asked.length, asked.plan
-    forced = system.forced_at is not None
-    own_periods = forced and bool(np.ptp(length.period) > 0)
-    time, period = plan.of_result(outcome, length, forced)
-    kept = plan.reached(outcome)
-    samples, modes = outcome.samples[:, kept, : len(system.states)], outcome.sample_mode[:, kept]
+    system, group, length, outcome = asked.system, asked.group, asked.length, arrays.outcome
+    forced, own_periods = system.forced_at is not None, asked.own_periods
     attrs: dict[str, Any] = {"sample_times": "given"} if asked.given else {}
     if asked.end is not None:
-        outcome, errors = asked.end.of_the_user(outcome, errors)
-        samples, modes = asked.end.with_ends(outcome, samples, modes, time)
         attrs["until"] = asked.end.condition.text
     subject = dataset_parts.trajectories(
         system,
@@ -255,21 +168,45 @@ def _dataset(asked: _Asked, outcome: Outcome, errors: np.ndarray) -> xr.Dataset:
     subject = replace(subject, attrs={**subject.attrs, **attrs})
     values = {
         "trajectory": np.arange(group.size),
-        **({"period": period} if forced and period is not None else {}),
-        "time": time,
-        "<state>": dataset_parts.motion_values(system, group, time, samples, modes),
-        "mode": modes,
-        **dataset_parts.contacts(system, group, outcome, errors),
+        **({"period": arrays.period} if forced and arrays.period is not None else {}),
+        "time": arrays.time,
+        "<state>": arrays.values,
+        "mode": arrays.mode,
+        **_contacts(system, arrays),
         **dataset_parts.endings(outcome),
         **dataset_parts.minima(outcome),
         "end_time": outcome.time,
-        "end_<state>": dataset_parts.motion_values(
-            system, group, outcome.time, outcome.state, outcome.mode
-        ),
+        "end_<state>": arrays.end_values,
     }
     return build(
         schema.TRAJECTORY,
         subject,
         values,
-        along={"time": "period"} if own_periods and plan.given is None else {},
+        along={"time": "period"} if own_periods and asked.plan.given is None else {},
     )
+
+
+def _contacts(system: System, arrays: MotionArrays) -> dict[str, Any]:
+    """The table of contacts; with the values before them where some jump."""
+    table = arrays.contacts
+    names = np.array([guard.name for guard in system.guards] or [""], dtype=np.str_)
+    columns = ("direction", "velocity", "kind", "mode_before", "mode_after", "steps", "trajectory")
+    values = {
+        "contact_time": table.time,
+        "contact_time_error": arrays.time_error,
+        "contact_guard": names[table.guard],
+        **{
+            f"contact_{name}": table.kind_name if name == "kind" else getattr(table, name)
+            for name in columns
+        },
+        "contact_<state>": arrays.contact_values,
+    }
+    if arrays.before is not None:
+        known = (*system.states, *system.outputs.names)
+        kept = known if jumping_states(system) else system.outputs.names
+        values["contact_<state>_before"] = {
+            name: column
+            for name, column in zip(known, arrays.before.T, strict=True)
+            if name in kept
+        }
+    return values

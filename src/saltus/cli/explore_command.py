@@ -1,0 +1,104 @@
+"""The command `saltus explore`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from saltus.cli.app import app
+from saltus.errors import ParameterError
+
+if TYPE_CHECKING:
+    from saltus.explore.desk import Desk
+    from saltus.system import System
+
+
+@app.command()
+def explore(
+    what: Annotated[
+        str,
+        typer.Argument(
+            help="A model, a study file, the folder of its results, or FILE.py:NAME, which runs "
+            "that file. Leave it out to choose a model on the page."
+        ),
+    ] = "",
+    values: Annotated[
+        list[str] | None, typer.Argument(help="Values of a model: NAME=VALUE, with units.")
+    ] = None,
+    browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,
+    until_closed: Annotated[
+        bool, typer.Option("--until-closed", help="End a minute after the last page was closed.")
+    ] = False,
+    threads: Annotated[
+        int | None, typer.Option(min=1, help="Threads of a map; by default one for each core.")
+    ] = None,
+) -> None:
+    """Explore a system in the browser: click a start, drag a parameter, follow a branch.
+
+    The page is served on this machine alone, to whoever has its address. From another machine use
+    ssh: `ssh -L PORT:127.0.0.1:PORT HOST`, and open the address that is printed there. Ctrl-C ends
+    it.
+
+    Example: `saltus explore delangre case=b force="4 N"`
+
+    Example: `saltus explore my_study.toml`
+
+    Example: `saltus explore my_rig.py:rig`
+    """
+    from saltus.cli import screen
+    from saltus.explore import opened
+    from saltus.explore.desk import Models
+
+    known: dict[str, Desk] = {}
+
+    def model(name: str) -> Desk:
+        if name not in known:
+            known[name] = _desk(_model(name, []), threads)
+        return known[name]
+
+    if what:
+        explorer = opened(_desk_of(what, values or [], threads), browser=browser, framed_by=())
+    else:
+        explorer = opened(Models(), model, browser=browser, framed_by=())
+    screen.say(explorer.url)
+    explorer.wait(until_closed)
+
+
+def _desk_of(what: str, values: list[str], threads: int | None) -> Desk:
+    """The desk of what stands on the command line."""
+    path = Path(what)
+    if ".py" in path.suffix:
+        from saltus.cli.own_system import own_system
+
+        _no_values(what, values)
+        return _desk(own_system(what), threads)
+    return _desk(_model(what, values), threads)
+
+
+def _no_values(what: str, values: list[str]) -> None:
+    if values:
+        raise ParameterError(f"{what} brings its own values: leave out {' '.join(values)}.")
+
+
+def _model(name: str, values: list[str]) -> System:
+    from saltus.models import find
+
+    given: dict[str, Any] = {}
+    for one in values:
+        key, equals, value = one.partition("=")
+        if not equals:
+            raise ParameterError(f"{one}: write NAME=VALUE, such as force='4 N'.")
+        try:
+            given[key] = float(value)
+        except ValueError:
+            given[key] = value
+    return find(name)(**given)
+
+
+def _desk(system: System, threads: int | None) -> Desk:
+    from saltus.explore.desk import Desk
+    from saltus.explore.opening import opening_of
+
+    return Desk(opening_of(system), threads)

@@ -1,0 +1,145 @@
+"""The explorer: a page in the browser that asks a system, and the server that answers it, on this
+machine alone.
+"""
+
+from __future__ import annotations
+
+import sys
+import webbrowser
+from collections.abc import Iterable, Mapping
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+from saltus.errors import ParameterError
+
+if TYPE_CHECKING:
+    from saltus.explore.server import Server
+    from saltus.explore.session import AnswersQuestions
+    from saltus.flow.methods import Method
+    from saltus.system import System
+
+#: Pages that may show the explorer in a frame: notebooks that are served on this machine.
+NOTEBOOKS = ("http://localhost:*", "http://127.0.0.1:*")
+
+
+class Explorer:
+    """An explorer that is open. In a notebook it is shown below the cell.
+
+    Attributes
+    ----------
+    url : str
+        The page's address, with the token that lets it in.
+    """
+
+    def __init__(self, server: Server) -> None:
+        self._server = server
+        self.url = server.url
+
+    @property
+    def view(self) -> Mapping[str, Any]:
+        """What the newest page shows now: the fields of its questions, by panel."""
+        sessions = self._server.sessions
+        return sessions[-1].view if sessions else {}
+
+    def close(self) -> None:
+        """End the pages' work and the server."""
+        self._server.stop()
+
+    def wait(self, until_closed: bool = False) -> None:
+        """Wait for the end: Ctrl-C, or a minute after the last page went."""
+        try:
+            self._server.wait(until_closed)
+        finally:
+            self.close()
+
+    def __repr__(self) -> str:
+        return f"Explorer at {self.url}"
+
+    def _repr_html_(self) -> str:
+        return (
+            f'<iframe src="{self.url}&amp;frame=1" width="100%" height="700" '
+            f'title="saltus explore" style="border: 0"></iframe>'
+        )
+
+
+def explore(
+    system: System,
+    *,
+    method: Method | None = None,
+    browser: bool | None = None,
+    threads: int | None = None,
+) -> Explorer:
+    """Open the explorer of a system: basins, motions, orbits and responses on one page.
+
+    It listens on this machine alone, and returns at once.
+
+    Parameters
+    ----------
+    system : System
+        Equations, contacts and values.
+    method : Method
+        Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
+        it serves.
+    browser : bool
+        Whether the page is opened in the browser; default: unless a notebook shows it.
+    threads : int, optional
+        Threads of a map; default all processors.
+
+    Returns
+    -------
+    Explorer
+        With ``url``, ``view`` and ``close()``.
+
+    Raises
+    ------
+    ParameterError
+        If an argument can't be used, or the packages of the extra ``explore`` aren't there.
+    """
+    from saltus.analysis.inputs.starts import check_system
+    from saltus.explore.desk import Desk
+    from saltus.explore.opening import opening_of
+    from saltus.flow.methods import check_method
+
+    check_system(system)
+    desk = Desk(opening_of(system, check_method(method, system)), threads)
+    return opened(desk, browser=not _in_notebook() if browser is None else browser)
+
+
+def opened(
+    desk: AnswersQuestions,
+    models: Any = None,
+    browser: bool = False,
+    framed_by: Iterable[str] = NOTEBOOKS,
+) -> Explorer:
+    """An explorer of a desk: its server listens when this returns. Raises ParameterError if the
+    packages of the extra ``explore`` aren't there.
+    """
+    try:
+        from saltus.explore.server import Server
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] not in ("starlette", "uvicorn", "websockets"):
+            raise
+        raise ParameterError(
+            f"the explorer needs {error.name}: pip install 'saltus[explore]'."
+        ) from None
+    server = Server(desk, models, framed_by)
+    server.start()
+    if browser:
+        webbrowser.open(server.url)
+    return Explorer(server)
+
+
+def _in_notebook() -> bool:
+    ipython = sys.modules.get("IPython")
+    return ipython is not None and hasattr(ipython.get_ipython(), "kernel")
+
+
+class _CallableModule(ModuleType):
+    """Let ``saltus.explore`` be the function, although importing this folder binds that name to the
+    module.
+    """
+
+    __call__ = staticmethod(explore)
+
+
+sys.modules[__name__].__class__ = _CallableModule

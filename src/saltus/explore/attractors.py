@@ -1,0 +1,190 @@
+"""Attractors at one set of values: their keys on the page, their hues, their numbers in words."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from saltus.analysis.attractors.aperiodic import SampledMotion
+from saltus.analysis.attractors.attractor_set import AttractorSet
+from saltus.analysis.attractors.portrait import portraits
+from saltus.analysis.closed.capture import Neighbourhoods
+from saltus.analysis.closed.motions import ClosedMotion, orbit_distance, same
+from saltus.analysis.solve.tolerances import SAME
+from saltus.flow.maps import Stroboscope
+from saltus.results import AttractorTable
+from saltus.results.dataset.schema import kind_text
+
+Attractor: TypeAlias = ClosedMotion | SampledMotion
+#: Two orbits of neighbouring values are one response if they are nearer than this share of the box.
+NEIGHBOUR = 0.25
+#: Most points of an attractor that the page draws.
+POINTS = 64
+#: Labels are signed bytes: most attractors that a map can show.
+MOST = 127
+
+
+class KnownAttractors:
+    """The attractors of a system at one set of values, as they are found.
+
+    A key is the place at which an attractor was found and stays; ids, which sort attractors by
+    period and size, change as more are found. A hue belongs to a response, not to a key: an
+    attractor takes that of the nearest one at the values that were shown before.
+
+    Parameters
+    ----------
+    map_ : Stroboscope
+        The map at these values.
+    scale : float64[D]
+        Range of each state.
+    before : KnownAttractors, optional
+        Those of the values shown before.
+    """
+
+    def __init__(
+        self, map_: Stroboscope, scale: np.ndarray, before: KnownAttractors | None = None
+    ) -> None:
+        self.map, self.scale = map_, scale
+        self.found = AttractorSet(Neighbourhoods.none(len(map_.states)))
+        self.complete = False  # whether a whole sample of starts was looked through
+        self.lock = threading.RLock()
+        self._members: list[Attractor] = []
+        self._hues: list[int] = []
+        self._table: AttractorTable | None = None
+        self._before = (
+            [] if before is None else list(zip(before._members, before._hues, strict=True))
+        )
+
+    def __len__(self) -> int:
+        return len(self._members)
+
+    def grow(self, found: AttractorSet) -> bool:
+        """Take what was found meanwhile; True if an attractor is new."""
+        with self.lock:
+            fresh = [one for one in found.every if self._key(one) is None]
+            self.found = found
+            fresh = fresh[: MOST - len(self._members)]
+            self._hues += self._hues_of(fresh)
+            self._members += fresh
+            if fresh:
+                self._table = None
+            return bool(fresh)
+
+    def keys(self, found: AttractorSet | None = None) -> np.ndarray:
+        """The key of each id of a set, int64[m]; -1 for one that isn't known."""
+        with self.lock:
+            keys = [self._key(one) for one in (found or self.found).every]
+        return np.array([-1 if key is None else key for key in keys], np.int64)
+
+    def member(self, key: int) -> Attractor | None:
+        """The attractor of a key; None if there is none."""
+        return self._members[key] if key < len(self._members) else None
+
+    def hue(self, key: int) -> int:
+        """The number of its hue."""
+        return self._hues[key]
+
+    def table(self) -> list[dict[str, Any]]:
+        """All of them in words and numbers, by their keys."""
+        with self.lock:
+            if self._table is None:
+                self._table = portraits(self.map, self.found)
+            keys, table = self.keys(), self._table
+        rows = [
+            self._row(i, int(key), table) | {"order": i} for i, key in enumerate(keys) if key >= 0
+        ]
+        return sorted(rows, key=lambda row: int(row["key"]))
+
+    def row(self, key: int) -> dict[str, Any] | None:
+        """One of them; None if there is none, or it has turned out to be scatter of another."""
+        return next((row for row in self.table() if row["key"] == key), None)
+
+    def _row(self, i: int, key: int, table: AttractorTable) -> dict[str, Any]:
+        system = self.map.system
+        cycle = float("nan") if table.cycle is None else float(table.cycle[i])
+        period = int(table.period[i])
+        seconds = period * float(self.map.period[0]) if period else cycle
+        rest = table.kind[i] == "equilibrium" and table.eigenvalues is not None
+        both = table.eigenvalues[i] if rest and table.eigenvalues is not None else None
+        multipliers = table.multipliers[i] if both is None else both
+        return {
+            "key": key,
+            "hue": self._hues[key],
+            "period": period,
+            "name": kind_text(table.kind[i], period),
+            "kind": table.kind[i],
+            "peak": {system.states[0]: float(table.peak[i]), **_of_outputs(table, i, "peak")},
+            "rms": {system.states[0]: float(table.rms[i]), **_of_outputs(table, i, "rms")},
+            "margin": float(table.margin[i]),
+            "contacts": float(table.contacts[i]),
+            "itinerary": table.itinerary[i],
+            "seconds": seconds,
+            "multipliers": pairs(multipliers),
+            "eigenvalues": both is not None,
+            "exponent": float(table.exponent[i]),
+            "stable": True,
+            "points": np.asarray(table.points[i])[:POINTS].tolist(),
+            "fraction": None,
+            "low": None,
+            "high": None,
+        }
+
+    def _key(self, one: Attractor) -> int | None:
+        for key, other in enumerate(self._members):
+            if other is one or _alike(one, other, self.scale):
+                return key
+        return None
+
+    def _hues_of(self, fresh: Sequence[Attractor]) -> list[int]:
+        """The hues of new attractors: each that of the nearest one of the values shown before, else
+        the first that neither these nor those have.
+        """
+        near = [
+            (_distance(one, other, self.scale), i, hue)
+            for i, one in enumerate(fresh)
+            for other, hue in self._before
+        ]
+        taken, found = set(self._hues), dict[int, int]()
+        for apart, i, hue in sorted(near):
+            if apart < NEIGHBOUR and i not in found and hue not in taken:
+                found[i] = hue
+                taken.add(hue)
+        kept = taken | {hue for _, hue in self._before}
+        free = iter(sorted(set(range(len(kept) + len(fresh))) - kept))
+        return [found[i] if i in found else next(free) for i in range(len(fresh))]
+
+
+def pairs(numbers: Sequence[complex] | np.ndarray) -> list[list[float]]:
+    """Complex numbers as pairs, without those that aren't known."""
+    known = np.ravel(np.asarray(numbers, complex))
+    return [[float(z.real), float(z.imag)] for z in known[np.isfinite(known)]]
+
+
+def _of_outputs(table: AttractorTable, i: int, what: str) -> dict[str, float]:
+    if table.outputs is None:
+        return {}
+    numbers = np.asarray(table.outputs[f"attractor_output_{what}"])[i]
+    return dict(zip(table.outputs["output"], map(float, numbers), strict=True))
+
+
+def _alike(one: Attractor, other: Attractor, scale: np.ndarray) -> bool:
+    """True where two are the same attractor, found twice."""
+    if one.kind != other.kind:
+        return False
+    if isinstance(one, ClosedMotion) and isinstance(other, ClosedMotion):
+        return one.period == other.period and same(one, other, scale, 10 * SAME)
+    if isinstance(one, SampledMotion) and isinstance(other, SampledMotion):
+        return bool(other.share(one.points[None])[0] >= 0.5)
+    return False
+
+
+def _distance(one: Attractor, other: Attractor, scale: np.ndarray) -> float:
+    """How far two attractors of neighbouring values are apart, in ranges of the states."""
+    if one.kind != other.kind:
+        return np.inf
+    if isinstance(one, ClosedMotion) and isinstance(other, ClosedMotion):
+        return orbit_distance(one.points, other.points, scale)
+    return float(np.abs((one.points.mean(axis=0) - other.points.mean(axis=0)) / scale).max())

@@ -1,0 +1,157 @@
+"""The desk: what a page may ask of a system, answered with arrays. Knows no sockets."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Generator, Mapping
+from typing import Any
+
+import numpy as np
+
+from saltus.analysis.inputs.starts import ensemble
+from saltus.errors import ParameterError, unknown
+from saltus.explore import questions as asked
+from saltus.explore.about import about_answer, models_answer
+from saltus.explore.frames import Answer
+from saltus.explore.motion import AskedRun, motion
+from saltus.explore.opening import Opening
+from saltus.explore.questions import QuestionError, about
+from saltus.flow.methods import METHODS, Method
+from saltus.system import System
+from saltus.units import to_si
+
+#: Quantities that are sent of each motion unless others are named: states, and outputs.
+MOST_STATES, MOST_OUTPUTS = 4, 8
+#: Samples of a forcing period unless the page asks for others.
+SAMPLES = 200
+#: Sets of values whose attractors are kept.
+KEPT_VALUES = 64
+
+
+class Desk:
+    """Answers of one system, to any number of pages at once.
+
+    Parameters
+    ----------
+    opening : Opening
+        The system, and what is shown first.
+    threads : int, optional
+        Threads of a map; default all processors.
+    """
+
+    def __init__(self, opening: Opening, threads: int | None = None) -> None:
+        self.opening, self.threads = opening, threads
+        self._lock = threading.Lock()
+        self._answers: Mapping[type, Callable[[Any], Generator[Answer]]] = {
+            asked.About: self._about,
+            asked.Open: self._about,
+            asked.MotionQuestion: self._motion,
+        }
+
+    def answers(self, question: asked.Question) -> Generator[Answer]:
+        """The answers to a question, as they are ready.
+
+        Raises
+        ------
+        QuestionError
+            If it can't be answered; with the field that is wrong.
+        Interrupted
+            If the work is asked to stop (:class:`saltus.interrupt.Stop`).
+        """
+        answer = self._answers.get(type(question))
+        if answer is None:
+            raise QuestionError(f"{question.ask} isn't answered here.", "ask")
+        yield from answer(question)
+
+    # -- what questions share ----------------------------------------------------------------------
+    def system_at(self, values: Mapping[str, asked.Number]) -> System:
+        """The system at the values of a question."""
+        for name, value in values.items():
+            with about(f"values.{name}"):
+                self.opening.system.resolve(name, value)
+        with about("values"):
+            return self.opening.system.with_values(**values) if values else self.opening.system
+
+    def method_of(self, name: str | None, field: str = "method") -> Method:
+        """The method of a name; that of the desk for None."""
+        mine = self.opening.method
+        if name is None or name == mine.name:
+            return mine
+        if name not in METHODS:
+            raise QuestionError(unknown("there is no method", name, METHODS), field)
+        return named_method(name, self.opening)
+
+    def start_of(self, system: System, start: asked.Start) -> tuple[float, ...]:
+        """The state of a start [SI]."""
+        with about("start"):
+            return tuple(ensemble(system, start, None).start[0].tolist())
+
+    def quantities_of(self, names: tuple[str, ...] | None) -> tuple[str, ...]:
+        """Names of states and outputs, checked; by default the first of them."""
+        system = self.opening.system
+        if names is None:
+            few = 2 if system.outputs.first else MOST_STATES
+            mine, others = set(self.opening.axes), system.states
+            states = [*self.opening.axes, *(name for name in others if name not in mine)][:few]
+            return (*states, *system.outputs.names[:MOST_OUTPUTS])
+        known = (*system.states, *system.outputs.names)
+        for name in names:
+            if name not in known:
+                raise QuestionError(unknown("there is no quantity", name, known), "quantities")
+        return names
+
+    # -- answers -----------------------------------------------------------------------------------
+    def _about(self, question: asked.Question) -> Generator[Answer]:  # noqa: ARG002
+        yield about_answer(self.opening)
+
+    def _motion(self, question: asked.MotionQuestion) -> Generator[Answer]:
+        begun = time.thread_time()
+        system = self.system_at(question.values)
+        method = self.method_of(question.method)
+        other = None if question.against is None else self.method_of(question.against, "against")
+        end = None
+        if question.t_end is not None:
+            with about("t_end"):
+                end = to_si(question.t_end, "s", "t_end")
+                if not 0 < end < np.inf:
+                    raise ParameterError("t_end must be a time after 0 s.")
+        run = AskedRun(
+            system,
+            self.start_of(system, question.start),
+            self.period_of(system),
+            question.periods if end is None else None,
+            end,
+            method,
+            question.samples or SAMPLES,
+            question.errors == "measured",
+        )
+        head, arrays = motion(run, self.quantities_of(question.quantities), other)
+        yield {**head, "ms": 1e3 * (time.thread_time() - begun)}, arrays
+
+    def period_of(self, system: System) -> float:
+        """The forcing period at these values; without forcing the turn of the opening [s]."""
+        if system.forced_at is None:
+            return self.opening.turn
+        return float(np.ravel(system.period(system.values))[0])
+
+
+class Models:
+    """Answers before a system is chosen: the models of saltus."""
+
+    def answers(self, question: asked.Question) -> Generator[Answer]:
+        """The list of models. Raises QuestionError for any other question."""
+        if not isinstance(question, asked.About):
+            raise QuestionError("choose a model first.", "ask")
+        yield models_answer()
+
+
+def named_method(name: str, opening: Opening) -> Method:
+    """A method by its name, with the options that show what it is compared for: MATLAB's usual
+    tolerances, a fixed step of a hundredth of a period.
+    """
+    if name == "RK4":
+        return METHODS[name](step=opening.turn / 100)  # type: ignore[call-arg]
+    if name.startswith("ODE"):
+        return METHODS[name](rtol=1e-4, atol=1e-7)  # type: ignore[call-arg]
+    return METHODS[name]()

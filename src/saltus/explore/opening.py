@@ -1,0 +1,170 @@
+"""What the explorer shows first: ranges of sliders, the box of the map, a start; those of a study
+where it gives them, else guesses from the system.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from saltus.analysis.closed.field_zeros import jacobian_of
+from saltus.analysis.dataset_parts import guards_over
+from saltus.analysis.motion.motion_arrays import motion_arrays
+from saltus.explore.motion import REACHED
+from saltus.flow.methods import Method, default_method
+from saltus.system import System
+
+#: Periods of the motion from rest, and its samples in each, by which the box of the map is guessed.
+LOOKED, SAMPLES = 60, 32
+#: Times the largest motion and gap that this box reaches.
+WIDER = 2.5
+#: Times the widest gap beyond which a motion has left the picture.
+FARTHEST = 1e3
+#: Starts along each axis of the first map.
+SIZE = (160, 160)
+#: Steps of a slider between its ends.
+STEPS = 400
+
+
+@dataclass(frozen=True)
+class Opening:
+    """What is shown first.
+
+    Attributes
+    ----------
+    system : System
+        Equations and values.
+    method : Method
+        How to integrate.
+    axes : mapping of str to (float, float)
+        The two states of the map and their ranges [SI].
+    at : mapping of str to float
+        Starts of the other states [SI].
+    size : (int, int)
+        Starts along the axes.
+    ranges : mapping of str to (float, float)
+        Range of the slider of each parameter [SI].
+    turn : float
+        Forcing period; without forcing about a turn of the motions [s].
+    start : mapping of str to float or None
+        A start to show.
+    responses : mapping or None
+        ``parameter``, ``range`` and ``quantity`` of the responses.
+    view : mapping
+        What a study asks for first, in the fields of questions.
+    results : mapping of str to Dataset
+        Results of a finished study, by the stems of their files.
+    """
+
+    system: System
+    method: Method
+    axes: Mapping[str, tuple[float, float]]
+    at: Mapping[str, float] = field(default_factory=dict)
+    size: tuple[int, int] = SIZE
+    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    turn: float = 1.0
+    start: Mapping[str, float] | None = None
+    responses: Mapping[str, Any] | None = None
+    view: Mapping[str, Any] = field(default_factory=dict)
+    results: Mapping[str, Any] = field(default_factory=dict)
+
+
+def opening_of(system: System, method: Method | None = None, **known: Any) -> Opening:
+    """What is shown first of a system; ``known`` are attributes of :class:`Opening` that a study
+    gives.
+    """
+    method = method or default_method(system)
+    box, turn = _box(system, method)
+    first = {name: box[name] for name in _plane(system)}
+    guess = Opening(system, method, first, ranges=sliders(system), turn=turn)
+    given = {name: one for name, one in known.items() if one is not None}
+    ranges = {**guess.ranges, **given.pop("ranges", {})}
+    found = replace(guess, ranges=ranges, **given)
+    return found if found.responses else replace(found, responses=_responses(found))
+
+
+def sliders(system: System) -> dict[str, tuple[float, float]]:
+    """A decade about the value of each parameter, ends of two digits; symmetric about zero for
+    values that aren't positive [SI].
+    """
+    found = {}
+    for name, value in system.values.items():
+        size = abs(value) or 1.0
+        low, high = (float(f"{size * by:.1e}") for by in (10**-0.5, 10**0.5))
+        found[name] = (low, high) if value > 0 else (-high, high)
+    return found
+
+
+def _plane(system: System) -> tuple[str, str]:
+    """The two states of the first map: a state and its rate where there is one."""
+    for i, name in enumerate(system.states):
+        for j, rate in enumerate(system.field):
+            if i != j and rate.op == "state" and rate.payload == name:
+                return system.states[j], name
+    return system.states[0], system.states[1 % len(system.states)]
+
+
+def _box(system: System, method: Method) -> tuple[dict[str, tuple[float, float]], float]:
+    """A range of each state about zero that holds the motion from rest and the gaps; and the time
+    of a turn [s].
+    """
+    reach = np.zeros(len(system.states))
+    about = guards_over(system, system.values, ())
+    for name, place in zip(about.states, np.ravel(about.boundaries), strict=True):
+        if name and np.isfinite(place):
+            i = system.states.index(name)
+            reach[i] = max(reach[i], abs(place))
+    forced, start = system.forced_at is not None, np.zeros(len(system.states))
+    if forced:
+        turn = float(np.ravel(system.period(system.values))[0])
+    else:
+        start = np.where(reach > 0, reach, 0.5)
+        turn = _turn(system, start)
+    length = {"periods": LOOKED} if forced else {"t_end": LOOKED * turn}
+    count = SAMPLES if forced else LOOKED * SAMPLES
+    seen = motion_arrays(
+        system, start, method=method, samples=count, time_errors="local", threads=1, **length
+    )
+    moved = np.abs(seen.values[0][:, : len(reach)]).max(axis=0)
+    if int(seen.outcome.status[0]) in REACHED and moved.max() < FARTHEST * (reach.max() or 1.0):
+        reach = np.maximum(reach, moved)  # else gaps alone say how wide
+    reach = np.where(reach > 0, reach, reach.max() or 1.0)
+    ends = [_round_up(WIDER * one) for one in reach]
+    return {name: (-end, end) for name, end in zip(system.states, ends, strict=True)}, turn
+
+
+def _turn(system: System, start: np.ndarray) -> float:
+    """Time in which the linear part of the equations at a state turns or decays once [s]; 1 s where
+    it does neither.
+    """
+    (matrix,) = jacobian_of(
+        system, start[None], {name: np.array([value]) for name, value in system.values.items()}
+    )
+    rate = float(np.abs(np.linalg.eigvals(matrix)).max()) if np.isfinite(matrix).all() else 0.0
+    return float(f"{2.0 * np.pi / rate:.1e}") if rate > 0 else 1.0
+
+
+def _round_up(value: float) -> float:
+    """The next of 1, 2, 5, 10, ..."""
+    ten = 10.0 ** math.floor(math.log10(value))
+    return next(float(f"{step * ten:.0e}") for step in (1, 2, 5, 10) if step * ten >= value)
+
+
+def _responses(found: Opening) -> dict[str, Any] | None:
+    """The range of responses that is shown first: of the forcing frequency, else of the first
+    parameter.
+    """
+    system = found.system
+    name = system.forced_at or next(iter(system.values), None)
+    if name is None:
+        return None
+    low, high = found.ranges[name]
+    value = system.values[name]
+    if name == system.forced_at:  # an octave: a decade takes minutes
+        low, high = (float(f"{value * by:.3g}") for by in (2**-0.5, 2**0.5))
+    first = system.outputs.names[0] if system.outputs.first else system.states[0]
+    return {"parameter": name, "range": [low, high], "quantity": first}

@@ -1,0 +1,301 @@
+"""What one page asks, and in which order it is answered: the newest question counts. Knows threads,
+and neither sockets nor files.
+"""
+
+from __future__ import annotations
+
+import secrets
+import sys
+import threading
+import time
+import traceback
+from collections import deque
+from collections.abc import Callable, Generator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
+from typing import Any, Protocol
+
+import numpy as np
+
+from saltus.announce import announcing_to
+from saltus.errors import SaltusError
+from saltus.explore.frames import Answer, packed
+from saltus.explore.questions import (
+    Open,
+    Pause,
+    Question,
+    QuestionError,
+    Seen,
+    Show,
+    StopWork,
+    read,
+)
+from saltus.interrupt import Interrupted, Stop
+
+#: Pieces of a map that may be on their way unseen; then its work waits.
+WINDOW = 8
+#: Most questions in a second, receipts of pieces not counted.
+RATE = 200
+#: Most bytes that wait for a page that doesn't read; then its work waits, and refusals are dropped.
+WAITING = 2**24
+#: Kinds of question of which a newer one stops the older. Of others one is finished and one waits.
+STOPPED_BY_NEWER = ("map", "responses")
+#: Time between two looks whether waiting work was asked to stop [s].
+LOOK = 0.1
+
+
+class AnswersQuestions(Protocol):
+    """A desk: it answers a question by one answer or several, while it works."""
+
+    def answers(self, question: Question) -> Generator[Answer]:
+        """The answers."""
+
+
+class Outbox:
+    """Frames for a page, until they are taken. Work that puts more than fit waits.
+
+    Parameters
+    ----------
+    ready : callable, optional
+        Called, from any thread, when there is a frame to take.
+    most : int
+        Bytes that fit.
+    """
+
+    def __init__(self, ready: Callable[[], None] | None = None, most: int = WAITING) -> None:
+        self._frames: deque[bytes] = deque()
+        self._ready, self._most = ready, most
+        self._room = threading.Condition()
+        self.size, self.dropped, self.closed = 0, 0, False
+
+    def put(self, frame: bytes, stop: Stop | None = None) -> None:
+        """Add a frame. With ``stop`` this thread waits for room until that is set, and Interrupted
+        is raised then; without, a frame that doesn't fit is dropped and counted.
+        """
+        with self._room:
+            while stop is not None and self.size > self._most and not self.closed:
+                if stop.is_set():
+                    raise Interrupted
+                self._room.wait(LOOK)
+            if self.closed or (stop is None and self.size > self._most):
+                self.dropped += not self.closed
+                return
+            self._frames.append(frame)
+            self.size += len(frame)
+        if self._ready:
+            self._ready()
+
+    def take(self) -> bytes | None:
+        """The oldest frame; None if there is none."""
+        with self._room:
+            if self.dropped and not self._frames:
+                told = packed({"kind": "dropped", "count": self.dropped}, {})
+                self.dropped = 0
+                return told
+            if not self._frames:
+                return None
+            frame = self._frames.popleft()
+            self.size -= len(frame)
+            self._room.notify_all()
+            return frame
+
+    def close(self) -> None:
+        """Drop all frames, and take no more."""
+        with self._room:
+            self.closed, self.size = True, 0
+            self._frames.clear()
+            self._room.notify_all()
+
+
+class _Lane:
+    """Questions of one kind: one under way, and one that waits."""
+
+    def __init__(self) -> None:
+        self.waiting: Question | None = None
+        self.stop: Stop | None = None  # of the one under way
+        self.busy = False
+
+
+class Session:
+    """One page at a desk.
+
+    A newer map or set of responses stops the older. Of every other kind of question one is finished
+    and one waits, and a newer one takes the place of the one that waits: a drag has answers all the
+    time, and the last one is that of its end.
+
+    Parameters
+    ----------
+    desk : AnswersQuestions
+        The desk.
+    outbox : Outbox
+        Where frames go.
+    opened : callable, optional
+        The desk of a model that the page opens, by the model's name.
+    clock : callable
+        The time [s], for the rate of questions.
+    """
+
+    def __init__(
+        self,
+        desk: AnswersQuestions,
+        outbox: Outbox,
+        opened: Callable[[str], AnswersQuestions] | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._desk, self._outbox, self._opened, self._clock = desk, outbox, opened, clock
+        self._lanes: dict[str, _Lane] = {}
+        self._lock = threading.Lock()
+        self._pool = ThreadPoolExecutor(thread_name_prefix="saltus-explore")
+        self._windows: dict[int, threading.Semaphore] = {}
+        self._looked_at = threading.Event()
+        self._looked_at.set()
+        self._second, self._count, self._closed = 0, 0, False
+        self.view: Mapping[str, Any] = {}
+
+    def hear(self, text: str) -> None:
+        """Take a question of the page. Never waits, never raises."""
+        try:
+            question = read(text)
+            if isinstance(question, Seen):
+                if (window := self._windows.get(question.id)) is not None:
+                    window.release()
+                return
+            self._check_rate(question)
+            self._take(question)
+        except QuestionError as error:
+            self._outbox.put(_refused(error, error.ask, error.id))
+
+    def close(self) -> None:
+        """End all work of the page, and wait for its end."""
+        with self._lock:
+            self._closed = True
+        self._stop(None)
+        self._outbox.close()
+        self._pool.shutdown(wait=True, cancel_futures=True)
+
+    # -- order -------------------------------------------------------------------------------------
+    def _check_rate(self, question: Question) -> None:
+        second = int(self._clock())
+        self._count = self._count + 1 if second == self._second else 1
+        self._second = second
+        if self._count > RATE:
+            error = QuestionError(f"too many questions: more than {RATE} in a second.")
+            error.ask, error.id = question.ask, question.id
+            raise error
+
+    def _take(self, question: Question) -> None:
+        if isinstance(question, StopWork):
+            self._stop(question.of)
+        elif isinstance(question, Show):
+            self.view = question.view
+        elif isinstance(question, Pause):
+            (self._looked_at.clear if question.on else self._looked_at.set)()
+        else:
+            self._queue(question)
+
+    def _queue(self, question: Question) -> None:
+        with self._lock:
+            if self._closed:
+                return
+            lane = self._lanes.setdefault(question.ask, _Lane())
+            replaced, lane.waiting = lane.waiting, question
+            if question.ask in STOPPED_BY_NEWER and lane.stop is not None:
+                lane.stop.set()
+            begins, lane.busy = not lane.busy, True
+            if begins:
+                self._pool.submit(self._work, lane)
+        if replaced is not None:
+            self._outbox.put(packed(_stopped(replaced), {}))
+
+    def _stop(self, of: str | None) -> None:
+        with self._lock:
+            lanes = [lane for ask, lane in self._lanes.items() if of in (None, ask)]
+            waiting = [lane.waiting for lane in lanes if lane.waiting is not None]
+            for lane in lanes:
+                lane.waiting = None
+                if lane.stop is not None:
+                    lane.stop.set()
+        for question in waiting:
+            self._outbox.put(packed(_stopped(question), {}))
+
+    # -- work --------------------------------------------------------------------------------------
+    def _work(self, lane: _Lane) -> None:
+        """Answer the questions of a lane until none waits."""
+        while True:
+            with self._lock:
+                question, lane.waiting = lane.waiting, None
+                if question is None:
+                    lane.busy, lane.stop = False, None
+                    return
+                stop = lane.stop = Stop()
+            try:
+                self._answer(question, stop)
+            except KeyboardInterrupt:  # nobody takes the last words
+                continue
+
+    def _answer(self, question: Question, stop: Stop) -> None:
+        """Answer a question, whatever happens."""
+        window = threading.Semaphore(WINDOW)
+        self._windows[question.id] = window
+        try:
+            with (
+                stop,
+                np.errstate(all="ignore"),
+                announcing_to(lambda text: self._outbox.put(_waits(question, text))),
+                closing(self._answers(question)) as answers,
+            ):
+                for head, arrays in answers:
+                    if head["kind"] == "map-piece":
+                        self._wait(window, stop)
+                    whose = {"ask": question.ask, "id": question.id}
+                    self._outbox.put(packed({**head, **whose}, arrays), stop)
+        except KeyboardInterrupt:
+            self._outbox.put(packed(_stopped(question), {}))
+        except (SaltusError, MemoryError) as error:
+            self._outbox.put(_refused(error, question.ask, question.id), stop)
+        except Exception:
+            self._outbox.put(packed(_failed(question), {}), stop)
+        finally:
+            self._windows.pop(question.id, None)
+
+    def _answers(self, question: Question) -> Generator[Answer]:
+        if isinstance(question, Open):
+            if self._opened is None:
+                raise QuestionError("the system was chosen where the explorer was started.")
+            self._desk = self._opened(question.model)
+        yield from self._desk.answers(question)
+
+    def _wait(self, window: threading.Semaphore, stop: Stop) -> None:
+        """Wait until the page has seen enough pieces, and is looked at."""
+        while not self._looked_at.wait(LOOK) or not window.acquire(timeout=LOOK):
+            if stop.is_set():
+                raise Interrupted
+
+
+def _stopped(question: Question) -> dict[str, Any]:
+    kind = "map-stopped" if question.ask == "map" else "stopped"
+    return {"kind": kind, "ask": question.ask, "id": question.id}
+
+
+def _waits(question: Question, text: str) -> bytes:
+    """The frame that says what an answer waits for."""
+    head = {"kind": "waits", "ask": question.ask, "id": question.id, "words": [text]}
+    return packed(head, {})
+
+
+def _refused(error: BaseException, ask: str | None, number: int | None) -> bytes:
+    """The frame that says why a question isn't answered."""
+    why = str(error) or "memory is used up. Ask for fewer starts or samples."
+    field = getattr(error, "field", None)
+    return packed({"kind": "refused", "ask": ask, "id": number, "why": why, "field": field}, {})
+
+
+def _failed(question: Question) -> dict[str, Any]:
+    """The head that says that an exception was met; the terminal has it under the same number."""
+    number = secrets.token_hex(2)
+    told = traceback.format_exc()
+    sys.stderr.write(f"saltus: failure {number} in the question {question.ask!r}:\n{told}")
+    why = f"saltus failed here; the terminal has the reason under the number {number}."
+    return {
+        "kind": "failed", "ask": question.ask, "id": question.id, "number": number, "why": why,
+    }  # fmt: skip
