@@ -13,4 +13,4 @@ await build({
   bundle: true, minify: true, format: "esm", target: "es2022", legalComments: "none", charset: "utf8",
   outdir: out, logLevel: "warning",
 });
-await copyFile(here("src/index.html"), `${out}/index.html`);
+for (const name of ["index.html", "favicon.svg"]) await copyFile(here(`src/${name}`), `${out}/${name}`);
