@@ -12,7 +12,7 @@ export interface About extends Head {
   system: { name: string; description: string; text: string; source?: string } | null;
   forced: boolean; forced_at: string | null; method: string; methods: string[];
   quantities: Quantity[]; parameters: Parameter[]; guards: { name: string; quantity: string | null; unit: string }[]; turn: number;
-  axes: Record<string, Range>; at: Record<string, number>; size: [number, number]; choices: string[];
+  axes: Record<string, Range>; at: Record<string, number>; ranges?: Record<string, Range>; size: [number, number]; choices: string[];
   panels: { history: string[]; phase: string[]; response: { parameter: string; range: Range; quantity: string } | null };
   start: Record<string, number> | null; view: Record<string, any>; results: { name: string; kind: string; words: string }[];
   hues: number[][]; hue_shades: number[][][]; codes: Record<string, string>; code_colors: Record<string, number[]>;

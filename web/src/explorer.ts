@@ -13,19 +13,21 @@ import { SaveSheet } from "./save";
 import { type Place, Sheet } from "./sheets";
 import { type Box, firstView, fromAddress, toAddress, Undo, type View } from "./state";
 import { Values } from "./values";
-import { $, differing, marked, notes, options, type Says, type Status } from "./words";
+import { $, differing, marked, notes, only, options, type Says, type Status } from "./words";
 
 /** drag: the finger is down; past: from the list of undo; shown: the motion and the curves are of it already. */
 interface Change { drag?: boolean; past?: boolean; shown?: boolean }
 /** Milliseconds: rest before a start is settled, before a map of another view, between coarse maps of a drag, before a view is kept for undo. */
 const SETTLE = 300, REST = 150, COARSE = 250, KEEP = 400;
+/** Milliseconds without an answer after which what follows a slider is dimmed. */
+const LATE = 250;
 const SIZES = [50, 100, 160, 250, 400, 700, 1000], ALL_POINTS = 1000;
 
 export class Explorer {
   view: View; readonly first: View; map: BasinMap; history: History; phase: Phase; responses: Responses; values: Values; private contacts: Contacts; readonly save: SaveSheet;
   motion: Motion | null = null; maps = new Map<number, Sheet>();
   private undo: Undo; private orbit: Head | null = null; private settled: Head | null = null; private timers: Record<string, number> = {};
-  private kept = ""; private dragging = false; private coarse = 0; private begun = 0; private typed: { key: string; id: number } | null = null; private whole: Box;
+  private kept = ""; private dragging = false; private dragged = ""; private heard = 0; private coarse = 0; private begun = 0; private typed: { key: string; id: number } | null = null; private whole: Box;
 
   constructor(readonly about: About, private link: Link, private status: Status, private says: Says, address: string | null) {
     this.first = firstView(about);
@@ -76,7 +78,12 @@ export class Explorer {
     if (values) this.track();
     if (values || start) this.later("settle", SETTLE, () => this.settleNow(), this.dragging);
   }
-  private later(name: string, wait: number, what: () => void, hold = false): void { clearTimeout(this.timers[name]); if (!hold) this.timers[name] = window.setTimeout(what, wait); }
+  private later(name: string, wait: number, what: () => void, hold = false): void {
+    clearTimeout(this.timers[name]); delete this.timers[name];
+    if (!hold) this.timers[name] = window.setTimeout(() => { delete this.timers[name]; what(); }, wait);
+  }
+  /** True if all that was asked is answered, and nothing is going to be. */
+  get rests(): boolean { return this.link.quiet && Object.keys(this.timers).length === 0 && this.motion !== null; }
   private keep(): void {
     const address = toAddress(this.view, this.first);
     if (address !== this.kept) { this.kept = address; this.undo.push(this.view, address); } else this.undo.replace(this.view, address);
@@ -102,8 +109,10 @@ export class Explorer {
   /** Rule one: every panel says of which values it is. */
   private marks(): void {
     const { about, view } = this, now = view.values;
-    marked("motion", differing(about, this.motion?.head.values, now)); marked("phase", differing(about, this.motion?.head.values, now));
-    marked("orbit", differing(about, this.orbit?.values, now));
+    for (const [panel, head] of [["motion", this.motion?.head], ["phase", this.motion?.head], ["orbit", this.orbit]] as const) {
+      const apart = differing(about, head?.values, now), follows = this.dragging && this.dragged !== "" && head != null;
+      if (follows) marked(panel, only(about, this.dragged, head.values), apart !== "" && performance.now() - this.heard > LATE); else marked(panel, apart);
+    }
     marked("responses", this.responses.head ? differing(about, this.responses.head.values, now, [this.responses.head.parameter]) : "");
     const under = this.map.under, of = under ? differing(about, under.values, now) : "";
     $("map-of").textContent = of ? `pale: ${of}` : this.map.paler ? "pale: cells of another view" : ""; $("map").classList.toggle("stale", of !== "");
@@ -154,7 +163,7 @@ export class Explorer {
     if (wait <= 0) { this.coarse = performance.now(); this.askMap(true); } else this.later("map", wait, () => { this.coarse = performance.now(); this.askMap(this.dragging); });
   }
   private askMap(coarse = false): void {
-    clearTimeout(this.timers.map);
+    clearTimeout(this.timers.map); delete this.timers.map;
     const fields = this.mapFields(), key = this.mapKey(fields), v = this.view, { axes, size, values, ...plane } = fields;
     let sheet = this.map.sheets.get(key);
     if (this.map.sheet && this.map.sheet !== sheet && !this.map.sheet.known) this.map.sheets.drop(this.map.sheet);
@@ -167,7 +176,7 @@ export class Explorer {
   }
 
   // -- what the user does -------------------------------------------------------------------------------------------------------
-  private slide(name: string, value: number, done: boolean): void { this.values.refuse(`values.${name}`, ""); this.go({ values: { ...this.view.values, [name]: value } }, { drag: !done }); }
+  private slide(name: string, value: number, done: boolean): void { this.values.refuse(`values.${name}`, ""); this.dragged = name; this.go({ values: { ...this.view.values, [name]: value } }, { drag: !done }); if (done) { this.dragged = ""; this.marks(); } }
   private type(group: "values" | "start", name: string, text: string): void {
     const fields = this.motionFields(), id = this.link.ask("motion", { ...fields, [group]: { ...(fields[group] as object), [name]: text } });
     this.typed = { key: `${group}.${name}`, id };
@@ -175,12 +184,12 @@ export class Explorer {
   private orbitOf(choice: { point?: number; event?: number }): void { const key = this.responses.head?.key; if (key !== undefined) this.go({ orbit: { responses: key, ...choice } }); }
   private attractor(key: number): void { this.go({ orbit: this.view.orbit?.attractor === key ? null : { attractor: key } }); }
   leaveOrbit(): void { this.go({ orbit: null }); this.status.say("the motion from the start"); }
-  stop(): void { for (const name of ["map", "settle"]) clearTimeout(this.timers[name]); this.link.tell("stop"); this.askedValues = ""; this.status.say("stopped"); }
+  stop(): void { for (const name of ["map", "settle"]) { clearTimeout(this.timers[name]); delete this.timers[name]; } this.link.tell("stop"); this.askedValues = ""; this.status.say("stopped"); }
   back(): void { this.undo.undo(); }
   forth(): void { this.undo.redo(); }
 
   private wholeOf([a, b]: [string, string]): Box {
-    const own = (name: string): Range => this.about.axes[name] ?? (this.about.ranges?.[name] as Range | undefined) ?? [-1, 1];
+    const own = (name: string): Range => this.about.axes[name] ?? (this.about.ranges?.[name]) ?? [-1, 1];
     return [...own(a), ...own(b)];
   }
   private controls(): void {
@@ -248,11 +257,12 @@ export class Explorer {
     const why = String(head.why), field: string = head.field ?? "";
     if (head.ask === "save" && this.save.shown) return this.save.refuse(why);
     if (field && this.values.refuse(field, why)) return;
+    if (head.ask === "track" && !this.view.orbit) return clearOrbit(why);
     if ((head.ask === "orbit" || head.ask === "track") && this.view.orbit) this.go({ orbit: null }, { past: true });
     this.says.say(why);
   }
   private showMotion(head: Head, arrays: Arrays): void {
-    this.motion = motionOf(head, arrays); const { history, phase } = this.view;
+    this.heard = performance.now(); this.motion = motionOf(head, arrays); const { history, phase } = this.view;
     this.history.show(this.motion, history); this.phase.show(this.motion, phase);
     this.later("contacts", this.dragging ? 120 : 0, () => { if (this.motion) this.contacts.show(this.motion); });
     notes($("motion-words"), head.words); $("motion-what").textContent = this.motionText();

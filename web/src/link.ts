@@ -80,7 +80,8 @@ export class Link {
 
   private send(message: Question): void { if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(message)); }
 
-  get open_(): boolean { return this.welcome; }
+  /** True if all that was asked is answered. */
+  get quiet(): boolean { return this.welcome && this.asked.size === 0; }
 
   /** Ask now; gives the number of the question, or -1 while there is no line. */
   ask(kind: string, fields: Question = {}): number {

@@ -36,12 +36,12 @@ export const stability = (stable: boolean | null | undefined): string => (stable
 export function showLegend(about: About, attractors: Attractor[], codes: [string, number[], string][], chosen: number | null, choose: (key: number) => void): void {
   const first = about.quantities[0], body = $("legend").querySelector("tbody")!, focused = document.activeElement?.getAttribute("data-key");
   const rows = [...attractors].sort((a, b) => a.order - b.order).map(one => {
-    const row = cells("td", ["", first && one.peak[first.name] != null ? spoken(one.peak[first.name], first.unit, 3) : "", share(one), stability(one.stable)]), button = element("button");
+    const row = cells("td", ["", first && one.peak[first.name] != null ? spoken(one.peak[first.name], first.unit, 3) : "", one.contacts == null ? "" : digits(one.contacts, 3), share(one)]), button = element("button");
     button.type = "button"; button.dataset.key = String(one.key); button.setAttribute("aria-pressed", String(chosen === one.key)); button.title = "show this orbit, the others grey";
     button.append(swatch(about.hues[one.hue % about.hues.length]), one.name); button.onclick = () => choose(one.key); row.cells[0].append(button);
     return row;
   });
-  for (const [name, colour, text] of codes) { const row = cells("td", ["", "", text, ""]), box = element("span"); box.append(swatch(colour), ` ${name}`); row.cells[0].append(box); rows.push(row); }
+  for (const [name, colour, text] of codes) { const row = cells("td", ["", "", "", text]), box = element("span"); box.append(swatch(colour), ` ${name}`); row.cells[0].append(box); rows.push(row); }
   body.replaceChildren(...rows);
   if (focused) body.querySelector<HTMLElement>(`[data-key="${CSS.escape(focused)}"]`)?.focus();
 }

@@ -67,6 +67,8 @@ export class Responses {
     for (let i = 0; i < this.x.length; i++) { const r = (p.X(this.x[i]) - px) ** 2 + (p.Y(this.y[i]) - py) ** 2; if (r < least) { least = r; best = { point: i }; } }
     return best;
   }
+  /** The pixel of a point, from the canvas's corner. */
+  pixel([x, y]: [number, number]): [number, number] { return [this.plot!.X(x), this.plot!.Y(y)]; }
   /** A point or an event in words. */
   text(choice: { point?: number; event?: number }): string {
     const head = this.head!, ux = parameterOf(this.about, head.parameter)?.unit ?? "", uy = unitOf(this.about, head.quantity), a = this.a;

@@ -50,9 +50,11 @@ export function differing(about: About, of: Record<string, number> | undefined, 
   const first = apart.slice(0, 2).map(p => `${plain(p.name)} ${spoken(of[p.name], p.unit, 5)}`).join(", ");
   return `of ${first}${apart.length > 2 ? ` and ${apart.length - 2} more` : ""}`;
 }
+/** The value of one parameter: `of frequency 15.9 Hz`. */
+export const only = (about: About, name: string, of: Record<string, number>): string => `of ${plain(name)} ${spoken(of[name], about.parameters.find(p => p.name === name)?.unit ?? "", 5)}`;
 const same = (a: number, b: number): boolean => a === b || Math.abs(a - b) <= 1e-12 * Math.max(Math.abs(a), Math.abs(b));
 
-/** Mark a panel as being of other values. */
-export function marked(panel: string, text: string): void {
-  $(`${panel}-of`).textContent = text; $(panel).classList.toggle("stale", text !== "");
+/** Mark a panel as being of other values; dimmed, but where new ones are on their way. */
+export function marked(panel: string, text: string, dim = text !== ""): void {
+  $(`${panel}-of`).textContent = text; $(panel).classList.toggle("stale", dim);
 }
