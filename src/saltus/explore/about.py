@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from saltus.analysis.basins.labels import OPEN
 from saltus.explore.frames import Answer
 from saltus.explore.opening import STEPS, Opening
 from saltus.flow.methods import METHODS, Modal
@@ -19,8 +20,6 @@ from saltus.units import from_si, to_si
 
 #: Hues, and shades of each, that a page is sent.
 HUES, SHADES = 24, 13
-#: Code of a start that isn't settled yet.
-OPEN = min(Kind) - 2
 #: Words and colours of codes, as in sl.plot.basins; an own one of what is under way.
 CODES: Mapping[int, tuple[str, str]] = {
     Kind.ESCAPED: ("escaped", "#BDBDBD"),

@@ -49,8 +49,8 @@ class KnownAttractors:
     ) -> None:
         self.map, self.scale = map_, scale
         self.found = AttractorSet(Neighbourhoods.none(len(map_.states)))
-        self.complete = False  # whether a whole sample of starts was looked through
-        self.lock = threading.RLock()
+        self.scouts = 0  # starts that were looked through for them
+        self.lock, self.scouting = threading.RLock(), threading.Lock()
         self._members: list[Attractor] = []
         self._hues: list[int] = []
         self._table: AttractorTable | None = None
@@ -62,8 +62,11 @@ class KnownAttractors:
         return len(self._members)
 
     def grow(self, found: AttractorSet) -> bool:
-        """Take what was found meanwhile; True if an attractor is new."""
+        """Take what was found meanwhile; True if an attractor is new. What others found while that
+        was looked for stays.
+        """
         with self.lock:
+            found = self._joined(found)
             fresh = [one for one in found.every if self._key(one) is None]
             self.found = found
             fresh = fresh[: MOST - len(self._members)]
@@ -72,6 +75,20 @@ class KnownAttractors:
             if fresh:
                 self._table = None
             return bool(fresh)
+
+    def _joined(self, found: AttractorSet) -> AttractorSet:
+        """A set, and what is known besides."""
+        more = [
+            one
+            for one in self.found.every
+            if not any(_alike(one, other, self.scale) for other in found.every)
+        ]
+        for one in more:
+            if isinstance(one, ClosedMotion):
+                found.add(self.map, one, self.scale)
+            else:
+                found.add_sampled(one)
+        return found.ordered(self.scale) if more else found
 
     def keys(self, found: AttractorSet | None = None) -> np.ndarray:
         """The key of each id of a set, int64[m]; -1 for one that isn't known."""

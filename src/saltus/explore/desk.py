@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Generator, Mapping
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
+from saltus.analysis.basins.pipeline import BasinPlan, basin_plan
 from saltus.analysis.inputs.starts import ensemble
 from saltus.errors import ParameterError, unknown
 from saltus.explore import questions as asked
 from saltus.explore.about import about_answer, models_answer
-from saltus.explore.frames import Answer
+from saltus.explore.attractors import KnownAttractors
+from saltus.explore.frames import Answer, Emit
+from saltus.explore.map import KeptMaps, grow_map, plan_of_map
 from saltus.explore.motion import AskedRun, motion
 from saltus.explore.opening import Opening
+from saltus.explore.orbits import MOST_PERIODS, attractor_orbit, settle
 from saltus.explore.questions import QuestionError, about
 from saltus.flow.methods import METHODS, Method
 from saltus.system import System
@@ -42,15 +47,20 @@ class Desk:
 
     def __init__(self, opening: Opening, threads: int | None = None) -> None:
         self.opening, self.threads = opening, threads
-        self._lock = threading.Lock()
-        self._answers: Mapping[type, Callable[[Any], Generator[Answer]]] = {
+        self._lock = threading.RLock()
+        self._plans: OrderedDict[Any, BasinPlan] = OrderedDict()
+        self._known: OrderedDict[Any, KnownAttractors] = OrderedDict()
+        self._maps = KeptMaps()
+        self._answers: Mapping[type, Callable[[Any], Answer]] = {
             asked.About: self._about,
             asked.Open: self._about,
             asked.MotionQuestion: self._motion,
+            asked.Settle: self._settle,
+            asked.OrbitQuestion: self._orbit,
         }
 
-    def answers(self, question: asked.Question) -> Generator[Answer]:
-        """The answers to a question, as they are ready.
+    def answer(self, question: asked.Question, emit: Emit) -> None:
+        """Answer a question: ``emit(head, arrays)`` for each answer, as it is ready.
 
         Raises
         ------
@@ -59,10 +69,13 @@ class Desk:
         Interrupted
             If the work is asked to stop (:class:`saltus.interrupt.Stop`).
         """
+        if isinstance(question, asked.MapQuestion):
+            self._map(question, emit)
+            return
         answer = self._answers.get(type(question))
         if answer is None:
             raise QuestionError(f"{question.ask} isn't answered here.", "ask")
-        yield from answer(question)
+        emit(*answer(question))
 
     # -- what questions share ----------------------------------------------------------------------
     def system_at(self, values: Mapping[str, asked.Number]) -> System:
@@ -102,10 +115,10 @@ class Desk:
         return names
 
     # -- answers -----------------------------------------------------------------------------------
-    def _about(self, question: asked.Question) -> Generator[Answer]:  # noqa: ARG002
-        yield about_answer(self.opening)
+    def _about(self, question: asked.Question) -> Answer:  # noqa: ARG002
+        return about_answer(self.opening)
 
-    def _motion(self, question: asked.MotionQuestion) -> Generator[Answer]:
+    def _motion(self, question: asked.MotionQuestion) -> Answer:
         begun = time.thread_time()
         system = self.system_at(question.values)
         method = self.method_of(question.method)
@@ -127,7 +140,54 @@ class Desk:
             question.errors == "measured",
         )
         head, arrays = motion(run, self.quantities_of(question.quantities), other)
-        yield {**head, "ms": 1e3 * (time.thread_time() - begun)}, arrays
+        return {**head, "ms": 1e3 * (time.thread_time() - begun)}, arrays
+
+    def _map(self, question: asked.MapQuestion, emit: Emit) -> None:
+        system, method = self.system_at(question.values), self.method_of(question.method)
+        plan = plan_of_map(question, system, method)
+        grow_map(plan, self.known_at(plan), self._maps, emit, question.coarse, self.threads)
+
+    def _settle(self, question: asked.Settle) -> Answer:
+        system, method = self.system_at(question.values), self.method_of(question.method)
+        known = self.known_at(self.plan_of(system, method))
+        return settle(
+            known, self.start_of(system, question.start), method, self.quantities_of(None)
+        )
+
+    def _orbit(self, question: asked.OrbitQuestion) -> Answer:
+        system, method = self.system_at(question.values), self.opening.method
+        known = self.known_at(self.plan_of(system, method))
+        if question.attractor is None or known.row(question.attractor) is None:
+            raise QuestionError(
+                f"no attractor {question.attractor} is known at these values.", "attractor"
+            )
+        return attractor_orbit(known, question.attractor, method, self.quantities_of(None))
+
+    # -- what is known of values -------------------------------------------------------------------
+    def plan_of(self, system: System, method: Method) -> BasinPlan:
+        """The map of the opening at some values, of a few cells: its scale, and how often motions
+        without forcing are looked at.
+        """
+        key = (tuple(system.values.values()), method)
+        with self._lock:
+            plan = self._plans.get(key)
+        if plan is None:
+            axes = {name: (*ends, 2) for name, ends in self.opening.axes.items()}
+            plan = basin_plan(system, axes, self.opening.at, method, MOST_PERIODS, None)
+            with self._lock:
+                keep(self._plans, key, plan, KEPT_VALUES)
+        return plan
+
+    def known_at(self, plan: BasinPlan) -> KnownAttractors:
+        """The attractors that are known at the values of a map, as they are found."""
+        key = (tuple(plan.system.values.values()), plan.method, plan.every)
+        with self._lock:
+            if key not in self._known:
+                before = next(reversed(self._known.values()), None)
+                scale = self.plan_of(plan.system, plan.method).scale
+                keep(self._known, key, KnownAttractors(plan.map(1), scale, before), KEPT_VALUES)
+            self._known.move_to_end(key)
+            return self._known[key]
 
     def period_of(self, system: System) -> float:
         """The forcing period at these values; without forcing the turn of the opening [s]."""
@@ -136,14 +196,21 @@ class Desk:
         return float(np.ravel(system.period(system.values))[0])
 
 
+def keep(kept: OrderedDict[Any, Any], key: Any, value: Any, most: int) -> None:
+    """Keep a value; the oldest are dropped."""
+    kept[key] = value
+    while len(kept) > most:
+        kept.popitem(last=False)
+
+
 class Models:
     """Answers before a system is chosen: the models of saltus."""
 
-    def answers(self, question: asked.Question) -> Generator[Answer]:
+    def answer(self, question: asked.Question, emit: Emit) -> None:
         """The list of models. Raises QuestionError for any other question."""
         if not isinstance(question, asked.About):
             raise QuestionError("choose a model first.", "ask")
-        yield models_answer()
+        emit(*models_answer())
 
 
 def named_method(name: str, opening: Opening) -> Method:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import json
 import math
 import struct
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias
 
 import numpy as np
 
 #: What answers a question: a head that JSON can hold, and arrays by name.
 Answer: TypeAlias = tuple[Mapping[str, Any], Mapping[str, np.ndarray]]
+#: What takes an answer.
+Emit: TypeAlias = Callable[[Mapping[str, Any], Mapping[str, np.ndarray]], None]
 #: Types of arrays that a page can view in place, little endian.
 TYPES = ("f4", "f8", "u1", "i1", "u2", "u4", "i4")
 #: Heads and arrays begin at multiples of this [bytes].

@@ -10,16 +10,15 @@ import threading
 import time
 import traceback
 from collections import deque
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing
 from typing import Any, Protocol
 
 import numpy as np
 
 from saltus.announce import announcing_to
 from saltus.errors import SaltusError
-from saltus.explore.frames import Answer, packed
+from saltus.explore.frames import Emit, packed
 from saltus.explore.questions import (
     Open,
     Pause,
@@ -47,8 +46,8 @@ LOOK = 0.1
 class AnswersQuestions(Protocol):
     """A desk: it answers a question by one answer or several, while it works."""
 
-    def answers(self, question: Question) -> Generator[Answer]:
-        """The answers."""
+    def answer(self, question: Question, emit: Emit) -> None:
+        """Answer a question: ``emit(head, arrays)`` for each answer, from this thread."""
 
 
 class Outbox:
@@ -237,18 +236,20 @@ class Session:
         """Answer a question, whatever happens."""
         window = threading.Semaphore(WINDOW)
         self._windows[question.id] = window
+
+        def emit(head: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> None:
+            if head["kind"] == "map-piece":
+                self._wait(window, stop)
+            whose = {"ask": question.ask, "id": question.id}
+            self._outbox.put(packed({**head, **whose}, arrays), stop)
+
         try:
             with (
                 stop,
                 np.errstate(all="ignore"),
                 announcing_to(lambda text: self._outbox.put(_waits(question, text))),
-                closing(self._answers(question)) as answers,
             ):
-                for head, arrays in answers:
-                    if head["kind"] == "map-piece":
-                        self._wait(window, stop)
-                    whose = {"ask": question.ask, "id": question.id}
-                    self._outbox.put(packed({**head, **whose}, arrays), stop)
+                self._desk_for(question).answer(question, emit)
         except KeyboardInterrupt:
             self._outbox.put(packed(_stopped(question), {}))
         except (SaltusError, MemoryError) as error:
@@ -258,12 +259,13 @@ class Session:
         finally:
             self._windows.pop(question.id, None)
 
-    def _answers(self, question: Question) -> Generator[Answer]:
+    def _desk_for(self, question: Question) -> AnswersQuestions:
+        """The desk; that of another model from where the page opens one."""
         if isinstance(question, Open):
             if self._opened is None:
                 raise QuestionError("the system was chosen where the explorer was started.")
             self._desk = self._opened(question.model)
-        yield from self._desk.answers(question)
+        return self._desk
 
     def _wait(self, window: threading.Semaphore, stop: Stop) -> None:
         """Wait until the page has seen enough pieces, and is looked at."""

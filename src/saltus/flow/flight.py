@@ -1,4 +1,6 @@
-"""Flights: many trajectories moved some periods at a time; those that have arrived are dropped."""
+"""Flights: many trajectories moved some periods at a time; those that have arrived are dropped,
+and others may take their places.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +45,7 @@ _FOLLOW = (
 
 
 class Flight:
-    """Trajectories of one system on one thread, all of the same age in forcing periods.
+    """Trajectories of one system on one thread.
 
     Parameters
     ----------
@@ -80,7 +82,7 @@ class Flight:
         self._arrays["options"] = options_of(method, longest, count)
         self._parameters = parameters
         self._data, self._due = tables_of(system.origin), method.due(longest)
-        self.age = 0
+        self.age = 0  # of those that were launched here [periods]
 
     def __len__(self) -> int:
         return len(self._arrays["status"])
@@ -103,10 +105,15 @@ class Flight:
     @property
     def going(self) -> np.ndarray:
         """True where a trajectory can go on, bool[k]."""
-        return np.isin(self.status, (st.RUNNING, st.OK, st.GRAZE_UNRESOLVED))
+        status = self.status
+        going: np.ndarray = (
+            (status == st.OK) | (status == st.RUNNING) | (status == st.GRAZE_UNRESOLVED)
+        )
+        return going
 
-    def advance(self, periods: int) -> np.ndarray:
-        """Move on by whole periods.
+    def advance(self, periods: int, last: int | None = None) -> np.ndarray:
+        """Move on by whole periods, those of age ``last`` no farther. The ages of two trajectories
+        are equal, or ``periods`` apart at least.
 
         Returns
         -------
@@ -117,14 +124,21 @@ class Flight:
         arrays = self._arrays
         k, states = arrays["state"].shape
         arrays["status"][self.going] = st.RUNNING
-        arrays["end_count"] = np.full(k, self.age + periods, np.int64)
-        samples = np.full((k, periods, states), np.nan)
-        schedule = Schedule.even(periods, 1, self.age + 1)
+        # the samples of every age that occurs, one age after the other; each trajectory begins at
+        # those of its own
+        ages, own = np.unique(arrays["end_count"], return_inverse=True)
+        count = (ages[:, None] + np.arange(1, periods + 1)).ravel()
+        arrays["end_count"] = arrays["end_count"] + periods
+        if last is not None:
+            arrays["end_count"] = np.minimum(arrays["end_count"], last)
+        samples = np.empty((k, len(ages), periods, states))
+        samples[np.arange(k), own] = np.nan
+        schedule = Schedule(count, np.zeros(len(count)))
         call = arrays | shared_arrays(k, self._parameters, schedule, self._data)
         call |= {
-            "cursor": np.zeros(k, np.int64),
-            "samples": samples,
-            "sample_mode": np.zeros((k, periods), np.int64),
+            "cursor": own * periods,
+            "samples": samples.reshape(k, -1, states),
+            "sample_mode": np.empty((k, len(count)), np.int64),
         }
         call["rec_i"], call["rec_f"] = ContactTable.empty(0, states).arrays
         move = self._module.bound(
@@ -132,7 +146,14 @@ class Flight:
         )
         move_to_end(move, arrays, self._due)
         self.age += periods
-        return samples
+        return samples[np.arange(k), own] if len(ages) != 1 else samples[:, 0]
+
+    def add(self, other: Flight) -> None:
+        """Take in the trajectories of another flight of the same map, behind these."""
+        if len(self._parameters) > 1:
+            self._parameters = np.concatenate([self._parameters, other._parameters])
+        for name in _FOLLOW:
+            self._arrays[name] = np.concatenate([self._arrays[name], other._arrays[name]])
 
     def keep(self, wanted: np.ndarray) -> None:
         """Keep only the wanted trajectories, bool[k]."""

@@ -8,7 +8,7 @@ import copy
 import functools
 import threading
 from collections.abc import Mapping
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -62,8 +62,11 @@ class Travel(Protocol):
     def unresolved(self) -> np.ndarray:
         """Grazes too shallow to be certain, int64[k]."""
 
-    def advance(self, periods: int) -> np.ndarray:
-        """States at the next iterates, float64[k, periods, D]."""
+    def advance(self, periods: int, last: int | None = None) -> np.ndarray:
+        """States at the next iterates, float64[k, periods, D]; NaN beyond an age of ``last``."""
+
+    def add(self, other: Any) -> None:
+        """Take in the trajectories of another travel of the same map, behind these."""
 
     def keep(self, wanted: np.ndarray) -> None:
         """Keep only the wanted trajectories, bool[k]."""

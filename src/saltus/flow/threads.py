@@ -32,9 +32,11 @@ def on_threads(
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
     stop: Stop | None = None,
+    every: float = 0.1,
 ) -> None:
     """Call ``work(item)`` for every item, and ``done(item, result)`` from this thread as each is
-    ready, in any order.
+    ready, in any order. ``progress(share)`` is called from this thread too, after ``every`` seconds
+    at most.
 
     Raises whatever a piece raises. On that, and on Ctrl-C, ``stop`` is set, pieces under way are
     waited for and the rest is left. What a piece calls asks ``stop`` too, threads of its own
@@ -66,7 +68,7 @@ def on_threads(
         try:
             waiting |= {pool.submit(copy_context().run, run_item, item) for item in items}
             while waiting:
-                ready, waiting = wait(waiting, timeout=0.1, return_when=FIRST_COMPLETED)
+                ready, waiting = wait(waiting, timeout=every, return_when=FIRST_COMPLETED)
                 for result in (future.result() for future in ready):
                     if result is not None:  # None: left out, because the work is to stop
                         done(*result)

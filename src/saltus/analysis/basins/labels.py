@@ -5,7 +5,7 @@ part can be computed anywhere.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -68,8 +68,114 @@ class Settling:
 
     def put(self, where: np.ndarray | slice, other: Settling) -> None:
         """Write the outcomes of other starts to these indices."""
-        for name in ("label", "periods", "status", "unresolved", "end"):
-            getattr(self, name)[where] = getattr(other, name)
+        for field in fields(self):
+            getattr(self, field.name)[where] = getattr(other, field.name)
+
+    def of(self, where: np.ndarray) -> Settling:
+        """The outcomes of some of the starts."""
+        return Settling(*(getattr(self, field.name)[where] for field in fields(self)))
+
+
+class Wanderers:
+    """Trajectories of any ages on their way to attractors, on one thread.
+
+    Parameters
+    ----------
+    map_ : Map
+        The map.
+    found : AttractorSet
+        The attractors that capture them.
+    most : int
+        Iterates after which one is given up.
+    size : int
+        States.
+    """
+
+    def __init__(self, map_: Map, found: AttractorSet, most: int, size: int) -> None:
+        self._map, self._found, self._most = map_, found, most
+        self._travel: Travel | None = None
+        self._window = min(APERIODIC_WINDOW, most) if found.sampled else 0
+        self._iterates = np.zeros((0, self._window, size))
+        #: Numbers and ages [iterates] of those that are under way, int64[k].
+        self.who, self.age = np.zeros((2, 0), np.int64)
+
+    def __len__(self) -> int:
+        return len(self.who)
+
+    def add(self, who: np.ndarray, start: np.ndarray) -> None:
+        """Send off more from float64[k, D], under their numbers int64[k]."""
+        fresh = self._map.launch(start, self._most)
+        if self._travel is not None and len(self):
+            self._travel.add(fresh)
+        else:
+            self._travel = fresh
+        unseen = np.full((len(who), *self._iterates.shape[1:]), np.nan)
+        self._iterates = np.concatenate([self._iterates, unseen])
+        self.who = np.concatenate([self.who, who])
+        self.age = np.concatenate([self.age, np.zeros(len(who), np.int64)])
+
+    def go_on(self) -> tuple[np.ndarray, Settling]:
+        """Move all by :data:`BLOCK` iterates. Returns those that have arrived, or can't go on, and
+        those given up, whose code is :data:`OPEN`: numbers int64[m] and outcomes.
+        """
+        travel, most = self._travel, self._most
+        assert travel is not None
+        if (self.age == self.age[0]).all():
+            points = travel.advance(min(BLOCK, most - int(self.age[0])))
+        else:
+            points = travel.advance(BLOCK, most)
+        label, when = self._found.near.capture(points)
+        periods = self.age + when + 1
+        moved = np.minimum(points.shape[1], most - self.age)
+        self.age = self.age + moved
+        if self._window:
+            self._keep_to_sampled(points, moved, label, periods)
+        going = travel.going
+        ended = np.where(travel.status == st.NONFINITE, Kind.ESCAPED, Kind.FAILED)
+        label = np.where(label >= 0, label, np.where(going, OPEN, ended))
+        return self._let_go(~going | (label >= 0) | (self.age >= most), label, periods)
+
+    def give_up(self, which: np.ndarray) -> tuple[np.ndarray, Settling]:
+        """Return some, bool[k], as :meth:`go_on` returns those that are given up."""
+        return self._let_go(which, np.full(len(self), OPEN), self.age)
+
+    def _let_go(
+        self, which: np.ndarray, label: np.ndarray, periods: np.ndarray
+    ) -> tuple[np.ndarray, Settling]:
+        """Return some, with labels and periods of all, and keep the others."""
+        travel, leaves = self._travel, np.flatnonzero(which)
+        assert travel is not None
+        label, who = label[leaves], self.who[leaves]
+        left = Settling(
+            label,
+            np.where(label >= 0, periods[leaves], -1),
+            travel.status[leaves],
+            travel.unresolved[leaves],
+            travel.state[leaves],
+        )
+        if len(leaves):
+            travel.keep(~which)
+            self.who, self.age = self.who[~which], self.age[~which]
+            self._iterates = self._iterates[~which]
+        return who, left
+
+    def _keep_to_sampled(
+        self, points: np.ndarray, moved: np.ndarray, label: np.ndarray, periods: np.ndarray
+    ) -> None:
+        """Note in ``label`` and ``periods`` who keeps to an attractor that is known by where it
+        goes: asked of each every :data:`APERIODIC_WINDOW` iterates, and at last.
+        """
+        ages, found = self.age, self._found
+        rows, last = np.arange(len(ages))[:, None], np.arange(self._window)
+        seen = np.concatenate([self._iterates, points], axis=1)
+        self._iterates = seen[rows, moved[:, None] + last]
+        asked = np.flatnonzero((ages % APERIODIC_WINDOW == 0) | (ages >= self._most))
+        if not len(asked):
+            return
+        on = keeps_to_sampled(found, self._iterates[asked], found.sampled[0].scale)
+        here = (label[asked] < 0) & (on >= 0)
+        label[asked[here]] = len(found.orbits) + on[here]
+        periods[asked[here]] = ages[asked[here]]
 
 
 def settle(map_: Map, start: np.ndarray, found: AttractorSet, most: int) -> Settling:
@@ -77,29 +183,11 @@ def settle(map_: Map, start: np.ndarray, found: AttractorSet, most: int) -> Sett
     iterates at most.
     """
     result = Settling.empty(len(start), start.shape[1])
-    travel, who = map_.launch(start, most), np.arange(len(start))
-    iterates = np.zeros((len(start), 0, start.shape[1]))
-    while len(who) and travel.age < most:
-        points = travel.advance(min(BLOCK, most - travel.age))
-        label, when = found.near.capture(points)
-        periods = travel.age - points.shape[1] + when + 1
-        if found.sampled:
-            iterates = np.concatenate([iterates, points], axis=1)[:, -APERIODIC_WINDOW:]
-            if travel.age % APERIODIC_WINDOW == 0 or travel.age >= most:
-                on = keeps_to_sampled(found, iterates, found.sampled[0].scale)
-                here = (label < 0) & (on >= 0)
-                label[here], periods[here] = len(found.orbits) + on[here], travel.age
-        going = travel.going & (label < 0)
-        leaves = np.flatnonzero(~going)
-        label[leaves] = np.where(
-            label[leaves] >= 0,
-            label[leaves],
-            np.where(travel.status[leaves] == st.NONFINITE, Kind.ESCAPED, Kind.FAILED),
-        )
-        _write(result, who[leaves], label[leaves], periods[leaves], travel, leaves)
-        travel.keep(going)
-        who, iterates = who[going], iterates[going]
-    _write(result, who, np.full(len(who), OPEN), np.full(len(who), -1), travel, np.arange(len(who)))
+    under_way = Wanderers(map_, found, most, start.shape[1])
+    if len(start):
+        under_way.add(np.arange(len(start)), start)
+    while len(under_way):
+        result.put(*under_way.go_on())
     return result
 
 
@@ -118,19 +206,6 @@ def settle_all(
         lambda piece: settle(map_, start[piece], found, most), pieces, result.put, threads, progress
     )
     return result
-
-
-def _write(
-    result: Settling,
-    who: np.ndarray,
-    label: np.ndarray,
-    periods: np.ndarray,
-    travel: Travel,
-    rows: np.ndarray,
-) -> None:
-    result.label[who], result.periods[who] = label, np.where(label >= 0, periods, -1)
-    result.status[who], result.unresolved[who] = travel.status[rows], travel.unresolved[rows]
-    result.end[who] = travel.state[rows]
 
 
 def complete(

@@ -21,6 +21,7 @@ from saltus.analysis.attractors.noisy import stray_attrs
 from saltus.analysis.attractors.portrait import portraits
 from saltus.analysis.basins import uncertainty
 from saltus.analysis.basins.labels import OPEN, Settling, complete, settle
+from saltus.analysis.basins.levels import Level, levels_of
 from saltus.analysis.closed.turns import ASKED, looks_every
 from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.inputs.axes import along, count_along
@@ -130,11 +131,18 @@ class BasinPlan:
         """Cells of a chunk, int64[k]."""
         return np.arange(chunk * CHUNK, min((chunk + 1) * CHUNK, self.cells))
 
+    def levels(self) -> list[Level]:
+        """Its cells coarse to fine, each level from the middle of the map outwards."""
+        return levels_of(self.shape)
+
     # -- the three stages --------------------------------------------------------------------------
     def scout(
-        self, threads: int | None = None, progress: Callable[[float], None] | None = None
+        self,
+        threads: int | None = None,
+        progress: Callable[[float], None] | None = None,
+        known: AttractorSet | None = None,
     ) -> AttractorSet:
-        """The attractors that a fixed quasi-random sample of the box leads to."""
+        """The attractors that a fixed quasi-random sample of the box leads to, and known ones."""
         unit = halton(self.scouts, 2)
         low, high = (
             np.array([end(values) for values in self.axes.values()]) for end in (np.min, np.max)
@@ -145,7 +153,8 @@ class BasinPlan:
             fill(self.system, drawn, self.fixed),
             self.scale,
             self.periods,
-            progress=progress,
+            known,
+            progress,
         )[0]
 
     def sample(self, count: int) -> np.ndarray:

@@ -11,6 +11,7 @@ within one sequence of contacts the return map is smooth.
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
@@ -71,7 +72,7 @@ class Neighbourhoods:
                 self.centres,
                 self.weights,
                 self.owners,
-                self._extents(),
+                self._extents,
                 label,
                 when,
             )
@@ -105,6 +106,7 @@ class Neighbourhoods:
             self.centres[rows], self.weights[rows], np.searchsorted(kept, self.owners[rows])
         )
 
+    @functools.cached_property
     def _extents(self) -> np.ndarray:
         """Half the extent of each along the first coordinate, float64[m]: sqrt of the corner of
         (W'W)^-1.

@@ -1,0 +1,226 @@
+"""A basin map that grows: its cells as they settle, coarse to fine, for who looks at it meanwhile.
+
+Each thread follows a pool of starts. Those that have settled are handed on after every few
+iterates, and new ones take their places, so that no lane waits for the slowest start. Every cell is
+labelled as by :func:`saltus.basins`: in what order starts are followed, and beside which others,
+changes no bit of them.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from queue import Empty, SimpleQueue
+
+import numpy as np
+
+from saltus.analysis.attractors.attractor_set import AttractorSet
+from saltus.analysis.basins.labels import OPEN, Settling, Wanderers
+from saltus.analysis.basins.levels import stride_of
+from saltus.analysis.basins.pipeline import BasinPlan
+from saltus.flow.maps import Stroboscope
+from saltus.flow.threads import on_threads, usable_processors
+from saltus.results.dataset.kinds import Kind
+
+#: Starts that one thread follows at a time: fewer leave lanes empty, more delay the first cells.
+POOL = 1024
+#: New starts are sent off when a pool has shrunk to this share.
+REFILL = 0.75
+#: Iterates after which a start of a coarse level waits for the finer ones.
+PATIENCE = 256
+#: Smallest stride of the levels that are that impatient.
+COARSE = 4
+#: Seconds for which cells are gathered before they are handed on.
+GATHERED = 0.03
+
+
+@dataclass(frozen=True)
+class Grown:
+    """Cells of one level that have settled since the last of these.
+
+    Attributes
+    ----------
+    stride : int
+        Of their level.
+    cells : int64[k]
+        Of the flattened grid.
+    part : Settling
+        Their outcomes. The label :data:`OPEN` says that nothing has captured them yet.
+    known : int
+        Cells of the map that have a label by now.
+    whole : bool
+        Whether every cell of the level has been handed on by now, open ones included: shares of
+        the labels are fair then.
+    """
+
+    stride: int
+    cells: np.ndarray
+    part: Settling
+    known: int
+    whole: bool
+
+
+def grow(
+    plan: BasinPlan,
+    found: AttractorSet,
+    take: Callable[[Grown], None],
+    *,
+    result: Settling | None = None,
+    finest: int = 1,
+    patience: int = PATIENCE,
+    threads: int | None = None,
+) -> Settling:
+    """Label the cells of a map, coarse to fine, and hand them on as they settle.
+
+    Starts of coarse levels that nothing captures within ``patience`` iterates are handed on as
+    open. They are followed again, from their start and as long as all, when no finer level waits;
+    with ``finest`` above 1 they stay open.
+
+    Parameters
+    ----------
+    plan : BasinPlan
+        The map.
+    found : AttractorSet
+        Its attractors, as :meth:`BasinPlan.scout` finds them.
+    take : callable
+        Called from this thread, some thirty times a second, with :class:`Grown` cells.
+    result : Settling, optional
+        Outcomes of cells that are known already, such as those of a map that was stopped; they
+        aren't followed again. New ones are written to it.
+    finest : int
+        Stride of the finest level that is wanted.
+    patience : int
+        Iterates; see above.
+    threads : int, optional
+        Default all processors.
+
+    Returns
+    -------
+    Settling
+        Of all cells: :meth:`BasinPlan.finish` makes the Dataset of them that
+        :func:`saltus.basins` gives.
+
+    Raises
+    ------
+    Interrupted
+        On Ctrl-C, or a :class:`saltus.Stop`. ``result`` holds what was finished.
+    """
+    if result is None:
+        result = Settling.empty(plan.cells, len(plan.system.states))
+    work = _Work(plan, found, result, finest, patience)
+    map_ = plan.map(1)
+    map_.launch(plan.starts(plan.cells_of(0)[:1]), 1)  # compiles before threads ask for it
+    handed = _Handed(work, take)
+    try:
+        on_threads(
+            lambda _: work.follow(map_), range(threads or usable_processors()), lambda *_: None,
+            threads, lambda _: handed.hand_on(), every=GATHERED,
+        )  # fmt: skip
+    finally:
+        handed.gather()
+    handed.hand_on()
+    return result
+
+
+class _Work:
+    """The cells that are still to be followed, shared by all threads."""
+
+    def __init__(
+        self, plan: BasinPlan, found: AttractorSet, result: Settling, finest: int, patience: int
+    ) -> None:
+        self.plan, self.found, self.result = plan, found, result
+        self.patience, self.resumes = patience, finest == 1
+        self.levels = [one for one in plan.levels() if one.stride >= finest]
+        self.settled: SimpleQueue[tuple[np.ndarray, Settling]] = SimpleQueue()
+        self._lock, self._ahead = threading.Lock(), np.zeros(0, np.int64)
+        self._tiles = self._in_order()
+        self._waiting: list[np.ndarray] = []
+        self._again = np.zeros(plan.cells, bool)
+
+    def _in_order(self) -> Iterator[np.ndarray]:
+        for level in self.levels:
+            for tile in level.tiles():
+                yield tile[~_has_label(self.result.label[tile])]
+
+    def take(self, count: int) -> np.ndarray:
+        """The next cells, int64[count at most]; behind all levels those that wait."""
+        with self._lock:
+            while len(self._ahead) < count:
+                tile = next(self._tiles, None)
+                if tile is None and self._waiting:
+                    tile = self._waiting.pop(0)
+                    self._again[tile] = True
+                if tile is None:
+                    break
+                self._ahead = np.concatenate([self._ahead, tile])
+            taken, self._ahead = self._ahead[:count], self._ahead[count:]
+            return taken
+
+    def follow(self, map_: Stroboscope) -> None:
+        """Follow starts until none is left; the work of one thread."""
+        plan = self.plan
+        pool = Wanderers(map_, self.found, plan.periods, len(plan.system.states))
+        while True:
+            if len(pool) <= REFILL * POOL and len(more := self.take(POOL - len(pool))):
+                pool.add(more, plan.starts(more))
+            if not len(pool):
+                return
+            self.settled.put(pool.go_on())
+            impatient = (pool.age >= self.patience) & self._is_impatient(pool.who)
+            if impatient.any():
+                who, part = pool.give_up(impatient)
+                self.settled.put((who, part))
+                if self.resumes:
+                    with self._lock:
+                        self._waiting.append(who)
+
+    def _is_impatient(self, cells: np.ndarray) -> np.ndarray:
+        if not self.resumes:
+            return np.ones(len(cells), bool)
+        coarse: np.ndarray = stride_of(cells, self.plan.shape) >= COARSE
+        return np.asarray(coarse & ~self._again[cells])
+
+
+class _Handed:
+    """What was handed on, counted by levels."""
+
+    def __init__(self, work: _Work, take: Callable[[Grown], None]) -> None:
+        self._work, self._take = work, take
+        self._known = _has_label(work.result.label)
+        self._seen = self._known.copy()
+        strides = stride_of(np.flatnonzero(self._seen), work.plan.shape)
+        self._left = {
+            one.stride: one.count - int((strides == one.stride).sum()) for one in work.levels
+        }
+        self._new: list[np.ndarray] = []
+
+    def gather(self) -> None:
+        """Write what has settled to the result."""
+        while True:
+            try:
+                who, part = self._work.settled.get_nowait()
+            except Empty:
+                return
+            if len(who):
+                self._work.result.put(who, part)
+                self._new.append(who)
+
+    def hand_on(self) -> None:
+        """Hand on what has settled, a level at a time."""
+        self.gather()
+        if not self._new:
+            return
+        cells, self._new = np.unique(np.concatenate(self._new)), []
+        strides = stride_of(cells, self._work.plan.shape)
+        for stride in sorted(set(strides.tolist()), reverse=True):
+            here = cells[strides == stride]
+            part = self._work.result.of(here)
+            self._left[stride] -= int((~self._seen[here]).sum())
+            self._seen[here], self._known[here] = True, _has_label(part.label)
+            self._take(Grown(stride, here, part, int(self._known.sum()), self._left[stride] == 0))
+
+
+def _has_label(label: np.ndarray) -> np.ndarray:
+    known: np.ndarray = (label != Kind.NOT_COMPUTED) & (label != OPEN)
+    return known

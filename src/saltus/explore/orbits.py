@@ -1,0 +1,106 @@
+"""What a start settles to, and orbits as the page draws them: one whole period, stable or not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from saltus.analysis.attractors.find_attractors import find_attractors
+from saltus.analysis.basins.labels import OPEN
+from saltus.analysis.basins.labels import settle as follow
+from saltus.explore.attractors import KnownAttractors
+from saltus.explore.frames import Answer
+from saltus.explore.motion import AskedRun, motion
+from saltus.flow.methods import Method
+from saltus.results.dataset.kinds import WITHOUT, Kind
+
+#: Periods that a start is followed at most, as by sl.basins.
+MOST_PERIODS = 2000
+#: Periods that are shown of an attractor that never repeats.
+NEVER_REPEATS = 60
+
+
+def settled(known: KnownAttractors, start: Sequence[float]) -> tuple[int, int]:
+    """The key of the attractor that a start leads to, or a code of
+    :class:`~saltus.results.dataset.kinds.Kind`, and the periods until it is captured (-1: it
+    isn't). What nobody knew yet joins the known ones.
+    """
+    with known.lock:
+        found, keys = known.found, known.keys()
+    begin = np.array([start], float)
+    followed = follow(known.map, begin, found, MOST_PERIODS)
+    label, periods = int(followed.label[0]), int(followed.periods[0])
+    if label != OPEN:
+        return (int(keys[label]) if label >= 0 else label), periods
+    with known.lock:
+        wider, ids, _ = find_attractors(
+            known.map, followed.end, known.scale, MOST_PERIODS, known.found
+        )
+        known.grow(wider)
+        if ids[0] < 0:
+            return int(Kind.UNCONVERGED), -1
+        again = follow(known.map, begin, wider, MOST_PERIODS)
+        return int(known.keys()[ids[0]]), int(again.periods[0])
+
+
+def settle(
+    known: KnownAttractors, start: Sequence[float], method: Method, quantities: Sequence[str]
+) -> Answer:
+    """What a start settles to, and that orbit."""
+    key, periods = settled(known, start)
+    unit = "periods" if known.map.system.forced_at is not None else "turns"
+    if key < 0:
+        words = f"This start {_fate(key)}."
+        empty = {"kind": "settle", "attractor": None, "code": key, "settles": -1, "words": [words]}
+        return {**empty, "values": dict(known.map.system.values)}, {}
+    head, arrays = attractor_orbit(known, key, method, quantities)
+    words = f"settles to {_noun(head['attractor'])}"
+    if periods >= 0:
+        words += f" after {periods} {unit}"
+    return {**head, "kind": "settle", "code": None, "settles": periods, "words": [words]}, arrays
+
+
+def _noun(row: Mapping[str, Any]) -> str:
+    """An attractor in a sentence."""
+    if row["period"]:
+        return str(row["name"])
+    rests = {"limit_cycle": "a limit cycle", "equilibrium": "an equilibrium"}
+    return rests.get(row["kind"], f"a {row['name']} motion")
+
+
+def _fate(code: int) -> str:
+    """What became of one start, in the words for many."""
+    return WITHOUT[Kind(code)].split(":")[0].replace("lead to", "leads to")
+
+
+def attractor_orbit(
+    known: KnownAttractors, key: int, method: Method, quantities: Sequence[str]
+) -> Answer:
+    """The orbit of an attractor: a whole period; of one that never repeats some periods on it."""
+    row: dict[str, Any] = known.row(key) or {}
+    head, arrays = orbit(
+        AskedRun(
+            known.map.system,
+            row["points"][0 if row["seconds"] == row["seconds"] else -1],
+            float(known.map.period[0]),
+            row["period"] or (1 if row["kind"] == "equilibrium" else NEVER_REPEATS),
+            row["seconds"] if row["kind"] == "limit_cycle" else None,
+            method,
+        ),
+        quantities,
+        row,
+    )
+    return {**head, "attractor": row}, arrays
+
+
+def orbit(asked: AskedRun, quantities: Sequence[str], about: Mapping[str, Any]) -> Answer:
+    """A motion over a whole period, and what is known of its orbit: ``name``, ``stable``,
+    ``multipliers``, ``margin``, ``peak``, ``seconds``.
+    """
+    head, arrays = motion(replace(asked, measured=False), quantities)
+    names = ("name", "stable", "multipliers", "eigenvalues", "margin", "peak", "seconds")
+    told = {name: about[name] for name in names if name in about}
+    return {**head, **told, "kind": "orbit", "repeats": bool(about.get("repeats", True))}, arrays
