@@ -4,11 +4,13 @@ pytest says so. SALTUS_CHROMIUM names another one, SALTUS_PICTURES a folder for 
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import time
 from contextlib import contextmanager
 from pathlib import Path
+from urllib.parse import quote
 
 import pytest
 
@@ -136,6 +138,11 @@ def see(browser):
     assert not said, said  # the console stays empty
 
 
+def small(explorer, **view):
+    """Address of a small map, so that tests are short."""
+    return f"{explorer.url}&view={quote(json.dumps({'size': 50, 'periods': 30, **view}))}"
+
+
 @pytest.fixture
 def seen(see, explored):
-    return see(explored.url)
+    return see(small(explored))

@@ -62,7 +62,7 @@ export class Link {
 
   private hear(head: Head, arrays: Arrays): void {
     if (head.kind === "hello") {
-      const first = !this.desk; this.desk = head.desk; this.wait = FIRST_WAIT; this.welcome = true;
+      const first = !this.desk; this.asked.delete(head.id); this.desk = head.desk; this.wait = FIRST_WAIT; this.welcome = true;
       this.listener.line("", false);
       return this.listener.ready(first, !first && !head.same);
     }
