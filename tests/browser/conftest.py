@@ -4,15 +4,13 @@ pytest says so. SALTUS_CHROMIUM names another one, SALTUS_PICTURES a folder for 
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
-import time
-from contextlib import contextmanager
+import subprocess
 from pathlib import Path
-from urllib.parse import quote
 
 import pytest
+from explorer_page import Seen, opened, small
 
 import saltus as sl
 
@@ -24,8 +22,6 @@ DRAWING = (
     "--disable-gpu-compositing", "--disable-gpu-rasterization", "--disable-accelerated-2d-canvas",
     "--no-sandbox",
 )  # fmt: skip
-#: How long a page may take before a test gives it up [s]; no test asserts how long it took.
-PATIENCE = 60.0
 #: What the console may say: that the line is lost, where a test cuts it.
 CUT = "WebSocket connection to"
 
@@ -40,49 +36,6 @@ def pytest_collection_modifyitems(items):
 def pytest_runtest_setup(item):
     if CHROMIUM is None and item.path.name != "test_bundle.py":
         pytest.skip("no Chromium on this machine: SALTUS_CHROMIUM may name one")
-
-
-class Seen:
-    """A page of the explorer, as a test sees and moves it."""
-
-    def __init__(self, page):
-        self.page, self.said = page, []
-        page.on("console", lambda message: self.said.append(message.text))
-        page.on("pageerror", lambda error: self.said.append(str(error)))
-
-    def get(self, text, argument=None):
-        """The value of an expression in the page."""
-        return self.page.evaluate(text, argument)
-
-    def until(self, text, argument=None):
-        """Ask again and again: waiting in the page needs eval, which its policy forbids."""
-        end = time.monotonic() + PATIENCE
-        while not (value := self.page.evaluate(text, argument)):
-            if time.monotonic() > end:
-                words = self.page.inner_text("body")
-                raise AssertionError(f"not in {PATIENCE:g} s: {text}\n{self.said}\n{words[:600]}")
-            time.sleep(0.01)
-        return value
-
-    def rest(self):
-        """Wait until everything that was asked is answered, and drawn."""
-        self.until("!!window.explorer && explorer.rests")
-        self.get("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
-
-    def text(self, at):
-        return self.page.inner_text(at)
-
-    def place(self, at, x, y):
-        """Pixel of the window at data of a canvas: #map-canvas, #responses-canvas."""
-        box = self.page.locator(at).bounding_box()
-        of = {"#map-canvas": "map", "#responses-canvas": "responses"}[at]
-        px, py = self.get(f"([x, y]) => explorer.{of}.pixel([x, y])", [x, y])
-        return box["x"] + px, box["y"] + py
-
-    def keep(self, name):
-        """A picture for whoever looks at them, if SALTUS_PICTURES names a folder."""
-        if folder := os.environ.get("SALTUS_PICTURES"):
-            self.page.screenshot(path=Path(folder) / f"{name}.png")
 
 
 @pytest.fixture(scope="session")
@@ -103,15 +56,6 @@ def rig():
 def explored(rig):
     with opened(rig) as explorer:
         yield explorer
-
-
-@contextmanager
-def opened(system, **options):
-    explorer = sl.explore(system, browser=False, **options)
-    try:
-        yield explorer
-    finally:
-        explorer.close()
 
 
 @pytest.fixture
@@ -138,11 +82,25 @@ def see(browser):
     assert not said, said  # the console stays empty
 
 
-def small(explorer, **view):
-    """Address of a small map, so that tests are short."""
-    return f"{explorer.url}&view={quote(json.dumps({'size': 50, 'periods': 30, **view}))}"
-
-
 @pytest.fixture
 def seen(see, explored):
     return see(small(explored))
+
+
+@pytest.fixture(scope="session")
+def web(tmp_path_factory):
+    """The page's sources with what builds them, fetched anew by the lock file."""
+    if shutil.which("npm") is None:
+        pytest.skip("no Node on this machine: what is built from web/ isn't compared")
+    sources = Path(__file__).parents[2] / "web"
+    if not sources.is_dir():
+        pytest.skip("no sources of the page here: these tests are run in a checkout")
+    copy = tmp_path_factory.mktemp("page") / "web"
+    shutil.copytree(sources, copy, ignore=shutil.ignore_patterns("node_modules"))
+    got = subprocess.run(
+        ["npm", "ci", "--no-audit", "--no-fund", "--ignore-scripts"],
+        cwd=copy, capture_output=True, text=True, timeout=300,
+    )  # fmt: skip
+    if got.returncode:
+        pytest.skip(f"npm can't fetch what builds the page: {got.stderr[-200:]}")
+    return copy

@@ -119,7 +119,7 @@ export function place(canvas: HTMLCanvasElement, rx: Range, ry: Range, margin = 
 export function frame(c: CanvasRenderingContext2D, p: Plot, rx: Range, ry: Range, names: [string, string], grid = true): void {
   const { ink, quiet, line } = colours(), bottom = p.top + p.height, half = (v: number) => Math.round(v) + 0.5;
   c.lineWidth = 1; c.setLineDash([]); c.font = FONT; c.fillStyle = quiet; c.strokeStyle = line; c.textBaseline = "middle";
-  const xs = ticks(rx, Math.min(8, Math.floor(p.width / 70))), ys = ticks(ry, Math.min(8, Math.floor(p.height / 40)));
+  const xs = ticks(rx, Math.min(8, Math.floor(p.width / 70))), ys = ticks(ry, Math.min(8, Math.floor(p.height / 30)));
   const xt = tickTexts(xs), yt = tickTexts(ys);
   c.beginPath();
   for (const v of xs) { c.moveTo(half(p.X(v)), grid ? p.top : bottom); c.lineTo(half(p.X(v)), bottom + 4); }

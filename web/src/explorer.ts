@@ -176,7 +176,7 @@ export class Explorer {
   }
 
   // -- what the user does -------------------------------------------------------------------------------------------------------
-  private slide(name: string, value: number, done: boolean): void { this.values.refuse(`values.${name}`, ""); this.dragged = name; this.go({ values: { ...this.view.values, [name]: value } }, { drag: !done }); if (done) { this.dragged = ""; this.marks(); } }
+  private slide(name: string, value: number, done: boolean): void { this.values.refuse(`values.${name}`, ""); this.dragged = name; this.settled = null; this.status.say(`${plain(name)} ${spoken(value, this.about.parameters.find(p => p.name === name)!.unit, 5)}`); this.go({ values: { ...this.view.values, [name]: value } }, { drag: !done }); if (done) { this.dragged = ""; this.marks(); } }
   private type(group: "values" | "start", name: string, text: string): void {
     const fields = this.motionFields(), id = this.link.ask("motion", { ...fields, [group]: { ...(fields[group] as object), [name]: text } });
     this.typed = { key: `${group}.${name}`, id };

@@ -2,6 +2,7 @@
 import { type About, plain, unitOf } from "./about";
 import { axisText, colours, fitted, frame, onResize, type Plot, place, type Range, reach, scaleFor } from "./axes";
 import type { Motion } from "./motion";
+import { differing } from "./words";
 
 /** Forcing periods that are drawn dark; of a motion without forcing this share of it. */
 const LAST = 24, LAST_SHARE = 0.3;
@@ -25,7 +26,8 @@ export class Phase {
     const others: [ArrayLike<number>, ArrayLike<number>][] = [];
     const ox = motion.arrays[`other:${first}`], oy = motion.arrays[`other:${second}`];
     if (ox && oy) others.push([ox, oy]);
-    const orbit: [ArrayLike<number>, ArrayLike<number>] | null = this.orbit && this.orbit !== motion ? [this.orbit.sample(first), this.orbit.sample(second)] : null;
+    const known = this.orbit && this.orbit !== motion && differing(this.about, this.orbit.head.values, motion.head.values) === "" ? this.orbit : null;
+    const orbit: [ArrayLike<number>, ArrayLike<number>] | null = known ? [known.sample(first), known.sample(second)] : null;
     if (orbit) others.push(orbit);
     const gaps = (of: string) => (motion.head.gaps ?? []).filter((g: any) => g.quantity === of).map((g: any) => g.value as number);
     const all = (this.seen = [reach([x, ...others.map(o => o[0])], gaps(first)), reach([y, ...others.map(o => o[1])], gaps(second))]), [rx, ry] = this.held ?? all;
@@ -40,7 +42,7 @@ export class Phase {
     path(c, p, x, y, 0, from + 1, quiet, 0.7, 0.35);
     path(c, p, x, y, from, n, ink, 1.2, 1);
     if (ox && oy) { c.setLineDash([6, 4]); path(c, p, ox, oy, Math.min(from, ox.length), ox.length, hue, 1.3, 1); c.setLineDash([]); }
-    if (orbit) path(c, p, orbit[0], orbit[1], 0, orbit[0].length, accent, 2, 0.9);
+    if (orbit) path(c, p, orbit[0], orbit[1], 0, orbit[0].length, accent, 1.6, 0.9);
     const cx = motion.contact(first), cy = motion.contact(second), begin = motion.time[from];
     if (cx && cy) for (let i = 0; i < cx.length; i++) {
       if (motion.contactTime[i] < begin && i !== this.chosen) continue;

@@ -32,10 +32,17 @@ export class Status {
   }
 }
 
-/** The line at the foot: what was refused or went wrong, until it is dismissed. */
+const MOST_LINES = 3;
+/** The lines at the foot: what was refused or went wrong, until they are dismissed. */
 export class Says {
   constructor(private at: HTMLElement) { at.querySelector("button")!.onclick = () => this.clear(); }
-  say(text: string): void { this.at.querySelector("p")!.textContent = text; this.at.hidden = false; }
+  say(text: string): void {
+    const lines = this.at.querySelector("div")!;
+    if (this.at.hidden) lines.replaceChildren();
+    for (const line of lines.children) if (line.textContent === text) return;
+    while (lines.children.length >= MOST_LINES) lines.firstChild!.remove();
+    lines.append(element("p", text)); this.at.hidden = false;
+  }
   clear(): void { this.at.hidden = true; }
 }
 
