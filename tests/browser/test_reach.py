@@ -50,7 +50,7 @@ def test_what_can_be_pressed_is_large_enough(seen):
     small_ones = seen.get(
         """[...document.querySelectorAll('button, select, input, canvas')].filter(one => {
           const { width, height } = one.getBoundingClientRect();
-          return one.checkVisibility() && one.type !== 'range' && (width < 24 || height < 24) }).map(one => one.id || one.outerHTML)"""
+          return one.checkVisibility() && !['range', 'checkbox', 'radio'].includes(one.type) && (width < 24 || height < 24) }).map(one => one.id || one.outerHTML)"""
     )
     assert small_ones == []
 
@@ -102,7 +102,8 @@ def test_contacts_are_chosen_in_their_table(seen):
 
 def test_the_status_is_heard(seen):
     assert seen.page.get_attribute("#status", "role") == "status"
-    assert "starts" in seen.until("document.getElementById('status').textContent")
+    seen.page.keyboard.press("Escape")
+    seen.until("document.getElementById('status').textContent === 'stopped'")
 
 
 def test_a_lost_line_is_said_and_tried_again(see, explored):

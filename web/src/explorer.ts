@@ -340,12 +340,12 @@ export class Explorer {
     const s = this.map.sheet, present = s ? new Set(s.label) : new Set<number>();
     const codes = Object.entries(this.about.codes).filter(([code]) => present.has(+code)).map(([code, name]) => [name, this.about.code_colors[code] ?? [120, 120, 120], ""] as [string, number[], string]);
     showLegend(this.about, s?.attractors ?? [], codes, this.map.only, key => this.attractor(key));
-    notes($("map-words"), s?.words); this.hover(null, null, null);
+    notes($("map-words"), s?.words); this.map.tell();
     this.map.label(`basins of ${plain(this.view.axes[0])} and ${plain(this.view.axes[1])}, ${s?.attractors.length ?? 0} attractors; arrows move the start, shift and arrows the view, plus and minus zoom, Enter settles; the table of attractors follows`);
   }
   private hover(where: Place | null, at: [number, number] | null, sheet: Sheet | null): void {
     const [a, b] = this.view.axes, say = (p: [number, number]) => `${plain(a)} = ${spoken(p[0], unitOf(this.about, a), 5)}, ${plain(b)} = ${spoken(p[1], unitOf(this.about, b), 5)}`;
-    if (!at) { const s = this.map.sheet; $("map-under").textContent = [s?.level ? `shares of the ${s.level === 1 ? "whole map" : `starts of every ${s.level}th row and column`}` : "click: a start; drag: the view; wheel: closer", s?.flip].filter(Boolean).join("; "); return; }
+    if (!at) { const s = this.map.sheet; $("map-under").textContent = s?.flip || (s?.level && s.level > 1 ? `shares are those of every ${s.level}th row and column` : "click: a start; drag: the view; wheel: closer"); return; }
     if (!where || !sheet) { $("map-under").textContent = `${say(at)}: not known yet`; return; }
     const one = sheet.attractors.find((o: Attractor) => o.key === where.label), what = one ? one.name : this.about.codes[String(where.label)] ?? "";
     const when = one && where.age < 255 ? `, settles within ${2 ** where.age} ${this.about.forced ? "periods" : "turns"}` : "";

@@ -126,7 +126,9 @@ export class BasinMap {
     this.at = [this.at[0] + dx * STEP * (b - a), this.at[1] + dy * STEP * (f - e)]; this.draw(); this.events.start(this.at, false);
     this.tell(this.at);
   }
-  tell(at: [number, number] | null): void { this.events.hover(at && this.sheet ? this.sheet.find(...at) : null, at, this.sheet); }
+  private told: [number, number] | null = null;
+  /** Say what is known of a point of the plane; without one, again of the same. */
+  tell(at: [number, number] | null = this.told): void { this.told = at; this.events.hover(at && this.sheet ? this.sheet.find(...at) : null, at, this.sheet); }
 
   // -- pointer and keys -----------------------------------------------------------------------------------------------------
   private listen(): void {
