@@ -7,15 +7,20 @@ from collections.abc import Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
+import xarray as xr
 
 from saltus.analysis.attractors.aperiodic import SampledMotion
 from saltus.analysis.attractors.attractor_set import AttractorSet
+from saltus.analysis.attractors.attractors import attractors_dataset
+from saltus.analysis.attractors.limit_cycles import cycle_of
 from saltus.analysis.attractors.portrait import portraits
 from saltus.analysis.closed.capture import Neighbourhoods
 from saltus.analysis.closed.motions import ClosedMotion, orbit_distance, same
+from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.solve.tolerances import SAME
 from saltus.flow.maps import Stroboscope
 from saltus.results import AttractorTable
+from saltus.results.dataset.kinds import Kind
 from saltus.results.dataset.schema import kind_text
 
 Attractor: TypeAlias = ClosedMotion | SampledMotion
@@ -96,9 +101,27 @@ class KnownAttractors:
             keys = [self._key(one) for one in (found or self.found).every]
         return np.array([-1 if key is None else key for key in keys], np.int64)
 
-    def member(self, key: int) -> Attractor | None:
-        """The attractor of a key; None if there is none."""
-        return self._members[key] if key < len(self._members) else None
+    def members(self) -> list[tuple[int, ClosedMotion]]:
+        """Those that repeat after whole periods, by their keys."""
+        with self.lock:
+            every = enumerate(self._members)
+            return [(key, one) for key, one in every if isinstance(one, ClosedMotion)]
+
+    def closed(self, key: int) -> ClosedMotion | None:
+        """The attractor of a key, closed by Newton's method; None if there is none, or it never
+        repeats.
+        """
+        one = self._members[key] if key < len(self._members) else None
+        if isinstance(one, SampledMotion) and one.kind == Kind.LIMIT_CYCLE.word:
+            return cycle_of(self.map, one)[0]
+        return one if isinstance(one, ClosedMotion) else None
+
+    def dataset(self) -> xr.Dataset:
+        """All of them, as :func:`saltus.attractors` returns them."""
+        system = self.map.system
+        about = provenance(system, self.map.method, system.values)
+        with self.lock:
+            return attractors_dataset(subject(system, about), portraits(self.map, self.found))
 
     def hue(self, key: int) -> int:
         """The number of its hue."""

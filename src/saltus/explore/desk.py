@@ -11,17 +11,18 @@ from typing import Any
 import numpy as np
 
 from saltus.analysis.basins.pipeline import BasinPlan, basin_plan
-from saltus.analysis.inputs.starts import ensemble
+from saltus.analysis.inputs.starts import ensemble, range_of
 from saltus.errors import ParameterError, unknown
 from saltus.explore import questions as asked
 from saltus.explore.about import about_answer, models_answer
 from saltus.explore.attractors import KnownAttractors
 from saltus.explore.frames import Answer, Emit
-from saltus.explore.map import KeptMaps, grow_map, plan_of_map
+from saltus.explore.map import FIRST_SCOUTS, KeptMaps, grow_map, look, plan_of_map
 from saltus.explore.motion import AskedRun, motion
 from saltus.explore.opening import Opening
-from saltus.explore.orbits import MOST_PERIODS, attractor_orbit, settle
+from saltus.explore.orbits import MOST_PERIODS, attractor_orbit, orbit_of, settle, tracked
 from saltus.explore.questions import QuestionError, about
+from saltus.explore.responses import KeptResponses, respond, response_orbit
 from saltus.flow.methods import METHODS, Method
 from saltus.system import System
 from saltus.units import to_si
@@ -50,13 +51,14 @@ class Desk:
         self._lock = threading.RLock()
         self._plans: OrderedDict[Any, BasinPlan] = OrderedDict()
         self._known: OrderedDict[Any, KnownAttractors] = OrderedDict()
-        self._maps = KeptMaps()
+        self._maps, self._responses = KeptMaps(), KeptResponses()
         self._answers: Mapping[type, Callable[[Any], Answer]] = {
             asked.About: self._about,
             asked.Open: self._about,
             asked.MotionQuestion: self._motion,
             asked.Settle: self._settle,
             asked.OrbitQuestion: self._orbit,
+            asked.Track: self._track,
         }
 
     def answer(self, question: asked.Question, emit: Emit) -> None:
@@ -71,6 +73,9 @@ class Desk:
         """
         if isinstance(question, asked.MapQuestion):
             self._map(question, emit)
+            return
+        if isinstance(question, asked.ResponsesQuestion):
+            self._respond(question, emit)
             return
         answer = self._answers.get(type(question))
         if answer is None:
@@ -156,12 +161,56 @@ class Desk:
 
     def _orbit(self, question: asked.OrbitQuestion) -> Answer:
         system, method = self.system_at(question.values), self.opening.method
+        quantities = self.quantities_of(None)
+        if question.responses is not None:
+            row = question.point if question.event is None else question.event
+            if row is None:
+                raise QuestionError("orbit of responses needs point or event.", "point")
+            return response_orbit(
+                self._responses,
+                question.responses,
+                row,
+                question.event is not None,
+                method,
+                quantities,
+                self.period_of,
+            )
         known = self.known_at(self.plan_of(system, method))
         if question.attractor is None or known.row(question.attractor) is None:
             raise QuestionError(
                 f"no attractor {question.attractor} is known at these values.", "attractor"
             )
-        return attractor_orbit(known, question.attractor, method, self.quantities_of(None))
+        return attractor_orbit(known, question.attractor, method, quantities)
+
+    def _track(self, question: asked.Track) -> Answer:
+        with about("source"):
+            source = self.system_at(question.source)
+        system, method = self.system_at(question.values), self.opening.method
+        known = self.known_at(self.plan_of(source, method))
+        old = None
+        if question.key is not None:
+            old = known.closed(question.key)
+        elif question.point is not None:
+            old = orbit_of(known.map, self.start_of(source, list(question.point)), question.period)
+        if old is None:
+            raise QuestionError("no orbit is known there: it needs key, or point.", "key")
+        quantities = self.quantities_of(None)
+        return tracked(old, source, system, method, self.period_of, quantities)
+
+    def _respond(self, question: asked.ResponsesQuestion, emit: Emit) -> None:
+        system, method = self.system_at(question.values), self.opening.method
+        with about("parameter"):
+            system.parameter_text(question.parameter)
+        with about("range"):
+            limits = range_of(system, question.parameter, question.range)
+        known = self.known_at(plan := self.plan_of(system, method))
+        first = system.outputs.names if system.outputs.first else system.states
+        quantity = self.quantities_of((question.quantity or first[0],))[0]
+        look(plan, known, FIRST_SCOUTS, self.threads)
+        respond(
+            known, method, question.parameter, limits, quantity, self.opening.axes,
+            self._responses, emit, self.threads,
+        )  # fmt: skip
 
     # -- what is known of values -------------------------------------------------------------------
     def plan_of(self, system: System, method: Method) -> BasinPlan:

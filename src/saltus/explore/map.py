@@ -131,7 +131,7 @@ def grow_map(
     if kept is not None and kept.dataset is not None:
         _Growing(kept, known, emit).tell_all()
         return
-    _look(plan, known, min(FIRST_SCOUTS, plan.scouts), threads)
+    look(plan, known, min(FIRST_SCOUTS, plan.scouts), threads)
     kept = kept or KeptMap(plan, Settling.empty(plan.cells, len(plan.system.states)), known.found)
     maps.put(kept)
     growing = _Growing(kept, known, emit)
@@ -143,13 +143,13 @@ def grow_map(
         growing.end({"coarse": True})
         return
     if known.scouts < plan.scouts:
-        _look(plan, known, plan.scouts, threads)
+        look(plan, known, plan.scouts, threads)
         growing.tell_attractors()
     growing.grow(1, threads)
     growing.finish(threads)
 
 
-def _look(plan: BasinPlan, known: KnownAttractors, scouts: int, threads: int | None) -> None:
+def look(plan: BasinPlan, known: KnownAttractors, scouts: int, threads: int | None) -> None:
     """Look for attractors from a sample of starts, unless as many were looked through."""
     while not known.scouting.acquire(timeout=0.1):
         check_stop()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,11 +11,16 @@ import numpy as np
 from saltus.analysis.attractors.find_attractors import find_attractors
 from saltus.analysis.basins.labels import OPEN
 from saltus.analysis.basins.labels import settle as follow
-from saltus.explore.attractors import KnownAttractors
+from saltus.analysis.closed.motions import ClosedMotion
+from saltus.analysis.closed.track import track
+from saltus.explore.attractors import KnownAttractors, pairs
 from saltus.explore.frames import Answer
 from saltus.explore.motion import AskedRun, motion
+from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.results.dataset.kinds import WITHOUT, Kind
+from saltus.results.dataset.schema import kind_text
+from saltus.system import System
 
 #: Periods that a start is followed at most, as by sl.basins.
 MOST_PERIODS = 2000
@@ -104,3 +109,40 @@ def orbit(asked: AskedRun, quantities: Sequence[str], about: Mapping[str, Any]) 
     names = ("name", "stable", "multipliers", "eigenvalues", "margin", "peak", "seconds")
     told = {name: about[name] for name in names if name in about}
     return {**head, **told, "kind": "orbit", "repeats": bool(about.get("repeats", True))}, arrays
+
+
+def orbit_of(map_: Stroboscope, point: Sequence[float], period: int) -> ClosedMotion:
+    """An orbit from a point on it and its period, as Newton's method takes it."""
+    start = np.array([point], float)
+    points = np.concatenate([start[:, None], map_.launch(start, period).advance(period)], axis=1)
+    return ClosedMotion(points[0, :period], np.zeros(len(point)), 0.0)
+
+
+def tracked(
+    old: ClosedMotion,
+    source: System,
+    system: System,
+    method: Method,
+    turn_of: Callable[[System], float],
+    quantities: Sequence[str],
+) -> Answer:
+    """An orbit that is known at the values of one system at those of another: ``lost`` says where
+    it folded on the way, and the orbit is then the last one.
+    """
+    now = track(source, old, source.values, system.values, method)
+    one = now.motion
+    cycle, rests = one.time > 0, one.time == 0 or (one.period == 1 and system.forced_at is None)
+    n = one.period if system.forced_at is not None else 0
+    there = system.with_values(**now.values)
+    turn = turn_of(there)
+    about = {
+        "name": kind_text("equilibrium" if rests and not cycle else one.kind, n),
+        "stable": now.stable,
+        "multipliers": pairs(one.multipliers),
+        "eigenvalues": False,
+        "seconds": one.time if cycle else n * turn or None,
+    }
+    run = AskedRun(there, one.points[0], turn, max(n, 1), one.time if cycle else None, method)
+    head, arrays = orbit(run, quantities, about)
+    words = [now.lost] if now.lost else []
+    return {**head, "kind": "track", "lost": now.lost or None, "words": words}, arrays

@@ -25,7 +25,7 @@ from saltus.analysis.branches.seeds import (
     seeds_of,
 )
 from saltus.analysis.branches.switching import Seed
-from saltus.analysis.branches.tracing import trace
+from saltus.analysis.branches.tracing import Plan, trace
 from saltus.analysis.closed.field_zeros import autonomous
 from saltus.analysis.inputs.given import Range, Reading, Starts, Value
 from saltus.analysis.inputs.outputs import outputs_of
@@ -33,7 +33,7 @@ from saltus.analysis.inputs.starts import at_values, check_system, range_of
 from saltus.analysis.inputs.verb import verb
 from saltus.errors import ParameterError, among, nearest, shown
 from saltus.flow.counts import whole
-from saltus.flow.methods import Method, exact_method
+from saltus.flow.methods import Method, check_method, exact_method
 from saltus.flow.progress import reporting, stage
 from saltus.interrupt import Interrupted
 from saltus.sentences import Dialect, Word
@@ -185,19 +185,9 @@ def branches(
     done = list[Branch]()
     with reporting(progress) as show:
         try:
-            equilibria: list[Seed] = []
-            if isinstance(start, xr.Dataset):
-                begins = seeds_of(system, name, start)
-                equilibria = [] if system.forced_at else equilibrium_seeds(system, name, start)
-            else:
-                check_grid(system, whole(at, "at", 1), start)
-                places = np.linspace(*limits, int(at) + 2)[1:-1]
-                grid = grid_of(system, {name: places}, start, box, None, seed, None, every)
-                if autonomous(system):
-                    equilibria = equilibria_between(system, name, limits, grid.starts)
-                begins = _found_in(grid, method, periods, threads)
-            begins = scaled(system, name, _inside(begins, limits), method)
-            equilibria = _inside(equilibria, limits)
+            begins, equilibria = seeds_between(
+                system, name, limits, start, box, at, seed, every, method, periods, threads
+            )
             if not begins and not equilibria:
                 raise ParameterError(
                     lambda say: (
@@ -208,13 +198,46 @@ def branches(
                     )
                 )
             plan = plan_of(system, name, limits, method, threads, points, longest, chosen)
-            born = trace_equilibria(plan, system, name, equilibria, done) if equilibria else []
-            born = born if "hopf" in chosen else []
-            trace(plan, [*born, *begins], done, stage(show, 0.0, 0.9))
+            follow_all(plan, system, name, begins, equilibria, done, stage(show, 0.0, 0.9))
         except KeyboardInterrupt:
             partial = functools.partial(table_of, system, name, limits, done, wanted, method)
             raise Interrupted(partial) from None
         return table_of(system, name, limits, done, wanted, method)
+
+
+def seeds_between(
+    system: System, name: str, limits: tuple[float, float], start: Any, box: Any = None,
+    at: Any = 12, seed: int = 1, every: Any = None, method: Method | None = None,
+    periods: int = 2000, threads: int | None = None,
+) -> tuple[list[Seed], list[Seed]]:  # fmt: skip
+    """Seeds of branches over a parameter between two values [SI]: of those of orbits, and those of
+    equilibria. Arguments as for :func:`branches`.
+    """
+    method, equilibria = check_method(method, system), list[Seed]()
+    if isinstance(start, xr.Dataset):
+        begins = seeds_of(system, name, start)
+        equilibria = [] if system.forced_at else equilibrium_seeds(system, name, start)
+    else:
+        check_grid(system, whole(at, "at", 1), start)
+        places = np.linspace(*limits, int(at) + 2)[1:-1]
+        grid = grid_of(system, {name: places}, start, box, None, seed, None, every)
+        if autonomous(system):
+            equilibria = equilibria_between(system, name, limits, grid.starts)
+        begins = _found_in(grid, method, periods, threads)
+    begins = scaled(system, name, _inside(begins, limits), method)
+    return begins, _inside(equilibria, limits)
+
+
+def follow_all(
+    plan: Plan, system: System, name: str, begins: list[Seed], equilibria: list[Seed],
+    done: list[Branch], progress: Callable[[float], None] | None = None,
+) -> None:  # fmt: skip
+    """Add the branches that seeds lie on to those that are known. Seeds on a known one are left
+    out.
+    """
+    born = trace_equilibria(plan, system, name, equilibria, done) if equilibria else []
+    born = born if "hopf" in plan.switch else []
+    trace(plan, [*born, *begins], done, progress)
 
 
 def _two_parameters(say: Dialect) -> str:
