@@ -23,7 +23,7 @@ export const scaleFor = (unit: string, [low, high]: Range): Scale => scaleOf(uni
 
 /** A unit as it stands on an axis: m/s² in place of m/s^2. */
 export const pretty = (unit: string): string =>
-  unit.replace(/\^(-?\d+)/g, (_, n: string) => [...n].map(c => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(c)]).join("")).replaceAll("*", "·");
+  unit.replaceAll("kg^0.5", "√kg").replace(/\^(-?\d+)(?!\.)/g, (_, n: string) => [...n].map(c => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(c)]).join("")).replaceAll("*", "·");
 
 /** Text of an axis: `x [mm]`. */
 export const axisText = (name: string, unit: string): string => (unit ? `${name} [${pretty(unit)}]` : name);

@@ -1,6 +1,6 @@
 /** The page of one system: what is looked at, what is asked for it, and where the answers go. */
 import { type About, type Attractor, plain, states, unitOf } from "./about";
-import { onTheme, type Range, spoken } from "./axes";
+import { digits, onTheme, type Range, spoken } from "./axes";
 import { Contacts } from "./contacts";
 import { History } from "./history";
 import type { Arrays, Head, Link, Question } from "./link";
@@ -243,6 +243,7 @@ export class Explorer {
     else if (kind === "settle") this.heardSettle(head, arrays);
     else if (kind === "track") this.heardTrack(head, arrays);
     else if (kind === "orbit") this.heardOrbit(head, arrays, question);
+    else if (kind === "responses-progress") $("responses-under").textContent = `the branches are followed: ${Math.round(100 * head.share)} %`;
     else if (kind === "responses") this.heardResponses(head, arrays);
     else if (kind === "save") this.save.take(head, arrays);
   }
@@ -272,7 +273,7 @@ export class Explorer {
     const head = this.motion?.head, n = this.about.forced ? "periods" : "turns";
     if (!head) return "";
     if (this.motion!.orbit) return `${head.name ?? "orbit"}${stability(head.stable) ? `, ${stability(head.stable)}` : ""}, ${head.repeats === false ? "some periods of it" : "repeated: nothing is integrated on"}`;
-    const from = Object.entries(head.start as Record<string, number>).slice(0, 3).map(([name, v]) => `${plain(name)} = ${spoken(v, unitOf(this.about, name))}`).join(", ");
+    const starts = Object.entries(head.start as Record<string, number>), from = starts.every(([, v]) => v === 0) ? "rest at zero" : starts.slice(0, 3).map(([name, v]) => `${plain(name)} = ${spoken(v, unitOf(this.about, name))}`).join(", ");
     const parts = [`from ${from}`, `${head.periods} ${n}`, `${head.contacts} ${head.contacts === 1 ? "contact" : "contacts"}`];
     if (this.settled && !this.dragging) parts.push(this.settledText(this.settled));
     return parts.join(" · ") + (head.against ? `. ${head.against.words}` : "");
@@ -323,7 +324,7 @@ export class Explorer {
     }
     if (head.kind === "map-end") {
       sheet.done = !head.coarse; sheet.took = (performance.now() - this.begun) / 1000;
-      if (head.flip_rate != null) sheet.flip = `a neighbour leads elsewhere in ${(100 * head.flip_rate).toPrecision(3)} % of the cells`;
+      if (head.flip_rate != null) sheet.flip = `${digits(100 * head.flip_rate, 2)} % of the starts lead elsewhere when computed more exactly`;
       sheet.words = head.words ?? [];
     }
     if (sheet !== this.map.sheet) return;

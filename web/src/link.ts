@@ -67,7 +67,7 @@ export class Link {
       return this.listener.ready(first, !first && !head.same);
     }
     const question = this.asked.get(head.id) ?? {}, kind = head.ask;
-    const last = kind === "map" ? ["map-end", "map-stopped", "refused", "failed"].includes(head.kind) : head.kind !== "waits" && head.done !== false;
+    const last = kind === "map" ? ["map-end", "map-stopped", "refused", "failed"].includes(head.kind) : head.kind !== "waits" && head.kind !== "responses-progress" && head.done !== false;
     if (head.kind === "map-piece") this.send({ ask: "seen", id: head.id });
     if (last) this.asked.delete(head.id);
     if (last && this.flying.get(kind) === head.id) {

@@ -74,7 +74,7 @@ export class Responses {
     const head = this.head!, ux = parameterOf(this.about, head.parameter)?.unit ?? "", uy = unitOf(this.about, head.quantity), a = this.a;
     if (choice.event !== undefined) { const i = choice.event; return `${head.events[i]} at ${spoken(a.event_parameter[i], ux, 6)}, peak ${spoken(a.event_peak[i], uy)}`; }
     const i = choice.point!;
-    return `${a.point_period[i] ? `${a.point_period[i]}T` : "orbit"}, ${a.point_stable[i] ? "stable" : "unstable"}, ${spoken(this.x[i], ux, 6)}, peak ${spoken(this.y[i], uy)}, branch ${a.point_branch[i]}`;
+    return `${periodText(a.point_period[i])}, ${a.point_stable[i] ? "stable" : "unstable"}, ${spoken(this.x[i], ux, 6)}, peak ${spoken(this.y[i], uy)}, branch ${a.point_branch[i]}`;
   }
   private choose(choice: { point?: number; event?: number }, ask: boolean): void {
     this.chosen = choice.event !== undefined ? this.a.event_point[choice.event] : choice.point!; this.draw(); this.events.hover(this.text(choice));
@@ -128,10 +128,13 @@ export class Responses {
       button.type = "button"; button.textContent = "orbit"; button.setAttribute("aria-label", `show the orbit of ${name}`); button.onclick = () => this.choose(choice, true); row.cells[0].append(button); rows.push(row);
     };
     (h.events as string[]).forEach((kind, i) => add({ event: i }, [digits(this.a.event_parameter[i] * sx.factor, 7), digits(this.a.event_peak[i] * sy.factor, 5), kind, "", String(this.a.event_branch[i])], kind));
-    for (let i = 0; i < Math.min(this.x.length, most); i++) add({ point: i }, [digits(this.x[i] * sx.factor, 7), digits(this.y[i] * sy.factor, 5), `${this.a.point_period[i]}T`, this.a.point_stable[i] ? "stable" : "unstable", String(this.a.point_branch[i])], `point ${i}`);
+    for (let i = 0; i < Math.min(this.x.length, most); i++) add({ point: i }, [digits(this.x[i] * sx.factor, 7), digits(this.y[i] * sy.factor, 5), periodText(this.a.point_period[i]), this.a.point_stable[i] ? "stable" : "unstable", String(this.a.point_branch[i])], `point ${i}`);
     body.replaceChildren(...rows);
   }
 }
+
+/** T, 2T, ... of an orbit in forcing periods; of others its kind stands with its branch. */
+const periodText = (n: number): string => (n > 1 ? `${n}T` : n ? "T" : "");
 
 /** An event by its shape: a fold is a triangle, a doubling a diamond, a graze a triangle upwards, all else a square. */
 function mark(c: CanvasRenderingContext2D, kind: string, x: number, y: number, size: number, fill: string, edge: string): void {
