@@ -69,6 +69,6 @@ def opened(system, **options):
 
 def small(explorer, **view):
     """Address of a small map, so that tests are short."""
-    return f"{explorer.url}&view={quote(json.dumps({'size': 50, 'periods': 30, **view}))}"
+    return f"{explorer.url}&view={quote(json.dumps({'size': 40, 'periods': 30, **view}))}"
 
 

@@ -49,7 +49,8 @@ def browser():
 
 @pytest.fixture(scope="session")
 def rig():
-    return sl.models.delangre("b", force="4 N", frequency="15 Hz")
+    """Two attractors of one period, found in a fifth of a second."""
+    return sl.models.delangre("a", force="1.5 N", frequency="10 Hz")
 
 
 @pytest.fixture(scope="session")

@@ -56,9 +56,10 @@ def test_every_start_of_the_map_has_the_hue_of_its_attractor(seen, rig):
 
 
 def test_a_click_shows_the_motion_of_simulate(seen, rig):
-    click(seen, 0.5e-3, 0.05)
+    click(seen, 0.3e-3, 0.02)
     start = seen.get("explorer.view.start")
-    assert np.allclose([start["x"], start["v"]], [0.5e-3, 0.05], atol=2e-3 * np.array([4e-3, 0.4]).max())
+    box = np.array(seen.get("explorer.view.box")).reshape(2, 2)
+    assert (np.abs(np.subtract([start["x"], start["v"]], [0.3e-3, 0.02])) < 0.005 * np.ptp(box, axis=1)).all()
     run = sl.simulate(rig, (start["x"], start["v"]), periods=30, samples=200, progress=False)
     for name in ("x", "v"):
         assert np.array_equal(samples(seen, name), run[name].values.astype(np.float32))
@@ -71,6 +72,7 @@ def test_a_click_shows_the_motion_of_simulate(seen, rig):
 
 
 def test_a_dragged_slider_is_followed_and_every_panel_says_of_which_values_it_is(seen):
+    seen.page.locator("[aria-label=frequency][type=range]").scroll_into_view_if_needed()
     box = seen.page.locator("[aria-label=frequency][type=range]").bounding_box()
     y, x0 = box["y"] + box["height"] / 2, box["x"]
     middle = seen.get("document.querySelector('[aria-label=frequency][type=range]').value / 1000")
@@ -81,14 +83,14 @@ def test_a_dragged_slider_is_followed_and_every_panel_says_of_which_values_it_is
         seen.page.mouse.move(x0 + (middle + 0.005 * i) * box["width"], y)
         seen.until("explorer.motion.head.values.frequency === explorer.view.values.frequency")
         assert not seen.get(WRONG)
-    seen.until("document.getElementById('map-of').textContent.includes('frequency 15 Hz') || explorer.map.sheet.covered")
+    seen.until("document.getElementById('map-of').textContent.includes('frequency 10 Hz') || explorer.map.sheet.covered")
     assert "of frequency" in seen.text("#motion-of")
     seen.keep("dragging")
     seen.page.mouse.up()
     seen.rest()
     assert seen.get("explorer.map.sheet.key") != before
     now = seen.get("explorer.view.values.frequency")
-    assert now != 15.0
+    assert now != 10.0
     assert seen.get("explorer.map.sheet.values.frequency") == now
     assert [seen.text(f"#{panel}-of") for panel in ("map", "motion", "phase", "orbit")] == [""] * 4
     assert not seen.get("document.querySelector('.panel.stale')")
@@ -119,17 +121,18 @@ def test_values_are_typed_with_units_and_refused_beside_their_field(seen):
 
 
 def test_zooming_keeps_the_old_cells_paler_until_finer_ones_come(seen, rig):
-    seen.page.mouse.move(*seen.place("#map-canvas", 0.5e-3, 0.05))
+    whole = seen.get("explorer.view.box")
+    seen.page.mouse.move(*seen.place("#map-canvas", 0.3e-3, 0.02))
     seen.page.mouse.wheel(0, -600)
     seen.until("explorer.map.paler")
     assert "another view" in seen.text("#map-of")
     seen.rest()
     assert seen.text("#map-of") == ""
     a, b, c, d = seen.get("explorer.map.sheet.box")
-    assert b - a == pytest.approx(4e-3 * np.exp(-1.2), rel=1e-6)
-    assert a < 0.5e-3 < b
-    theirs = sl.basins(rig, x=(a, b, 50), v=(c, d, 50), progress=False)["basin"].values
-    keys = np.array(seen.get("[...explorer.map.sheet.label]")).reshape(50, 50)
+    assert b - a == pytest.approx((whole[1] - whole[0]) * np.exp(-1.2), rel=1e-6)
+    assert a < 0.3e-3 < b
+    theirs = sl.basins(rig, x=(a, b, 40), v=(c, d, 40), progress=False)["basin"].values
+    keys = np.array(seen.get("[...explorer.map.sheet.label]")).reshape(40, 40)
     pairs = set(zip(keys.ravel().tolist(), theirs.ravel().tolist(), strict=True))
     assert len(pairs) == len({key for key, _ in pairs})
     seen.keep("zoomed")
@@ -137,7 +140,7 @@ def test_zooming_keeps_the_old_cells_paler_until_finer_ones_come(seen, rig):
 
 def test_back_and_undo_show_the_view_before(seen):
     whole, first = seen.get("explorer.view.box"), seen.get("explorer.view.start")
-    click(seen, 0.5e-3, 0.05)
+    click(seen, 0.3e-3, 0.02)
     second = seen.get("explorer.view.start")
     seen.page.click("#map-in")
     seen.rest()
@@ -156,18 +159,18 @@ def test_back_and_undo_show_the_view_before(seen):
 
 
 def test_an_address_opens_its_view_and_a_damaged_one_says_so(see, seen, explored):
-    click(seen, 0.5e-3, 0.05)
-    seen.page.locator("[id='values.force']").fill("4.5 N")
+    click(seen, 0.3e-3, 0.02)
+    seen.page.locator("[id='values.force']").fill("1.6 N")
     seen.page.keyboard.press("Enter")
     seen.rest()
     other = see(seen.get("explorer.address()"))
     for part in ("values", "start", "box", "size", "periods"):
         assert other.get(f"explorer.view.{part}") == seen.get(f"explorer.view.{part}")
     assert "token" not in other.page.url
-    damaged = see(f"{explored.url}&view=%7B%22size%22:50,%22values%22:%7B%22force%22:%22DROP%22%7D,%22box%22:[1,0,0,1]%7D")
+    damaged = see(f"{explored.url}&view=%7B%22size%22:40,%22values%22:%7B%22force%22:%22DROP%22%7D,%22box%22:[1,0,0,1]%7D")
     assert "damaged" in damaged.text("#says")
-    assert damaged.get("explorer.view.values.force") == 4.0
-    assert damaged.get("explorer.view.size") == 50
+    assert damaged.get("explorer.view.values.force") == 1.5
+    assert damaged.get("explorer.view.size") == 40
 
 
 def test_methods_are_compared_in_the_history_and_in_words(seen, rig):

@@ -61,7 +61,7 @@ export class Explorer {
     if (past && other("axes")) this.whole = this.wholeOf(next.axes);
     this.show();
     const values = other("values");
-    if (!shown) this.askMotions(values, other("values", "start", "periods", "method", "against", "orbit", "history", "phase") || released, other("start", "method") || released, past || other("orbit"));
+    if (!shown) this.askMotions(values || released, other("values", "start", "periods", "method", "against", "orbit", "history", "phase") || released, other("start", "method") || released, past || other("orbit"));
     const others = states(this.about).some(name => !next.axes.includes(name) && before.start[name] !== next.start[name]);
     if (values && drag) this.askCoarse();
     else if (values || other("method", "size", "axes") || others) this.askMap();

@@ -18,7 +18,8 @@ export class Values {
   private own: Record<string, { unit: string; factor: number }> = {};
 
   constructor(about: About, private events: ValueEvents) {
-    $("sliders").replaceChildren(...about.parameters.map(p => this.slider(p)));
+    const drive = (p: Parameter): number => (p.name === about.forced_at ? 0 : 1);          // what is turned most often comes first
+    $("sliders").replaceChildren(...[...about.parameters].sort((p, q) => drive(p) - drive(q)).map(p => this.slider(p)));
     const names = states(about).slice(0, MOST_STARTS);
     $("starts").replaceChildren(element("legend", "start"), ...names.map(name => {
       const unit = about.quantities.find(q => q.name === name)!.shown;

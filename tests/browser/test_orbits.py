@@ -1,0 +1,138 @@
+"""Orbits on the explorer's page: of branches, of attractors, under a slider; and what is saved."""
+
+from __future__ import annotations
+
+import tomllib
+
+import explorer_systems as systems
+import numpy as np
+import pytest
+from explorer_page import opened, small
+
+import saltus as sl
+
+#: Index of the point of an unstable orbit that is farthest from all others.
+UNSTABLE = """(() => { const { point_stable: stable, point_branch: branch } = explorer.responses.a;
+  const i = [...stable.keys()].filter(k => !stable[k] && branch[k - 1] === branch[k] && branch[k + 1] === branch[k]);
+  return i[i.length >> 1] })()"""
+
+
+def unstable(seen):
+    """An unstable point of the responses: its number, parameter and peak."""
+    i = seen.get(UNSTABLE)
+    return i, *seen.get("i => [explorer.responses.x[i], explorer.responses.y[i]]", i)
+
+
+def test_a_click_on_an_unstable_branch_shows_that_orbit(seen, rig):
+    i, frequency, peak = unstable(seen)
+    seen.page.mouse.click(*seen.place("#responses-canvas", frequency, peak))
+    seen.rest()
+    shown = seen.get("explorer.responses.chosen")
+    frequency = seen.get("i => explorer.responses.x[i]", shown)
+    assert not seen.get("i => explorer.responses.a.point_stable[i]", shown)
+    assert seen.get("explorer.view.values.frequency") == frequency
+    assert "unstable" in seen.text("#orbit-what")
+    assert "nothing is integrated on" in seen.text("#motion-what")
+    x, time = (np.array(seen.get(f"[...{what}]")) for what in ("explorer.motion.sample('x')", "explorer.motion.time"))
+    assert time[-1] - time[0] == pytest.approx(4 / frequency, rel=1e-9)
+    each = (len(x) - 1) // 4
+    assert np.array_equal(x[:each], x[each : 2 * each])  # repeated
+    assert np.abs(x).max() == pytest.approx(seen.get("i => explorer.responses.y[i]", shown), rel=1e-3)
+    start = seen.get("explorer.motion.head.start")
+    at = rig.with_values(frequency=frequency)
+    once = sl.simulate(at, (start["x"], start["v"]), periods=1, samples=200, progress=False)
+    assert np.allclose(x[: each + 1], once["x"].values, atol=1e-6 * np.abs(x).max())
+    assert not seen.get("document.querySelector('.panel.stale')")
+    seen.keep("unstable-orbit")
+    seen.page.click("#orbit-leave")
+    seen.rest()
+    assert seen.get("explorer.motion.head.kind") == "motion"
+
+
+def test_an_orbit_follows_a_slider_by_newtons_method(seen):
+    i, frequency, peak = unstable(seen)
+    seen.page.mouse.click(*seen.place("#responses-canvas", frequency, peak))
+    seen.rest()
+    seen.page.focus("[aria-label=force][type=range]")
+    seen.page.keyboard.press("ArrowRight")
+    seen.rest()
+    head = seen.get("({ ...explorer.motion.head, arrays: [] })")
+    assert head["kind"] == "track"
+    assert head["values"]["force"] == seen.get("explorer.view.values.force") != 1.5
+    x = seen.get("[...explorer.motion.sample('x')]")
+    assert x[0] == pytest.approx(x[(len(x) - 1) // 4], rel=1e-5)  # it closes
+    assert seen.text("#orbit-of") == ""
+
+
+def test_branches_are_walked_by_keys_and_read_in_a_table(seen):
+    seen.page.focus("#responses-canvas")
+    for key in ("ArrowRight", "ArrowRight", "]", "e"):
+        seen.page.keyboard.press(key)
+    assert "fold" in seen.text("#responses-under") or "graz" in seen.text("#responses-under")
+    seen.page.keyboard.press("[")
+    seen.page.keyboard.press("Enter")
+    seen.rest()
+    assert seen.get("explorer.view.orbit") is not None
+    seen.page.keyboard.press("t")
+    rows = seen.page.locator("#points tbody tr")
+    points, events = seen.get("[explorer.responses.x.length, explorer.responses.head.events.length]")
+    assert rows.count() == points + events
+    rows.nth(events).locator("button").press("Enter")
+    seen.rest()
+    assert seen.get("explorer.responses.chosen") == 0
+
+
+def test_a_hue_of_the_legend_shows_its_orbit_alone(seen):
+    key = seen.get("explorer.map.sheet.attractors[1].key")
+    seen.page.click(f"[data-key='{key}']")
+    seen.rest()
+    assert seen.get("explorer.map.only") == key
+    assert seen.get("explorer.motion.orbit")
+    peak = seen.get("explorer.map.sheet.attractors[1].peak.x")
+    assert np.abs(seen.get("[...explorer.motion.sample('x')]")).max() == pytest.approx(peak, rel=1e-3)
+    seen.page.click(f"[data-key='{key}']")
+    seen.rest()
+    assert seen.get("explorer.map.only") is None
+
+
+def test_hues_stay_with_orbits_when_values_change(seen):
+    table = "explorer.map.sheet.attractors.map(one => [one.contacts, one.hue])"
+    before = {contacts: hue for contacts, hue in seen.get(table)}
+    seen.page.locator("[id='values.frequency']").fill("10.2 Hz")
+    seen.page.keyboard.press("Enter")
+    seen.rest()
+    after = {contacts: hue for contacts, hue in seen.get(table)}
+    assert after == before
+
+
+def saved(seen, kind):
+    """The text of a file that the save sheet makes."""
+    seen.page.click("#save-open")
+    seen.page.check(f"input[name=kind][value={kind}]")
+    with seen.page.expect_download() as download:
+        seen.page.click("#save-download")
+    return download.value
+
+
+def test_the_save_sheet_gives_a_study_of_what_is_seen(seen):
+    seen.page.mouse.click(*seen.place("#map-canvas", 0.3e-3, 0.02))
+    seen.rest()
+    download = saved(seen, "study")
+    seen.keep("save")
+    study = tomllib.loads(download.path().read_text())
+    assert download.suggested_filename.endswith(".toml")
+    assert "basins" in study
+
+
+def test_a_structure_shows_its_sensors_and_a_free_system_its_cycle(see):
+    with opened(systems.beam()) as explorer:
+        seen = see(small(explorer, size=16))
+        assert seen.get("explorer.view.history") == "tip"
+        assert "history of tip" in seen.get("explorer.history.canvas.ariaLabel")
+        seen.keep("structure")
+    with opened(systems.van_der_pol) as explorer:
+        seen = see(small(explorer, size=16, start={"x": 1.0, "y": 0.0}))
+        assert "limit cycle" in seen.text("#legend")
+        assert "limit cycle" in seen.text("#motion-what")
+        assert seen.page.locator("#contacts-period").is_hidden()
+        seen.keep("free")
