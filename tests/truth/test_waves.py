@@ -30,7 +30,13 @@ def legs(rng, waves, count):
     amplitudes = sizes * (rng.normal(size=(count, waves + 1)) + 1j * rng.normal(size=(count, 1)))
     amplitudes[:, -1] = 1.0
     length = rng.uniform(0.2, 1.5, count)
-    return WaveLegs(rates, rows, amplitudes, np.cumsum(length) - length, length)
+    return one_state(rates, rows, amplitudes, np.cumsum(length) - length, length)
+
+
+def one_state(rates, rows, amplitudes, begin, length):
+    """WaveLegs of a single contact state."""
+    state = np.zeros(len(length), np.int64)
+    return WaveLegs(rates[None], rows[None], state, amplitudes, begin, length)
 
 
 def sampled(one, number=40_001):
@@ -55,16 +61,16 @@ def test_sums_of_random_waves(seed):
         )
 
     mean = integral(lambda t, q: q) / total
-    np.testing.assert_allclose(means([one]), mean, atol=2e-5 * np.abs(mean).max())
+    np.testing.assert_allclose(means(one), mean, atol=2e-5 * np.abs(mean).max())
     square = integral(lambda t, q: (q - mean) ** 2) / total
-    np.testing.assert_allclose(deviations([one], means([one])), np.sqrt(square), rtol=2e-4)
+    np.testing.assert_allclose(deviations(one, means(one)), np.sqrt(square), rtol=2e-4)
     wave = integral(lambda t, q: q * np.exp(-3j * t)[:, None]) * 2 / total
-    np.testing.assert_allclose(harmonics([one], 3.0), wave, atol=2e-4 * np.abs(wave).max())
+    np.testing.assert_allclose(harmonics(one, 3.0), wave, atol=2e-4 * np.abs(wave).max())
     seen = np.array(
         [np.min([q.min(axis=0) for _, q in dense], axis=0),
          np.max([q.max(axis=0) for _, q in dense], axis=0)]
     )  # fmt: skip
-    beyond = (extremes([one]) - seen) * [[-1.0], [1.0]]
+    beyond = (extremes(one) - seen) * [[-1.0], [1.0]]
     assert (beyond >= 0.0).all()
     assert (beyond < 1e-4 * np.abs(seen).max()).all()
     for leg, (t, q) in enumerate(dense):
@@ -79,17 +85,17 @@ def test_sums_of_random_waves(seed):
 def test_a_cosine():
     """A cos(w t + phi) + c over whole periods."""
     w, phi = 7.0, 0.4
-    one = WaveLegs(
+    one = one_state(
         np.array([1j * w, 0.0]), np.array([[3.0 + 0j, 0.5]]),
         np.array([[np.exp(1j * phi), 1.0]]), np.zeros(1), np.array([2 * np.pi / w]),
     )  # fmt: skip
-    np.testing.assert_allclose(extremes([one]), [[-2.5], [3.5]], atol=1e-13)
-    assert means([one])[0] == pytest.approx(0.5, abs=1e-14)
-    assert deviations([one], means([one]))[0] == pytest.approx(3 / np.sqrt(2), abs=1e-13)
-    np.testing.assert_allclose(harmonics([one], w), [3.0 * np.exp(1j * phi)], atol=1e-13)
+    np.testing.assert_allclose(extremes(one), [[-2.5], [3.5]], atol=1e-13)
+    assert means(one)[0] == pytest.approx(0.5, abs=1e-14)
+    assert deviations(one, means(one))[0] == pytest.approx(3 / np.sqrt(2), abs=1e-13)
+    np.testing.assert_allclose(harmonics(one, w), [3.0 * np.exp(1j * phi)], atol=1e-13)
     *_, when = turns(one, np.array([0]))
     np.testing.assert_allclose(np.sort(when), (np.array([1, 2]) * np.pi - phi) / w, atol=1e-12)
-    least = least_turns([one], np.array([0]), np.array([1e-3]))
+    least = least_turns(one, np.array([0]), np.array([1e-3]))
     np.testing.assert_allclose(least, [2.5], atol=1e-13)
 
 
@@ -102,22 +108,52 @@ def test_many_quantities_together_or_one_by_one(together, monkeypatch):
     leg, row, time = turns(one, np.arange(3))
     at = [one.values(leg, time)[np.arange(len(row)), row]]
     ends = [one.values(every, end) for end in (0.0 * one.length, one.length)]
-    for quantity, (low, high) in enumerate(extremes([one]).T):
+    for quantity, (low, high) in enumerate(extremes(one).T):
         values = np.concatenate([at[0][row == quantity], *(end[:, quantity] for end in ends)])
         assert low == pytest.approx(values.min(), abs=1e-12)
         assert high == pytest.approx(values.max(), abs=1e-12)
 
 
+def test_legs_of_several_contact_states_are_those_of_each():
+    rng = np.random.default_rng(11)
+    each = [legs(rng, 5, count) for count in (4, 1, 7)]
+    total = sum(one.length.sum() for one in each)
+    state = np.repeat(np.arange(3), [len(one.length) for one in each])
+    parts = (
+        np.concatenate([getattr(one, name) for one in each])
+        for name in ("rates", "rows", "amplitudes", "begin", "length")
+    )
+    rates, rows, *others = parts
+    whole, shares = (
+        WaveLegs(rates, rows, state, *others),
+        [one.length.sum() / total for one in each],
+    )
+    mean = sum(share * means(one) for share, one in zip(shares, each, strict=True))
+    np.testing.assert_allclose(means(whole), mean, rtol=1e-13)
+    wave = sum(share * harmonics(one, 3.0) for share, one in zip(shares, each, strict=True))
+    np.testing.assert_allclose(harmonics(whole, 3.0), wave, rtol=1e-13)
+    square = sum(
+        share * deviations(one, mean) ** 2 for share, one in zip(shares, each, strict=True)
+    )
+    np.testing.assert_allclose(deviations(whole, mean), np.sqrt(square), rtol=1e-12)
+    every = np.array([extremes(one) for one in each])
+    found = np.array([every[:, 0].min(axis=0), every[:, 1].max(axis=0)])
+    np.testing.assert_allclose(extremes(whole), found, rtol=1e-13)
+    row, near = np.arange(3), np.full(3, 1e-3)
+    least = np.min([least_turns(one, row, near) for one in each], axis=0)
+    np.testing.assert_allclose(least_turns(whole, row, near), least, rtol=1e-12)
+
+
 def test_a_wave_that_dies_out_at_once():
     """e^{-a t} cos(w t) has its least value at its first turn: w t = pi - atan(a/w)."""
     a, w = 4000.0, 3000.0
-    one = WaveLegs(
+    one = one_state(
         np.array([-a + 1j * w, 0.0]), np.ones((1, 2), complex), np.array([[1.0, 0.0]]),
         np.zeros(1), np.ones(1),
     )  # fmt: skip
     time = (np.pi - np.arctan(a / w)) / w
     least = np.exp(-a * time) * np.cos(w * time)
-    np.testing.assert_allclose(extremes([one])[:, 0], [least, 1.0], rtol=1e-12)
+    np.testing.assert_allclose(extremes(one)[:, 0], [least, 1.0], rtol=1e-12)
 
 
 def test_mean_squares_of_waves_of_every_speed():
@@ -125,12 +161,12 @@ def test_mean_squares_of_waves_of_every_speed():
     rng = np.random.default_rng(3)
     one = legs(rng, 4, 40)
     rates = np.array([-1e-8 + 2j, 2.0000001j, 3000j, -500 + 40j, 0.0])
-    one = replace(one, rates=rates, length=10 ** rng.uniform(-4, 0, 40))
+    one = replace(one, rates=rates[None], length=10 ** rng.uniform(-4, 0, 40))
     nodes, weights = np.polynomial.legendre.leggauss(20)
     places = (np.arange(400)[:, None] + 0.5 * (nodes + 1.0)).ravel() / 400
     total = np.zeros(3)
     for leg, length in enumerate(one.length):
         q = one.values(np.full(len(places), leg), length * places)
         total += length / 800 * np.tile(weights, 400) @ (q - 0.25) ** 2
-    found = deviations([one], np.full(3, 0.25))
+    found = deviations(one, np.full(3, 0.25))
     np.testing.assert_allclose(found, np.sqrt(total / one.length.sum()), rtol=1e-12)

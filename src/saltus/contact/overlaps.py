@@ -18,7 +18,18 @@ import numpy as np
 from saltus.contact.guards import Guard, equation_of, is_hold
 from saltus.language.canonical import Canonical
 from saltus.language.evaluate import evaluate
-from saltus.language.expression import Bit, Condition, Expr, Not, add, neg, walk
+from saltus.language.expression import (
+    Bit,
+    Condition,
+    Expr,
+    Not,
+    add,
+    constant,
+    neg,
+    state,
+    substituted,
+    walk,
+)
 from saltus.sentences import Text
 
 
@@ -39,9 +50,8 @@ def overlapping(
         Values of all parameters [SI]; arrays of one length, one for each trajectory.
     """
     gaps = tuple((guard.gap, is_hold(guard)) for guard in guards)
-    for first, second, width in _opposed(field, gaps):
-        # the states cancel in the width
-        (overlap,) = evaluate([width], states=dict.fromkeys(states, 0.0), values=values)
+    for first, second, width in _opposed(field, gaps, tuple(states)):
+        (overlap,) = evaluate([width], values=values)
         if not np.any(overlap > 0):
             continue
         worst = int(np.argmax(np.ravel(overlap > 0)))
@@ -65,12 +75,15 @@ def overlapping(
 
 @functools.lru_cache(maxsize=256)
 def _opposed(
-    field: tuple[Expr, ...], gaps: tuple[tuple[Expr, bool], ...]
+    field: tuple[Expr, ...], gaps: tuple[tuple[Expr, bool], ...], states: tuple[str, ...]
 ) -> tuple[tuple[int, int, Expr], ...]:
     """Guards of a piece and of the next one, and their overlap: the sum of their gaps, where it
-    depends on parameters only. Hold guards are told from the others.
+    depends on parameters only: states cancel in it. Hold guards are told from the others.
     """
-    return tuple(_pairs(field, gaps))
+    nowhere = {state(name): constant(0.0) for name in states}
+    return tuple(
+        (first, second, substituted(width, nowhere)) for first, second, width in _pairs(field, gaps)
+    )
 
 
 def _pairs(

@@ -25,7 +25,7 @@ from saltus.explore.questions import QuestionError, about
 from saltus.explore.responses import KeptResponses, respond, response_orbit
 from saltus.flow.methods import METHODS, Method
 from saltus.system import System
-from saltus.units import to_si
+from saltus.units import from_si, to_si
 
 #: Quantities that are sent of each motion unless others are named: states, and outputs.
 MOST_STATES, MOST_OUTPUTS = 4, 8
@@ -132,8 +132,9 @@ class Desk:
         if question.t_end is not None:
             with about("t_end"):
                 end = to_si(question.t_end, "s", "t_end")
-                if not 0 < end < np.inf:
-                    raise ParameterError("t_end must be a time after 0 s.")
+                most = asked.MOST_PERIODS * self.period_of(system)
+                if not 0 < end <= most:
+                    raise ParameterError(f"t_end must be a time from 0 to {from_si(most, 's')}.")
         run = AskedRun(
             system,
             self.start_of(system, question.start),

@@ -11,7 +11,7 @@ import secrets
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from importlib import metadata, resources
 from typing import Any
 
@@ -68,14 +68,23 @@ class OnlyOurs:
         The application behind.
     port : int
         The server's port.
+    headers : mapping of str to str
+        Headers of every answer.
     """
 
-    def __init__(self, application: Any, port: int) -> None:
+    def __init__(self, application: Any, port: int, headers: Mapping[str, str]) -> None:
         self._application = application
+        self._headers = [(name.lower().encode(), one.encode()) for name, one in headers.items()]
         self._hosts = {f"127.0.0.1:{port}".encode(), f"localhost:{port}".encode()}
 
     async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
         """Answer, or refuse: 421 for a foreign host, 403 for a foreign origin."""
+
+        async def answer(message: Any) -> None:
+            if message["type"] == "http.response.start":
+                message = {**message, "headers": [*message["headers"], *self._headers]}
+            await send(message)
+
         named: dict[bytes, list[bytes]] = {}
         for name, value in scope["headers"]:
             named.setdefault(name, []).append(value)
@@ -83,12 +92,11 @@ class OnlyOurs:
         ours = len(host) == 1 and host[0] in self._hosts
         known = not origin or (ours and origin == [b"http://" + host[0]])
         if ours and known:
-            await self._application(scope, receive, send)
+            await self._application(scope, receive, answer)
         elif scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 1008})
         else:
-            refusal = PlainTextResponse("Not here.", 403 if ours else 421, _HEADERS)
-            await refusal(scope, receive, send)
+            await PlainTextResponse("Not here.", 403 if ours else 421)(scope, receive, answer)
 
 
 class Server:
@@ -111,7 +119,6 @@ class Server:
         framed_by: Iterable[str] = (),
     ) -> None:
         self._desk, self._opened = desk, opened
-        self._policy = _POLICY + (" ".join(framed_by) or "'none'")
         self.token, self.desk = secrets.token_urlsafe(24), secrets.token_hex(8)
         self.sessions: list[Session] = []
         self._sockets = 0
@@ -124,8 +131,11 @@ class Server:
             Route("/", self._file),
             Route("/{name}", self._file),
         ]
+        application = Starlette(routes=routes)
+        application.router.redirect_slashes = False
+        policy = {"Content-Security-Policy": _POLICY + (" ".join(framed_by) or "'none'")}
         config = uvicorn.Config(
-            OnlyOurs(Starlette(routes=routes), self.port),
+            OnlyOurs(application, self.port, _HEADERS | policy),
             lifespan="off",
             log_config=None,
             access_log=False,
@@ -175,10 +185,9 @@ class Server:
     async def _file(self, request: Request) -> Response:
         name = request.path_params.get("name", "index.html")
         file = resources.files(__package__) / "page" / name if name in _FILES else None
-        headers = {**_HEADERS, "Content-Security-Policy": self._policy}
         if file is None or not file.is_file():
-            return PlainTextResponse("There is no such page.", 404, headers)
-        return Response(file.read_bytes(), headers=headers, media_type=_FILES[name])
+            return PlainTextResponse("There is no such page.", 404)
+        return Response(file.read_bytes(), media_type=_FILES[name])
 
     # -- WebSocket ---------------------------------------------------------------------------------
     async def _page(self, page: WebSocket) -> None:

@@ -365,6 +365,20 @@ class Stroboscope:
         still = step[:, None] == 0.0
         return outcomes[0].state, np.where(still, 0.0, slopes / np.where(still, 1.0, step[:, None]))
 
+    def images(
+        self, start: np.ndarray, count: np.ndarray | int, directions: np.ndarray
+    ) -> np.ndarray:
+        """The derivative of ``count`` periods times directions float64[k, D, m], float64[k, D, m]:
+        where the flow carries few columns, at the cost of these.
+        """
+        map_ = self._tangent_map((), directions.shape[2])
+        if map_ is None:
+            return np.asarray(self.tangent(start, count)[1] @ directions)
+        k, size = start.shape
+        state, status = map_.ends(np.hstack([start, directions.reshape(k, -1)]), count)
+        state[(status != st.OK) & (status != st.GRAZE_UNRESOLVED)] = np.nan
+        return state[:, size:].reshape(directions.shape)
+
     def tangent_samples(
         self, start: np.ndarray, count: np.ndarray | int, schedule: Schedule
     ) -> np.ndarray:
@@ -376,18 +390,21 @@ class Stroboscope:
         outcome = map_.run(_with_tangent(start, None), count, schedule)
         return outcome.samples[:, :, : start.shape[1]]
 
-    def _tangent_map(self, names: tuple[str, ...]) -> Stroboscope | None:
+    def _tangent_map(
+        self, names: tuple[str, ...], directions: int | None = None
+    ) -> Stroboscope | None:
         """The same rows of the system with its tangents, and the derivatives with respect to some
-        parameters; None if only differences give these.
+        parameters, or along some directions only; None if no flow carries these.
         """
-        if names not in self._tangent_maps:
-            system = self.method.tangents(self.system, names)
-            self._tangent_maps[names] = None if system is None else self.of_system(system)
-        return self._tangent_maps[names]
+        key = names, directions
+        if key not in self._tangent_maps:
+            system = self.method.tangents(self.system, names, directions)
+            self._tangent_maps[key] = None if system is None else self.of_system(system)
+        return self._tangent_maps[key]
 
     @functools.cached_property
-    def _tangent_maps(self) -> dict[tuple[str, ...], Stroboscope | None]:
-        """Maps of the system with its tangents made before, by the parameters."""
+    def _tangent_maps(self) -> dict[tuple[tuple[str, ...], int | None], Stroboscope | None]:
+        """Maps of the system with its tangents made before, by parameters and directions."""
         return {}
 
     def sequences(self, start: np.ndarray, count: int) -> tuple[np.ndarray, list[np.ndarray]]:

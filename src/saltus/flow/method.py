@@ -118,11 +118,16 @@ class Method:
         """The method that moves a system: this one, or the one that stands in for it."""
         return self
 
-    def tangents(self, system: System, names: tuple[str, ...] = ()) -> System | None:
+    def tangents(
+        self, system: System, names: tuple[str, ...] = (), directions: int | None = None
+    ) -> System | None:
         """The system whose flow carries the derivative of the state with respect to the state at
-        the start, and to some parameters; None if only differences give them.
+        the start, and to some parameters, or along a number of directions; None if it carries
+        others only.
         """
-        return None if names or system.is_steep else tangent_system(system)
+        if names or directions is not None or system.is_steep:
+            return None
+        return tangent_system(system)
 
     def suited_to(self, count: int) -> Method:  # noqa: ARG002  (unused by most methods)
         """The fastest variant of the method for ``count`` trajectories; its results are the same to

@@ -55,19 +55,19 @@ class ModalFlow:
     ----------
     tables : Tables
         Its contact states.
-    tangents : bool
-        Whether the states are followed by the derivative of the state with respect to the state at
-        the start, row by row.
+    columns : int
+        Columns of the derivative that follows the states, row by row: of the state with respect to
+        the state at the start, or along some directions.
     names : tuple of str, optional
-        Parameters with respect to which it is carried too.
+        Parameters with respect to which it is carried too: these are the last columns.
     """
 
-    def __init__(self, tables: Tables, tangents: bool = False, names: tuple[str, ...] = ()) -> None:
-        self.tables, self._kernel, self._tangents = tables, modal_module(), tangents
+    def __init__(self, tables: Tables, columns: int = 0, names: tuple[str, ...] = ()) -> None:
+        self.tables, self._kernel = tables, modal_module()
         self._lanes, self._memory = self.tables.modes.table.shape[1], threading.local()
         size, _, _, _, guards, _, rows, *_ = tables.sizes.tolist()
         self._states, self._sizes = size, tables.sizes.copy()
-        self._names, columns = names, size + len(names) if tangents else 0
+        self._names, tangents = names, columns > 0
         self._sizes[layout.TANGENTS] = columns
         self.CARRY = layout.AMPLITUDES + rows * self._lanes + tangents * (size + guards) + columns
         self.CARRY += 2 * tables.groups * self._lanes if names else 0
@@ -251,7 +251,8 @@ def modal_flow(system: System) -> ModalFlow:
     """The modal flow of a system. Raises ParameterError, with the reason, if it has none."""
     if system.tangent_of is not None:
         tables = modal_flow(system.tangent_of.origin).tables
-        return ModalFlow(tables, tangents=True, names=system.tangent_by)
+        columns = len(system.states) // len(system.tangent_of.states) - 1
+        return ModalFlow(tables, columns, system.tangent_by)
     linear = linear_pieces(system)
     if isinstance(linear, str):
         raise ParameterError(f"sl.Modal doesn't serve {system.name}: {linear}.")
@@ -302,14 +303,16 @@ class Modal(Method):
         """The modal flow."""
         return modal_flow(system)
 
-    def tangents(self, system: System, names: tuple[str, ...] = ()) -> System | None:
+    def tangents(
+        self, system: System, names: tuple[str, ...] = (), directions: int | None = None
+    ) -> System | None:
         """The states alone: the modes of a contact state move the derivative too."""
         if self.serving(system.origin) is not self or remembered(system):
-            return super().tangents(system, names)
+            return super().tangents(system, names, directions)
         linear = linear_pieces(system.origin)
         if isinstance(linear, str) or not all(varies_by(linear, name) for name in names):
             return None
-        return tangent_states(system, names)
+        return tangent_states(system, names, directions)
 
     def numbers(self, periods: float) -> np.ndarray:
         """Step budget, event budget."""

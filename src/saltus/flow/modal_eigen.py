@@ -42,13 +42,19 @@ def one_of_each_pair(eigen: Eigen) -> Eigen:
 
 def both_of_each_pair(half: Eigen) -> Eigen:
     """All modes of those that :func:`one_of_each_pair` keeps."""
-    values, vectors, inverse = half
+    values, _, inverse = half
     pairs = np.flatnonzero(values.imag > 0)
     return (
         np.concatenate([values, values[pairs].conj()]),
-        np.concatenate([vectors, vectors[:, pairs].conj()], axis=1),
+        vectors_of_each_pair(half),
         np.concatenate([inverse, inverse[pairs].conj()]),
     )
+
+
+def vectors_of_each_pair(half: Eigen) -> np.ndarray:
+    """All eigenvectors of those that :func:`one_of_each_pair` keeps."""
+    values, vectors, _ = half
+    return np.concatenate([vectors, vectors[:, values.imag > 0].conj()], axis=1)
 
 
 def eigen_of(matrix: np.ndarray) -> Eigen:

@@ -29,12 +29,16 @@ from saltus.flow.modal_eigen import (
     eigen_of,
     one_of_each_pair,
     slots_of,
+    vectors_of_each_pair,
 )
 from saltus.system.linear import LinearPiece
 from saltus.system.linear_laws import Constrained
 
 #: Rate of growth that is none, in units of the largest eigenvalue.
 NO_GROWTH = 1e-12
+#: By the fastest of rates and eigenvalues: all eigenvalues, the loads on their modes, and which of
+#: these don't go their own ways.
+Known = dict[float, tuple[np.ndarray, np.ndarray, np.ndarray]]
 
 
 @dataclass(frozen=True)
@@ -68,6 +72,7 @@ def modes_of(
     most: int,
     eigen: Eigen,
     fastest: float = 0.0,
+    known: Known | None = None,
 ) -> StateModes:
     """Modes of a contact state.
 
@@ -85,10 +90,11 @@ def modes_of(
         :func:`saltus.flow.modal_eigen.half_of` the matrix.
     fastest : float
         Size of the largest eigenvalue of other contact states [1/s]: they tell how slow a mode is.
+    known : dict, optional
+        What is the same for other rates, all else being equal: is filled, and read.
     """
     if not len(eigen[0]):  # contacts at rest hold all states
         return StateModes(*eigen, None, np.zeros((0, 1 + len(rates) + speeds.size), complex))
-    whole = both_of_each_pair(eigen)
     every = np.concatenate([[0.0], rates])
     acts = ModalLoads(
         every,
@@ -99,10 +105,18 @@ def modes_of(
         float(max(np.abs(eigen[0]).max(), np.abs(every).max())),
         fastest,
     )
-    if not _together(*whole, acts).any() and len(eigen[0]) <= most:
-        return StateModes(*eigen, None, _answers(*whole, acts))
+    known = {} if known is None else known
+    if acts.scale not in known:
+        whole = both_of_each_pair(eigen)
+        parts = whole[2] @ acts.loads
+        known[acts.scale] = whole[0], parts, _always_together(*whole, parts, acts)
+    values, parts, always = known[acts.scale]
+    together = always | _driven_together(values, parts, acts)
+    if not together.any() and len(eigen[0]) <= most:
+        answers = _answers(values, vectors_of_each_pair(eigen), parts, acts)
+        return StateModes(*eigen, None, answers)
     spaces, whole = _parted(piece.matrix, acts, most)
-    eigen, answers = one_of_each_pair(whole), _answers(*whole, acts)
+    eigen, answers = one_of_each_pair(whole), _answers(*whole[:2], whole[2] @ acts.loads, acts)
     if not spaces:  # states that the equations keep apart aren't mixed any more
         return StateModes(*eigen, None, answers)
     return StateModes(*eigen, *block_of(spaces, acts, answers))
@@ -133,17 +147,37 @@ def _together(
     values: np.ndarray, vectors: np.ndarray, inverse: np.ndarray, acts: ModalLoads
 ) -> np.ndarray:
     """True for modes that don't go their own ways: bool[M]."""
-    # sum_i |L_ji V_ij|: what rounding of the states is multiplied by, in any units of theirs
-    found: np.ndarray = ~((np.abs(inverse.T) * np.abs(vectors)).sum(axis=0) <= MOST_LOSS)
-    found |= values.real > NO_GROWTH * acts.scale
-    parts, sizes = inverse @ acts.loads, np.abs(values)
-    slow = MOST_SPREAD * sizes <= acts.scale
-    found |= slow & (slow.sum() > 1)
+    parts = inverse @ acts.loads
+    always = _always_together(values, vectors, inverse, parts, acts)
+    together: np.ndarray = always | _driven_together(values, parts, acts)
+    return together
+
+
+def _driven_together(values: np.ndarray, parts: np.ndarray, acts: ModalLoads) -> np.ndarray:
+    """True for modes that a drive comes too near to, bool[M]; loads on them, complex128[M, ..]."""
+    found, sizes = np.zeros(len(values), bool), np.abs(values)
     for rate, part in zip(acts.rates[1:], parts.T[1:], strict=False):
         far = np.minimum(np.abs(1j * rate - values), np.abs(1j * rate + values))
         found |= (part != 0) & (MOST_LOSS * far <= np.maximum(abs(rate), sizes))
     for course, part in zip(acts.speeds, parts.T[len(acts.rates) :], strict=True):
         found |= (part != 0) & (loss_of(course, sizes, acts.scale) >= MOST_LOSS_OF_TWO)
+    return found
+
+
+def _always_together(
+    values: np.ndarray,
+    vectors: np.ndarray,
+    inverse: np.ndarray,
+    parts: np.ndarray,
+    acts: ModalLoads,
+) -> np.ndarray:
+    """True for modes that don't go their own ways whatever the rates of the drives, bool[M]."""
+    # sum_i |L_ji V_ij|: what rounding of the states is multiplied by, in any units of theirs
+    found: np.ndarray = ~((np.abs(inverse.T) * np.abs(vectors)).sum(axis=0) <= MOST_LOSS)
+    found |= values.real > NO_GROWTH * acts.scale
+    sizes = np.abs(values)
+    slow = MOST_SPREAD * sizes <= acts.scale
+    found |= slow & (slow.sum() > 1)
     # a force that is constant moves a slow mode far before it is balanced
     with np.errstate(all="ignore"):
         static = np.abs(acts.gaps @ vectors * (parts[:, 0] / values))
@@ -157,12 +191,13 @@ def _together(
 
 
 def _answers(
-    values: np.ndarray, vectors: np.ndarray, inverse: np.ndarray, acts: ModalLoads
+    values: np.ndarray, vectors: np.ndarray, parts: np.ndarray, acts: ModalLoads
 ) -> np.ndarray:
-    """Steady answers of modes that go their own ways: complex128[N, 1 + D + K * C]."""
+    """Steady answers of modes that go their own ways, by the loads on them complex128[M, ..]:
+    complex128[N, 1 + D + K * C].
+    """
     harmonic = len(acts.rates)
     far = 1j * acts.rates[:, None] - values[None]
-    parts = inverse @ acts.loads
     with np.errstate(all="ignore"):
         answers: np.ndarray = vectors @ np.where(
             parts[:, :harmonic] == 0, 0, parts[:, :harmonic] / far.T

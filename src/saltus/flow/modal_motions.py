@@ -26,7 +26,7 @@ def wave_motions(
     periods: int,
     quantities: Sequence[Expr],
     guards: Sequence[Guard],
-) -> tuple[list[list[WaveLegs]], Outcome] | None:
+) -> tuple[list[WaveLegs | None], Outcome] | None:
     """The motions from float64[k, D] over ``periods``, row i by row i of the map, as legs of waves.
 
     Parameters
@@ -36,11 +36,11 @@ def wave_motions(
 
     Returns
     -------
-    list of list of WaveLegs, Outcome
-        The legs of each motion, none of one that didn't reach the end; their quantities are the
-        states, then those asked for, then the gaps. None if another method moves this system, a
-        quantity isn't linear, a drive is a record, a contact has a law, or modes go together in a
-        block.
+    list of WaveLegs, Outcome
+        The legs of each motion, None of one that didn't reach the end; their quantities are the
+        states, then those asked for, then the gaps. None in place of both if another method moves
+        this system, a quantity isn't linear, a drive is a record, a contact has a law, or modes go
+        together in a block.
     """
     system = map_.system
     method = map_.method.serving(system.origin)
@@ -53,9 +53,13 @@ def wave_motions(
     if asked is None or tables.linear.courses:
         return None
     outcome = map_.run(start, periods, record=0)
-    begins, motions = outcome.contacts.begins(len(start)), []
+    begins = outcome.contacts.begins(len(start))
+    motions: list[WaveLegs | None] = []
     for i in range(len(start)):
         mine = slice(begins[i], begins[i + 1])
+        if not np.isfinite(outcome.state[i]).all() or outcome.time[i] < periods * map_.period[i]:
+            motions.append(None)
+            continue
         legs = _legs(map_, tables, asked, start[i], periods, outcome, i, mine)
         if legs is None:
             return None
@@ -72,26 +76,60 @@ def _legs(
     outcome: Outcome,
     i: int,
     mine: slice,
-) -> list[WaveLegs] | None:
+) -> WaveLegs | None:
     """The legs of one motion, by contact state; None if modes go together in a block."""
-    if not np.isfinite(outcome.state[i]).all() or outcome.time[i] < periods * map_.period[i]:
-        return []
     contacts, period = outcome.contacts.rows(mine), float(map_.period[i])
     first = int(contacts.mode_before[0]) if len(contacts) else int(outcome.mode[i])
     modes = np.append(first, contacts.mode_after)
     states = np.vstack([start, contacts.state])
     counts, phases = np.append(0, contacts.period), np.append(0.0, contacts.phase)
     length = np.diff(counts, append=periods) * period + np.diff(phases, append=0.0)
-    parts = []
-    for mode in np.unique(modes).tolist():
+    known, amplitudes, legs = list[_Waves](), list[np.ndarray](), list[np.ndarray]()
+    for mode in np.unique(modes[length > 0.0]).tolist():
         own = np.flatnonzero((modes == mode) & (length > 0.0))
         waves = _waves_of(tables, map_.parameters[i if len(map_) > 1 else 0], mode, asked)
         if waves is None:
             return None
-        amplitudes = waves.amplitudes(states[own], counts[own], period, phases[own])
-        begin = counts[own] * period + phases[own]
-        parts.append(WaveLegs(waves.rates, waves.rows, amplitudes, begin, length[own]))
-    return parts
+        known.append(waves)
+        amplitudes.append(waves.amplitudes(states[own], counts[own], period, phases[own]))
+        legs.append(own)
+    order, widest = np.concatenate(legs), max(len(one.rates) for one in known)
+    return WaveLegs(
+        np.stack([_padded(one.rates, widest, -1.0) for one in known]),
+        np.stack([_padded(one.rows, widest) for one in known]),
+        np.repeat(np.arange(len(legs)), [len(own) for own in legs]),
+        np.concatenate([_padded(one, widest) for one in amplitudes]),
+        counts[order] * period + phases[order],
+        length[order],
+    )
+
+
+def _padded(waves: np.ndarray, width: int, number: float = 0.0) -> np.ndarray:
+    """Waves with others before them, of which nothing is seen, [.., width]."""
+    more = np.full((*waves.shape[:-1], width - waves.shape[-1]), number, complex)
+    return np.concatenate([more, waves], axis=-1)
+
+
+def modal_rates(map_: Stroboscope, states: np.ndarray) -> np.ndarray | None:
+    """The rates at states float64[k, D] at a whole period, row i by row i of the map, float64[k, D];
+    None if another method moves this system, or a contact has a law.
+    """
+    system = map_.system
+    if not isinstance(map_.method.serving(system.origin), Modal):
+        return None
+    tables = modal_flow(system.origin).tables
+    if not tables.plain.all() or len(tables.linear.states) != states.shape[1]:
+        return None
+    found = np.empty_like(states)
+    with tables.lock:
+        for i, state in enumerate(states):
+            given = tables.sets[tables.set_of(map_.parameters[i if len(map_) > 1 else 0])]
+            loads = [np.cos(given.lags), *(np.ravel(one.at(np.zeros(()))[0]) for one in given.courses)]
+            drives = np.concatenate(loads)
+            gap = given.gaps.matrix @ state + given.gaps.constant + given.gaps.driven @ drives
+            piece = tables.piece_of(given, int((gap > 0) @ (1 << np.arange(len(gap)))))
+            found[i] = piece.matrix @ state + piece.constant + piece.driven @ drives
+    return found
 
 
 @dataclass(frozen=True)
@@ -146,14 +184,15 @@ def _waves_of(
     if modes.block is not None:
         return None
     asked = tables.linear.rows(quantities, given.values, mode)
-    size, weight = len(modes.vectors), np.where(modes.values.imag > 0, 2.0, 1.0)
-    rows = np.vstack([np.eye(size), asked.matrix, given.gaps.matrix])
-    direct = np.zeros((len(rows), modes.answers.shape[1]))
-    direct[size:, 0] = np.append(asked.constant, given.gaps.constant)
-    direct[size:, 1:] = np.vstack([asked.driven, given.gaps.driven])
+    weight = np.where(modes.values.imag > 0, 2.0, 1.0)
+    states = np.hstack([modes.vectors * weight, modes.answers])
+    others = np.vstack([asked.matrix, given.gaps.matrix]) @ states
+    behind = others[:, len(weight) :]
+    behind[:, 0] += np.append(asked.constant, given.gaps.constant)
+    behind[:, 1:] += np.vstack([asked.driven, given.gaps.driven])
     return _Waves(
         np.concatenate([modes.values, [0.0], 1j * given.rates]),
-        np.hstack([rows @ (modes.vectors * weight), rows @ modes.answers + direct]),
+        np.vstack([states, others]),
         modes.inverse,
         modes.answers,
         given.rates,

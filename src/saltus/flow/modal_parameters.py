@@ -20,8 +20,9 @@ from saltus.contact.guards import is_hold
 from saltus.flow.modal_blocks import MOST_LOSS, MOST_SPREAD
 from saltus.flow.modal_eigen import both_of_each_pair
 from saltus.flow.modal_modes import StateModes
-from saltus.flow.modal_rows import Rows
+from saltus.flow.modal_rows import Links, Rows
 from saltus.flow.modal_values import ValueSet
+from saltus.kernels.modal import layout
 from saltus.language import expression as ex
 from saltus.system.linear import LinearPiece, LinearSystem
 
@@ -66,8 +67,16 @@ class ParameterTables:
         The parameters.
     groups, state_groups : int
         Groups of LANES modes, and of states.
-    sets, made : sequence
-        Its sets of parameter values; equations and modes of its contact states. Both grow.
+    sets, made, links : sequence, sequence, Links
+        Its sets of parameter values; equations and modes of its contact states; what links these.
+        All grow.
+
+    Attributes
+    ----------
+    rows, shifts : Rows
+        What the kernel reads.
+    links : Links
+        Links between the contact states that have derivatives, with the first row of these.
     """
 
     def __init__(
@@ -78,6 +87,7 @@ class ParameterTables:
         state_groups: int,
         sets: Sequence[ValueSet],
         made: Sequence[tuple[object, StateModes]],
+        links: Links,
     ) -> None:
         self._groups, self._state_groups, self._sets, self._made = groups, state_groups, sets, made
         self._linear = [linear.by(name) for name in names]
@@ -87,28 +97,36 @@ class ParameterTables:
         self.rows, self.shifts = Rows(), Rows(max(len(names) * self._width, 1))
         #: Derivatives of the equations, by the parameters and the values that they depend on.
         self._pieces: dict[tuple[float, ...], Callable[[int], LinearPiece]] = {}
-        #: First row of each contact state, -1 where it has none yet.
-        self._first = np.zeros(0, np.int64)
-
-    @property
-    def first(self) -> np.ndarray:
-        """First row of each contact state that the tables hold, -1 where it has none yet."""
-        more = len(self._made) - len(self._first)
-        self._first = np.append(self._first, np.full(more, -1))
-        return self._first
+        self._every, self.links = links, Links(links.table.shape[1])
 
     def need(self, at: int, which: int, mode: int) -> None:
         """Make the derivatives of a contact state and of its set of values."""
         while self.shifts.used <= which:
             self.shifts.add(self._shifts_of(self._sets[self.shifts.used]))
-        if self.first[at] < 0:
+        while self.links.used < len(self._made):
+            self.links.add(np.full(self.links.table.shape[1], -1))
+        if self.links.table[at, layout.SLOPES] < 0:
             given, (_, modes) = self._sets[which], self._made[at]
             parts = [self._slopes_of(j, given, modes, mode) for j in range(len(self._linear))]
             answers, mixing = zip(*parts, strict=True)
             behind = np.cumsum([sum(map(len, answers)), *map(len, mixing)])
             for one, more, place in zip(answers, mixing, behind, strict=False):
                 one[0, 0] = place if len(more) else 0
-            self._first[at] = self.rows.add(np.concatenate([*answers, *mixing]))
+            self._link(at, self.rows.add(np.concatenate([*answers, *mixing])))
+
+    def _link(self, at: int, first: int) -> None:
+        """Link a contact state whose derivatives begin at a row to others that have some."""
+        links, behind, smooth = self.links, layout.BEHIND, layout.SMOOTH
+        row = self._every.table[at].copy()
+        row[layout.SLOPES] = first
+        for g in range(len(row) - behind):
+            other = int(row[behind + g])
+            if other < 0 or links.table[other, layout.SLOPES] < 0:
+                row[behind + g] = -1
+                continue
+            links.put(other, behind + g, at)
+            links.put(other, smooth, int(self._every.table[other, smooth]))
+        links.put(at, slice(None), row)
 
     def _shifts_of(self, given: ValueSet) -> np.ndarray:
         """Of each parameter: what it does to the rate and the phase of each drive; of each guard

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+
 import numpy as np
 
 from saltus.codegen.module import MODAL_LANES as LANES
@@ -24,3 +26,37 @@ class Rows:
         self.used += len(rows)
         self.table[first : self.used] = rows
         return first
+
+
+class Links(Rows):
+    """A table of whole numbers whose rows change as others are added. Each thread has a copy, which
+    doesn't change while a kernel reads it; only what has changed since is copied again.
+    """
+
+    def __init__(self, width: int) -> None:
+        super().__init__(width, int)
+        self._changed: list[int] = []
+        self._mine = threading.local()
+
+    def add(self, numbers: np.ndarray) -> int:
+        """Append a row; returns its number."""
+        first = super().add(numbers)
+        self._changed.append(first)
+        return first
+
+    def put(self, row: int, column: int | slice, numbers: int | np.ndarray) -> None:
+        """Change some numbers of a row."""
+        self.table[row, column] = numbers
+        self._changed.append(row)
+
+    def copy(self) -> np.ndarray:
+        """The copy of this thread, brought up to date."""
+        known: tuple[int, np.ndarray] = getattr(self._mine, "known", (0, self.table[:0]))
+        since, copy = known
+        if len(copy) < self.used:
+            copy = self.table.copy()
+        else:
+            rows = self._changed[since:]
+            copy[rows] = self.table[rows]
+        self._mine.known = len(self._changed), copy
+        return copy

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,9 +14,9 @@ from saltus.codegen.module import MODAL_LANES as LANES
 from saltus.contact.guards import is_hold
 from saltus.flow.modal_blocks import table_of
 from saltus.flow.modal_eigen import Eigen, half_of, slots_of
-from saltus.flow.modal_modes import StateModes, modes_of, spread_over
+from saltus.flow.modal_modes import Known, StateModes, modes_of, spread_over
 from saltus.flow.modal_parameters import ParameterTables
-from saltus.flow.modal_rows import Rows
+from saltus.flow.modal_rows import Links, Rows
 from saltus.flow.modal_values import ValueSet
 from saltus.kernels.modal import layout
 from saltus.kernels.status import LAW_KINDS, NO_LAW
@@ -99,6 +99,7 @@ class Tables:
         self._equations: dict[tuple[object, ...], _Equations] = {}
         self._pieces: dict[tuple[float, ...], Callable[[int], LinearPiece]] = {}
         self._fast: dict[tuple[float, ...], float] = {}
+        self._parts: dict[tuple[int, int], Known] = {}
         self._smooth: dict[tuple[object, ...], bool] = {}
         self._known: dict[tuple[int, bytes], int] = {}
         self._states: dict[tuple[int, int], int] = {}
@@ -107,7 +108,7 @@ class Tables:
         self._by: dict[tuple[str, ...], ParameterTables] = {}
         drives, guards = max(len(self.linear.drives), 1), len(self.linear.system.guards)
         self._offset, self._rate, self._lag = Rows(max(guards, 1)), Rows(drives), Rows(drives)
-        self._links = Rows(layout.BEHIND + guards, int)
+        self._links = Links(layout.BEHIND + guards)
         self._course = Rows(max(5 * len(self.linear.courses), 1))
         states = len(self.linear.states)
         width = states + 1 + len(self.linear.drives) + len(self.linear.courses)
@@ -149,18 +150,16 @@ class Tables:
         """The derivatives with respect to some parameters."""
         if names not in self._by:
             widths = self.groups, self.state_groups
-            self._by[names] = ParameterTables(self.linear, names, *widths, self.sets, self.made)
+            known = self.sets, self.made, self._links
+            self._by[names] = ParameterTables(self.linear, names, *widths, *known)
         return self._by[names]
 
     def arrays(self, names: tuple[str, ...] = ()) -> tuple[np.ndarray, ...]:
         """The tables, in the order in which the kernel takes them after the sizes. With names of
         parameters a contact state that lacks the derivatives with respect to them isn't linked.
         """
-        links = self._links.table[: self._links.used].copy()  # others change while a kernel reads
         slopes = self.by(names)
-        if names:
-            links[:, layout.SLOPES], behind = slopes.first, links[:, layout.BEHIND :]
-            behind[slopes.first[behind] < 0] = -1
+        links = slopes.links.copy() if names else self._links.copy()
         return (
             self.row_of, self.sign_of, self._offset.table, self._rate.table, self._lag.table,
             self.modes.table, self.steady.table, links, self._course.table, self.pieces.table,
@@ -177,7 +176,8 @@ class Tables:
             found = [self._course_of(node, values) for node in self.linear.courses]
             rows = np.array([row for _, row in found], float).ravel()
             courses, gaps = tuple(course for course, _ in found), self.linear.gaps(values)
-            gaps.constant[self.holds] = 0.0
+            if self.holds.any():
+                gaps = replace(gaps, constant=np.where(self.holds, 0.0, gaps.constant))
             for table, numbers in (
                 (self._offset, gaps.constant), (self._rate, rates), (self._lag, lags),
                 (self._course, rows),
@@ -233,10 +233,11 @@ class Tables:
             behind = self._states.get((which, mode ^ 1 << g), -1)
             links.append(behind)
             if behind >= 0:
-                self._links.table[behind, layout.BEHIND + g] = number
+                self._links.put(behind, layout.BEHIND + g, number)
                 if self.plain[g] and self._is_smooth(known, self.made[behind][0], given.gaps, g):
                     links[layout.SMOOTH] |= 1 << g
-                    self._links.table[behind, layout.SMOOTH] |= 1 << g
+                    smooth = int(self._links.table[behind, layout.SMOOTH]) | 1 << g
+                    self._links.put(behind, layout.SMOOTH, smooth)
         self._links.add(np.array(links))
         if self.holds.any():
             # the closing accelerations of contacts that can be held: the gaps of their hold guards
@@ -259,8 +260,9 @@ class Tables:
         piece, gaps = (
             (free.reduced(known.piece), free.seen(shown)) if held else (known.piece, shown)
         )
+        also = self._parts.setdefault((id(known), id(given.gaps)), {}) if not held else None
         modes = modes_of(
-            piece, gaps, given.rates, speeds, LANES * self.groups, known.eigen, known.fastest
+            piece, gaps, given.rates, speeds, LANES * self.groups, known.eigen, known.fastest, also
         )
         return spread_over(modes, free, len(given.rates)) if held else modes
 

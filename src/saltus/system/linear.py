@@ -140,9 +140,10 @@ class LinearSystem:
     def rows(
         self, quantities: tuple[Expr, ...], values: Mapping[str, float], mode: int
     ) -> LinearPiece:
-        """Coefficients of quantities that :meth:`of` has given, in a contact state."""
-        bits = [bool(mode >> i & 1) for i in range(len(self.system.guards))]
-        return LinearPiece(*self._coefficients(quantities, values, bits))
+        """Coefficients of quantities that :meth:`of` has given, in a contact state. The arrays
+        belong to all that have asked for them.
+        """
+        return _rows_of(self, quantities, self._used(quantities, values), mode)
 
     def piece(self, values: Mapping[str, float], mode: int) -> LinearPiece:
         """The equations of a contact state, bit i the side of guard i."""
@@ -176,10 +177,17 @@ class LinearSystem:
 
     def gaps(self, values: Mapping[str, float], mode: int = 0) -> LinearPiece:
         """a, c and e of all guards in a contact state, float64[guards, N], float64[guards],
-        float64[guards, D]; only those of hold guards depend on it.
+        float64[guards, D]; only those of hold guards depend on it. The arrays belong to all that
+        have asked for them.
         """
-        bits = [bool(mode >> i & 1) for i in range(len(self.system.guards))]
-        return LinearPiece(*self._coefficients(self._gaps, values, bits))
+        return _rows_of(self, self._gaps, self._used(self._gaps, values), mode)
+
+    def _used(
+        self, entries: tuple[Expr, ...], values: Mapping[str, float]
+    ) -> tuple[tuple[str, float], ...]:
+        """The values of the parameters in some expressions."""
+        used = _parameters_in(entries)
+        return tuple((name, values[name]) for name in self.system.values if name in used)
 
     def pieces_of(self, entries: Sequence[Expr], values: Mapping[str, float]) -> LinearPiece:
         """Coefficients of other linear functions of the states and drives of the system."""
@@ -217,6 +225,24 @@ class LinearSystem:
         ).reshape(len(entries), probes.shape[1])
         slopes = (found[:, 1 : 1 + n + m] - found[:, 1 + n + m :]) / (2 * PROBE)
         return slopes[:, :n].copy(), found[:, 0].copy(), slopes[:, n:].copy()
+
+
+@functools.lru_cache(maxsize=256)
+def _parameters_in(entries: tuple[Expr, ...]) -> frozenset[object]:
+    """The names of the parameters in some expressions."""
+    return frozenset(node.payload for node in ex.walk(*entries) if node.op == "param")
+
+
+@functools.lru_cache(maxsize=2048)
+def _rows_of(
+    linear: LinearSystem,
+    entries: tuple[Expr, ...],
+    values: tuple[tuple[str, float], ...],
+    mode: int,
+) -> LinearPiece:
+    """Coefficients of expressions in a contact state, by the parameters in them."""
+    bits = [bool(mode >> i & 1) for i in range(len(linear.system.guards))]
+    return LinearPiece(*linear._coefficients(entries, dict(values), bits))
 
 
 @dataclass(frozen=True)

@@ -54,14 +54,17 @@ def tangent_system(system: System) -> System:
 
 
 @functools.lru_cache(maxsize=256)
-def tangent_states(system: System, names: tuple[str, ...] = ()) -> System:
+def tangent_states(
+    system: System, names: tuple[str, ...] = (), directions: int | None = None
+) -> System:
     """The tangent system with the equations of the D states only, for a flow that needs no others;
     cached. The derivatives with respect to some parameters are further columns of Y: zero at the
-    start.
+    start. Y times a number of directions has a column for each of these.
     """
     if system.origin is not system:
-        return tangent_states(system.origin, names).with_values(**system.values)
-    columns = (*(f"{name}(0)" for name in system.states), *names)
+        return tangent_states(system.origin, names, directions).with_values(**system.values)
+    along = system.states if directions is None else tuple(map(str, range(directions)))
+    columns = (*(f"{name}(0)" for name in along), *names)
     more = tuple(f"d{row}/d{column}" for row in system.states for column in columns)
     return replace(
         system,

@@ -96,12 +96,10 @@ def _around(points: np.ndarray, scale: np.ndarray, across: int) -> np.ndarray:
     """Codes of the boxes that points float64[n, D] visit and of their neighbours along each axis,
     ascending int64.
     """
-    cells = np.unique(np.floor(points / scale * across).astype(np.int64), axis=0)
-    size = cells.shape[1]
-    steps = np.concatenate(
-        [np.zeros((1, size), np.int64), np.eye(size, dtype=np.int64), -np.eye(size, dtype=np.int64)]
-    )
-    return np.unique(_codes((cells[:, None] + steps).reshape(-1, size)))
+    visited = np.unique(_codes(np.floor(points / scale * across).astype(np.int64)))
+    own = np.eye(points.shape[1], dtype=np.int64)
+    steps = _codes(np.concatenate([0 * own[:1], own, -own]))
+    return np.unique(visited[:, None] + steps)
 
 
 def _inside(points: np.ndarray, scale: np.ndarray, across: int, boxes: np.ndarray) -> np.ndarray:

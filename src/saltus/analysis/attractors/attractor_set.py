@@ -70,6 +70,10 @@ class AttractorSet:
                 return i
         raise AssertionError("an attractor that wasn't found")
 
+    def ids(self, before: AttractorSet) -> np.ndarray:
+        """The id that each of fewer attractors has among these, int64[m]."""
+        return np.array([self.index(one) for one in before.every], np.int64)
+
     def ordered(self, scale: np.ndarray) -> AttractorSet:
         """The same with ids that don't depend on the order of discovery: by period, then by size,
         then by place.

@@ -32,9 +32,12 @@ from saltus.results.dataset.kinds import Kind
 Owners = list[ClosedMotion | SampledMotion | None]
 #: Candidates for orbits in one round; what isn't tried has its turn in the next.
 MAX_CANDIDATES = 12
-#: Trajectories that never recur whose motion is surveyed.
+#: Trajectories of up to seven states that never recur whose motion is surveyed; of more states
+#: fewer, as each costs more.
 MAX_SURVEYED = 24
-#: Iterates of the survey.
+#: Fewest of them.
+FEWEST_SURVEYED = 4
+#: Iterates of the survey, of up to seven states.
 WATCHING_ITERATES = 32 * 1024
 #: Recurrence below which its survivor is periodic after all.
 ARRIVED = 1e-5
@@ -257,9 +260,8 @@ def _survey(
     survivors, points, leavers = _watch(travel, going, found, owner, settled)
     if not len(survivors):
         return
-    chosen = np.unique(
-        np.linspace(0, len(survivors) - 1, min(MAX_SURVEYED, len(survivors))).astype(int)
-    )
+    few = max(MAX_SURVEYED // max(len(scale) // 4, 1), FEWEST_SURVEYED)
+    chosen = np.unique(np.linspace(0, len(survivors) - 1, min(few, len(survivors))).astype(int))
     noisy, strays = _blurred(map_, travel.state[chosen], points[chosen], scale, most)
     keeps = keep_to(noisy, points[chosen], INSIDE) >= 0
     # stays on an orbit that doesn't attract
@@ -337,9 +339,10 @@ def _leave(
     """True where a trajectory, followed for very long, reaches an orbit after all, bool[k]. Those
     near a noisy orbit don't count.
     """
-    travel, going = map_.launch(state, WATCHING_ITERATES), np.arange(len(state))
+    most = WATCHING_ITERATES // max(len(scale) // 4, 1)
+    travel, going = map_.launch(state, most), np.arange(len(state))
     left = np.zeros(len(state), bool)
-    while len(going) and travel.age < WATCHING_ITERATES:
+    while len(going) and travel.age < most:
         points = travel.advance(ROUND)
         arrives = found.near.capture(points)[0] >= 0
         if travel.age % (8 * ROUND) == 0:

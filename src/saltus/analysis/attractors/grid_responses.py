@@ -4,6 +4,7 @@ which lead to the same response.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
@@ -218,6 +219,9 @@ def _gathered(
     the response they settled to.
     """
     response_of = result.kind.copy()
+    sampled = functools.cache(
+        lambda row: SampledMotion("", 0.0, 0.0, result.iterates[row], result.scale[row])
+    )
     rows: list[int] = []
     for every in np.split(np.arange(len(place)), np.flatnonzero(np.diff(place)) + 1):
         here = [row for row in every.tolist() if result.kind[row] >= 0]
@@ -227,7 +231,7 @@ def _gathered(
                 (
                     group
                     for group in groups
-                    if _same(result, group[0], row, max(SAME, tolerance[row]))
+                    if _same(result, sampled, group[0], row, max(SAME, tolerance[row]))
                 ),
                 None,
             )
@@ -242,7 +246,13 @@ def _gathered(
     return GridResponses(result, chosen, place[chosen], response_of, complete)
 
 
-def _same(result: SettledMotions, a: int, b: int, tolerance: float) -> bool:
+def _same(
+    result: SettledMotions,
+    sampled: Callable[[int], SampledMotion],
+    a: int,
+    b: int,
+    tolerance: float,
+) -> bool:
     """True where two trajectories at one value settled to the same response."""
     if result.kind[a] != result.kind[b] or result.orbits.period[a] != result.orbits.period[b]:
         return False
@@ -256,10 +266,7 @@ def _same(result: SettledMotions, a: int, b: int, tolerance: float) -> bool:
             result.orbits.distance(result.orbits.points[[b], 0], result.scale[[a]], [a])[0]
             < tolerance
         )
-    first, second = (
-        SampledMotion("", 0.0, 0.0, result.iterates[row], result.scale[a]) for row in (a, b)
-    )
-    return alike(first, second)
+    return alike(sampled(a), sampled(b))
 
 
 def _order(result: SettledMotions, row: int) -> tuple[float, ...]:

@@ -9,12 +9,12 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.attractors.attractors import attractors_dataset, looked
-from saltus.analysis.attractors.find_attractors import find_attractors
 from saltus.analysis.attractors.noisy import stray_attrs
 from saltus.analysis.attractors.portrait import portraits
 from saltus.analysis.basins import uncertainty
 from saltus.analysis.basins.labels import complete, settle_all
-from saltus.analysis.basins.pipeline import SCOUTS, memory
+from saltus.analysis.basins.pipeline import memory
+from saltus.analysis.basins.scouting import SCOUTS, scouted
 from saltus.analysis.closed.spread import spread
 from saltus.analysis.closed.turns import looks_every
 from saltus.analysis.dataset_parts import provenance, subject
@@ -26,7 +26,7 @@ from saltus.analysis.inputs.verb import verb
 from saltus.flow.counts import whole
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method, check_method
-from saltus.flow.progress import reporting
+from saltus.flow.progress import reporting, stage
 from saltus.flow.room import check_room
 from saltus.intervals import smallest_seen
 from saltus.results.dataset.kinds import Kind
@@ -117,9 +117,9 @@ def basin_fractions(
     scale = spread(map_, start[:SPREAD_STARTS])
     with reporting(progress) as show:
         scouts = fill(system, draw(ranges, halton(min(SCOUTS, samples), len(ranges))), fixed)
-        found = find_attractors(map_, scouts, scale, periods)[0]
-        result = settle_all(map_, start, found, periods, threads, show)
-        found = complete(map_, result, found, scale, periods, threads)
+        *_, found = scouted(map_, scouts, scale, periods, stage(show, 0.0, 0.1))
+        result = settle_all(map_, start, found, periods, threads, stage(show, 0.1, 0.9))
+        found = complete(map_, result, found, scale, periods, threads, stage(show, 0.9, 1.0))
     table = replace(
         portraits(map_, found), fractions=uncertainty.fractions(result.label, len(found))
     )

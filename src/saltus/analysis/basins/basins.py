@@ -4,21 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
+import numpy as np
 import xarray as xr
 
 from saltus.analysis.attractors.attractor_set import AttractorSet
-from saltus.analysis.basins.labels import Settling
+from saltus.analysis.basins.labels import Settling, pieces_of, settle
 from saltus.analysis.basins.pipeline import BasinPlan, basin_plan
+from saltus.analysis.closed.capture import Neighbourhoods
 from saltus.analysis.inputs.given import Axis, Value
 from saltus.analysis.inputs.verb import verb
+from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporting, stage
 from saltus.flow.threads import on_threads
 from saltus.interrupt import Interrupted
 from saltus.system import System
 
-#: Share of the progress bar for the search for attractors.
-SCOUTING = 0.05
+#: Share of the progress bar at which all cells have been followed once. What is left is for those
+#: that no attractor has captured.
+LABELLED = 0.9
 
 
 @verb
@@ -36,7 +40,8 @@ def basins(
     """The attractor that each start of a grid leads to, every attractor typed and verified.
 
     1. A fixed quasi-random sample of 1024 starts is followed until it settles, and its attractors
-       are established as by :func:`saltus.attractors`: a small sample meets all large basins.
+       are established as by :func:`saltus.attractors`: a small sample meets all large basins. Of
+       systems of more than four states the first 16 say what a start costs, and so how many follow.
     2. About each attracting orbit a neighbourhood is taken in which the return map was seen to
        contract with an unchanged sequence of contacts: a trajectory inside needn't be followed any
        further.
@@ -47,7 +52,8 @@ def basins(
        ``periods``, since small basins may be missing from the first sample. Then all of these go on
        for as long again.
     5. A random sample of the settled cells is computed again by a more exact method; ``flip_rate``
-       is the share that leads elsewhere, an estimate of wrong labels.
+       is the share that leads elsewhere, an estimate of wrong labels. Nothing is more exact than
+       :class:`saltus.Modal`: there it is NaN.
     6. Shares, entropies and the uncertainty exponent are computed from the labels; they say how far
        the map can be trusted.
 
@@ -57,9 +63,11 @@ def basins(
         Equations, contacts and values.
     **axes : (low, high, count), or a list or array of starts
         Two states, the range of each [SI or text with a unit] and the number of starts, ends
-        included: ``x=("-5 mm", "5 mm", 400), v=("-1 m/s", "1 m/s", 400)``.
+        included: ``x=("-5 mm", "5 mm", 400), v=("-1 m/s", "1 m/s", 400)``. Of a structure by its
+        modes two sensors of deflections or velocities: of all states that they show so, each start
+        is that of least energy.
     at : mapping, optional
-        Starts of the other states; default zero.
+        Starts of the other states, or what other sensors show; default zero.
     method : Method
         Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
         it serves.
@@ -86,7 +94,7 @@ def basins(
     ParameterError, UnitError
         If an argument can't be used.
     Interrupted
-        On Ctrl-C; its ``partial`` is the Dataset so far.
+        On Ctrl-C; its ``partial`` is the Dataset so far: the attractors found, the cells followed.
 
     References
     ----------
@@ -112,26 +120,22 @@ def map_of(
     plan: BasinPlan, threads: int | None, progress: bool | Callable[[float], None] | None
 ) -> xr.Dataset:
     """The Dataset of a planned map, as :func:`basins` returns it. Raises Interrupted on Ctrl-C."""
-    result = Settling.empty(plan.cells, len(plan.system.states))
-    found = None
+    size, every = len(plan.system.states), np.arange(plan.cells)
+    scouting = LABELLED * plan.scouts / (plan.scouts + plan.cells)
+    result, found = Settling.empty(plan.cells, size), AttractorSet(Neighbourhoods.none(size))
     with reporting(progress) as show:
         try:
-            found = plan.scout(threads, stage(show, 0.0, SCOUTING))
-            chunks, rest = range(plan.chunks), stage(show, SCOUTING, 1.0)
-            label_all(
-                plan,
-                found,
-                chunks,
-                lambda i, part: result.put(plan.cells_of(i), part),
-                threads,
-                rest,
-            )
-            return plan.finish(result, found, threads)
+            for known in plan.scouted(threads, stage(show, 0.0, scouting)):
+                found = known
+            map_ = compiled(plan)
+            on_threads(
+                lambda piece: settle(map_, plan.starts(every[piece]), found, plan.periods),
+                pieces_of(plan.cells, size), result.put, threads, stage(show, scouting, LABELLED),
+            )  # fmt: skip
+            return plan.finish(result, found, threads, stage(show, LABELLED, 1.0))
         except KeyboardInterrupt:
             scouted = found
-            raise Interrupted(
-                None if scouted is None else lambda: plan.dataset(result, scouted, threads)
-            ) from None
+            raise Interrupted(lambda: plan.dataset(result, scouted, threads)) from None
 
 
 def label_all(
@@ -145,6 +149,12 @@ def label_all(
     """Label chunks on threads; ``done(index, settling)`` is called from this thread as each is
     ready, in any order.
     """
-    map_ = plan.map(1)
-    map_.launch(plan.starts(plan.cells_of(0)[:1]), 1)  # compiles before threads ask for it
+    map_ = compiled(plan)
     on_threads(lambda index: plan.chunk(index, found, map_), chunks, done, threads, progress)
+
+
+def compiled(plan: BasinPlan) -> Stroboscope:
+    """The map of a plan for one thread, compiled before threads ask for it."""
+    map_ = plan.map(1)
+    map_.launch(plan.starts(np.zeros(1, np.int64)), 1)
+    return map_

@@ -10,20 +10,23 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from queue import Empty, SimpleQueue
 
 import numpy as np
 
 from saltus.analysis.attractors.attractor_set import AttractorSet
-from saltus.analysis.basins.labels import OPEN, Settling, Wanderers
+from saltus.analysis.basins.basins import compiled
+from saltus.analysis.basins.labels import OPEN, Settling, Wanderers, complete, fewer, renumber
 from saltus.analysis.basins.levels import stride_of
 from saltus.analysis.basins.pipeline import BasinPlan
+from saltus.analysis.closed.capture import Neighbourhoods
 from saltus.flow.maps import Stroboscope
 from saltus.flow.threads import on_threads, usable_processors
 from saltus.results.dataset.kinds import Kind
 
-#: Starts that one thread follows at a time: fewer leave lanes empty, more delay the first cells.
+#: Starts of up to seven states that one thread follows at a time: fewer leave lanes empty, more
+#: delay the first cells.
 POOL = 1024
 #: New starts are sent off when a pool has shrunk to this share.
 REFILL = 0.75
@@ -31,8 +34,27 @@ REFILL = 0.75
 PATIENCE = 256
 #: Smallest stride of the levels that are that impatient.
 COARSE = 4
+#: Starts from which attractors are looked for before the first cells: not enough for an answer,
+#: large basins are hit. Of seven frequencies of the rig they missed small ones at four.
+FEW_SCOUTS = 64
 #: Seconds for which cells are gathered before they are handed on.
 GATHERED = 0.03
+
+
+@dataclass(frozen=True)
+class KnownAttractors:
+    """The attractors that cells are labelled with from now on.
+
+    Attributes
+    ----------
+    found : AttractorSet
+        All that are known by now.
+    ids : int64[m]
+        The new id of each that was known before: labels of before change by it.
+    """
+
+    found: AttractorSet
+    ids: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -69,13 +91,13 @@ def grow(
     result: Settling | None = None,
     finest: int = 1,
     patience: int = PATIENCE,
+    resume: bool | None = None,
     threads: int | None = None,
 ) -> Settling:
     """Label the cells of a map, coarse to fine, and hand them on as they settle.
 
     Starts of coarse levels that nothing captures within ``patience`` iterates are handed on as
-    open. They are followed again, from their start and as long as all, when no finer level waits;
-    with ``finest`` above 1 they stay open.
+    open. They are followed again, from their start and as long as all, when no finer level waits.
 
     Parameters
     ----------
@@ -92,6 +114,9 @@ def grow(
         Stride of the finest level that is wanted.
     patience : int
         Iterates; see above.
+    resume : bool
+        Whether open starts are followed again; default where ``finest`` is 1. Else all levels are
+        that impatient.
     threads : int, optional
         Default all processors.
 
@@ -108,9 +133,9 @@ def grow(
     """
     if result is None:
         result = Settling.empty(plan.cells, len(plan.system.states))
-    work = _Work(plan, found, result, finest, patience)
-    map_ = plan.map(1)
-    map_.launch(plan.starts(plan.cells_of(0)[:1]), 1)  # compiles before threads ask for it
+    resume = finest == 1 if resume is None else resume
+    work = _Work(plan, found, result, finest, patience, resume)
+    map_ = compiled(plan)
     handed = _Handed(work, take)
     try:
         on_threads(
@@ -123,14 +148,91 @@ def grow(
     return result
 
 
+def grow_all(
+    plan: BasinPlan,
+    take: Callable[[Grown | KnownAttractors], None],
+    known: AttractorSet | None = None,
+    threads: int | None = None,
+) -> tuple[AttractorSet, Settling]:
+    """A whole map from nothing, or from some of its attractors, with a first picture early.
+
+    1. Attractors are looked for from a few starts.
+    2. Coarse levels are labelled by what is known, while attractors are looked for from as many
+       starts as :func:`saltus.basins` looks from.
+    3. The other cells are labelled, and those that nothing had captured.
+    4. More attractors are looked for from cells that are still open.
+
+    Labels are those of :func:`saltus.basins`. Periods to settle may differ by a few where
+    attractors were known: their neighbourhoods are those of Newton's method from elsewhere.
+
+    Parameters
+    ----------
+    plan : BasinPlan
+        The map.
+    take : callable
+        Called with each :class:`KnownAttractors` before the cells that it labels, and with
+        :class:`Grown` cells as by :func:`grow`; never by two threads at once.
+    known : AttractorSet, optional
+        Attractors that are known, such as those of old values
+        (:func:`saltus.analysis.attractors.followed.followed`).
+    threads : int, optional
+        Default all processors.
+
+    Returns
+    -------
+    AttractorSet, Settling
+        All attractors, and the outcomes of all cells: :meth:`BasinPlan.finish` makes the Dataset.
+
+    Raises
+    ------
+    Interrupted
+        On Ctrl-C, or a :class:`saltus.Stop`.
+    """
+    result = Settling.empty(plan.cells, len(plan.system.states))
+    found = replace(plan, scouts=min(FEW_SCOUTS, plan.scouts)).scout(threads, known=known)
+    none = AttractorSet(Neighbourhoods.none(len(plan.system.states)))
+    take(KnownAttractors(found, found.ids(known or none)))
+    wider = found
+
+    def look() -> None:
+        nonlocal wider
+        wider = plan.scout(1, known=found)
+
+    def begin() -> None:
+        finest = min(COARSE, plan.levels()[0].stride)
+        grow(plan, found, take, result=result, finest=finest, resume=False, threads=threads)
+
+    on_threads(lambda job: job(), [look, begin], lambda *_: None, 2)
+    ids = wider.ids(found)
+    renumber(result.label, ids)
+    if len(wider) > len(found):
+        take(KnownAttractors(wider, ids))
+    grow(plan, wider, take, result=result, threads=threads)
+    opened = np.flatnonzero(result.label == OPEN)
+    every = complete(plan.map(threads), result, wider, plan.scale, plan.periods, threads)
+    if len(every) > len(wider):
+        take(KnownAttractors(every, every.ids(wider)))
+    strides = stride_of(opened, plan.shape)
+    for stride in np.unique(strides)[::-1].tolist():
+        here = opened[strides == stride]
+        take(Grown(stride, here, result.of(here), plan.cells, True))
+    return every, result
+
+
 class _Work:
     """The cells that are still to be followed, shared by all threads."""
 
     def __init__(
-        self, plan: BasinPlan, found: AttractorSet, result: Settling, finest: int, patience: int
+        self,
+        plan: BasinPlan,
+        found: AttractorSet,
+        result: Settling,
+        finest: int,
+        patience: int,
+        resumes: bool,
     ) -> None:
         self.plan, self.found, self.result = plan, found, result
-        self.patience, self.resumes = patience, finest == 1
+        self.patience, self.resumes = patience, resumes
         self.levels = [one for one in plan.levels() if one.stride >= finest]
         self.settled: SimpleQueue[tuple[np.ndarray, Settling]] = SimpleQueue()
         self._lock, self._ahead = threading.Lock(), np.zeros(0, np.int64)
@@ -160,9 +262,10 @@ class _Work:
     def follow(self, map_: Stroboscope) -> None:
         """Follow starts until none is left; the work of one thread."""
         plan = self.plan
-        pool = Wanderers(map_, self.found, plan.periods, len(plan.system.states))
+        states = len(plan.system.states)
+        pool, size = Wanderers(map_, self.found, plan.periods, states), fewer(POOL, states)
         while True:
-            if len(pool) <= REFILL * POOL and len(more := self.take(POOL - len(pool))):
+            if len(pool) <= REFILL * size and len(more := self.take(size - len(pool))):
                 pool.add(more, plan.starts(more))
             if not len(pool):
                 return

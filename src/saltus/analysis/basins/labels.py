@@ -9,9 +9,12 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from saltus.analysis.attractors.aperiodic import SURVEY_ITERATES
 from saltus.analysis.attractors.attractor_set import AttractorSet
 from saltus.analysis.attractors.find_attractors import find_attractors, keeps_to_sampled
+from saltus.analysis.basins.scouting import affordable
 from saltus.flow.maps import Map, Travel
+from saltus.flow.progress import stage
 from saltus.flow.threads import on_threads
 from saltus.kernels import status as st
 from saltus.results.dataset.kinds import Kind
@@ -21,8 +24,8 @@ from saltus.results.dataset.kinds import Kind
 OPEN = min(Kind) - 1
 #: Iterates between two tests for capture.
 BLOCK = 8
-#: Starts that one thread follows at a time.
-PIECE = 4096
+#: Starts that one thread follows at a time, of up to seven states, and the fewest.
+PIECE, FEWEST = 4096, 16
 #: Age from which a trajectory may count as being on a chaotic attractor, and age between two such
 #: tests.
 APERIODIC_WINDOW = 64
@@ -201,11 +204,22 @@ def settle_all(
 ) -> Settling:
     """:func:`settle` for any number of starts, in pieces on threads."""
     result = Settling.empty(len(start), start.shape[1])
-    pieces = [slice(first, first + PIECE) for first in range(0, len(start), PIECE)]
     on_threads(
-        lambda piece: settle(map_, start[piece], found, most), pieces, result.put, threads, progress
-    )
+        lambda piece: settle(map_, start[piece], found, most), pieces_of(*start.shape), result.put,
+        threads, progress,
+    )  # fmt: skip
     return result
+
+
+def pieces_of(count: int, states: int) -> list[slice]:
+    """Starts that one thread follows at a time."""
+    size = fewer(PIECE, states)
+    return [slice(first, first + size) for first in range(0, count, size)]
+
+
+def fewer(most: int, states: int) -> int:
+    """Starts that are followed at a time: fewer of many states, so that one hears of them."""
+    return max(most // max(states // 4, 1) ** 3, FEWEST)
 
 
 def complete(
@@ -215,6 +229,7 @@ def complete(
     scale: np.ndarray,
     most: int,
     threads: int | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> AttractorSet:
     """Search for new attractors from uncaptured trajectories, label those they capture, and give
     all attractors their final ids.
@@ -225,12 +240,13 @@ def complete(
     opened = np.flatnonzero(result.label == OPEN)
     if not len(opened):
         return found
-    sample = np.sort(
-        np.random.default_rng(0).choice(opened, min(SAMPLE, len(opened)), replace=False)
-    )
-    wider, _, _ = find_attractors(map_, result.end[sample], scale, most, found)
-    _renumber(result.label, found, wider)
-    more = settle_all(map_, result.end[opened], wider, most, threads)
+    size = affordable(most + SURVEY_ITERATES, len(scale), min(SAMPLE, len(opened)))
+    sample = np.sort(np.random.default_rng(0).choice(opened, min(size, len(opened)), replace=False))
+    half = stage(progress, 0.0, 0.5)
+    wider, _, _ = find_attractors(map_, result.end[sample], scale, most, found, half)
+    renumber(result.label, wider.ids(found))
+    half = stage(progress, 0.5, 1.0)
+    more = settle_all(map_, result.end[opened], wider, most, threads, half)
     more.periods[more.periods >= 0] += most
     more.unresolved[:] += result.unresolved[opened]
     still = more.label == OPEN
@@ -239,7 +255,7 @@ def complete(
     return wider
 
 
-def _renumber(label: np.ndarray, before: AttractorSet, after: AttractorSet) -> None:
-    ids = np.array([*map(after.index, before.orbits), *map(after.index, before.sampled)], np.int64)
+def renumber(label: np.ndarray, ids: np.ndarray) -> None:
+    """Give labels new ids of their attractors, int64[m]. Changes ``label``."""
     if len(ids):
         label[label >= 0] = ids[label[label >= 0]]

@@ -8,7 +8,8 @@ labels what no known attractor captured and makes the Dataset.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import functools
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -16,18 +17,20 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.attractors.attractor_set import AttractorSet
-from saltus.analysis.attractors.find_attractors import find_attractors
 from saltus.analysis.attractors.noisy import stray_attrs
 from saltus.analysis.attractors.portrait import portraits
 from saltus.analysis.basins import uncertainty
 from saltus.analysis.basins.labels import OPEN, Settling, complete, settle
 from saltus.analysis.basins.levels import Level, levels_of
+from saltus.analysis.basins.scouting import SCOUTS, scouted
+from saltus.analysis.closed.spread import spread
 from saltus.analysis.closed.turns import ASKED, looks_every
 from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.inputs.axes import along, count_along
 from saltus.analysis.inputs.halton import halton
+from saltus.analysis.inputs.sensed import sensed
 from saltus.analysis.inputs.starts import check_system, fill, fixed_states
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, must_be, unknown
 from saltus.flow.counts import whole
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
@@ -40,14 +43,15 @@ from saltus.results.dataset.attractors import basin_meanings
 from saltus.results.dataset.kinds import Kind
 from saltus.results.provenance import to_json
 from saltus.system import System
+from saltus.system.structures.told import by_modes
 from saltus.units import to_si
 
-#: Starts of the first search for attractors; a basin of half a per cent is hit with 99.4 %.
-SCOUTS = 1024
 #: Cells of one task: seconds of work at most, and enough cells to keep lanes full to the end.
 CHUNK = 4096
 #: Cells recomputed by a more exact method.
 CHECKED = 1000
+#: Cells whose motions say how large those of a map over sensors are.
+SPREAD_STARTS = 64
 
 
 @dataclass(frozen=True)
@@ -61,9 +65,10 @@ class BasinPlan:
     method : Method
         The method of integration.
     axes : mapping of str to float64[n]
-        The two states that the map is drawn over, and their values [SI].
+        The two states, or sensors of a structure, that the map is drawn over, and their values
+        [SI].
     fixed : mapping of str to float
-        The other states at the start [SI].
+        The other states, or sensors, at the start [SI].
     periods : int
         Forcing periods that a trajectory is followed at most, before and once more after new
         attractors are looked for.
@@ -102,11 +107,13 @@ class BasinPlan:
         """The map whose attractors are computed."""
         return Stroboscope(self.system, self.method, every=self.every, threads=threads)
 
-    @property
+    @functools.cached_property
     def scale(self) -> np.ndarray:
         """Range of each state: of an axis its length, of other states the largest of those with the
-        same unit, else of any.
+        same unit, else of any. With sensors on the axes that of motions from some of the cells.
         """
+        if not set(self.axes) <= set(self.system.states):
+            return spread(self.map(1), self.starts(self.sample(SPREAD_STARTS)))
         lengths = {name: float(np.ptp(values)) for name, values in self.axes.items()}
         units = self.system.units
         alike = {
@@ -123,9 +130,16 @@ class BasinPlan:
     def starts(self, cells: np.ndarray) -> np.ndarray:
         """States at the start of cells int64[k] of the flattened grid, float64[k, D]."""
         rows = dict(zip(self.axes, np.unravel_index(cells, self.shape), strict=True))
-        return fill(
-            self.system, {name: self.axes[name][row] for name, row in rows.items()}, self.fixed
-        )
+        return self._states({name: self.axes[name][row] for name, row in rows.items()})
+
+    def _states(self, columns: Mapping[str, np.ndarray]) -> np.ndarray:
+        """States float64[k, D] at places float64[k] along both axes."""
+        if set(columns) <= set(self.system.states):
+            return fill(self.system, columns, self.fixed)
+        count = len(next(iter(columns.values())))
+        given = {name: np.full(count, value) for name, value in self.fixed.items()}
+        found = sensed(self.system, {**columns, **given})
+        return np.stack([found[name] for name in self.system.states], axis=1)
 
     def cells_of(self, chunk: int) -> np.ndarray:
         """Cells of a chunk, int64[k]."""
@@ -136,26 +150,25 @@ class BasinPlan:
         return levels_of(self.shape)
 
     # -- the three stages --------------------------------------------------------------------------
-    def scout(
+    def scout(self, threads: int | None = None, known: AttractorSet | None = None) -> AttractorSet:
+        """The attractors that a fixed quasi-random sample of the box leads to, and known ones."""
+        *_, found = self.scouted(threads, known=known)
+        return found
+
+    def scouted(
         self,
         threads: int | None = None,
         progress: Callable[[float], None] | None = None,
         known: AttractorSet | None = None,
-    ) -> AttractorSet:
-        """The attractors that a fixed quasi-random sample of the box leads to, and known ones."""
+    ) -> Iterator[AttractorSet]:
+        """The same, more and more of them."""
         unit = halton(self.scouts, 2)
         low, high = (
             np.array([end(values) for values in self.axes.values()]) for end in (np.min, np.max)
         )
         drawn = dict(zip(self.axes, (low + (high - low) * unit).T, strict=True))
-        return find_attractors(
-            self.map(threads),
-            fill(self.system, drawn, self.fixed),
-            self.scale,
-            self.periods,
-            known,
-            progress,
-        )[0]
+        start = self._states(drawn)
+        return scouted(self.map(threads), start, self.scale, self.periods, progress, known)
 
     def sample(self, count: int) -> np.ndarray:
         """Indices of cells drawn at random, the same each time: int64[count at most], ascending."""
@@ -168,12 +181,17 @@ class BasinPlan:
         return settle(map_ or self.map(1), self.starts(self.cells_of(index)), found, self.periods)
 
     def finish(
-        self, result: Settling, found: AttractorSet, threads: int | None = None
+        self,
+        result: Settling,
+        found: AttractorSet,
+        threads: int | None = None,
+        progress: Callable[[float], None] | None = None,
     ) -> xr.Dataset:
         """The finished Dataset: open cells are settled first, and a sample is checked. Changes
         ``result``.
         """
-        found = complete(self.map(threads), result, found, self.scale, self.periods, threads)
+        map_ = self.map(threads)
+        found = complete(map_, result, found, self.scale, self.periods, threads, progress)
         return self.dataset(result, found, threads).assign_attrs(self._check(result, found))
 
     def dataset(
@@ -225,7 +243,7 @@ class BasinPlan:
         """
         chosen = self.sample(CHECKED)
         chosen = chosen[result.label[chosen] >= 0]
-        if not len(chosen):
+        if not len(chosen) or self.method.companion() == self.method:
             return {}
         again = settle(
             self.map(1).by(self.method.companion()), self.starts(chosen), found, 2 * self.periods
@@ -263,7 +281,8 @@ def basin_plan(
         If an axis isn't a state, a range is empty, or the grid is too large.
     """
     check_system(system)
-    fixed = fixed_states(system, at, axes)
+    by_sensors = by_modes(system) and not any(name in system.states for name in axes)
+    fixed = (_fixed_sensors if by_sensors else fixed_states)(system, at, axes)
     if len(axes) != 2:
         example = ", ".join(
             f'{name}=("-1 {system.units[name]}", "1 {system.units[name]}", 400)'
@@ -280,15 +299,29 @@ def basin_plan(
         f"{first} x {second} cells",
         lambda say: f"Take a coarser grid, or {say.verb('basin_fractions')}.",
     )
-    values = {name: _axis(system, name, given) for name, given in axes.items()}
+    units = {**system.units, **dict(zip(system.outputs.names, system.outputs.units, strict=True))}
+    values = {name: _axis(units[name], name, given) for name, given in axes.items()}
     plan = BasinPlan(system, method, values, fixed, periods)
     some = plan.starts(np.linspace(0, plan.cells - 1, ASKED).astype(int))
     return replace(plan, every=looks_every(system, every, some))
 
 
-def _axis(system: System, name: str, given: Any) -> np.ndarray:
+def _fixed_sensors(system: System, at: Any, moving: Iterable[str]) -> dict[str, float]:
+    """What sensors show [SI] besides those of a map."""
+    if at is not None and not isinstance(at, Mapping):
+        raise must_be("at", "a mapping of sensors to starts", at)
+    units, given = dict(zip(system.outputs.names, system.outputs.units, strict=True)), at or {}
+    for name in (*moving, *given):
+        if name not in units:
+            raise unknown(f"{system.name} has no state and no sensor", name, units)
+    return {
+        name: to_si(value, units[name], name) for name, value in given.items() if name not in moving
+    }
+
+
+def _axis(unit: str, name: str, given: Any) -> np.ndarray:
     """Starts along one state from (low, high, count) or a list or array of starts."""
-    example, unit = {name: ("-5 mm", "5 mm", 400)}, system.units[name]
+    example = {name: ("-5 mm", "5 mm", 400)}
     values = along(name, given, lambda value: to_si(value, unit, name), "starts", example, 2)
     if len(values) < 2 or not (np.diff(values) > 0).all():
         raise ParameterError(f"the starts along {name} must ascend, at least two of them.")

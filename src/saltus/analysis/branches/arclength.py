@@ -16,6 +16,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 
 from saltus.analysis.branches.equations import CurveEquations
+from saltus.analysis.solve.linear import solved
 from saltus.analysis.solve.newton import Zeros, newton
 from saltus.flow.polynomials import between
 
@@ -159,7 +160,13 @@ def tangents(derivative: np.ndarray, along: np.ndarray) -> np.ndarray:
     """Unit vectors that span the null spaces of float64[k, m, m + 1], float64[k, m + 1], on the
     side of others.
     """
-    null = np.linalg.svd(derivative)[2][:, -1]
+    whole, last = np.empty((*along.shape, along.shape[1])), np.zeros(along.shape)
+    whole[:, :-1], whole[:, -1], last[:, -1] = derivative, along, 1.0
+    null = solved(whole, last)
+    null /= np.linalg.norm(null, axis=1)[:, None]
+    vague = ~np.isfinite(null).all(axis=1)
+    if vague.any():  # two curves cross here, or it leads across the side asked for
+        null[vague] = np.linalg.svd(derivative[vague])[2][:, -1]
     side = np.sign(np.einsum("ki,ki->k", null, along))
     return np.asarray(null * np.where(side == 0, 1.0, side)[:, None])
 

@@ -13,6 +13,7 @@ from saltus.analysis.closed.field_zeros import field_of
 from saltus.flow.contact_table import ContactTable
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
+from saltus.flow.modal_motions import modal_rates
 from saltus.flow.request import Outcome, Schedule
 from saltus.kernels import status as st
 from saltus.system import System
@@ -131,7 +132,10 @@ class ParametricStroboscope(Stroboscope):
         for j, name in enumerate(self._others, size + self.timed):
             matrix[:, :size, j] = by_parameter[name]
         if self.timed:  # the end moves, and the forcing is slower
-            late = field_of(self.base, state, below.values) * np.reshape(count, (-1, 1))
+            rates = modal_rates(below, state)
+            if rates is None:
+                rates = field_of(self.base, state, below.values)
+            late = rates * np.reshape(count, (-1, 1))
             forced = self.base.forced_at
             if forced is not None:
                 late -= by_parameter[forced] * (below.values[forced] / below.period)[:, None]

@@ -228,7 +228,7 @@ def _count_contacts(
 
 def _measured_by_waves(
     map_: Stroboscope,
-    motions: list[list[WaveLegs]],
+    motions: list[WaveLegs | None],
     outcome: Outcome,
     span: int,
     closed: bool,
@@ -239,12 +239,12 @@ def _measured_by_waves(
     result = unknown(len(motions), size, outputs)
     _count_contacts(map_, outcome, span, closed, result)
     own, gaps = slice(0, outputs), slice(outputs, None)
-    for i, parts in enumerate(motions):
+    for i, legs in enumerate(motions):
         check_stop()
-        if not parts:
+        if legs is None:
             continue
-        low, high = extremes(parts)
-        wanted = [replace(part, rows=part.rows[own]) for part in parts]
+        low, high = extremes(legs)
+        wanted = replace(legs, rows=legs.rows[:, own])
         mean = means(wanted)
         result.maximum[i], result.minimum[i], result.mean[i] = high[own], low[own], mean
         result.deviation[i] = deviations(wanted, mean)
@@ -252,32 +252,27 @@ def _measured_by_waves(
             rate = 2.0 * np.pi / float(map_.period[i])
             result.harmonic[i] = harmonics(wanted, rate)
         spans = (high - low)[gaps]
-        margins = least_turns(parts, outputs + np.arange(len(spans)), NEAR * spans)
+        margins = least_turns(legs, outputs + np.arange(len(spans)), NEAR * spans)
         result.margin[i], result.span[i] = margins.min(initial=np.inf), spans.max(initial=0.0)
-        result.turning[i] = _turning_states(parts, size, closed)
+        result.turning[i] = _turning_states(legs, size, closed)
     return result
 
 
-def _turning_states(parts: list[WaveLegs], size: int, closed: bool) -> np.ndarray:
+def _turning_states(legs: WaveLegs, size: int, closed: bool) -> np.ndarray:
     """The states where the first one turns, float64[n, D], in the order of time: inside legs, and
     where one ends and the next begins.
     """
-    times, states, ends = [], [], []
-    for part in parts:
-        leg, _, time = turns(part, np.zeros(1, np.int64))
-        times.append(part.begin[leg] + time)
-        states.append(replace(part, rows=part.rows[:size]).values(leg, time))
-        legs, moving = np.arange(len(part.length)), replace(part, rows=part.rows[:1] * part.rates)
-        first, last = (moving.values(legs, at)[:, 0] for at in (0.0 * part.length, part.length))
-        ends.append(np.column_stack([part.begin, first, last, part.values(legs, 0.0 * first)]))
-    order = np.concatenate(ends)
-    order = order[np.argsort(order[:, 0])]
-    before = np.roll(order[:, 2], 1)
+    states = replace(legs, rows=legs.rows[:, :size])
+    leg, _, time = turns(legs, np.zeros(1, np.int64))
+    every = np.argsort(legs.begin)
+    moving = replace(legs, rows=legs.rows[:, :1] * legs.rates[:, None])
+    first, last = (moving.values(every, at[every])[:, 0] for at in (0.0 * legs.length, legs.length))
+    before = np.roll(last, 1)
     before[0] = before[0] if closed else 0.0
-    joints = order[before * order[:, 1] < 0.0]
-    when = np.concatenate([*times, joints[:, 0]])
-    points = np.concatenate([*states, joints[:, 3 : 3 + size]])
-    return points[np.argsort(when, kind="stable")]
+    joints = every[before * first < 0.0]
+    when = np.concatenate([legs.begin[leg] + time, legs.begin[joints]])
+    points = np.concatenate([states.values(leg, time), states.values(joints, 0.0 * joints)])
+    return np.asarray(points[np.argsort(when, kind="stable")])
 
 
 @dataclass(frozen=True)

@@ -171,11 +171,13 @@ def less_next(matrices: np.ndarray) -> np.ndarray:
     float64[k, n D, n D].
     """
     k, n, size = matrices.shape[:3]
-    derivative = np.zeros((k, n, size, n, size))
-    at = np.arange(n)
-    derivative[:, at, :, at, :] = np.moveaxis(matrices, 1, 0)
-    derivative[:, at, :, (at + 1) % n, :] -= np.eye(size)
-    return derivative.reshape(k, n * size, n * size)
+    derivative = np.zeros((k, n * size, n * size))
+    for i in range(n):
+        own = slice(i * size, (i + 1) * size)
+        derivative[:, own, own] = matrices[:, i]
+    row = np.arange(n * size)
+    derivative[:, row, (row + size) % (n * size)] -= 1.0
+    return derivative
 
 
 def close(

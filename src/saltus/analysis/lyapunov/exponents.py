@@ -44,10 +44,12 @@ class Exponents(Algorithm):
 
     algorithm = "variational equations with saltation, QR method"
 
-    def __init__(self, map_: Stroboscope, start: np.ndarray, periods: int, *blocks: Any):
+    def __init__(
+        self, map_: Stroboscope, start: np.ndarray, periods: int, *blocks: Any, most: int
+    ):
         super().__init__(map_, start, periods, *blocks)
-        self._ends = running_ends(periods)
-        k, size, m = *start.shape, len(self._ends)
+        self._ends, self._most = running_ends(periods), most
+        k, size, m = len(start), most, len(self._ends)
         nan = np.full
         self._mean, self._error, self._half = (nan((k, size), np.nan) for _ in range(3))
         self._running, self._running_half = (nan((k, size, m), np.nan) for _ in range(2))
@@ -67,7 +69,8 @@ class Exponents(Algorithm):
     def run(self, progress: Callable[[float], None] | None = None) -> None:
         """Compute all, in groups."""
         k, size = self._start.shape
-        step = max(min(GROUP // (SEGMENT * size * (size + 1)), RATES // (self._periods * size)), 1)
+        held = SEGMENT * size * (size + 1 if self._most == size else 1)
+        step = max(min(GROUP // held, RATES // (self._periods * self._most)), 1)
         for first in range(0, k, step):
             rows = np.arange(first, min(first + step, k))
 
@@ -77,8 +80,9 @@ class Exponents(Algorithm):
 
             flow = TangentFlow(self.map.rows(rows))
             found = spectrum(
-                flow, self._start[rows], self._periods, self._transient, self._every is None, show
-            )
+                flow, self._start[rows], self._periods, self._transient, self._most,
+                self._every is None, show,
+            )  # fmt: skip
             if self._every is not None and autonomous(self.map.system):
                 _of_equilibria(found, flow, self._start[rows], self._every)
             self._keep(rows, flow, found)
@@ -127,6 +131,8 @@ class Exponents(Algorithm):
         running, running_half = self._running * running_scale, self._running_half * running_scale
         lost = ~np.isin(self._status, GOOD)
         mean[lost], half[lost] = np.nan, np.nan
+        every = self._most == self._start.shape[1]
+        flow = _with_phase(mean) if self._every is None else mean
         return {
             "kind": self._kind.astype(str),
             "response_period": self._period,
@@ -134,8 +140,8 @@ class Exponents(Algorithm):
             "lyapunov_error": np.where(np.isnan(mean), np.nan, self._error * scale),
             "lyapunov_low": mean - half,
             "lyapunov_high": mean + half,
-            "flow_lyapunov_exponent": _with_phase(mean) if self._every is None else mean,
-            "exponent_sum": mean.sum(axis=1),
+            "flow_lyapunov_exponent": flow if every else flow[:, : self._most],
+            **({"exponent_sum": mean.sum(axis=1)} if every else {}),
             "mean_divergence": self._volume * factor,
             "independent_batches": self._batches,
             "near_graze": self._near,
@@ -186,7 +192,7 @@ def _of_equilibria(found: Spectrum, flow: TangentFlow, start: np.ndarray, every:
     rounding = 64 * np.finfo(float).eps
     for i in arrived:
         eigenvalues = still.multipliers[i]
-        found.exponents[i] = eigenvalues.real * every
+        found.exponents[i] = eigenvalues.real[: found.exponents.shape[1]] * every
         found.errors[i] = found.half_width[i] = rounding * np.abs(eigenvalues).max() * every
         found.batches[i], found.kinds[i] = 0, Kind.EQUILIBRIUM.word
         found.volume[i] = flow.rows(np.array([i])).divergences(still.points[[i], :1])[0][0, 0]

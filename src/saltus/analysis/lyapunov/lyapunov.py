@@ -47,6 +47,7 @@ def lyapunov(
     start: Starts | None = None,
     *,
     method: str = "variational",
+    exponents: int | None = None,
     flow: Method | None = None,
     periods: int = 2000,
     transient: int = 500,
@@ -91,6 +92,10 @@ def lyapunov(
         the trajectory, as much of the literature has it (:func:`saltus.wolf`). Points are all
         states and the phase of the forcing, 32 in a block; an evolution is one block. It is the
         largest exponent of the flow, so never below zero: neighbours on an orbit stay neighbours.
+    exponents : int, optional
+        Number of exponents, the largest ones; default all, as many as there are states. Where
+        :class:`saltus.Modal` moves the system the cost is in proportion; elsewhere all directions
+        are carried anyhow.
     flow : Method
         The method of integration. Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from
         eight states on where it serves. With
@@ -126,8 +131,8 @@ def lyapunov(
         of the mean divergence without the others, several are NaN (a shorter ``every`` helps).
         ``kind``: ``periodic``, ``quasi_periodic``,
         ``chaotic``, ``equilibrium``, ``limit_cycle`` or ``unclear``; ``response_period``: n of nT,
-        or 0. ``exponent_sum`` beside ``mean_divergence``, which must agree: the mean trace of the
-        Jacobian and what contacts add, found without the tangent. ``near_graze``: 1 if the motion
+        or 0. ``exponent_sum`` (of all) beside ``mean_divergence``, which must agree: the mean trace
+        of the Jacobian and what contacts add, found without the tangent. ``near_graze``: 1 if the motion
         after the transient grazes a boundary, or is an orbit that misses one by less than a
         thousandth of its size: then deviations that could be seen in practice don't grow as
         infinitesimal ones do. ``running_exponent`` and its interval over ``running_time``;
@@ -159,14 +164,17 @@ def lyapunov(
     """
     check_system(system)
     _check_words(method, unit, system)
+    most = _most(exponents, method, len(system.states))
     flow = check_method(flow, system)
     group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
     periods, transient = whole(periods, "periods", LEAST_PERIODS), whole(transient, "transient", 0)
     rows = np.broadcast_to(group.parameters, (group.size, len(system.values)))
     block = looks_every(system, every, group.start, rows)
     map_ = Stroboscope(system, flow, rows, block, threads)
-    algorithm: type[Algorithm] = Exponents if method == "variational" else NeighbourExponents
-    work = algorithm(map_, group.start, periods, transient, block)
+    asked = map_, group.start, periods, transient, block
+    work: Algorithm = (
+        Exponents(*asked, most=most) if method == "variational" else NeighbourExponents(*asked)
+    )
 
     def dataset() -> xr.Dataset:
         return _dataset(system, flow, group, work, unit)
@@ -200,6 +208,20 @@ def _check_words(method: Any, unit: Any, system: System) -> None:
                 f"Take {say.key(unit=unit.replace('period', 's'))}."
             )
         )
+
+
+def _most(exponents: Any, method: str, states: int) -> int:
+    """Number of exponents that are computed."""
+    if exponents is None:
+        return states
+    if method == "wolf":
+        raise ParameterError(
+            lambda say: (
+                f"{say.key(method='wolf')} finds the largest exponent only. Leave "
+                f"{say.key('exponents')} out."
+            )
+        )
+    return whole(exponents, "exponents", 1, states)
 
 
 def _dataset(

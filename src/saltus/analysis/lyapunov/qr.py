@@ -4,8 +4,9 @@ method.
 The derivatives of all blocks of a segment are computed in one batch, as the states at which they
 begin are known from the trajectory itself. Then an orthogonal frame is carried through them: block
 by block M Q = Q' R, and the logarithms of the diagonal of R are the growth of the frame's axes;
-their means are the Lyapunov exponents. Benettin, Galgani, Giorgilli & Strelcyn, Meccanica 15 (1980)
-9-20 and 21-30; Eckmann & Ruelle, Reviews of Modern Physics 57 (1985) 617-656, section V.
+their means are the Lyapunov exponents. A frame of fewer axes than states has the largest of them:
+only its images are computed, block after block. Benettin, Galgani, Giorgilli & Strelcyn, Meccanica
+15 (1980) 9-20 and 21-30; Eckmann & Ruelle, Reviews of Modern Physics 57 (1985) 617-656, section V.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from saltus.analysis.lyapunov.segments import Segment, TangentFlow
+from saltus.flow.progress import stage
 from saltus.kernels import status as st
 
 #: Blocks of a segment. A trajectory restarts after each, so this number is part of the result and
@@ -35,8 +37,8 @@ class Growth:
 
     Attributes
     ----------
-    rates : float64[k, n, D]
-        Logarithm of the growth of the frame's axes in each block.
+    rates : float64[k, n, m]
+        Logarithm of the growth of the frame's m axes in each block.
     volume : float64[k, n]
         Logarithm of the growth of volumes, found without the tangent.
     zeros : int64[k]
@@ -60,6 +62,7 @@ def grow(
     start: np.ndarray,
     count: int,
     transient: int,
+    axes: int,
     progress: Callable[[float], None] | None = None,
 ) -> Growth:
     """Growth over ``count`` blocks after a transient.
@@ -72,6 +75,8 @@ def grow(
         Their starts.
     count, transient : int
         Blocks that count, and blocks before them.
+    axes : int
+        Of the frame.
     progress : callable, optional
         Called with the share done.
     """
@@ -81,11 +86,11 @@ def grow(
     scale = _scale(
         start, np.concatenate([before.points, flow.sample(before.points[:, -1])], axis=1)
     )
-    frame = np.broadcast_to(np.eye(size), (k, size, size))
+    frame = np.broadcast_to(_first_frame(size, axes), (k, size, axes))
     if aligning:
-        _, frame = carry(flow.derivatives(before.points[:, :-1]), frame, scale)
+        _, frame = _carried(flow, before.points[:, :-1], frame, scale)
     rates, volume, segments, state = (
-        np.full((k, count, size), np.nan),
+        np.full((k, count, axes), np.nan),
         np.full((k, count), np.nan),
         [before],
         before.points[:, -1],
@@ -95,7 +100,8 @@ def grow(
         last = min(first + SEGMENT, count)
         segment = flow.advance(state, last - first)
         blocks = segment.points[:, :-1]
-        rates[:, first:last], frame = carry(flow.derivatives(blocks), frame, scale)
+        part = stage(progress, first / count, last / count)
+        rates[:, first:last], frame = _carried(flow, blocks, frame, scale, part)
         volume[:, first:last], lost = flow.divergences(blocks)
         zeros = np.maximum(zeros, lost.max(axis=1))
         segments.append(segment)
@@ -119,6 +125,39 @@ def _scale(start: np.ndarray, motion: np.ndarray) -> np.ndarray:
         )
     wide = np.where(own > AT_REST * whole, own, whole)
     return np.where((wide > 0) & np.isfinite(wide), wide, 1.0)
+
+
+def _first_frame(size: int, axes: int) -> np.ndarray:
+    """Orthogonal directions in which no motion stays by its symmetry, float64[D, m]; all of them
+    are those of the states.
+    """
+    if axes == size:
+        return np.eye(size)
+    return np.linalg.qr(np.random.default_rng(0).normal(size=(size, axes)))[0]
+
+
+def _carried(
+    flow: TangentFlow,
+    states: np.ndarray,
+    frame: np.ndarray,
+    scale: np.ndarray,
+    progress: Callable[[float], None] | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Carry frames float64[k, D, m] through the blocks that begin at float64[k, n, D]: growth
+    float64[k, n, m], and the frames.
+    """
+    if frame.shape[1] == frame.shape[2]:
+        return carry(flow.derivatives(states), frame, scale)
+    (k, n, _), units = states.shape, scale[:, :, None]
+    diagonal = np.empty((k, n, frame.shape[2]))
+    for j in range(n):
+        image = flow.images(states[:, j], frame * units) / units
+        frame, triangle = np.linalg.qr(image)
+        diagonal[:, j] = np.diagonal(triangle, axis1=1, axis2=2)
+        if progress:
+            progress((j + 1) / n)
+    with np.errstate(divide="ignore"):
+        return np.log(np.abs(diagonal)), frame
 
 
 def carry(

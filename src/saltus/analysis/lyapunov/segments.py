@@ -82,6 +82,12 @@ class TangentFlow:
             self._blocks(k, n).tangent(states.reshape(k * n, size), 1)[1].reshape(k, n, size, size)
         )
 
+    def images(self, states: np.ndarray, directions: np.ndarray) -> np.ndarray:
+        """That of the block that begins at each of float64[k, D] times directions float64[k, D, m],
+        float64[k, D, m].
+        """
+        return self.map.images(states, 1, directions)
+
     def divergences(self, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Growth of volumes in the block from each of float64[k, n, D]: logarithm, float64[k, n],
         and directions lost in it for good, int64[k, n].

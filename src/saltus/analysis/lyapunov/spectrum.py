@@ -38,8 +38,8 @@ class Spectrum:
 
     Attributes
     ----------
-    exponents, errors, half_width : float64[k, D]
-        In descending order, their standard errors, and half of the 95 % confidence interval.
+    exponents, errors, half_width : float64[k, m]
+        The m largest in descending order, their standard errors, and half of the 95 % confidence interval.
     volume : float64[k]
         Mean growth of volumes, found without the tangent: the sum of the exponents.
     batches : int64[k]
@@ -49,10 +49,10 @@ class Spectrum:
     kinds : list of str
         ``periodic``, ``quasi_periodic``, ``chaotic``, ``equilibrium``, ``limit_cycle`` or
         ``unclear``.
-    ends : int64[m]
+    ends : int64[..]
         Blocks after which running means are kept,
     running : Means
-        and these, float64[k, D, m].
+        and these, float64[k, m, ends].
     growth : Growth
         The growth that they come from.
     """
@@ -74,22 +74,24 @@ def spectrum(
     start: np.ndarray,
     count: int,
     transient: int,
+    most: int,
     forced: bool = True,
     progress: Callable[[float], None] | None = None,
 ) -> Spectrum:
-    """Exponents over ``count`` blocks after a transient, of trajectories from float64[k, D].
+    """The ``most`` largest exponents over ``count`` blocks after a transient, of trajectories from
+    float64[k, D].
 
     Without forcing a motion that repeats has an exponent of zero along itself, which changes its
     kind.
     """
-    growth = grow(flow, start, count, transient, progress)
+    growth, size = grow(flow, start, count, transient, most, progress), start.shape[1]
     rates = _told(
         np.take_along_axis(
             growth.rates,
             np.argsort(-growth.rates.mean(axis=1), axis=1, kind="stable")[:, None],
             axis=2,
         ),
-        growth.volume,
+        growth.volume if most == size else None,
     )
     ends = running_ends(count)
     running = batch_means(np.swapaxes(rates, 1, 2), ends)
@@ -102,34 +104,36 @@ def spectrum(
     for i, orbit in enumerate(orbits):
         if orbit is None:
             kinds.append(kind_of(rates[i], errors[i], forced))
-            _vanish(growth.zeros[i], exponents[i], errors[i], half_width[i])
+            _vanish(size - growth.zeros[i], exponents[i], errors[i], half_width[i])
             continue
         kinds.append((Kind.PERIODIC if forced else Kind.EQUILIBRIUM).word)
         volume[i], zeros = _volume(flow, i, orbit)
-        exponents[i], errors[i] = _of_orbit(flow, i, orbit, growth.scale[i], volume[i], zeros > 0)
-        _vanish(zeros, exponents[i], errors[i])
+        every = _of_orbit(flow, i, orbit, growth.scale[i], volume[i], zeros > 0)
+        exponents[i], errors[i] = (one[:most] for one in every)
+        _vanish(size - zeros, exponents[i], errors[i])
         half_width[i], batches[i] = errors[i], 0
     return Spectrum(
         exponents, errors, half_width, volume, batches, orbits, kinds, ends, running, growth
     )
 
 
-def _told(rates: np.ndarray, volume: np.ndarray) -> np.ndarray:
-    """Rates float64[k, n, D] without directions lost in the rounding of the fastest one. A single
-    lost direction has the rest of the growth of volumes float64[k, n]; several are NaN.
+def _told(rates: np.ndarray, volume: np.ndarray | None) -> np.ndarray:
+    """Rates float64[k, n, m] without directions lost in the rounding of the fastest one. A single
+    lost direction of all has the rest of the growth of volumes float64[k, n]; others are NaN.
     """
     with np.errstate(invalid="ignore"):
         lost = ~((rates[:, :, :1] - rates).mean(axis=1) < LOST)
+        if volume is None:
+            return np.where(lost[:, None], np.nan, rates)
         left = volume - np.where(lost[:, None], 0.0, rates).sum(axis=2)
     left[lost.sum(axis=1) > 1] = np.nan
     return np.where(lost[:, None], left[:, :, None], rates)
 
 
-def _vanish(zeros: int, exponents: np.ndarray, *errors: np.ndarray) -> None:
-    """Set the last exponents of a trajectory float64[D] to those of vanishing directions, without
-    an error: a held contact keeps no deviation from it.
+def _vanish(last: int, exponents: np.ndarray, *errors: np.ndarray) -> None:
+    """Set the exponents of a trajectory float64[m] from one on to those of vanishing directions,
+    without an error: a held contact keeps no deviation from it.
     """
-    last = len(exponents) - zeros
     exponents[last:] = -np.inf
     for one in errors:
         one[last:] = 0.0

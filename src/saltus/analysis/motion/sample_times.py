@@ -11,7 +11,7 @@ import numpy as np
 from saltus.analysis.inputs.spans import Span
 from saltus.analysis.inputs.starts import Ensemble
 from saltus.errors import ParameterError, shown
-from saltus.flow.counts import whole
+from saltus.flow.counts import MOST, whole
 from saltus.flow.request import Outcome, Request, Schedule
 from saltus.flow.room import check_room
 from saltus.system import System
@@ -96,7 +96,7 @@ def planned(
     )
     first = first_kept(system, length, keep)
     longest = np.max((length.count + length.phase / length.period) * per)
-    count = int(longest + 1e-9) + 1 - first * per
+    count = int(min(longest + 1e-9, MOST)) + 1 - first * per
     check_samples(system, group.size, count, states)
     periods = np.arange(first, first - (-count // per))
     return SampleTimes(

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from saltus.analysis.solve.deflation import Known, is_new, stretch, weight
+from saltus.analysis.solve.linear import solved
 from saltus.analysis.solve.tolerances import (
     AMPLIFIED,
     CONVERGED,
@@ -107,35 +108,47 @@ def newton(
     known : Known, optional
         Zeros that must not be found again.
     """
-    work = _Iteration(start, scale, least_squares, known)
+    work = _Iteration(start, scale, least_squares, known, planes is not None)
     enough, farthest = (np.broadcast_to(one, len(start)) for one in (enough, farthest))
     slow, rows = np.zeros(len(start), np.int64), np.flatnonzero(np.isfinite(start).all(axis=1))
     for _ in range(max_steps or (MAX_DAMPED_STEPS if damped else MAX_NEWTON_STEPS)):
         if not len(rows):
             break
         residual, derivative = equations(work.trial[rows], rows)
-        if planes is not None:
-            across = ((work.trial[rows] - start[rows]) / scale[rows] * planes[rows]).sum(axis=1)
-            residual = np.append(residual, across[:, None], axis=1)
-            derivative = np.append(derivative, planes[rows, None], axis=1)
+        work.evaluations[rows] += 1
         retried = rows[:0]
         if damped:
             helps = work.helps(rows, residual)
             retried = rows[~helps & (work.share[rows] >= SHORTEST_SHARE)]
             rows, residual, derivative = rows[helps], residual[helps], derivative[helps]
-        if planes is not None:  # a zero is one where the derivative is singular too
+        if planes is not None:
+            residual, derivative = _bordered(residual, derivative, planes[rows])
             closed = np.abs(residual).max(axis=1) < enough[rows]
-            work.settle(rows[closed], derivative[closed])
-            rows, residual, derivative = rows[~closed], residual[~closed], derivative[~closed]
+            if closed.any():  # a zero is one where the derivative is singular too
+                work.settle(rows[closed], derivative[closed])
+                rows, residual, derivative = rows[~closed], residual[~closed], derivative[~closed]
+                if not len(rows):
+                    break
         rows = work.step(rows, residual, derivative)
-        done = work.done(rows, enough[rows], foresee, stay=planes is not None)
-        slow[rows] += work.length[rows] > SLOW * work.before[rows]
-        near = np.abs((work.trial[rows] - start[rows]) / scale[rows]).max(axis=1) <= farthest[rows]
-        near &= (work.length[rows] < longest_step) | damped
-        rows = rows[~done & near & (slow[rows] <= max_slow)]
+        done = work.done(rows, enough[rows], foresee)
+        goes = ~done & (damped | (work.length[rows] < longest_step))
+        if np.isfinite(max_slow):
+            slow[rows] += work.length[rows] > SLOW * work.before[rows]
+            goes &= slow[rows] <= max_slow
+        goes &= np.abs((work.trial[rows] - start[rows]) / scale[rows]).max(axis=1) <= farthest[rows]
+        rows = rows[goes]
         rows = np.sort(np.append(rows, retried)) if damped else rows
         work.ahead(rows, damped)
-    return work.zeros(planes is not None)
+    return work.zeros()
+
+
+def _bordered(
+    residual: np.ndarray, derivative: np.ndarray, planes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The equations with those of the planes, in which every point of the iteration lies."""
+    right, whole = np.zeros(planes.shape), np.empty((*planes.shape, planes.shape[1]))
+    right[:, :-1], whole[:, :-1], whole[:, -1] = residual, derivative, planes
+    return right, whole
 
 
 class _Iteration:
@@ -144,13 +157,19 @@ class _Iteration:
     """
 
     def __init__(
-        self, start: np.ndarray, scale: np.ndarray, least_squares: bool, known: Known | None
+        self,
+        start: np.ndarray,
+        scale: np.ndarray,
+        least_squares: bool,
+        known: Known | None,
+        in_planes: bool,
     ) -> None:
-        k = len(start)
-        self.scale, self.known, self.least_squares = scale, known, least_squares
+        k, width = start.shape
+        self.scale, self.known = scale, known
+        self.least_squares, self.in_planes = least_squares, in_planes
         self.x, self.trial = np.array(start, float), np.array(start, float)
         self.newton_step = np.zeros(start.shape)
-        self.derivative = np.full((k, start.shape[1], start.shape[1]), np.nan)
+        self.derivative = np.full((k, width, width), np.nan)
         self.length, self.before = np.full((2, k), np.inf)
         self.share, self.cut = np.ones((2, k))
         self.found, self.evaluations = np.zeros(k, bool), np.zeros(k, np.int64)
@@ -160,7 +179,7 @@ class _Iteration:
         """True where the step to the trial shortens the next one, or is too short to tell, bool[r];
         elsewhere its share is halved.
         """
-        better = (self.evaluations[rows] == 0) | (self.length[rows] < AMPLIFIED)
+        better = (self.evaluations[rows] == 1) | (self.length[rows] < AMPLIFIED)
         told, some = ~better, rows[~better]
         if len(some):
             with np.errstate(all="ignore"):
@@ -180,7 +199,6 @@ class _Iteration:
     def settle(self, rows: np.ndarray, derivative: np.ndarray) -> None:
         """End at the trials."""
         self.x[rows], self.found[rows] = self.trial[rows], True
-        self.evaluations[rows] += 1
         self._keep(rows, derivative)
 
     def _keep(self, rows: np.ndarray, derivative: np.ndarray) -> None:
@@ -190,44 +208,46 @@ class _Iteration:
 
     def step(self, rows: np.ndarray, residual: np.ndarray, derivative: np.ndarray) -> np.ndarray:
         """Go to the trials, where the next steps are known; the rows that have one, int64[r]."""
-        finite = np.isfinite(derivative).all(axis=(1, 2)) & np.isfinite(residual).all(axis=1)
-        good = np.flatnonzero(finite)
-        if not self.least_squares:
+        good = np.isfinite(derivative).all(axis=(1, 2)) & np.isfinite(residual).all(axis=1)
+        if not (self.least_squares or self.in_planes):
             sizes = np.linalg.svd(derivative[good], compute_uv=False)
-            good = good[sizes[:, 0] < SINGULAR * sizes[:, -1]]
-        rows = rows[good]
+            good[good] = sizes[:, 0] < SINGULAR * sizes[:, -1]
+        if not good.all():
+            rows, residual, derivative = rows[good], residual[good], derivative[good]
+        self._keep(rows, derivative)
+        step = -self._solved(derivative, residual)
         self.x[rows] = self.trial[rows]
-        self._keep(rows, derivative[good])
-        step = -self._solved(derivative[good], residual[good])
         self.newton_step[rows], self.before[rows] = step, self.length[rows]
         self.length[rows] = np.abs(step).max(axis=1)
-        self.trial[rows] = self.x[rows] + step * self.scale[rows]
-        self.evaluations[rows] += 1
-        second = rows[self.evaluations[rows] == 2]
-        self.contraction[second] = self.length[second] / np.maximum(self.before[second], AMPLIFIED)
+        self.trial[rows] += step * self.scale[rows]
+        second = self.evaluations[rows] == 2
+        if second.any():
+            some = rows[second]
+            self.contraction[some] = self.length[some] / np.maximum(self.before[some], AMPLIFIED)
         return rows
 
     def _solved(self, matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
         if self.least_squares:
             return np.asarray((np.linalg.pinv(matrix, RANK) @ right[:, :, None])[:, :, 0])
-        return np.asarray(np.linalg.solve(matrix, right[:, :, None])[:, :, 0])
+        return solved(matrix, right)
 
-    def done(self, rows: np.ndarray, enough: np.ndarray, foresee: bool, stay: bool) -> np.ndarray:
-        """True where the step is the last one, bool[r]: it is taken, unless the zeros ``stay``
-        where the derivatives are known, which is told by the residual.
+    def done(self, rows: np.ndarray, enough: np.ndarray, foresee: bool) -> np.ndarray:
+        """True where the step is the last one, bool[r]: it is taken, but in planes, where the zeros
+        stay where the derivatives are known.
         """
         length, before = self.length[rows], self.before[rows]
-        step = np.abs(self.newton_step[rows] * self.scale[rows])
         done = (length < AMPLIFIED) & (length > 0.5 * before)
-        if not stay:
+        if not self.in_planes:
+            step = np.abs(self.newton_step[rows] * self.scale[rows])
             rounding = np.all(step <= ROUNDED * np.abs(self.trial[rows]), axis=1)
             done |= (length < enough) | rounding
-        taken = np.zeros_like(done) if stay else done.copy()
+        taken = done & (not self.in_planes)
         if foresee:
             sure = ~done & np.isfinite(before) & (length * (length / before) ** 2 < FORESEEN)
             self.evaluations[rows[sure]] += 1
             done, taken = done | sure, taken | sure
-        self.x[rows[taken]], self.found[rows[done]] = self.trial[rows[taken]], True
+        if done.any():
+            self.x[rows[taken]], self.found[rows[done]] = self.trial[rows[taken]], True
         return np.asarray(done)
 
     def ahead(self, rows: np.ndarray, damped: bool) -> None:
@@ -242,11 +262,11 @@ class _Iteration:
             step = step * self.cut[rows, None]
         self.trial[rows] = x + step * scale
 
-    def zeros(self, bordered: bool) -> Zeros:
+    def zeros(self) -> Zeros:
         """Return the zeros; known ones don't count as found."""
         found, derivative = self.found, self.derivative
         found[found] = is_new(self.x[found], self.scale[found], self.known)
-        derivative = derivative[:, :-1] if bordered else derivative
+        derivative = derivative[:, :-1] if self.in_planes else derivative
         return Zeros(self.x, found, derivative, self.evaluations, self.contraction)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from saltus.fence import MOST_PERIODS
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
 
 
 LYAPUNOV = {
+    "exponents": replace(whole(3), default=None),
     "transient": whole(500, least=0, most=MOST_PERIODS),
     "periods": whole(2000, most=MOST_PERIODS),
 }

@@ -99,7 +99,7 @@ def traced(
     defaults, units = _parameters(loads, unit)
     if needs:
         defaults[FREQUENCY] = frequency
-        units |= {} if isinstance(frequency, str) else {FREQUENCY: "Hz"}
+        units[FREQUENCY] = "Hz"  # the drives turn 2 pi times as quickly, however it is written
     own = (unit, UNITS[unit][0]) if moving.transform is None or not unit else MODAL
     units |= dict.fromkeys(moving.names, own[0]) | dict.fromkeys(moving.rates, own[1])
     sides: dict[str, Relation] = {}

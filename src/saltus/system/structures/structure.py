@@ -91,8 +91,9 @@ def structure(
         Acceleration of the base, such as ``sl.Base("z", sl.recorded(times, values, "g0"))``. The
         deflections are then relative to the base.
     frequency : float or str, optional
-        Forcing frequency [Hz]; needed with forces that oscillate. A structure with a force or a
-        base that doesn't repeat has no forcing frequency: ``t_end=`` ends its motion.
+        Forcing frequency [Hz], ``"40 Hz"`` or ``"40 rad/s"``; needed with forces that oscillate. A
+        structure with a force or a base that doesn't repeat has no forcing frequency: ``t_end=``
+        ends its motion.
     damping_ratio : float, str or sequence, optional
         In place of ``damping``: the ratio of every mode, such as 0.02 or ``"2 %"``, or one each for
         the lowest of them.

@@ -44,6 +44,12 @@ def test_without_forces_it_has_no_period():
     assert free.units["stop_stiffness"] == "N*m/rad"
 
 
+@pytest.mark.parametrize(("written", "turns"), [("40 rad/s", 20 / np.pi), ("900 rpm", 15.0)])
+def test_the_frequency_is_in_hertz_however_it_is_written(written, turns):
+    made = sl.structure(M, K, 0.1 * K, forces=[PUSH], frequency=written)
+    assert (made.values["frequency"], made.units["frequency"]) == (pytest.approx(turns), "Hz")
+
+
 def test_every_analysis_takes_it():
     made = sl.structure(
         M, K, damping_ratio=0.1, modes=2, contacts=[STOP], forces=[PUSH], frequency=0.1

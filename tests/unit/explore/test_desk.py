@@ -1,0 +1,318 @@
+"""The desk: its numbers are those of the public functions, and bad input gets a sentence."""
+
+import random
+import warnings
+
+import numpy as np
+import pytest
+from mad_page import mad_message
+
+import saltus as sl
+from saltus.errors import SaltusError
+from saltus.explore import desk as desks
+from saltus.explore import motion as motions
+from saltus.explore import responses
+from saltus.explore.desk import Desk, Models
+from saltus.explore.frames import packed, unpacked
+from saltus.explore.opening import Opening, opening_of
+from saltus.explore.questions import QuestionError, question_of, read
+from saltus.interrupt import Interrupted, Stop
+
+RIG = sl.models.delangre("b", force="4 N", frequency="15 Hz")
+BOX = {"x": (-5e-3, 5e-3), "v": (-1.0, 1.0)}
+
+
+def desk_of(system=RIG, axes=BOX):
+    opening = opening_of(system, None, axes=axes) if axes else opening_of(system)
+    return Desk(opening, 1)
+
+
+def asked(desk, ask, **fields):
+    """All answers to a question, as a page has them."""
+    found = []
+    question = question_of(ask, {"id": 1, **fields})
+    desk.answer(question, lambda *answer: found.append(unpacked(packed(*answer))))
+    return found
+
+
+def one(desk, ask, **fields):
+    (answer,) = asked(desk, ask, **fields)
+    return answer
+
+
+@pytest.fixture(scope="module")
+def desk():
+    return desk_of()
+
+
+# -- motions ---------------------------------------------------------------------------------------
+def test_a_motion_is_that_of_simulate(desk):
+    head, arrays = one(
+        desk, "motion", start={"x": "1 mm", "v": 0}, values={"force": "3.5 N"}, periods=20
+    )
+    run = sl.simulate(RIG.with_values(force=3.5), ("1 mm", 0), periods=20)
+    assert (head["t0"], head["count"], head["status"]) == (0.0, run.sizes["time"], "ok")
+    assert head["values"] == {**RIG.values, "force": 3.5}
+    times = head["t0"] + head["dt"] * np.arange(head["count"])
+    np.testing.assert_allclose(times, run["time"].values, rtol=1e-12)
+    for name in ("x", "v"):
+        np.testing.assert_array_equal(arrays[f"sample:{name}"], run[name].values.astype("f4"))
+        np.testing.assert_array_equal(
+            arrays[f"contact:{name}"], run[f"contact_{name}"].values.astype("f4")
+        )
+    np.testing.assert_array_equal(arrays["mode"], run["mode"].values)
+    for name in ("time", "direction"):
+        np.testing.assert_array_equal(arrays[f"contact_{name}"], run[f"contact_{name}"].values)
+    np.testing.assert_array_equal(arrays["contact_error"], run["contact_time_error"].values)
+    guards = [guard.name for guard in RIG.guards]
+    assert [guards[i] for i in arrays["contact_guard"]] == run["contact_guard"].values.tolist()
+    about, _ = one(desk, "about")
+    kinds = [about["contact_kinds"][i] for i in arrays["contact_kind"]]
+    assert kinds == run["contact_kind"].values.tolist()
+    assert {gap["guard"]: gap["value"] for gap in head["gaps"]} == {
+        "lower_gap": 0.0, "upper_gap": 4e-4,
+    }  # fmt: skip
+
+
+def test_a_click_is_a_small_frame(desk):
+    question = question_of("motion", {"id": 1, "start": [1e-3, 0.0]})
+    sizes = []
+    desk.answer(question, lambda *answer: sizes.append(len(packed(*answer))))
+    assert sizes[0] <= 120_000
+
+
+def test_of_a_long_motion_all_extremes_are_sent_and_the_last_periods_in_full(desk, monkeypatch):
+    monkeypatch.setattr(motions, "KEPT", 10)
+    monkeypatch.setattr(motions, "COLUMNS", 300)
+    head, arrays = one(desk, "motion", start=[3e-3, 0.0], periods=40, samples=100)
+    run = sl.simulate(RIG, (3e-3, 0.0), periods=40, samples=100)
+    x = run["x"].values.astype("f4")
+    np.testing.assert_array_equal(arrays["sample:x"], x[3000:])
+    assert head["t0"] == run["time"].values[3000]
+    edges = np.searchsorted(run["time"].values, arrays["column_time"])
+    parts = np.split(x, edges[1:])
+    np.testing.assert_array_equal(arrays["least:x"], [part.min() for part in parts])
+    np.testing.assert_array_equal(arrays["most:x"], [part.max() for part in parts])
+    assert len(parts) == 300
+
+
+def test_another_method_parts_where_the_first_sample_says_so(desk):
+    values = {"force": 3.0}
+    head, arrays = one(desk, "motion", start=[1e-3, 0.0], values=values, against="ODE45")
+    told = head["against"]
+    ours, theirs = arrays["sample:x"], arrays["other:x"]
+    apart = np.abs(ours - theirs) > 0.01 * np.ptp(ours)
+    apart |= np.abs(arrays["sample:v"] - arrays["other:v"]) > 0.01 * np.ptp(arrays["sample:v"])
+    first = head["t0"] + head["dt"] * int(np.argmax(apart))
+    assert told["parts"] == pytest.approx(first, abs=1e-9)
+    assert arrays["contact_time"][told["contact"]] <= first
+    assert "part by 1% of the range" in told["words"]
+    same, _ = one(desk, "motion", start=[1e-3, 0.0], periods=5, against="Taylor")
+    assert same["against"]["parts"] is None
+
+
+def test_a_motion_that_fails_is_drawn_as_far_as_it_went():
+    grows = sl.system(states="x y")(lambda t, x, y, *, c=1.0: (x * x, -c * y))
+    desk = Desk(Opening(grows, sl.Taylor(), {"x": (-1, 1), "y": (-1, 1)}, turn=0.05), 1)
+    head, arrays = one(desk, "motion", start=[2.0, 1.0], periods=20)  # x = 2/(1 - 2 t)
+    assert head["status"] == "nonfinite"
+    assert head["words"][0].startswith("It ended at 0.5 s: nonfinite")
+    times = head["dt"] * np.arange(head["count"])
+    reached = times < 0.499
+    exact = 2 / (1 - 2 * times[reached])
+    np.testing.assert_allclose(arrays["sample:x"][reached], exact, rtol=1e-6)
+    assert not np.isfinite(arrays["sample:x"][times > 0.501]).any()
+
+
+def test_a_motion_can_be_stopped(desk):
+    stop = Stop()
+    stop.set()
+    with stop, pytest.raises(Interrupted):
+        asked(desk, "motion", start=[1e-3, 0.0], periods=100_000, samples=2)
+
+
+# -- orbits ----------------------------------------------------------------------------------------
+def test_a_start_settles_to_what_attractors_says(desk):
+    start = {"x": "1 mm", "v": 0}
+    found = sl.attractors(RIG, {"x": 1e-3, "v": 0.0})
+    for _ in range(2):  # found, then known
+        head, arrays = one(desk, "settle", start=start)
+        told = head["attractor"]
+        assert told["period"] == found["attractor_period"].item()
+        assert told["peak"]["x"] == pytest.approx(found["attractor_peak"].item(), rel=1e-9)
+        assert told["margin"] == pytest.approx(found["attractor_margin"].item(), rel=1e-6)
+        assert head["settles"] == found["periods_to_settle"].item() or head["settles"] > 0
+        x = arrays["sample:x"]
+        assert x[0] == pytest.approx(x[-1], abs=1e-9)  # a whole period
+        assert np.abs(x).max() == pytest.approx(told["peak"]["x"], rel=1e-3)
+    again, _ = one(desk, "orbit", attractor=told["key"])
+    assert again["multipliers"] == told["multipliers"]
+
+
+def test_an_orbit_is_tracked_to_where_branches_has_it_and_lost_at_the_fold(desk):
+    head, _ = one(desk, "settle", start={"x": "1 mm", "v": 0})
+    key = head["attractor"]["key"]
+    found = sl.branches(
+        RIG, {"frequency": (14.9, 15.5)}, sl.attractors(RIG, {"x": 1e-3, "v": 0.0})
+    )
+    mine = found["branch_periods"].values == 3
+    points = mine[found["point_branch"].values] & (found["point_stable"].values == 1)
+    frequency = found["point_frequency"].values[points]
+    at = int(np.argmin(np.abs(frequency - 15.05)))
+    now, arrays = one(desk, "track", key=key, source={}, values={"frequency": frequency[at]})
+    assert now["lost"] is None
+    assert now["stable"]
+    peak = found["point_peak"].values[points][at]
+    assert np.abs(arrays["sample:x"]).max() == pytest.approx(peak, rel=1e-3)
+    fold = found["event_frequency"].values[found["event_kind"].values == "fold"]
+    lost, _ = one(desk, "track", key=key, source={}, values={"frequency": 15.5})
+    assert lost["lost"].startswith("folded between")
+    assert np.abs(fold - lost["values"]["frequency"]).min() < 2e-3
+
+
+def test_responses_are_branches_and_their_points_are_orbits(desk, monkeypatch):
+    monkeypatch.setattr(responses, "STARTS", 1)
+    monkeypatch.setattr(responses, "VALUES", 1)
+    monkeypatch.setattr(desks, "FIRST_SCOUTS", 1)
+    one(desk, "settle", start={"x": "1 mm", "v": 0})
+    answers = asked(desk, "responses", parameter="frequency", range=[15.0, 15.1])
+    head, arrays = [one for one in answers if one[0]["kind"] == "responses"][-1]
+    assert head["done"]
+    unstable = np.flatnonzero(arrays["point_stable"] == 0)
+    for point in (int(unstable[0]), 0):
+        orbit, samples = one(desk, "orbit", responses=head["key"], point=point)
+        assert orbit["stable"] == bool(arrays["point_stable"][point])
+        assert orbit["values"]["frequency"] == arrays["point_parameter"][point]
+        x = samples["sample:x"]
+        assert x[0] == pytest.approx(x[-1], abs=2e-7)
+        assert np.abs(x).max() == pytest.approx(arrays["point_peak"][point], rel=1e-3)
+        outside = [np.hypot(*pair) > 1 for pair in orbit["multipliers"]]
+        assert any(outside) != orbit["stable"]
+    event, _ = one(desk, "orbit", responses=head["key"], event=0)
+    assert event["event"] == head["events"][0]
+    again = asked(desk, "responses", parameter="frequency", range=[15.0, 15.1])
+    assert [one[0]["key"] for one in again] == [head["key"]]  # kept
+    hue = one(desk, "settle", start={"x": "1 mm", "v": 0})[0]["attractor"]["hue"]
+    of_three = [row["hue"] for row in head["branches"] if row["period"] == 3]
+    assert hue in of_three
+
+
+# -- other systems ---------------------------------------------------------------------------------
+def test_a_system_without_forcing_has_limit_cycles():
+    belt = desk_of(sl.models.belt_stribeck(), None)
+    about, _ = one(belt, "about")
+    assert not about["forced"]
+    head, arrays = one(belt, "settle", start=[2.0, 0.0])
+    told = head["attractor"]
+    assert (told["kind"], told["period"]) == ("limit_cycle", 0)
+    x = arrays["sample:x"]
+    assert head["dt"] * (len(x) - 1) == pytest.approx(told["seconds"], rel=1e-9)
+    assert x[0] == pytest.approx(x[-1], abs=1e-5)
+    now, _ = one(belt, "track", key=told["key"], source={}, values={"mass": 1.01})
+    assert now["lost"] is None
+
+
+def test_a_system_without_forcing_has_equilibria():
+    swings = sl.system(states="x v")(lambda t, x, v, *, k=1.0, c=0.2: (v, -k * x - c * v))
+    desk = desk_of(swings, None)
+    head, _ = one(desk, "settle", start=[0.3, 0.0])
+    told = head["attractor"]
+    assert told["kind"] == "equilibrium"
+    assert told["eigenvalues"]
+    np.testing.assert_allclose(sorted(told["multipliers"])[0], [-0.1, -np.sqrt(0.99)], rtol=1e-9)
+    now, _ = one(desk, "track", key=told["key"], source={}, values={"k": 2.0})
+    assert now["name"] == "equilibrium"
+    np.testing.assert_allclose(sorted(now["multipliers"])[0], [-0.1, -np.sqrt(1.99)], rtol=1e-9)
+
+
+def test_a_structure_shows_its_sensors():
+    stiffness = 1e4 * np.array([[2.0, -1.0], [-1.0, 1.0]])
+    rig = sl.structure(
+        np.eye(2), stiffness, damping_ratio=0.02, modes=2, names=["w1", "w2"],
+        frequency="12 Hz", forces=[sl.Force("w2", "5 N")], sensors={"tip": "w2"},
+        contacts=[sl.Contact("w2", stiffness="50 kN/m", gap="1 mm")],
+    )  # fmt: skip
+    desk = desk_of(rig, None)
+    about, _ = one(desk, "about")
+    assert "tip" in about["panels"]["history"]
+    assert about["panels"]["response"]["quantity"] == rig.outputs.names[0]
+    assert set(about["axes"]) <= set(rig.states)
+    head, arrays = one(desk, "motion", start={"tip": "2 mm"}, periods=5)
+    run = sl.simulate(rig, {"tip": "2 mm"}, periods=5)
+    np.testing.assert_array_equal(arrays["sample:tip"], run["tip"].values.astype("f4"))
+    assert head["contacts"] == run.sizes["contact"] > 0
+
+
+# -- bad input: each gets a sentence, and nothing else ------------------------------------------------
+@pytest.mark.parametrize(
+    ("ask", "fields", "field", "words"),
+    [
+        ("motion", {"start": [1, 2, 3]}, "start", "2 numbers"),
+        ("motion", {"start": {"x": 0}}, "start", "gives no 'v'"),
+        ("motion", {"start": {"y": 0, "v": 0}}, "start", "no state 'y'"),
+        ("motion", {"start": {"x": "1 kg", "v": 0}}, "start", "wrong unit"),
+        ("motion", {"start": [0, 0], "values": {"force": "3 m"}}, "values.force", "wrong unit"),
+        ("motion", {"start": [0, 0], "values": {"farce": 3}}, "values.farce", "Did you mean"),
+        ("motion", {"start": [0, 0], "values": {"mass": 0}}, "values.mass", "positive"),
+        ("motion", {"start": [0, 0], "method": "ode"}, "method", "no method 'ode'"),
+        ("motion", {"start": [0, 0], "against": "x"}, "against", "no method"),
+        ("motion", {"start": [0, 0], "quantities": ["y"]}, "quantities", "no quantity"),
+        ("motion", {"start": [0, 0], "t_end": 1e308}, "t_end", "a time from 0"),
+        ("motion", {"start": [0, 0], "t_end": "3 m"}, "t_end", "wrong unit"),
+        ("map", {"axes": {"x": [1, 0], "v": [0, 1]}, "size": [16, 16]}, "axes", "ascend"),
+        ("map", {"axes": {"x": [0, 0], "v": [0, 1]}, "size": [16, 16]}, "axes", "ascend"),
+        ("map", {"axes": {"y": [0, 1], "v": [0, 1]}, "size": [16, 16]}, "axes", "no state"),
+        ("map", {"axes": {"x": ["1 s", 1], "v": [0, 1]}, "size": [16, 16]}, "axes", "wrong unit"),
+        ("responses", {"parameter": "mss", "range": [1, 2]}, "parameter", "Did you mean"),
+        ("responses", {"parameter": "mass", "range": [2, 1]}, "range", "ascend"),
+        ("orbit", {"attractor": 99}, "attractor", "no attractor 99"),
+        ("orbit", {"responses": 77, "point": 0}, "point", "kept"),
+        ("track", {"source": {}, "key": 99}, "key", "no orbit"),
+    ],
+)
+def test_bad_input_gets_a_sentence(desk, ask, fields, field, words):
+    with pytest.raises(QuestionError) as refused:
+        asked(desk, ask, **fields)
+    assert words in str(refused.value)
+    assert refused.value.field == field
+
+
+def test_no_question_that_can_be_read_upsets_the_desk(desk):
+    draw, answered = random.Random(831), 0
+    small = {"map": {"size": [16, 16], "periods": 3}, "responses": {"range": [15.0, 15.01]}}
+    for number in range(400):
+        try:
+            text = mad_message(draw, number)
+            question = read(text if isinstance(text, str) else text.decode("latin"))
+        except QuestionError:
+            continue
+        if question.ask in small:
+            continue
+        try:
+            with np.errstate(all="ignore"), warnings.catch_warnings():
+                warnings.simplefilter("ignore", RuntimeWarning)
+                desk.answer(question, lambda *answer: packed(*answer))
+            answered += 1
+        except SaltusError as error:
+            assert "\n" not in str(error)
+    assert answered > 20
+
+
+def test_without_a_system_there_are_models_to_choose():
+    (answer,) = asked(Models(), "about")
+    assert answer[0]["system"] is None
+    assert [one["name"] for one in answer[0]["models"]] == list(sl.models.MODELS)
+    with pytest.raises(QuestionError, match="choose a model"):
+        asked(Models(), "motion", start=[0, 0])
+
+
+@pytest.mark.parametrize("name", ["chain", "double_scroll", "shaken_belt", "thermostat", "play"])
+def test_every_kind_of_model_opens_with_a_box_that_holds_its_motion(name):
+    opening = opening_of(sl.models.find(name)())
+    assert isinstance(opening, Opening)
+    for low, high in opening.axes.values():
+        assert 0 < high < 1e4
+        assert low == -high
+    about, _ = one(Desk(opening, 1), "about")
+    for row in about["parameters"]:
+        assert row["low"] <= row["value"] <= row["high"] or row["value"] == 0
