@@ -136,3 +136,32 @@ def test_a_structure_shows_its_sensors_and_a_free_system_its_cycle(see):
         assert "limit cycle" in seen.text("#motion-what")
         assert seen.page.locator("#contacts-period").is_hidden()
         seen.keep("free")
+
+
+@pytest.mark.nightly
+def test_the_pictures_of_the_documentation_can_be_taken(see):
+    """SALTUS_PICTURES=docs/pictures takes them anew: explore.png, explore-orbit.png, ..."""
+    with opened(sl.models.delangre("b", force="4 N", frequency="15 Hz")) as explorer:
+        view = {"size": 250, "periods": 60, "box": [-5e-3, 5e-3, -1, 1], "range": [12, 18]}
+        view |= {"start": {"x": 1e-3, "v": 0.0}}
+        seen = see(small(explorer, **view))
+        seen.keep("explore")
+        low, high = 15.5, 16.0
+        pick = """([low, high]) => { const { x, y, a } = explorer.responses;
+          return [...x.keys()].filter(k => !a.point_stable[k] && x[k] > low && x[k] < high)
+            .sort((i, k) => y[k] - y[i]).map(k => [x[k], y[k]])[0] }"""
+        seen.page.mouse.click(*seen.place("#responses-canvas", *seen.get(pick, [low, high])))
+        seen.rest()
+        seen.keep("explore-orbit")
+        seen.page.click("#undo")
+        seen.rest()
+        slider = seen.page.locator("[aria-label=frequency][type=range]")
+        box, at = slider.bounding_box(), int(slider.input_value()) / 1000
+        place = box["y"] + box["height"] / 2
+        seen.page.mouse.move(box["x"] + at * box["width"], place)
+        seen.page.mouse.down()
+        seen.page.mouse.move(box["x"] + at * box["width"] + 2, place)
+        seen.until("explorer.motion.head.values.frequency === explorer.view.values.frequency")
+        seen.until("document.getElementById('map-of').textContent !== ''")
+        seen.keep("explore-dragging")
+        seen.page.mouse.up()

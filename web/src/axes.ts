@@ -110,7 +110,7 @@ export function fitted(canvas: HTMLCanvasElement): CanvasRenderingContext2D {
 
 export interface Plot { left: number; top: number; width: number; height: number; X: (v: number) => number; Y: (v: number) => number }
 /** The place of the data on a canvas. The ranges are in the units shown. */
-export function place(canvas: HTMLCanvasElement, rx: Range, ry: Range, margin = { left: 58, right: 12, top: 10, bottom: 40 }): Plot {
+export function place(canvas: HTMLCanvasElement, rx: Range, ry: Range, margin = { left: 58, right: 18, top: 10, bottom: 40 }): Plot {
   const left = margin.left, top = margin.top, width = Math.max(canvas.clientWidth - left - margin.right, 10), height = Math.max(canvas.clientHeight - top - margin.bottom, 10);
   return { left, top, width, height, X: v => left + (v - rx[0]) / (rx[1] - rx[0]) * width, Y: v => top + height - (v - ry[0]) / (ry[1] - ry[0]) * height };
 }

@@ -63,6 +63,7 @@ export class Explorer {
     const values = other("values");
     if (!shown) this.askMotions(values || released, other("values", "start", "periods", "method", "against", "orbit", "history", "phase") || released, other("start", "method") || released, past || other("orbit"));
     const others = states(this.about).some(name => !next.axes.includes(name) && before.start[name] !== next.start[name]);
+    if (other("history")) this.legend();
     if (values && drag) this.askCoarse();
     else if (values || other("method", "size", "axes") || others) this.askMap();
     else if (other("box")) { this.pickSheet(); this.later("map", REST, () => this.askMap()); } else if (released) this.askMap();
@@ -340,7 +341,7 @@ export class Explorer {
   private legend(): void {
     const s = this.map.sheet, present = s ? new Set(s.label) : new Set<number>();
     const codes = Object.entries(this.about.codes).filter(([code]) => present.has(+code)).map(([code, name]) => [name, this.about.code_colors[code] ?? [120, 120, 120], ""] as [string, number[], string]);
-    showLegend(this.about, s?.attractors ?? [], codes, this.map.only, key => this.attractor(key));
+    showLegend(this.about, s?.attractors ?? [], codes, this.view.history, this.map.only, key => this.attractor(key));
     notes($("map-words"), s?.words); this.map.tell();
     this.map.label(`basins of ${plain(this.view.axes[0])} and ${plain(this.view.axes[1])}, ${s?.attractors.length ?? 0} attractors; arrows move the start, shift and arrows the view, plus and minus zoom, Enter settles; the table of attractors follows`);
   }

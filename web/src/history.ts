@@ -46,7 +46,7 @@ export class History {
     if (!motion) return;
     const { ink, quiet, contact, second, accent } = colours(), rx = this.span(), ry = this.held ?? this.range, scale = scaleFor(unitOf(this.about, this.of), ry), shown: Range = [ry[0] * scale.factor, ry[1] * scale.factor];
     const gaps = this.gaps(), names = gaps.map(g => plain(g.guard)), small = "11px system-ui, sans-serif"; c.font = small;
-    const margin = { left: 58, right: 12 + Math.max(0, ...names.map(name => c.measureText(name).width)), top: 10, bottom: 40 }, p = (this.plot = place(this.canvas, rx, ry, margin)), right = p.left + p.width;
+    const margin = { left: 58, right: 18 + Math.max(0, ...names.map(name => c.measureText(name).width)), top: 10, bottom: 40 }, p = (this.plot = place(this.canvas, rx, ry, margin)), right = p.left + p.width;
     frame(c, place(this.canvas, rx, shown, margin), rx, shown, ["time [s]", axisText(plain(this.of), scale.unit)]);
     c.strokeStyle = c.fillStyle = quiet; c.textAlign = "left"; c.textBaseline = "middle"; c.font = small; c.setLineDash([6, 5]);
     let above = -Infinity;

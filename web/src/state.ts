@@ -14,6 +14,13 @@ export interface View {
 
 const finite = (v: unknown): v is number => typeof v === "number" && Number.isFinite(v);
 
+/** What the phase portrait shows at first: of sensors one and its rate, where there is one. */
+function firstPhase(about: About): [string, string] {
+  const first = about.quantities.find(q => q.name === about.panels.history[0])!;
+  const rate = first.kind === "output" ? about.quantities.find(q => q.kind === "output" && first.unit !== "" && q.unit === `${first.unit}/s`) : undefined;
+  return rate ? [first.name, rate.name] : (about.panels.phase as [string, string]);
+}
+
 /** The view that a system opens with. */
 export function firstView(about: About): View {
   const [a, b] = Object.keys(about.axes), response = about.panels.response, asked = about.view;
@@ -22,7 +29,7 @@ export function firstView(about: About): View {
   const view: View = {
     values, start, axes: [a, b], box: [...about.axes[a], ...about.axes[b]], size: about.size[0], method: about.method, against: "", periods: 60,
     over: response?.parameter ?? "", range: response?.range ?? [0, 1], quantity: response?.quantity ?? about.panels.history[0],
-    history: about.panels.history[0], phase: about.panels.phase as [string, string], orbit: null,
+    history: about.panels.history[0], phase: firstPhase(about), orbit: null,
   };
   if (finite(asked.motion?.periods)) view.periods = asked.motion.periods;
   return view;
