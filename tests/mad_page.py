@@ -5,7 +5,18 @@ import json
 from saltus.explore.questions import QUESTIONS
 
 #: Fields without which most questions go no further.
-NEEDED = {"start", "axes", "size", "parameter", "range", "view", "source", "what", "format", "token"}
+NEEDED = {
+    "start",
+    "axes",
+    "size",
+    "parameter",
+    "range",
+    "view",
+    "source",
+    "what",
+    "format",
+    "token",
+}
 
 
 def mad_message(draw, number):
@@ -42,5 +53,20 @@ def _value(draw, name):
         "format": ["toml", "py", "nc", "png"],
         "token": ["x"],
     }
-    wild = [None, True, -1, 0, 2.5, 1e308, 10**30, "", "x" * 300, [], {}, [[[]]], {"a": {}}, "\ud800"]
+    wild = [
+        None,
+        True,
+        -1,
+        0,
+        2.5,
+        1e308,
+        10**30,
+        "",
+        "x" * 300,
+        [],
+        {},
+        [[[]]],
+        {"a": {}},
+        "\ud800",
+    ]
     return draw.choice(sound[name] if name in sound and draw.random() < 0.9 else wild)

@@ -27,6 +27,9 @@ def explore(
     values: Annotated[
         list[str] | None, typer.Argument(help="Values of a model: NAME=VALUE, with units.")
     ] = None,
+    system: Annotated[
+        str, typer.Option(help="The system of your own that a study is about: FILE.py:NAME.")
+    ] = "",
     browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,
     until_closed: Annotated[
         bool, typer.Option("--until-closed", help="End a minute after the last page was closed.")
@@ -59,21 +62,31 @@ def explore(
         return known[name]
 
     if what:
-        explorer = opened(_desk_of(what, values or [], threads), browser=browser, framed_by=())
+        desk = _desk_of(what, values or [], system, threads)
+        explorer = opened(desk, browser=browser, framed_by=())
     else:
         explorer = opened(Models(), model, browser=browser, framed_by=())
     screen.say(explorer.url)
     explorer.wait(until_closed)
 
 
-def _desk_of(what: str, values: list[str], threads: int | None) -> Desk:
+def _desk_of(what: str, values: list[str], system: str, threads: int | None) -> Desk:
     """The desk of what stands on the command line."""
+    from saltus.cli.own_system import own_system
+    from saltus.explore.desk import Desk
+
     path = Path(what)
     if ".py" in path.suffix:
-        from saltus.cli.own_system import own_system
-
         _no_values(what, values)
         return _desk(own_system(what), threads)
+    if path.is_dir() or path.suffix == ".toml":
+        from saltus.explore.studies import desk_of_results, opening_of_study
+
+        _no_values(what, values)
+        own = own_system(system) if system else None
+        if path.is_dir():
+            return desk_of_results(path, own, threads)
+        return Desk(opening_of_study(path, own), threads)
     return _desk(_model(what, values), threads)
 
 

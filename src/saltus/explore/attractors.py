@@ -32,7 +32,7 @@ POINTS = 64
 MOST = 127
 
 
-class KnownAttractors:
+class Legend:
     """The attractors of a system at one set of values, as they are found.
 
     A key is the place at which an attractor was found and stays; ids, which sort attractors by
@@ -45,17 +45,15 @@ class KnownAttractors:
         The map at these values.
     scale : float64[D]
         Range of each state.
-    before : KnownAttractors, optional
+    before : Legend, optional
         Those of the values shown before.
     """
 
-    def __init__(
-        self, map_: Stroboscope, scale: np.ndarray, before: KnownAttractors | None = None
-    ) -> None:
+    def __init__(self, map_: Stroboscope, scale: np.ndarray, before: Legend | None = None) -> None:
         self.map, self.scale = map_, scale
         self.found = AttractorSet(Neighbourhoods.none(len(map_.states)))
         self.scouts = 0  # starts that were looked through for them
-        self.lock, self.scouting = threading.RLock(), threading.Lock()
+        self.lock = threading.RLock()
         self._members: list[Attractor] = []
         self._hues: list[int] = []
         self._table: AttractorTable | None = None

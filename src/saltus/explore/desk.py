@@ -9,15 +9,16 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from saltus.analysis.basins.pipeline import BasinPlan, basin_plan
 from saltus.analysis.inputs.starts import ensemble, range_of
 from saltus.errors import ParameterError, unknown
 from saltus.explore import questions as asked
 from saltus.explore.about import about_answer, models_answer
-from saltus.explore.attractors import KnownAttractors
+from saltus.explore.attractors import Legend
 from saltus.explore.frames import Answer, Emit
-from saltus.explore.map import FIRST_SCOUTS, KeptMaps, grow_map, look, plan_of_map
+from saltus.explore.map import KeptMaps, grow_map, look, plan_of_map
 from saltus.explore.motion import AskedRun, motion
 from saltus.explore.opening import Opening
 from saltus.explore.orbits import MOST_PERIODS, attractor_orbit, orbit_of, settle, tracked
@@ -50,8 +51,8 @@ class Desk:
         self.opening, self.threads = opening, threads
         self._lock = threading.RLock()
         self._plans: OrderedDict[Any, BasinPlan] = OrderedDict()
-        self._known: OrderedDict[Any, KnownAttractors] = OrderedDict()
-        self._maps, self._responses = KeptMaps(), KeptResponses()
+        self._known: OrderedDict[Any, Legend] = OrderedDict()
+        self.maps, self._responses = KeptMaps(), KeptResponses()
         self._answers: Mapping[type, Callable[[Any], Answer]] = {
             asked.About: self._about,
             asked.Open: self._about,
@@ -151,11 +152,11 @@ class Desk:
     def _map(self, question: asked.MapQuestion, emit: Emit) -> None:
         system, method = self.system_at(question.values), self.method_of(question.method)
         plan = plan_of_map(question, system, method)
-        grow_map(plan, self.known_at(plan), self._maps, emit, question.coarse, self.threads)
+        grow_map(plan, self.legend_at(plan), self.maps, emit, question.coarse, self.threads)
 
     def _settle(self, question: asked.Settle) -> Answer:
         system, method = self.system_at(question.values), self.method_of(question.method)
-        known = self.known_at(self.plan_of(system, method))
+        known = self.legend_at(self.plan_of(system, method))
         return settle(
             known, self.start_of(system, question.start), method, self.quantities_of(None)
         )
@@ -176,7 +177,7 @@ class Desk:
                 quantities,
                 self.period_of,
             )
-        known = self.known_at(self.plan_of(system, method))
+        known = self.legend_at(self.plan_of(system, method))
         if question.attractor is None or known.row(question.attractor) is None:
             raise QuestionError(
                 f"no attractor {question.attractor} is known at these values.", "attractor"
@@ -187,7 +188,7 @@ class Desk:
         with about("source"):
             source = self.system_at(question.source)
         system, method = self.system_at(question.values), self.opening.method
-        known = self.known_at(self.plan_of(source, method))
+        known = self.legend_at(self.plan_of(source, method))
         old = None
         if question.key is not None:
             old = known.closed(question.key)
@@ -204,14 +205,22 @@ class Desk:
             system.parameter_text(question.parameter)
         with about("range"):
             limits = range_of(system, question.parameter, question.range)
-        known = self.known_at(plan := self.plan_of(system, method))
+        known = self.legend_at(plan := self.plan_of(system, method))
         first = system.outputs.names if system.outputs.first else system.states
         quantity = self.quantities_of((question.quantity or first[0],))[0]
-        look(plan, known, FIRST_SCOUTS, self.threads)
+        look(plan, known, self.threads)
         respond(
             known, method, question.parameter, limits, quantity, self.opening.axes,
             self._responses, emit, self.threads,
         )  # fmt: skip
+
+    def keep_responses(self, ds: xr.Dataset) -> None:
+        """Keep branches that were computed before."""
+        parameter, system = str(ds.attrs["parameter"]), self.opening.system
+        limits = tuple(float(ds.attrs[f"parameter_{end}"]) for end in ("low", "high"))
+        for quantity in ds["output"].values.tolist():
+            asked_for = (tuple(system.values.values()), self.opening.method, parameter, limits)
+            self._responses.put((*asked_for, quantity), system, ds)
 
     # -- what is known of values -------------------------------------------------------------------
     def plan_of(self, system: System, method: Method) -> BasinPlan:
@@ -228,14 +237,14 @@ class Desk:
                 keep(self._plans, key, plan, KEPT_VALUES)
         return plan
 
-    def known_at(self, plan: BasinPlan) -> KnownAttractors:
+    def legend_at(self, plan: BasinPlan) -> Legend:
         """The attractors that are known at the values of a map, as they are found."""
         key = (tuple(plan.system.values.values()), plan.method, plan.every)
         with self._lock:
             if key not in self._known:
                 before = next(reversed(self._known.values()), None)
                 scale = self.plan_of(plan.system, plan.method).scale
-                keep(self._known, key, KnownAttractors(plan.map(1), scale, before), KEPT_VALUES)
+                keep(self._known, key, Legend(plan.map(1), scale, before), KEPT_VALUES)
             self._known.move_to_end(key)
             return self._known[key]
 

@@ -4,20 +4,28 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from saltus.analysis.attractors.attractor_set import AttractorSet
-from saltus.analysis.basins.growing import Grown, grow
-from saltus.analysis.basins.labels import OPEN, Settling, complete
+from saltus.analysis.basins.growing import (
+    COARSE,
+    FEW_SCOUTS,
+    Grown,
+    KnownAttractors,
+    grow,
+    grow_all,
+)
+from saltus.analysis.basins.labels import OPEN, Settling
 from saltus.analysis.basins.levels import stride_of
 from saltus.analysis.basins.pipeline import BasinPlan, basin_plan
 from saltus.errors import counted
-from saltus.explore.attractors import KnownAttractors
+from saltus.explore.attractors import Legend
 from saltus.explore.frames import Emit
 from saltus.explore.questions import MapQuestion, about
 from saltus.flow.methods import Method
@@ -30,12 +38,8 @@ from saltus.system import System
 KEPT = 2**26
 #: Bytes of a kept cell.
 _CELL = 40
-#: Starts of the first look for attractors at new values; the whole sample follows.
-FIRST_SCOUTS = 64
-#: Stride of the finest level of a coarse map.
-COARSE = 4
-#: Starts whose grids differ by less than this share of a cell are the same.
-_SAME = 1e-9
+#: Time between two looks whether who waits was asked to stop [s].
+LOOK = 0.1
 #: Age of a start that isn't settled.
 _NO_AGE = 255
 #: Numbers of a finished map that the page shows.
@@ -57,12 +61,15 @@ class KeptMap:
     found : AttractorSet
     dataset : Dataset or None
         The finished map.
+    lock : RLock
+        Who grows it holds this.
     """
 
     plan: BasinPlan
     result: Settling
     found: AttractorSet
     dataset: xr.Dataset | None = None
+    lock: Any = field(default_factory=threading.RLock)
 
 
 class KeptMaps:
@@ -115,7 +122,7 @@ def plan_of_map(question: MapQuestion, system: System, method: Method) -> BasinP
 
 def grow_map(
     plan: BasinPlan,
-    known: KnownAttractors,
+    legend: Legend,
     maps: KeptMaps,
     emit: Emit,
     coarse: bool,
@@ -128,48 +135,86 @@ def grow_map(
     Raises Interrupted if it is asked to stop; what was finished is kept.
     """
     kept = maps.get(plan)
-    if kept is not None and kept.dataset is not None:
-        _Growing(kept, known, emit).tell_all()
-        return
-    look(plan, known, min(FIRST_SCOUTS, plan.scouts), threads)
-    kept = kept or KeptMap(plan, Settling.empty(plan.cells, len(plan.system.states)), known.found)
-    maps.put(kept)
-    growing = _Growing(kept, known, emit)
-    growing.begin()
-    growing.take_over(maps.beside(plan))
-    if coarse or known.scouts < plan.scouts:
-        growing.grow(min(COARSE, plan.levels()[0].stride), threads)
-    if coarse:
-        growing.end({"coarse": True})
-        return
-    if known.scouts < plan.scouts:
-        look(plan, known, plan.scouts, threads)
-        growing.tell_attractors()
-    growing.grow(1, threads)
-    growing.finish(threads)
+    if kept is None:
+        kept = KeptMap(plan, Settling.empty(plan.cells, len(plan.system.states)), legend.found)
+        maps.put(kept)
+    growing = _Growing(kept, legend, emit)
+    with _held(kept.lock):
+        if kept.dataset is None:
+            growing.take_over(maps.beside(plan))
+            growing.grow(coarse, threads)
+        else:
+            growing.tell_all()
 
 
-def look(plan: BasinPlan, known: KnownAttractors, scouts: int, threads: int | None) -> None:
-    """Look for attractors from a sample of starts, unless as many were looked through."""
-    while not known.scouting.acquire(timeout=0.1):
+@contextmanager
+def _held(lock: Any) -> Iterator[None]:
+    """Hold a lock; who waits for it hears that it is asked to stop."""
+    while not lock.acquire(timeout=LOOK):
         check_stop()
     try:
-        if known.scouts < scouts:
-            known.grow(replace(plan, scouts=scouts).scout(threads, None, known.found))
-            known.scouts = scouts
+        yield
     finally:
-        known.scouting.release()
+        lock.release()
+
+
+def look(plan: BasinPlan, legend: Legend, threads: int | None) -> None:
+    """Look for attractors from a few starts, unless some were looked through."""
+    if not legend.scouts:
+        legend.grow(replace(plan, scouts=FEW_SCOUTS).scout(threads, known=legend.found))
+        legend.scouts = FEW_SCOUTS
 
 
 class _Growing:
     """A map that is told as it grows."""
 
-    def __init__(self, kept: KeptMap, known: KnownAttractors, emit: Emit) -> None:
-        self._kept, self._known, self._emit = kept, known, emit
+    def __init__(self, kept: KeptMap, legend: Legend, emit: Emit) -> None:
+        self._kept, self._legend, self._emit = kept, legend, emit
         self._whole: list[int] = []
+        self._begun = False
 
-    def begin(self) -> None:
-        """Tell what map it is."""
+    def take_over(self, others: list[KeptMap]) -> None:
+        """Take cells that other maps know."""
+        mine, label = self._kept, self._kept.result.label
+        wider, before = self._legend.found, mine.found
+        label[:] = self._renumbered(label, before, wider)
+        mine.found = wider
+        for other in others:
+            if other is not mine:
+                here, there = _shared(mine.plan, other.plan)
+                has = _has_label(other.result.label[there]) & ~_has_label(label[here])
+                here, there = here[has], there[has]
+                part = other.result.of(there)
+                part.label[:] = self._renumbered(part.label, other.found, wider)
+                mine.result.put(here, part)
+
+    def grow(self, coarse: bool, threads: int | None) -> None:
+        """Follow the cells that aren't known: all, or those of coarse levels."""
+        kept, plan, legend = self._kept, self._kept.plan, self._legend
+        if coarse:
+            look(plan, legend, threads)
+            self.take_over([])
+            self._begin()
+            finest = min(COARSE, plan.levels()[0].stride)
+            grow(plan, kept.found, self._take, result=kept.result, finest=finest, threads=threads)
+            self._end({"coarse": True})
+            return
+        scouted = legend.scouts >= plan.scouts
+        found, _ = grow_all(
+            plan, self._take, kept.found, threads, result=kept.result, scouted=scouted
+        )
+        legend.grow(found)
+        legend.scouts = max(legend.scouts, plan.scouts)
+        kept.dataset = plan.finish(kept.result, found, threads)
+        self._end({"coarse": False})
+
+    def tell_all(self) -> None:
+        """Tell a map that is known."""
+        self._begin()
+        self._end({"coarse": False})
+
+    def _begin(self) -> None:
+        """Tell what map it is, and what is known of it."""
         plan = self._kept.plan
         self._emit(
             {
@@ -181,88 +226,48 @@ class _Growing:
                 "method": plan.method.name,
                 "every": plan.every,
                 "levels": [level.stride for level in plan.levels()],
-                "attractors": self._known.table(),
+                "attractors": self._legend.table(),
                 "cached": self._kept.dataset is not None,
             },
             {},
         )
-
-    def tell_attractors(self) -> None:
-        """Tell the attractors anew, and take the ids of the wider set for labels."""
-        self._renumber(self._known.found)
-        self._emit({"kind": "map-attractors", "attractors": self._known.table()}, {})
-
-    def take_over(self, others: list[KeptMap]) -> None:
-        """Take cells that other maps know, and tell what is known."""
-        mine, label = self._kept, self._kept.result.label
-        self._renumber(self._known.found)
-        for other in others:
-            if other is not mine:
-                here, there = _shared(mine.plan, other.plan)
-                has = _has_label(other.result.label[there]) & ~_has_label(label[here])
-                here, there = here[has], there[has]
-                part = other.result.of(there)
-                part.label[:] = self._by_id(part.label, other.found)
-                mine.result.put(here, part)
-        self._tell(np.flatnonzero(_has_label(label)))
-
-    def grow(self, finest: int, threads: int | None) -> None:
-        """Follow the cells of all levels down to a stride."""
-        kept = self._kept
-        grow(kept.plan, kept.found, self._take, result=kept.result, finest=finest, threads=threads)
-
-    def finish(self, threads: int | None) -> None:
-        """Search what nothing captured for new attractors, and tell the finished map."""
-        kept, plan = self._kept, self._kept.plan
-        opened = np.flatnonzero(kept.result.label == OPEN)
-        if len(opened):
-            wider = complete(
-                plan.map(threads), kept.result, kept.found, plan.scale, plan.periods, threads
-            )
-            kept.found = wider
-            if self._known.grow(wider):
-                self.tell_attractors()
-            self._tell(opened)
-        kept.dataset = plan.finish(kept.result, kept.found, threads)
-        self.end({})
-
-    def tell_all(self) -> None:
-        """Tell a map that is known."""
-        self.begin()
-        cells = np.arange(self._kept.plan.cells)
-        self._tell(cells)
-        self.end({})
-
-    def end(self, more: Mapping[str, Any]) -> None:
-        """Tell that nothing follows."""
-        ds, label = self._kept.dataset, self._kept.result.label
-        seen = label[label != Kind.NOT_COMPUTED]
-        trust = {} if ds is None else {name: ds.attrs.get(name) for name in _TRUST}
-        words = sentences(seen)
-        if waiting := int((seen == OPEN).sum()):
-            words.append(f"{counted(waiting, 'start')} not settled yet.")
-        shares = {one["key"]: one for one in self._fractions(label)}
-        table = [{**row, **shares.get(row["key"], {})} for row in self._known.table()]
-        head = {"kind": "map-end", "coarse": False, "attractors": table, "words": words}
-        self._emit({**head, **trust, **more}, {})
-
-    # -- cells -------------------------------------------------------------------------------------
-    def _take(self, grown: Grown) -> None:
-        self._piece(grown.stride, grown.cells, grown.known)
-        if grown.whole and grown.stride not in self._whole:
-            self._whole.append(grown.stride)
-            level = {"kind": "map-level", "level": grown.stride}
-            self._emit({**level, "fractions": self._fair()}, {})
-
-    def _tell(self, cells: np.ndarray) -> None:
-        """Tell cells that are known, a level at a time."""
-        plan, label = self._kept.plan, self._kept.result.label
-        known = int(_has_label(label).sum())
-        strides = stride_of(cells, plan.shape)
+        self._begun = True
+        label = self._kept.result.label
+        cells = np.flatnonzero(label != Kind.NOT_COMPUTED)
+        known, strides = int(_has_label(label).sum()), stride_of(cells, plan.shape)
         for level in plan.levels():
             here = cells[strides == level.stride]
             if len(here):
                 self._piece(level.stride, here, known)
+
+    def _end(self, more: Mapping[str, Any]) -> None:
+        """Tell that nothing follows."""
+        ds, label = self._kept.dataset, self._kept.result.label
+        seen = label[label != Kind.NOT_COMPUTED]
+        trust = {name: None if ds is None else ds.attrs.get(name) for name in _TRUST}
+        words = sentences(seen)
+        if waiting := int((seen == OPEN).sum()):
+            words.append(f"{counted(waiting, 'start')} not settled yet.")
+        fair = self._fair() if ds is None else self._fractions(label)
+        shares = {one["key"]: one for one in fair}
+        table = [{**row, **shares.get(row["key"], {})} for row in self._legend.table()]
+        self._emit({"kind": "map-end", "attractors": table, "words": words, **trust, **more}, {})
+
+    # -- cells -------------------------------------------------------------------------------------
+    def _take(self, news: Grown | KnownAttractors) -> None:
+        if isinstance(news, KnownAttractors):
+            self._kept.found = news.found
+            fresh = self._legend.grow(news.found)
+            if not self._begun:
+                self._begin()
+            elif fresh:
+                self._emit({"kind": "map-attractors", "attractors": self._legend.table()}, {})
+            return
+        self._piece(news.stride, news.cells, news.known)
+        if news.whole and news.stride not in self._whole:
+            self._whole.append(news.stride)
+            level = {"kind": "map-level", "level": news.stride}
+            self._emit({**level, "fractions": self._fair()}, {})
 
     def _piece(self, stride: int, cells: np.ndarray, known: int) -> None:
         result = self._kept.result
@@ -294,7 +299,7 @@ class _Growing:
         """Share of each attractor among labels, with its interval."""
         count = len(label)
         found = []
-        for i, key in enumerate(self._known.keys(self._kept.found).tolist()):
+        for i, key in enumerate(self._legend.keys(self._kept.found).tolist()):
             mine = int((label == i).sum())
             low, high = wilson(mine, count)
             share = {"fraction": mine / count, "low": float(low), "high": float(high)}
@@ -304,20 +309,16 @@ class _Growing:
     # -- ids and keys ------------------------------------------------------------------------------
     def _by_key(self, label: np.ndarray) -> np.ndarray:
         """Labels by keys in place of ids; codes stay."""
-        keys = np.append(self._known.keys(self._kept.found), -1)
+        keys = np.append(self._legend.keys(self._kept.found), -1)
         return np.where(label >= 0, keys[np.maximum(label, -1)], label)
 
-    def _by_id(self, label: np.ndarray, found: AttractorSet) -> np.ndarray:
-        """Labels by ids of one set as ids of this map's."""
-        keys, ids = self._known.keys(found), self._known.keys(self._kept.found).tolist()
+    def _renumbered(
+        self, label: np.ndarray, before: AttractorSet, after: AttractorSet
+    ) -> np.ndarray:
+        """Labels by ids of one set as ids of another."""
+        keys, ids = self._legend.keys(before), self._legend.keys(after).tolist()
         new = np.array([ids.index(key) if key in ids else OPEN for key in keys] + [OPEN], np.int64)
         return np.where(label >= 0, new[np.maximum(label, -1)], label)
-
-    def _renumber(self, found: AttractorSet) -> None:
-        """Take a wider set of attractors, and its ids for the labels so far."""
-        before, self._kept.found = self._kept.found, found
-        label = self._kept.result.label
-        label[:] = self._by_id(label, before)
 
 
 def _shared(plan: BasinPlan, other: BasinPlan) -> tuple[np.ndarray, np.ndarray]:
@@ -334,11 +335,11 @@ def _shared(plan: BasinPlan, other: BasinPlan) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _same_starts(mine: np.ndarray, theirs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Indices of two ascending rows at which they hold the same value."""
-    at = np.clip(np.searchsorted(theirs, mine), 1, len(theirs) - 1)
-    at -= np.abs(theirs[at - 1] - mine) < np.abs(theirs[at] - mine)
-    here = np.flatnonzero(np.abs(theirs[at] - mine) <= _SAME * (mine[1] - mine[0]))
-    return here, at[here]
+    """Indices of two rows at which they hold the same value, to the bit: one start in a hundred
+    leads elsewhere from beside it, however near.
+    """
+    _, here, there = np.intersect1d(mine, theirs, return_indices=True)
+    return here, there
 
 
 def _has_label(label: np.ndarray) -> np.ndarray:

@@ -11,9 +11,10 @@ import numpy as np
 from saltus.analysis.attractors.find_attractors import find_attractors
 from saltus.analysis.basins.labels import OPEN
 from saltus.analysis.basins.labels import settle as follow
+from saltus.analysis.closed.field_zeros import jacobian_of
 from saltus.analysis.closed.motions import ClosedMotion
 from saltus.analysis.closed.track import track
-from saltus.explore.attractors import KnownAttractors, pairs
+from saltus.explore.attractors import Legend, pairs
 from saltus.explore.frames import Answer
 from saltus.explore.motion import AskedRun, motion
 from saltus.flow.maps import Stroboscope
@@ -28,7 +29,7 @@ MOST_PERIODS = 2000
 NEVER_REPEATS = 60
 
 
-def settled(known: KnownAttractors, start: Sequence[float]) -> tuple[int, int]:
+def settled(known: Legend, start: Sequence[float]) -> tuple[int, int]:
     """The key of the attractor that a start leads to, or a code of
     :class:`~saltus.results.dataset.kinds.Kind`, and the periods until it is captured (-1: it
     isn't). What nobody knew yet joins the known ones.
@@ -52,7 +53,7 @@ def settled(known: KnownAttractors, start: Sequence[float]) -> tuple[int, int]:
 
 
 def settle(
-    known: KnownAttractors, start: Sequence[float], method: Method, quantities: Sequence[str]
+    known: Legend, start: Sequence[float], method: Method, quantities: Sequence[str]
 ) -> Answer:
     """What a start settles to, and that orbit."""
     key, periods = settled(known, start)
@@ -81,9 +82,7 @@ def _fate(code: int) -> str:
     return WITHOUT[Kind(code)].split(":")[0].replace("lead to", "leads to")
 
 
-def attractor_orbit(
-    known: KnownAttractors, key: int, method: Method, quantities: Sequence[str]
-) -> Answer:
+def attractor_orbit(known: Legend, key: int, method: Method, quantities: Sequence[str]) -> Answer:
     """The orbit of an attractor: a whole period; of one that never repeats some periods on it."""
     row: dict[str, Any] = known.row(key) or {}
     head, arrays = orbit(
@@ -131,18 +130,27 @@ def tracked(
     """
     now = track(source, old, source.values, system.values, method)
     one = now.motion
-    cycle, rests = one.time > 0, one.time == 0 or (one.period == 1 and system.forced_at is None)
+    cycle = one.time > 0
+    rests = system.forced_at is None and not cycle
     n = one.period if system.forced_at is not None else 0
     there = system.with_values(**now.values)
     turn = turn_of(there)
     about = {
-        "name": kind_text("equilibrium" if rests and not cycle else one.kind, n),
+        "name": kind_text("equilibrium" if rests else one.kind, n),
         "stable": now.stable,
-        "multipliers": pairs(one.multipliers),
-        "eigenvalues": False,
+        "multipliers": pairs(_eigenvalues(there, one.points[0]) if rests else one.multipliers),
+        "eigenvalues": rests,
         "seconds": one.time if cycle else n * turn or None,
     }
     run = AskedRun(there, one.points[0], turn, max(n, 1), one.time if cycle else None, method)
     head, arrays = orbit(run, quantities, about)
     words = [now.lost] if now.lost else []
     return {**head, "kind": "track", "lost": now.lost or None, "words": words}, arrays
+
+
+def _eigenvalues(system: System, state: np.ndarray) -> np.ndarray:
+    """Eigenvalues of the equations at an equilibrium [1/s], the largest real part first."""
+    values = {name: np.array([value]) for name, value in system.values.items()}
+    (matrix,) = jacobian_of(system, state[None], values)
+    found = np.linalg.eigvals(matrix)
+    return np.asarray(found[np.argsort(-found.real)])

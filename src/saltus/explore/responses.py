@@ -17,7 +17,7 @@ from saltus.analysis.branches.plans import LONGEST_DOUBLED, POINTS, SWITCHES, pl
 from saltus.analysis.inputs.halton import halton
 from saltus.analysis.inputs.outputs import outputs_of
 from saltus.errors import unknown
-from saltus.explore.attractors import KnownAttractors, pairs
+from saltus.explore.attractors import Legend, pairs
 from saltus.explore.frames import Answer, Emit
 from saltus.explore.motion import AskedRun
 from saltus.explore.orbits import orbit
@@ -75,7 +75,7 @@ class KeptResponses:
 
 
 def respond(
-    known: KnownAttractors,
+    known: Legend,
     method: Method,
     parameter: str,
     limits: tuple[float, float],
@@ -187,7 +187,7 @@ class _Told:
         return told
 
 
-def _starts(known: KnownAttractors, box: Mapping[str, tuple[float, float]]) -> np.ndarray:
+def _starts(known: Legend, box: Mapping[str, tuple[float, float]]) -> np.ndarray:
     """Starts in a box, and a point of each known attractor, float64[k, D]."""
     states = known.map.system.states
     starts = np.zeros((STARTS, len(states)))
@@ -196,9 +196,7 @@ def _starts(known: KnownAttractors, box: Mapping[str, tuple[float, float]]) -> n
     return np.concatenate([starts, *(one.points[:1] for one in known.found.every)])
 
 
-def _answer(
-    known: KnownAttractors, ds: xr.Dataset, number: int, quantity: str, share: float
-) -> Answer:
+def _answer(known: Legend, ds: xr.Dataset, number: int, quantity: str, share: float) -> Answer:
     """Branches as the page draws them."""
     parameter = str(ds.attrs["parameter"])
     limits = [float(ds.attrs[f"parameter_{end}"]) for end in ("low", "high")]
@@ -251,7 +249,7 @@ def _peaks(ds: xr.Dataset, quantity: str, what: str) -> np.ndarray:
     return np.asarray(peaks, "f4")
 
 
-def _hues(known: KnownAttractors, ds: xr.Dataset) -> np.ndarray:
+def _hues(known: Legend, ds: xr.Dataset) -> np.ndarray:
     """The hue of each branch: that of the known attractor which lies on it, uint8[branch]."""
     system, hues = known.map.system, np.full(ds.sizes["branch"], NO_HUE, "u1")
     parameter = str(ds.attrs["parameter"])

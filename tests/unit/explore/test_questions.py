@@ -47,7 +47,7 @@ def test_a_question_is_read_with_its_defaults():
     ],
 )
 def test_a_wrong_field_is_named(change, field, words):
-    with pytest.raises(QuestionError, match="^[^\n]*$") as refused:
+    with pytest.raises(QuestionError, match=r"^[^\n]*$") as refused:
         read(json.dumps(MAP | change))
     assert refused.value.field == field
     assert words in str(refused.value)

@@ -7,11 +7,11 @@ import socket
 import threading
 
 import pytest
-from mad_page import mad_message
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 import saltus as sl
+from mad_page import mad_message
 from saltus.explore import server as servers
 from saltus.explore import session as sessions
 from saltus.explore.desk import Desk
@@ -136,7 +136,8 @@ def test_a_foreign_host_gets_no_socket(server):
     "path",
     [
         "/nothing", "/../server.py", "/..%2fserver.py", "/%2e%2e/server.py", "/page/index.html",
-        "/index.html/", "//etc/passwd", "/main.js%00", "/server.py", "/.", "/socket", "/?token=x/..",
+        "/index.html/", "//etc/passwd", "/main.js%00", "/server.py", "/.", "/socket",
+        "/?token=x/..",
     ],
 )  # fmt: skip
 def test_only_the_files_of_the_page_are_served(server, path):

@@ -11,7 +11,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from queue import Empty, SimpleQueue
+from queue import Empty, Full, Queue
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from saltus.analysis.basins.pipeline import BasinPlan
 from saltus.analysis.closed.capture import Neighbourhoods
 from saltus.flow.maps import Stroboscope
 from saltus.flow.threads import on_threads, usable_processors
+from saltus.interrupt import check_stop
 from saltus.results.dataset.kinds import Kind
 
 #: Starts of up to seven states that one thread follows at a time: fewer leave lanes empty, more
@@ -37,6 +38,8 @@ COARSE = 4
 #: Starts from which attractors are looked for before the first cells: not enough for an answer,
 #: large basins are hit. Of seven frequencies of the rig they missed small ones at four.
 FEW_SCOUTS = 64
+#: Batches of settled starts that may wait to be taken; then those who follow starts wait.
+AHEAD = 256
 #: Seconds for which cells are gathered before they are handed on.
 GATHERED = 0.03
 
@@ -106,7 +109,8 @@ def grow(
     found : AttractorSet
         Its attractors, as :meth:`BasinPlan.scout` finds them.
     take : callable
-        Called from this thread, some thirty times a second, with :class:`Grown` cells.
+        Called from this thread, some thirty times a second, with :class:`Grown` cells. While it
+        doesn't return, starts are soon followed no further.
     result : Settling, optional
         Outcomes of cells that are known already, such as those of a map that was stopped; they
         aren't followed again. New ones are written to it.
@@ -153,6 +157,9 @@ def grow_all(
     take: Callable[[Grown | KnownAttractors], None],
     known: AttractorSet | None = None,
     threads: int | None = None,
+    *,
+    result: Settling | None = None,
+    scouted: bool = False,
 ) -> tuple[AttractorSet, Settling]:
     """A whole map from nothing, or from some of its attractors, with a first picture early.
 
@@ -177,6 +184,12 @@ def grow_all(
         (:func:`saltus.analysis.attractors.followed.followed`).
     threads : int, optional
         Default all processors.
+    result : Settling, optional
+        Outcomes of cells that are known already, labelled by the ids of ``known``; they aren't
+        followed again. New ones are written to it.
+    scouted : bool
+        Whether ``known`` is all that a whole sample of starts leads to: none is looked through
+        again.
 
     Returns
     -------
@@ -188,10 +201,15 @@ def grow_all(
     Interrupted
         On Ctrl-C, or a :class:`saltus.Stop`.
     """
-    result = Settling.empty(plan.cells, len(plan.system.states))
-    found = replace(plan, scouts=min(FEW_SCOUTS, plan.scouts)).scout(threads, known=known)
+    if result is None:
+        result = Settling.empty(plan.cells, len(plan.system.states))
     none = AttractorSet(Neighbourhoods.none(len(plan.system.states)))
-    take(KnownAttractors(found, found.ids(known or none)))
+    found = known or none
+    if not scouted:
+        found = replace(plan, scouts=min(FEW_SCOUTS, plan.scouts)).scout(threads, known=known)
+    ids = found.ids(known or none)
+    renumber(result.label, ids)
+    take(KnownAttractors(found, ids))
     wider = found
 
     def look() -> None:
@@ -202,11 +220,12 @@ def grow_all(
         finest = min(COARSE, plan.levels()[0].stride)
         grow(plan, found, take, result=result, finest=finest, resume=False, threads=threads)
 
-    on_threads(lambda job: job(), [look, begin], lambda *_: None, 2)
-    ids = wider.ids(found)
-    renumber(result.label, ids)
-    if len(wider) > len(found):
-        take(KnownAttractors(wider, ids))
+    if not scouted:
+        on_threads(lambda job: job(), [look, begin], lambda *_: None, 2)
+        ids = wider.ids(found)
+        renumber(result.label, ids)
+        if len(wider) > len(found):
+            take(KnownAttractors(wider, ids))
     grow(plan, wider, take, result=result, threads=threads)
     opened = np.flatnonzero(result.label == OPEN)
     every = complete(plan.map(threads), result, wider, plan.scale, plan.periods, threads)
@@ -234,7 +253,7 @@ class _Work:
         self.plan, self.found, self.result = plan, found, result
         self.patience, self.resumes = patience, resumes
         self.levels = [one for one in plan.levels() if one.stride >= finest]
-        self.settled: SimpleQueue[tuple[np.ndarray, Settling]] = SimpleQueue()
+        self.settled: Queue[tuple[np.ndarray, Settling]] = Queue(AHEAD)
         self._lock, self._ahead = threading.Lock(), np.zeros(0, np.int64)
         self._tiles = self._in_order()
         self._waiting: list[np.ndarray] = []
@@ -269,14 +288,24 @@ class _Work:
                 pool.add(more, plan.starts(more))
             if not len(pool):
                 return
-            self.settled.put(pool.go_on())
+            self._hand_on(*pool.go_on())
             impatient = (pool.age >= self.patience) & self._is_impatient(pool.who)
             if impatient.any():
                 who, part = pool.give_up(impatient)
-                self.settled.put((who, part))
+                self._hand_on(who, part)
                 if self.resumes:
                     with self._lock:
                         self._waiting.append(who)
+
+    def _hand_on(self, who: np.ndarray, part: Settling) -> None:
+        """Hand on what has settled; wait while who takes it is behind."""
+        while len(who):
+            try:
+                self.settled.put((who, part), timeout=GATHERED)
+            except Full:
+                check_stop()
+            else:
+                return
 
     def _is_impatient(self, cells: np.ndarray) -> np.ndarray:
         if not self.resumes:
@@ -305,9 +334,8 @@ class _Handed:
                 who, part = self._work.settled.get_nowait()
             except Empty:
                 return
-            if len(who):
-                self._work.result.put(who, part)
-                self._new.append(who)
+            self._work.result.put(who, part)
+            self._new.append(who)
 
     def hand_on(self) -> None:
         """Hand on what has settled, a level at a time."""
