@@ -18,8 +18,8 @@ PATIENCE = 60.0
 class Seen:
     """A page of the explorer, as a test sees and moves it."""
 
-    def __init__(self, page):
-        self.page, self.said = page, []
+    def __init__(self, page, patience=PATIENCE):
+        self.page, self.said, self.patience = page, [], patience
         page.on("console", lambda message: self.said.append(message.text))
         page.on("pageerror", lambda error: self.said.append(str(error)))
 
@@ -29,11 +29,11 @@ class Seen:
 
     def until(self, text, argument=None):
         """Ask again and again: waiting in the page needs eval, which its policy forbids."""
-        end = time.monotonic() + PATIENCE
+        end = time.monotonic() + self.patience
         while not (value := self.page.evaluate(text, argument)):
             if time.monotonic() > end:
                 words = self.page.inner_text("body")
-                raise AssertionError(f"not in {PATIENCE:g} s: {text}\n{self.said}\n{words[:600]}")
+                raise AssertionError(f"not in {self.patience:g} s: {text}\n{self.said}\n{words[:600]}")
             time.sleep(0.01)
         return value
 

@@ -10,7 +10,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from explorer_page import Seen, opened, small
+from explorer_page import PATIENCE, Seen, opened, small
 
 import saltus as sl
 
@@ -64,10 +64,10 @@ def see(browser):
     """Opens a page in a window of its own: ``see(address, width=..., **options)``."""
     contexts, pages = [], []
 
-    def open_page(address, width=1400, height=900, rest=True, before=None, **options):
+    def open_page(address, width=1400, height=900, rest=True, before=None, patience=PATIENCE, **options):
         context = browser.new_context(viewport={"width": width, "height": height}, **options)
         contexts.append(context)
-        seen = Seen(context.new_page())
+        seen = Seen(context.new_page(), patience)
         pages.append(seen)
         if before is not None:
             before(seen.page)

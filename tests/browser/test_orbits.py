@@ -142,9 +142,9 @@ def test_a_structure_shows_its_sensors_and_a_free_system_its_cycle(see):
 def test_the_pictures_of_the_documentation_can_be_taken(see):
     """SALTUS_PICTURES=docs/pictures takes them anew: explore.png, explore-orbit.png, ..."""
     with opened(sl.models.delangre("b", force="4 N", frequency="15 Hz")) as explorer:
-        view = {"size": 250, "periods": 60, "box": [-5e-3, 5e-3, -1, 1], "range": [12, 18]}
+        view = {"size": 160, "periods": 60, "box": [-5e-3, 5e-3, -1, 1], "range": [12, 18]}
         view |= {"start": {"x": 1e-3, "v": 0.0}}
-        seen = see(small(explorer, **view))
+        seen = see(small(explorer, **view), patience=600.0)
         seen.keep("explore")
         low, high = 15.5, 16.0
         pick = """([low, high]) => { const { x, y, a } = explorer.responses;

@@ -15,8 +15,8 @@ import { type Box, firstView, fromAddress, toAddress, Undo, type View } from "./
 import { Values } from "./values";
 import { $, differing, marked, notes, only, options, type Says, type Status } from "./words";
 
-/** drag: the finger is down; past: from the list of undo; shown: the motion and the curves are of it already. */
-interface Change { drag?: boolean; past?: boolean; shown?: boolean }
+/** drag: the finger is down; past: from the list of undo; shown: the motion and the curves are of it already; half: its values are still to come. */
+interface Change { drag?: boolean; past?: boolean; shown?: boolean; half?: boolean }
 /** Milliseconds: rest before a start is settled, before a map of another view, between coarse maps of a drag, before a view is kept for undo. */
 const SETTLE = 300, REST = 150, COARSE = 250, KEEP = 400;
 /** Milliseconds without an answer after which what follows a slider is dimmed. */
@@ -54,7 +54,7 @@ export class Explorer {
 
   // -- what is looked at ------------------------------------------------------------------------------------------------------
   /** Look at something else: ask what it needs, and keep it for undo once it rests. */
-  go(change: Partial<View>, { drag = false, past = false, shown = false }: Change = {}): void {
+  go(change: Partial<View>, { drag = false, past = false, shown = false, half = false }: Change = {}): void {
     const before = this.view, next = (this.view = { ...before, ...structuredClone(change) });
     const other = (...keys: (keyof View)[]) => keys.some(k => JSON.stringify(before[k]) !== JSON.stringify(next[k])), released = this.dragging && !drag;
     this.dragging = drag;
@@ -69,7 +69,7 @@ export class Explorer {
     else if (other("box")) { this.pickSheet(); this.later("map", REST, () => this.askMap()); } else if (released) this.askMap();
     const apart = Object.keys(next.values).some(name => name !== next.over && next.values[name] !== before.values[name]);
     if (!drag && !shown && (apart || other("over", "range", "quantity") || released)) this.askResponses();
-    if (!past) this.later("keep", KEEP, () => this.keep(), drag);
+    if (!past) this.later("keep", KEEP, () => this.keep(), drag || half);
     else this.kept = toAddress(next, this.first);
   }
   private askMotions(values: boolean, motion: boolean, start: boolean, orbit: boolean): void {
@@ -182,7 +182,7 @@ export class Explorer {
     const fields = this.motionFields(), id = this.link.ask("motion", { ...fields, [group]: { ...(fields[group] as object), [name]: text } });
     this.typed = { key: `${group}.${name}`, id };
   }
-  private orbitOf(choice: { point?: number; event?: number }): void { const key = this.responses.head?.key; if (key !== undefined) this.go({ orbit: { responses: key, ...choice } }); }
+  private orbitOf(choice: { point?: number; event?: number }): void { const key = this.responses.head?.key; if (key !== undefined) this.go({ orbit: { responses: key, ...choice } }, { half: true }); }
   private attractor(key: number): void { this.go({ orbit: this.view.orbit?.attractor === key ? null : { attractor: key } }); }
   leaveOrbit(): void { this.go({ orbit: null }); this.status.say("the motion from the start"); }
   stop(): void { for (const name of ["map", "settle"]) { clearTimeout(this.timers[name]); delete this.timers[name]; } this.link.tell("stop"); this.askedValues = ""; this.status.say("stopped"); }
@@ -341,17 +341,19 @@ export class Explorer {
   private legend(): void {
     const s = this.map.sheet, present = s ? new Set(s.label) : new Set<number>();
     const codes = Object.entries(this.about.codes).filter(([code]) => present.has(+code)).map(([code, name]) => [name, this.about.code_colors[code] ?? [120, 120, 120], ""] as [string, number[], string]);
+    if (s && !s.known && !s.attractors.length) return;                    // the one before stays, dim, until there is another
     showLegend(this.about, s?.attractors ?? [], codes, this.view.history, this.map.only, key => this.attractor(key));
     notes($("map-words"), s?.words); this.map.tell();
     this.map.label(`basins of ${plain(this.view.axes[0])} and ${plain(this.view.axes[1])}, ${s?.attractors.length ?? 0} attractors; arrows move the start, shift and arrows the view, plus and minus zoom, Enter settles; the table of attractors follows`);
   }
   private hover(where: Place | null, at: [number, number] | null, sheet: Sheet | null): void {
     const [a, b] = this.view.axes, say = (p: [number, number]) => `${plain(a)} = ${spoken(p[0], unitOf(this.about, a), 5)}, ${plain(b)} = ${spoken(p[1], unitOf(this.about, b), 5)}`;
-    if (!at) { const s = this.map.sheet; $("map-under").textContent = s?.flip || (s?.level && s.level > 1 ? `shares are those of every ${s.level}th row and column` : "click: a start; drag: the view; wheel: closer"); return; }
+    if (!at) { const s = this.map.sheet; $("map-under").textContent = s?.flip || (s?.level && s.level > 1 ? `shares of the starts in every ${ORDINAL[s.level] ?? `${s.level}th`} row and column` : "click: a start; drag: the view; wheel: closer"); return; }
     if (!where || !sheet) { $("map-under").textContent = `${say(at)}: not known yet`; return; }
     const one = sheet.attractors.find((o: Attractor) => o.key === where.label), what = one ? one.name : this.about.codes[String(where.label)] ?? "";
     const when = one && where.age < 255 ? `, settles within ${2 ** where.age} ${this.about.forced ? "periods" : "turns"}` : "";
     $("map-under").textContent = `${say(where.at)}: ${what}${when}${where.stride > 1 ? " (one start for the whole block)" : ""}`;
   }
 }
+const ORDINAL: Record<number, string> = { 2: "second", 4: "fourth", 8: "eighth" };
 const about_ = (about: About): string => about.system!.name.replace(/\s*\(.*/, "");

@@ -45,8 +45,9 @@ export class Values {
     const box = this.field("values", p.name, p.shown), range = element("input");
     Object.assign(range, { type: "range", min: "0", max: String(STEPS), step: "1" }); range.setAttribute("aria-label", plain(p.name));
     const value = (): number => {
-      const u = +range.value / STEPS, v = p.scale === "log" ? p.low * (p.high / p.low) ** u : p.low + u * (p.high - p.low);
-      return +(p.step ? Math.round(v / p.step) * p.step : v).toPrecision(p.step ? 12 : 4);
+      const u = +range.value / STEPS, log = p.scale === "log", v = log ? p.low * (p.high / p.low) ** u : p.low + u * (p.high - p.low);
+      const ten = 10 ** Math.floor(Math.log10((log ? v * Math.log(p.high / p.low) : p.high - p.low) / STEPS));
+      return +(Math.round(v / ten) * ten).toPrecision(12);                // the roundest number that a step of the slider reaches
     };
     range.oninput = () => this.events.slide(p.name, value(), false);
     range.onchange = () => this.events.slide(p.name, value(), true);
