@@ -93,6 +93,8 @@ def test_a_slider_is_moved_by_keys(seen):
 
 
 def test_contacts_are_chosen_in_their_table(seen):
+    seen.page.mouse.click(*seen.place(ON_MAP, -0.9e-3, -0.04))
+    seen.rest()
     seen.page.focus("#contacts-scroll")
     for _ in range(3):
         seen.page.keyboard.press("ArrowDown")

@@ -133,5 +133,10 @@ export function frame(c: CanvasRenderingContext2D, p: Plot, rx: Range, ry: Range
   c.save(); c.translate(11, p.top + p.height / 2); c.rotate(-Math.PI / 2); c.fillText(yt.offset ? `${names[1]}  ${yt.offset}` : names[1], 0, 0); c.restore();
 }
 
+/** What an empty picture says. */
+export function wordsIn(c: CanvasRenderingContext2D, p: Plot, text: string): void {
+  c.fillStyle = colours().quiet; c.font = FONT; c.textAlign = "center"; c.textBaseline = "middle"; c.fillText(text, p.left + p.width / 2, p.top + p.height / 3);
+}
+
 /** Draw again when a place changes its size. */
 export function onResize(element: Element, redraw: () => void): void { new ResizeObserver(() => redraw()).observe(element); }

@@ -19,7 +19,7 @@ export class Contacts {
     });
   }
   private pick(row: HTMLTableRowElement | null): void {
-    if (!row) return;
+    if (!row || !this.made) return;
     for (const other of this.body.querySelectorAll(".chosen")) other.classList.remove("chosen");
     row.classList.add("chosen"); this.choose(row.sectionRowIndex);
   }

@@ -27,7 +27,7 @@ export class Explorer {
   view: View; readonly first: View; map: BasinMap; history: History; phase: Phase; responses: Responses; values: Values; private contacts: Contacts; readonly save: SaveSheet;
   motion: Motion | null = null; maps = new Map<number, Sheet>();
   private undo: Undo; private orbit: Head | null = null; private settled: Head | null = null; private timers: Record<string, number> = {};
-  private kept = ""; private dragging = false; private dragged = ""; private heard = 0; private coarse = 0; private begun = 0; private typed: { key: string; id: number } | null = null; private whole: Box;
+  private kept = ""; private dragging = false; private dragged = ""; private heard = 0; private settledFrom = ""; private coarse = 0; private begun = 0; private typed: { key: string; text: string; id: number } | null = null; private whole: Box;
 
   constructor(readonly about: About, private link: Link, private status: Status, private says: Says, address: string | null) {
     this.first = firstView(about);
@@ -58,6 +58,8 @@ export class Explorer {
     const before = this.view, next = (this.view = { ...before, ...structuredClone(change) });
     const other = (...keys: (keyof View)[]) => keys.some(k => JSON.stringify(before[k]) !== JSON.stringify(next[k])), released = this.dragging && !drag;
     this.dragging = drag;
+    if (other("start", "values", "method")) this.settled = null;
+    if (other("start")) this.phase.over(null);
     if (past && other("axes")) this.whole = this.wholeOf(next.axes);
     this.show();
     const values = other("values");
@@ -112,6 +114,7 @@ export class Explorer {
     const { about, view } = this, now = view.values;
     for (const [panel, head] of [["motion", this.motion?.head], ["phase", this.motion?.head], ["orbit", this.orbit]] as const) {
       const apart = differing(about, head?.values, now), follows = this.dragging && this.dragged !== "" && head != null;
+      if (panel === "orbit" && apart === "" && this.settledFrom !== "" && this.settledFrom !== JSON.stringify(this.view.start)) { marked(panel, "of the start before"); continue; }
       if (follows) marked(panel, only(about, this.dragged, head.values), apart !== "" && performance.now() - this.heard > LATE); else marked(panel, apart);
     }
     marked("responses", this.responses.head ? differing(about, this.responses.head.values, now, [this.responses.head.parameter]) : "");
@@ -171,7 +174,7 @@ export class Explorer {
     if (!sheet) this.map.sheets.add((sheet = new Sheet(key, { ...v.values }, JSON.stringify([v.axes, plane]), [...v.box], v.size, v.size)));
     this.map.sheet = sheet; this.map.draw(); this.legend();
     if (sheet.done) { this.link.tell("stop", { of: "map" }); this.status.say(this.mapText()); return; }
-    this.begun = performance.now();
+    this.begun = performance.now(); this.status.say(this.mapText());
     const id = this.link.ask("map", coarse ? { ...fields, coarse } : fields);
     if (id >= 0) { this.maps.clear(); this.maps.set(id, sheet); }
   }
@@ -180,7 +183,7 @@ export class Explorer {
   private slide(name: string, value: number, done: boolean): void { this.values.refuse(`values.${name}`, ""); this.dragged = name; this.settled = null; this.status.say(`${plain(name)} ${spoken(value, this.about.parameters.find(p => p.name === name)!.unit, 5)}`); this.go({ values: { ...this.view.values, [name]: value } }, { drag: !done }); if (done) { this.dragged = ""; this.marks(); } }
   private type(group: "values" | "start", name: string, text: string): void {
     const fields = this.motionFields(), id = this.link.ask("motion", { ...fields, [group]: { ...(fields[group] as object), [name]: text } });
-    this.typed = { key: `${group}.${name}`, id };
+    this.typed = { key: `${group}.${name}`, text, id };
   }
   private orbitOf(choice: { point?: number; event?: number }): void { const key = this.responses.head?.key; if (key !== undefined) this.go({ orbit: { responses: key, ...choice } }, { half: true }); }
   private attractor(key: number): void { this.go({ orbit: this.view.orbit?.attractor === key ? null : { attractor: key } }); }
@@ -241,7 +244,7 @@ export class Explorer {
     if (kind === "waits") return this.status.say((head.words ?? []).join(" "));
     if (kind.startsWith("map-")) return this.heardMap(head, arrays);
     if (kind === "motion") { if (!this.view.orbit) this.showMotion(head, arrays); }
-    else if (kind === "settle") this.heardSettle(head, arrays);
+    else if (kind === "settle") this.heardSettle(head, arrays, question);
     else if (kind === "track") this.heardTrack(head, arrays);
     else if (kind === "orbit") this.heardOrbit(head, arrays, question);
     else if (kind === "responses-progress") $("responses-under").textContent = `the branches are followed: ${Math.round(100 * head.share)} %`;
@@ -249,8 +252,9 @@ export class Explorer {
     else if (kind === "save") this.save.take(head, arrays);
   }
   private heardTyped(head: Head): void {
-    const { key } = this.typed!, group = key.startsWith("values.") ? "values" : "start";
+    const { key, text } = this.typed!, group = key.startsWith("values.") ? "values" : "start";
     this.typed = null;
+    if (head.kind === "stopped") return this.type(group, key.slice(group.length + 1), text);    // a newer motion took its place
     if (head.kind !== "motion") { this.values.refuse(key, String(head.why ?? "")); return; }
     this.values.accept(key); this.go({ [group]: group === "values" ? this.known(head.values) : { ...this.view.start, ...head.start }, ...(group === "start" ? { orbit: null } : {}) });
   }
@@ -282,9 +286,9 @@ export class Explorer {
   private settledText(head: Head): string {
     return head.words?.[0] ?? (head.attractor ? `settles to ${head.attractor.name}` : this.about.codes[String(head.code)] ?? "not settled");
   }
-  private heardSettle(head: Head, arrays: Arrays): void {
-    if (this.view.orbit) return;
-    this.settled = head; this.orbit = head.attractor ? head : null;
+  private heardSettle(head: Head, arrays: Arrays, question: Question): void {
+    if (this.view.orbit || JSON.stringify(question.start) !== JSON.stringify(this.view.start)) return;
+    this.settledFrom = JSON.stringify(question.start); this.settled = head; this.orbit = head.attractor ? head : null;
     if (head.attractor) showOrbit(this.about, head, `${head.attractor.name}${stability(head.attractor.stable) ? `, ${stability(head.attractor.stable)}` : ""}`); else clearOrbit(this.settledText(head));
     this.phase.over(head.attractor && arrays[`sample:${this.view.phase[0]}`] ? motionOf(head, arrays) : null);
     $("motion-what").textContent = this.motionText(); this.status.say(this.settledText(head)); this.marks();
@@ -302,7 +306,7 @@ export class Explorer {
   }
   private heardOrbit(head: Head, arrays: Arrays, question: Question): void {
     if (!this.view.orbit) return;
-    this.orbit = head; this.settled = null; this.phase.over(null);
+    this.orbit = head; this.settled = null; this.settledFrom = ""; this.phase.over(null);
     showOrbit(this.about, head, `${head.name ?? "orbit"}${stability(head.stable) ? `, ${stability(head.stable)}` : ""}`); this.showMotion(head, arrays);
     if (question.responses !== undefined) this.go({ values: this.known(head.values), start: { ...this.view.start, ...head.start } }, { shown: true });
     this.status.say($("motion-what").textContent!);

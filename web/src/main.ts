@@ -36,6 +36,7 @@ const link = new Link(token, {
 
 function begin(about: About): void {
   $("models").hidden = about.system !== null; $("main").hidden = about.system === null;
+  for (const part of $("top").querySelectorAll<HTMLElement>(".choice, .tools")) part.hidden = about.system === null;
   if (!about.system) {
     status.say("choose a system");
     $("models").querySelector("ul")!.replaceChildren(...(about.models ?? []).map(model => {

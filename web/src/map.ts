@@ -1,6 +1,6 @@
 /** The map of basins: sheets of labels on a Canvas 2D, the start as a cross, the attractors' points; pointer and keys. */
 import { type About, type Attractor, plain, unitOf } from "./about";
-import { axisText, colours, fitted, frame, onResize, type Plot, place, type Range, scaleFor } from "./axes";
+import { axisText, colours, fitted, frame, onResize, type Plot, place, type Range, scaleFor, wordsIn } from "./axes";
 import { type Place, Sheet, Sheets, colourTable } from "./sheets";
 import type { Box } from "./state";
 
@@ -51,6 +51,7 @@ export class BasinMap {
     if (own) this.stretch(c, p, own, 1);
     if (own) this.points(c, p, own.attractors);
     c.restore();
+    if (!below && !paler.length && !own?.known) wordsIn(c, p, "the first starts are being followed");
     frame(c, place(this.canvas, rx, ry), rx, ry, [axisText(plain(first), sx.unit), axisText(plain(second), sy.unit)], false);
     this.cross(c, p);
     this.frames++; this.painted();

@@ -1,6 +1,6 @@
 /** Response curves: stable solid, unstable dashed, events by their shapes; nearest point, and keys along a branch. */
 import { type About, parameterOf, plain, unitOf } from "./about";
-import { axisText, colours, digits, fitted, frame, onResize, type Plot, place, type Range, reach, scaleFor, spoken } from "./axes";
+import { axisText, colours, digits, fitted, frame, onResize, type Plot, place, type Range, reach, scaleFor, spoken, wordsIn } from "./axes";
 import type { Arrays, Head, Numbers } from "./link";
 import { cells } from "./words";
 
@@ -25,8 +25,8 @@ export class Responses {
 
   draw(): void {
     const c = fitted(this.canvas), head = this.head;
-    if (!head) return;
-    const { ink, quiet, accent, panel } = colours(), { point_stable: stable, point_branch: branch, point_hue: hue } = this.a, x = this.x, y = this.y, n = x?.length ?? 0;
+    if (!head) return wordsIn(c, place(this.canvas, [0, 1], [0, 1]), "the branches are being followed");
+    const { ink, accent, panel } = colours(), { point_stable: stable, point_branch: branch, point_hue: hue } = this.a, x = this.x, y = this.y, n = x?.length ?? 0;
     const ux = parameterOf(this.about, head.parameter)?.unit ?? "", uy = unitOf(this.about, head.quantity), [low, high] = head.range as Range;
     const pad = 0.02 * (high - low), own = n ? reach([y]) : ([0, 1] as Range);
     this.whole = [[low - pad, high + pad], own[0] > 0 && own[0] < 0.5 * own[1] ? [0, own[1]] : own];
@@ -50,7 +50,7 @@ export class Responses {
     const size = head.events.length > MANY && !this.seen ? 0.65 : 1;
     (head.events as string[]).forEach((kind, i) => { mark(c, kind, p.X(this.a.event_parameter[i]), p.Y(this.a.event_peak[i]), size, ink, panel); });
     if (this.chosen >= 0) { c.strokeStyle = accent; c.lineWidth = 2.4; c.beginPath(); c.arc(p.X(x[this.chosen]), p.Y(y[this.chosen]), 7, 0, 7); c.stroke(); }
-    if (!n) { c.fillStyle = quiet; c.textAlign = "center"; c.fillText(head.done === false ? "the branches are being followed" : "no branch was found in this range", p.left + p.width / 2, p.top + p.height / 2); }
+    if (!n) wordsIn(c, p, head.done === false ? "the branches are being followed" : "no branch was found in this range");
     c.restore();
     const branches = new Set(Array.from(branch ?? [])).size;
     this.canvas.setAttribute("aria-label", `responses: peak of ${plain(head.quantity)} over ${plain(head.parameter)}, ${branches} branches, ${n} points, ${head.events.length} events; left and right go along a branch, e to the next event, Enter shows the orbit, t the table`);

@@ -14,7 +14,7 @@ const STEPS = 1000;
 const MOST_STARTS = 16;
 
 export class Values {
-  private fields = new Map<string, { text: HTMLInputElement; note: HTMLElement; range?: HTMLInputElement; parameter?: Parameter }>();
+  private fields = new Map<string, { text: HTMLInputElement; note: HTMLElement; spoken: string; range?: HTMLInputElement; parameter?: Parameter }>();
   private own: Record<string, { unit: string; factor: number }> = {};
 
   constructor(about: About, private events: ValueEvents) {
@@ -36,8 +36,8 @@ export class Values {
       const typed = text.value.trim(), bare = /^[-+−]?[\d.,]+(e[-+]?\d+)?$/i.test(typed);
       this.events.type(group, name, (bare && shown.unit ? `${typed} ${shown.unit}` : typed).replace("−", "-").replace("µ", "u"));
     };
-    text.onkeydown = e => { if (e.key === "Escape") { text.blur(); this.refuse(key, ""); e.stopPropagation(); } };
-    this.fields.set(key, { text, note });
+    text.onkeydown = e => { if (e.key === "Escape") { text.value = this.fields.get(key)!.spoken; this.refuse(key, ""); text.blur(); e.stopPropagation(); } };
+    this.fields.set(key, { text, note, spoken: "" });
     return box;
   }
 
@@ -58,10 +58,12 @@ export class Values {
 
   /** Show the values and the start of a view; a field that is being typed in stays. */
   show(values: Record<string, number>, start: Record<string, number>): void {
-    for (const [key, { text, range, parameter }] of this.fields) {
+    for (const [key, field] of this.fields) {
+      const { text, range, parameter } = field;
       const [group, name] = [key.slice(0, key.indexOf(".")), key.slice(key.indexOf(".") + 1)], value = (group === "values" ? values : start)[name], shown = this.own[key];
       const spoken = `${digits(value * shown.factor, range ? 6 : 5)} ${pretty(shown.unit)}`.trim();
-      if (document.activeElement !== text) text.value = spoken;
+      field.spoken = spoken;
+      if (document.activeElement !== text && !text.hasAttribute("aria-invalid")) text.value = spoken;
       if (!range || !parameter) continue;
       const p = parameter, u = p.scale === "log" ? Math.log(value / p.low) / Math.log(p.high / p.low) : (value - p.low) / (p.high - p.low);
       if (document.activeElement !== range || Math.abs(+range.value - STEPS * u) > 2) range.value = String(Math.round(STEPS * Math.min(Math.max(u, 0), 1)));
