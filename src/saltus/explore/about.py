@@ -9,7 +9,7 @@ import numpy as np
 
 from saltus.analysis.basins.labels import OPEN
 from saltus.explore.frames import Answer
-from saltus.explore.opening import STEPS, Opening
+from saltus.explore.opening import STEPS, Opening, choices
 from saltus.flow.methods import METHODS, Modal
 from saltus.kernels import status as st
 from saltus.models import describe
@@ -40,7 +40,7 @@ def about_answer(opening: Opening) -> Answer:
         {"name": name, "unit": unit, "kind": "state", "shown": shown_as(unit, largest.get(name))}
         for name, unit in zip(system.states, units, strict=True)
     ] + [
-        {"name": name, "unit": unit, "kind": "output", "shown": shown_as(unit)}
+        {"name": name, "unit": unit, "kind": "output", "shown": shown_as(unit, largest.get(name))}
         for name, unit in zip(system.outputs.names, system.outputs.units, strict=True)
     ]
     return {
@@ -65,7 +65,7 @@ def about_answer(opening: Opening) -> Answer:
         "axes": {name: list(ends) for name, ends in opening.axes.items()},
         "at": dict(opening.at),
         "size": list(opening.size),
-        "choices": list(system.states),
+        "choices": choices(system),
         "panels": {
             "history": list(first)[:4],
             "phase": list(opening.axes),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -12,6 +13,7 @@ import xarray as xr
 from saltus.analysis.attractors.aperiodic import SampledMotion
 from saltus.analysis.attractors.attractor_set import AttractorSet
 from saltus.analysis.attractors.attractors import attractors_dataset
+from saltus.analysis.attractors.followed import followed
 from saltus.analysis.attractors.limit_cycles import cycle_of
 from saltus.analysis.attractors.portrait import portraits
 from saltus.analysis.closed.capture import Neighbourhoods
@@ -26,6 +28,8 @@ from saltus.results.dataset.schema import kind_text
 Attractor: TypeAlias = ClosedMotion | SampledMotion
 #: Two orbits of neighbouring values are one response if they are nearer than this share of the box.
 NEIGHBOUR = 0.25
+#: An equilibrium nearer to zero than this share of the box is there.
+_AT_ZERO = 1e-9
 #: Most points of an attractor that the page draws.
 POINTS = 64
 #: Labels are signed bytes: most attractors that a map can show.
@@ -60,9 +64,22 @@ class Legend:
         self._before = (
             [] if before is None else list(zip(before._members, before._hues, strict=True))
         )
+        self._old = None if before is None else before.found
+        self._followed = False
 
     def __len__(self) -> int:
         return len(self._members)
+
+    def follow(self) -> bool:
+        """Close the orbits of the values shown before at these, by Newton's method; once. True if
+        there were any.
+        """
+        with self.lock:
+            if self._old and not self._followed:
+                self.grow(followed(self.map, self._old, self.scale)[0])
+                self._followed = len(self) > 0
+            self._old = None
+            return self._followed
 
     def grow(self, found: AttractorSet) -> bool:
         """Take what was found meanwhile; True if an attractor is new. What others found while that
@@ -112,7 +129,10 @@ class Legend:
         one = self._members[key] if key < len(self._members) else None
         if isinstance(one, SampledMotion) and one.kind == Kind.LIMIT_CYCLE.word:
             return cycle_of(self.map, one)[0]
-        return one if isinstance(one, ClosedMotion) else None
+        if not isinstance(one, ClosedMotion) or self.map.system.forced_at is not None:
+            return one if isinstance(one, ClosedMotion) else None
+        still = np.where(np.abs(one.points) > _AT_ZERO * self.scale, one.points, 0.0)
+        return replace(one, points=still)
 
     def dataset(self) -> xr.Dataset:
         """All of them, as :func:`saltus.attractors` returns them."""

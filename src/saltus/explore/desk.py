@@ -6,6 +6,7 @@ import threading
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ import xarray as xr
 
 from saltus.analysis.basins.pipeline import BasinPlan, basin_plan
 from saltus.analysis.inputs.starts import ensemble, range_of
+from saltus.analysis.motion.simulate import simulate
 from saltus.errors import ParameterError, unknown
 from saltus.explore import questions as asked
 from saltus.explore.about import about_answer, models_answer
@@ -23,7 +25,14 @@ from saltus.explore.motion import AskedRun, motion
 from saltus.explore.opening import Opening
 from saltus.explore.orbits import MOST_PERIODS, attractor_orbit, orbit_of, settle, tracked
 from saltus.explore.questions import QuestionError, about
-from saltus.explore.responses import KeptResponses, respond, response_orbit
+from saltus.explore.responses import (
+    VALUES,
+    KeptResponses,
+    respond,
+    response_orbit,
+    starts_from,
+)
+from saltus.explore.save import PARTS, View, saved, starts_of
 from saltus.flow.methods import METHODS, Method
 from saltus.system import System
 from saltus.units import from_si, to_si
@@ -60,6 +69,7 @@ class Desk:
             asked.Settle: self._settle,
             asked.OrbitQuestion: self._orbit,
             asked.Track: self._track,
+            asked.Save: self._save,
         }
 
     def answer(self, question: asked.Question, emit: Emit) -> None:
@@ -111,8 +121,8 @@ class Desk:
         system = self.opening.system
         if names is None:
             few = 2 if system.outputs.first else MOST_STATES
-            mine, others = set(self.opening.axes), system.states
-            states = [*self.opening.axes, *(name for name in others if name not in mine)][:few]
+            axes = [name for name in self.opening.axes if name in system.states]
+            states = list(dict.fromkeys([*axes, *system.states]))[:few]
             return (*states, *system.outputs.names[:MOST_OUTPUTS])
         known = (*system.states, *system.outputs.names)
         for name in names:
@@ -210,9 +220,78 @@ class Desk:
         quantity = self.quantities_of((question.quantity or first[0],))[0]
         look(plan, known, self.threads)
         respond(
-            known, method, question.parameter, limits, quantity, self.opening.axes,
+            known, method, question.parameter, limits, quantity, plan,
             self._responses, emit, self.threads,
         )  # fmt: skip
+
+    def _save(self, question: asked.Save) -> Answer:
+        shown = {}
+        for part in PARTS:
+            if part in question.view:
+                with about(f"view.{part}"):
+                    fields = question.view[part]
+                    if not isinstance(fields, Mapping):
+                        raise QuestionError("must hold the fields of the question.")
+                    shown[part] = asked.question_of(part, {**fields, "id": 0})
+        view, datasets = self.view_of(shown)
+        return saved(question, view, datasets)
+
+    def view_of(self, shown: Mapping[str, Any]) -> tuple[View, dict[str, Callable[[], xr.Dataset]]]:
+        """What questions show, in SI, and the result of each, computed when it is called."""
+        first = next(iter(shown.values()), None)
+        system = self.system_at({} if first is None else first.values)
+        name = next((one.method for one in shown.values() if getattr(one, "method", None)), None)
+        method, found = self.method_of(name), dict[str, Callable[[], xr.Dataset]]()
+        given: dict[str, Any] = {}
+        if (motion_ := shown.get("motion")) is not None:
+            start = self.start_of(system, motion_.start)
+            given["start"] = dict(zip(system.states, start, strict=True))
+            given["length"] = self._length(system, motion_)
+            found["motion"] = partial(
+                simulate, system, start, method=method, progress=False, **given["length"]
+            )
+        if (map_ := shown.get("map")) is not None:
+            plan = plan_of_map(map_, system, method)
+            given["axes"] = {
+                axis: (float(one[0]), float(one[-1]), len(one)) for axis, one in plan.axes.items()
+            }
+            given |= {"at": dict(plan.fixed), "periods": plan.periods}
+            found["map"] = partial(self._finished, plan)
+        if (responses := shown.get("responses")) is not None:
+            limits = range_of(system, responses.parameter, responses.range)
+            given["vary"] = responses.parameter, *limits
+            plan = self.plan_of(system, method)
+            starts = starts_from(self.legend_at(plan), plan)
+            given["starts"] = starts_of(system.states, starts)
+            given["values_tried"] = VALUES
+            found["responses"] = partial(self._answered, system, method, responses, limits)
+        return View(self.opening, system, method, **given), found
+
+    def _length(self, system: System, question: asked.MotionQuestion) -> dict[str, Any]:
+        """The length of a motion as sl.simulate takes it."""
+        if question.t_end is not None:
+            return {"t_end": to_si(question.t_end, "s", "t_end")}
+        if system.forced_at is None:
+            return {"t_end": question.periods * self.opening.turn}
+        return {"periods": question.periods}
+
+    def _finished(self, plan: BasinPlan) -> xr.Dataset:
+        kept = self.maps.get(plan)
+        if kept is None or kept.dataset is None:
+            raise QuestionError("the map isn't finished: let it come to its end first.", "parts")
+        return kept.dataset
+
+    def _answered(
+        self, system: System, method: Method, question: asked.ResponsesQuestion, limits: Any
+    ) -> xr.Dataset:
+        first = system.outputs.names if system.outputs.first else system.states
+        about_it = (tuple(system.values.values()), method, question.parameter, limits)
+        number = self._responses.number((*about_it, question.quantity or first[0]))
+        if number is None:
+            raise QuestionError(
+                "the responses aren't finished: let them come to their end.", "parts"
+            )
+        return self._responses.get(number)[1]
 
     def keep_responses(self, ds: xr.Dataset) -> None:
         """Keep branches that were computed before."""

@@ -159,7 +159,10 @@ def _held(lock: Any) -> Iterator[None]:
 
 
 def look(plan: BasinPlan, legend: Legend, threads: int | None) -> None:
-    """Look for attractors from a few starts, unless some were looked through."""
+    """Look for attractors from those of the values before, and from a few starts, unless some were
+    looked through.
+    """
+    legend.follow()
     if not legend.scouts:
         legend.grow(replace(plan, scouts=FEW_SCOUTS).scout(threads, known=legend.found))
         legend.scouts = FEW_SCOUTS
@@ -199,6 +202,9 @@ class _Growing:
             grow(plan, kept.found, self._take, result=kept.result, finest=finest, threads=threads)
             self._end({"coarse": True})
             return
+        if not legend.follow():  # else what was known there colours the first cells
+            look(plan, legend, threads)
+        self.take_over([])
         scouted = legend.scouts >= plan.scouts
         found, _ = grow_all(
             plan, self._take, kept.found, threads, result=kept.result, scouted=scouted

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -13,10 +14,13 @@ import numpy as np
 
 from saltus.analysis.closed.field_zeros import jacobian_of
 from saltus.analysis.dataset_parts import guards_over
+from saltus.analysis.inputs.starts import ensemble
 from saltus.analysis.motion.motion_arrays import motion_arrays
+from saltus.errors import SaltusError
 from saltus.explore.motion import REACHED
 from saltus.flow.methods import Method, default_method
 from saltus.system import System
+from saltus.system.structures.told import by_modes
 
 #: Periods of the motion from rest, and its samples in each, by which the box of the map is guessed.
 LOOKED, SAMPLES = 60, 32
@@ -58,6 +62,8 @@ class Opening:
         What a study asks for first, in the fields of questions.
     results : mapping of str to Dataset
         Results of a finished study, by the stems of their files.
+    system_table : mapping
+        The table [system] of a study.
     """
 
     system: System
@@ -71,6 +77,7 @@ class Opening:
     responses: Mapping[str, Any] | None = None
     view: Mapping[str, Any] = field(default_factory=dict)
     results: Mapping[str, Any] = field(default_factory=dict)
+    system_table: Mapping[str, Any] = field(default_factory=dict)
 
 
 def opening_of(system: System, method: Method | None = None, **known: Any) -> Opening:
@@ -99,8 +106,27 @@ def sliders(system: System) -> dict[str, tuple[float, float]]:
     return found
 
 
+def choices(system: System) -> list[str]:
+    """What the axes of a map may be: states, and of a structure by its modes first the sensors of
+    deflections and velocities, by which a start can be given.
+    """
+    found = []
+    for name in system.outputs.names if by_modes(system) else ():
+        with suppress(SaltusError):
+            ensemble(system, {name: 1.0}, None)
+            found.append(name)
+    return [*found, *system.states]
+
+
 def _plane(system: System) -> tuple[str, str]:
-    """The two states of the first map: a state and its rate where there is one."""
+    """The two axes of the first map: a state and its rate where there is one; of a structure by its
+    modes what a sensor of a deflection and one of a velocity show.
+    """
+    if by_modes(system):
+        units = dict(zip(system.outputs.names, system.outputs.units, strict=True))
+        shown = {units.get(name): name for name in reversed(choices(system))}
+        if "m" in shown and "m/s" in shown:
+            return shown["m"], shown["m/s"]
     for i, name in enumerate(system.states):
         for j, rate in enumerate(system.field):
             if i != j and rate.op == "state" and rate.payload == name:
@@ -112,29 +138,30 @@ def _box(system: System, method: Method) -> tuple[dict[str, tuple[float, float]]
     """A range of each state about zero that holds the motion from rest and the gaps; and the time
     of a turn [s].
     """
-    reach = np.zeros(len(system.states))
+    names = (*system.states, *system.outputs.names)
+    reach = np.zeros(len(names))
     about = guards_over(system, system.values, ())
     for name, place in zip(about.states, np.ravel(about.boundaries), strict=True):
         if name and np.isfinite(place):
-            i = system.states.index(name)
+            i = names.index(name)
             reach[i] = max(reach[i], abs(place))
     forced, start = system.forced_at is not None, np.zeros(len(system.states))
     if forced:
         turn = float(np.ravel(system.period(system.values))[0])
     else:
-        start = np.where(reach > 0, reach, 0.5)
+        start = np.where(reach > 0, reach, 0.5)[: len(start)]
         turn = _turn(system, start)
     length = {"periods": LOOKED} if forced else {"t_end": LOOKED * turn}
     count = SAMPLES if forced else LOOKED * SAMPLES
     seen = motion_arrays(
         system, start, method=method, samples=count, time_errors="local", threads=1, **length
     )
-    moved = np.abs(seen.values[0][:, : len(reach)]).max(axis=0)
+    moved = np.abs(seen.values[0]).max(axis=0)
     if int(seen.outcome.status[0]) in REACHED and moved.max() < FARTHEST * (reach.max() or 1.0):
         reach = np.maximum(reach, moved)  # else gaps alone say how wide
     reach = np.where(reach > 0, reach, reach.max() or 1.0)
     ends = [_round_up(WIDER * one) for one in reach]
-    return {name: (-end, end) for name, end in zip(system.states, ends, strict=True)}, turn
+    return {name: (-end, end) for name, end in zip(names, ends, strict=True)}, turn
 
 
 def _turn(system: System, start: np.ndarray) -> float:

@@ -11,7 +11,6 @@ import numpy as np
 from saltus.analysis.attractors.find_attractors import find_attractors
 from saltus.analysis.basins.labels import OPEN
 from saltus.analysis.basins.labels import settle as follow
-from saltus.analysis.closed.field_zeros import jacobian_of
 from saltus.analysis.closed.motions import ClosedMotion
 from saltus.analysis.closed.track import track
 from saltus.explore.attractors import Legend, pairs
@@ -41,15 +40,12 @@ def settled(known: Legend, start: Sequence[float]) -> tuple[int, int]:
     label, periods = int(followed.label[0]), int(followed.periods[0])
     if label != OPEN:
         return (int(keys[label]) if label >= 0 else label), periods
-    with known.lock:
-        wider, ids, _ = find_attractors(
-            known.map, followed.end, known.scale, MOST_PERIODS, known.found
-        )
-        known.grow(wider)
-        if ids[0] < 0:
-            return int(Kind.UNCONVERGED), -1
-        again = follow(known.map, begin, wider, MOST_PERIODS)
-        return int(known.keys()[ids[0]]), int(again.periods[0])
+    wider, ids, _ = find_attractors(known.map, followed.end, known.scale, MOST_PERIODS, found)
+    known.grow(wider)
+    if ids[0] < 0:
+        return int(Kind.UNCONVERGED), -1
+    again = follow(known.map, begin, wider, MOST_PERIODS)
+    return int(known.keys(wider)[ids[0]]), int(again.periods[0])
 
 
 def settle(
@@ -138,7 +134,7 @@ def tracked(
     about = {
         "name": kind_text("equilibrium" if rests else one.kind, n),
         "stable": now.stable,
-        "multipliers": pairs(_eigenvalues(there, one.points[0]) if rests else one.multipliers),
+        "multipliers": pairs(one.multipliers),
         "eigenvalues": rests,
         "seconds": one.time if cycle else n * turn or None,
     }
@@ -146,11 +142,3 @@ def tracked(
     head, arrays = orbit(run, quantities, about)
     words = [now.lost] if now.lost else []
     return {**head, "kind": "track", "lost": now.lost or None, "words": words}, arrays
-
-
-def _eigenvalues(system: System, state: np.ndarray) -> np.ndarray:
-    """Eigenvalues of the equations at an equilibrium [1/s], the largest real part first."""
-    values = {name: np.array([value]) for name, value in system.values.items()}
-    (matrix,) = jacobian_of(system, state[None], values)
-    found = np.linalg.eigvals(matrix)
-    return np.asarray(found[np.argsort(-found.real)])

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from saltus.analysis.basins.pipeline import BasinPlan
 from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.branch_table import table_of
 from saltus.analysis.branches.branches import follow_all, seeds_between
 from saltus.analysis.branches.plans import LONGEST_DOUBLED, POINTS, SWITCHES, plan_of
-from saltus.analysis.inputs.halton import halton
 from saltus.analysis.inputs.outputs import outputs_of
 from saltus.errors import unknown
 from saltus.explore.attractors import Legend, pairs
@@ -80,7 +80,7 @@ def respond(
     parameter: str,
     limits: tuple[float, float],
     quantity: str,
-    box: Mapping[str, tuple[float, float]],
+    plan: BasinPlan,
     kept: KeptResponses,
     emit: Emit,
     threads: int | None,
@@ -103,19 +103,25 @@ def respond(
         return
     told = _Told(emit, parameter, limits, quantity)
     method, done = exact_method(method, system, "responses"), list[Branch]()
-    plan = plan_of(
+    rules = plan_of(
         system, parameter, limits, method, threads, POINTS, LONGEST_DOUBLED, frozenset(SWITCHES)
     )
     wanted = outputs_of(system)
     if len(known):
         seeds = seeds_between(system, parameter, limits, known.dataset(), method=method)
-        follow_all(plan, system, parameter, *seeds, done, told.between(0.0, FIRST))
+        follow_all(rules, system, parameter, *seeds, done, told.between(0.0, FIRST))
         first = table_of(system, parameter, limits, done, wanted, method)
         emit(*_answer(known, first, kept.put(None, system, first), quantity, FIRST))
     seeds = seeds_between(
-        system, parameter, limits, _starts(known, box), at=VALUES, method=method, threads=threads
+        system,
+        parameter,
+        limits,
+        starts_from(known, plan),
+        at=VALUES,
+        method=method,
+        threads=threads,
     )
-    follow_all(plan, system, parameter, *seeds, done, told.between(FIRST, 1.0))
+    follow_all(rules, system, parameter, *seeds, done, told.between(FIRST, 1.0))
     if not done:
         raise QuestionError(f"nothing that repeats is known for this range of {parameter}.")
     every = table_of(system, parameter, limits, done, wanted, method)
@@ -187,13 +193,9 @@ class _Told:
         return told
 
 
-def _starts(known: Legend, box: Mapping[str, tuple[float, float]]) -> np.ndarray:
-    """Starts in a box, and a point of each known attractor, float64[k, D]."""
-    states = known.map.system.states
-    starts = np.zeros((STARTS, len(states)))
-    for column, (name, (low, high)) in zip(halton(STARTS, len(box)).T, box.items(), strict=True):
-        starts[:, states.index(name)] = low + (high - low) * column
-    return np.concatenate([starts, *(one.points[:1] for one in known.found.every)])
+def starts_from(known: Legend, plan: BasinPlan) -> np.ndarray:
+    """Starts in the box of a map, and a point of each known attractor, float64[k, D]."""
+    return np.concatenate([plan.drawn(STARTS), *(one.points[:1] for one in known.found.every)])
 
 
 def _answer(known: Legend, ds: xr.Dataset, number: int, quantity: str, share: float) -> Answer:

@@ -38,7 +38,7 @@ RATE = 200
 #: Most bytes that wait for a page that doesn't read; then its work waits, and refusals are dropped.
 WAITING = 2**24
 #: Kinds of question of which a newer one stops the older. Of others one is finished and one waits.
-STOPPED_BY_NEWER = ("map", "responses")
+STOPPED_BY_NEWER = ("map", "responses", "settle")
 #: Time between two looks whether waiting work was asked to stop [s].
 LOOK = 0.1
 
@@ -118,7 +118,7 @@ class _Lane:
 class Session:
     """One page at a desk.
 
-    A newer map or set of responses stops the older. Of every other kind of question one is finished
+    A newer map, set of responses or start that settles stops the older. Of every other kind of question one is finished
     and one waits, and a newer one takes the place of the one that waits: a drag has answers all the
     time, and the last one is that of its end.
 

@@ -81,6 +81,7 @@ def _opening(
     system = setting.base
     asked: dict[str, Any] = dict(study.questions())
     known: dict[str, Any] = {"results": results or {}, "responses": _responses(asked, system)}
+    known["system_table"] = study.system.model_dump(exclude_unset=True)
     view: dict[str, Any] = {}
     if (map_ := asked.get("basins")) is not None:
         axes = {name: _ends(system, name, axis) for name, axis in map_.axes.items()}

@@ -49,9 +49,13 @@ class AttractorSet:
     def __len__(self) -> int:
         return len(self.orbits) + len(self.sampled)
 
-    def add(self, map_: Map, orbit: ClosedMotion, scale: np.ndarray) -> None:
-        """One more periodic attractor, and where it captures."""
-        self.near = self.near.joined(neighbourhoods(map_, orbit, len(self.orbits), scale))
+    def add(
+        self, map_: Map, orbit: ClosedMotion, scale: np.ndarray, like: Neighbourhoods | None = None
+    ) -> None:
+        """One more periodic attractor, and where it captures; ``like`` as for
+        :func:`saltus.analysis.closed.capture.neighbourhoods`.
+        """
+        self.near = self.near.joined(neighbourhoods(map_, orbit, len(self.orbits), scale, like))
         self.orbits.append(orbit)
 
     def add_sampled(self, one: SampledMotion) -> None:

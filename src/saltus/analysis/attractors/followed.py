@@ -55,7 +55,7 @@ def followed(
         orbit = orbits[i]
         if not any(same(orbit, one, scale, SAME) for one in found.orbits):
             owners[id(orbit)] = i
-            found.add(map_, orbit, scale)
+            found.add(map_, orbit, scale, old.near.of(np.array([i])))
     if autonomous(map_.system):
         for i, one in enumerate(old.sampled, len(old.orbits)):
             if one.kind == Kind.LIMIT_CYCLE.word:

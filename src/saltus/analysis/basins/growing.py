@@ -163,7 +163,7 @@ def grow_all(
 ) -> tuple[AttractorSet, Settling]:
     """A whole map from nothing, or from some of its attractors, with a first picture early.
 
-    1. Attractors are looked for from a few starts.
+    1. Where none is known, attractors are looked for from a few starts.
     2. Coarse levels are labelled by what is known, while attractors are looked for from as many
        starts as :func:`saltus.basins` looks from.
     3. The other cells are labelled, and those that nothing had captured.
@@ -203,13 +203,10 @@ def grow_all(
     """
     if result is None:
         result = Settling.empty(plan.cells, len(plan.system.states))
-    none = AttractorSet(Neighbourhoods.none(len(plan.system.states)))
-    found = known or none
-    if not scouted:
-        found = replace(plan, scouts=min(FEW_SCOUTS, plan.scouts)).scout(threads, known=known)
-    ids = found.ids(known or none)
-    renumber(result.label, ids)
-    take(KnownAttractors(found, ids))
+    found = known or AttractorSet(Neighbourhoods.none(len(plan.system.states)))
+    if not found and not scouted:
+        found = replace(plan, scouts=min(FEW_SCOUTS, plan.scouts)).scout(threads)
+    take(KnownAttractors(found, np.arange(len(known or ()))))
     wider = found
 
     def look() -> None:

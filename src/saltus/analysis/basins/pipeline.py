@@ -162,13 +162,16 @@ class BasinPlan:
         known: AttractorSet | None = None,
     ) -> Iterator[AttractorSet]:
         """The same, more and more of them."""
-        unit = halton(self.scouts, 2)
+        start = self.drawn(self.scouts)
+        return scouted(self.map(threads), start, self.scale, self.periods, progress, known)
+
+    def drawn(self, count: int) -> np.ndarray:
+        """A fixed quasi-random sample of starts from the box, float64[count, D]."""
         low, high = (
             np.array([end(values) for values in self.axes.values()]) for end in (np.min, np.max)
         )
-        drawn = dict(zip(self.axes, (low + (high - low) * unit).T, strict=True))
-        start = self._states(drawn)
-        return scouted(self.map(threads), start, self.scale, self.periods, progress, known)
+        unit = halton(count, 2)
+        return self._states(dict(zip(self.axes, (low + (high - low) * unit).T, strict=True)))
 
     def sample(self, count: int) -> np.ndarray:
         """Indices of cells drawn at random, the same each time: int64[count at most], ascending."""

@@ -27,6 +27,8 @@ from saltus.flow.maps import Map
 #: what lies between two of them.
 RADII = 2.0 ** -np.arange(1.0, 21.0, 2.0)
 BETWEEN = (2.0**1.5, 2.0, 2.0**0.5)
+#: Radii tried first where those of the same orbit at other values are known, in units of these.
+LIKE = (2.0**0.25, 1.0, 2.0**-0.5, 0.5)
 #: Points on the outer shell for each dimension beyond the first; the inner shell has as many.
 DIRECTIONS = 16
 #: Every so-manyth point of the outer shell is followed first: a radius that is too large is nearly
@@ -106,6 +108,15 @@ class Neighbourhoods:
             self.centres[rows], self.weights[rows], np.searchsorted(kept, self.owners[rows])
         )
 
+    def radii(self, points: np.ndarray, norms: np.ndarray) -> np.ndarray:
+        """Radii r of the neighbourhoods nearest to points float64[k, D], in norms float64[k, D, D]
+        like those in which they were found, float64[k].
+        """
+        apart = np.linalg.norm(norms[:, None] @ (points[:, None] - self.centres)[..., None], axis=2)
+        nearest = apart[..., 0].argmin(axis=1)
+        one, other = (np.linalg.slogdet(each)[1] for each in (norms, self.weights[nearest]))
+        return np.asarray(np.exp((one - other) / points.shape[1]))
+
     @functools.cached_property
     def _extents(self) -> np.ndarray:
         """Half the extent of each along the first coordinate, float64[m]: sqrt of the corner of
@@ -116,7 +127,13 @@ class Neighbourhoods:
         )
 
 
-def neighbourhoods(map_: Map, orbit: ClosedMotion, owner: int, scale: np.ndarray) -> Neighbourhoods:
+def neighbourhoods(
+    map_: Map,
+    orbit: ClosedMotion,
+    owner: int,
+    scale: np.ndarray,
+    like: Neighbourhoods | None = None,
+) -> Neighbourhoods:
     """Verified neighbourhoods of the points of a stable periodic orbit.
 
     Parameters
@@ -129,14 +146,19 @@ def neighbourhoods(map_: Map, orbit: ClosedMotion, owner: int, scale: np.ndarray
         Its number.
     scale : float64[D]
         Range of each state.
+    like : Neighbourhoods, optional
+        Of the same orbit at other parameter values: radii like theirs are tried first, and larger
+        ones hardly.
     """
-    centres, weights = _verified(map_, orbit, scale)
+    centres, weights = _verified(map_, orbit, scale, like)
     return Neighbourhoods.none(len(scale)).joined(
         Neighbourhoods(centres, weights, np.full(len(centres), owner, np.int64))
     )
 
 
-def _verified(map_: Map, orbit: ClosedMotion, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _verified(
+    map_: Map, orbit: ClosedMotion, scale: np.ndarray, like: Neighbourhoods | None
+) -> tuple[np.ndarray, np.ndarray]:
     """Centres and weights about points of one orbit: of each the largest radius tried at which the
     returns were seen to contract.
 
@@ -177,12 +199,20 @@ def _verified(map_: Map, orbit: ClosedMotion, scale: np.ndarray) -> tuple[np.nda
             passed[passed] = contracts(radius[passed], which[passed], shell[~few])
         return passed
 
-    best = np.zeros(n)
+    best, largest = np.zeros(n), np.full(n, np.inf)
+    if like is not None and len(like.centres):
+        largest = like.radii(points, norms) / SAFETY
+        for factor in LIKE:
+            waiting = np.flatnonzero(best == 0.0)
+            if len(waiting):
+                tried = factor * largest[waiting]
+                passed = passes(tried, waiting)
+                best[waiting[passed]] = tried[passed]
     for radius in RADII:
-        waiting = np.flatnonzero(best == 0.0)
+        waiting = np.flatnonzero((best == 0.0) & (radius < LIKE[-1] * largest))
         if len(waiting):
             best[waiting[passes(np.full(len(waiting), radius), waiting)]] = radius
-    have = np.flatnonzero((best > 0.0) & (best < RADII[0]))
+    have = np.flatnonzero((best > 0.0) & (best < np.minimum(RADII[0], LIKE[-1] * largest)))
     for factor in BETWEEN:  # a little larger still?
         if len(have):
             better = passes(best[have] * factor, have)

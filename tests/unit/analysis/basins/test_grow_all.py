@@ -9,6 +9,7 @@ import saltus as sl
 from saltus.analysis.attractors.followed import followed
 from saltus.analysis.basins import growing
 from saltus.analysis.basins.growing import Grown, KnownAttractors, grow_all
+from saltus.analysis.basins.labels import Settling
 from saltus.analysis.basins.pipeline import basin_plan
 from saltus.analysis.closed.motions import same
 from saltus.flow.methods import ODE45
@@ -74,7 +75,7 @@ def test_old_attractors_are_followed_and_the_map_is_the_same():
         assert any(same(one, other, new.scale, 1e-6) for other in alone.orbits)
     page = Page(new)
     found, result = grow_all(new, page, known, threads=2)
-    assert page.told[0].ids.tolist() == [page.told[0].found.index(one) for one in known.every]
+    assert page.told[0].found is known
     whole = growing.grow(new, alone, lambda _: None, threads=2)
     ds, direct = (new.finish(*one, 2) for one in ((result, found), (whole, alone)))
     np.testing.assert_array_equal(ds["basin"].values, direct["basin"].values)
@@ -110,12 +111,23 @@ def test_a_limit_cycle_is_followed():
     assert before.every[came_from[len(known.orbits)]].kind == "limit_cycle"
 
 
-def test_a_stopped_map_ends_all_its_work():
+def test_a_stopped_map_ends_all_its_work_and_goes_on_where_it_stood(monkeypatch):
     stop, plan = sl.Stop(), plan_at(14.0, 256)
+    monkeypatch.setattr(growing, "POOL", 32)
+    result, found = Settling.empty(plan.cells, 2), plan.scout(1)
 
     def take(one):
-        if isinstance(one, Grown):
+        if isinstance(one, Grown) and one.known > 99:
             stop.set()
 
     with pytest.raises(sl.Interrupted), stop:
-        grow_all(plan, take, threads=2)
+        grow_all(plan, take, found, threads=2, result=result, scouted=True)
+    settled = result.label >= 0
+    assert 99 < settled.sum() < plan.cells
+    page = Page(plan)
+    grow_all(plan, page, found, threads=2, result=result, scouted=True)
+    assert page.told[0].found is found
+    assert (page.label[settled] == Kind.NOT_COMPUTED).all()  # they are known, and aren't told again
+    whole = growing.grow(plan, found, lambda _: None, threads=2)
+    basin = plan.finish(whole, found, 1)["basin"].values.ravel()
+    np.testing.assert_array_equal(result.label, basin)

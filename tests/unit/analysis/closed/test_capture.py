@@ -292,3 +292,22 @@ def test_settling_takes_the_first_visit():
     late = settle(map_, np.array([[1024.0], [2.0**20]]), found, 10)
     assert late.label.tolist() == [0, -5]  # -5: still open
     assert late.end[1, 0] == 1024.0
+
+
+@pytest.mark.parametrize("factor", [1e-3, 1.0, 1e3])
+def test_radii_of_other_values_are_tried_first_and_verified_too(factor):
+    """Whatever radius is handed over, a start inside comes to the orbit; one that was right is
+    found again, and one that was far too large is cut down.
+    """
+    scale = np.array([2.0])
+    old, new = cubic(1.35), cubic(1.4)
+    before, orbit = (orbit_near(map_, np.array([0.6]), 1, scale) for map_ in (old, new))
+    like = neighbourhoods(old, before, 0, scale)
+    given = Neighbourhoods(like.centres, like.weights / factor, like.owners)
+    near = neighbourhoods(new, orbit, 0, scale, given)
+    plain = neighbourhoods(new, orbit, 0, scale)
+    ratio = float((plain.weights / near.weights).item())
+    assert 0.45 * min(factor, 1.0) < ratio < 2.0 * min(factor, 1.0)
+    inside = orbit.points[0] + np.linspace(-1.0, 1.0, 41)[:, None] / near.weights[0]
+    ends = new.launch(inside, 400).advance(400)[:, -1]
+    np.testing.assert_allclose(ends, np.broadcast_to(orbit.points[0], ends.shape), atol=1e-12)
