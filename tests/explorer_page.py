@@ -33,7 +33,9 @@ class Seen:
         while not (value := self.page.evaluate(text, argument)):
             if time.monotonic() > end:
                 words = self.page.inner_text("body")
-                raise AssertionError(f"not in {self.patience:g} s: {text}\n{self.said}\n{words[:600]}")
+                raise AssertionError(
+                    f"not in {self.patience:g} s: {text}\n{self.said}\n{words[:600]}"
+                )
             time.sleep(0.01)
         return value
 
@@ -69,6 +71,4 @@ def opened(system, **options):
 
 def small(explorer, **view):
     """Address of a small map, so that tests are short."""
-    return f"{explorer.url}&view={quote(json.dumps({'size': 40, 'periods': 30, **view}))}"
-
-
+    return f"{explorer.url}&view={quote(json.dumps({'size': [40, 40], 'periods': 30, **view}))}"

@@ -19,7 +19,11 @@ def beam():
         forces=[sl.Force("tip", "5 N")],
         contacts=[sl.Contact("tip", stiffness="20 kN/m", gap="0.5 mm", name="stop")],
         frequency="20 Hz",
-        sensors={"tip": "tip", "tip speed": sl.velocity("tip"), "stop force": sl.contact_force("stop")},
+        sensors={
+            "tip": "tip",
+            "tip speed": sl.velocity("tip"),
+            "stop force": sl.contact_force("stop"),
+        },
         name="two masses",
     )
 

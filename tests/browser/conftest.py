@@ -64,7 +64,9 @@ def see(browser):
     """Opens a page in a window of its own: ``see(address, width=..., **options)``."""
     contexts, pages = [], []
 
-    def open_page(address, width=1400, height=900, rest=True, before=None, patience=PATIENCE, **options):
+    def open_page(
+        address, width=1400, height=900, rest=True, before=None, patience=PATIENCE, **options
+    ):
         context = browser.new_context(viewport={"width": width, "height": height}, **options)
         contexts.append(context)
         seen = Seen(context.new_page(), patience)

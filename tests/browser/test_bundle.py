@@ -38,7 +38,13 @@ def test_the_sources_make_the_same_bytes(web):
 
 
 def test_the_sources_are_strictly_typed(web):
-    run = subprocess.run(["node", "node_modules/typescript/bin/tsc", "-p", "."], cwd=web, capture_output=True, text=True, timeout=300)
+    run = subprocess.run(
+        ["node", "node_modules/typescript/bin/tsc", "-p", "."],
+        cwd=web,
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
     assert run.returncode == 0, run.stdout
 
 

@@ -33,11 +33,16 @@ def test_a_click_on_an_unstable_branch_shows_that_orbit(seen, rig):
     assert seen.get("explorer.view.values.frequency") == frequency
     assert "unstable" in seen.text("#orbit-what")
     assert "nothing is integrated on" in seen.text("#motion-what")
-    x, time = (np.array(seen.get(f"[...{what}]")) for what in ("explorer.motion.sample('x')", "explorer.motion.time"))
+    x, time = (
+        np.array(seen.get(f"[...{what}]"))
+        for what in ("explorer.motion.sample('x')", "explorer.motion.time")
+    )
     assert time[-1] - time[0] == pytest.approx(4 / frequency, rel=1e-9)
     each = (len(x) - 1) // 4
     assert np.array_equal(x[:each], x[each : 2 * each])  # repeated
-    assert np.abs(x).max() == pytest.approx(seen.get("i => explorer.responses.y[i]", shown), rel=1e-3)
+    assert np.abs(x).max() == pytest.approx(
+        seen.get("i => explorer.responses.y[i]", shown), rel=1e-3
+    )
     start = seen.get("explorer.motion.head.start")
     at = rig.with_values(frequency=frequency)
     once = sl.simulate(at, (start["x"], start["v"]), periods=1, samples=200, progress=False)
@@ -75,7 +80,9 @@ def test_branches_are_walked_by_keys_and_read_in_a_table(seen):
     assert seen.get("explorer.view.orbit") is not None
     seen.page.keyboard.press("t")
     rows = seen.page.locator("#points tbody tr")
-    points, events = seen.get("[explorer.responses.x.length, explorer.responses.head.events.length]")
+    points, events = seen.get(
+        "[explorer.responses.x.length, explorer.responses.head.events.length]"
+    )
     assert rows.count() == points + events
     rows.nth(events).locator("button").press("Enter")
     seen.rest()
@@ -89,7 +96,9 @@ def test_a_hue_of_the_legend_shows_its_orbit_alone(seen):
     assert seen.get("explorer.map.only") == key
     assert seen.get("explorer.motion.orbit")
     peak = seen.get("explorer.map.sheet.attractors[1].peak.x")
-    assert np.abs(seen.get("[...explorer.motion.sample('x')]")).max() == pytest.approx(peak, rel=1e-3)
+    assert np.abs(seen.get("[...explorer.motion.sample('x')]")).max() == pytest.approx(
+        peak, rel=1e-3
+    )
     seen.page.click(f"[data-key='{key}']")
     seen.rest()
     assert seen.get("explorer.map.only") is None
@@ -105,33 +114,47 @@ def test_hues_stay_with_orbits_when_values_change(seen):
     assert after == before
 
 
-def saved(seen, kind):
-    """The text of a file that the save sheet makes."""
+def saved(seen, kind, part=None):
+    """A file that the save sheet makes."""
     seen.page.click("#save-open")
     seen.page.check(f"input[name=kind][value={kind}]")
+    if part is not None:
+        for box in seen.page.locator("input[name=part]").all():
+            if box.get_attribute("value") == part:
+                box.check()
+            elif box.get_attribute("type") == "checkbox":
+                box.uncheck()
     with seen.page.expect_download() as download:
         seen.page.click("#save-download")
+    seen.keep(f"save-{kind}")
+    seen.page.keyboard.press("Escape")
     return download.value
 
 
-def test_the_save_sheet_gives_a_study_of_what_is_seen(seen):
+def test_what_is_seen_is_saved_and_is_what_saltus_says(seen, rig, tmp_path):
     seen.page.mouse.click(*seen.place("#map-canvas", 0.3e-3, 0.02))
     seen.rest()
-    download = saved(seen, "study")
-    seen.keep("save")
-    study = tomllib.loads(download.path().read_text())
-    assert download.suggested_filename.endswith(".toml")
-    assert "basins" in study
+    study = tomllib.loads(saved(seen, "study").path().read_text())
+    assert {"system", "simulate", "basins"} <= set(study)
+    saved(seen, "data", "map").save_as(tmp_path / "map.nc")
+    (a, b, c, d), n = seen.get("explorer.view.box"), seen.get("explorer.view.size[0]")
+    theirs = sl.basins(rig, x=(a, b, n), v=(c, d, n), progress=False)
+    assert np.array_equal(sl.load(tmp_path / "map.nc")["basin"].values, theirs["basin"].values)
+    script = saved(seen, "script").path().read_text()
+    compile(script, "script", "exec")
+    picture = saved(seen, "picture", "map")
+    assert picture.suggested_filename.endswith(".png")
+    assert picture.path().read_bytes()[:4] == b"\x89PNG"
 
 
 def test_a_structure_shows_its_sensors_and_a_free_system_its_cycle(see):
     with opened(systems.beam()) as explorer:
-        seen = see(small(explorer, size=16))
+        seen = see(small(explorer, size=[16, 16]))
         assert seen.get("explorer.view.history") == "tip"
         assert "history of tip" in seen.get("explorer.history.canvas.ariaLabel")
         seen.keep("structure")
     with opened(systems.van_der_pol) as explorer:
-        seen = see(small(explorer, size=16, start={"x": 1.0, "y": 0.0}))
+        seen = see(small(explorer, size=[16, 16], start={"x": 1.0, "y": 0.0}))
         assert "limit cycle" in seen.text("#legend")
         assert "limit cycle" in seen.text("#motion-what")
         assert seen.page.locator("#contacts-period").is_hidden()
@@ -142,7 +165,7 @@ def test_a_structure_shows_its_sensors_and_a_free_system_its_cycle(see):
 def test_the_pictures_of_the_documentation_can_be_taken(see):
     """SALTUS_PICTURES=docs/pictures takes them anew: explore.png, explore-orbit.png, ..."""
     with opened(sl.models.delangre("b", force="4 N", frequency="15 Hz")) as explorer:
-        view = {"size": 160, "periods": 60, "box": [-5e-3, 5e-3, -1, 1], "range": [12, 18]}
+        view = {"size": [160, 160], "periods": 60, "box": [-5e-3, 5e-3, -1, 1], "range": [12, 18]}
         view |= {"start": {"x": 1e-3, "v": 0.0}}
         seen = see(small(explorer, **view), patience=600.0)
         seen.keep("explore")

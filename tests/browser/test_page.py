@@ -51,7 +51,9 @@ def test_every_start_of_the_map_has_the_hue_of_its_attractor(seen, rig):
     shares = {one["key"]: one["fraction"] for one in seen.get("explorer.map.sheet.attractors")}
     for key, name in pairs:
         if key >= 0:
-            assert shares[key] == pytest.approx(float(theirs["attractor_fraction"].sel(attractor=name)))
+            assert shares[key] == pytest.approx(
+                float(theirs["attractor_fraction"].sel(attractor=name))
+            )
     seen.keep("rest")
 
 
@@ -59,7 +61,9 @@ def test_a_click_shows_the_motion_of_simulate(seen, rig):
     click(seen, 0.3e-3, 0.02)
     start = seen.get("explorer.view.start")
     box = np.array(seen.get("explorer.view.box")).reshape(2, 2)
-    assert (np.abs(np.subtract([start["x"], start["v"]], [0.3e-3, 0.02])) < 0.005 * np.ptp(box, axis=1)).all()
+    assert (
+        np.abs(np.subtract([start["x"], start["v"]], [0.3e-3, 0.02])) < 0.005 * np.ptp(box, axis=1)
+    ).all()
     run = sl.simulate(rig, (start["x"], start["v"]), periods=30, samples=200, progress=False)
     for name in ("x", "v"):
         assert np.array_equal(samples(seen, name), run[name].values.astype(np.float32))
@@ -83,7 +87,9 @@ def test_a_dragged_slider_is_followed_and_every_panel_says_of_which_values_it_is
         seen.page.mouse.move(x0 + (middle + 0.005 * i) * box["width"], y)
         seen.until("explorer.motion.head.values.frequency === explorer.view.values.frequency")
         assert not seen.get(WRONG)
-    seen.until("document.getElementById('map-of').textContent.includes('frequency 10 Hz') || explorer.map.sheet.covered")
+    seen.until(
+        "document.getElementById('map-of').textContent.includes('frequency 10 Hz') || explorer.map.sheet.covered"
+    )
     assert "of frequency" in seen.text("#motion-of")
     seen.keep("dragging")
     seen.page.mouse.up()
@@ -167,10 +173,12 @@ def test_an_address_opens_its_view_and_a_damaged_one_says_so(see, seen, explored
     for part in ("values", "start", "box", "size", "periods"):
         assert other.get(f"explorer.view.{part}") == seen.get(f"explorer.view.{part}")
     assert "token" not in other.page.url
-    damaged = see(f"{explored.url}&view=%7B%22size%22:40,%22values%22:%7B%22force%22:%22DROP%22%7D,%22box%22:[1,0,0,1]%7D")
+    damaged = see(
+        f"{explored.url}&view=%7B%22size%22:[40,30],%22values%22:%7B%22force%22:%22DROP%22%7D,%22box%22:[1,0,0,1]%7D"
+    )
     assert "damaged" in damaged.text("#says")
     assert damaged.get("explorer.view.values.force") == 1.5
-    assert damaged.get("explorer.view.size") == 40
+    assert damaged.get("explorer.view.size") == [40, 30]
 
 
 def test_methods_are_compared_in_the_history_and_in_words(seen, rig):
@@ -178,7 +186,14 @@ def test_methods_are_compared_in_the_history_and_in_words(seen, rig):
     seen.rest()
     other = seen.get("[...explorer.motion.arrays['other:x']]")
     start = seen.get("explorer.view.start")
-    run = sl.simulate(rig, (start["x"], start["v"]), periods=30, samples=200, method=sl.ODE45(1e-4, 1e-7), progress=False)
+    run = sl.simulate(
+        rig,
+        (start["x"], start["v"]),
+        periods=30,
+        samples=200,
+        method=sl.ODE45(1e-4, 1e-7),
+        progress=False,
+    )
     assert np.array_equal(np.float32(other), run["x"].values.astype(np.float32))
     assert "hey part by" in seen.text("#motion-what") or "hey agree" in seen.text("#motion-what")
     seen.keep("compare")

@@ -17,8 +17,8 @@ import { $, differing, marked, notes, only, options, type Says, type Status } fr
 
 /** drag: the finger is down; past: from the list of undo; shown: the motion and the curves are of it already; half: its values are still to come. */
 interface Change { drag?: boolean; past?: boolean; shown?: boolean; half?: boolean }
-/** Milliseconds: rest before a start is settled, before a map of another view, between coarse maps of a drag, before a view is kept for undo. */
-const SETTLE = 300, REST = 150, COARSE = 250, KEEP = 400;
+/** Milliseconds: rest before a start is settled, before a map of another view, between coarse maps of a drag, before a view is kept for undo, before the desk is told of it. */
+const SETTLE = 300, REST = 150, COARSE = 250, KEEP = 400, TELL = 1000;
 /** Milliseconds without an answer after which what follows a slider is dimmed. */
 const LATE = 250;
 const SIZES = [50, 100, 160, 250, 400, 700, 1000], ALL_POINTS = 1000;
@@ -86,11 +86,11 @@ export class Explorer {
     if (!hold) this.timers[name] = window.setTimeout(() => { delete this.timers[name]; what(); }, wait);
   }
   /** True if all that was asked is answered, and nothing is going to be. */
-  get rests(): boolean { return this.link.quiet && Object.keys(this.timers).length === 0 && this.motion !== null; }
+  get rests(): boolean { return this.link.quiet && Object.keys(this.timers).every(name => name === "told") && this.motion !== null; }
   private keep(): void {
     const address = toAddress(this.view, this.first);
     if (address !== this.kept) { this.kept = address; this.undo.push(this.view, address); } else this.undo.replace(this.view, address);
-    this.link.tell("show", { view: this.shownView() });
+    this.later("told", TELL, () => this.link.tell("show", { view: this.shownView() }));
   }
   private address(): string { return `${location.origin}/#token=${this.token()}&view=${toAddress(this.view, this.first)}`; }
   token: () => string = () => "";
@@ -131,7 +131,7 @@ export class Explorer {
   }
   private mapFields(): Question {
     const v = this.view, [a, b, c, d] = v.box, at = Object.fromEntries(Object.entries(v.start).filter(([name]) => !v.axes.includes(name)));
-    return { axes: { [v.axes[0]]: [a, b], [v.axes[1]]: [c, d] }, size: [v.size, v.size], values: this.changed(), at, method: v.method };
+    return { axes: { [v.axes[0]]: [a, b], [v.axes[1]]: [c, d] }, size: v.size, values: this.changed(), at, method: v.method, ...this.about.view.map };
   }
   private responseFields(): Question { const v = this.view; return { values: this.changed(), parameter: v.over, range: v.range, quantity: v.quantity }; }
   shownView(): Question { return { motion: this.motionFields(), map: this.mapFields(), ...(this.view.over ? { responses: this.responseFields() } : {}) }; }
@@ -171,7 +171,7 @@ export class Explorer {
     const fields = this.mapFields(), key = this.mapKey(fields), v = this.view, { axes, size, values, ...plane } = fields;
     let sheet = this.map.sheets.get(key);
     if (this.map.sheet && this.map.sheet !== sheet && !this.map.sheet.known) this.map.sheets.drop(this.map.sheet);
-    if (!sheet) this.map.sheets.add((sheet = new Sheet(key, { ...v.values }, JSON.stringify([v.axes, plane]), [...v.box], v.size, v.size)));
+    if (!sheet) this.map.sheets.add((sheet = new Sheet(key, { ...v.values }, JSON.stringify([v.axes, plane]), [...v.box], ...v.size)));
     this.map.sheet = sheet; this.map.draw(); this.legend();
     if (sheet.done) { this.link.tell("stop", { of: "map" }); this.status.say(this.mapText()); return; }
     this.begun = performance.now(); this.status.say(this.mapText());
@@ -204,7 +204,8 @@ export class Explorer {
       options($(id), about.choices.map(name => [name, plain(name)]), this.view.axes[i]); $(id).hidden = about.choices.length < 3;
       on(id, name => { const axes = [...this.view.axes] as [string, string]; if (axes[1 - i] === name) axes[1 - i] = axes[i]; axes[i] = name; this.whole = this.wholeOf(axes); this.go({ axes, box: [...this.whole] }); });
     }
-    options($("map-size"), [...new Set([...SIZES, about.size[0], this.view.size])].sort((a, b) => a - b).map(n => [String(n), `${n} × ${n}`]), String(this.view.size)); on("map-size", n => this.go({ size: +n }));
+    const sizes = new Map([...SIZES.map(n => [n, n]), about.size, this.view.size].sort((p, q) => p[0] * p[1] - q[0] * q[1]).map(([n, m]) => [`${n},${m}`, `${n} × ${m}`]));
+    options($("map-size"), [...sizes], String(this.view.size)); on("map-size", n => this.go({ size: n.split(",").map(Number) as [number, number] }));
     for (const id of ["history-of", "phase-first", "phase-second", "quantity"]) options($(id), names, "");
     $("history-of").hidden = names.length < 2; on("history-of", history => this.go({ history }));
     on("phase-first", name => this.go({ phase: [name, this.view.phase[1]] })); on("phase-second", name => this.go({ phase: [this.view.phase[0], name] }));

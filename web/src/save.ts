@@ -6,7 +6,7 @@ const KINDS: [string, string, string[]][] = [
   ["study", "study: runs again with saltus run", ["toml"]], ["script", "script: the same as calls of saltus", ["py"]],
   ["picture", "picture: drawn by sl.plot", ["png", "svg", "pdf"]], ["data", "data: numbers with their units", ["nc", "csv", "mat"]],
 ];
-const PARTS: [string, string][] = [["motion", "motion"], ["contacts", "contacts"], ["map", "map"], ["responses", "responses"]];
+const PARTS: [string, string][] = [["motion", "motion, contacts"], ["map", "map"], ["responses", "responses"]];
 
 export class SaveSheet {
   private note = element("p", "", "note"); private words = element("p", "", "under");

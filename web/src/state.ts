@@ -6,7 +6,7 @@ import type { Question } from "./link";
 export type Box = [number, number, number, number];                       // first axis from, to, second axis from, to [SI]
 export interface View {
   values: Record<string, number>; start: Record<string, number>;
-  axes: [string, string]; box: Box; size: number; method: string; against: string; periods: number;
+  axes: [string, string]; box: Box; size: [number, number]; method: string; against: string; periods: number;
   over: string; range: Range; quantity: string;                          // responses
   history: string; phase: [string, string];
   orbit: Question | null;                                                 // an orbit in place of the motion from the start
@@ -27,7 +27,7 @@ export function firstView(about: About): View {
   const values = Object.fromEntries(about.parameters.map(p => [p.name, p.value]));
   const start = { ...Object.fromEntries(states(about).map(name => [name, 0])), ...about.at, ...about.start };
   const view: View = {
-    values, start, axes: [a, b], box: [...about.axes[a], ...about.axes[b]], size: about.size[0], method: about.method, against: "", periods: 60,
+    values, start, axes: [a, b], box: [...about.axes[a], ...about.axes[b]], size: [...about.size], method: about.method, against: "", periods: 60,
     over: response?.parameter ?? "", range: response?.range ?? [0, 1], quantity: response?.quantity ?? about.panels.history[0],
     history: about.panels.history[0], phase: firstPhase(about), orbit: null,
   };
@@ -59,7 +59,7 @@ export function fromAddress(text: string, first: View, about: About): { view: Vi
   const record = (known: object) => (v: unknown) =>
     v !== null && typeof v === "object" && Object.entries(v).every(([k, x]) => Object.hasOwn(known, k) && finite(x));
   const checks: Record<string, (v: unknown) => boolean> = {
-    values: record(first.values), start: record(first.start), axes: pair(about.choices), size: v => finite(v) && v >= 16 && v <= 4000 && v % 1 === 0,
+    values: record(first.values), start: record(first.start), axes: pair(about.choices), size: v => numbers(2)(v) && (v as number[]).every(n => n >= 16 && n <= 4000 && n % 1 === 0),
     box: v => numbers(4)(v) && (v as Box)[0] < (v as Box)[1] && (v as Box)[2] < (v as Box)[3],
     method: oneOf(about.methods), against: oneOf(["", ...about.methods]), periods: v => finite(v) && v >= 1 && v <= 1e6 && v % 1 === 0,
     over: oneOf(about.parameters.map(p => p.name)), range: v => numbers(2)(v) && (v as Range)[0] < (v as Range)[1],
