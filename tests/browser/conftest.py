@@ -10,9 +10,9 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from explorer_page import PATIENCE, Seen, opened, small
 
 import saltus as sl
+from explorer_page import PATIENCE, Seen, opened, small
 
 CHROMIUM = os.environ.get("SALTUS_CHROMIUM") or next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None

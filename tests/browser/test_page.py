@@ -12,11 +12,13 @@ from saltus.plot.palette import hues, shades
 COLOURS = """starts => {
   const map = explorer.map, at = document.getElementById('map-canvas');
   const { data } = at.getContext('2d').getImageData(0, 0, at.width, at.height);
-  const marks = [map.at, ...map.sheet.attractors.flatMap(one => one.points)].map(p => map.pixel(p));
+  const points = map.sheet.attractors.flatMap(one => one.points);
+  const marks = [map.at, ...points].map(p => map.pixel(p));
   return starts.map(start => {
     const [x, y] = map.pixel(start);
     if (marks.some(([u, v]) => Math.hypot(u - x, v - y) < 16)) return null;
-    const first = 4 * (Math.floor(y * devicePixelRatio) * at.width + Math.floor(x * devicePixelRatio));
+    const [column, row] = [x, y].map(v => Math.floor(v * devicePixelRatio));
+    const first = 4 * (row * at.width + column);
     return [...data.slice(first, first + 3)];
   }) }"""
 #: Panels whose words of values don't agree with their numbers.
@@ -88,7 +90,8 @@ def test_a_dragged_slider_is_followed_and_every_panel_says_of_which_values_it_is
         seen.until("explorer.motion.head.values.frequency === explorer.view.values.frequency")
         assert not seen.get(WRONG)
     seen.until(
-        "document.getElementById('map-of').textContent.includes('frequency 10 Hz') || explorer.map.sheet.covered"
+        """explorer.map.sheet.covered
+        || document.getElementById('map-of').textContent.includes('frequency 10 Hz')"""
     )
     assert "of frequency" in seen.text("#motion-of")
     seen.keep("dragging")
