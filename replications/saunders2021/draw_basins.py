@@ -19,6 +19,7 @@ from matplotlib.patches import Patch
 from saltus.analysis.basins.compare import compare
 from saltus.plot import cells
 from saltus.plot.palette import hues
+from saltus.plot.unsettled import UNSETTLED
 from saltus.replication.claims import Data
 from saltus.results.dataset.schema import kind_text
 
@@ -136,7 +137,7 @@ def _legend(ax: Axes, row: _Row, exact: xr.Dataset) -> None:
         handles.append(Patch(fc=color, label=f"{entry.text}\n{shares}"))
     lost = [int((cells < 0).sum()) for cells in row.cells.values()]
     if any(lost):
-        handles.append(Patch(fc=cells.UNSETTLED[-2].color, label="not settled"))
+        handles.append(Patch(fc=UNSETTLED[-2].color, label="not settled"))
     title = f"located | not located | exact\nof {exact['basin'].size} starts"
     legend = ax.legend(
         handles=handles,

@@ -11,7 +11,6 @@ from saltus.analysis.branches.backbone import backbone as backbone
 from saltus.analysis.branches.bifurcation_curve import bifurcation_curve as bifurcation_curve
 from saltus.analysis.branches.branches import branches as branches
 from saltus.analysis.closed.equilibria import equilibria as equilibria
-from saltus.explore import explore as explore
 from saltus.analysis.closed.periodic_orbits import periodic_orbits as periodic_orbits
 from saltus.analysis.lyapunov.lyapunov import lyapunov as lyapunov
 from saltus.analysis.methods.compare_methods import compare_methods as compare_methods
@@ -43,6 +42,7 @@ from saltus.contact import lankarani_nikravesh as lankarani_nikravesh
 from saltus.contact import play as play
 from saltus.contact import slider as slider
 from saltus.errors import SaltusError as SaltusError
+from saltus.explore import explore as explore
 from saltus.flow import ODE23 as ODE23
 from saltus.flow import ODE45 as ODE45
 from saltus.flow import ODE113 as ODE113

@@ -11,6 +11,7 @@ import pytest
 
 import saltus as sl
 from saltus.analysis.attractors.find_attractors import find_attractors
+from saltus.analysis.basins import labels
 from saltus.analysis.basins import pipeline as plans
 from saltus.analysis.basins.labels import settle
 from saltus.analysis.basins.pipeline import basin_plan
@@ -246,7 +247,7 @@ def test_threads_change_nothing(coarse, few_scouts, threads):
 
 @pytest.mark.parametrize("size", [47, 250])
 def test_the_size_of_chunks_changes_nothing(coarse, few_scouts, monkeypatch, size):
-    monkeypatch.setattr(plans, "CHUNK", size)
+    monkeypatch.setattr(labels, "PIECE", size)
     same_to_the_bit(coarse, sl.basins(B16, threads=2, **box(20)))
 
 
@@ -258,7 +259,8 @@ def test_chunks_of_a_chaotic_map_change_nothing(monkeypatch):
     axes = dict(x=(-3, 3, 6), v=(-6, 6, 6), periods=256, progress=False)
     whole = sl.basins(system, **axes)
     assert whole.attractor_type.values.tolist() == ["periodic", "chaotic"]
-    monkeypatch.setattr(plans, "CHUNK", 11)
+    monkeypatch.setattr(labels, "PIECE", 11)
+    monkeypatch.setattr(labels, "FEWEST", 11)
     same_to_the_bit(whole, sl.basins(system, threads=2, **axes))
 
 

@@ -11,9 +11,11 @@ from scipy.linalg import expm
 import saltus as sl
 from saltus.analysis.branches.parametric_map import ParametricStroboscope
 from saltus.analysis.branches.shooting import PeriodicOrbits
+from saltus.analysis.closed.field_zeros import field_of
 from saltus.analysis.closed.measures import measure
 from saltus.analysis.motion import contact_peaks
 from saltus.flow.maps import Stroboscope
+from saltus.flow.modal_motions import modal_rates
 
 
 def chain(modes, *, damping=None, side="both", gap=0.01):
@@ -208,3 +210,32 @@ def test_random_structures(seed):
             getattr(other, name), getattr(one, name), atol=1e-10 * np.abs(one.maximum).max()
         )
     assert other.itinerary == one.itinerary
+
+
+def test_the_largest_exponents_alone_are_those_of_all():
+    """Three directions are carried in place of twelve, from other ones at the start."""
+    beam = chain(6, gap=0.02).with_values(first_stiffness=2e4, last_stiffness=2e4)
+    kw = {"periods": 100, "transient": 150, "progress": False}
+    every, some = (sl.lyapunov(beam, exponents=most, **kw) for most in (None, 3))
+    assert every.kind.item() == some.kind.item() == "chaotic"
+    apart = np.abs(some.lyapunov_exponent.values - every.lyapunov_exponent.values[:, :3])
+    assert (apart < 1e-3 * some.lyapunov_error.values).all()
+    np.testing.assert_array_equal(some.mean_divergence, every.mean_divergence)
+    assert some.sizes["flow_exponent"] == 3
+    assert "exponent_sum" not in some
+
+
+def test_the_largest_exponents_of_an_orbit_and_by_other_methods():
+    quiet = chain(2, gap=10.0)
+    kw = {"periods": 64, "transient": 10, "progress": False}
+    every, some = (sl.lyapunov(quiet, exponents=most, flow=sl.Taylor(), **kw) for most in (None, 2))
+    assert some.kind.item() == "periodic"
+    np.testing.assert_array_equal(some.lyapunov_exponent, every.lyapunov_exponent[:, :2])
+
+
+def test_rates_by_modes_are_those_of_the_equations():
+    system = chain(5)
+    start = starts(system, 6, 2)
+    map_ = Stroboscope(system, sl.Modal()).rows(np.zeros(6, np.int64))
+    rates = field_of(system, start, map_.values)
+    np.testing.assert_allclose(modal_rates(map_, start), rates, rtol=0, atol=1e-12 * rates.max())

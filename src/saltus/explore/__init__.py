@@ -94,6 +94,15 @@ def explore(
     ------
     ParameterError
         If an argument can't be used, or the packages of the extra ``explore`` aren't there.
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> rig = sl.models.delangre("b", force="4 N", frequency="15 Hz")
+    >>> page = sl.explore(rig, browser=False)
+    >>> page.url.startswith("http://127.0.0.1:")
+    True
+    >>> page.close()
     """
     from saltus.analysis.inputs.starts import check_system
     from saltus.explore.desk import Desk

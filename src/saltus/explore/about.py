@@ -14,18 +14,17 @@ from saltus.flow.methods import METHODS, Modal
 from saltus.kernels import status as st
 from saltus.models import describe
 from saltus.plot.palette import hues, shades
+from saltus.plot.unsettled import UNSETTLED, Unsettled
 from saltus.results.dataset.kinds import Kind
 from saltus.system import System, gap_units
 from saltus.units import from_si, to_si
 
 #: Hues, and shades of each, that a page is sent.
 HUES, SHADES = 24, 13
-#: Words and colours of codes, as in sl.plot.basins; an own one of what is under way.
-CODES: Mapping[int, tuple[str, str]] = {
-    Kind.ESCAPED: ("escaped", "#BDBDBD"),
-    Kind.UNCONVERGED: ("not settled", "#1E1E1E"),
-    Kind.FAILED: ("failed", "#3C3C3C"),
-    OPEN: ("not settled yet", "#8C8C8C"),
+#: Codes of starts that no attractor holds, and their words; an own one of what is under way.
+CODES: Mapping[int, Unsettled] = {
+    **{code: UNSETTLED[code] for code in (Kind.ESCAPED, Kind.UNCONVERGED, Kind.FAILED)},
+    OPEN: Unsettled("not settled yet", "#8C8C8C"),
 }
 
 
@@ -33,7 +32,8 @@ def about_answer(opening: Opening) -> Answer:
     """The system of an explorer, and what is to be shown first."""
     system = opening.system
     colors = hues(HUES)
-    largest = {name: max(map(abs, ends)) for name, ends in opening.axes.items()}
+    about_ranges = {**opening.box, **opening.axes}
+    largest = {name: max(map(abs, ends)) for name, ends in about_ranges.items()}
     first = system.outputs.names if system.outputs.first else tuple(opening.axes)
     units = [system.units[name] for name in system.states]
     quantities = [
@@ -66,6 +66,9 @@ def about_answer(opening: Opening) -> Answer:
         "at": dict(opening.at),
         "size": list(opening.size),
         "choices": choices(system),
+        "ranges": {
+            name: list(ends) for name, ends in about_ranges.items() if name in choices(system)
+        },
         "panels": {
             "history": list(first)[:4],
             "phase": list(opening.axes),
@@ -79,9 +82,9 @@ def about_answer(opening: Opening) -> Answer:
         ],
         "hues": _bytes(colors),
         "hue_shades": _bytes(shades(colors, SHADES)),
-        "codes": {str(int(code)): words for code, (words, _) in CODES.items()},
+        "codes": {str(int(code)): one.label for code, one in CODES.items()},
         "code_colors": {
-            str(int(code)): list(bytes.fromhex(color[1:])) for code, (_, color) in CODES.items()
+            str(int(code)): list(bytes.fromhex(one.color[1:])) for code, one in CODES.items()
         },
         "contact_kinds": [st.CONTACT_KIND[i] for i in range(len(st.CONTACT_KIND))],
         "words": [],

@@ -13,8 +13,7 @@ import xarray as xr
 from saltus.analysis.attractors.aperiodic import SampledMotion
 from saltus.analysis.attractors.attractor_set import AttractorSet
 from saltus.analysis.attractors.attractors import attractors_dataset
-from saltus.analysis.attractors.followed import followed
-from saltus.analysis.attractors.limit_cycles import cycle_of
+from saltus.analysis.attractors.followed import cycle_on, followed
 from saltus.analysis.attractors.portrait import portraits
 from saltus.analysis.closed.capture import Neighbourhoods
 from saltus.analysis.closed.motions import ClosedMotion, orbit_distance, same
@@ -51,9 +50,17 @@ class Legend:
         Range of each state.
     before : Legend, optional
         Those of the values shown before.
+    branches : sequence of (ClosedMotion, int), optional
+        Orbits at these values that lie on branches with a hue.
     """
 
-    def __init__(self, map_: Stroboscope, scale: np.ndarray, before: Legend | None = None) -> None:
+    def __init__(
+        self,
+        map_: Stroboscope,
+        scale: np.ndarray,
+        before: Legend | None = None,
+        branches: Sequence[tuple[ClosedMotion, int]] = (),
+    ) -> None:
         self.map, self.scale = map_, scale
         self.found = AttractorSet(Neighbourhoods.none(len(map_.states)))
         self.scouts = 0  # starts that were looked through for them
@@ -64,6 +71,7 @@ class Legend:
         self._before = (
             [] if before is None else list(zip(before._members, before._hues, strict=True))
         )
+        self._before += branches
         self._old = None if before is None else before.found
         self._followed = False
 
@@ -128,7 +136,7 @@ class Legend:
         """
         one = self._members[key] if key < len(self._members) else None
         if isinstance(one, SampledMotion) and one.kind == Kind.LIMIT_CYCLE.word:
-            return cycle_of(self.map, one)[0]
+            return cycle_on(self.map, one)
         if not isinstance(one, ClosedMotion) or self.map.system.forced_at is not None:
             return one if isinstance(one, ClosedMotion) else None
         still = np.where(np.abs(one.points) > _AT_ZERO * self.scale, one.points, 0.0)

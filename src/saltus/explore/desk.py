@@ -323,7 +323,9 @@ class Desk:
             if key not in self._known:
                 before = next(reversed(self._known.values()), None)
                 scale = self.plan_of(plan.system, plan.method).scale
-                keep(self._known, key, Legend(plan.map(1), scale, before), KEPT_VALUES)
+                branches = self._responses.orbits_at(plan.system)
+                legend = Legend(plan.map(1), scale, before, branches)
+                keep(self._known, key, legend, KEPT_VALUES)
             self._known.move_to_end(key)
             return self._known[key]
 

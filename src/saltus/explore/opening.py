@@ -64,6 +64,8 @@ class Opening:
         Results of a finished study, by the stems of their files.
     system_table : mapping
         The table [system] of a study.
+    box : mapping of str to (float, float)
+        A range of each state and output that holds the motion from rest [SI].
     """
 
     system: System
@@ -78,6 +80,7 @@ class Opening:
     view: Mapping[str, Any] = field(default_factory=dict)
     results: Mapping[str, Any] = field(default_factory=dict)
     system_table: Mapping[str, Any] = field(default_factory=dict)
+    box: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
 
 def opening_of(system: System, method: Method | None = None, **known: Any) -> Opening:
@@ -87,7 +90,7 @@ def opening_of(system: System, method: Method | None = None, **known: Any) -> Op
     method = method or default_method(system)
     box, turn = _box(system, method)
     first = {name: box[name] for name in _plane(system)}
-    guess = Opening(system, method, first, ranges=sliders(system), turn=turn)
+    guess = Opening(system, method, first, ranges=sliders(system), turn=turn, box=box)
     given = {name: one for name, one in known.items() if one is not None}
     ranges = {**guess.ranges, **given.pop("ranges", {})}
     found = replace(guess, ranges=ranges, **given)

@@ -118,9 +118,9 @@ class _Lane:
 class Session:
     """One page at a desk.
 
-    A newer map, set of responses or start that settles stops the older. Of every other kind of question one is finished
-    and one waits, and a newer one takes the place of the one that waits: a drag has answers all the
-    time, and the last one is that of its end.
+    A newer map, set of responses or start that settles stops the older. Of every other kind of
+    question one is finished and one waits, and a newer one takes the place of the one that waits: a
+    drag has answers all the time, and the last one is that of its end.
 
     Parameters
     ----------

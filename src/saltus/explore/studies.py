@@ -23,6 +23,7 @@ from saltus.explore.opening import Opening, opening_of
 from saltus.kernels import status as st
 from saltus.results import load
 from saltus.results.dataset import schema
+from saltus.study.ask import questions_of
 from saltus.study.read import read
 from saltus.study.run.copies import copy_of, inputs_of
 from saltus.study.setting.inputs import Inputs
@@ -63,12 +64,11 @@ def desk_of_results(folder: Path, own: System | None = None, threads: int | None
         If the folder isn't the output of a study, or a result in it is damaged.
     """
     study, text = read(copy_of(folder))
-    results = {
-        stem: load(folder / f"{stem}.nc")
-        for _, stem in study.answers()
-        if (folder / f"{stem}.nc").is_file()
-    }
-    opening = _opening(study, setting_of(study, own, inputs_of(folder, text)), results)
+    inputs = inputs_of(folder, text)
+    stems = [stem for one in questions_of(study, own, inputs) for stem in one.stems]
+    files = {stem: folder / f"{stem}.nc" for stem in stems}
+    results = {stem: load(file) for stem, file in files.items() if file.is_file()}
+    opening = _opening(study, setting_of(study, own, inputs), results)
     desk = Desk(opening, threads)
     for ds in results.values():
         _give(desk, ds)

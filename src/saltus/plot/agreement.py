@@ -19,6 +19,7 @@ from saltus.plot.axes import Panels
 from saltus.plot.palette import hues
 from saltus.plot.picture import picture
 from saltus.plot.style import OKABE_ITO, style
+from saltus.plot.unsettled import UNSETTLED
 from saltus.results.dataset.schema import kind_text
 
 #: Colour and name of each value of the agreement; differences are the news.
@@ -94,9 +95,7 @@ def _three(panels: np.ndarray, ds: xr.Dataset, sides: cells.Sides) -> np.ndarray
     handles = (
         [Patch(fc=colors[key], label=_name(ds, key)) for key in ids] if len(ids) <= _NAMED else []
     )
-    handles += [
-        Patch(fc=cells.UNSETTLED[code].color, label=cells.UNSETTLED[code].label) for code in codes
-    ]
+    handles += [Patch(fc=UNSETTLED[code].color, label=UNSETTLED[code].label) for code in codes]
     if handles:
         _below(panels[0], handles, columns=2)
     return panels
@@ -137,7 +136,7 @@ def _occurring(ds: xr.Dataset) -> tuple[list[int], list[int]]:
         [np.unique(np.nan_to_num(ds[name].values, nan=-4)) for name in ("basin_a", "basin_b")]
     )
     found = np.unique(both).astype(np.int64).tolist()
-    return [key for key in found if key >= 0], [code for code in cells.UNSETTLED if code in found]
+    return [key for key in found if key >= 0], [code for code in UNSETTLED if code in found]
 
 
 def _name(ds: xr.Dataset, key: int) -> str:

@@ -22,6 +22,7 @@ from saltus.plot import cells
 from saltus.plot.palette import shades
 from saltus.plot.picture import check, picture
 from saltus.plot.style import QUIET
+from saltus.plot.unsettled import UNSETTLED
 from saltus.units import from_si
 
 #: Share of the settled starts that may be lighter or darker than the ends of the scale. Without it,
@@ -340,7 +341,7 @@ def _legend(
             )
         )
         texts.append(f"shade: {'periods' if every is None else 's'} to settle")
-    for code, unsettled in cells.UNSETTLED.items():
+    for code, unsettled in UNSETTLED.items():
         if code in shares:
             handles.append(_Ramp(np.array([to_rgb(unsettled.color)])))
             texts.append(f"{unsettled.label}, {cells.share_text(shares[code])}")

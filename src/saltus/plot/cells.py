@@ -18,27 +18,11 @@ from saltus.errors import ParameterError, shown
 from saltus.plot.palette import hues, shades
 from saltus.plot.response_points import is_log, parameter_scale
 from saltus.plot.style import Scale, display_scale
+from saltus.plot.unsettled import UNSETTLED
 from saltus.results.dataset.kinds import Kind
 from saltus.results.dataset.schema import kind_text
 from saltus.units import from_si
 
-
-@dataclass(frozen=True)
-class Unsettled:
-    """A code for starts that lead to no attractor: its name in a legend and its colour."""
-
-    label: str
-    color: str
-
-
-#: Without hue, so that no shade is taken for them: near-black where nothing settled, grey where a
-#: start left, pale where nothing is known.
-UNSETTLED: dict[int, Unsettled] = {
-    Kind.ESCAPED: Unsettled("escaped", "#BDBDBD"),
-    Kind.UNCONVERGED: Unsettled("not settled", "#1E1E1E"),
-    Kind.FAILED: Unsettled("failed", "#3C3C3C"),
-    Kind.NOT_COMPUTED: Unsettled("not computed", "#E9E9E9"),
-}
 #: Shades of a hue; the middle one is the hue itself.
 LEVELS = 65
 

@@ -194,6 +194,7 @@ def frame(
                 )
             for curve in drawing.along:
                 named |= draw_branches(panel, drawing.shown.ds, curve, across, up)
+                named |= _lost_ends(panel, drawing.shown.ds, curve, across, up)
                 if events and not drawing.events_above:
                     draw_marks(panel, drawing.shown.ds, curve, across, up)
         yield panel, across
@@ -298,6 +299,28 @@ def draw_branches(
     if (ds["point_unstable_multipliers"].values > 0).any():
         named["unstable"] = Line2D([], [], color=QUIET, lw=0.9, ls=DASHES)
     return named
+
+
+def _lost_ends(
+    ax: Axes, ds: xr.Dataset, values: np.ndarray, across: Scale, up: Scale
+) -> dict[str, Any]:
+    """Mark the ends of branches beyond which no orbit was found, so that no gap is left without a
+    word; return the entry of the legend.
+    """
+    of = ds["point_branch"].values
+    branches, first, count = np.unique(of, return_index=True, return_counts=True)
+    lost = [
+        at[ds[f"branch_{end}"].values[branches] == "lost"]
+        for end, at in (("begin", first), ("end", first + count - 1))
+    ]
+    at = np.concatenate(lost)
+    at = at[np.isfinite(values[at])]
+    if not len(at):
+        return {}
+    mark = {"ls": "none", "marker": "s", "ms": 3.6, "mfc": "white", "mec": QUIET, "mew": 0.8}
+    x = ds[point_name(ds.attrs["parameter"])].values[at] * across.factor
+    ax.plot(x, values[at] * up.factor, zorder=4, gid="lost ends", **mark)
+    return {"no orbit found beyond": Line2D([], [], **mark)}
 
 
 def _with_events(

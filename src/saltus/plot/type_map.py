@@ -12,6 +12,7 @@ from saltus.errors import ParameterError, shown
 from saltus.plot import axes as draw
 from saltus.plot import cells, motion_colors
 from saltus.plot.picture import PictureError, caller, picture
+from saltus.plot.unsettled import UNSETTLED
 from saltus.results.dataset.kinds import Kind
 from saltus.results.dataset.schema import parameters_of, start_name, states_of
 from saltus.units import from_si
@@ -24,7 +25,7 @@ _PALE = {
     Kind.NOT_COMPUTED: "#F3F3F3",
 }
 _UNSETTLED: dict[int, tuple[str, str]] = {
-    code: (cells.UNSETTLED[code].label, color) for code, color in _PALE.items()
+    code: (UNSETTLED[code].label, color) for code, color in _PALE.items()
 }
 
 

@@ -21,6 +21,8 @@ WING = sl.models.find("aeroelastic")()
         (RIG, {"start": (float("nan"), 0.0)}, "start of x isn't finite"),
         (RIG, {"start": (0.0,)}, "2 numbers"),
         (RIG, {"every": 0.1}, r"is forced.*Leave every= out"),
+        (RIG, {"exponents": 3}, "exponents must be at most 2"),
+        (RIG, {"exponents": 1, "method": "wolf"}, "largest exponent only. Leave exponents= out"),
         (RIG, {"flow": "Taylor"}, "method must be such as sl.Taylor"),
         (RIG, {"values": {"fequency": 3.0}}, "Did you mean 'frequency'"),
         (RIG, {"start": ("1 s", 0)}, "x is measured in m"),

@@ -1,11 +1,14 @@
 """Maps of the desk: every cell is that of `sl.basins`, however the map came about."""
 
+import functools
+
 import numpy as np
 import pytest
 
 import saltus as sl
 from saltus.analysis.basins import growing, labels, pipeline
 from saltus.explore import map as maps
+from saltus.explore import responses
 from saltus.explore.desk import Desk
 from saltus.explore.frames import packed, unpacked
 from saltus.explore.opening import opening_of
@@ -14,13 +17,13 @@ from saltus.interrupt import Interrupted, Stop
 
 RIG = sl.models.delangre("b", force="4 N", frequency="15 Hz")
 BOX = {"x": (-5e-3, 5e-3), "v": (-1.0, 1.0)}
-SIZE = (24, 20)
+SIZE = (20, 16)
 
 
 @pytest.fixture(autouse=True)
 def few_scouts(monkeypatch):
     """Fewer starts are looked through for attractors, and fewer cells checked."""
-    monkeypatch.setattr(pipeline, "SCOUTS", 128)
+    monkeypatch.setattr(pipeline, "SCOUTS", 64)
     monkeypatch.setattr(pipeline, "CHECKED", 32)
     monkeypatch.setattr(growing, "FEW_SCOUTS", 16)
 
@@ -85,6 +88,12 @@ def held_against(screen, ds):
 
 
 def basins(axes=BOX, size=SIZE, system=RIG):
+    return _basins(tuple(axes.items()), size, system)
+
+
+@functools.cache
+def _basins(axes, size, system):
+    axes = dict(axes)
     box = {name: (*ends, n) for (name, ends), n in zip(axes.items(), size, strict=True)}
     return sl.basins(system, **box)
 
@@ -152,10 +161,10 @@ def _starts_counted(monkeypatch):
 
 def test_a_stopped_map_goes_on_where_it_was(desk, monkeypatch):
     with pytest.raises(Interrupted):
-        Screen(desk, stop_after=100)
+        Screen(desk, stop_after=60)
     started = _starts_counted(monkeypatch)
     screen = Screen(desk)
-    assert started[0] <= screen.label.size - 100
+    assert started[0] <= screen.label.size - 60
     held_against(screen, basins())
 
 
@@ -170,7 +179,7 @@ def test_a_coarse_map_shows_whole_levels_and_goes_on_to_the_full_one(desk):
 
 
 def test_shares_come_from_whole_levels_with_their_interval(desk):
-    screen = Screen(desk, size=(48, 40))
+    screen = Screen(desk, size=(36, 32))
     told = {head["level"]: head for head in screen.heads if head["kind"] == "map-level"}
     (first, *_) = screen.heads[0]["levels"]
     coarse = screen.label[::first, ::first]  # what was open then has a label now
@@ -186,7 +195,7 @@ def test_an_attractor_that_only_open_cells_reveal_joins_the_legend(desk, monkeyp
     monkeypatch.setattr(pipeline, "SCOUTS", 2)
     monkeypatch.setattr(growing, "FEW_SCOUTS", 1)
     screen = Screen(desk)
-    monkeypatch.setattr(pipeline, "SCOUTS", 128)
+    monkeypatch.setattr(pipeline, "SCOUTS", 64)
     known = len(screen.heads[0]["attractors"])
     assert len(screen.end["attractors"]) > known
     held_against(screen, basins())
@@ -204,6 +213,27 @@ def test_a_hue_belongs_to_an_orbit_at_neighbouring_values(desk):
             assert row["hue"] == hues[row["period"], row["kind"]]
     fresh = [row for row in then.end["attractors"] if (row["period"], row["kind"]) not in hues]
     assert not {row["hue"] for row in fresh} & set(hues.values())
+
+
+def test_a_hue_follows_a_branch_to_values_far_away(desk, monkeypatch):
+    monkeypatch.setattr(responses, "VALUES", 1)
+    monkeypatch.setattr(responses, "STARTS", 1)
+    at_home, found = Screen(desk, size=(16, 16)), []
+    hues = {row["period"]: row["hue"] for row in at_home.end["attractors"]}
+    question = {"id": 2, "parameter": "frequency", "range": [15.0, 15.08]}
+    desk.answer(question_of("responses", question), lambda *answer: found.append(answer))
+    head, arrays = found[-1]
+    (number,) = [i for i, row in enumerate(head["branches"]) if row["period"] == 1]
+    assert head["branches"][number]["hue"] == hues[1]
+    Screen(desk, size=(16, 16), values={"force": 2.0})  # hues of before are those of other orbits
+    away = Screen(desk, size=(16, 16), values={"frequency": 15.06})
+    mine = arrays["point_branch"] == number
+    order = np.argsort(arrays["point_parameter"][mine])
+    peak = np.interp(
+        15.06, arrays["point_parameter"][mine][order], arrays["point_peak"][mine][order]
+    )
+    (there,) = [row for row in away.end["attractors"] if abs(row["peak"]["x"] / peak - 1) < 1e-2]
+    assert there["hue"] == hues[1]
 
 
 def test_a_map_without_forcing_is_that_of_basins():

@@ -13,7 +13,7 @@ from matplotlib.colors import to_rgb
 from saltus.errors import ParameterError
 from saltus.plot import basins, palette
 from saltus.plot.basins import _apart as apart_ticks
-from saltus.plot.cells import UNSETTLED
+from saltus.plot.unsettled import UNSETTLED
 
 from .maps_data import attractors, basins_map
 

@@ -6,11 +6,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from saltus.analysis.attractors.aperiodic import SampledMotion
 from saltus.analysis.attractors.attractor_set import AttractorSet
-from saltus.analysis.attractors.limit_cycles import limit_cycles
+from saltus.analysis.attractors.limit_cycles import cycle_of, limit_cycles
 from saltus.analysis.closed.capture import Neighbourhoods
 from saltus.analysis.closed.field_zeros import autonomous
-from saltus.analysis.closed.motions import same
+from saltus.analysis.closed.motions import ClosedMotion, same
 from saltus.analysis.closed.orbits import find_orbits
 from saltus.analysis.solve.tolerances import ROUND, SAME
 from saltus.flow.maps import Stroboscope
@@ -65,3 +66,8 @@ def followed(
                     owners |= {id(kept): i for kept in found.sampled if id(kept) not in owners}
     found = found.ordered(scale)
     return found, np.array([owners[id(one)] for one in found.every], np.int64)
+
+
+def cycle_on(map_: Stroboscope, one: SampledMotion) -> ClosedMotion:
+    """A limit cycle that is known by its points, closed by Newton's method."""
+    return cycle_of(map_, one)[0]

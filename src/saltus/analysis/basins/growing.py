@@ -312,7 +312,7 @@ class _Work:
 
 
 class _Handed:
-    """What was handed on, counted by levels."""
+    """Count of the cells that were handed on, by levels."""
 
     def __init__(self, work: _Work, take: Callable[[Grown], None]) -> None:
         self._work, self._take = work, take

@@ -15,7 +15,7 @@ TILE = 64
 
 
 @dataclass(frozen=True)
-class Level:
+class GridLevel:
     """The cells of a grid whose indices are multiples of a stride, and that no coarser level holds.
 
     Attributes
@@ -64,10 +64,10 @@ class Level:
                 yield cells.ravel()
 
 
-def levels_of(shape: tuple[int, int]) -> list[Level]:
+def levels_of(shape: tuple[int, int]) -> list[GridLevel]:
     """The levels of a grid, the coarsest first."""
     power = max((max(shape) // FIRST).bit_length() - 1, 0)
-    return [Level(shape, 2**n, n == power) for n in range(power, -1, -1)]
+    return [GridLevel(shape, 2**n, n == power) for n in range(power, -1, -1)]
 
 
 def stride_of(cells: np.ndarray, shape: tuple[int, int]) -> np.ndarray:

@@ -21,7 +21,7 @@ from saltus.analysis.attractors.noisy import stray_attrs
 from saltus.analysis.attractors.portrait import portraits
 from saltus.analysis.basins import uncertainty
 from saltus.analysis.basins.labels import OPEN, Settling, complete, settle
-from saltus.analysis.basins.levels import Level, levels_of
+from saltus.analysis.basins.levels import GridLevel, levels_of
 from saltus.analysis.basins.scouting import SCOUTS, scouted
 from saltus.analysis.closed.spread import spread
 from saltus.analysis.closed.turns import ASKED, looks_every
@@ -145,7 +145,7 @@ class BasinPlan:
         """Cells of a chunk, int64[k]."""
         return np.arange(chunk * CHUNK, min((chunk + 1) * CHUNK, self.cells))
 
-    def levels(self) -> list[Level]:
+    def levels(self) -> list[GridLevel]:
         """Its cells coarse to fine, each level from the middle of the map outwards."""
         return levels_of(self.shape)
 

@@ -117,7 +117,7 @@ def track(
 
 
 @dataclass(frozen=True)
-class _Place:
+class _OnTheWay:
     """The motion at a share of the way: its points as they are solved for, its period [s]."""
 
     at: float
@@ -138,7 +138,7 @@ class _Way:
         whole.multipliers[0], whole.mismatch[0], whole.time[0] = (
             motion.multipliers, motion.mismatch, time,
         )  # fmt: skip
-        self._places = [_Place(0.0, whole, motion.points, time)]
+        self._places = [_OnTheWay(0.0, whole, motion.points, time)]
 
     def here(self) -> Tracked:
         """The motion that was reached last."""
@@ -174,7 +174,9 @@ class _Way:
         self._places.append(found)
         return True
 
-    def _orbit(self, system: System, points: np.ndarray, time: float, at: float) -> _Place | None:
+    def _orbit(
+        self, system: System, points: np.ndarray, time: float, at: float
+    ) -> _OnTheWay | None:
         map_ = Stroboscope(system, self._method, threads=1)
         scale = _ranges(map_, points)
         guess = Orbits(map_, scale).guess(points[None])
@@ -189,11 +191,11 @@ class _Way:
         motion = ClosedMotions.none(1, points.shape[1])
         motion.period[0], motion.points[0, : one.period] = one.period, one.points
         motion.multipliers[0], motion.mismatch[0] = one.multipliers, one.mismatch
-        return _Place(at, motion, closed.points[0], time)
+        return _OnTheWay(at, motion, closed.points[0], time)
 
     def _unforced(
         self, system: System, points: np.ndarray, time: float, at: float
-    ) -> _Place | None:
+    ) -> _OnTheWay | None:
         map_ = Stroboscope(system, self._method, every=time or 1.0, threads=1)
         sizes = np.abs(points).max(axis=0)
         scale = np.ptp(points, axis=0) if time > 0 else sizes
@@ -207,7 +209,7 @@ class _Way:
         same = motion.period[0] > 0 and moved[0] <= FARTHEST
         if not same or (time > 0 and abs(motion.time[0] / time - 1.0) > FARTHEST):
             return None
-        return _Place(at, motion, motion[0].points, float(motion.time[0]))
+        return _OnTheWay(at, motion, motion[0].points, float(motion.time[0]))
 
     # -- where it is lost --------------------------------------------------------------------------
     def loss(self, at: float, beyond: float) -> str:
@@ -240,7 +242,7 @@ class _Way:
         )
 
 
-def _from_fold(place: _Place) -> np.ndarray:
+def _from_fold(place: _OnTheWay) -> np.ndarray:
     """Distances of the multipliers from 1, or of the eigenvalues from 0."""
     motion = place.motion[0]
     rests = place.time == 0

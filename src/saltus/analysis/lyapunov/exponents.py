@@ -80,8 +80,8 @@ class Exponents(Algorithm):
 
             flow = TangentFlow(self.map.rows(rows))
             found = spectrum(
-                flow, self._start[rows], self._periods, self._transient, self._most,
-                self._every is None, show,
+                flow, self._start[rows], self._periods, self._transient, self._every is None,
+                show, self._most,
             )  # fmt: skip
             if self._every is not None and autonomous(self.map.system):
                 _of_equilibria(found, flow, self._start[rows], self._every)

@@ -74,17 +74,19 @@ def spectrum(
     start: np.ndarray,
     count: int,
     transient: int,
-    most: int,
     forced: bool = True,
     progress: Callable[[float], None] | None = None,
+    most: int | None = None,
 ) -> Spectrum:
-    """The ``most`` largest exponents over ``count`` blocks after a transient, of trajectories from
-    float64[k, D].
+    """The ``most`` largest exponents (default: all) over ``count`` blocks after a transient, of
+    trajectories from float64[k, D].
 
     Without forcing a motion that repeats has an exponent of zero along itself, which changes its
     kind.
     """
-    growth, size = grow(flow, start, count, transient, most, progress), start.shape[1]
+    size = start.shape[1]
+    most = size if most is None else most
+    growth = grow(flow, start, count, transient, most, progress)
     rates = _told(
         np.take_along_axis(
             growth.rates,

@@ -24,7 +24,7 @@ from saltus.analysis.responses.bifurcation_diagram import bifurcation_diagram
 from saltus.analysis.responses.frequency_response import frequency_response
 from saltus.errors import ParameterError, among, shown
 from saltus.flow.maps import Stroboscope
-from saltus.flow.methods import ODE45, Method, Taylor, check_method
+from saltus.flow.methods import ODE45, Method, check_method
 from saltus.interrupt import Interrupted
 from saltus.intervals import wilson
 from saltus.results import Subject, build
@@ -73,7 +73,8 @@ def compare_methods(
     methods : sequence of Method
         The methods compared; default ode45 at (1e-4, 1e-7) with and without event location.
     reference : Method
-        The exact method; default :class:`saltus.Taylor`, exact but for rounding.
+        The exact method; default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states
+        on where it serves: exact but for rounding.
     computed : mapping of str to Dataset, optional
         Results that exist already, by the ``label`` of their method; they aren't computed again,
         and their cost stays unknown.
@@ -119,9 +120,7 @@ def compare_methods(
         )
     if "method" in arguments:
         raise ParameterError("give the methods as methods=[...]; method= is for a single analysis.")
-    everything = list(
-        dict.fromkeys(check_method(one, system) for one in (reference or Taylor(), *methods))
-    )
+    everything = list(dict.fromkeys(check_method(one, system) for one in (reference, *methods)))
     if len(everything) < 2:
         raise ParameterError(
             "there is nothing to compare: give at least one method beside the reference."

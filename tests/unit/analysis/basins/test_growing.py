@@ -13,7 +13,8 @@ from saltus.analysis.basins.growing import grow
 from saltus.analysis.basins.labels import OPEN, Settling, Wanderers, settle
 from saltus.analysis.basins.levels import TILE, levels_of, stride_of
 from saltus.analysis.basins.pipeline import basin_plan
-from saltus.flow.methods import ODE45
+from saltus.flow.maps import Stroboscope
+from saltus.flow.methods import ODE45, RK4
 from saltus.results.dataset.kinds import Kind
 
 RIG = sl.models.delangre("b", force="4 N", frequency="15 Hz")
@@ -61,12 +62,22 @@ def test_a_level_goes_from_the_middle_of_the_map_outwards():
 
 
 # -- trajectories of any ages ----------------------------------------------------------------------
-@pytest.mark.parametrize("method", [sl.Taylor(), ODE45(1e-4, 1e-7)])
-def test_travellers_join_and_leave_at_any_time_and_no_bit_changes(method):
+@pytest.mark.parametrize(
+    ("system", "method", "size"),
+    [
+        (RIG, sl.Taylor(), (5e-3, 1.0)),
+        (RIG, ODE45(1e-4, 1e-7), (5e-3, 1.0)),
+        (RIG, RK4("0.5 ms"), (5e-3, 1.0)),
+        (sl.models.impact_oscillator(), sl.Taylor(), (0.5, 1.0)),
+        (sl.models.two_masses(), sl.Modal(), (2.0, 2.0, 2.0, 2.0)),
+        (sl.models.dry_friction(), sl.Taylor(), (1.0, 1.0)),
+    ],
+)
+def test_travellers_join_and_leave_at_any_time_and_no_bit_changes(system, method, size):
     """Each trajectory is the one that it is alone, whatever the ages of its neighbours."""
-    map_ = plan_of((8, 8), method=method).map(1)
+    map_ = Stroboscope(system, method)
     random = np.random.default_rng(SEED)
-    start = random.uniform([-5e-3, -1.0], [5e-3, 1.0], (40, 2))
+    start = random.uniform(-1.0, 1.0, (40, len(size))) * size
     alone = map_.launch(start, 64)
     whole = np.concatenate([alone.advance(8) for _ in range(5)], axis=1)
     flight, who, seen = map_.launch(start[:10], 64), np.arange(10), {i: [] for i in range(40)}
@@ -102,10 +113,10 @@ def test_a_pool_labels_as_one_call_does_attractors_that_never_repeat_too():
     map_, start = plan.map(1), plan.starts(np.arange(plan.cells))
     found = find_attractors(map_, start[::6], plan.scale, 500)[0]
     assert found.sampled
-    for most in (140, 44):  # neither whole blocks nor windows
+    for most in (140, 20):  # neither whole blocks nor windows
         pool, result, at = Wanderers(map_, found, most, 2), Settling.empty(plan.cells, 2), 0
         while len(pool) or at < plan.cells:
-            more = np.arange(at, min(at + 24 - len(pool), plan.cells))
+            more = np.arange(at, min(at + 8, plan.cells))  # their ages differ
             if len(more):
                 pool.add(more, start[more])
                 at = more[-1] + 1

@@ -1,5 +1,6 @@
 """Motions followed to other values: against closed forms, branches, and folds that are known."""
 
+import itertools
 import math
 import re
 
@@ -63,6 +64,20 @@ def test_orbits_go_where_the_flow_says_unstable_ones_too():
         np.testing.assert_allclose(end, points[0], rtol=1e-9, atol=1e-12)
         back = track(RIG, found.motion, found.values, {"frequency": 15.0})
         np.testing.assert_allclose(back.motion.points, old.points, rtol=1e-8, atol=1e-11)
+
+
+@pytest.mark.parametrize(("period", "by"), [(4, -0.4), (5, -1.0)])
+def test_a_long_way_ends_where_many_short_ones_do(period, by):
+    """Newton's method alone jumps to another orbit of this period on the way."""
+    _, orbits = orbits_of(RIG)
+    old = next(one for one in orbits if one.period == period)
+    at_once = track(RIG, old, {"frequency": 15.0}, {"frequency": 15.0 + by})
+    places = np.linspace(15.0, 15.0 + by, 21)
+    for before, after in itertools.pairwise(places):
+        step = track(RIG, old, {"frequency": before}, {"frequency": after})
+        assert not step.lost
+        old = step.motion
+    np.testing.assert_allclose(at_once.motion.points, old.points, rtol=1e-6, atol=1e-9)
 
 
 def test_it_goes_along_a_branch_and_is_lost_at_its_fold():
