@@ -153,7 +153,16 @@ def test_a_structure_shows_its_sensors_and_a_free_system_its_cycle(see):
         seen = see(small(explorer, size=[16, 16]))
         assert seen.get("explorer.view.history") == "tip"
         assert "history of tip" in seen.get("explorer.history.canvas.ariaLabel")
+        seen.page.mouse.click(*seen.place("#map-canvas", 4e-3, 0.2))
+        seen.rest()
+        assert set(seen.get("explorer.view.start")) == {"tip", "tip speed"}
+        x = seen.get("[explorer.motion.sample('tip')[0], explorer.view.start.tip]")
+        assert x[0] == pytest.approx(x[1], rel=1e-6)
         seen.keep("structure")
+        seen.page.select_option("#map-first", "q1")
+        seen.rest()
+        assert seen.get("explorer.view.axes") == ["q1", "q2"]
+        assert len(seen.get("explorer.view.start")) == 4
     with opened(systems.van_der_pol) as explorer:
         seen = see(small(explorer, size=[16, 16], start={"x": 1.0, "y": 0.0}))
         assert "limit cycle" in seen.text("#legend")

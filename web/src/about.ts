@@ -28,4 +28,7 @@ export interface Attractor {
 export const plain = (name: string): string => name.replaceAll("_", " ");
 export const unitOf = (about: About, name: string): string => about.quantities.find(q => q.name === name)?.unit ?? "";
 export const parameterOf = (about: About, name: string): Parameter | undefined => about.parameters.find(p => p.name === name);
+/** What a start is given by: of a map over sensors these two, else all states. */
+export const coordinates = (about: About, axes: [string, string]): string[] => (isOutput(about, axes[0]) ? [...axes] : states(about));
+export const isOutput = (about: About, name: string): boolean => about.quantities.find(q => q.name === name)?.kind === "output";
 export const states = (about: About): string[] => about.quantities.filter(q => q.kind === "state").map(q => q.name);

@@ -1,5 +1,5 @@
 /** The page of one system: what is looked at, what is asked for it, and where the answers go. */
-import { type About, type Attractor, plain, states, unitOf } from "./about";
+import { type About, type Attractor, coordinates, isOutput, plain, states, unitOf } from "./about";
 import { digits, onTheme, type Range, spoken } from "./axes";
 import { Contacts } from "./contacts";
 import { History } from "./history";
@@ -11,7 +11,7 @@ import { Phase } from "./phase";
 import { Responses } from "./responses";
 import { SaveSheet } from "./save";
 import { type Place, Sheet } from "./sheets";
-import { type Box, firstView, fromAddress, toAddress, Undo, type View } from "./state";
+import { type Box, firstView, fromAddress, startOf, toAddress, Undo, type View } from "./state";
 import { Values } from "./values";
 import { $, differing, marked, notes, only, options, type Says, type Status } from "./words";
 
@@ -125,7 +125,7 @@ export class Explorer {
   // -- questions --------------------------------------------------------------------------------------------------------------
   private changed(): Record<string, number> { return Object.fromEntries(this.about.parameters.filter(p => this.view.values[p.name] !== p.value).map(p => [p.name, this.view.values[p.name]])); }
   private motionFields(): Question {
-    const v = this.view, fields: Question = { start: v.start, values: this.changed(), periods: v.periods, method: v.method, quantities: [...new Set([v.history, ...v.phase])] };
+    const v = this.view, fields: Question = { start: v.start, values: this.changed(), periods: v.periods, method: v.method, quantities: [...new Set([v.history, ...v.phase, ...(isOutput(this.about, v.axes[0]) ? v.axes : [])])] };
     if (v.against) fields.against = v.against;
     return fields;
   }
@@ -192,6 +192,20 @@ export class Explorer {
   back(): void { this.undo.undo(); }
   forth(): void { this.undo.redo(); }
 
+  /** Another axis of the map: both are states, or both are sensors. */
+  private axis(i: 0 | 1, name: string): void {
+    const { about, view } = this, axes = [...view.axes] as [string, string], kind = isOutput(about, name);
+    if (axes[1 - i] === name) axes[1 - i] = axes[i];
+    axes[i] = name;
+    if (isOutput(about, axes[1 - i]) !== kind) axes[1 - i] = about.choices.find(other => other !== name && isOutput(about, other) === kind) ?? view.axes[1 - i];
+    if (axes[0] === axes[1] || isOutput(about, axes[0]) !== isOutput(about, axes[1])) return this.show();
+    this.whole = this.wholeOf(axes); this.go({ axes, box: [...this.whole], start: startOf(about, axes, { ...this.motion?.head.start, ...view.start }) });
+  }
+  /** The start of an answer in the coordinates of the map; sensors to the seven digits of their samples. */
+  private beginning(head: Head, arrays: Arrays): Record<string, number> {
+    const known = (name: string): number => head.start[name] ?? (arrays[`sample:${name}`] ? +arrays[`sample:${name}`][0].toPrecision(7) : this.view.start[name]);
+    return Object.fromEntries(coordinates(this.about, this.view.axes).map(name => [name, known(name)]));
+  }
   private wholeOf([a, b]: [string, string]): Box {
     const own = (name: string): Range => this.about.axes[name] ?? (this.about.ranges?.[name]) ?? [-1, 1];
     return [...own(a), ...own(b)];
@@ -202,7 +216,7 @@ export class Explorer {
     options($("against"), [["", "nothing"], ...about.methods.map(m => [m, m] as [string, string])], ""); on("against", against => this.go({ against }));
     for (const [id, i] of [["map-first", 0], ["map-second", 1]] as const) {
       options($(id), about.choices.map(name => [name, plain(name)]), this.view.axes[i]); $(id).hidden = about.choices.length < 3;
-      on(id, name => { const axes = [...this.view.axes] as [string, string]; if (axes[1 - i] === name) axes[1 - i] = axes[i]; axes[i] = name; this.whole = this.wholeOf(axes); this.go({ axes, box: [...this.whole] }); });
+      on(id, name => { this.axis(i, name); });
     }
     const sizes = new Map([...SIZES.map(n => [n, n]), about.size, this.view.size].sort((p, q) => p[0] * p[1] - q[0] * q[1]).map(([n, m]) => [`${n},${m}`, `${n} × ${m}`]));
     options($("map-size"), [...sizes], String(this.view.size)); on("map-size", n => this.go({ size: n.split(",").map(Number) as [number, number] }));
@@ -220,7 +234,7 @@ export class Explorer {
     $<HTMLInputElement>("hold").onchange = e => { const held = (e.target as HTMLInputElement).checked; this.history.hold(held); this.phase.hold(held); };
     const click = (id: string, what: () => void) => { $(id).onclick = what; };
     click("map-in", () => this.map.zoom(0.7)); click("map-out", () => this.map.zoom(1 / 0.7)); click("map-whole", () => this.map.showWhole());
-    click("undo", () => this.back()); click("redo", () => this.forth()); click("orbit-leave", () => this.leaveOrbit()); click("reset", () => this.go({ values: { ...this.first.values }, start: { ...this.first.start }, orbit: null }));
+    click("undo", () => this.back()); click("redo", () => this.forth()); click("orbit-leave", () => this.leaveOrbit()); click("reset", () => this.go({ values: { ...this.first.values }, start: startOf(this.about, this.view.axes, this.first.start), orbit: null }));
     click("save-open", () => this.openSave()); click("responses-table", () => this.table());
   }
   openSave(): void { this.save.open(`${about_(this.about)}-${Object.entries(this.changed()).slice(0, 2).map(([name, v]) => spoken(v, this.about.parameters.find(p => p.name === name)!.unit, 4).replace(/\s/g, "")).join("-")}`.replace(/[^\w.-]/g, "").replace(/-$/, "")); }
@@ -239,7 +253,7 @@ export class Explorer {
   // -- answers ------------------------------------------------------------------------------------------------------------------
   hear(head: Head, arrays: Arrays, question: Question): void {
     const { ask, kind } = head;
-    if (this.typed && head.id === this.typed.id && kind !== "waits") return this.heardTyped(head);
+    if (this.typed && head.id === this.typed.id && kind !== "waits") return this.heardTyped(head, arrays);
     if (kind === "refused") return this.refused(head);
     if (kind === "failed") { if (ask === "save") this.save.refuse(String(head.why)); return this.says.say(`Something went wrong at the desk: ${head.why} (number ${head.number}, in the terminal too).`); }
     if (kind === "waits") return this.status.say((head.words ?? []).join(" "));
@@ -252,12 +266,12 @@ export class Explorer {
     else if (kind === "responses") this.heardResponses(head, arrays);
     else if (kind === "save") this.save.take(head, arrays);
   }
-  private heardTyped(head: Head): void {
+  private heardTyped(head: Head, arrays: Arrays): void {
     const { key, text } = this.typed!, group = key.startsWith("values.") ? "values" : "start";
     this.typed = null;
     if (head.kind === "stopped") return this.type(group, key.slice(group.length + 1), text);    // a newer motion took its place
     if (head.kind !== "motion") { this.values.refuse(key, String(head.why ?? "")); return; }
-    this.values.accept(key); this.go({ [group]: group === "values" ? this.known(head.values) : { ...this.view.start, ...head.start }, ...(group === "start" ? { orbit: null } : {}) });
+    this.values.accept(key); this.go({ [group]: group === "values" ? this.known(head.values) : this.beginning(head, arrays), ...(group === "start" ? { orbit: null } : {}) });
   }
   private known(values: Record<string, number>): Record<string, number> { return Object.fromEntries(this.about.parameters.map(p => [p.name, values[p.name] ?? this.view.values[p.name]])); }
   private refused(head: Head): void {
@@ -279,7 +293,7 @@ export class Explorer {
     const head = this.motion?.head, n = this.about.forced ? "periods" : "turns";
     if (!head) return "";
     if (this.motion!.orbit) return `${head.name ?? "orbit"}${stability(head.stable) ? `, ${stability(head.stable)}` : ""}, ${head.repeats === false ? "some periods of it" : "repeated: nothing is integrated on"}`;
-    const starts = Object.entries(head.start as Record<string, number>), from = starts.every(([, v]) => v === 0) ? "rest at zero" : starts.slice(0, 3).map(([name, v]) => `${plain(name)} = ${spoken(v, unitOf(this.about, name))}`).join(", ");
+    const starts = Object.entries(this.view.start), from = starts.every(([, v]) => v === 0) ? "rest at zero" : starts.slice(0, 3).map(([name, v]) => `${plain(name)} = ${spoken(v, unitOf(this.about, name))}`).join(", ");
     const parts = [`from ${from}`, `${head.periods} ${n}`, `${head.contacts} ${head.contacts === 1 ? "contact" : "contacts"}`];
     if (this.settled && !this.dragging) parts.push(this.settledText(this.settled));
     return parts.join(" · ") + (head.against ? `. ${head.against.words}` : "");
@@ -309,7 +323,7 @@ export class Explorer {
     if (!this.view.orbit) return;
     this.orbit = head; this.settled = null; this.settledFrom = ""; this.phase.over(null);
     showOrbit(this.about, head, `${head.name ?? "orbit"}${stability(head.stable) ? `, ${stability(head.stable)}` : ""}`); this.showMotion(head, arrays);
-    if (question.responses !== undefined) this.go({ values: this.known(head.values), start: { ...this.view.start, ...head.start } }, { shown: true });
+    if (question.responses !== undefined) this.go({ values: this.known(head.values), start: this.beginning(head, arrays) }, { shown: true });
     this.status.say($("motion-what").textContent!);
   }
   private heardResponses(head: Head, arrays: Arrays): void {

@@ -1,5 +1,5 @@
 /** What is looked at: one view, its address, and the views before it (the browser's own history is the undo list). */
-import { type About, states } from "./about";
+import { type About, coordinates, isOutput } from "./about";
 import type { Range } from "./axes";
 import type { Question } from "./link";
 
@@ -14,6 +14,10 @@ export interface View {
 
 const finite = (v: unknown): v is number => typeof v === "number" && Number.isFinite(v);
 
+/** A start in the coordinates of a map's axes; what isn't known is zero. */
+export const startOf = (about: About, axes: [string, string], known: Record<string, number>): Record<string, number> =>
+  Object.fromEntries(coordinates(about, axes).map(name => [name, known[name] ?? 0]));
+
 /** What the phase portrait shows at first: of sensors one and its rate, where there is one. */
 function firstPhase(about: About): [string, string] {
   const first = about.quantities.find(q => q.name === about.panels.history[0])!;
@@ -25,7 +29,7 @@ function firstPhase(about: About): [string, string] {
 export function firstView(about: About): View {
   const [a, b] = Object.keys(about.axes), response = about.panels.response, asked = about.view;
   const values = Object.fromEntries(about.parameters.map(p => [p.name, p.value]));
-  const start = { ...Object.fromEntries(states(about).map(name => [name, 0])), ...about.at, ...about.start };
+  const start = startOf(about, [a, b], { ...about.at, ...about.start });
   const view: View = {
     values, start, axes: [a, b], box: [...about.axes[a], ...about.axes[b]], size: [...about.size], method: about.method, against: "", periods: 60,
     over: response?.parameter ?? "", range: response?.range ?? [0, 1], quantity: response?.quantity ?? about.panels.history[0],
@@ -59,7 +63,7 @@ export function fromAddress(text: string, first: View, about: About): { view: Vi
   const record = (known: object) => (v: unknown) =>
     v !== null && typeof v === "object" && Object.entries(v).every(([k, x]) => Object.hasOwn(known, k) && finite(x));
   const checks: Record<string, (v: unknown) => boolean> = {
-    values: record(first.values), start: record(first.start), axes: pair(about.choices), size: v => numbers(2)(v) && (v as number[]).every(n => n >= 16 && n <= 4000 && n % 1 === 0),
+    values: record(first.values), start: record(Object.fromEntries(about.quantities.map(q => [q.name, 0]))), axes: pair(about.choices), size: v => numbers(2)(v) && (v as number[]).every(n => n >= 16 && n <= 4000 && n % 1 === 0),
     box: v => numbers(4)(v) && (v as Box)[0] < (v as Box)[1] && (v as Box)[2] < (v as Box)[3],
     method: oneOf(about.methods), against: oneOf(["", ...about.methods]), periods: v => finite(v) && v >= 1 && v <= 1e6 && v % 1 === 0,
     over: oneOf(about.parameters.map(p => p.name)), range: v => numbers(2)(v) && (v as Range)[0] < (v as Range)[1],
@@ -70,6 +74,8 @@ export function fromAddress(text: string, first: View, about: About): { view: Vi
     const isRecord = key === "values" || key === "start";
     Object.assign(view, { [key]: isRecord ? { ...(view[key as keyof View] as object), ...(value as object) } : value });
   }
+  if (isOutput(about, view.axes[0]) !== isOutput(about, view.axes[1])) { view.axes = first.axes; view.box = first.box; damaged = true; }
+  view.start = startOf(about, view.axes, view.start);
   if (view.axes[0] === view.axes[1]) { view.axes = first.axes; view.box = first.box; damaged = true; }
   return { view, damaged };
 }

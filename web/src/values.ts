@@ -1,5 +1,5 @@
 /** Sliders and typed values: units as everywhere in saltus, read by the desk; what it refuses stands beside the control. */
-import { type About, type Parameter, plain, states } from "./about";
+import { type About, type Parameter, plain } from "./about";
 import { digits, pretty } from "./axes";
 import { $, element } from "./words";
 
@@ -17,14 +17,9 @@ export class Values {
   private fields = new Map<string, { text: HTMLInputElement; note: HTMLElement; spoken: string; range?: HTMLInputElement; parameter?: Parameter }>();
   private own: Record<string, { unit: string; factor: number }> = {};
 
-  constructor(about: About, private events: ValueEvents) {
+  constructor(private about: About, private events: ValueEvents) {
     const drive = (p: Parameter): number => (p.name === about.forced_at ? 0 : 1);          // what is turned most often comes first
     $("sliders").replaceChildren(...[...about.parameters].sort((p, q) => drive(p) - drive(q)).map(p => this.slider(p)));
-    const names = states(about).slice(0, MOST_STARTS);
-    $("starts").replaceChildren(element("legend", "start"), ...names.map(name => {
-      const unit = about.quantities.find(q => q.name === name)!.shown;
-      return this.field("start", name, unit);
-    }));
   }
 
   private field(group: "values" | "start", name: string, shown: { unit: string; factor: number }): HTMLElement {
@@ -56,8 +51,16 @@ export class Values {
     return box;
   }
 
+  private starts(names: string[]): void {
+    for (const key of [...this.fields.keys()]) if (key.startsWith("start.")) this.fields.delete(key);
+    const shown = (name: string) => this.about.quantities.find(q => q.name === name)!.shown;
+    $("starts").replaceChildren(element("legend", "start"), ...names.map(name => this.field("start", name, shown(name))));
+  }
+
   /** Show the values and the start of a view; a field that is being typed in stays. */
   show(values: Record<string, number>, start: Record<string, number>): void {
+    const names = Object.keys(start).slice(0, MOST_STARTS);
+    if (!names.every(name => this.fields.has(`start.${name}`)) || $("starts").children.length !== names.length + 1) this.starts(names);
     for (const [key, field] of this.fields) {
       const { text, range, parameter } = field;
       const [group, name] = [key.slice(0, key.indexOf(".")), key.slice(key.indexOf(".") + 1)], value = (group === "values" ? values : start)[name], shown = this.own[key];
