@@ -254,7 +254,7 @@ class _Growing:
         words = sentences(seen)
         if waiting := int((seen == OPEN).sum()):
             words.append(f"{counted(waiting, 'start')} not settled yet.")
-        fair = self._fair() if ds is None else self._fractions(label)
+        fair = self._fair()[1] if ds is None else self._fractions(label)
         shares = {one["key"]: one for one in fair}
         table = [{**row, **shares.get(row["key"], {})} for row in self._legend.table()]
         self._emit({"kind": "map-end", "attractors": table, "words": words, **trust, **more}, {})
@@ -272,8 +272,9 @@ class _Growing:
         self._piece(news.stride, news.cells, news.known)
         if news.whole and news.stride not in self._whole:
             self._whole.append(news.stride)
-            level = {"kind": "map-level", "level": news.stride}
-            self._emit({**level, "fractions": self._fair()}, {})
+            stride, shares = self._fair()
+            level = {"kind": "map-level", "level": news.stride, "of": stride}
+            self._emit({**level, "fractions": shares}, {})
 
     def _piece(self, stride: int, cells: np.ndarray, known: int) -> None:
         result = self._kept.result
@@ -288,18 +289,20 @@ class _Growing:
         }
         self._emit(head, arrays)
 
-    def _fair(self) -> list[dict[str, Any]]:
-        """Shares of the cells of whole levels: what settles early is no fair sample."""
+    def _fair(self) -> tuple[int | None, list[dict[str, Any]]]:
+        """The stride of the finest grid of which all levels are whole, None if there is none, and
+        the shares of its cells: what settles early is no fair sample.
+        """
         plan, whole = self._kept.plan, []
         for level in plan.levels():
             if level.stride not in self._whole:
                 break
             whole.append(level.stride)
         if not whole:
-            return []
+            return None, []
         rows, columns = (np.arange(0, size, whole[-1]) for size in plan.shape)
         label = self._kept.result.label.reshape(plan.shape)[np.ix_(rows, columns)]
-        return self._fractions(label.ravel())
+        return whole[-1], self._fractions(label.ravel())
 
     def _fractions(self, label: np.ndarray) -> list[dict[str, Any]]:
         """Share of each attractor among labels, with its interval."""

@@ -26,6 +26,7 @@ def few_scouts(monkeypatch):
     monkeypatch.setattr(pipeline, "SCOUTS", 64)
     monkeypatch.setattr(pipeline, "CHECKED", 32)
     monkeypatch.setattr(growing, "FEW_SCOUTS", 16)
+    monkeypatch.setattr(maps, "FEW_SCOUTS", 16)
 
 
 @pytest.fixture
@@ -180,20 +181,22 @@ def test_a_coarse_map_shows_whole_levels_and_goes_on_to_the_full_one(desk):
 
 def test_shares_come_from_whole_levels_with_their_interval(desk):
     screen = Screen(desk, size=(36, 32))
-    told = {head["level"]: head for head in screen.heads if head["kind"] == "map-level"}
-    (first, *_) = screen.heads[0]["levels"]
-    coarse = screen.label[::first, ::first]  # what was open then has a label now
-    for one in told[first]["fractions"]:
-        final = (coarse == one["key"]).mean()
-        assert one["low"] <= one["fraction"] <= min(one["high"], final)
-    for one in told[1]["fractions"]:
-        assert one["fraction"] <= (screen.label == one["key"]).mean()
-    assert [level for level in told if told[level]["fractions"]][-1] == 1
+    told = [head for head in screen.heads if head["kind"] == "map-level"]
+    assert {head["level"] for head in told} == {2, 1}
+    assert told[-1]["of"] == 1
+    for head in told:
+        seen = screen.label[:: head["of"] or 99, :: head["of"] or 99]
+        assert bool(head["fractions"]) == bool(head["of"])
+        for one in head["fractions"]:  # what was open then has a label now
+            assert one["fraction"] <= (seen == one["key"]).mean() + 1e-12
+            assert one["low"] <= one["fraction"] <= one["high"]
+        named = sum(one["fraction"] for one in head["fractions"])
+        assert named > 0.8 or not head["of"]
 
 
 def test_an_attractor_that_only_open_cells_reveal_joins_the_legend(desk, monkeypatch):
     monkeypatch.setattr(pipeline, "SCOUTS", 2)
-    monkeypatch.setattr(growing, "FEW_SCOUTS", 1)
+    monkeypatch.setattr(maps, "FEW_SCOUTS", 1)
     screen = Screen(desk)
     monkeypatch.setattr(pipeline, "SCOUTS", 64)
     known = len(screen.heads[0]["attractors"])
