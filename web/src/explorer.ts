@@ -60,6 +60,7 @@ export class Explorer {
     this.dragging = drag;
     if (other("start", "values", "method")) this.settled = null;
     if (other("start")) this.phase.over(null);
+    if (other("orbit") && next.orbit === null) this.responses.chosen = -1;
     if (past && other("axes")) this.whole = this.wholeOf(next.axes);
     this.show();
     const values = other("values");
