@@ -5,14 +5,17 @@ machine alone.
 from __future__ import annotations
 
 import sys
+import threading
 import webbrowser
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, SaltusError
 
 if TYPE_CHECKING:
+    from saltus.explore.desk import Desk
     from saltus.explore.server import Server
     from saltus.explore.session import AnswersQuestions
     from saltus.flow.methods import Method
@@ -31,8 +34,8 @@ class Explorer:
         The page's address, with the token that lets it in.
     """
 
-    def __init__(self, server: Server) -> None:
-        self._server = server
+    def __init__(self, server: Server, desk: AnswersQuestions) -> None:
+        self._server, self._desk = server, desk
         self.url = server.url
 
     @property
@@ -40,6 +43,18 @@ class Explorer:
         """What the newest page shows now: the fields of its questions, by panel."""
         sessions = self._server.sessions
         return sessions[-1].view if sessions else {}
+
+    def study(self) -> str:
+        """The study file of what the newest page shows, as text. Raises ParameterError if no page
+        shows anything.
+        """
+        from saltus.explore.save import study_text
+
+        view, desk = self.view, self._desk
+        shown = getattr(desk, "shown", None)
+        if not view or shown is None:
+            raise ParameterError(f"no page shows anything yet: open {self.url}.")
+        return study_text(shown(view)[0], "view")
 
     def close(self) -> None:
         """End the pages' work and the server."""
@@ -123,6 +138,8 @@ def opened(
     """An explorer of a desk: its server listens when this returns. Raises ParameterError if the
     packages of the extra ``explore`` aren't there.
     """
+    from saltus.explore.desk import Desk
+
     try:
         from saltus.explore.server import Server
     except ModuleNotFoundError as error:
@@ -135,7 +152,14 @@ def opened(
     server.start()
     if browser:
         webbrowser.open(server.url)
-    return Explorer(server)
+    if isinstance(desk, Desk):
+        threading.Thread(target=_warm, args=(desk,), daemon=True).start()
+    return Explorer(server, desk)
+
+
+def _warm(desk: Desk) -> None:
+    with suppress(SaltusError):  # whoever asks for a map is told
+        desk.warm()
 
 
 def _in_notebook() -> bool:

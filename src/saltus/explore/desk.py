@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from saltus.analysis.basins.basins import compiled
 from saltus.analysis.basins.pipeline import BasinPlan, basin_plan
 from saltus.analysis.inputs.starts import ensemble, range_of
 from saltus.analysis.motion.simulate import simulate
@@ -92,6 +93,10 @@ class Desk:
         if answer is None:
             raise QuestionError(f"{question.ask} isn't answered here.", "ask")
         emit(*answer(question))
+
+    def warm(self) -> None:
+        """Compile what the first map needs, before anybody asks for it."""
+        compiled(self.plan_of(self.opening.system, self.opening.method))
 
     # -- what questions share ----------------------------------------------------------------------
     def system_at(self, values: Mapping[str, asked.Number]) -> System:

@@ -17,6 +17,7 @@ from saltus.errors import ParameterError, SaltusError
 from saltus.explore import studies
 from saltus.explore.frames import packed, unpacked
 from saltus.explore.questions import question_of
+from saltus.study.read import parse
 
 RIG = sl.models.delangre("b", force="4 N", frequency="15 Hz")
 STUDY = """
@@ -63,11 +64,17 @@ def test_explore_returns_at_once_with_a_page_that_answers():
         token = page.url.partition("token=")[2]
         socket.send(json.dumps({"ask": "hello", "id": 0, "token": token, "wire": 1}))
         socket.recv()
-        socket.send(json.dumps({"ask": "show", "id": 1, "view": {"start": [1, 2]}}))
+        with pytest.raises(ParameterError, match="no page shows anything yet"):
+            page.study()
+        view = {"motion": {"start": ["1 mm", 0], "values": {"force": "3 N"}, "periods": 9}}
+        socket.send(json.dumps({"ask": "show", "id": 1, "view": view}))
         socket.send(json.dumps({"ask": "about", "id": 2}))
         head, _ = unpacked(socket.recv())
         assert head["system"]["name"] == "delangre"
-        assert page.view == {"start": [1, 2]}
+        assert page.view == view
+        study = parse(page.study())
+        assert study.system.values["force"] == "3 N"
+        assert (study.simulate.start["x"], study.simulate.periods) == ("1 mm", 9)
     html = page._repr_html_()
     assert f'src="{page.url}' in html
     assert page.url in repr(page)

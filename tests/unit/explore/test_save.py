@@ -156,7 +156,7 @@ def test_data_are_read_back(desk, tmp_path):
     [
         ({"what": "study", "format": "nc", "view": {}}, "format"),
         ({"what": "data", "format": "nc", "view": {}}, "parts"),
-        ({"what": "data", "format": "nc", "view": {"motion": 3}}, None),
+        ({"what": "data", "format": "nc", "view": {"motion": 3}}, "view"),
         ({"what": "study", "format": "toml", "view": {"motion": {}}}, "start"),
         ({"what": "data", "format": "nc", "view": {"map": {**MAP, "size": [20, 20]}}}, "parts"),
     ],
