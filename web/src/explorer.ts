@@ -3,9 +3,10 @@ import { type About, coordinates, isOutput, plain, states } from "./about";
 import { onTheme, type Range, spoken } from "./axes";
 import { ALL_POINTS, Answers } from "./answers";
 import { Contacts } from "./contacts";
+import { Asks, SETTLE } from "./asks";
 import { connect } from "./controls";
 import { History } from "./history";
-import type { Arrays, Head, Link, Question } from "./link";
+import type { Arrays, Head, Link } from "./link";
 import { BasinMap } from "./map";
 import type { Motion } from "./motion";
 import { Phase } from "./phase";
@@ -23,10 +24,8 @@ interface Change {
   shown?: boolean;
   half?: boolean;
 }
-/** Milliseconds: rest before a start is settled, before a map of another view, between coarse maps of a drag, before a view is kept for undo, before the desk is told of it. */
-const SETTLE = 300,
-  REST = 150,
-  COARSE = 250,
+/** Milliseconds of rest before a map of another view is asked, before a view is kept for undo, before the desk is told of it. */
+const REST = 150,
   KEEP = 400,
   TELL = 1000;
 /** Milliseconds without an answer after which what follows a slider is dimmed. */
@@ -42,6 +41,7 @@ export class Explorer {
   values: Values;
   contacts: Contacts;
   readonly save: SaveSheet;
+  readonly asks = new Asks(this);
   readonly answers = new Answers(this);
   motion: Motion | null = null;
   maps = new Map<number, Sheet>();
@@ -90,7 +90,7 @@ export class Explorer {
         ),
       view: (box, done) => this.go({ box }, { drag: !done }),
       hover: (where, at, sheet) => this.answers.hover(where, at, sheet),
-      settle: () => this.settleNow(),
+      settle: () => this.asks.settleNow(),
     });
     this.map.painted = () => this.marks();
     this.history = new History($("history"), about, text => {
@@ -109,7 +109,7 @@ export class Explorer {
     });
     this.save = new SaveSheet(
       $("save"),
-      fields => this.link.ask("save", { ...fields, view: this.shownView() }),
+      fields => this.link.ask("save", { ...fields, view: this.asks.shownView() }),
       () => this.address(),
       () => this.answers.mapText(),
     );
@@ -130,7 +130,7 @@ export class Explorer {
     this.show();
     this.kept = toAddress(this.view, this.first);
     this.undo.replace(this.view, this.kept);
-    this.askAll();
+    this.asks.askAll();
   }
 
   // -- what is looked at ------------------------------------------------------------------------------------------------------
@@ -158,25 +158,25 @@ export class Explorer {
       name => !next.axes.includes(name) && before.start[name] !== next.start[name],
     );
     if (other("history")) this.answers.legend();
-    if (values && drag) this.askCoarse();
-    else if (values || other("method", "size", "axes") || others) this.askMap();
+    if (values && drag) this.asks.askCoarse();
+    else if (values || other("method", "size", "axes") || others) this.asks.askMap();
     else if (other("box")) {
-      this.pickSheet();
-      this.later("map", REST, () => this.askMap());
-    } else if (released) this.askMap();
+      this.asks.pickSheet();
+      this.later("map", REST, () => this.asks.askMap());
+    } else if (released) this.asks.askMap();
     const apart = Object.keys(next.values).some(
       name => name !== next.over && next.values[name] !== before.values[name],
     );
-    if (!drag && !shown && (apart || other("over", "range", "quantity") || released)) this.askResponses();
+    if (!drag && !shown && (apart || other("over", "range", "quantity") || released)) this.asks.askResponses();
     if (!past) this.later("keep", KEEP, () => this.keep(), drag || half);
     else this.kept = toAddress(next, this.first);
   }
   askMotions(values: boolean, motion: boolean, start: boolean, orbit: boolean): void {
-    if (values && this.view.orbit && !orbit) return this.track();
-    if (motion) this.askMotion();
+    if (values && this.view.orbit && !orbit) return this.asks.track();
+    if (motion) this.asks.askMotion();
     if (this.view.orbit) return;
-    if (values) this.track();
-    if (values || start) this.later("settle", SETTLE, () => this.settleNow(), this.dragging);
+    if (values) this.asks.track();
+    if (values || start) this.later("settle", SETTLE, () => this.asks.settleNow(), this.dragging);
   }
   later(name: string, wait: number, what: () => void, hold = false): void {
     clearTimeout(this.timers[name]);
@@ -197,7 +197,7 @@ export class Explorer {
       this.kept = address;
       this.undo.push(this.view, address);
     } else this.undo.replace(this.view, address);
-    this.later("told", TELL, () => this.link.tell("show", { view: this.shownView() }));
+    this.later("told", TELL, () => this.link.tell("show", { view: this.asks.shownView() }));
   }
   address(): string {
     return `${location.origin}/#token=${this.token()}&view=${toAddress(this.view, this.first)}`;
@@ -275,151 +275,6 @@ export class Explorer {
     $("map").classList.toggle("stale", of !== "");
   }
 
-  // -- questions --------------------------------------------------------------------------------------------------------------
-  changed(): Record<string, number> {
-    return Object.fromEntries(
-      this.about.parameters
-        .filter(p => this.view.values[p.name] !== p.value)
-        .map(p => [p.name, this.view.values[p.name]]),
-    );
-  }
-  motionFields(): Question {
-    const v = this.view,
-      fields: Question = {
-        start: v.start,
-        values: this.changed(),
-        periods: v.periods,
-        method: v.method,
-        quantities: [...new Set([v.history, ...v.phase, ...(isOutput(this.about, v.axes[0]) ? v.axes : [])])],
-      };
-    if (v.against) fields.against = v.against;
-    return fields;
-  }
-  mapFields(): Question {
-    const v = this.view,
-      [a, b, c, d] = v.box,
-      at = Object.fromEntries(Object.entries(v.start).filter(([name]) => !v.axes.includes(name)));
-    return {
-      axes: { [v.axes[0]]: [a, b], [v.axes[1]]: [c, d] },
-      size: v.size,
-      values: this.changed(),
-      at,
-      method: v.method,
-      ...this.about.view.map,
-    };
-  }
-  responseFields(): Question {
-    const v = this.view;
-    return { values: this.changed(), parameter: v.over, range: v.range, quantity: v.quantity };
-  }
-  shownView(): Question {
-    return {
-      motion: this.motionFields(),
-      map: this.mapFields(),
-      ...(this.view.over ? { responses: this.responseFields() } : {}),
-    };
-  }
-
-  askAll(): void {
-    this.askMotion();
-    this.askMap();
-    this.askedValues = "";
-    this.askResponses();
-    this.later("settle", SETTLE, () => this.settleNow());
-  }
-  askMotion(): void {
-    const orbit = this.view.orbit;
-    if (!orbit) this.link.newest("motion", { ...this.motionFields(), errors: this.dragging ? "local" : "measured" });
-    else if (orbit.track) this.link.newest("track", { ...(orbit.track as Question), values: this.view.values });
-    else this.link.newest("orbit", { ...orbit, values: this.view.values });
-  }
-  settleNow(): void {
-    if (!this.view.orbit)
-      this.link.newest("settle", { start: this.view.start, values: this.changed(), method: this.view.method });
-  }
-  /** The known orbit follows the values by Newton's method. */
-  track(): void {
-    const known = this.orbit,
-      point = known?.start ?? known?.attractor?.points?.[0];
-    if (!known || !point || (!known.periods && !known.attractor)) {
-      if (this.view.orbit) {
-        this.view.orbit = null;
-        this.askMotion();
-      }
-      return;
-    }
-    const period = known.attractor?.period || known.periods || 1;
-    if (period > 64) return;
-    this.link.newest("track", {
-      values: this.view.values,
-      source: known.values,
-      point: Array.isArray(point) ? point : states(this.about).map(name => point[name]),
-      period,
-    });
-  }
-  askedValues = "";
-  askResponses(): void {
-    if (!this.view.over) return;
-    const fields = this.responseFields(),
-      { [this.view.over]: _, ...others } = fields.values as Record<string, number>,
-      key = JSON.stringify({ ...fields, values: others });
-    if (key === this.askedValues) return;
-    this.askedValues = key;
-    this.link.ask("responses", fields);
-  }
-  mapKey(fields: Question): string {
-    return JSON.stringify({ ...fields, values: this.view.values });
-  }
-  pickSheet(): void {
-    const sheet = this.map.sheets.get(this.mapKey(this.mapFields()));
-    if (sheet) {
-      this.map.sheet = sheet;
-      this.answers.legend();
-      this.map.draw();
-    }
-  }
-  askCoarse(): void {
-    this.pickSheet();
-    const wait = this.coarse + COARSE - performance.now();
-    if (wait <= 0) {
-      this.coarse = performance.now();
-      this.askMap(true);
-    } else
-      this.later("map", wait, () => {
-        this.coarse = performance.now();
-        this.askMap(this.dragging);
-      });
-  }
-  askMap(coarse = false): void {
-    clearTimeout(this.timers.map);
-    delete this.timers.map;
-    const fields = this.mapFields(),
-      key = this.mapKey(fields),
-      v = this.view,
-      { axes, size, values, ...plane } = fields;
-    let sheet = this.map.sheets.get(key);
-    if (this.map.sheet && this.map.sheet !== sheet && !this.map.sheet.known) this.map.sheets.drop(this.map.sheet);
-    if (!sheet)
-      this.map.sheets.add(
-        (sheet = new Sheet(key, { ...v.values }, JSON.stringify([v.axes, plane]), [...v.box], ...v.size)),
-      );
-    this.map.sheet = sheet;
-    this.map.draw();
-    this.answers.legend();
-    if (sheet.done) {
-      this.link.tell("stop", { of: "map" });
-      this.status.say(this.answers.mapText());
-      return;
-    }
-    this.begun = performance.now();
-    this.status.say(this.answers.mapText());
-    const id = this.link.ask("map", coarse ? { ...fields, coarse } : fields);
-    if (id >= 0) {
-      this.maps.clear();
-      this.maps.set(id, sheet);
-    }
-  }
-
   // -- what the user does -------------------------------------------------------------------------------------------------------
   slide(name: string, value: number, done: boolean): void {
     this.values.refuse(`values.${name}`, "");
@@ -433,7 +288,7 @@ export class Explorer {
     }
   }
   type(group: "values" | "start", name: string, text: string): void {
-    const fields = this.motionFields(),
+    const fields = this.asks.motionFields(),
       id = this.link.ask("motion", { ...fields, [group]: { ...(fields[group] as object), [name]: text } });
     this.typed = { key: `${group}.${name}`, text, id };
   }
@@ -454,7 +309,7 @@ export class Explorer {
       delete this.timers[name];
     }
     this.link.tell("stop");
-    this.askedValues = "";
+    this.asks.askedValues = "";
     this.status.say("stopped");
   }
   back(): void {
@@ -490,7 +345,7 @@ export class Explorer {
   }
   openSave(): void {
     this.save.open(
-      `${about_(this.about)}-${Object.entries(this.changed())
+      `${shortName(this.about)}-${Object.entries(this.asks.changed())
         .slice(0, 2)
         .map(([name, v]) => spoken(v, this.about.parameters.find(p => p.name === name)!.unit, 4).replace(/\s/g, ""))
         .join("-")}`
@@ -513,8 +368,9 @@ export class Explorer {
       bare = /^[-+]?[\d.,]+(e[-+]?\d+)?$/i.test(typed);
     const range: (number | string)[] = [...this.view.range];
     range[i] = bare && p.shown.unit ? `${typed} ${p.shown.unit}` : typed;
-    this.askedValues = "";
-    this.link.ask("responses", { ...this.responseFields(), range });
+    this.asks.askedValues = "";
+    this.link.ask("responses", { ...this.asks.responseFields(), range });
   }
 }
-const about_ = (about: About): string => about.system!.name.replace(/\s*\(.*/, "");
+/** A system's name without what stands in brackets behind it. */
+const shortName = (about: About): string => about.system!.name.replace(/\s*\(.*/, "");

@@ -28,7 +28,7 @@ const link = new Link(token, {
   ready(first, again) {
     if (!first && again) says.say("saltus was started again: everything is asked anew.");
     if (explorer && !again) {
-      explorer.askAll();
+      explorer.asks.askAll();
       return;
     }
     view = /#view=([^&]*)/.exec(location.hash)?.[1] ?? view;
