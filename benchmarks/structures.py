@@ -95,8 +95,7 @@ def matrices(modes: int, stops: int) -> tuple[np.ndarray, ...]:
     """Squares, damping, shapes at the stops and loads of the modes."""
     mass, stiffness = beam(elements_for(modes))
     found = sl.structure_modes(mass, stiffness, modes)
-    shapes = found.shape.values
-    shapes = shapes if shapes.shape[0] == modes else shapes.T
+    shapes = found.shape.transpose("mode", "degree").values
     omega = 2 * np.pi * found.frequency.values
     fine = len(mass) // 60
     at = np.array([2 * fine * node - 2 for node in NODES[:stops]])

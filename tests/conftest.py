@@ -6,10 +6,15 @@ from __future__ import annotations
 
 import gc
 import math
+import os
 import warnings
 from pathlib import Path
 
 import pytest
+
+# A process a core runs the tests: threads of linear algebra would wait for one another. Before
+# NumPy is imported, and for all processes that tests start.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 #: Files in which tests take longest, longest first: no process is to begin one of them when all
 #: others have ended.
@@ -26,7 +31,6 @@ LONGEST = (
     "unit/analysis/branches/test_branches.py",
     "unit/analysis/branches/test_backbone.py",
     "truth/test_order.py",
-    "test_examples.py",
     "truth/test_attractors.py",
     "truth/test_lyapunov.py",
     "unit/study/test_questions.py",
@@ -55,6 +59,15 @@ LONGEST = (
     "conformance/test_lanes.py",
     "conformance/test_time.py",
     "faults/test_interrupted_runs.py",
+)
+
+#: Where results are written as users write them, as netCDF-4.
+NETCDF_4 = (
+    "conformance/test_every_verb.py",
+    "faults/test_result_files.py",
+    "test_readme.py",
+    "unit/results",
+    "unit/study/test_run.py",
 )
 
 
@@ -105,6 +118,30 @@ def compiled_here():
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(building, "OTHER_PROCESS", math.inf)
+        yield
+
+
+@pytest.fixture(autouse=True, scope="module")
+def netcdf_3(request):
+    """Elsewhere they are written as if [io] weren't installed: in a fifteenth of the time."""
+    here = Path(__file__).parent
+    if any(request.path.is_relative_to(here / name) for name in NETCDF_4):
+        yield
+        return
+    from saltus.results.files import export
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(export, "_has", lambda _: False)
+        yield
+
+
+@pytest.fixture(scope="module")
+def few_scouts():
+    """Maps of some ten cells, before which no thousand starts look for attractors."""
+    from saltus.analysis.basins import pipeline
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pipeline, "SCOUTS", 64)
         yield
 
 

@@ -349,21 +349,28 @@ def test_a_study_file_asks_for_the_same_method(method):
 
 
 # -- in every question -----------------------------------------------------------------------------
+FREQUENCY = ("7 Hz", "8 Hz", 2)
+IN_QUESTIONS = {
+    "attractors": lambda method: sl.attractors(RIG, START, method=method),
+    "responses": lambda method: sl.frequency_response(RIG, FREQUENCY, method=method),
+    "diagram": lambda method: sl.bifurcation_diagram(RIG, {"frequency": FREQUENCY}, method=method),
+}
+
+
+@pytest.fixture(scope="module")
+def exactly():
+    """The exact answers to these questions."""
+    return {name: asked(sl.Taylor()) for name, asked in IN_QUESTIONS.items()}
+
+
 @APPROXIMATE
-def test_orbits_are_the_exact_ones(method):
-    exact, found = (sl.attractors(RIG, START, method=one) for one in (sl.Taylor(), method))
-    assert found.attractor_type.values.tolist() == exact.attractor_type.values.tolist()
-    np.testing.assert_allclose(found.attractor_peak, exact.attractor_peak, rtol=1e-4)
-    frequency = ("7 Hz", "8 Hz", 2)
-    exact, found = (
-        sl.frequency_response(RIG, frequency, method=one) for one in (sl.Taylor(), method)
-    )
-    np.testing.assert_allclose(found.peak, exact.peak, rtol=1e-4)
-    exact, found = (
-        sl.bifurcation_diagram(RIG, {"frequency": frequency}, method=one)
-        for one in (sl.Taylor(), method)
-    )
-    assert found.type.values.tolist() == exact.type.values.tolist()
+def test_orbits_are_the_exact_ones(exactly, method):
+    found = {name: asked(method) for name, asked in IN_QUESTIONS.items()}
+    for name in ("attractors", "diagram"):
+        kind = "attractor_type" if name == "attractors" else "type"
+        assert found[name][kind].values.tolist() == exactly[name][kind].values.tolist()
+    for name, peak in (("attractors", "attractor_peak"), ("responses", "peak")):
+        np.testing.assert_allclose(found[name][peak], exactly[name][peak], rtol=1e-4)
 
 
 def test_all_are_compared_side_by_side(monkeypatch):

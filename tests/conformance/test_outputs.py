@@ -2,11 +2,15 @@
 what it gives can be saved, described and read back.
 """
 
+from functools import cache
+
 import numpy as np
 import pytest
-from tests.conformance.test_every_verb import CALLS, RIG, few_scouts  # noqa: F401
+from tests.conformance.test_every_verb import CALLS, takes
 
 import saltus as sl
+
+pytestmark = pytest.mark.usefixtures("few_scouts")
 
 OUTPUTS = {
     "stop force": lambda x, contact_stiffness, upper_gap: (
@@ -16,17 +20,27 @@ OUTPUTS = {
 }
 #: One with a boundary of its own, at which the pieces of a motion are cut: sums round otherwise.
 BEYOND = {"beyond": lambda x: sl.piecewise((x, x > 0.2e-3), otherwise=0)}
-#: Those that take the rig; the call of compare would compute two maps when this file is read.
-VERBS = [name for name in CALLS if name != "compare" and CALLS[name]("in SI")[0] is RIG]
+#: Those that take the rig.
+VERBS = [name for name in CALLS if takes(name, "system") and name != "equilibria"]
+
+
+def call_of(name):
+    """A verb, its system and the other arguments of a call without outputs."""
+    system, arguments = CALLS[name]("in SI")
+    return getattr(sl, name), system, {k: v for k, v in arguments.items() if k != "outputs"}
+
+
+@cache
+def plain_result(name):
+    verb, system, arguments = call_of(name)
+    return verb(system, **arguments)
 
 
 @pytest.mark.parametrize("outputs", [OUTPUTS, OUTPUTS | BEYOND], ids=["smooth", "cut"])
 @pytest.mark.parametrize("name", VERBS)
 def test_an_output_changes_nothing_else(name, outputs, tmp_path):
-    verb, (system, arguments) = getattr(sl, name), CALLS[name]("in SI")
-    arguments = {key: value for key, value in arguments.items() if key != "outputs"}
-    plain = verb(system, **arguments)
-    more = verb(system.with_outputs(outputs), **arguments)
+    verb, system, arguments = call_of(name)
+    plain, more = plain_result(name), verb(system.with_outputs(outputs), **arguments)
     for key, one in plain.drop_vars("method_cpu_seconds", errors="ignore").variables.items():
         other = more[key]
         if "output" in one.dims:  # the states stand first

@@ -61,11 +61,13 @@ saltus.analysis.basins.pipeline.SCOUTS, saltus.analysis.basins.pipeline.CHECKED 
 
 if __name__ == "__main__":  # a process of --workers computes chunks only
     import saltus.plot, saltus.study.run.maps, saltus.study.read, saltus.study.run.study
+    import saltus.results.files.export
     from saltus.cli import main
     from saltus.results.store.store import Store
 
     saltus.study.run.maps.CHUNK = 24
     saltus.study.run.maps.LARGE = 100  # nobody asks how long it will take
+    saltus.results.files.export._has = lambda _: False  # netCDF-3 is written sooner
     commit = Store.commit
     committed = []
 

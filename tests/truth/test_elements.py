@@ -27,11 +27,11 @@ def after_turns(x, k, limit):
     return force
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(7))
 def test_forces_after_turns(seed):
     """An input that goes between random places in straight lines: each element is clipped there."""
     rng = np.random.default_rng(seed)
-    places = np.concatenate([[0.0], rng.uniform(-2, 2, 9)])
+    places = np.concatenate([[0.0], rng.uniform(-2, 2, 5)])
     k, limits, gap = rng.uniform(0.5, 3, 3), rng.uniform(0.3, 1.5, 3), rng.uniform(0.2, 0.9)
 
     @sl.system(states="x force part")
@@ -42,7 +42,7 @@ def test_forces_after_turns(seed):
             sl.play(x, gap=gap),
         )
 
-    run = sl.simulate(path, (0.0, 0.0, 0.0), t_end=9.0)
+    run = sl.simulate(path, (0.0, 0.0, 0.0), t_end=5.0)
     assert run.status.item() == "ok"
     deflections = [run[f"end_iwan_{i}"].item() for i in (1, 2, 3)]
     expected = [after_turns(places, 1.0, limit / ki) for ki, limit in zip(k, limits, strict=True)]
@@ -93,7 +93,7 @@ def by_hand(t, x, v, f, *, w=0.9):
     return v, 1.5 * sl.cos(w * t) - 0.2 * x - 0.05 * v - f, rates
 
 
-def test_the_same_by_hand_in_every_verb():
+def test_the_same_by_hand_in_every_verb(few_scouts):
     ours, hand = (sl.simulate(one, (0.5, 0.0, 0.0), periods=30) for one in (joint, by_hand))
     short = sl.simulate(joint, (0.5, 0.0), periods=30)
     assert short.end_x.item() == ours.end_x.item()

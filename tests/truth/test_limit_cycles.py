@@ -98,7 +98,7 @@ def test_a_turn_is_found_where_the_linear_part_is_a_thousand_times_faster():
     assert looks_every(circle, "2 ms", np.zeros((1, 2))) == 2e-3
 
 
-def test_basins_tell_rest_from_oscillation_without_a_period():
+def test_basins_tell_rest_from_oscillation_without_a_period(few_scouts):
     wing = sl.models.aeroelastic()
     found = sl.basins(wing, pitch=(-0.02, 0.02, 9), plunge=(-0.002, 0.002, 5))
     assert found.attractor_type.values.tolist() == ["equilibrium", "limit_cycle"]

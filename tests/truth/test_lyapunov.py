@@ -356,14 +356,14 @@ def test_lorenz_and_roessler_have_their_published_exponents():
         (slice(4, 8), 1.0, 2.0, (0.0714, 0.0, -5.3943)),
     ):
         ds = sl.lyapunov(
-            butterfly, starts[chosen], flow=FINE, every=every, periods=1500, values={"band": band}
+            butterfly, starts[chosen], flow=FINE, every=every, periods=750, values={"band": band}
         )
         assert ds["kind"].values.tolist() == ["chaotic"] * 4
         value, error = ds["lyapunov_exponent"].values, ds["lyapunov_error"].values
         assert (np.abs(value - published) < 4 * error + 5e-5).all()
         assert (np.abs(value.mean(axis=0) - published) < 2.5 * error.mean(axis=0) / 2 + 5e-5).all()
         # the zero of the flow converges like 1 / time
-        assert np.abs(value[:, 1]).max() < 3 / (1500 * every)
+        assert np.abs(value[:, 1]).max() < 3 / (750 * every)
         assert np.abs(ds["exponent_sum"] - ds["mean_divergence"]).max() < 1e-5  # ode45's own error
         assert ds["flow_lyapunov_exponent"].values.tolist() == value.tolist()
 

@@ -42,14 +42,31 @@ class Exact:
                 self.matrix[at, at + 1] = 1
 
     def motion(self, state, begin):
+        passed = {begin: state}  # breaks are passed once, however many times are asked for
+
         def at(t):
-            now, z = begin, state
+            now = begin
             for end in [*self.breaks(begin, t), t]:
-                z = (mp.expm(self.matrix * (end - now)) * self.whole(z, now, end))[: len(state), 0]
+                z = passed.get(end)
+                if z is None:
+                    whole = self.whole(passed[now], now, end)
+                    z = (mp.expm(self.matrix * (end - now)) * whole)[: len(state), 0]
+                    passed[end] = z
                 now = end
-            return z
+            return passed[now]
 
         return at
+
+    def zero(self, motion, row, away, t):
+        """A time at which row.z + away vanishes, and the state there, by Newton's method."""
+        for _ in range(8):
+            z = motion(t)
+            slope = row * (self.matrix * self.whole(z, t, t))[: len(z), 0]
+            step = ((row * z)[0] + away) / slope[0]
+            if abs(step) < mp.mpf("1e-22"):
+                break
+            t -= step
+        return t, z
 
     def breaks(self, begin, end):
         every = [one for breaks, _ in self.courses for one in breaks]
@@ -89,15 +106,14 @@ def check_contacts(system, start, run, most, tolerance, courses=()):
             row = mp.matrix([[mp.mpf(float(one)) for one in gaps.matrix[g]]])
             away = mp.mpf(float(gaps.constant[g]))
             claimed = mp.mpf(float(run.contact_time[k]))
-            gap = lambda t, r=row, a=away, m=motion: (r * m(t))[0] + a  # noqa: E731
-            found = mp.findroot(gap, (claimed, claimed * (1 + mp.mpf("1e-12"))), solver="secant")
+            found, state = known[mode].zero(motion, row, away, claimed)
             assert abs(found - claimed) < tolerance, (k, float(found - claimed))
             for part in (0.1, 0.5, 0.9):
                 there = np.array([float(one) for one in motion(now + (found - now) * part)])
                 others = gaps.matrix @ there + gaps.constant
                 sides = np.where(mode >> np.arange(len(names)) & 1, 1.0, -1.0)
                 assert (others * sides > -1e-12).all()
-            state, now, mode = motion(found), found, int(run.contact_mode_after[k])
+            now, mode = found, int(run.contact_mode_after[k])
     return count
 
 

@@ -1,6 +1,8 @@
-"""What the modal flow proves of gaps: legs beside matrix exponentials, tries, Bernstein rows."""
+"""What the modal flow says of legs, beside matrix exponentials: contacts, samples, tries."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ from scipy.interpolate import BPoly
 from scipy.linalg import expm
 
 import saltus as sl
+from saltus.kernels.modal.layout import QUEUE
 from saltus.system.linear import linear_pieces
 
 
@@ -31,26 +34,37 @@ def spread(seed, degrees, contacts):
     )  # fmt: skip
 
 
+def augmented(system, mode):
+    """The matrix of a contact state for the states, cosine, sine and one; the rate of the drive."""
+    linear, values = linear_pieces(system), dict(system.values)
+    piece, rate, states = (
+        linear.piece(values, mode),
+        float(linear.rates(values)[0][0]),
+        len(system.states),
+    )
+    every = np.zeros((states + 3, states + 3))
+    every[:states, :states], every[:states, states] = piece.matrix, piece.driven[:, 0]
+    every[:states, states + 2] = piece.constant
+    every[states, states + 1], every[states + 1, states] = -rate, rate
+    return every, rate
+
+
 def check_legs(system, run, parts):
     """From each recorded contact to the next by a matrix exponential of the states, of cosine, sine
     and one: it ends at the recorded state, on the boundary, and no gap closes before.
     """
     linear, values = linear_pieces(system), dict(system.values)
-    gaps, (rates, _) = linear.gaps(values), linear.rates(values)
-    states, rate, matrices = len(system.states), float(rates[0]), {}
+    gaps, states, matrices = linear.gaps(values), len(system.states), {}
     names = [guard.name for guard in system.guards]
     at = np.array([run[f"contact_{name}"].values for name in system.states]).T
     times, size = run.contact_time.values, np.abs(at).max(axis=0)
     for k in range(len(times) - 1):
         mode = int(run.contact_mode_after[k])
         if mode not in matrices:
-            piece, every = linear.piece(values, mode), np.zeros((states + 3, states + 3))
-            every[:states, :states], every[:states, states] = piece.matrix, piece.driven[:, 0]
-            every[:states, states + 2] = piece.constant
-            every[states, states + 1], every[states + 1, states] = -rate, rate
-            matrices[mode] = every
+            matrices[mode] = augmented(system, mode)
+        every, rate = matrices[mode]
         whole = times[k + 1] - times[k]
-        step = expm(matrices[mode] * whole / parts)
+        step = expm(every * whole / parts)
         z = np.concatenate([at[k], [np.cos(rate * times[k]), np.sin(rate * times[k]), 1.0]])
         for part in range(1, parts + 1):
             z = step @ z
@@ -80,6 +94,71 @@ def test_legs_need_no_compiler():
     check_legs(system, run, 10)
 
 
+@pytest.mark.nojit
+def test_samples_are_those_of_matrix_exponentials_however_many_there_are():
+    """States are written some samples at a time, of one contact state each: more samples between
+    two contacts than are written together, and a fourth of them, which are the same to the bit.
+    """
+    system = spread(6, 5, 1)
+    few, many = (
+        sl.simulate(system, periods=1, samples=samples, progress=False, method=sl.Modal(),
+            time_errors="local") for samples in (60, 240)
+    )  # fmt: skip
+    states = np.array([many[name].values for name in system.states]).T
+    assert (states[::4] == np.array([few[name].values for name in system.states]).T).all()
+    at = np.array([many[f"contact_{name}"].values for name in system.states]).T
+    before = np.searchsorted(many.contact_time.values, many.time.values, side="right") - 1
+    assert np.bincount(before[before >= 0]).max() > 2 * QUEUE
+    for k in np.flatnonzero(before >= 0)[::3]:
+        begin = float(many.contact_time[before[k]])
+        every, rate = augmented(system, int(many.contact_mode_after[before[k]]))
+        z = np.concatenate([at[before[k]], [np.cos(rate * begin), np.sin(rate * begin), 1.0]])
+        there = (expm(every * (float(many.time[k]) - begin)) @ z)[: len(system.states)]
+        assert (np.abs(there - states[k]) < 1e-10 * np.abs(states).max(axis=0)).all()
+
+
+def test_contacts_of_sixty_modes_are_those_of_dense_sampling(monkeypatch):
+    """The first contacts of the beam of the benchmark from rest: by matrix exponentials, one of
+    twenty thousand parts of a period after the other, then halves of these where a gap changes its
+    sign.
+    """
+    monkeypatch.syspath_prepend(Path(__file__).resolve().parents[2])
+    from benchmarks.structures import structure
+
+    system = structure(60, 1)
+    run = sl.simulate(system, periods=1, progress=False, method=sl.Modal(), time_errors="local")
+    linear, values = linear_pieces(system), dict(system.values)
+    gaps, steps, now, mode = linear.gaps(values), {}, 0.0, int(run.contact_mode_before[0])
+    part = 1 / (values["frequency"] * 20_000)
+    z, found = np.append(np.zeros(len(system.states)), [1.0, 0.0, 1.0]), []
+    while len(found) < min(run.sizes["contact"], 30):
+        if mode not in steps:
+            every, _ = augmented(system, mode)
+            steps[mode] = [expm(every * part / 2**k) for k in range(28)]
+        sides = np.array([1.0 if mode >> g & 1 else -1.0 for g in range(len(gaps.matrix))])
+
+        def open_(z, sides=sides):
+            return (gaps.matrix @ z[:-3] + gaps.constant) * sides > 0
+
+        k, h = 0, part
+        if not open_(steps[mode][0] @ z).all():
+            for k in range(1, 28):
+                h /= 2
+                if open_(steps[mode][k] @ z).all():
+                    z, now = steps[mode][k] @ z, now + h
+            z, now = steps[mode][k] @ z, now + h
+            g = int(np.flatnonzero(~open_(z))[0])
+            found.append((now, g))
+            mode ^= 1 << g
+        else:
+            z, now = steps[mode][0] @ z, now + h
+    names = [guard.name for guard in system.guards]
+    assert len(found) > 20
+    assert [names[g] for _, g in found] == list(run.contact_guard.values[: len(found)])
+    late = np.array([at for at, _ in found]) - run.contact_time.values[: len(found)]
+    assert np.abs(late).max() < 1e-11 * 20_000 * part
+
+
 def test_few_tries_are_in_vain():
     """Where a step isn't decided as a whole, its first parts are: without them there are two tries
     in vain for each contact.
@@ -94,9 +173,28 @@ def test_bernstein_rows_are_those_of_scipy():
     from saltus.codegen.module import MODAL_LANES
     from saltus.flow.modal import bernstein_table
 
-    rows = bernstein_table(MODAL_LANES).reshape(2, 16, 16)
+    rows = bernstein_table(MODAL_LANES).reshape(3, 16, 16)
     terms = np.random.default_rng(2).normal(size=16)
     polynomial, x = BPoly((terms @ rows[0])[:, None], [0.0, 1.0]), np.linspace(0, 1, 33)
     assert polynomial(x) == pytest.approx(np.polyval(terms[::-1], x), abs=1e-13)
     rates = BPoly(15 * (terms @ rows[1])[:15, None], [0.0, 1.0])
     assert rates(x) == pytest.approx(np.polyval(np.polyder(terms[::-1]), x), abs=1e-11)
+    less = BPoly((terms[:15] @ rows[2][:15])[:15, None], [0.0, 1.0])
+    assert less(x) == pytest.approx(np.polyval(terms[14::-1], x), abs=1e-13)
+
+
+def test_runs_hold_all_that_is_not_zero_and_no_more_than_two_gaps_less():
+    from saltus.flow.modal_tables import runs_of
+
+    rng = np.random.default_rng(20261126)
+    for share in (0.02, 0.3, 0.9, 1.0):
+        filled = rng.uniform(size=(40, 17)) < share
+        filled[0] = False
+        for row, (first, end, again, last) in zip(filled, runs_of(filled).astype(int), strict=True):
+            covered = [*range(first, end), *range(again, last)]
+            assert set(np.flatnonzero(row)) <= set(covered)
+            assert len(set(covered)) == len(covered)
+            # the widest gap is left out, and so is what lies outside
+            inner = np.diff(np.flatnonzero(row)).max(initial=1) - 1
+            spread_ = np.ptp(np.flatnonzero(row)) + 1 if row.any() else 0
+            assert len(covered) == spread_ - inner

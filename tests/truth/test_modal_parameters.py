@@ -61,8 +61,15 @@ def test_derivatives_are_those_of_a_matrix_exponential(apart):
         )
 
 
-@pytest.mark.nojit
-@pytest.mark.parametrize(("name", "sway"), [("w", 0.0), ("lag", 0.02), ("k", 0.02), ("push", 0.02)])
+@pytest.mark.parametrize(
+    ("name", "sway"),
+    [
+        pytest.param("w", 0.0, marks=pytest.mark.nojit),
+        pytest.param("lag", 0.02, marks=pytest.mark.nojit),
+        ("k", 0.02),
+        ("push", 0.02),
+    ],
+)
 def test_derivatives_through_impacts_and_rest(name, sway):
     """At a stop that may move with the drive: the instants of impacts, and what they change, do."""
 

@@ -10,7 +10,7 @@ START = {"x": 1e-3, "v": 0.0}
 
 
 @pytest.fixture(scope="module")
-def answers():
+def answers(few_scouts):
     found = sl.attractors(RIG, START)
     cells = sl.basins(RIG, x=[1e-3, 1.1e-3], v=[0.0, 0.01])
     response = sl.frequency_response(RIG, [15.0], start=START)

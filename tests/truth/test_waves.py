@@ -124,10 +124,8 @@ def test_legs_of_several_contact_states_are_those_of_each():
         for name in ("rates", "rows", "amplitudes", "begin", "length")
     )
     rates, rows, *others = parts
-    whole, shares = (
-        WaveLegs(rates, rows, state, *others),
-        [one.length.sum() / total for one in each],
-    )
+    whole = WaveLegs(rates, rows, state, *others)
+    shares = [one.length.sum() / total for one in each]
     mean = sum(share * means(one) for share, one in zip(shares, each, strict=True))
     np.testing.assert_allclose(means(whole), mean, rtol=1e-13)
     wave = sum(share * harmonics(one, 3.0) for share, one in zip(shares, each, strict=True))

@@ -191,7 +191,7 @@ def test_two_frequencies_have_none():
 @pytest.mark.parametrize("dimension", [3, None])
 def test_white_noise_is_called_noise(dimension):
     with pytest.warns(SaltusWarning, match=r"neighbours are false.*mostly noise"):
-        ds = sl.wolf(np.random.default_rng(1).standard_normal(3000), 0.01, dimension=dimension)
+        ds = sl.wolf(np.random.default_rng(1).standard_normal(1500), 0.01, dimension=dimension)
     assert ds["kind"].item() == "unclear"
     assert ds.attrs["false_neighbours"] > 0.1
 

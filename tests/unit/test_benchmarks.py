@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from saltus.system.linear import linear_pieces
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -52,6 +54,24 @@ def test_a_subset_leaves_out_starts_on_a_boundary(basins, small_map):
     assert len(subset.cells) == 30
     assert not (subset.x == 0.0).any()
     assert (subset.labels == small_map[1].basin.values.ravel()[subset.cells]).all()
+
+
+@pytest.mark.parametrize("modes", [4, 60])
+def test_rivals_move_the_same_beam(monkeypatch, modes):
+    """With as many modes as degrees of freedom the matrix of shapes is square."""
+    monkeypatch.syspath_prepend(ROOT)
+    from benchmarks import structures
+
+    squares, damping, shapes, push = structures.matrices(modes, 2)
+    system = structures.structure(modes, 2)
+    linear, values = linear_pieces(system), dict(system.values)
+    gaps = linear.gaps(values)
+    free = sum(1 << g for g, offset in enumerate(gaps.constant) if offset > 0)
+    piece = linear.piece(values, free)
+    assert np.abs(piece.matrix[modes:, :modes]) == pytest.approx(np.diag(squares))
+    assert np.abs(piece.matrix[modes:, modes:]) == pytest.approx(np.diag(damping))
+    assert np.abs(piece.driven[modes:, 0]) == pytest.approx(np.abs(push))
+    assert np.abs(gaps.matrix[[0, 2], :modes]) == pytest.approx(np.abs(shapes))
 
 
 def test_what_it_costs_to_begin(monkeypatch):

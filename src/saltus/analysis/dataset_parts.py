@@ -13,7 +13,7 @@ import numpy as np
 from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.inputs.starts import Ensemble
 from saltus.flow.contact_table import ContactTable
-from saltus.flow.methods import Method
+from saltus.flow.methods import Method, note_on
 from saltus.flow.request import Outcome
 from saltus.flow.until import STATUS
 from saltus.kernels import status as st
@@ -139,7 +139,8 @@ def provenance(
     """Attributes that say where a result comes from; ``values`` are those of its parameters, but
     for the ``varied`` ones.
     """
-    return attributes(
+    note = note_on(method, system)
+    return ({"method_note": note} if note else {}) | attributes(
         system=system.name,
         equations=system.equations(),
         parameters=values,

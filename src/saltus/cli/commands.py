@@ -52,6 +52,7 @@ class PictureKind(StrEnum):
     impacts = "impacts"
     contact_forces = "contact_forces"
     energy = "energy"
+    sensitivity = "sensitivity"
     exponents = "exponents"
     methods = "methods"
 

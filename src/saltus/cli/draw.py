@@ -12,7 +12,7 @@ _WORDS = {
     "agreement": "the agreement "
         "of two maps of basins",
     "responses": "responses", "section": "a section", "spectrum": "a spectrum",
-    "impacts": "impacts", "energy": "energies",
+    "impacts": "impacts", "energy": "energies", "sensitivity": "derivatives",
     "methods": "one question by several methods", "exponents": "exponents",
     "branches": "branches of periodic orbits", "orbits": "periodic orbits",
     "bifurcation_curve": "a curve of bifurcations", "backbone": "a backbone",

@@ -77,7 +77,7 @@ TAYLOR = Interface(
         "impacts", "taylor/laws", "taylor/together", "taylor/trajectories"),
     sizes=(
         "NSTATES", "NGUARDS", "ORDER", "NCONST", "NTURNS", "CLOCK_ROW", "GAP_ROW", "SCALE_ROW",
-        "CALM_ROW", "ROWS", "NMOVED", "NSINGULAR",
+        "CALM_ROW", "ROWS", "NMOVED", "NSINGULAR", "NCOLUMNS",
         "NEWTON_DEGREE_1", "NEWTON_DEGREE_2", "NSERIES", "NCLOCKS",
     ),
     flags=("PROBED", "TANGENT", "LAWS", "LEVELS"),
@@ -195,7 +195,7 @@ _MODAL_TABLES = (
     *(_I1, _I1, _F1, _F2, _F2, _F2, _F2, _F2, _I2, _F2, _F2),
     *(_I2, _F2, _F2, _I1, _F2, _F2),
 )
-_MODAL_WORK = (_F2,) * 6 + (_F1, _F2, _F2, _F1, _F1) + (_F2,) * 15 + (_F1,)
+_MODAL_WORK = (_F2,) * 6 + (_F1, _F2, _F2, _F1, _F1) + (_F2,) * 15 + (_F1, _F2, _I1)
 
 #: The modal flow: what it needs of an equation are tables, which it is given.
 MODAL = Interface(
@@ -209,6 +209,7 @@ MODAL = Interface(
         "modal/gaps",
         "modal/laws",
         "modal/impacts",
+        "modal/friction",
         "modal/tangents",
         "modal/steps",
     ),

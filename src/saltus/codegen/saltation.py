@@ -75,10 +75,13 @@ def jump_function(system: System, clocks: Clocks) -> str:
     )
 
 
-def reset_function(system: System, clocks: Clocks) -> str:
+def reset_function(system: System, clocks: Clocks, dated: bool = False) -> str:
     """``reset(t, y, p, h, before, after, g, out)``: put the state after the jump of guard g's law
     into y, and S times the tangent, between two modes (bits); out[0] is the law's restitution,
     out[1] the closing velocity before.
+
+    If `dated`, out[3:] holds by how much earlier the instant of the jump comes, for each column of
+    the tangent: taken from there if out[2] isn't zero, else written there.
     """
     head = "@kernel\ndef reset(t, y, p, h, before, after, g, out):\n"
     base = system.tangent_of or system
@@ -119,7 +122,7 @@ def reset_function(system: System, clocks: Clocks) -> str:
         lines += [f"if g == {g}:", *("    " + line for line in code.lines)]
     helper = ""
     if system.tangent_of:
-        helper, more = _reset_of_tangent(system, base, clocks, carried)
+        helper, more = _reset_of_tangent(system, base, clocks, carried, dated)
         lines += more
     lines += ["out[0] = restitution", "out[1] = closing_before"]
     lines += [f"y[{i}] = new_{i}" for i in range(size)]
@@ -127,7 +130,7 @@ def reset_function(system: System, clocks: Clocks) -> str:
 
 
 def _reset_of_tangent(
-    system: System, base: System, clocks: Clocks, carried: list[tuple[int, int]]
+    system: System, base: System, clocks: Clocks, carried: list[tuple[int, int]], dated: bool
 ) -> tuple[str, list[str]]:
     """A function that multiplies a column of the tangent by S of a jump, and lines that call it."""
     size = len(base.states)
@@ -158,11 +161,15 @@ def _reset_of_tangent(
             "closing",
         ]
     )
-    lines += [f"reset_of_column(y[{j}:], {given})" for j in range(size)]
     column = [f"y[{i}]" for i in first_column(system)]
-    body = [
-        f"along = ({' + '.join(f'n_{i} * {entry}' for i, entry in enumerate(column))}) / closing"
-    ]
+    own = f"({' + '.join(f'n_{i} * {entry}' for i, entry in enumerate(column))}) / closing"
+    body = [f"along = {own}"]
+    if dated:
+        given = f"dated, date, {given}"
+        body = ["if dated == 0.0:", f"    date[0] = {own}", "along = date[0]"]
+    for j in range(size):
+        call = given.replace("dated, date", f"out[2], out[{3 + j}:]", 1)
+        lines.append(f"reset_of_column(y[{j}:], {call})")
     body += [
         f"carried_{i} = " + " + ".join(f"s_{i}_{k} * {column[k]}" for j, k in carried if j == i)
         for i in changed

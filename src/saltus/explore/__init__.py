@@ -48,13 +48,13 @@ class Explorer:
         """The study file of what the newest page shows, as text. Raises ParameterError if no page
         shows anything.
         """
+        from saltus.explore.desk import Desk
         from saltus.explore.save import study_text
+        from saltus.explore.shown import shown
 
-        view, desk = self.view, self._desk
-        shown = getattr(desk, "shown", None)
-        if not view or shown is None:
+        if not self.view or not isinstance(self._desk, Desk):
             raise ParameterError(f"no page shows anything yet: open {self.url}.")
-        return study_text(shown(view)[0], "view")
+        return study_text(shown(self._desk, self.view)[0], "view")
 
     def close(self) -> None:
         """End the pages' work and the server."""

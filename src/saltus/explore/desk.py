@@ -6,7 +6,6 @@ import threading
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,25 +14,17 @@ import xarray as xr
 from saltus.analysis.basins.basins import compiled
 from saltus.analysis.basins.pipeline import BasinPlan, basin_plan
 from saltus.analysis.inputs.starts import ensemble, range_of
-from saltus.analysis.motion.simulate import simulate
 from saltus.errors import ParameterError, unknown
 from saltus.explore import questions as asked
 from saltus.explore.about import about_answer, models_answer
 from saltus.explore.attractors import Legend
 from saltus.explore.frames import Answer, Emit
+from saltus.explore.kept_responses import KeptResponses
 from saltus.explore.map import KeptMaps, grow_map, look, plan_of_map
 from saltus.explore.motion import AskedRun, motion
 from saltus.explore.opening import Opening
 from saltus.explore.orbits import MOST_PERIODS, attractor_orbit, orbit_of, settle, tracked
 from saltus.explore.questions import QuestionError, about
-from saltus.explore.responses import (
-    VALUES,
-    KeptResponses,
-    respond,
-    response_orbit,
-    starts_from,
-)
-from saltus.explore.save import PARTS, View, saved, starts_of
 from saltus.flow.methods import METHODS, Method
 from saltus.system import System
 from saltus.units import from_si, to_si
@@ -62,7 +53,7 @@ class Desk:
         self._lock = threading.RLock()
         self._plans: OrderedDict[Any, BasinPlan] = OrderedDict()
         self._known: OrderedDict[Any, Legend] = OrderedDict()
-        self.maps, self._responses = KeptMaps(), KeptResponses()
+        self.maps, self.responses = KeptMaps(), KeptResponses()
         self._answers: Mapping[type, Callable[[Any], Answer]] = {
             asked.About: self._about,
             asked.Open: self._about,
@@ -180,11 +171,13 @@ class Desk:
         system, method = self.system_at(question.values), self.opening.method
         quantities = self.quantities_of(None)
         if question.responses is not None:
+            from saltus.explore.responses import response_orbit  # a fifth of a start
+
             row = question.point if question.event is None else question.event
             if row is None:
                 raise QuestionError("orbit of responses needs point or event.", "point")
             return response_orbit(
-                self._responses,
+                self.responses,
                 question.responses,
                 row,
                 question.event is not None,
@@ -215,6 +208,8 @@ class Desk:
         return tracked(old, source, system, method, self.period_of, quantities)
 
     def _respond(self, question: asked.ResponsesQuestion, emit: Emit) -> None:
+        from saltus.explore.responses import respond
+
         system, method = self.system_at(question.values), self.opening.method
         with about("parameter"):
             system.parameter_text(question.parameter)
@@ -226,77 +221,14 @@ class Desk:
         look(plan, known, self.threads)
         respond(
             known, method, question.parameter, limits, quantity, plan,
-            self._responses, emit, self.threads,
+            self.responses, emit, self.threads,
         )  # fmt: skip
 
     def _save(self, question: asked.Save) -> Answer:
-        shown = {}
-        for part in PARTS:
-            if part in question.view:
-                with about(f"view.{part}"):
-                    fields = question.view[part]
-                    if not isinstance(fields, Mapping):
-                        raise QuestionError("must hold the fields of the question.")
-                    shown[part] = asked.question_of(part, {**fields, "id": 0})
-        view, datasets = self.view_of(shown)
-        return saved(question, view, datasets)
+        from saltus.explore.save import saved
+        from saltus.explore.shown import shown
 
-    def view_of(self, shown: Mapping[str, Any]) -> tuple[View, dict[str, Callable[[], xr.Dataset]]]:
-        """What questions show, in SI, and the result of each, computed when it is called."""
-        first = next(iter(shown.values()), None)
-        system = self.system_at({} if first is None else first.values)
-        name = next((one.method for one in shown.values() if getattr(one, "method", None)), None)
-        method, found = self.method_of(name), dict[str, Callable[[], xr.Dataset]]()
-        given: dict[str, Any] = {}
-        if (motion_ := shown.get("motion")) is not None:
-            start = self.start_of(system, motion_.start)
-            given["start"] = dict(zip(system.states, start, strict=True))
-            given["length"] = self._length(system, motion_)
-            found["motion"] = partial(
-                simulate, system, start, method=method, progress=False, **given["length"]
-            )
-        if (map_ := shown.get("map")) is not None:
-            plan = plan_of_map(map_, system, method)
-            given["axes"] = {
-                axis: (float(one[0]), float(one[-1]), len(one)) for axis, one in plan.axes.items()
-            }
-            given |= {"at": dict(plan.fixed), "periods": plan.periods}
-            found["map"] = partial(self._finished, plan)
-        if (responses := shown.get("responses")) is not None:
-            limits = range_of(system, responses.parameter, responses.range)
-            given["vary"] = responses.parameter, *limits
-            plan = self.plan_of(system, method)
-            starts = starts_from(self.legend_at(plan), plan)
-            given["starts"] = starts_of(system.states, starts)
-            given["values_tried"] = VALUES
-            found["responses"] = partial(self._answered, system, method, responses, limits)
-        return View(self.opening, system, method, **given), found
-
-    def _length(self, system: System, question: asked.MotionQuestion) -> dict[str, Any]:
-        """The length of a motion as sl.simulate takes it."""
-        if question.t_end is not None:
-            return {"t_end": to_si(question.t_end, "s", "t_end")}
-        if system.forced_at is None:
-            return {"t_end": question.periods * self.opening.turn}
-        return {"periods": question.periods}
-
-    def _finished(self, plan: BasinPlan) -> xr.Dataset:
-        kept = self.maps.get(plan)
-        if kept is None or kept.dataset is None:
-            raise QuestionError("the map isn't finished: let it come to its end first.", "parts")
-        return kept.dataset
-
-    def _answered(
-        self, system: System, method: Method, question: asked.ResponsesQuestion, limits: Any
-    ) -> xr.Dataset:
-        first = system.outputs.names if system.outputs.first else system.states
-        about_it = (tuple(system.values.values()), method, question.parameter, limits)
-        number = self._responses.number((*about_it, question.quantity or first[0]))
-        if number is None:
-            raise QuestionError(
-                "the responses aren't finished: let them come to their end.", "parts"
-            )
-        return self._responses.get(number)[1]
+        return saved(question, *shown(self, question.view))
 
     def keep_responses(self, ds: xr.Dataset) -> None:
         """Keep branches that were computed before."""
@@ -304,7 +236,7 @@ class Desk:
         limits = tuple(float(ds.attrs[f"parameter_{end}"]) for end in ("low", "high"))
         for quantity in ds["output"].values.tolist():
             asked_for = (tuple(system.values.values()), self.opening.method, parameter, limits)
-            self._responses.put((*asked_for, quantity), system, ds)
+            self.responses.put((*asked_for, quantity), system, ds)
 
     # -- what is known of values -------------------------------------------------------------------
     def plan_of(self, system: System, method: Method) -> BasinPlan:
@@ -328,7 +260,7 @@ class Desk:
             if key not in self._known:
                 before = next(reversed(self._known.values()), None)
                 scale = self.plan_of(plan.system, plan.method).scale
-                branches = self._responses.orbits_at(plan.system)
+                branches = self.responses.orbits_at(plan.system)
                 legend = Legend(plan.map(1), scale, before, branches)
                 keep(self._known, key, legend, KEPT_VALUES)
             self._known.move_to_end(key)

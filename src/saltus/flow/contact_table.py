@@ -70,7 +70,8 @@ class ContactTable:
             np.concatenate(half) if len(half) > 1 else half[0]
             for half in zip(*(p.arrays for p in parts), strict=True)
         )
-        return cls(integers, floats).rows(np.argsort(integers[:, st.REC_TRAJECTORY], kind="stable"))
+        table, who = cls(integers, floats), integers[:, st.REC_TRAJECTORY]
+        return table if (np.diff(who) >= 0).all() else table.rows(np.argsort(who, kind="stable"))
 
     @classmethod
     def empty(cls, size: int, states: int) -> ContactTable:

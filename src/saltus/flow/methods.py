@@ -12,6 +12,7 @@ from saltus.flow.method import Method
 from saltus.flow.modal import Modal
 from saltus.flow.taylor import Taylor
 from saltus.system import System
+from saltus.system.linear import linear_pieces
 
 __all__ = [
     "METHODS",
@@ -68,3 +69,16 @@ def exact_method(method: Any, system: Any, asked: str) -> Method:
             lambda say: f"Leave {say.key('method')} out.",
         )
     return checked
+
+
+def note_on(method: Method, system: System) -> str:
+    """Which flow moves a system, and why, where the name of the method doesn't say so; else ``""``:
+    the modal flow is asked for, or would be the default, and doesn't serve the system.
+    """
+    asked = isinstance(method, Modal)
+    if not (asked or (isinstance(method, Taylor) and len(system.states) >= MANY_STATES)):
+        return ""
+    found = linear_pieces(system.origin)
+    if not isinstance(found, str):
+        return ""
+    return f"moved by Taylor: {found}" if asked else f"not by Modal: {found}"

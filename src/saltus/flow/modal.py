@@ -16,6 +16,7 @@ from saltus.errors import ParameterError
 from saltus.flow.counts import whole
 from saltus.flow.method import Method, explain_unknown_options, step_budget
 from saltus.flow.modal_parameters import varies_by
+from saltus.flow.modal_rubbing import Rubbing
 from saltus.flow.modal_tables import Tables
 from saltus.flow.modal_values import ValueSet
 from saltus.flow.taylor import Taylor
@@ -30,22 +31,26 @@ from saltus.system.tangent import tangent_states
 
 #: Share of a period, or of an unforced span, that is tried as the first step.
 FIRST_STEP = 1.0 / 64
+#: Times that a slice of the modal flow has the steps of a slice of other flows, at most: its steps
+#: grow with the states, not with their square.
+MOST_AT_ONCE = 150
 #: Terms of a gap's series by which the way from a boundary is told.
 WAYS = 6
 
 
 def bernstein_table(lanes: int) -> np.ndarray:
-    """Bernstein coefficients of the powers of x on [0, 1], and the differences of two that follow
-    one another, in the rows of the kernel: float64[2 * 16 * 16 / lanes, lanes].
+    """Bernstein coefficients of the powers of x on [0, 1], the differences of two that follow one
+    another, and the coefficients where the degree is one less, in the rows of the kernel:
+    float64[3 * 16 * 16 / lanes, lanes].
     """
-    order = layout.ORDER
-    table = np.array(
-        [[math.comb(i, k) / math.comb(order, k) for i in range(order + 1)]
-         for k in range(order + 1)]
-    )  # fmt: skip
+    terms, order = range(layout.ORDER + 1), layout.ORDER
+    table, less = (
+        np.array([[math.comb(i, k) / max(math.comb(n, k), 1) for i in terms] for k in terms])
+        for n in (order, order - 1)
+    )
     steps = np.diff(table, axis=1)
     steps = np.append(steps, steps[:, -1:], axis=1)
-    return np.concatenate([table, steps]).reshape(-1, lanes)
+    return np.concatenate([table, steps, less]).reshape(-1, lanes)
 
 
 class ModalFlow:
@@ -84,7 +89,7 @@ class ModalFlow:
     def propagate(self, *values: Any) -> int:
         """Move the trajectories of a batch, until contact states that haven't been made must be."""
         batch = Batch(*values[:-1])
-        budget = values[-1] * max(batch.state.shape[1] // 4, 1)
+        budget = values[-1] * min(max(batch.state.shape[1] ** 2 // 100, 1), MOST_AT_ONCE)
         with self.tables.lock:
             self._begin(batch)
             self._look_up(batch)
@@ -130,8 +135,10 @@ class ModalFlow:
                 empty((max(courses, 1), layout.VALUE + self.tables.linear.terms)),
                 empty((2 * groups, lanes)), empty((amplitudes, lanes)), empty((size, columns)),
                 empty((3, size)), bernstein_table(lanes),
-                empty((max(rows, 1), layout.BEYOND + 2 * groups + 2)),
-                empty((4 * groups * max(rows, 1), lanes)), empty((max(rows, 1), 11)), empty(5),
+                empty((max(rows, 1), layout.FIFTH + 1)),
+                empty((layout.WAVES * (groups + 1) * max(rows, 1), lanes)),
+                empty((max(rows, 1), 11)), empty(5),
+                empty((layout.QUEUE * (2 * groups + states), lanes)), np.zeros(1, np.int64),
             )  # fmt: skip
         arrays: tuple[np.ndarray, ...] = self._memory.arrays
         return arrays
@@ -174,11 +181,22 @@ class ModalFlow:
         size = np.abs(state) @ np.abs(given.gaps.matrix.T)
         zero = np.abs(gap) <= layout.ROUNDED * (size + np.abs(parts[1]) + np.abs(parts[2]))
         bits, allowed, plain = 1 << np.arange(gap.shape[1]), self.tables.allowed, self.tables.plain
-        zero &= plain | (allowed != 0)
+        beyond = ((gap * self.tables.limits > 0) & ~zero).any(axis=1)
+        batch.status[who[beyond]] = st.INVALID
+        rubs = zero & self.tables.rubs
+        zero &= plain | (allowed != 0) | rubs
         up = np.where(zero, allowed > 0, gap > 0) & ~self.tables.holds
         mode = up @ bits if gap.shape[1] else np.zeros(len(who), np.int64)
         fresh = zero @ bits if gap.shape[1] else mode
         zero &= plain
+        for i in np.flatnonzero(rubs.any(axis=1)).tolist():
+            begin = Rubbing(self.tables, which, state[i], drives[i])
+            mode[i] = begin.mode(int(mode[i]), rubs[i])
+            held = begin.held(int(mode[i]))
+            fresh[i] &= ~sum(1 << one.guard for one in held)
+            if held and self._tangents:
+                rows = batch.state[who[i], self._states :].reshape(self._states, -1)
+                rows[:] = begin.projection(int(mode[i]), held) @ rows
         for i in np.flatnonzero(zero.any(axis=1)).tolist():
             mode[i] |= self._ways(which, int(mode[i]), zero[i], state[i], time[i])
         batch.mode[who], batch.fresh[who] = mode, fresh
@@ -271,9 +289,10 @@ class Modal(Method):
 
     A gap is followed by the modes that matter and bounded by the others, so that no contact is
     missed; the instant of a contact is a zero of all modes, to rounding. At a rigid stop
-    (:func:`saltus.impact`) impacts, rest and release follow the rules of :class:`saltus.Taylor`.
-    Systems that it doesn't serve - nonlinear forces, friction, jumps - are moved by
-    :class:`saltus.Taylor`.
+    (:func:`saltus.impact`) impacts, rest and release follow the rules of :class:`saltus.Taylor`. So
+    do dry friction whose force in motion is linear in the states, and memories
+    (:func:`saltus.slider`), which begin within their limits. Systems that it doesn't serve -
+    nonlinear forces, friction beside rigid stops, jumps - are moved by :class:`saltus.Taylor`.
 
     Parameters
     ----------

@@ -185,7 +185,7 @@ def _always_together(
     others = known @ (sizes[:, None] > 1.5 * sizes) + np.abs(acts.offsets)[:, None]
     zero = sizes <= ROUNDING * acts.scale
     far_off = (static > MOST_LOSS * others).any(axis=0) | zero
-    slow = sizes < max(acts.scale / MOST_LOSS_OF_TWO, acts.fastest / MOST_LOSS)
+    slow = zero | (sizes < max(acts.scale / MOST_LOSS_OF_TWO, acts.fastest / MOST_LOSS))
     found |= (parts[:, 0] != 0) & far_off & slow
     return found
 

@@ -111,8 +111,8 @@ def _padded(waves: np.ndarray, width: int, number: float = 0.0) -> np.ndarray:
 
 
 def modal_rates(map_: Stroboscope, states: np.ndarray) -> np.ndarray | None:
-    """The rates at states float64[k, D] at a whole period, row i by row i of the map, float64[k, D];
-    None if another method moves this system, or a contact has a law.
+    """The rates at states float64[k, D] at a whole period, row i by row i of the map,
+    float64[k, D]; None if another method moves this system, or a contact has a law.
     """
     system = map_.system
     if not isinstance(map_.method.serving(system.origin), Modal):
@@ -124,8 +124,8 @@ def modal_rates(map_: Stroboscope, states: np.ndarray) -> np.ndarray | None:
     with tables.lock:
         for i, state in enumerate(states):
             given = tables.sets[tables.set_of(map_.parameters[i if len(map_) > 1 else 0])]
-            loads = [np.cos(given.lags), *(np.ravel(one.at(np.zeros(()))[0]) for one in given.courses)]
-            drives = np.concatenate(loads)
+            courses = [float(one.at(np.zeros(()))[0]) for one in given.courses]
+            drives = np.concatenate([np.cos(given.lags), courses])
             gap = given.gaps.matrix @ state + given.gaps.constant + given.gaps.driven @ drives
             piece = tables.piece_of(given, int((gap > 0) @ (1 << np.arange(len(gap)))))
             found[i] = piece.matrix @ state + piece.constant + piece.driven @ drives

@@ -30,9 +30,9 @@ from saltus.system.linear import LinearPiece, LinearSystem
 @functools.lru_cache(maxsize=256)
 def varies_by(linear: LinearSystem, name: str) -> bool:
     """True if the derivative with respect to a parameter has a closed form: its boundaries keep
-    their slopes, its laws of contact don't change, and no drive is a record.
+    their slopes, its laws of contact don't change, no drive is a record and no friction sticks.
     """
-    if linear.courses:
+    if linear.courses or linear.sticking:
         return False
     guards = linear.system.guards
     laws = [

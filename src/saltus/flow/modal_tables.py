@@ -19,11 +19,12 @@ from saltus.flow.modal_parameters import ParameterTables
 from saltus.flow.modal_rows import Links, Rows
 from saltus.flow.modal_values import ValueSet
 from saltus.kernels.modal import layout
-from saltus.kernels.status import LAW_KINDS, NO_LAW
+from saltus.kernels.status import HOLD_LAW, LAW_KINDS, NO_LAW, SURFACE_LAW
 from saltus.language.expression import Expr, walk
 from saltus.system import System
 from saltus.system.courses import Course, course_of
 from saltus.system.linear import LinearPiece, LinearSystem
+from saltus.system.linear_friction import is_idle, limit_side
 from saltus.system.linear_laws import Constrained, constrained, impacts_of, rows_of
 from saltus.system.quantity import remembered
 
@@ -64,16 +65,18 @@ class Tables:
     def __init__(self, linear: LinearSystem) -> None:
         self.linear = linear
         self.lock = threading.Lock()
-        laws = [guard.law for guard in linear.system.guards]
-        self.holds = np.array([is_hold(guard) for guard in linear.system.guards], bool)
-        self.plain = np.array([law is None for law in laws], bool)
-        self.allowed = np.array([law.side if law else 0 for law in laws], np.int64)
-        self._laws = _laws_of(linear.system)
+        self._laws = laws_of(linear)
+        kinds, sides = self._laws[:, layout.KIND], np.zeros(len(self._laws), np.int64)
+        for g, guard in enumerate(linear.system.guards):
+            sides[g] = guard.law.side if guard.law else 0
+        self.holds, self.plain = kinds == HOLD_LAW, kinds == NO_LAW
+        self.rubs, self.allowed = kinds == SURFACE_LAW, sides
+        self.limits = self._laws[:, layout.LIMITS]
         self._remembers = np.array(remembered(linear.system), np.int64)
         self._impacts = impacts_of(linear, linear.system.values)
         self.generation = 0
         self.clear()
-        n, guards = len(linear.states), len(linear.system.guards)
+        n, gaps = len(linear.states), len(self._laws)
         self.row_of, self.sign_of = self._rows_of_gaps()
         rows = int(self.row_of.max(initial=-1)) + 1
         self.first_guard = [int(np.flatnonzero(self.row_of == r)[0]) for r in range(rows)]
@@ -84,7 +87,7 @@ class Tables:
         courses = len(linear.courses)
         self.block_groups = -(-(n + 1 + 2 * drives + linear.terms * courses) // LANES)
         self.rows = 2 * self.groups + self.block_groups
-        counts = n, self.groups, self.state_groups, rows, guards, drives, self.rows, courses
+        counts = n, self.groups, self.state_groups, rows, gaps, drives, self.rows, courses
         self.sizes = np.array([*counts, 0, len(self._remembers), linear.terms], np.int64)
 
     def clear(self) -> None:
@@ -106,9 +109,9 @@ class Tables:
         #: Equations and modes of each contact state.
         self.made: list[tuple[_Equations, StateModes]] = []
         self._by: dict[tuple[str, ...], ParameterTables] = {}
-        drives, guards = max(len(self.linear.drives), 1), len(self.linear.system.guards)
-        self._offset, self._rate, self._lag = Rows(max(guards, 1)), Rows(drives), Rows(drives)
-        self._links = Links(layout.BEHIND + guards)
+        drives, gaps = max(len(self.linear.drives), 1), len(self._laws)
+        self._offset, self._rate, self._lag = Rows(max(gaps, 1)), Rows(drives), Rows(drives)
+        self._links = Links(layout.BEHIND + gaps)
         self._course = Rows(max(5 * len(self.linear.courses), 1))
         states = len(self.linear.states)
         width = states + 1 + len(self.linear.drives) + len(self.linear.courses)
@@ -123,7 +126,7 @@ class Tables:
         return self._held + sum(one.table.nbytes for one in tables) >= MOST_BYTES
 
     def _rows_of_gaps(self) -> tuple[np.ndarray, np.ndarray]:
-        """Row and sign of each guard's gap: guards whose gaps differ by a number only share one."""
+        """Row and sign of each gap: those that differ by a number only share one."""
         values = dict(self.linear.system.values)
         rng = np.random.default_rng(0)
         sets = [values, {name: one * rng.uniform(0.9, 1.1) for name, one in values.items()}]
@@ -150,8 +153,9 @@ class Tables:
         """The derivatives with respect to some parameters."""
         if names not in self._by:
             widths = self.groups, self.state_groups
-            known = self.sets, self.made, self._links
-            self._by[names] = ParameterTables(self.linear, names, *widths, *known)
+            self._by[names] = ParameterTables(
+                self.linear, names, *widths, self.sets, self.made, self._links
+            )
         return self._by[names]
 
     def arrays(self, names: tuple[str, ...] = ()) -> tuple[np.ndarray, ...]:
@@ -223,8 +227,9 @@ class Tables:
 
     def _make(self, which: int, mode: int) -> None:
         given = self.sets[which]
-        shown = self._shown(given, mode)
-        free = constrained(self.linear.system, mode, given.gaps, given.impacts)
+        shown = self.shown(given, mode)
+        stays = [g for g in np.flatnonzero(self.limits).tolist() if self.stays(given, mode, g)]
+        free = constrained(self.linear.system, mode, given.gaps, given.impacts, stays)
         known = self._equations_of(given, mode, free)
         modes = self._state_modes(known, given, shown, free)
         number, guards = len(self.made), len(self.linear.system.guards)
@@ -238,16 +243,18 @@ class Tables:
                     links[layout.SMOOTH] |= 1 << g
                     smooth = int(self._links.table[behind, layout.SMOOTH]) | 1 << g
                     self._links.put(behind, layout.SMOOTH, smooth)
+        links += [-1] * (len(self._laws) - guards)
         self._links.add(np.array(links))
         if self.holds.any():
             # the closing accelerations of contacts that can be held: the gaps of their hold guards
-            rows, partner = rows_of(shown), self._laws[:, layout.PARTNER]
+            rows, partner = rows_of(shown), self._laws[:, layout.PARTNER].copy()
+            partner[guards:] = np.arange(guards, len(partner))
             self._presses.add(np.where((partner >= 0)[:, None], rows[partner], 0.0))
         self.made.append((known, modes))
         self._states[which, mode] = number
 
     # -- one contact state -------------------------------------------------------------------------
-    def _shown(self, given: ValueSet, mode: int) -> LinearPiece:
+    def shown(self, given: ValueSet, mode: int) -> LinearPiece:
         """The gaps in a contact state: those of hold guards depend on it."""
         return self.linear.gaps(given.values, mode) if self.holds.any() else given.gaps
 
@@ -265,6 +272,14 @@ class Tables:
             piece, gaps, given.rates, speeds, LANES * self.groups, known.eigen, known.fastest, also
         )
         return spread_over(modes, free, len(given.rates)) if held else modes
+
+    def stays(self, given: ValueSet, mode: int, g: int) -> bool:
+        """True if a memory stays at its limit in a contact state, the boundary of a guard."""
+        if (self.limits[g] > 0) != bool(mode >> g & 1):
+            return False
+        normal = given.gaps.matrix[g]
+        rates = [normal @ rows_of(self.piece_of(given, one)) for one in (mode, mode ^ 1 << g)]
+        return not rates[0].any() and bool(rates[1].any()) and not given.gaps.driven[g].any()
 
     def piece_of(self, given: ValueSet, mode: int) -> LinearPiece:
         """The matrices of a contact state."""
@@ -316,7 +331,9 @@ class Tables:
         return self._known[key]
 
     def _table(self, modes: StateModes, gaps: np.ndarray) -> np.ndarray:
-        """The table of some modes: lambda, its size, L, V, amplitudes of the gaps; the block."""
+        """The table of some modes: lambda, its size, L, V, amplitudes of the gaps; where L and V
+        aren't zero; the block.
+        """
         values, states, slots = modes.values, len(modes.vectors), len(modes.values)
         width, count = LANES * self.groups, LANES * self.state_groups
         weight = np.where(values.imag > 0, 2.0, 1.0)
@@ -336,8 +353,16 @@ class Tables:
         rows = gaps @ to_states[:states]
         waves = np.stack([rows.real, rows.imag, np.abs(rows)], axis=1)
         block = table_of(modes.block, gaps, LANES, self.state_groups)
+        sides = (
+            (to_modes, self.groups, self.state_groups),
+            (to_states, self.state_groups, self.groups),
+        )
+        runs = [
+            runs_of((side != 0).reshape(rows, LANES, columns, LANES).any(axis=(1, 3)))
+            for side, rows, columns in sides
+        ]
         return np.concatenate(
-            [one.ravel() for one in (lam.real, lam.imag, size, left, right, waves, *block)]
+            [one.ravel() for one in (lam.real, lam.imag, size, left, right, waves, *runs, *block)]
         )
 
     def _steady_of(self, modes: StateModes, given: ValueSet, shown: LinearPiece) -> int:
@@ -365,18 +390,42 @@ class Tables:
         return self.steady.add(np.concatenate([*states, flat]))
 
 
-def _laws_of(system: System) -> np.ndarray:
-    """Of each guard the kind of its law, its partner, and the state that its gap is a level of,
-    int64[guards, 3]; -1 where there is none.
+def runs_of(filled: np.ndarray) -> np.ndarray:
+    """Where the rows of bool[rows, places] are true: the first place of a run and the one behind
+    it, then those of a second run behind the widest gap, float64[rows, 4].
     """
-    table = np.full((len(system.guards), 3), -1, np.int64)
-    table[:, layout.KIND] = NO_LAW
-    for g, guard in enumerate(system.guards):
-        if guard.law is not None:
-            table[g, layout.KIND] = LAW_KINDS[guard.law.kind]
-            table[g, layout.PARTNER] = guard.law.partner
+    runs = np.zeros((len(filled), 4))
+    for run, row in zip(runs, filled, strict=True):
+        places = np.flatnonzero(row)
+        if len(places):
+            apart = np.diff(places)
+            cut = int(np.argmax(apart)) + 1 if apart.max(initial=1) > 1 else len(places)
+            for part, own in enumerate((places[:cut], places[cut:])):
+                run[2 * part : 2 * part + 2] = (own[0], own[-1] + 1) if len(own) else 0
+    return runs
+
+
+def laws_of(linear: LinearSystem) -> np.ndarray:
+    """What the kernel reads of the law of each gap, see layout.KIND: int64[gaps, LAW_COLUMNS]."""
+    guards, sticking = linear.system.guards, linear.sticking
+    table = np.full((len(linear.own_gaps), layout.LAW_COLUMNS), -1, np.int64)
+    table[:, layout.KIND], table[:, layout.LIMITS] = NO_LAW, 0
+    for g, guard in enumerate(guards):
         if guard.state is not None:
-            table[g, layout.LEVEL] = system.states.index(guard.state)
+            table[g, layout.LEVEL] = linear.system.states.index(guard.state)
+        table[g, layout.LIMITS] = limit_side(guard)
+        if is_idle(guards, guard):
+            table[g, layout.KIND] = HOLD_LAW
+        elif guard.law is not None and limit_side(guard) == 0:
+            holds = g if is_hold(guard) else guard.law.partner
+            kind, partner = LAW_KINDS[guard.law.kind], guard.law.partner
+            table[g, [layout.KIND, layout.PARTNER, layout.HOLDER]] = kind, partner, holds
+    for one in sticking:
+        fades = int(one.fades)
+        table[one.second, [layout.KIND, layout.PARTNER]] = HOLD_LAW, one.guard
+        table[[one.guard, one.hold, one.second], layout.HOLDER] = one.hold
+        table[[one.guard, one.hold, one.second], layout.SECOND] = one.second
+        table[[one.guard, one.hold, one.second], layout.FADES] = fades
     return table
 
 

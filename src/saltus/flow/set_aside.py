@@ -86,6 +86,20 @@ class Boundaries:
         gap: np.ndarray = np.maximum(self._side[g] * work[self._module.GAP_ROW + g], 0.0)
         return gap
 
+    def _noise(self, work: np.ndarray, j: int) -> np.ndarray:
+        """Gaps that can't be told from zero."""
+        scale = work[self._module.SCALE_ROW + self._module.SINGULAR_GUARD[j]]
+        noise: np.ndarray = NONZERO_ROUNDINGS * ROUNDING * scale
+        return noise
+
+    def _stays(self, work: np.ndarray, j: int, h: np.ndarray) -> np.ndarray:
+        """True where a gap changes by no more than rounding in a time h."""
+        first = self._module.GUARD_ROW[self._module.SINGULAR_GUARD[j]]
+        changes = work[first + 1 : first + _terms(self._module)]
+        powers = h ** np.arange(1, _terms(self._module))[:, None]
+        stays: np.ndarray = (np.abs(changes) * powers).sum(axis=0) <= self._noise(work, j)
+        return stays
+
     def _way(self, work: np.ndarray, j: int) -> np.ndarray:
         """Time in which the quadratic part of a gap changes by the gap itself."""
         first, gap = self._module.GUARD_ROW[self._module.SINGULAR_GUARD[j]], self._gap(work, j)
@@ -113,10 +127,7 @@ class Boundaries:
         the term changes nothing until it is reached.
         """
         module, count = self._module, _terms(self._module)
-        nonzero = (
-            self._gap(work, j)
-            > NONZERO_ROUNDINGS * ROUNDING * work[module.SCALE_ROW + module.SINGULAR_GUARD[j]]
-        )
+        nonzero = self._gap(work, j) > self._noise(work, j)
         size = np.abs(self._state[: module.NMOVED])
         weak = np.all(
             self._way(work, j) * self._forces(work, j) <= 0.25 * NEGLIGIBLE * size, axis=0
@@ -127,7 +138,7 @@ class Boundaries:
 
     def _negligible(self, work: np.ndarray, h: np.ndarray, which: np.ndarray) -> np.ndarray:
         """Lengths over which the terms set aside change no state by more than NEGLIGIBLE, estimated
-        in the middle of the step.
+        in the middle of the step. Those of a boundary on which the motion stays are zero.
         """
         module, count = self._module, _terms(self._module)
         # [terms, states, n]
@@ -140,17 +151,18 @@ class Boundaries:
             self._constants[:, which],
             self._clock[:, which].copy(),
         )
-        side[module.NGUARDS :] = -1.0
         phase, there = clock[module.TAU].copy(), np.zeros_like(work)
         for _ in range(TRIALS):
+            for j in range(module.SINGULAR):
+                stays = (self._side[module.NGUARDS + j, which] > 0.0) & self._stays(work, j, h)
+                side[module.NGUARDS + j] = np.where(stays, 1.0, -1.0)
             clock[module.TAU] = phase + 0.5 * h
             module.jets(polynomials.value(series, 0.5 * h), side, constants, clock, there)
             defect = np.abs(
                 there[1 : module.NSTATES * count : count] - polynomials.value(rates, 0.5 * h)
             )
-            change = (defect * h / (np.abs(series[0]) + h * np.abs(series[1]))).max(
-                axis=0
-            ) / NEGLIGIBLE
+            size = np.where(defect == 0.0, 1.0, np.abs(series[0]) + h * np.abs(series[1]))
+            change = (defect * h / size).max(axis=0) / NEGLIGIBLE
             fits = change <= 1.0
             if fits.all():
                 break

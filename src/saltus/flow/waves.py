@@ -208,9 +208,7 @@ def extremes(one: WaveLegs) -> np.ndarray:
     for state, mine in one.by_state(legs):
         tolerance[state] = TOLERANCE * (sizes[mine] @ one.row_sizes[state].T).max(axis=0)
 
-    def beyond(
-        leg: np.ndarray, row: np.ndarray, value: np.ndarray, room: np.ndarray
-    ) -> np.ndarray:
+    def beyond(leg: np.ndarray, row: np.ndarray, value: np.ndarray, room: np.ndarray) -> np.ndarray:
         state = one.state[leg]
         least = tolerance[state[:, None] if value.ndim == 2 else state, row]
         low, high = found[:, row]

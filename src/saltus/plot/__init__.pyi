@@ -17,6 +17,7 @@ from saltus.plot.methods import methods as methods
 from saltus.plot.orbits import periodic_orbits as periodic_orbits
 from saltus.plot.phase import phase as phase
 from saltus.plot.section import section as section
+from saltus.plot.sensitivity import sensitivity as sensitivity
 from saltus.plot.spectrum import spectrum as spectrum
 from saltus.plot.style import OKABE_ITO as OKABE_ITO
 from saltus.plot.style import style as style

@@ -22,6 +22,7 @@ TAKES: dict[str, tuple[str, ...]] = {
     "impacts": (schema.IMPACTS,),
     "contact_forces": (schema.IMPACTS,),
     "energy": (schema.ENERGY,),
+    "sensitivity": (schema.SENSITIVITY,),
     "methods": (schema.METHODS,),
     "exponents": (schema.EXPONENTS,),
     "branches": (schema.BRANCHES,),

@@ -317,7 +317,14 @@ def _lost_ends(
     at = at[np.isfinite(values[at])]
     if not len(at):
         return {}
-    mark = {"ls": "none", "marker": "s", "ms": 3.6, "mfc": "white", "mec": QUIET, "mew": 0.8}
+    mark: dict[str, Any] = {
+        "ls": "none",
+        "marker": "s",
+        "ms": 3.6,
+        "mfc": "white",
+        "mec": QUIET,
+        "mew": 0.8,
+    }
     x = ds[point_name(ds.attrs["parameter"])].values[at] * across.factor
     ax.plot(x, values[at] * up.factor, zorder=4, gid="lost ends", **mark)
     return {"no orbit found beyond": Line2D([], [], **mark)}

@@ -49,6 +49,8 @@ def describe(ds: xr.Dataset) -> str:
             f"method   {ds.attrs['method']}{_options(ds)}, saltus "
             f"{ds.attrs.get('saltus_version', 'unknown')}"
         )
+        if note := ds.attrs.get("method_note"):
+            lines.append(f"         {note}")
     lines += KINDS[kind_of(ds)].account(ds)
     return "\n".join([*lines, f"hash     {ds.attrs.get('result_hash', 'none')[:16]}"])
 

@@ -21,6 +21,7 @@ from saltus.language.derivatives import differentiate
 from saltus.language.evaluate import evaluate
 from saltus.language.expression import Expr
 from saltus.system.courses import TERMS, reason_against, terms_of
+from saltus.system.linear_friction import Sticking, gaps_of, sticking_of
 from saltus.system.periodic import rate_of
 from saltus.system.quantity import is_remembered, remembered
 from saltus.system.system import System
@@ -80,11 +81,14 @@ class LinearSystem:
         The sines and cosines of time in it.
     courses : tuple of Expr
         The drives in it that are polynomials of the time between breaks.
+    sticking : tuple of Sticking
+        The boundaries on which friction may hold the motion.
     """
 
     system: System
     drives: tuple[Drive, ...]
     courses: tuple[Expr, ...]
+    sticking: tuple[Sticking, ...]
     _field: tuple[Expr, ...]
     _gaps: tuple[Expr, ...]
     _names: Mapping[Expr, Expr]
@@ -115,7 +119,9 @@ class LinearSystem:
 
     @property
     def own_gaps(self) -> tuple[Expr, ...]:
-        """The gaps, as functions of the states and the drives."""
+        """The gaps, as functions of the states and the drives: those of the guards, then the second
+        margins of frictions.
+        """
         return self._gaps
 
     def of(self, quantities: tuple[Expr, ...]) -> tuple[Expr, ...] | None:
@@ -176,9 +182,9 @@ class LinearSystem:
         return (asked, entries) if _are_affine(entries, moving) else None
 
     def gaps(self, values: Mapping[str, float], mode: int = 0) -> LinearPiece:
-        """a, c and e of all guards in a contact state, float64[guards, N], float64[guards],
-        float64[guards, D]; only those of hold guards depend on it. The arrays belong to all that
-        have asked for them.
+        """a, c and e of all gaps in a contact state, float64[gaps, N], float64[gaps],
+        float64[gaps, D]; only those of hold guards and second margins depend on it. The arrays
+        belong to all that have asked for them.
         """
         return _rows_of(self, self._gaps, self._used(self._gaps, values), mode)
 
@@ -310,7 +316,10 @@ def linear_pieces(system: System) -> LinearSystem | str:
         for one in (law.constraint, *law.settled[:size], *law.reset[:size])
         if one is not None
     )
-    gaps = tuple(guard.gap for guard in system.guards)
+    sticking = sticking_of(system)
+    if sticking and stops:
+        return "it has friction beside rigid stops"
+    gaps = gaps_of(system, sticking)
     drives, courses = dict[Expr, Drive](), dict[Expr, None]()
     for node in _driving(*system.field[:size], *gaps, *laws):
         rate = rate_of(node.args[0]) if node.op in ("sin", "cos") else None
@@ -337,9 +346,13 @@ def linear_pieces(system: System) -> LinearSystem | str:
         return "a boundary of it moves when another is crossed"
     if not _are_affine((*field, *gaps, *laws), [_name(i) for i in range(len(names))]):
         return "it isn't linear between its contacts"
-    linear = LinearSystem(system, tuple(drives.values()), tuple(courses), field, gaps, names)
+    found = tuple(drives.values()), tuple(courses), sticking
+    linear = LinearSystem(system, *found, field, gaps, names)
     if not all(_only_reverses(linear, law) for law in stops):
         return "an impact of it changes more than velocities"
+    rows = linear.gaps(system.values).matrix[[one.guard for one in sticking]]
+    if len(rows) and np.linalg.matrix_rank(rows) < len(rows):
+        return "frictions of it that may stick at once depend on one another"
     return linear
 
 
@@ -389,8 +402,8 @@ def _missing(system: System, size: int) -> str | None:
     for law in [guard.law for guard in system.guards if guard.law]:
         if law.kind == "jump":
             return "a contact of it makes its state jump"
-        if law.kind == "surface" or law.friction is not None:
-            return "a contact of it has friction, or a force that jumps"
+        if law.friction is not None:
+            return "a rigid stop of it has friction"
         if law.restitution is not None and ex.varies(law.restitution):
             return "a restitution of it isn't a number"
     return None

@@ -1,4 +1,5 @@
-"""Laws of contact that a linear flow carries: impacts and rest at rigid stops, by numbers.
+"""Laws of contact that a linear flow carries: impacts and rest at rigid stops, and friction that
+sticks, by numbers.
 
 At an impact of guard g the closing velocity ``w = n_g z + ...`` becomes ``-e w``: the state changes
 by ``-(1 + e) w p_g``, so ``z -> R z + r`` with ``R = I - (1 + e) p_g n_g``. A contact at rest keeps
@@ -8,7 +9,7 @@ its own force changes its sign.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,15 +28,15 @@ INDEPENDENT = 1e-10
 
 @dataclass(frozen=True)
 class Impacts:
-    """Laws of all guards for one set of parameter values; zeros for guards without one.
+    """Laws of all gaps for one set of parameter values; zeros for those without one.
 
     Attributes
     ----------
     closing : LinearPiece
-        The closing velocities.
-    push : float64[guards, N]
+        The closing velocities; of a friction the velocity of sliding.
+    push : float64[gaps, N]
         Change of the state by which the closing velocity becomes one more.
-    restitution : float64[guards]
+    restitution : float64[gaps]
         Coefficients of restitution.
     """
 
@@ -76,9 +77,13 @@ class Constrained:
 
 def impacts_of(linear: LinearSystem, values: Mapping[str, float]) -> Impacts:
     """The laws of a system by numbers."""
-    guards, n = linear.system.guards, len(linear.states)
-    constraints = [ex.constant(0.0)] * len(guards)
-    push, restitution = np.zeros((len(guards), n)), np.zeros(len(guards))
+    guards, n, count = linear.system.guards, len(linear.states), len(linear.own_gaps)
+    constraints = [ex.constant(0.0)] * count
+    push, restitution = np.zeros((count, n)), np.zeros(count)
+    for one in linear.sticking:
+        constraints[one.guard] = guards[one.guard].gap
+        normal = linear.pieces_of([guards[one.guard].gap], values).matrix[0]
+        push[one.guard] = normal / (normal @ normal)
     for g, guard in enumerate(guards):
         law = guard.law
         if law is None or law.constraint is None or law.restitution is None:
@@ -92,13 +97,17 @@ def impacts_of(linear: LinearSystem, values: Mapping[str, float]) -> Impacts:
     return Impacts(closing, push, restitution)
 
 
-def constrained(system: System, mode: int, gaps: LinearPiece, impacts: Impacts) -> Constrained:
-    """The states that the contacts held in a mode (bits) allow."""
+def constrained(
+    system: System, mode: int, gaps: LinearPiece, impacts: Impacts, stays: Sequence[int] = ()
+) -> Constrained:
+    """The states that the contacts held in a mode (bits) allow, and memories that stay at the
+    boundaries of some guards.
+    """
     n = gaps.matrix.shape[1]
     held = [
         g.law.partner for i, g in enumerate(system.guards) if g.law and is_hold(g) and mode >> i & 1
     ]
-    rows = np.vstack([rows_of(gaps)[held], rows_of(impacts.closing)[held]])
+    rows = np.vstack([rows_of(gaps)[[*held, *stays]], rows_of(impacts.closing)[held]])
     if not len(rows):
         return Constrained(np.arange(n), np.eye(n), np.zeros((n, rows.shape[1] - n)))
     pivots = np.sort(_independent(rows[:, :n]))

@@ -7,7 +7,8 @@ come with the flow's own precision.
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping, Sequence
+import itertools
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from saltus.contact.boundaries import surface_guard
@@ -19,6 +20,7 @@ from saltus.language.expression import (
     Expr,
     add,
     constant,
+    depends_on,
     div,
     mul,
     neg,
@@ -28,12 +30,16 @@ from saltus.language.expression import (
     sub,
     substituted,
 )
+from saltus.language.known_sides import assuming
 from saltus.language.names import why_no_name
 from saltus.language.sums import total
+from saltus.system.checks import MOST_GUARDS
 from saltus.system.read_off import Quantity, quantity
 from saltus.system.system import System
 from saltus.units import check_declared, to_si
 
+#: Most contacts that switch an output whose turning points are looked for.
+MOST_SIDES = 3
 #: Suffix of a remembered state's name, which no user can write.
 _REMEMBERED = " before a jump"
 
@@ -131,6 +137,65 @@ def turning_surface(system: System, name: str) -> System:
     """
     formula, guards = formula_of(system, name)
     return _with_guard(system, rate_of(system, formula), guards, f"{name} turns")
+
+
+def with_turning_surfaces(
+    system: System, names: Iterable[str], admits: Callable[[System], bool]
+) -> tuple[System, dict[int, str], list[str]]:
+    """The system with surfaces on which states and outputs turn, as many as it has room for.
+
+    One that contacts switch, such as the force of a stop, has a surface for each of their sides: it
+    jumps where they do, and a surface that jumps would have no side between.
+
+    Parameters
+    ----------
+    system : System
+        The equations and values.
+    names : iterable of str
+        States and outputs.
+    admits : callable
+        True for a system that is wanted; a surface that makes another one is left out.
+
+    Returns
+    -------
+    System
+    dict of int to str
+        The state or output of each new guard by its number. The gap of a guard is the rate.
+    list of str
+        The names that turn on these surfaces only, or never. The others turn at times of their own,
+        on surfaces that were left out, or are switched by more than :data:`MOST_SIDES` contacts or
+        by boundaries of their own.
+    """
+    found, of, complete = system, {}, []
+    for name in names:
+        formula, guards = formula_of(system, name)
+        bits = sorted(bits_in([formula]))
+        if len(guards) > len(system.guards) or len(bits) > MOST_SIDES:
+            continue
+        gaps: dict[Expr, None] = {}
+        for sides in itertools.product((False, True), repeat=len(bits)):
+            rate = rate_of(system, _on_sides(formula, bits, sides))
+            gaps[_on_sides(rate, bits, sides)] = None
+        left_out = False
+        for gap in gaps:
+            if not depends_on(gap, ("state",)):
+                left_out |= depends_on(gap, ("time",))
+                continue
+            more = _with_guard(found, gap, found.guards, f"{name} turns")
+            if len(found.guards) >= MOST_GUARDS or not admits(more):
+                left_out = True
+                continue
+            of[len(found.guards)] = name
+            found = more
+        if not left_out:
+            complete.append(name)
+    return found, of, complete
+
+
+def _on_sides(formula: Expr, bits: Iterable[int], sides: Iterable[bool]) -> Expr:
+    for bit, side in zip(bits, sides, strict=True):
+        formula = assuming(formula, bit, side)
+    return formula
 
 
 def formula_of(system: System, name: str) -> tuple[Expr, tuple[Guard, ...]]:

@@ -9,6 +9,7 @@ import saltus as sl
 from saltus.analysis.basins import growing, labels, pipeline
 from saltus.explore import map as maps
 from saltus.explore import responses
+from saltus.explore.attractors import Legend
 from saltus.explore.desk import Desk
 from saltus.explore.frames import packed, unpacked
 from saltus.explore.opening import opening_of
@@ -218,25 +219,26 @@ def test_a_hue_belongs_to_an_orbit_at_neighbouring_values(desk):
     assert not {row["hue"] for row in fresh} & set(hues.values())
 
 
-def test_a_hue_follows_a_branch_to_values_far_away(desk, monkeypatch):
+def test_a_hue_follows_a_branch_to_other_values(desk, monkeypatch):
     monkeypatch.setattr(responses, "VALUES", 1)
     monkeypatch.setattr(responses, "STARTS", 1)
     at_home, found = Screen(desk, size=(16, 16)), []
     hues = {row["period"]: row["hue"] for row in at_home.end["attractors"]}
     question = {"id": 2, "parameter": "frequency", "range": [15.0, 15.08]}
     desk.answer(question_of("responses", question), lambda *answer: found.append(answer))
-    head, arrays = found[-1]
-    (number,) = [i for i, row in enumerate(head["branches"]) if row["period"] == 1]
-    assert head["branches"][number]["hue"] == hues[1]
-    Screen(desk, size=(16, 16), values={"force": 2.0})  # hues of before are those of other orbits
-    away = Screen(desk, size=(16, 16), values={"frequency": 15.06})
-    mine = arrays["point_branch"] == number
-    order = np.argsort(arrays["point_parameter"][mine])
-    peak = np.interp(
-        15.06, arrays["point_parameter"][mine][order], arrays["point_peak"][mine][order]
-    )
-    (there,) = [row for row in away.end["attractors"] if abs(row["peak"]["x"] / peak - 1) < 1e-2]
-    assert there["hue"] == hues[1]
+    away = RIG.with_values(frequency=15.06)
+    orbits = desk.responses.orbits_at(away)
+    assert {one.period: hue for one, hue in orbits} == hues
+    assert desk.responses.orbits_at(away.with_values(force=2.0)) == []
+    assert desk.responses.orbits_at(RIG.with_values(frequency=15.1)) == []
+    plan = desk.plan_of(away, sl.Taylor())
+    told = [(one, hue + 7) for one, hue in orbits]  # what no order of discovery gives
+    legend = Legend(plan.map(1), plan.scale, None, told)
+    legend.grow(plan.scout())
+    shown = {row["period"]: row["hue"] for row in legend.table()}
+    known = {period: hue for period, hue in shown.items() if period in hues}
+    assert known
+    assert known == {period: hues[period] + 7 for period in known}
 
 
 def test_a_map_without_forcing_is_that_of_basins():

@@ -159,9 +159,12 @@ def test_other_methods_are_refused(server, method):
 def test_a_page_is_kept_to_itself(server, tmp_path, monkeypatch):
     (tmp_path / "page").mkdir()
     (tmp_path / "page" / "index.html").write_text("<p>here</p>")
+    (tmp_path / "page" / "notes.txt").write_text("not for pages")
     monkeypatch.setattr(servers.resources, "files", lambda package: tmp_path)
     status, headers, body = get(server)
     assert (status, body) == (200, b"<p>here</p>")
+    assert get(server, "/index.html")[0] == 200
+    assert get(server, "/notes.txt")[0] == 404
     policy = dict(part.split(" ", 1) for part in headers["content-security-policy"].split("; "))
     assert policy["default-src"] == policy["frame-ancestors"] == "'none'"
     assert policy["script-src"] == policy["connect-src"] == policy["style-src"] == "'self'"
@@ -261,6 +264,9 @@ def test_nothing_listens_when_it_has_ended(server):
         line.send(json.dumps({"ask": "about", "id": 1}))
         heard(line)
         assert other.idle == 0.0
+        (session,) = other.sessions
     other.stop()
+    assert session._closed  # and its work has ended
+    assert other.sessions == []
     with socket.socket() as line, pytest.raises(ConnectionRefusedError):
         line.connect(("127.0.0.1", other.port))

@@ -34,7 +34,7 @@ def test_stable_ones_are_dots_and_others_crosses_at_their_points(orbits):
     assert words == [f"T, {word}" for word in orbits.orbit_stability.values]
 
 
-def test_over_a_map_they_are_drawn_in_its_units(orbits):
+def test_over_a_map_they_are_drawn_in_its_units(orbits, few_scouts):
     basins = sl.basins(RIG, x=("-5 mm", "5 mm", 4), v=("-1 m/s", "1 m/s", 4))
     axes = sl.plot.periodic_orbits(orbits, over=basins, legend=False)
     assert [line.get_xdata()[0] for line in marks(axes)] == pytest.approx(

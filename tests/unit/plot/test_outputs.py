@@ -29,7 +29,7 @@ def run():
 
 @pytest.fixture(scope="module")
 def responses():
-    return sl.frequency_response(structure(), frequency=[1.7, 1.8, 1.9], progress=False)
+    return sl.frequency_response(structure(), frequency=[1.8, 1.82], progress=False)
 
 
 @pytest.fixture(autouse=True)

@@ -537,3 +537,15 @@ def test_small_responses_are_read_on_a_logarithmic_axis(peak):
     assert frequency_response(peak).get_yscale() == "linear"
     with pytest.raises(ParameterError, match="log=True with quantity='mean', which has a sign"):
         frequency_response(peak, log=True, quantity="mean")
+
+
+def test_ends_beyond_which_no_orbit_was_found_are_marked():
+    rig = sl.models.delangre("a", force="4 N", frequency="17 Hz")
+    ds = sl.frequency_response(rig, ["17 Hz", "17.2 Hz"], progress=False)
+    assert not [one for one in sl.plot.frequency_response(ds).lines if one.get_gid() == "lost ends"]
+    ds["branch_end"][0] = "lost"
+    ax = sl.plot.frequency_response(ds, quantity="peak")
+    (mark,) = [one for one in ax.lines if one.get_gid() == "lost ends"]
+    last = np.flatnonzero(ds.point_branch.values == 0)[-1]
+    np.testing.assert_allclose(mark.get_xdata(), ds.point_frequency.values[[last]])
+    assert "no orbit found beyond" in [one.get_text() for one in ax.get_legend().get_texts()]

@@ -23,7 +23,7 @@ def test_starts_say_how_small_a_basin_they_may_have_missed():
     assert "1 start: other attractors may be missed" in sl.describe(sl.attractors(wells, (1.5, 0)))
 
 
-def test_maps_and_shares_say_it_too():
+def test_maps_and_shares_say_it_too(few_scouts):
     found = sl.basins(wells, x=(-2, 2, 10), v=(-1, 1, 10))
     shares = sl.basin_fractions(wells, x=(-2, 2), v=(-1, 1), samples=100)
     for one in (found, shares):

@@ -61,8 +61,8 @@ def test_not_toml(text, parts):
         (HEAD + "[simulat]", "the file has no table 'simulat'. Did you mean 'simulate'?"),
         (
             HEAD,
-            "a study asks something: it has a table [simulate], [poincare], [spectrum], "
-            "[impacts], [energy], [lyapunov], ",
+            "a study asks something: it has a table [simulate], [sensitivity], [poincare], "
+            "[spectrum], [impacts], [energy], [lyapunov], ",
         ),
         (WHOLE.replace("periods", "# "), "[simulate] give the length once"),
         (WHOLE + 't_end = "2 s"', "[simulate] give the length once"),
@@ -126,8 +126,8 @@ def test_schema_tells_editors_the_keys():
     schema = Study.model_json_schema()
     json.dumps(schema)
     assert set(schema["properties"]) == {
-        "study", "system", "method", "simulate", "compare", "poincare", "spectrum", "impacts",
-        "energy", "lyapunov",
+        "study", "system", "method", "simulate", "sensitivity", "compare", "poincare",
+        "spectrum", "impacts", "energy", "lyapunov",
         "frequency_response", "bifurcation_diagram", "equilibria", "periodic_orbits", "branches",
         "bifurcation_curve", "backbone", "basins",
     }  # fmt: skip

@@ -97,7 +97,7 @@ def damped(t, x, v, *, gap=0.5, frequency=0.2):
     return v, sl.cos(2 * sl.pi * frequency * t) - x - v - sl.where(x > gap, 4 * (x - gap), 0)
 
 
-def test_every_analysis_runs():
+def test_every_analysis_runs(few_scouts):
     smooth, quiet = sl.regularise(damped, width=0.1), {"progress": False}
     assert sl.simulate(smooth, (0.0, 0.0), periods=2).sizes["contact"] == 0
     map_ = sl.basins(smooth, x=(-1, 1, 2), v=(-1, 1, 2), **quiet)

@@ -30,7 +30,7 @@ from saltus.analysis.inputs.axes import along, count_along
 from saltus.analysis.inputs.halton import halton
 from saltus.analysis.inputs.sensed import sensed
 from saltus.analysis.inputs.starts import check_system, fill, fixed_states
-from saltus.errors import ParameterError, must_be, unknown
+from saltus.errors import ParameterError, unknown
 from saltus.flow.counts import whole
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
@@ -311,8 +311,6 @@ def basin_plan(
 
 def _fixed_sensors(system: System, at: Any, moving: Iterable[str]) -> dict[str, float]:
     """What sensors show [SI] besides those of a map."""
-    if at is not None and not isinstance(at, Mapping):
-        raise must_be("at", "a mapping of sensors to starts", at)
     units, given = dict(zip(system.outputs.names, system.outputs.units, strict=True)), at or {}
     for name in (*moving, *given):
         if name not in units:

@@ -166,7 +166,8 @@ def backbone(
         )
         peak = _Peak(moving, orbits, method, measured)
         whole_z, end = _family(orbits, z, peak, (low, high), points, show)
-        attrs = {"mode": mode, "amplitude_of": state, "end": end, "phase": phase}
+        # not "mode": SciPy's netCDF-3 keeps its own there, and neither writes nor reads such a file
+        attrs = {"vibration_mode": mode, "amplitude_of": state, "end": end, "phase": phase}
         return _table(system, moving, orbits, whole_z, method, attrs)
 
 

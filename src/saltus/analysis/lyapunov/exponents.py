@@ -44,9 +44,7 @@ class Exponents(Algorithm):
 
     algorithm = "variational equations with saltation, QR method"
 
-    def __init__(
-        self, map_: Stroboscope, start: np.ndarray, periods: int, *blocks: Any, most: int
-    ):
+    def __init__(self, map_: Stroboscope, start: np.ndarray, periods: int, *blocks: Any, most: int):
         super().__init__(map_, start, periods, *blocks)
         self._ends, self._most = running_ends(periods), most
         k, size, m = len(start), most, len(self._ends)

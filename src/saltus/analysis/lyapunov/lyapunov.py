@@ -132,8 +132,8 @@ def lyapunov(
         ``kind``: ``periodic``, ``quasi_periodic``,
         ``chaotic``, ``equilibrium``, ``limit_cycle`` or ``unclear``; ``response_period``: n of nT,
         or 0. ``exponent_sum`` (of all) beside ``mean_divergence``, which must agree: the mean trace
-        of the Jacobian and what contacts add, found without the tangent. ``near_graze``: 1 if the motion
-        after the transient grazes a boundary, or is an orbit that misses one by less than a
+        of the Jacobian and what contacts add, found without the tangent. ``near_graze``: 1 if the
+        motion after the transient grazes a boundary, or is an orbit that misses one by less than a
         thousandth of its size: then deviations that could be seen in practice don't grow as
         infinitesimal ones do. ``running_exponent`` and its interval over ``running_time``;
         ``status``.

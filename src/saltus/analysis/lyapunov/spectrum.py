@@ -39,7 +39,8 @@ class Spectrum:
     Attributes
     ----------
     exponents, errors, half_width : float64[k, m]
-        The m largest in descending order, their standard errors, and half of the 95 % confidence interval.
+        The m largest in descending order, their standard errors, and half of the 95 % confidence
+        interval.
     volume : float64[k]
         Mean growth of volumes, found without the tangent: the sum of the exponents.
     batches : int64[k]

@@ -8,6 +8,7 @@ series            amplitudes on their way, states, and gaps there
 gaps              what the gaps do over a step, and where they cross
 laws              impacts, contacts at rest, their release
 impacts           several impacts at one instant
+friction          friction that sticks and slides
 tangents          the derivative of the state with respect to the start and to parameters
 steps             steps, and the life of a trajectory
 ================  ==================================================================================

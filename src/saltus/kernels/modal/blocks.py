@@ -20,8 +20,7 @@ TAIL = 1.6
 @inner
 def block_of(modes, m):
     """First row of the block of a contact state, behind its modes."""
-    groups = m.sizes[MODE_GROUPS]
-    return modes + groups * (3 + 4 * LANES * m.sizes[STATE_GROUPS] + 3 * m.sizes[GAP_ROWS])
+    return runs_of(modes, m) + m.sizes[MODE_GROUPS] + m.sizes[STATE_GROUPS]
 
 
 @inner

@@ -33,10 +33,11 @@ def stand(modes, steady, which, m):
         real, imaginary = load(m.y, g, LANES), load(m.y, groups + g, LANES)
         store(m.size, g, root(fma(real, real, imaginary * imaginary)))
     for r in range(m.sizes[GAP_ROWS]):
-        row, at = waves_of(r, modes, m), 4 * groups * r
+        row, at = waves_of(r, modes, m), first_wave(r, m)
         value, rate, fifth = splat(0.0, LANES), splat(0.0, LANES), splat(0.0, LANES)
         size, speed = splat(0.0, LANES), splat(0.0, LANES)
-        m.stood[r, BEYOND + groups], m.stood[r, BEYOND + 2 * groups + 1] = 0.0, 0.0
+        store(m.waves, at + WAVES * groups + BEYOND, size)
+        store(m.waves, at + WAVES * groups + FASTER, speed)
         for g in range(groups - 1, -1, -1):
             real, imaginary = load(m.y, g, LANES), load(m.y, groups + g, LANES)
             a, b = load(m.modes, row + g, LANES), load(m.modes, row + groups + g, LANES)
@@ -44,17 +45,15 @@ def stand(modes, steady, which, m):
             a, b = load(m.modes, modes + g, LANES), load(m.modes, modes + groups + g, LANES)
             going, fast = fma(-b, imaginary, a * real), load(m.modes, modes + 2 * groups + g, LANES)
             bound = load(m.size, g, LANES) * load(m.modes, row + 2 * groups + g, LANES)
-            store(m.waves, at + 4 * g, real)
-            store(m.waves, at + 4 * g + 1, imaginary)
-            store(m.waves, at + 4 * g + 2, going)
-            store(m.waves, at + 4 * g + 3, bound)
+            store(m.waves, at + WAVES * g + REAL, real)
+            store(m.waves, at + WAVES * g + IMAGINARY, imaginary)
+            store(m.waves, at + WAVES * g + GOING, going)
+            store(m.waves, at + WAVES * g + BOUND, bound)
             value, rate = value + real, rate + going
             size, speed, square = size + bound, fma(bound, fast, speed), fast * fast
             fifth = fma(bound * fast, square * square, fifth)
-            store(m.sums, 0, size)
-            store(m.sums, 1, speed)
-            m.stood[r, BEYOND + g] = total_of(m.sums, 0)
-            m.stood[r, BEYOND + groups + 1 + g] = total_of(m.sums, 1)
+            store(m.waves, at + WAVES * g + BEYOND, size)
+            store(m.waves, at + WAVES * g + FASTER, speed)
         store(m.sums, 0, value)
         store(m.sums, 1, rate)
         store(m.sums, 2, fifth)
@@ -68,7 +67,7 @@ def stand_row(r, steady, which, m):
     value, rate, fifth = total_of(m.sums, 0), total_of(m.sums, 1), total_of(m.sums, 2)
     first, at = numbers_of_gap(r, steady, m)
     more, faster = steady_gap(first, at, which, m)
-    size = m.stood[r, BEYOND] + abs(number(m.steady, first, at))
+    size = total_of(m.waves, first_wave(r, m) + BEYOND) + abs(number(m.steady, first, at))
     for d in range(m.sizes[DRIVES]):
         a, b = number(m.steady, first, at + 1 + 2 * d), number(m.steady, first, at + 2 + 2 * d)
         size += abs(a) + abs(b)
@@ -82,6 +81,12 @@ def waves_of(r, modes, m):
     """First row of the amplitudes of a row of gaps in the table of modes."""
     groups = m.sizes[MODE_GROUPS]
     return modes + groups * (3 + 4 * LANES * m.sizes[STATE_GROUPS]) + 3 * groups * r
+
+
+@inner
+def first_wave(r, m):
+    """First row of a row of gaps in `waves`."""
+    return r * (WAVES * m.sizes[MODE_GROUPS] + WAVES)
 
 
 @inner
@@ -106,7 +111,8 @@ def reach(i, h, modes, batch, m):
         slow = 0.5 * abs(rate) if fresh == (rate > 0.0) else 0.0
         value = 0.0 if fresh else 0.5 * value
         while most < groups:
-            left, speed = m.stood[r, BEYOND + most], m.stood[r, BEYOND + groups + 1 + most]
+            row = first_wave(r, m) + WAVES * most
+            left, speed = total_of(m.waves, row + BEYOND), total_of(m.waves, row + FASTER)
             if left <= value or speed <= slow:
                 break
             most += 1
@@ -131,13 +137,13 @@ def bound_row(r, modes, steady, which, h, near, m):
     """Bounds of a row of gaps over a step, by the ways that its waves can go: quick, and enough for
     a gap that is far from its boundary.
     """
-    groups, way = m.sizes[MODE_GROUPS], splat(0.0, LANES)
+    groups, at, way = m.sizes[MODE_GROUPS], first_wave(r, m), splat(0.0, LANES)
     for g in range(near):
-        bound = load(m.waves, 4 * (groups * r + g) + 3, LANES)
+        bound = load(m.waves, at + WAVES * g + BOUND, LANES)
         part = load(m.modes, modes + 2 * groups + g, LANES) * h
         way = fma(bound, smaller(part, splat(2.0, LANES)), way)
     store(m.sums, 0, way)
-    most = total_of(m.sums, 0) + 2.0 * m.stood[r, BEYOND + near]
+    most = total_of(m.sums, 0) + 2.0 * total_of(m.waves, at + WAVES * near + BEYOND)
     first, at = numbers_of_gap(r, steady, m)
     for d in range(m.sizes[DRIVES]):
         a, b = number(m.steady, first, at + 1 + 2 * d), number(m.steady, first, at + 2 + 2 * d)
@@ -159,25 +165,26 @@ def series_of(r, modes, steady, which, h, near, m):
         store(m.sums, k, splat(0.0, LANES))
     rest = splat(0.0, LANES)
     for g in range(near):
-        at = 4 * (groups * r + g)
+        at = first_wave(r, m) + WAVES * g
         part = load(m.modes, modes + 2 * groups + g, LANES) * h
         # Re(lambda^(k+1) y) = 2 Re(lambda) Re(lambda^k y) - |lambda|^2 Re(lambda^(k-1) y)
         twice, squared = load(m.modes, modes + g, LANES) * (2.0 * h), part * part
-        term, following = load(m.waves, at, LANES), load(m.waves, at + 2, LANES) * h
+        term, following = load(m.waves, at + REAL, LANES), load(m.waves, at + GOING, LANES) * h
         for k in range(ORDER + 1):
             store(m.sums, k, load(m.sums, k, LANES) + term)
             term, following = following, fma(twice, following, -(squared * term))
         fourth = squared * squared
         eighth = fourth * fourth
-        rest = fma(load(m.waves, at + 3, LANES), eighth * eighth, rest)
+        rest = fma(load(m.waves, at + BOUND, LANES), eighth * eighth, rest)
     store(m.sums, ORDER + 1, rest * (1.0 / FACTORIAL))
     store(m.sums, ORDER + 2, rest * (16.0 / FACTORIAL))
     store(m.sums, ORDER + 3, splat(0.0, LANES))
     add_block_series(r, modes, h, m)
     for k in range(ORDER + 1):
         m.q[r, k] = total_of(m.sums, k)
-    e0 = total_of(m.sums, ORDER + 1) + m.stood[r, BEYOND + near]
-    e1 = total_of(m.sums, ORDER + 2) + m.stood[r, BEYOND + groups + 1 + near] * h
+    beyond = first_wave(r, m) + WAVES * near
+    e0 = total_of(m.sums, ORDER + 1) + total_of(m.waves, beyond + BEYOND)
+    e1 = total_of(m.sums, ORDER + 2) + total_of(m.waves, beyond + FASTER) * h
     size = total_of(m.sums, ORDER + 3) + m.stood[r, SIZE]
     first, at = numbers_of_gap(r, steady, m)
     m.q[r, 0] += number(m.steady, first, at)
@@ -310,6 +317,24 @@ def terms_of(i, g, side, batch, m):
 
 
 @kernel
+def bernstein_of(degree, m):
+    """Bernstein coefficients of the terms in `p` on [0, 1], to the first row of `bern`."""
+    if degree < ORDER - 1:
+        to_bernstein(m.p, degree, m.bern[0])
+        return
+    rows = (ORDER + 1) // LANES
+    first = 0 if degree == ORDER else 2 * (ORDER + 1) * rows
+    for i in range(rows):
+        a = splat(0.0, LANES)
+        for k in range(min((i + 1) * LANES, degree + 1)):
+            a = fma(load(m.bernstein, first + k * rows + i, LANES), m.p[k], a)
+        store(m.sums, 0, a)
+        for j in range(LANES):
+            m.bern[0, i * LANES + j] = m.sums[0, j]
+    m.bern[0, degree] = polynomial(m.p, degree, 1.0)
+
+
+@kernel
 def pieces(g, degree, fresh, error, whole, slope_error, noise, shortest, m):
     """Outcome of a gap by the parts of its step, from the first on, as far as they tell: the whole
     step, its halves, their halves, down to the shortest.
@@ -377,6 +402,8 @@ def decide(i, g, batch, m):
     noise = terms_of(i, g, side, batch, m)
     error, slope_error = m.errors[m.row_of[g], 0], m.errors[m.row_of[g], 1]
     exact, known = error <= noise, known_zeros(i, g, batch)
+    if known == 1 and m.laws[g, LIMITS] != 0 and turns_here(i, g, noise, batch, m):
+        known = 2
     fresh, degree, whole = known > 0, ORDER - known, error
     if fresh:
         whole += abs(m.p[0])  # what the bounded modes add to the gap where it is zero
@@ -386,6 +413,9 @@ def decide(i, g, batch, m):
         if known > 1 and not exact:
             return OPEN
         if exact and is_rounding(m.p, degree, noise):
+            if m.laws[g, KIND] == HOLD_LAW:  # the force that holds has gone
+                m.found[g, PLACE], m.found[g, FINAL] = 0.0, 1.0
+                return CROSSES
             m.found[g, RIDDEN] = 1.0
             return CLEAR
         if exact and leading_sign(m.p, degree) < 0:
@@ -400,10 +430,11 @@ def decide(i, g, batch, m):
             batch.status[i] = MODE_VIOLATION
             return CLEAR
         # what presses a contact at rest jumps where the state does
-        if m.p[0] < -noise or side_of_leaving(m.p, degree, False, noise) < 0:
+        least = 0 if m.laws[g, KIND] == HOLD_LAW and m.laws[g, SECOND] >= 0 else -1
+        if m.p[0] < -noise or side_of_leaving(m.p, degree, False, noise) <= least:
             m.found[g, PLACE], m.found[g, FINAL] = 0.0, 1.0
             return CROSSES
-    to_bernstein(m.p, degree, m.bern[0])
+    bernstein_of(degree, m)
     shortest = 1.0 if exact else SHORTEST_PIECE
     answer = pieces(g, degree, fresh, error, whole, slope_error, noise, shortest, m)
     if answer != OPEN or not exact:
@@ -515,9 +546,9 @@ def gap_after(r, h, modes, steady, which, m):
     a, b, c = splat(0.0, LANES), splat(0.0, LANES), splat(0.0, LANES)
     d, e = splat(0.0, LANES), splat(0.0, LANES)
     for g in range(groups):
-        at = 4 * (groups * r + g)
+        at = first_wave(r, m) + WAVES * g
         cosine, sine = factor_of(modes, g, h, m)
-        real, imaginary = load(m.waves, at, LANES), load(m.waves, at + 1, LANES)
+        real, imaginary = load(m.waves, at + REAL, LANES), load(m.waves, at + IMAGINARY, LANES)
         real, imaginary = fma(-imaginary, sine, real * cosine), fma(imaginary, cosine, real * sine)
         grow, size = load(m.modes, modes + g, LANES), load(m.modes, modes + 2 * groups + g, LANES)
         turns, twice, squared = load(m.modes, modes + groups + g, LANES), 2.0 * grow, size * size

@@ -32,9 +32,9 @@ from saltus.kernels.status import (
 @inner
 def is_watched(g, mode, m):
     """True if a guard can act: a hold guard while its contact is held, others while it isn't."""
-    partner, holds = m.laws[g, PARTNER], m.laws[g, KIND] == HOLD_LAW
-    held = partner >= 0 and (mode >> (g if holds else partner)) & 1 == 1
-    return held == holds
+    holder = m.laws[g, HOLDER]
+    held = holder >= 0 and (mode >> holder) & 1 == 1
+    return held == (m.laws[g, KIND] == HOLD_LAW)
 
 
 @inner
@@ -59,7 +59,19 @@ def know_nothing(i, batch):
     """Time has passed: no gap is known to be zero, and the start is over."""
     batch.fresh[i] = 0
     batch.carry[i, TWICE], batch.carry[i, THRICE], batch.carry[i, STARTS] = 0.0, 0.0, 0.0
-    batch.carry[i, DATED] = 0.0
+    batch.carry[i, DATED], batch.carry[i, REVERSED] = 0.0, 0.0
+
+
+@inner
+def know_rides(i, batch, m):
+    """Time has passed, and the state hasn't jumped: boundaries that were ridden go on to be."""
+    fresh, twice, thrice = 0, int(batch.carry[i, TWICE]), int(batch.carry[i, THRICE])
+    for g in range(m.sizes[GUARDS]):
+        if m.found[g, RIDDEN] > 0.5:
+            fresh |= 1 << g
+    know_nothing(i, batch)
+    batch.fresh[i] = fresh
+    batch.carry[i, TWICE], batch.carry[i, THRICE] = float(twice & fresh), float(thrice & fresh)
 
 
 # -- linear functions of the state -----------------------------------------------------------------
@@ -157,7 +169,9 @@ def first_law(hits, m):
 def act(i, g, tau, d, hits, modes, steady, batch, m):
     """Let the law of a guard act a time d after tau. Returns the status."""
     state_after(i, tau, d, modes, steady, batch, m)
-    if d > 0.0:
+    if d > 0.0 and m.laws[g, SECOND] >= 0:
+        know_rides(i, batch, m)
+    elif d > 0.0:
         know_nothing(i, batch)
     elif has_just_landed(i, tau, batch):
         for j in range(m.sizes[STATES]):
@@ -168,7 +182,9 @@ def act(i, g, tau, d, hits, modes, steady, batch, m):
             know_zeros(i, other, max(1, known_zeros(i, other, batch)), batch)
     before, at = batch.mode[i], int(batch.carry[i, AT])
     status, endless = RUNNING, 0
-    if m.laws[g, KIND] == HOLD_LAW:
+    if m.laws[g, SECOND] >= 0:
+        rub(i, g, tau + d, d > 0.0, modes, steady, batch, m)
+    elif m.laws[g, KIND] == HOLD_LAW:
         release(i, g, tau + d, 3 if d > 0.0 else 2, batch, m)
     else:
         status, endless = impacts(i, g, tau + d, hits, modes, steady, batch, m)
@@ -179,6 +195,8 @@ def act(i, g, tau, d, hits, modes, steady, batch, m):
         leave_columns(i, struck, at, tau + d, batch, m)
         if endless != 0:
             repeat_impacts(i, endless, tau + d, batch, m)
+        elif m.laws[g, SECOND] >= 0:
+            date_rubbing(i, g, modes, tau + d, d > 0.0, batch, m)
         elif struck != 0:
             strike_columns(i, g, tau + d, batch, m)
     slides = count_landing(i, tau + d, batch)

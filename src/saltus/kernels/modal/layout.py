@@ -42,15 +42,19 @@ MODES, STEADY, SMOOTH, SLOPES, BEHIND = range(5)
 # tables in which these numbers stand; with tangents the time for which they haven't been moved [s]
 # and the boundaries just crossed (bits); gaps whose rate is known to be zero too, and those whose
 # acceleration is (bits), whether no time has passed since the start, the contact that was struck
-# (one more than its number; 0: none), whether it is known how the instant of a landing moves; then
-# the amplitudes, and with tangents the rates of the states and the gaps before these boundaries,
+# (one more than its number; 0: none), whether it is known how the instant of a landing moves, the
+# frictions whose sliding has been reversed at this instant (bits); then the amplitudes, and with tangents the rates of the states and the gaps before these boundaries,
 # how that instant moves with each column, and with parameters the amplitudes when the derivative
 # was moved last.
 AT, ENTERS, NEXT_STEP, LANDED_AT, LANDINGS, RIDES, SET, TABLES, WAITED, CROSSED = range(10)
-TWICE, THRICE, STARTS, ASKS, DATED, AMPLITUDES = range(10, 16)
+TWICE, THRICE, STARTS, ASKS, DATED, REVERSED, AMPLITUDES = range(10, 17)
 # Columns of `laws`, for each guard: the kind of its law (status.py), its hold guard (of a hold
-# guard: its contact's), the state that its gap is a level of; -1 where there is none.
-KIND, PARTNER, LEVEL = range(3)
+# guard: its contact's), the state that its gap is a level of; the guard whose bit says that the
+# contact is held; of a friction, and of what holds it, the number of the second margin, and whether
+# nothing jumps at its release; -1 where there is none; the side to which the input
+# leads on at the limit of a memory, 0 at other boundaries. Second margins are guards behind those of
+# the system, whose bits are never set: their gaps are minus the margins.
+KIND, PARTNER, LEVEL, HOLDER, SECOND, FADES, LIMITS, LAW_COLUMNS = range(8)
 # Rows of `acts`, where a guard has a law: guards, set by set. Columns: the gap and the closing
 # velocity as functions of the state - N slopes, a constant, slopes for the cosines of the H drives
 # and for the C courses -, the change of the state by a unit of closing velocity, N numbers, the
@@ -68,10 +72,15 @@ CLEAR, CROSSES, OPEN = range(3)
 # decided, the end of the bracket of the crossing.
 PLACE, FINAL, RIDDEN, TOUCHED, DECIDED, BRACKET = range(6)
 # Columns of `stood`, for each row of gaps where the amplitudes stand: value and rate, the size of
-# its terms, what its fifth derivative is at most; then for each group of modes the sizes of all
-# terms from it on, and those of their rates. Rows of `waves`, for each row of gaps and group of
-# modes: its real and imaginary part, its rate, its size.
-HERE, SLOPE, SIZE, FIFTH, BEYOND = range(5)
+# its terms, what its fifth derivative is at most.
+HERE, SLOPE, SIZE, FIFTH = range(4)
+# Rows of `waves`, for each row of gaps: of each group of modes its real and imaginary part, its
+# rate, its size, the sizes of all terms from it on, and those of their rates; then these two once
+# more, 0. The last two are lanes whose numbers add up to them.
+REAL, IMAGINARY, GOING, BOUND, BEYOND, FASTER, WAVES = range(7)
+#: Samples that wait for one product with the modes of their contact state. Rows of `queue`, for
+#: each: its amplitudes, the steady answer.
+QUEUE = 8
 # Columns of `spans`, for each row of gaps over a step: bounds of the gap without what its series
 # leaves out; whether the series is known; its first and its last Bernstein coefficient, the least
 # and the largest difference of two, those that rise and that fall (bits), coefficients below and
@@ -99,5 +108,6 @@ Modal = namedtuple(
     "Modal",
     "sizes row_of sign_of offset rate lag modes steady links course pieces laws acts presses "
     "remembers varied shifts y moved size sums q errors p bern bounds slopes out touches state "
-    "answer angle found chain record factor column columns struck bernstein stood waves spans near",
+    "answer angle found chain record factor column columns struck bernstein stood waves spans near "
+    "queue queued",
 )

@@ -123,36 +123,59 @@ def less_answer(m):
 @kernel
 def amplitudes_of(modes, y, m):
     """Amplitudes of what is in `state`, to y: L z."""
-    width, count = 2 * m.sizes[MODE_GROUPS], LANES * m.sizes[STATE_GROUPS]
-    for g in range(width):
-        row = modes + 3 * m.sizes[MODE_GROUPS] + g * count
+    groups, count = m.sizes[MODE_GROUPS], LANES * m.sizes[STATE_GROUPS]
+    for g in range(2 * groups):
+        runs = runs_of(modes, m) + g % groups
+        first = modes + 3 * groups + g * count
         a, b = splat(0.0, LANES), splat(0.0, LANES)
         c, d = splat(0.0, LANES), splat(0.0, LANES)
-        for i in range(0, count, 4):
-            a = fma(load(m.modes, row + i, LANES), number(m.state, 0, i), a)
-            b = fma(load(m.modes, row + i + 1, LANES), number(m.state, 0, i + 1), b)
-            c = fma(load(m.modes, row + i + 2, LANES), number(m.state, 0, i + 2), c)
-            d = fma(load(m.modes, row + i + 3, LANES), number(m.state, 0, i + 3), d)
+        for run in range(0, LANES, 2):
+            for s in range(int(m.modes[runs, run]), int(m.modes[runs, run + 1])):
+                row = first + LANES * s
+                a = fma(load(m.modes, row, LANES), m.state[s, 0], a)
+                b = fma(load(m.modes, row + 1, LANES), m.state[s, 1], b)
+                c = fma(load(m.modes, row + 2, LANES), m.state[s, 2], c)
+                d = fma(load(m.modes, row + 3, LANES), m.state[s, 3], d)
         store(y, g, (a + b) + (c + d))
     block_amplitudes(modes, y, m)
+
+
+@inner
+def runs_of(modes, m):
+    """First row of the runs of a table of modes: of each group of modes the groups of states that
+    its amplitudes ask for, of each group of states the groups of modes that it asks for, as first
+    and last one of two runs. All else is zero: without contact a mode is two states.
+    """
+    groups = m.sizes[MODE_GROUPS]
+    return modes + groups * (3 + 4 * LANES * m.sizes[STATE_GROUPS] + 3 * m.sizes[GAP_ROWS])
+
+
+@inner
+def group_of_states(s, modes, y, at, answer, m):
+    """A lane of states: an answer, and Re(V y) of the amplitudes in the rows of y from `at` on."""
+    groups, runs = m.sizes[MODE_GROUPS], runs_of(modes, m) + m.sizes[MODE_GROUPS] + s
+    first = modes + 3 * groups + 2 * groups * LANES * (m.sizes[STATE_GROUPS] + s)
+    a, b = answer, splat(0.0, LANES)
+    c, d = splat(0.0, LANES), splat(0.0, LANES)
+    for run in range(0, LANES, 2):
+        for g in range(int(m.modes[runs, run]), int(m.modes[runs, run + 1])):
+            row, real, imaginary = first + 2 * LANES * g, at + g, at + groups + g
+            a = fma(load(m.modes, row, LANES), y[real, 0], a)
+            b = fma(load(m.modes, row + 1, LANES), y[imaginary, 0], b)
+            c = fma(load(m.modes, row + 2, LANES), y[real, 1], c)
+            d = fma(load(m.modes, row + 3, LANES), y[imaginary, 1], d)
+            a = fma(load(m.modes, row + 4, LANES), y[real, 2], a)
+            b = fma(load(m.modes, row + 5, LANES), y[imaginary, 2], b)
+            c = fma(load(m.modes, row + 6, LANES), y[real, 3], c)
+            d = fma(load(m.modes, row + 7, LANES), y[imaginary, 3], d)
+    return (a + b) + (c + d)
 
 
 @kernel
 def state_of(modes, y, m):
     """The state that some amplitudes are, to `state`: z_p + Re(V y). Needs `answer`."""
-    groups = m.sizes[MODE_GROUPS]
-    count = LANES * groups
-    first = modes + 3 * groups + 2 * groups * LANES * m.sizes[STATE_GROUPS]
     for s in range(m.sizes[STATE_GROUPS]):
-        row = first + 2 * count * s
-        a, b = load(m.answer, s, LANES), splat(0.0, LANES)
-        c, d = splat(0.0, LANES), splat(0.0, LANES)
-        for j in range(0, count, 2):
-            a = fma(load(m.modes, row + 2 * j, LANES), number(y, 0, j), a)
-            b = fma(load(m.modes, row + 2 * j + 1, LANES), number(y, groups, j), b)
-            c = fma(load(m.modes, row + 2 * j + 2, LANES), number(y, 0, j + 1), c)
-            d = fma(load(m.modes, row + 2 * j + 3, LANES), number(y, groups, j + 1), d)
-        store(m.state, s, (a + b) + (c + d))
+        store(m.state, s, group_of_states(s, modes, y, 0, load(m.answer, s, LANES), m))
     add_block_state(modes, y, m)
 
 

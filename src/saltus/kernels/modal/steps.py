@@ -105,21 +105,26 @@ def state_after(i, tau, d, modes, steady, batch, m):
 
 
 @kernel
-def write_samples(i, tau, until, modes, steady, batch, m):
-    """Write the samples due up to a time of the period from the amplitudes at tau."""
+def take_samples(i, tau, until, modes, steady, batch, m):
+    """Take the samples due up to a time of the period from the amplitudes at tau: their states are
+    written together, when the queue is full or the contact state ends.
+    """
     k = batch.cursor[i]
     while 0 <= k < batch.sample_count.shape[0] and batch.sample_count[k] <= batch.count[i]:
         due = (batch.sample_count[k] - batch.count[i]) * batch.period[i]
         due += batch.sample_fraction[k] * batch.period[i]
         if due > until:
             break
-        state_after(i, tau, due - tau, modes, steady, batch, m)
         states = m.sizes[STATES]
         if due == tau and has_just_landed(i, tau, batch):
             for j in range(states):
-                m.state[j // LANES, j % LANES] = batch.state[i, j]
-        for j in range(states):
-            batch.samples[i, k, j] = m.state[j // LANES, j % LANES]
+                batch.samples[i, k, j] = batch.state[i, j]
+        elif block_groups(modes, m) > 0:
+            state_after(i, tau, due - tau, modes, steady, batch, m)
+            for j in range(states):
+                batch.samples[i, k, j] = m.state[j // LANES, j % LANES]
+        else:
+            put_off(i, k, tau, due - tau, modes, steady, batch, m)
         for j in range(states, states + m.sizes[REMEMBERED]):
             batch.samples[i, k, j] = batch.state[i, j]
         if m.sizes[TANGENTS] != 0:
@@ -130,6 +135,41 @@ def write_samples(i, tau, until, modes, steady, batch, m):
         batch.sample_mode[i, k] = batch.mode[i]
         k += 1
     batch.cursor[i] = k
+
+
+@inner
+def put_off(i, k, tau, d, modes, steady, batch, m):
+    """Put the amplitudes of a sample a time d after tau, and the answer, into the queue."""
+    if m.queued[0] == QUEUE:
+        write_queue(i, k, modes, batch, m)
+    move(modes, d, m)
+    drive(i, tau + d, batch, m)
+    answer_now(steady, m)
+    width = 2 * m.sizes[MODE_GROUPS]
+    row = m.queued[0] * (width + m.sizes[STATE_GROUPS])
+    for g in range(width):
+        store(m.queue, row + g, load(m.moved, g, LANES))
+    for s in range(m.sizes[STATE_GROUPS]):
+        store(m.queue, row + width + s, load(m.answer, s, LANES))
+    m.queued[0] += 1
+
+
+@kernel
+def write_queue(i, k, modes, batch, m):
+    """Write the samples in the queue, the last ones before sample k: all of them for one group of
+    states after the other, whose part of the table stays near.
+    """
+    width, states, count = 2 * m.sizes[MODE_GROUPS], m.sizes[STATES], m.queued[0]
+    if count == 0:
+        return
+    for s in range(m.sizes[STATE_GROUPS]):
+        for p in range(count):
+            row = p * (width + m.sizes[STATE_GROUPS])
+            answer = load(m.queue, row + width + s, LANES)
+            store(m.sums, 0, group_of_states(s, modes, m.queue, row, answer, m))
+            for j in range(min(LANES, states - LANES * s)):
+                batch.samples[i, k - count + p, LANES * s + j] = m.sums[0, j]
+    m.queued[0] = 0
 
 
 # -- one trajectory --------------------------------------------------------------------------------
@@ -191,8 +231,9 @@ def land(i, tau, d, hits, modes, steady, batch, m):
             batch.counters[i, EVENTS] += 1
             batch.minima[i, CONTACT_SPEED] = min(batch.minima[i, CONTACT_SPEED], abs(rate))
             record(i, g, tau + d, CROSSING, direction, rate, after, error, batch, m)
+    arrives = hits if d > 0.0 else hits & ~batch.fresh[i]
     if d > 0.0:
-        know_nothing(i, batch)
+        know_rides(i, batch, m)
     for g in range(m.sizes[GUARDS]):
         if (hits >> g) & 1:
             know_zeros(i, g, 1, batch)
@@ -201,21 +242,15 @@ def land(i, tau, d, hits, modes, steady, batch, m):
     if m.sizes[TANGENTS] != 0:
         batch.carry[i, WAITED] += d
         leave_columns(i, hits, at, tau + d, batch, m)
+        date_limits(i, arrives, modes, tau + d, batch, m)
     return count_landing(i, tau + d, batch)
 
 
 @inner
 def keep_on(i, h, batch, m):
     """Take a step without a contact: boundaries that were ridden go on to be."""
-    fresh = 0
-    for g in range(m.sizes[GUARDS]):
-        if m.found[g, RIDDEN] > 0.5:
-            fresh |= 1 << g
-    twice, thrice = int(batch.carry[i, TWICE]), int(batch.carry[i, THRICE])
-    know_nothing(i, batch)
-    batch.fresh[i] = fresh
-    batch.carry[i, TWICE], batch.carry[i, THRICE] = float(twice & fresh), float(thrice & fresh)
-    batch.carry[i, RIDES] = float(int(batch.carry[i, RIDES]) & fresh)
+    know_rides(i, batch, m)
+    batch.carry[i, RIDES] = float(int(batch.carry[i, RIDES]) & batch.fresh[i])
     batch.carry[i, NEXT_STEP] = 4.0 * h
     batch.minima[i, GAP_MARGIN] = m.out[MARGIN]
 
@@ -263,11 +298,12 @@ def advance(i, budget, batch, m):
         modes, steady = m.links[at, MODES], m.links[at, STEADY]
         if batch.carry[i, ASKS] > 0.5:
             stands = False
+            write_queue(i, batch.cursor[i], modes, batch, m)
             rest_or_go(i, tau, modes, steady, batch, m)
             if batch.carry[i, ENTERS] > 0.5 and batch.carry[i, AT] >= 0.0:
                 enter(i, tau, batch, m)
             continue
-        write_samples(i, tau, tau, modes, steady, batch, m)
+        take_samples(i, tau, tau, modes, steady, batch, m)
         end = end_of(i, batch)
         if tau >= end:
             stands = False
@@ -278,7 +314,7 @@ def advance(i, budget, batch, m):
                 tau = 0.0
                 begin_period(i, batch, m)
                 take_up(i, tau, batch, m)
-                write_samples(i, tau, tau, modes, steady, batch, m)
+                take_samples(i, tau, tau, modes, steady, batch, m)
             if batch.count[i] >= batch.end_count[i] and tau >= batch.end_phase[i]:
                 status = at_the_end(i, batch)
             continue
@@ -299,7 +335,7 @@ def advance(i, budget, batch, m):
         else:
             stands = False
             batch.counters[i, STEPS] += 1
-            write_samples(i, tau, tau + d, modes, steady, batch, m)
+            take_samples(i, tau, tau + d, modes, steady, batch, m)
             note_touches(i, tau, h, d, modes, steady, batch, m)
             if answer == CLEAR:
                 h = d
@@ -317,6 +353,7 @@ def advance(i, budget, batch, m):
                     take_up(i, tau, batch, m)
                 status = NONFINITE if is_lost(modes, m) else RUNNING
             else:
+                write_queue(i, batch.cursor[i], modes, batch, m)
                 status = land(i, tau, d, hits, modes, steady, batch, m)
                 tau += d
                 if batch.carry[i, AT] >= 0.0:
@@ -335,6 +372,7 @@ def put_back(i, tau, status, batch, m):
     """Store a trajectory that has ended or is paused."""
     if batch.carry[i, ENTERS] < 0.5:
         at = int(batch.carry[i, AT])
+        write_queue(i, batch.cursor[i], m.links[at, MODES], batch, m)
         for k in range(m.sizes[ROWS] * LANES):
             batch.carry[i, AMPLITUDES + k] = m.y[k // LANES, k % LANES]
         keep_state(i, tau, batch, m)
@@ -351,6 +389,7 @@ def propagate(
     lag, modes, steady, links, course, pieces, laws, acts, presses, remembers, varied, shifts, y,
     moved, size, sums, q, errors, p, bern, bounds, slopes, out, touches, place, answer, angle,
     found, chain, follows, factor, column, columns, struck, bernstein, stood, waves, spans, near,
+    queue, queued,
 ):  # fmt: skip
     """Move every trajectory whose status is RUNNING and whose contact state has been made, `budget`
     steps at most. See kernels/batch.py for the arrays.
@@ -364,7 +403,7 @@ def propagate(
         sizes, row_of, sign_of, offset, rate, lag, modes, steady, links, course, pieces, laws, acts,
         presses, remembers, varied, shifts, y, moved, size, sums, q, errors, p, bern, bounds,
         slopes, out, touches, place, answer, angle, found, chain, follows, factor, column, columns,
-        struck, bernstein, stood, waves, spans, near,
+        struck, bernstein, stood, waves, spans, near, queue, queued,
     )  # fmt: skip
     waits = False
     for i in range(status.shape[0]):

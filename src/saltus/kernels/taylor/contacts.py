@@ -584,13 +584,16 @@ def saltate(lanes, lane, batch, g, before, slow):
 @inner
 def note_arrival(lanes, lane):
     """True if time has passed since the last landing (or the start); counts the landings at one
-    instant.
+    instant. A flight after an impact that is too short for the clock leads to the same instant.
     """
     now = lanes.clock[TAU, lane] + lanes.clock[BASE, lane]
-    arrived = lanes.found[DELTA, lane] > 0.0 or now != lanes.run[LANDED, lane]
+    later = now != lanes.run[LANDED, lane]
+    arrived = lanes.found[DELTA, lane] > 0.0 or later
     if arrived:
-        lanes.run[BOUNCES, lane], lanes.run[STARTING, lane], lanes.run[LANDED, lane] = 0.0, 0.0, now
+        lanes.run[STARTING, lane], lanes.run[LANDED, lane] = 0.0, now
         lanes.run[FLIPPED, lane], lanes.run[CAUSE, lane] = 0.0, -1.0
+    if later or (arrived and lanes.run[DATED, lane] == 0.0):
+        lanes.run[BOUNCES, lane], lanes.run[DATED, lane] = 0.0, 0.0
     else:
         lanes.run[BOUNCES, lane] += 1.0
     return arrived

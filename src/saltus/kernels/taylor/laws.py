@@ -108,6 +108,24 @@ def carried_over(lanes, lane, g):
     return at_once and abs(lanes.work[GAP_ROW + g, lane]) > near
 
 
+@inner
+def load_dates(lanes, lane, slow):
+    """Show a jump the derivatives of this instant, if one has found them."""
+    slow.out[OUT_DATED] = lanes.run[DATED, lane]
+    for j in range(NCOLUMNS):
+        slow.out[OUT_DATES + j] = lanes.run[DATES + j, lane]
+
+
+@inner
+def keep_dates(lanes, lane, slow):
+    """Keep the derivatives of this instant for the jumps that follow: where impacts cause each
+    other, their gaps and rates become as small as rounding.
+    """
+    lanes.run[DATED, lane] = 1.0
+    for j in range(NCOLUMNS):
+        lanes.run[DATES + j, lane] = slow.out[OUT_DATES + j]
+
+
 @kernel
 def strike(lanes, lane, batch, g, rate, slow):
     """Apply a jump of the state at a boundary that it may not pass. Rebounds too small to be
@@ -119,6 +137,7 @@ def strike(lanes, lane, batch, g, rate, slow):
     for i in range(NSTATES):
         slow.state[i] = lanes.y[i, lane]
     show_clocks(lanes, lane, slow)
+    load_dates(lanes, lane, slow)
     now, parameters = time_of_law(lanes, lane, batch), batch.param[who * batch.stride]
     reset(now, slow.state, parameters, slow.held, mode, mode, g, slow.out)
     restitution, closing = slow.out[0], slow.out[1]
@@ -137,6 +156,7 @@ def strike(lanes, lane, batch, g, rate, slow):
                 reset(now, slow.state, parameters, slow.held, mode, loose, g, slow.out)
                 for i in range(NSTATES):
                     lanes.y[i, lane] = slow.state[i]
+        keep_dates(lanes, lane, slow)
         for i in range(NSTATES):
             slow.state[i] = lanes.y[i, lane]
         velocity = rate * lanes.side[g, lane]
@@ -251,17 +271,23 @@ def loosen(lanes, lane, batch, struck, closing, slow):
                 if LAW[g] == IMPACT_LAW and lanes.fresh[g, lane] > 1.5:
                     lanes.fresh[g, lane] = 1.0
             else:
-                left = slow.gaps[3 * NGUARDS + g]
-                lanes.side[PARTNER[g], lane] = -1.0
-                let_go(lanes, lane, batch, PARTNER[g], slow)
-                if LAW[g] == SURFACE_LAW:
-                    lanes.side[g, lane] = 1.0 if left > 0.0 else -1.0
-                    lanes.fresh[g, lane] = 0.0
-                else:
-                    lanes.side[g, lane], lanes.fresh[g, lane] = LAW_SIDE[g], 1.0
-                watch(lanes, lane)
-                note(lanes, lane, batch, PARTNER[g], RELEASE, -1, 0.0, mode, 0.0, slow)
+                loosen_one(lanes, lane, batch, g, mode, slow)
                 mode = mode_of(lanes, lane)
+
+
+@kernel
+def loosen_one(lanes, lane, batch, g, mode, slow):
+    """Release a held contact because of an impact. Needs slow.gaps."""
+    left = slow.gaps[3 * NGUARDS + g]
+    lanes.side[PARTNER[g], lane] = -1.0
+    let_go(lanes, lane, batch, PARTNER[g], slow)
+    if LAW[g] == SURFACE_LAW:
+        lanes.side[g, lane] = 1.0 if left > 0.0 else -1.0
+        lanes.fresh[g, lane] = 0.0
+    else:
+        lanes.side[g, lane], lanes.fresh[g, lane] = LAW_SIDE[g], 1.0
+    watch(lanes, lane)
+    note(lanes, lane, batch, PARTNER[g], RELEASE, -1, 0.0, mode, 0.0, slow)
 
 
 @inner

@@ -43,7 +43,8 @@ CLOCK_ROWS = CLOCK_ROW + HELD * NCLOCKS
 # counted again); the number of steps at which its pace is looked at next, and the periods behind it
 # when that was done last; the phase of the next break of a clock, and from which on it counts as
 # reached; log2 of the tolerance, and the contacts that the trajectory may make; the guard whose
-# boundary the state came to at the last landing's instant (-1: none).
+# boundary the state came to at the last landing's instant (-1: none); whether there was an impact
+# at that instant (0/1), and by how much earlier it came, for each column of a tangent.
 (
     END,
     DUE,
@@ -64,8 +65,8 @@ CLOCK_ROWS = CLOCK_ROW + HELD * NCLOCKS
     BREAK,
     WATCH,
 ) = range(18)
-TOLERANCE, MOST_MET, CAUSE = 18, 19, 20
-RUN_ROWS = 21
+TOLERANCE, MOST_MET, CAUSE, DATED, DATES = range(18, 23)
+RUN_ROWS = DATES + NCOLUMNS
 # Rows of `bounds`, for each series that a gap reads (see bound_series).
 LINEAR, QUADRATIC, CUBIC, CHANGE, SLOPE_AT_END, REST, BOUNDS = range(7)
 # Rows of `found`: time to the event or end of step, rate of the gap there, guard (-1: none),
@@ -92,10 +93,11 @@ LOG2_TOLERANCE, MOST_STEPS, MOST_CONTACTS, PACE = range(4)
 # this one, each step counting half of the one after it; their rounding is inherited.
 OLD, NEW, PRIOR_ROWS = range(3)
 # Columns of `carry`, what a paused lane needs besides its state: LANDED, BOUNCES, STARTING,
-# FLIPPED, LIMIT, MARK, CAUSE, ALWAYS, then NEW for each guard; where contacts have laws, `fresh` of
-# each.
-CARRIED = 8
-CARRY = CARRIED + (2 if LAWS else 1) * NGUARDS
+# FLIPPED, LIMIT, MARK, CAUSE, ALWAYS, DATED, then NEW for each guard; where contacts have laws,
+# `fresh` of each; DATES.
+CARRIED = 9
+DATES_CARRIED = CARRIED + (2 if LAWS else 1) * NGUARDS
+CARRY = DATES_CARRIED + NCOLUMNS
 #: Records that one step may write at most: contacts and touches of all lanes, in the step and at
 #: the end of the run.
 STEP_RECORDS = 2 * LANES * ((2 if LAWS else 1) * NGUARDS + MOST_TOUCHES)
@@ -107,6 +109,10 @@ SLOW_START = 1.0e-9
 #: Part of the first closing velocity at which successive impacts of one instant have ended for
 #: good; landings at one instant after which the rest is taken at once.
 CLOSED, MOST_STRIKES = 1.0e-16, 50
+#: Duration of a flight that the clock can't resolve, over the time.
+SHORTEST_FLIGHT = 2.0e-16
+#: Places of `slow.out` where a jump finds DATED and DATES (codegen/saltation.py).
+OUT_DATED, OUT_DATES = 2, 3
 #: Rows of `slow.state` after the state, if there are laws (see impacts.py).
 TRIED, AT_FIRST, BY_GUARDS, WAY = (NSTATES * row for row in range(1, 5))
 #: Times in each step at which a force of friction is tested; halvings that find where it becomes
@@ -212,7 +218,8 @@ def workspace():
     slow = Slow(
         q=np.zeros(ORDER + 1), b=np.zeros((DEEPEST + 2, ORDER + 1)),
         bounds=np.zeros((DEEPEST + 2, 2)), rates=np.zeros(ORDER + 1),
-        out=np.zeros(2), gaps=np.zeros(6 * guards), state=np.zeros((5 if LAWS else 1) * NSTATES),
+        out=np.zeros(OUT_DATES + NCOLUMNS), gaps=np.zeros(6 * guards),
+        state=np.zeros((5 if LAWS else 1) * NSTATES),
         touches=np.zeros((MOST_TOUCHES, 2)),
         held=np.zeros(HELD * NCLOCKS), numbers=np.zeros((NUMBERS + 1) * NCLOCKS),
     )  # fmt: skip

@@ -151,8 +151,8 @@ def rounding_of_gaps(lanes, i):
 def negligible_step(lanes, h, j, wanted):
     """Approximate longest step up to h over which the terms of boundary j may be left out.
 
-    Not shorter than the gap needs to be told from zero, nor than SHORTEST. By the secant rule on
-    the logarithms, in a bracket.
+    Not shorter than the gap needs to be told from zero, by that of its terms which takes it there
+    first, nor than SHORTEST. By the secant rule on the logarithms, in a bracket.
     """
     g = SINGULAR_GUARD[j]
     goal, rate, bend = (
@@ -162,6 +162,10 @@ def negligible_step(lanes, h, j, wanted):
     )
     longest, speed = h, rate + root(rate * rate + 4.0 * bend * goal)
     leaves = select(speed > 0.0, 2.0 * goal / speed, 0.0)
+    for k in range(3, ORDER + 1):
+        term = magnitude(load(lanes.work, GUARD_ROW[g] + k, LANES))
+        alone = coarse_exp2((coarse_log2(goal) - coarse_log2(term)) * (1.0 / k))
+        leaves = select(term > 0.0, smaller(leaves, alone), leaves)
     floor = smaller(larger(leaves, SHORTEST), longest)
     power, before, log_before = splat(USUAL_POWER, LANES), splat(2000.0, LANES), splat(0.0, LANES)
     # logs of a step short enough, and of one too long

@@ -35,6 +35,7 @@ def begin_impacts(lanes, lane, slow):
 def orders(lanes, lane, batch, stops, slow):
     """Test that impacts on these stops have one outcome: OK, or the status that ends the motion."""
     begin_impacts(lanes, lane, slow)
+    slow.out[OUT_DATED] = 0.0
     p, now = batch.param[lanes.memo[lane, WHO] * batch.stride], time_of_law(lanes, lane, batch)
     mode = mode_of(lanes, lane)
     return order_of_impacts(now, slow.state, p, slow.held, mode, stops, slow.out)
@@ -43,9 +44,11 @@ def orders(lanes, lane, batch, stops, slow):
 @kernel
 def end_impacts(lanes, lane, batch, hits, slow):
     """Complete impacts that cause each other without end at one instant. Stops that don't close any
-    more are held where they are pressed. True if one closed.
+    more, or open for a time too short for the clock, are held where they are pressed, each by those
+    that are held already. True if one closed.
     """
     begin_impacts(lanes, lane, slow)
+    load_dates(lanes, lane, slow)
     rows, held, told, stops = slow.state, slow.held, slow.out, standing(lanes, lane, hits)
     now, mode = time_of_law(lanes, lane, batch), mode_of(lanes, lane)
     p = batch.param[lanes.memo[lane, WHO] * batch.stride]
@@ -58,24 +61,30 @@ def end_impacts(lanes, lane, batch, hits, slow):
         return True
     for i in range(NSTATES):
         lanes.y[i, lane] = slow.state[i]
+    gaps_here(lanes, lane, batch, slow)
     for g in range(NGUARDS):
-        if stands_on(lanes, lane, g, hits) and lanes.side[PARTNER[g], lane] < 0.0:
+        if (stops >> g) & 1:
+            if lanes.side[PARTNER[g], lane] > 0.0:
+                loosen_one(lanes, lane, batch, g, mode_of(lanes, lane), slow)
             snap(lanes, lane, g)
-            gaps_here(lanes, lane, batch, slow)
-            if abs(slow.gaps[3 * NGUARDS + g]) <= FELT * fastest:
-                rest_or_leave(lanes, lane, batch, g, slow)
+    for look in range(NGUARDS * NGUARDS):
+        g = look % NGUARDS
+        if (stops >> g) & 1 and lanes.side[PARTNER[g], lane] < 0.0:
+            rest_or_leave(lanes, lane, batch, g, FELT * fastest, slow)
     return True
 
 
 @inner
-def rest_or_leave(lanes, lane, batch, g, slow):
+def rest_or_leave(lanes, lane, batch, g, least, slow):
     """Hold a stop that neither closes nor opens, if it is pressed; else its gap and its rate are
     known to be zero.
     """
     face(lanes, lane, batch, g, slow)
-    if slow.gaps[NGUARDS + g] > 0.0:
+    pressing, velocity = slow.gaps[NGUARDS + g], abs(slow.gaps[3 * NGUARDS + g])
+    now = lanes.clock[TAU, lane] + abs(lanes.clock[BASE, lane])
+    if pressing > 0.0 and velocity <= max(least, pressing * SHORTEST_FLIGHT * now):
         hold(lanes, lane, batch, g, 0.0, 0.0, slow)
-    else:
+    elif velocity <= least:
         lanes.fresh[g, lane] = 2.0
         ask_for_paradox(lanes, lane, g, slow)
 

@@ -292,7 +292,7 @@ def fill(lanes, lane, who, batch, slow):
         batch.minima[who, CONTACT_SPEED],
     )
     lanes.run[BOUNCES, lane], lanes.run[STARTING, lane], lanes.run[FLIPPED, lane] = 0.0, 0.0, 0.0
-    lanes.run[CAUSE, lane] = -1.0
+    lanes.run[CAUSE, lane], lanes.run[DATED, lane] = -1.0, 0.0
     lanes.run[ACTIVE, lane] = 1.0
     lanes.run[TOLERANCE, lane] = batch.options[who, LOG2_TOLERANCE]
     lanes.run[MOST_MET, lane] = batch.options[who, MOST_CONTACTS]
@@ -328,6 +328,9 @@ def fill(lanes, lane, who, batch, slow):
     )
     lanes.run[CAUSE, lane] = batch.carry[who, 6]
     lanes.memo[lane, ALWAYS] = int(batch.carry[who, 7])
+    lanes.run[DATED, lane] = batch.carry[who, 8]
+    for j in range(NCOLUMNS):
+        lanes.run[DATES + j, lane] = batch.carry[who, DATES_CARRIED + j]
 
 
 @kernel
@@ -356,6 +359,9 @@ def empty(lanes, lane, batch, status):
     )
     batch.carry[who, 6] = lanes.run[CAUSE, lane]
     batch.carry[who, 7] = lanes.memo[lane, ALWAYS]
+    batch.carry[who, 8] = lanes.run[DATED, lane]
+    for j in range(NCOLUMNS):
+        batch.carry[who, DATES_CARRIED + j] = lanes.run[DATES + j, lane]
     batch.counters[who, STEPS] = int(lanes.run[TAKEN, lane])
     batch.counters[who, EVENTS], batch.counters[who, UNRESOLVED] = (
         int(lanes.run[MET, lane]),

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache, lru_cache
+from functools import cache, cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -263,7 +263,7 @@ class _Building:
             else zip(self._outputs(np.shape(values)[-1]), np.moveaxis(values, -1, 0), strict=True)
         )
         for name, given in of_each:
-            if row == f"<{what}>" and name in self._reserved():
+            if row == f"<{what}>" and name in self._reserved:
                 rename = (
                     "Rename the state in the system."
                     if what == "state"
@@ -283,6 +283,7 @@ class _Building:
         states = self.subject.states
         return states if count == len(states) else (*states, *self.subject.outputs)
 
+    @cached_property
     def _reserved(self) -> set[str]:
         """Names of the table, and of its dims."""
         return {

@@ -43,9 +43,9 @@ def account(ds: xr.Dataset) -> list[str]:
     peak, unit = one["point_output_peak"].values, one["output_units"].item()
     phase = " in quadrature" if ds.attrs["phase"] == "quadrature" else ""
     return [
-        f"found    mode {ds.attrs['mode']}{phase} at {len(peak)} points, {frequency[0]:.8g} Hz at "
-        f"|{name}| {peak[0]:.4g} {unit} to {frequency[-1]:.8g} Hz at {peak[-1]:.4g} "
-        f"{unit}".rstrip(),
+        f"found    mode {ds.attrs['vibration_mode']}{phase} at {len(peak)} points, "
+        f"{frequency[0]:.8g} Hz at |{name}| {peak[0]:.4g} {unit} to {frequency[-1]:.8g} Hz at "
+        f"{peak[-1]:.4g} {unit}".rstrip(),
         f"ends     {ds.attrs['end']}, {ds['point_stable'].values.mean():.0%} of it stable",
     ]
 

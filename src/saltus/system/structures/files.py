@@ -15,7 +15,6 @@ import numpy as np
 
 from saltus import fence
 from saltus.errors import ParameterError, shown
-from saltus.system.structures.matrices import is_sparse
 
 #: Names of the matrices in a file, in small letters.
 KEYS = {"mass": ("m", "mass"), "stiffness": ("k", "stiffness"), "damping": ("c", "damping")}
@@ -204,10 +203,13 @@ def _mat(stream: BinaryIO) -> dict[str, Any]:
 
 
 def _mtx(stream: BinaryIO) -> dict[str, Any]:
-    from scipy.io import mmread
+    from scipy.io import mminfo, mmread
 
-    found = mmread(stream)
-    return {"": found.tocsr() if is_sparse(found) and found.shape[0] == found.shape[1] else found}
+    rows, columns, _, kind, *_ = mminfo(stream)
+    if kind == "array":
+        _check_size(8 * rows * columns)
+    stream.seek(0)
+    return {"": mmread(stream)}  # entries alone: rows take memory, and are counted before
 
 
 def _check_size(size: int) -> None:

@@ -1,0 +1,1 @@
+"""Derivatives of motions with respect to parameters, through their contacts."""

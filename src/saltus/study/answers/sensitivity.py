@@ -1,0 +1,44 @@
+"""[sensitivity]: derivatives of motions with respect to parameters."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import Field
+
+from saltus.study.answers.question import OneVerb, asked
+from saltus.study.setting.setting import Setting
+from saltus.study.tables.kinds import KINDS
+from saltus.study.tables.signature import Asked, OfLength, table
+
+_TO = Field(
+    min_length=1,
+    description="Parameters, and states at the start: what derivatives are with respect to.",
+    examples=[["gap", "x(0)"]],
+)
+
+
+@asked(
+    15,
+    table(
+        "sensitivity",
+        ["sensitivity"],
+        KINDS,
+        base=(OfLength, Asked),
+        called="Derivatives",
+        without=("at", "to"),
+        to=(list[str], _TO),
+    ),
+)
+class Derivatives(OneVerb):
+    """[sensitivity]: derivatives of motions."""
+
+    def check(self, table: Any, setting: Setting) -> None:  # noqa: ARG002
+        """Check start, length and values, and what the derivatives are with respect to."""
+        from saltus.analysis.derivatives.sensitivity import Columns
+        from saltus.analysis.motion.window import stretch
+
+        self.arguments["to"] = table.to
+        Columns.of(self.system, table.to)
+        names = ("start", "values", "periods", "t_end", "t_start")
+        stretch(self.system, **{name: self.arguments[name] for name in names}, transient=0)

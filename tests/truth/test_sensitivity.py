@@ -1,0 +1,188 @@
+"""Derivatives of motions with respect to parameters: closed forms, and differences of runs."""
+
+import numpy as np
+import pytest
+
+import saltus as sl
+
+#: Differences of fourth order, and their steps.
+WEIGHTS = np.array([1.0, -8.0, 8.0, -1.0]) / 12.0
+SHIFTS = np.array([-2.0, -1.0, 1.0, 2.0])
+
+
+@sl.system(states="x v", forced_at="f")
+def bumper(t, x, v, *, f=2.0, pull=3.0, k=40.0, d=0.3, gap=0.01, stop=900.0):
+    return v, pull * sl.cos(2 * sl.pi * f * t) - k * x - d * v - sl.where(
+        x > gap, stop * (x - gap), 0
+    )
+
+
+@sl.system(states="x v", forced_at="f")
+def hammer(t, x, v, *, f=2.0, pull=3.0, k=40.0, gap=0.01, e=0.7):
+    law = sl.impact(x < gap, v, restitution=e)
+    return v, pull * sl.cos(2 * sl.pi * f * t) - k * x, law
+
+
+@sl.system(states="x v", forced_at="f")
+def slider(t, x, v, *, f=2.0, pull=3.0, k=140.0, limit=1.2):
+    friction = sl.friction(v, slip=limit, stick=limit)
+    return v, pull * sl.cos(2 * sl.pi * f * t) - k * x - friction
+
+
+@sl.system(states="h v")
+def ball(t, h, v, *, g=9.81, e=0.5):
+    return v, -g, sl.impact(h > 0, -v, restitution=e)
+
+
+def beam(modes=4):
+    """A chain of four masses between two stops, one of them damped."""
+    stiffness = 100.0 * (2 * np.eye(4) - np.eye(4, k=1) - np.eye(4, k=-1))
+    return sl.structure(
+        np.eye(4),
+        stiffness,
+        contacts=[
+            sl.Contact("x1", stiffness="1e4 N/m", gap="1 mm", damping="3 N*s/m", name="s"),
+            sl.Contact("x3", stiffness="3e3 N/m", gap="4 mm", side="both", name="r"),
+        ],
+        forces=[sl.Force("x2", "1 N")],
+        frequency="2 Hz",
+        damping_ratio="2 %",
+        sensors={"tip": "x3"},
+        modes=modes,
+    )
+
+
+def by_differences(system, start, name, times, *, t_start=0.0, step=1e-6):
+    """Derivatives of states and outputs at times, and of contact times."""
+    unit = step * abs(system.values.get(name, 0.01))
+    states, contacts = [], []
+    for shift in SHIFTS * unit:
+        moved, values = np.array(start, float), {}
+        if name.endswith("(0)"):
+            moved[system.states.index(name[:-3])] += shift
+        else:
+            values = {name: system.values[name] + shift}
+        run = sl.simulate(
+            system, moved, at=times, t_start=t_start, values=values, time_errors="local",
+            progress=False,
+        )  # fmt: skip
+        names = (*system.states, *system.outputs.names)
+        states.append(np.stack([run[one].values for one in names], axis=1))
+        contacts.append(run.contact_time.values)
+    return (np.tensordot(WEIGHTS, np.array(part), 1) / unit for part in (states, contacts))
+
+
+def off(found, expected):
+    """Largest difference, in the largest of the expected."""
+    return float(np.nanmax(np.abs(found - expected)) / np.nanmax(np.abs(expected)))
+
+
+def test_a_bouncing_ball_has_the_derivatives_of_its_formulas():
+    height, g, e = 0.1, 9.81, 0.5
+    found = sl.sensitivity(ball, (height, 0), t_end=0.5, to=["g", "e", "h(0)"])
+    # impact n: t_n = t_1 (1 + 2 e + ... + 2 e^(n - 1)), t_1 = sqrt(2 h/g)
+    first = np.sqrt(2 * height / g)
+    for n in range(6):
+        powers = 1 + 2 * sum(e**j for j in range(1, n + 1))
+        slope = 2 * sum(j * e ** (j - 1) for j in range(1, n + 1))
+        expected = [-first * powers / (2 * g), first * slope, first * powers / (2 * height)]
+        assert found.contact_time.values[n] == pytest.approx(first * powers, rel=1e-13)
+        assert found.contact_time_derivative.values[n] == pytest.approx(expected, rel=1e-11)
+    # the highest point after the start is the start; the deepest speed is that of the first impact
+    assert found.maximum.values == pytest.approx([height, e * np.sqrt(2 * g * height)], rel=1e-12)
+    assert found.maximum_derivative.values[0] == pytest.approx([0.0, 0.0, 1.0], abs=1e-12)
+    speed = np.sqrt(2 * g * height)
+    assert found.maximum_derivative.values[1] == pytest.approx(
+        [e * height / speed, speed, e * g / speed], rel=1e-11
+    )
+
+
+@pytest.mark.parametrize(
+    ("system", "start", "to"),
+    [
+        (bumper, (0.0, 0.0), ["gap", "stop", "k", "d", "pull", "f", "x(0)", "v(0)"]),
+        (hammer, (0.0, 0.0), ["gap", "e", "k", "pull", "f", "v(0)"]),
+        (slider, (0.02, 0.0), ["limit", "k", "pull", "f", "x(0)"]),
+        (beam(), np.zeros(8), ["s_gap", "s_stiffness", "s_damping", "r_gap", "force", "frequency"]),
+        (beam(3), np.zeros(6), ["s_gap", "r_stiffness", "frequency", "q1(0)"]),
+    ],
+    ids=["soft stop", "impacts", "friction", "modal flow", "structure by Taylor"],
+)  # fmt: skip
+@pytest.mark.parametrize("t_start", [0.0, 0.13])
+def test_derivatives_are_the_limits_of_differences(system, start, to, t_start):
+    times = t_start + np.linspace(0.2, 1.1, 5)
+    found = sl.sensitivity(system, start, at=times, t_start=t_start, to=to, extremes=False)
+    assert found.sizes["contact"] > 1
+    for column, name in enumerate(to):
+        states, contacts = by_differences(system, start, name, times, t_start=t_start)
+        assert off(found.derivative.values[..., column], states) < 1e-6, name
+        assert off(found.contact_time_derivative.values[:, column], contacts) < 1e-6, name
+
+
+def test_extremes_and_their_derivatives_are_exact():
+    outputs = {"force": (lambda x, gap, stop: sl.where(x > gap, stop * (x - gap), 0), "N")}
+    to = ["gap", "stop", "f"]
+    found = sl.sensitivity(bumper, periods=6, to=to, outputs=outputs)
+    run = sl.simulate(bumper, periods=6, samples=20_000)
+    force = np.maximum(bumper.values["stop"] * (run.x.values - bumper.values["gap"]), 0.0)
+    for k, sampled in enumerate([run.x.values, run.v.values, force]):
+        size = np.ptp(sampled)
+        for word, extreme in (("maximum", sampled.max()), ("minimum", sampled.min())):
+            assert found[word].values[k] == pytest.approx(extreme, abs=1e-6 * size)
+            assert (found[word].values[k] - extreme) * (1 if word == "maximum" else -1) >= -1e-14
+    for column, name in enumerate(to):
+        unit = 1e-6 * bumper.values[name]
+        each = [
+            sl.sensitivity(
+                bumper.with_values(**{name: bumper.values[name] + shift * unit}),
+                periods=6, to=name, outputs=outputs,
+            )
+            for shift in SHIFTS
+        ]  # fmt: skip
+        for word in ("maximum", "minimum"):
+            expected = WEIGHTS @ np.array([one[word].values for one in each]) / unit
+            assert found[f"{word}_derivative"].values[:, column] == pytest.approx(
+                expected, abs=1e-6 * np.abs(expected).max()
+            ), (word, name)
+
+
+def test_random_rough_oscillators_agree_with_differences():
+    random, worst, contacts = np.random.default_rng(261126), 0.0, 0
+    for _ in range(24):
+        system = [bumper, hammer, slider][random.integers(3)]
+        values = {
+            name: value * random.uniform(0.7, 1.3)
+            for name, value in system.values.items()
+            if name != "e"
+        }
+        system = system.with_values(**values)
+        to = list(random.choice(list(system.values), 2, replace=False))
+        start = random.uniform(-1, 1, 2) * (0.008, 0.05)
+        times = np.sort(random.uniform(0.05, 1.0, 3))
+        found = sl.sensitivity(system, start, at=times, to=to, extremes=False)
+        contacts += found.sizes["contact"]
+        for column, name in enumerate(to):
+            states, instants = by_differences(system, start, name, times, step=3e-7)
+            worst = max(worst, off(found.derivative.values[..., column], states))
+            if instants.size:
+                slopes = found.contact_time_derivative.values[:, column]
+                worst = max(worst, off(slopes, instants))
+    assert contacts > 60
+    assert worst < 2e-6
+
+
+def test_many_trajectories_are_those_of_one_each():
+    starts = {"x": [0.0, 2e-3], "v": [0.0, 0.01]}
+    many = sl.sensitivity(bumper, starts, periods=3, to=["gap", "x(0)"], values={"f": [2.0, 2.3]})
+    for i in range(2):
+        one = sl.sensitivity(
+            bumper.with_values(f=[2.0, 2.3][i]), (starts["x"][i], starts["v"][i]), periods=3,
+            to=["gap", "x(0)"],
+        )  # fmt: skip
+        mine = many.isel(trajectory=i)
+        assert np.array_equal(mine.end_derivative.values, one.end_derivative.values)
+        assert np.array_equal(mine.maximum_derivative.values, one.maximum_derivative.values)
+        here = many.contact_trajectory.values == i
+        assert np.array_equal(
+            many.contact_time_derivative.values[here], one.contact_time_derivative.values
+        )

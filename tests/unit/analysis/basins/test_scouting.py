@@ -1,0 +1,86 @@
+"""Scouts within a budget, maps over sensors, and what an interrupted map hands out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import saltus as sl
+from saltus.analysis.attractors.aperiodic import SURVEY_ITERATES
+from saltus.analysis.basins import scouting
+from saltus.analysis.basins.pipeline import basin_plan
+from saltus.errors import ParameterError
+from saltus.flow.methods import check_method
+from saltus.results.dataset.kinds import Kind
+
+
+@pytest.fixture(scope="module")
+def chain():
+    stiffness = 400.0 * (2 * np.eye(5) - np.eye(5, k=1) - np.eye(5, k=-1))
+    return sl.structure(
+        np.eye(5), stiffness, modes=4, damping_ratio=0.05, frequency=2.3,
+        contacts=[sl.Contact("x5", 900.0, 0.02)], forces=[sl.Force("x5", 20.0)],
+        sensors={"tip": "x5", "tip speed": sl.velocity("x5"), "root": "x1"},
+    )  # fmt: skip
+
+
+def test_few_states_have_all_scouts_and_many_as_many_as_their_cost_allows():
+    longest = 2000 + SURVEY_ITERATES
+    assert scouting.affordable(longest, 4) == scouting.SCOUTS
+    assert scouting.affordable(longest, 20) == scouting.FEWEST
+    assert scouting.FEWEST < scouting.affordable(300, 20) < scouting.SCOUTS
+
+
+def test_the_first_scouts_say_how_many_follow(chain, monkeypatch):
+    plan = basin_plan(
+        chain, {"tip": (-0.05, 0.05, 3), "root": (-0.01, 0.01, 3)}, None,
+        check_method(None, chain), 200, None,
+    )  # fmt: skip
+    seen, find = [], scouting.find_attractors
+    monkeypatch.setattr(
+        scouting, "find_attractors", lambda map_, start, *rest, **more: (
+            seen.append(len(start)), find(map_, start, *rest, **more))[1]
+    )  # fmt: skip
+    for work, count in ((1.0, [16]), (8**3 * 64 * 20.0, None), (np.inf, [1024])):
+        seen.clear()
+        monkeypatch.setattr(scouting, "WORK", work)
+        known = list(plan.scouted(1))
+        assert len(known[0]) == 0
+        assert [len(one) for one in known[1:]] == [1] * len(seen)
+        assert seen == count if count else (seen[0] == 16 and 0 < seen[1] < 1008)
+
+
+def test_a_map_over_sensors_begins_where_they_show_its_cells(chain):
+    axes = {"tip": (-0.05, 0.05, 3), "tip speed": ("-1 m/s", "1 m/s", 2)}
+    plan = basin_plan(chain, axes, {"root": "2 mm"}, check_method(None, chain), 200, None)
+    starts = plan.starts(np.arange(6))
+    shown = sl.simulate(chain, starts, periods=1, samples=2, progress=False).isel(time=0)
+    np.testing.assert_allclose(shown.tip, np.repeat([-0.05, 0.0, 0.05], 2), atol=1e-12)
+    np.testing.assert_allclose(shown["tip speed"], np.tile([-1.0, 1.0], 3), atol=1e-12)
+    np.testing.assert_allclose(shown.root, 2e-3, atol=1e-12)
+    found = sl.basins(chain, at={"root": "2 mm"}, progress=False, **axes)
+    assert found.basin.dims == ("tip", "tip speed")
+    assert (found.basin == 0).all()
+    assert found["tip speed"].units == "m/s"
+    assert np.isnan(found.flip_rate)
+
+
+@pytest.mark.parametrize(
+    ("axes", "at", "message"),
+    [
+        ({"tip": (-1, 1, 3), "nose": (-1, 1, 3)}, None, "no state and no sensor 'nose'"),
+        ({"tip": (-1, 1, 3), "root": (-1, 1, 3)}, {"q1": 1.0}, "no sensor 'q1'"),
+        ({"tip": (-1, 1, 3), "q1": (-1, 1, 3)}, None, "no state 'tip'"),
+    ],
+)
+def test_axes_that_can_not_be_used(chain, axes, at, message):
+    with pytest.raises(ParameterError, match=message):
+        sl.basins(chain, at=at, **axes)
+
+
+def test_what_was_found_is_handed_out_even_before_a_cell_was_followed():
+    rig, stop = sl.models.delangre("a", force="4 N", frequency="17 Hz"), sl.Stop()
+    axes = {"x": ("-5 mm", "5 mm", 20), "v": ("-1 m/s", "1 m/s", 20)}
+    with pytest.raises(sl.Interrupted) as caught, stop:
+        sl.basins(rig, progress=lambda _: stop.set(), **axes)
+    assert (caught.value.partial.basin == Kind.NOT_COMPUTED).all()
