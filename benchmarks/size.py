@@ -58,8 +58,8 @@ def counted(root: Path) -> dict[str, list[int]]:
     rows: dict[str, list[int]] = defaultdict(lambda: [0, 0, 0, 0])
     for file in root.rglob("*.py"):
         text, parts = file.read_text(encoding="utf-8"), file.relative_to(root).parts
+        counts = (1, text.count("\n"), *lines_and_tokens(text))
         for name in (parts[0] if len(parts) > 1 else ".", "all"):
-            counts = (1, text.count("\n"), *lines_and_tokens(text))
             rows[name] = [a + b for a, b in zip(rows[name], counts, strict=True)]
     return rows
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
+from saltus.system import courses
 from saltus.system.courses import SMOOTH_TERMS, course_of
 from saltus.system.linear import linear_pieces
 from two_flows import FOLLOWS, same_rows
@@ -201,13 +202,14 @@ def test_a_sweep_and_its_steady_end_need_no_compiler():
     assert run.sizes["contact"] == other.sizes["contact"] > 1
 
 
-def test_what_has_no_end_is_moved_by_taylor_and_early_starts_are_refused():
+def test_what_has_no_end_is_moved_by_taylor_and_early_starts_are_refused(monkeypatch):
     assert isinstance(sl.Modal().serving(body(lambda t: sl.exp(-t))), sl.Taylor)
     assert isinstance(sl.Modal().serving(body(lambda t: sl.sin(t * t))), sl.Taylor)
     run_up = body(sl.sweep(5.0, 80.0, "10 Hz/s"))
     assert isinstance(sl.Modal().serving(run_up), sl.Modal)
     with pytest.raises(sl.SaltusError, match=r"from 0 s on.*sl\.Taylor"):
         sl.simulate(run_up, (0.0, 0.0), t_start=-1.0, t_end=1.0, method=sl.Modal(), progress=False)
+    monkeypatch.setattr(courses, "MOST_PIECES", 2**12)
     endless = body(sl.sweep(5.0, 8e6, "1 Hz/s"))
     with pytest.raises(sl.SaltusError, match="turns too often"):
         sl.simulate(endless, (0.0, 0.0), t_end=1.0, method=sl.Modal(), progress=False)

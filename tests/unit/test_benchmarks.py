@@ -22,7 +22,7 @@ def basins():
 
 
 @pytest.fixture(scope="module")
-def small_map(basins):
+def small_map(basins, few_scouts):
     return basins.ours(6, threads=1)
 
 
@@ -125,8 +125,9 @@ def test_a_column_that_is_new_is_empty_in_older_rows(releases, tmp_path):
     assert "1.2" in releases.as_text(releases.kept(file))
 
 
-def test_all_that_a_release_takes_can_be_measured(releases, monkeypatch):
+def test_all_that_a_release_takes_can_be_measured(releases, monkeypatch, few_scouts):
     monkeypatch.setattr(releases.compile, "measured", lambda *_: (0.5, 0.6))  # takes long, else
+    monkeypatch.setattr(releases.size, "SOURCE", releases.size.SOURCE / "cache")
     small = {"import [s]": (1,), "period [us]": (32,), "map [s]": (4,), "diagram [s]": (3,)}
     for name, (measure, form) in releases.MEASURED.items():
         assert float(format(measure(*small.get(name, ())), form)) > 0, name
