@@ -124,6 +124,7 @@ export class Values {
     const field = this.fields.get(key);
     if (!field) return false;
     field.note.textContent = why;
+    if (why) field.note.scrollIntoView({ block: "nearest" });
     if (why) field.text.setAttribute("aria-invalid", "true");
     else field.text.removeAttribute("aria-invalid");
     return true;
