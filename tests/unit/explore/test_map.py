@@ -209,6 +209,22 @@ def test_an_attractor_that_only_open_cells_reveal_joins_the_legend(desk, monkeyp
     assert [later[key] for key in keys] == hues  # nothing on the screen jumps
 
 
+def test_a_map_that_is_stopped_while_open_cells_settle_keeps_its_labels(desk, monkeypatch):
+    monkeypatch.setattr(pipeline, "SCOUTS", 2)
+    monkeypatch.setattr(maps, "FEW_SCOUTS", 1)
+
+    def stopped(*_):
+        raise Interrupted
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(labels, "settle_all", stopped)
+        with pytest.raises(Interrupted):
+            Screen(desk)
+    screen = Screen(desk)
+    monkeypatch.setattr(pipeline, "SCOUTS", 64)
+    held_against(screen, basins())
+
+
 def test_a_hue_belongs_to_an_orbit_at_neighbouring_values(desk):
     first, then = Screen(desk), Screen(desk, values={"frequency": 15.02})
     hues = {(row["period"], row["kind"]): row["hue"] for row in first.end["attractors"]}

@@ -107,7 +107,7 @@ def test_a_system_of_ones_own_says_how_it_is_run():
 # -- scripts ---------------------------------------------------------------------------------------
 @pytest.mark.parametrize("own", [False, True])
 def test_the_script_runs_and_finds_the_same(tmp_path, own, monkeypatch, capsys):
-    system = RIG.with_values(force=3.7)
+    system = RIG.with_values(force=3.7123456789)
     if own:
         system = replace(system, name="mine")
     view = View(

@@ -244,13 +244,13 @@ def complete(
     sample = np.sort(np.random.default_rng(0).choice(opened, min(size, len(opened)), replace=False))
     half = stage(progress, 0.0, 0.5)
     wider, _, _ = find_attractors(map_, result.end[sample], scale, most, found, half)
-    renumber(result.label, wider.ids(found))
     half = stage(progress, 0.5, 1.0)
     more = settle_all(map_, result.end[opened], wider, most, threads, half)
     more.periods[more.periods >= 0] += most
     more.unresolved[:] += result.unresolved[opened]
     still = more.label == OPEN
     more.label[still], more.status[still] = Kind.UNCONVERGED, st.LONG_TRANSIENT
+    renumber(result.label, wider.ids(found))  # at last: who stops this keeps the ids of before
     result.put(opened, more)
     return wider
 
