@@ -91,10 +91,7 @@ def random_rubbing(rng, degrees, frictions, stops=0, *, kinds=("ground", "belt")
     stiffness = 200.0 * (root @ root.T / n + np.eye(n))
     damping = rng.choice([0.0, 0.3, 2.0]) * np.eye(n) + rng.choice([0, 0.002]) * stiffness
     force, lag = rng.uniform(5, 30, (2, n)), rng.uniform(0, 6, (2, n))
-    w, told = (
-        float(rng.uniform(5, 30)),
-        [k for k in kinds if k != "rough" and (k != "pair" or n > 1)],
-    )
+    w, told = float(rng.uniform(5, 30)), [k for k in kinds if k != "rough" and (k != "pair" or n > 1)]
     chosen = [(str(rng.choice(told)), int(i), *rng.uniform(0.2, 1.5, 3).tolist())
         for i in rng.permutation(n)[:frictions]]  # fmt: skip
     walls = [(int(rng.integers(n)), *rng.uniform([0.003, 200, 0], [0.05, 3000, 20]).tolist())
@@ -115,12 +112,12 @@ def by_exponentials(given, start, t_end, steps=400):
     n, w = given.degrees, given.w
     size = 2 * n + 5
     free = np.zeros((size, size))
-    free[:n, n : 2 * n] = np.eye(n)
-    free[n : 2 * n, :n], free[n : 2 * n, n : 2 * n] = -given.stiffness, -given.damping
+    free[:n, n:2 * n] = np.eye(n)
+    free[n:2 * n, :n], free[n:2 * n, n:2 * n] = -given.stiffness, -given.damping
     for m in (0, 1):
         c = 2 * n + 1 + 2 * m
-        free[n : 2 * n, c] = given.force[m] * np.cos(given.lag[m])
-        free[n : 2 * n, c + 1] = -given.force[m] * np.sin(given.lag[m])
+        free[n:2 * n, c] = given.force[m] * np.cos(given.lag[m])
+        free[n:2 * n, c + 1] = -given.force[m] * np.sin(given.lag[m])
         free[c, c + 1], free[c + 1, c] = -(m + 1) * w, (m + 1) * w
     slides, normals, slip, stick = [], [], [], []
     for kind, i, limit, more, speed in given.frictions:
@@ -129,7 +126,7 @@ def by_exponentials(given, start, t_end, steps=400):
         normal[i] += 1.0
         if j != i:
             normal[j] -= 1.0
-        row[n : 2 * n], row[2 * n] = normal, -mean
+        row[n:2 * n], row[2 * n] = normal, -mean
         row[2 * n + 1], row[2 * n + 2] = -sway * math.cos(phase), sway * math.sin(phase)
         slides.append(row)
         normals.append(normal)
@@ -143,10 +140,10 @@ def by_exponentials(given, start, t_end, steps=400):
         for k in range(count):
             forces[k, 2 * n] = state[k] * slip[k]
         matrix = free.copy()
-        matrix[n : 2 * n] -= normals.T @ forces
+        matrix[n:2 * n] -= normals.T @ forces
         if held:
             forces[held] = np.linalg.solve(normals[held] @ normals[held].T, slides[held] @ matrix)
-            matrix[n : 2 * n] -= normals[held].T @ forces[held]
+            matrix[n:2 * n] -= normals[held].T @ forces[held]
         return matrix, forces
 
     def left(z, state, forces):
@@ -164,7 +161,7 @@ def by_exponentials(given, start, t_end, steps=400):
                 continue
             state[k] = 0
             if abs(equations(state)[1][k] @ z) < stick[k]:
-                z[n : 2 * n] -= normals[k] * (slides[k] @ z) / (normals[k] @ normals[k])
+                z[n:2 * n] -= normals[k] * (slides[k] @ z) / (normals[k] @ normals[k])
                 found.append((t, "hold", k))
                 forces = equations(state)[1]
                 over = [j for j in range(count) if not state[j] and abs(forces[j] @ z) > stick[j]]
@@ -205,4 +202,4 @@ def by_exponentials(given, start, t_end, steps=400):
         before = len(found)
         settled(z, state, ended, found, t)
         young = [k for _, kind, k in found[before:] if kind == "release"]
-    return found, z[: 2 * n]
+    return found, z[:2 * n]

@@ -121,7 +121,7 @@ def test_orbits_of_branches_close_by_matrix_exponentials(masses):
     rng = np.random.default_rng(100 + masses)
     made, first, parts = random_chain(rng, masses)
     band = {"frequency": (0.9 * first, 1.2 * first)}
-    ds = sl.branches(made, band, np.zeros(2 * masses), at=2, switch=(), points=100, progress=False)
+    ds = sl.branches(made, band, np.zeros(2 * masses), at=2, switch=(), points=40, progress=False)
     size = 2 * masses
     orbits = np.stack([ds[f"point_{name}"].values for name in made.states], axis=-1)
     multipliers = ds.point_multiplier_real.values + 1j * ds.point_multiplier_imag.values

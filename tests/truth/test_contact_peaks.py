@@ -354,3 +354,21 @@ def test_a_chatter_on_a_boundary_with_a_factor_has_its_impulse():
     # a unit of this impulse changes v by 3: it is a third of the momentum
     np.testing.assert_allclose(found.contact_impulse_of_impacts, 1.7 / 0.3 / 3, rtol=1e-11)
     np.testing.assert_allclose(found.contact_speed, 1.0, rtol=1e-13)
+
+
+def test_a_curved_contact_that_a_stop_holds_at_its_boundary_has_peaks():
+    """Nothing changes while the mass rests there: a series is one piece long."""
+    stops = [
+        sl.Contact("x", gap=0.0, restitution=0.0, name="rigid"),
+        sl.Contact("x", gap=0.0, stiffness=2e4, power=1.5, name="curved"),
+    ]
+    made = sl.structure(
+        np.eye(2), [[4e3, -5e2], [-5e2, 9e3]], names="x y", damping_ratio="1 %", contacts=stops,
+        base=sl.Base({"x": 1.0, "y": 1.0}, lambda t: 30 * sl.sin(40 * t)),
+    )  # fmt: skip
+    with pytest.warns(SaltusWarning, match="inertia="):
+        found = contacts(made, (-1e-3, 0, 0, 0), 0.3)
+    curved = found.contact_guard == "curved"
+    assert curved.sum() > 1
+    np.testing.assert_allclose(found.contact_depth[curved], 0.0, atol=1e-15)
+    np.testing.assert_allclose(found.contact_peak_force[curved], 0.0, atol=1e-15)

@@ -40,9 +40,7 @@ def test_vibration_decays_by_twice_the_friction_a_half_cycle_and_sticks(start):
     times, kinds = run.contact_time.values, run.contact_kind.values.tolist()
     assert kinds == ["crossing"] * (half - 1) + ["hold"]
     assert times == pytest.approx(math.pi * np.arange(1, half + 1), rel=1e-14)
-    assert float(run.end_x) == pytest.approx(
-        (-1) ** half * math.copysign(1, start) * size, abs=1e-14
-    )
+    assert float(run.end_x) == pytest.approx((-1) ** half * math.copysign(1, start) * size, abs=1e-14)
     assert float(run.end_v) == 0.0
 
 

@@ -184,7 +184,7 @@ def test_bernstein_rows_are_those_of_scipy():
 
 
 def test_runs_hold_all_that_is_not_zero_and_no_more_than_two_gaps_less():
-    from saltus.flow.modal_tables import runs_of
+    from saltus.flow.modal_rows import runs_of
 
     rng = np.random.default_rng(20261126)
     for share in (0.02, 0.3, 0.9, 1.0):

@@ -119,6 +119,29 @@ def test_impacts_that_cause_each_other_move_together(restitutions, inertia, meth
         np.testing.assert_allclose(found[0, :, j], expected, atol=1e-8 * np.abs(found).max())
 
 
+def test_two_pairs_that_come_to_rest_by_chatter_have_one_instant():
+    """Flights between cascades of impacts become too short for the clock. Where both bodies rest at
+    the end nothing depends on the start.
+    """
+
+    @sl.system(states="x y v u", forced_at="w", units={"w": "rad/s"})
+    def pair(t, x, y, v, u, *, w=9.0, gap=0.1, wall=0.5, inertia=1.0, first=0.5, second=0.5):
+        body = sl.impact(x < y + gap, v - u, restitution=first, inertia={"v": 1.0, "u": inertia})
+        push = 2.0 - 0.3 * y + 0.2 * sl.cos(w * t)
+        law = sl.impact(y < wall, u, restitution=second)
+        return v, u, 3.0 * sl.cos(w * t) - 4.0 * x, push, body, law
+
+    draws = np.random.default_rng(20261127).uniform((0, 0, 0.3, 1.5), (0.3, 0.3, 3, 3), (60, 4))
+    known = (0.149427304543, 0.108746554434, 2.20130665365, 1.67532773288)
+    resting = 0
+    for first, second, inertia, speed in (known, *draws):
+        given = pair.with_values(first=first, second=second, inertia=inertia)
+        found, exact = compared(given, np.array([[-0.5, 0.5, speed, 0.0]]), 1)
+        np.testing.assert_allclose(exact, found, rtol=0, atol=1e-9 * max(1, np.abs(found).max()))
+        resting += not found.any()
+    assert resting > 3
+
+
 def test_impacts_at_resonance_have_the_derivatives_of_taylor():
     """The drive goes together with the mode, on both sides of an impact."""
 

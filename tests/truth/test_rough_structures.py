@@ -129,6 +129,41 @@ def test_a_curved_contact_that_is_entered_with_the_third_power_of_time():
     assert ends(run) == pytest.approx(truth.y[:, -1], rel=1e-10)
 
 
+@pytest.mark.parametrize("stiffness", [1e4, 4.5e4, 2e5])
+def test_a_curved_contact_that_is_entered_from_rest_on_a_stop(stiffness):
+    """The third power of time is behind the rounding of the modes when the stop lets go."""
+    squares = np.array([[4e3, -5e2], [-5e2, 9e3]])
+    stops = [
+        sl.Contact("x", gap=0.0, restitution=0.0),
+        sl.Contact("x", gap=0.0, stiffness=stiffness, power=1.5, side="lower"),
+    ]
+    made = sl.structure(
+        np.eye(2), squares, modes=2, damping_ratio="1 %", names="x y", contacts=stops,
+        base=sl.Base({"x": 1.0, "y": 1.0}, lambda t: 30 * sl.sin(40 * t)),
+    )  # fmt: skip
+    run = sl.simulate(made, (-1e-3, 0, 0, 0), t_end=0.3, progress=False)
+    kinds = run.contact_kind.values.tolist()
+    first = kinds.index("release")
+    shapes = sl.structure_modes(np.eye(2), squares, 2)["shape"].values
+    modal = [run[f"contact_{name}"].values[first] for name in made.states]
+    (_, y), (_, u) = shapes @ modal[:2], shapes @ modal[2:]
+    damping = shapes @ np.diag(0.02 * np.sqrt(np.linalg.eigvalsh(squares))) @ shapes.T
+
+    def rates(t, state):
+        x, v = state[:2], state[2:]
+        force = -squares @ x - damping @ v - 30 * math.sin(40 * t)
+        return [*v, force[0] + stiffness * max(-x[0], 0.0) ** 1.5, force[1]]
+
+    def comes_back(t, state):
+        return state[0] if t > begin + 1e-3 else -1.0
+
+    comes_back.terminal, begin = True, run.contact_time.values[first]
+    truth = solve_ivp(rates, (begin, 0.3), (0.0, y, 0.0, u), method="DOP853", rtol=1e-11,
+                      atol=1e-15, max_step=1e-3, events=comes_back)  # fmt: skip
+    after = kinds.index("impact", first)
+    assert run.contact_time.values[after] == pytest.approx(truth.t[-1], abs=1e-10)
+
+
 def test_the_derivative_where_friction_begins_at_zero_against_finite_differences():
     """What slides there when the contact closes is stopped in a time that goes as the root of its
     speed, so the difference is one over 1e-10 m.

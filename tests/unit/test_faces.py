@@ -11,7 +11,7 @@ ROOT = Path(saltus.__file__).parent
 USUAL = 25
 #: Rooms that hand out more, and of what kind these are.
 LARGER = {
-    "system": (80, "what is added to a system, structures, linear pieces for the modal flow"),
+    "system": (85, "what is added to a system, structures, linear pieces for the modal flow"),
     "results": (95, "names of kinds and of variables, which pictures and verbs share"),
     "kernels": (55, "codes of what happened, columns of the tables that kernels fill"),
     "flow": (55, "maps, requests, series of a motion, threads, progress"),

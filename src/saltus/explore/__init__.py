@@ -40,7 +40,7 @@ class Explorer:
 
     @property
     def view(self) -> Mapping[str, Any]:
-        """What the newest page shows now: the fields of its questions, by panel."""
+        """The newest page's view: the fields of its questions, by panel."""
         sessions = self._server.sessions
         return sessions[-1].view if sessions else {}
 
@@ -167,7 +167,7 @@ def _in_notebook() -> bool:
     return ipython is not None and hasattr(ipython.get_ipython(), "kernel")
 
 
-class _CallableModule(ModuleType):
+class _CallableRoom(ModuleType):
     """Let ``saltus.explore`` be the function, although importing this folder binds that name to the
     module.
     """
@@ -175,4 +175,4 @@ class _CallableModule(ModuleType):
     __call__ = staticmethod(explore)
 
 
-sys.modules[__name__].__class__ = _CallableModule
+sys.modules[__name__].__class__ = _CallableRoom

@@ -1,4 +1,4 @@
-"""What a page is told of a system before it asks for anything: names, units, ranges, colours."""
+"""The first answer to a page: names, units, ranges and colours of a system."""
 
 from __future__ import annotations
 

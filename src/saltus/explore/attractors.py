@@ -248,7 +248,7 @@ def _alike(one: Attractor, other: Attractor, scale: np.ndarray) -> bool:
 
 
 def _distance(one: Attractor, other: Attractor, scale: np.ndarray) -> float:
-    """How far two attractors of neighbouring values are apart, in ranges of the states."""
+    """Distance of two attractors of neighbouring values, in ranges of the states."""
     if one.kind != other.kind:
         return np.inf
     if isinstance(one, ClosedMotion) and isinstance(other, ClosedMotion):

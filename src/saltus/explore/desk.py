@@ -64,7 +64,7 @@ class Desk:
             asked.Save: self._save,
         }
 
-    def answer(self, question: asked.Question, emit: Emit) -> None:
+    def answer(self, question: asked.PageQuestion, emit: Emit) -> None:
         """Answer a question: ``emit(head, arrays)`` for each answer, as it is ready.
 
         Raises
@@ -127,7 +127,7 @@ class Desk:
         return names
 
     # -- answers -----------------------------------------------------------------------------------
-    def _about(self, question: asked.Question) -> Answer:  # noqa: ARG002
+    def _about(self, question: asked.PageQuestion) -> Answer:  # noqa: ARG002
         return about_answer(self.opening)
 
     def _motion(self, question: asked.MotionQuestion) -> Answer:
@@ -283,7 +283,7 @@ def keep(kept: OrderedDict[Any, Any], key: Any, value: Any, most: int) -> None:
 class Models:
     """Answers before a system is chosen: the models of saltus."""
 
-    def answer(self, question: asked.Question, emit: Emit) -> None:
+    def answer(self, question: asked.PageQuestion, emit: Emit) -> None:
         """The list of models. Raises QuestionError for any other question."""
         if not isinstance(question, asked.About):
             raise QuestionError("choose a model first.", "ask")

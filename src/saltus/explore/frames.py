@@ -10,9 +10,9 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-#: What answers a question: a head that JSON can hold, and arrays by name.
+#: Answer to a question: a head that JSON can hold, and arrays by name.
 Answer: TypeAlias = tuple[Mapping[str, Any], Mapping[str, np.ndarray]]
-#: What takes an answer.
+#: A function that takes an answer.
 Emit: TypeAlias = Callable[[Mapping[str, Any], Mapping[str, np.ndarray]], None]
 #: Types of arrays that a page can view in place, little endian.
 TYPES = ("f4", "f8", "u1", "i1", "u2", "u4", "i4")

@@ -195,7 +195,7 @@ def _in_columns(time: np.ndarray, values: np.ndarray, names: Sequence[str]) -> d
 
 
 def _words(found: MotionArrays, status: int) -> list[str]:
-    """What is to be said of a motion's end."""
+    """Sentences on a motion's end."""
     if status == st.OK:
         return []
     name, meaning = STATUS[status]
@@ -207,7 +207,7 @@ def _words(found: MotionArrays, status: int) -> list[str]:
 def _parting(
     ours: MotionArrays, theirs: MotionArrays, columns: Sequence[int], method: Method, system: System
 ) -> Mapping[str, Any]:
-    """Where two motions part, in numbers and words: when they differ by :data:`PARTED` of the
+    """The parting of two motions, in numbers and words: when they differ by :data:`PARTED` of the
     range, and the contact before that.
     """
     count = min(len(ours.time), len(theirs.time))

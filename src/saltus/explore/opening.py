@@ -1,4 +1,4 @@
-"""What the explorer shows first: ranges of sliders, the box of the map, a start; those of a study
+"""The first view of the explorer: ranges of sliders, the box of the map, a start; those of a study
 where it gives them, else guesses from the system.
 """
 
@@ -36,7 +36,7 @@ STEPS = 400
 
 @dataclass(frozen=True)
 class Opening:
-    """What is shown first.
+    """The first view.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ class Opening:
 
 
 def opening_of(system: System, method: Method | None = None, **known: Any) -> Opening:
-    """What is shown first of a system; ``known`` are attributes of :class:`Opening` that a study
+    """The first view of a system; ``known`` are attributes of :class:`Opening` that a study
     gives.
     """
     method = method or default_method(system)
@@ -110,8 +110,8 @@ def sliders(system: System) -> dict[str, tuple[float, float]]:
 
 
 def choices(system: System) -> list[str]:
-    """What the axes of a map may be: states, and of a structure by its modes first the sensors of
-    deflections and velocities, by which a start can be given.
+    """Names that the axes of a map may have: states, and of a structure by its modes first the
+    sensors of deflections and velocities, by which a start can be given.
     """
     found = []
     for name in system.outputs.names if by_modes(system) else ():

@@ -1,4 +1,4 @@
-"""What a start settles to, and orbits as the page draws them: one whole period, stable or not."""
+"""Attractors of starts, and orbits as the page draws them: one whole period, stable or not."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def settled(known: Legend, start: Sequence[float]) -> tuple[int, int]:
 def settle(
     known: Legend, start: Sequence[float], method: Method, quantities: Sequence[str]
 ) -> Answer:
-    """What a start settles to, and that orbit."""
+    """The attractor that a start settles to, and its orbit."""
     key, periods = settled(known, start)
     unit = "periods" if known.map.system.forced_at is not None else "turns"
     if key < 0:
@@ -74,7 +74,7 @@ def _noun(row: Mapping[str, Any]) -> str:
 
 
 def _fate(code: int) -> str:
-    """What became of one start, in the words for many."""
+    """The fate of one start, in the words for many."""
     return WITHOUT[Kind(code)].split(":")[0].replace("lead to", "leads to")
 
 

@@ -154,15 +154,15 @@ Numbers: TypeAlias = Annotated[Mapping[str, Number], _numbers]
 
 # -- the questions ---------------------------------------------------------------------------------
 @dataclass(frozen=True, kw_only=True)
-class Question:
-    """What a page asks. Numbers are SI or text with a unit; names are those of the system."""
+class PageQuestion:
+    """A question of a page. Numbers are SI or text with a unit; names are those of the system."""
 
     ask: ClassVar[str] = ""
     id: Annotated[int, _whole(0, MOST_ID)]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Hello(Question):
+class Hello(PageQuestion):
     """The first one of a page: its token, its version of the frames, the desk that it knew."""
 
     ask = "hello"
@@ -172,14 +172,14 @@ class Hello(Question):
 
 
 @dataclass(frozen=True, kw_only=True)
-class About(Question):
+class About(PageQuestion):
     """The system: its states, parameters, guards, and what to show first."""
 
     ask = "about"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Open(Question):
+class Open(PageQuestion):
     """Another of saltus's models, where no system was named."""
 
     ask = "open"
@@ -187,7 +187,7 @@ class Open(Question):
 
 
 @dataclass(frozen=True, kw_only=True)
-class MotionQuestion(Question):
+class MotionQuestion(PageQuestion):
     """The motion from a start; ``against`` a second method."""
 
     ask = "motion"
@@ -203,8 +203,8 @@ class MotionQuestion(Question):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Settle(Question):
-    """What a start settles to."""
+class Settle(PageQuestion):
+    """Question for the attractor of a start."""
 
     ask = "settle"
     start: Annotated[Start, _start]
@@ -213,7 +213,7 @@ class Settle(Question):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Track(Question):
+class Track(PageQuestion):
     """An orbit known at the values ``source``, at other values: by its key, or a point on it."""
 
     ask = "track"
@@ -225,7 +225,7 @@ class Track(Question):
 
 
 @dataclass(frozen=True, kw_only=True)
-class MapQuestion(Question):
+class MapQuestion(PageQuestion):
     """The attractor that each start of a grid leads to."""
 
     ask = "map"
@@ -239,7 +239,7 @@ class MapQuestion(Question):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ResponsesQuestion(Question):
+class ResponsesQuestion(PageQuestion):
     """Orbits over a parameter, stable or not."""
 
     ask = "responses"
@@ -250,7 +250,7 @@ class ResponsesQuestion(Question):
 
 
 @dataclass(frozen=True, kw_only=True)
-class OrbitQuestion(Question):
+class OrbitQuestion(PageQuestion):
     """One orbit: an attractor by its key, or a point or an event of responses."""
 
     ask = "orbit"
@@ -262,7 +262,7 @@ class OrbitQuestion(Question):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Save(Question):
+class Save(PageQuestion):
     """A file of what is seen."""
 
     ask = "save"
@@ -274,7 +274,7 @@ class Save(Question):
 
 
 @dataclass(frozen=True, kw_only=True)
-class StopWork(Question):
+class StopWork(PageQuestion):
     """Request to end what is under way, or that of one kind."""
 
     ask = "stop"
@@ -282,29 +282,29 @@ class StopWork(Question):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Seen(Question):
+class Seen(PageQuestion):
     """Receipt of a piece of a map."""
 
     ask = "seen"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Show(Question):
-    """What the page shows now."""
+class Show(PageQuestion):
+    """Notice of what the page shows now."""
 
     ask = "show"
     view: Annotated[Mapping[str, Any], _mapping]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Pause(Question):
+class Pause(PageQuestion):
     """Notice that nobody looks, so that maps wait."""
 
     ask = "pause"
     on: Annotated[bool, _flag]
 
 
-QUESTIONS: Mapping[str, type[Question]] = {
+QUESTIONS: Mapping[str, type[PageQuestion]] = {
     one.ask: one
     for one in (
         Hello, About, Open, MotionQuestion, Settle, Track, MapQuestion, ResponsesQuestion,
@@ -313,7 +313,7 @@ QUESTIONS: Mapping[str, type[Question]] = {
 }  # fmt: skip
 
 
-def read(text: str) -> Question:
+def read(text: str) -> PageQuestion:
     """The question in a text of a page.
 
     Raises
@@ -338,7 +338,7 @@ def read(text: str) -> Question:
         raise
 
 
-def question_of(ask: str, data: Mapping[str, Any]) -> Question:
+def question_of(ask: str, data: Mapping[str, Any]) -> PageQuestion:
     """The question of a kind from its fields. Raises QuestionError as :func:`read` does."""
     if not among(ask, QUESTIONS):
         raise QuestionError(f"there is no question {shown(ask)}. {nearest(ask, QUESTIONS)}", "ask")
@@ -363,7 +363,7 @@ def question_of(ask: str, data: Mapping[str, Any]) -> Question:
 
 @cache
 def _readers(ask: str) -> dict[str, Callable[[Any, str], Any]]:
-    """What reads each field of a kind of question."""
+    """Functions that read each field of a kind of question."""
     hints = get_type_hints(QUESTIONS[ask], include_extras=True)
     return {one.name: hints[one.name].__metadata__[0] for one in fields(QUESTIONS[ask])}
 

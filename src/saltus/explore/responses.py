@@ -146,7 +146,7 @@ class _Told:
         self._about = {"parameter": parameter, "range": list(limits), "quantity": quantity}
 
     def between(self, begin: float, end: float) -> Callable[[float], None]:
-        """What takes the share of a stage."""
+        """A function that takes the share of a stage."""
 
         def told(share: float) -> None:
             here = begin + (end - begin) * share

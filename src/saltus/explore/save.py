@@ -46,7 +46,7 @@ _DRAWING = threading.Lock()
 
 @dataclass(frozen=True)
 class View:
-    """What a page shows, in SI. What it doesn't is None.
+    """The view of a page, in SI. What it doesn't is None.
 
     Attributes
     ----------

@@ -31,9 +31,9 @@ from saltus.explore.session import AnswersQuestions, Outbox, Session
 WIRE = 1
 #: Most pages at once, and how long a page may take to say its token [s].
 MOST_PAGES, HELLO = 8, 5.0
-#: Why a socket is closed: 4400 and the code of HTTP for the same.
+#: Codes of why a socket is closed: 4400 and the code of HTTP for the same.
 WRONG_TOKEN, SLOW, OTHER_WIRE, TOO_MANY = 4403, 4408, 4409, 4429
-#: How long the server goes on without a page where it shall end with them [s].
+#: Time for which the server goes on without a page where it shall end with them [s].
 LINGER = 60.0
 
 _FILES = {
@@ -155,7 +155,7 @@ class Server:
 
     @property
     def idle(self) -> float:
-        """How long no page has been there [s]."""
+        """Time for which no page has been there [s]."""
         return 0.0 if self.sessions else time.monotonic() - self._alone_since
 
     def start(self) -> None:

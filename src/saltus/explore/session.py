@@ -1,4 +1,4 @@
-"""What one page asks, and in which order it is answered: the newest question counts. Knows threads,
+"""Questions of one page, and the order of answers: the newest question counts. Knows threads,
 and neither sockets nor files.
 """
 
@@ -21,8 +21,8 @@ from saltus.errors import SaltusError
 from saltus.explore.frames import Emit, packed
 from saltus.explore.questions import (
     Open,
+    PageQuestion,
     Pause,
-    Question,
     QuestionError,
     Seen,
     Show,
@@ -46,7 +46,7 @@ LOOK = 0.1
 class AnswersQuestions(Protocol):
     """A desk: it answers a question by one answer or several, while it works."""
 
-    def answer(self, question: Question, emit: Emit) -> None:
+    def answer(self, question: PageQuestion, emit: Emit) -> None:
         """Answer a question: ``emit(head, arrays)`` for each answer, from this thread."""
 
 
@@ -110,7 +110,7 @@ class _Lane:
     """Questions of one kind: one under way, and one that waits."""
 
     def __init__(self) -> None:
-        self.waiting: Question | None = None
+        self.waiting: PageQuestion | None = None
         self.stop: Stop | None = None  # of the one under way
         self.busy = False
 
@@ -173,7 +173,7 @@ class Session:
         self._pool.shutdown(wait=True, cancel_futures=True)
 
     # -- order -------------------------------------------------------------------------------------
-    def _check_rate(self, question: Question) -> None:
+    def _check_rate(self, question: PageQuestion) -> None:
         second = int(self._clock())
         self._count = self._count + 1 if second == self._second else 1
         self._second = second
@@ -182,7 +182,7 @@ class Session:
             error.ask, error.id = question.ask, question.id
             raise error
 
-    def _take(self, question: Question) -> None:
+    def _take(self, question: PageQuestion) -> None:
         if isinstance(question, StopWork):
             self._stop(question.of)
         elif isinstance(question, Show):
@@ -192,7 +192,7 @@ class Session:
         else:
             self._queue(question)
 
-    def _queue(self, question: Question) -> None:
+    def _queue(self, question: PageQuestion) -> None:
         with self._lock:
             if self._closed:
                 return
@@ -232,7 +232,7 @@ class Session:
             except KeyboardInterrupt:  # nobody takes the last words
                 continue
 
-    def _answer(self, question: Question, stop: Stop) -> None:
+    def _answer(self, question: PageQuestion, stop: Stop) -> None:
         """Answer a question, whatever happens."""
         window = threading.Semaphore(WINDOW)
         self._windows[question.id] = window
@@ -259,7 +259,7 @@ class Session:
         finally:
             self._windows.pop(question.id, None)
 
-    def _desk_for(self, question: Question) -> AnswersQuestions:
+    def _desk_for(self, question: PageQuestion) -> AnswersQuestions:
         """The desk; that of another model from where the page opens one."""
         if isinstance(question, Open):
             if self._opened is None:
@@ -274,12 +274,12 @@ class Session:
                 raise Interrupted
 
 
-def _stopped(question: Question) -> dict[str, Any]:
+def _stopped(question: PageQuestion) -> dict[str, Any]:
     kind = "map-stopped" if question.ask == "map" else "stopped"
     return {"kind": kind, "ask": question.ask, "id": question.id}
 
 
-def _waits(question: Question, text: str) -> bytes:
+def _waits(question: PageQuestion, text: str) -> bytes:
     """The frame that says what an answer waits for."""
     head = {"kind": "waits", "ask": question.ask, "id": question.id, "words": [text]}
     return packed(head, {})
@@ -292,7 +292,7 @@ def _refused(error: BaseException, ask: str | None, number: int | None) -> bytes
     return packed({"kind": "refused", "ask": ask, "id": number, "why": why, "field": field}, {})
 
 
-def _failed(question: Question) -> dict[str, Any]:
+def _failed(question: PageQuestion) -> dict[str, Any]:
     """The head that says that an exception was met; the terminal has it under the same number."""
     number = secrets.token_hex(2)
     told = traceback.format_exc()

@@ -1,4 +1,4 @@
-"""What a page shows, from the fields of its questions: in SI, with the result of each part."""
+"""The view of a page, from the fields of its questions: in SI, with the result of each part."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from saltus.units import to_si
 
 
 def shown(desk: Any, fields: Mapping[str, Any]) -> tuple[View, dict[str, Callable[[], xr.Dataset]]]:
-    """What a page shows.
+    """The view of a page.
 
     Parameters
     ----------

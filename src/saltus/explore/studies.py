@@ -1,4 +1,4 @@
-"""What a study, or its results, show first: its system, values and axes, and what is computed."""
+"""The first view of a study, or of its results: its system, values, axes, and what is computed."""
 
 from __future__ import annotations
 

@@ -137,7 +137,7 @@ class Flight:
         call = arrays | shared_arrays(k, self._parameters, schedule, self._data)
         call |= {
             "cursor": own * periods,
-            "samples": samples.reshape(k, -1, states),
+            "samples": samples.reshape(k, len(count), states),
             "sample_mode": np.empty((k, len(count)), np.int64),
         }
         call["rec_i"], call["rec_f"] = ContactTable.empty(0, states).arrays

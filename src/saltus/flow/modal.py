@@ -72,9 +72,10 @@ class ModalFlow:
         self._lanes, self._memory = self.tables.modes.table.shape[1], threading.local()
         size, _, _, _, guards, _, rows, *_ = tables.sizes.tolist()
         self._states, self._sizes = size, tables.sizes.copy()
-        self._names, tangents = names, columns > 0
+        self._names, self._tangents = names, columns > 0
         self._sizes[layout.TANGENTS] = columns
-        self.CARRY = layout.AMPLITUDES + rows * self._lanes + tangents * (size + guards) + columns
+        self.CARRY = layout.AMPLITUDES + rows * self._lanes + columns
+        self.CARRY += size + guards if self._tangents else 0
         self.CARRY += 2 * tables.groups * self._lanes if names else 0
         self.STEP_RECORDS = 2 * guards + MOST_TOUCHES
 
@@ -111,6 +112,9 @@ class ModalFlow:
             if tables.full:
                 return
             which = tables.set_of(batch.param[i if batch.stride else 0])
+            if not tables.is_finite(which, int(batch.mode[i])):
+                batch.status[i] = st.NONFINITE
+                continue
             at = tables.state_of(which, int(batch.mode[i]))
             if self._names:
                 tables.by(self._names).need(at, which, int(batch.mode[i]))

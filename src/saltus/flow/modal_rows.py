@@ -66,6 +66,21 @@ class Links(Rows):
         return copy
 
 
+def runs_of(filled: np.ndarray) -> np.ndarray:
+    """Runs in which the rows of bool[rows, places] are true: the first place of one and that behind
+    it, then those of a second run behind the widest gap, float64[rows, 4].
+    """
+    runs = np.zeros((len(filled), 4))
+    for run, row in zip(runs, filled, strict=True):
+        places = np.flatnonzero(row)
+        if len(places):
+            apart = np.diff(places)
+            cut = int(np.argmax(apart)) + 1 if apart.max(initial=1) > 1 else len(places)
+            for part, own in enumerate((places[:cut], places[cut:])):
+                run[2 * part : 2 * part + 2] = (own[0], own[-1] + 1) if len(own) else 0
+    return runs
+
+
 def _zeros(shape: tuple[int, int], kind: Any) -> np.ndarray:
     """Zeros that begin where a line of the processor's cache does: else half of the lanes lie in
     two lines each.

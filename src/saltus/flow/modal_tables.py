@@ -16,12 +16,11 @@ from saltus.flow.modal_blocks import table_of
 from saltus.flow.modal_eigen import Eigen, half_of, slots_of
 from saltus.flow.modal_modes import Known, StateModes, modes_of, spread_over
 from saltus.flow.modal_parameters import ParameterTables
-from saltus.flow.modal_rows import Links, Rows
+from saltus.flow.modal_rows import Links, Rows, runs_of
 from saltus.flow.modal_values import ValueSet
 from saltus.kernels.modal import layout
 from saltus.kernels.status import HOLD_LAW, LAW_KINDS, NO_LAW, SURFACE_LAW
 from saltus.language.expression import Expr, walk
-from saltus.system import System
 from saltus.system.courses import Course, course_of
 from saltus.system.linear import LinearPiece, LinearSystem
 from saltus.system.linear_friction import is_idle, limit_side
@@ -81,7 +80,7 @@ class Tables:
         rows = int(self.row_of.max(initial=-1)) + 1
         self.first_guard = [int(np.flatnonzero(self.row_of == r)[0]) for r in range(rows)]
         values = dict(linear.system.values)
-        slots = len(slots_of(np.linalg.eigvals(linear.piece(values, 0).matrix))) + rows
+        slots = len(slots_of(np.linalg.eigvals(_numbers(linear.piece(values, 0).matrix)))) + rows
         self.groups, self.state_groups = -(-slots // LANES), -(-n // LANES)
         drives = len(linear.drives)
         courses = len(linear.courses)
@@ -219,6 +218,15 @@ class Tables:
             self._held += course.begins.nbytes + course.terms.nbytes
         return self._courses[key]
 
+    def is_finite(self, which: int, mode: int) -> bool:
+        """True if the equations of a contact state are made of numbers, whatever formulas say."""
+        given = self.sets[which]
+        pieces = self.piece_of(given, mode), given.gaps, given.impacts.closing
+        parts = [part for one in pieces for part in (one.matrix, one.constant, one.driven)]
+        parts += [given.rates, given.lags, given.impacts.push, given.impacts.restitution]
+        parts += [one.terms for one in given.courses]
+        return all(bool(np.isfinite(part).all()) for part in parts)
+
     def state_of(self, which: int, mode: int) -> int:
         """Number of a contact state, made if it isn't known."""
         if (which, mode) not in self._states:
@@ -309,7 +317,7 @@ class Tables:
         """
         if used not in self._fast:
             every = int(np.sum((1 << np.arange(len(self.holds)))[~self.holds]))
-            matrices = [self.piece_of(given, mode).matrix for mode in (0, every)]
+            matrices = [_numbers(self.piece_of(given, mode).matrix) for mode in (0, every)]
             self._fast[used] = max(float(np.abs(np.linalg.eigvals(one)).max()) for one in matrices)
         return self._fast[used]
 
@@ -390,19 +398,9 @@ class Tables:
         return self.steady.add(np.concatenate([*states, flat]))
 
 
-def runs_of(filled: np.ndarray) -> np.ndarray:
-    """Where the rows of bool[rows, places] are true: the first place of a run and the one behind
-    it, then those of a second run behind the widest gap, float64[rows, 4].
-    """
-    runs = np.zeros((len(filled), 4))
-    for run, row in zip(runs, filled, strict=True):
-        places = np.flatnonzero(row)
-        if len(places):
-            apart = np.diff(places)
-            cut = int(np.argmax(apart)) + 1 if apart.max(initial=1) > 1 else len(places)
-            for part, own in enumerate((places[:cut], places[cut:])):
-                run[2 * part : 2 * part + 2] = (own[0], own[-1] + 1) if len(own) else 0
-    return runs
+def _numbers(matrix: np.ndarray) -> np.ndarray:
+    """A matrix with zeros where formulas give no numbers."""
+    return np.where(np.isfinite(matrix), matrix, 0.0)
 
 
 def laws_of(linear: LinearSystem) -> np.ndarray:

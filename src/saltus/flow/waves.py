@@ -98,7 +98,7 @@ class WaveLegs:
 
     @functools.cached_property
     def row_sizes(self) -> np.ndarray:
-        """What each wave of size 1 adds to each quantity at most, float64[S, R, E]."""
+        """Sizes of the rows: the most that a wave of size 1 adds, float64[S, R, E]."""
         return np.asarray(np.abs(self.rows))
 
     def by_state(self, leg: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:

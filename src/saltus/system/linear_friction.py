@@ -70,7 +70,8 @@ def gaps_of(system: System, sticking: Sequence[Sticking]) -> tuple[Expr, ...]:
     minus the second margin of each.
     """
     gaps = [
-        ex.constant(0.0) if is_idle(system.guards, guard) else guard.gap for guard in system.guards
+        ex.constant(0.0) if is_idle(system.guards, guard) else guard.gap
+        for guard in system.guards
     ]
     for one in sticking:
         gaps[one.hold] = one.margins[0]

@@ -310,7 +310,7 @@ def basin_plan(
 
 
 def _fixed_sensors(system: System, at: Any, moving: Iterable[str]) -> dict[str, float]:
-    """What sensors show [SI] besides those of a map."""
+    """Return the values [SI] that sensors show besides those of a map."""
     units, given = dict(zip(system.outputs.names, system.outputs.units, strict=True)), at or {}
     for name in (*moving, *given):
         if name not in units:

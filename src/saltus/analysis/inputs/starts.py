@@ -345,6 +345,12 @@ def _columns(system: System, start: Any) -> dict[str, np.ndarray]:
             _length(shown_by)
             return sensed(system, shown_by)
         strange = [name for name in start if name not in system.states]
+        if strange and by_modes(system) and strange[0] in system.outputs.names:
+            state = next(name for name in start if name in system.states)
+            raise ParameterError(
+                f"the start gives {strange[0]}, which a sensor shows, and {state}, the coordinate "
+                f"of a mode. Give sensors alone, or coordinates of modes alone."
+            )
         if strange:
             raise unknown(f"{system.name} has no state", strange[0], system.states)
         start = {**dict.fromkeys(_made(system), 0.0), **start}

@@ -83,8 +83,8 @@ class TangentFlow:
         )
 
     def images(self, states: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """That of the block that begins at each of float64[k, D] times directions float64[k, D, m],
-        float64[k, D, m].
+        """Images of directions float64[k, D, m] behind the block that begins at each of
+        float64[k, D], float64[k, D, m].
         """
         return self.map.images(states, 1, directions)
 

@@ -81,7 +81,9 @@ def let_slide(i, margin, now, moved, batch, m):
     """
     g, h = m.laws[margin, PARTNER], m.laws[margin, HOLDER]
     upper, lower = margins_of(i, g, batch, m)
-    fades = m.laws[g, FADES] == 1 and (moved or min(upper, lower) >= -margin_noise(i, g, batch, m))
+    fades = m.laws[g, FADES] == 1 and (
+        moved or min(upper, lower) >= -margin_noise(i, g, batch, m)
+    )
     batch.carry[i, CROSSED] = 0.0 if fades else float(1 << margin)
     know_zeros(i, h, 0, batch)
     know_zeros(i, m.laws[h, SECOND], 0, batch)

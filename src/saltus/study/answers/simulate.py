@@ -112,14 +112,16 @@ class Motion(OneVerb):
         return [contact_table(self.title, ds, self.printed, self.exact, found.get(REFERENCE))]
 
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
-        """Phase portrait, or time history of a system of one state; of a large batch the first
-        trajectories.
+        """Phase portrait, or time history of a system of one state and of sensors of which none is
+        the rate of the first; of a large batch the first trajectories.
         """
         from saltus import plot
-        from saltus.plot.selection import MOST
+        from saltus.plot.selection import MOST, rate_of
         from saltus.results.dataset.schema import told_of
 
-        draw = plot.phase if len(told_of(ds)) > 1 else plot.history
+        first, *others = told_of(ds)
+        apart = bool(ds.attrs.get("outputs_first")) and not rate_of(ds, first)
+        draw = plot.phase if others and not apart else plot.history
         some = (
             {"trajectory": ds["trajectory"].values[:MOST].tolist()}
             if "trajectory" in ds.dims

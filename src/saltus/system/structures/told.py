@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.errors import SaltusWarning
+from saltus.errors import SaltusWarning, listed
 from saltus.system.display import STRUCTURE
 from saltus.system.equations_of_motion import EquationsOfMotion
 from saltus.system.structures.parts import Base, direction
@@ -23,6 +23,8 @@ _USUAL = (1e-3, 1e6)
 _STIFF = 1e3
 #: Natural frequencies that the description lists, and modes of which it says what mass they move.
 _TOLD = 6
+#: Share of a flexibility that may be left out where all of it is said to be kept.
+_WHOLE = 5e-5
 #: Units of a flexibility and of an inertia, by that of a deflection.
 _UNITS = {"m": (" m/N", " kg"), "rad": (" rad/(N*m)", " kg*m^2"), "": ("", "")}
 
@@ -69,13 +71,18 @@ def _kept_at_contacts(
         return ""
     at = np.array([direction(one, degrees) for _, one in contacts])
     totals, residuals = flexibility(stiffness, modes, count, at)
-    words = ""
+    words, whole = "", list[str]()
     for (name, _), total, residual in zip(contacts, totals, residuals, strict=True):
+        if 0 < total < np.inf and residual <= _WHOLE * total:
+            whole.append(name)
+            continue
         if math.isnan(residual):
             words += f" The flexibility left out at {name} isn't known: a rigid body moves there."
             continue
         share = f", {100 * (1 - residual / total):.4g} % of it kept" if 0 < total < np.inf else ""
         words += f" Static flexibility at {name}: {residual:.3g}{unit} left out{share}."
+    if whole:
+        words += f" Static flexibility at {listed(whole)}: 100 % of it kept."
     return words
 
 

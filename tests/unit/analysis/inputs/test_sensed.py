@@ -74,7 +74,7 @@ def test_what_is_asked_back():
         ({"stop force": 1.0}, "'stop force' is neither a deflection nor a velocity"),
         ({"x1": 1e-3, "x2": 1e-3, "x6": -1e-3}, "no motion of the 2 modes.*x1, x2, x6 at once"),
         ({"x1": [1e-3, 2e-3], "x6": [0, 0, 1]}, "one length: x1 has 2"),
-        ({"x1": 1e-3, "q1": 0.0}, "no state 'x1'"),
+        ({"x1": 1e-3, "q1": 0.0}, "x1, which a sensor shows, and q1, the coordinate of a mode"),
         ({"q1": 0.0}, "gives no 'q2'"),
     ):
         with pytest.raises(ParameterError, match=words):

@@ -55,6 +55,12 @@ def test_units_of_what_is_told(unit, words):
     assert "m/N" not in made.description
 
 
+def test_contacts_at_which_all_is_kept_share_a_sentence():
+    stops = [sl.Contact(f"x{i}", stiffness=1e3, gap=0.1, name=f"s{i}") for i in (1, 2)]
+    made = sl.structure(MASS, CHAIN, modes=len(MASS), contacts=stops)
+    assert made.description.endswith("Static flexibility at s1, s2: 100 % of it kept.")
+
+
 @pytest.mark.parametrize("size", [6, 1600])
 def test_rigid_bodies_move_and_are_no_error(size):
     """A free chain: its first frequency is exactly 0, the next that of a closed form; of a large
