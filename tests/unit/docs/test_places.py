@@ -7,7 +7,9 @@ import pytest
 
 ROOT = Path(__file__).parents[3]
 PAGES = ("CONTRIBUTING.md", "docs/architecture.md", "docs/decisions/README.md")
-FOLDERS = ("src", "tests", "benchmarks", "docs", "replications", "changelog.d", ".ci", "conda")
+FOLDERS = (
+    "src", "tests", "benchmarks", "docs", "replications", "changelog.d", ".ci", "conda", "web",
+)  # fmt: skip
 PLACE = re.compile(r"`((?:[\w.]+/)+(?:\w+\.\w+)?|\w+\.py)`")
 
 

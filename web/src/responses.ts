@@ -1,0 +1,351 @@
+/** Response curves: stable solid, unstable dashed, events by their shapes; nearest point, and keys along a branch. */
+import { type About, parameterOf, plain, unitOf } from "./about";
+import {
+  axisText,
+  colours,
+  digits,
+  fitted,
+  frame,
+  onResize,
+  type Plot,
+  place,
+  type Range,
+  reach,
+  scaleFor,
+  spoken,
+  wordsIn,
+} from "./axes";
+import type { Arrays, Head, Numbers } from "./link";
+import { mark, periodText } from "./response_marks";
+import { cells } from "./words";
+
+export interface ResponseEvents {
+  orbit(choice: { point?: number; event?: number }): void;
+  hover(text: string): void;
+}
+const REACH = 22,
+  EVENT_REACH = 12;
+/** Events above which their marks are smaller. */
+const MANY = 25;
+
+export class Responses {
+  head: Head | null = null;
+  chosen = -1;
+  now = NaN;
+  private a: Arrays = {};
+  private plot: Plot | null = null;
+  private seen: [Range, Range] | null = null;
+  private whole: [Range, Range] = [
+    [0, 1],
+    [0, 1],
+  ];
+  constructor(
+    private canvas: HTMLCanvasElement,
+    private about: About,
+    private events: ResponseEvents,
+  ) {
+    onResize(canvas, () => this.draw());
+    this.listen();
+  }
+
+  show(head: Head, arrays: Arrays): void {
+    if (this.head?.key !== head.key || this.chosen >= (arrays.point_peak?.length ?? 0)) this.chosen = -1;
+    if (
+      this.head?.parameter !== head.parameter ||
+      this.head?.quantity !== head.quantity ||
+      String(this.head?.range) !== String(head.range)
+    )
+      this.seen = null;
+    this.head = head;
+    this.a = arrays;
+    this.draw();
+  }
+
+  private get x(): Numbers {
+    return this.a.point_parameter;
+  }
+  private get y(): Numbers {
+    return this.a.point_peak;
+  }
+
+  draw(): void {
+    const c = fitted(this.canvas),
+      head = this.head;
+    if (!head) return wordsIn(c, place(this.canvas, [0, 1], [0, 1]), "the branches are being followed");
+    const { ink, accent, panel } = colours(),
+      { point_stable: stable, point_branch: branch, point_hue: hue } = this.a,
+      x = this.x,
+      y = this.y,
+      n = x?.length ?? 0;
+    const ux = parameterOf(this.about, head.parameter)?.unit ?? "",
+      uy = unitOf(this.about, head.quantity),
+      [low, high] = head.range as Range;
+    const pad = 0.02 * (high - low),
+      own = n ? reach([y]) : ([0, 1] as Range);
+    this.whole = [[low - pad, high + pad], own[0] > 0 && own[0] < 0.5 * own[1] ? [0, own[1]] : own];
+    const [rx, ry] = this.seen ?? this.whole;
+    const sx = scaleFor(ux, rx),
+      sy = scaleFor(uy, ry),
+      p = (this.plot = place(this.canvas, rx, ry));
+    const fx: Range = [rx[0] * sx.factor, rx[1] * sx.factor],
+      fy: Range = [ry[0] * sy.factor, ry[1] * sy.factor];
+    frame(c, place(this.canvas, fx, fy), fx, fy, [
+      axisText(plain(head.parameter), sx.unit),
+      axisText(`peak of ${plain(head.quantity)}`, sy.unit),
+    ]);
+    c.save();
+    c.beginPath();
+    c.rect(p.left, p.top, p.width, p.height);
+    c.clip();
+    if (Number.isFinite(this.now)) {
+      c.strokeStyle = accent;
+      c.lineWidth = 1;
+      c.globalAlpha = 0.7;
+      c.beginPath();
+      c.moveTo(p.X(this.now), p.top);
+      c.lineTo(p.X(this.now), p.top + p.height);
+      c.stroke();
+      c.globalAlpha = 1;
+    }
+    for (let i = 1; i < n; i++) {
+      if (branch[i] !== branch[i - 1]) continue;
+      const firm = stable[i] && stable[i - 1],
+        rgb = this.about.hues[hue[i]];
+      c.strokeStyle = rgb ? `rgb(${rgb})` : ink;
+      c.lineWidth = firm ? 2.4 : 1.4;
+      c.setLineDash(firm ? [] : [4, 3]);
+      c.lineDashOffset = firm ? 0 : p.X(x[i - 1]) % 7;
+      c.beginPath();
+      c.moveTo(p.X(x[i - 1]), p.Y(y[i - 1]));
+      c.lineTo(p.X(x[i]), p.Y(y[i]));
+      c.stroke();
+    }
+    c.setLineDash([]);
+    for (let i = 0; i < n; i++) {
+      // a branch of one point would not be seen
+      if (branch[i] === branch[i - 1] || branch[i] === branch[i + 1]) continue;
+      c.fillStyle = ink;
+      c.beginPath();
+      c.arc(p.X(x[i]), p.Y(y[i]), 2.5, 0, 7);
+      c.fill();
+    }
+    const size = head.events.length > MANY && !this.seen ? 0.65 : 1;
+    (head.events as string[]).forEach((kind, i) => {
+      mark(c, kind, p.X(this.a.event_parameter[i]), p.Y(this.a.event_peak[i]), size, ink, panel);
+    });
+    if (this.chosen >= 0) {
+      c.strokeStyle = accent;
+      c.lineWidth = 2.4;
+      c.beginPath();
+      c.arc(p.X(x[this.chosen]), p.Y(y[this.chosen]), 7, 0, 7);
+      c.stroke();
+    }
+    if (!n)
+      wordsIn(c, p, head.done === false ? "the branches are being followed" : "no branch was found in this range");
+    c.restore();
+    const branches = new Set(Array.from(branch ?? [])).size;
+    this.canvas.setAttribute(
+      "aria-label",
+      `responses: peak of ${plain(head.quantity)} over ${plain(head.parameter)}, ${branches} branches, ${n} points, ${head.events.length} events; left and right go along a branch, e to the next event, Enter shows the orbit, t the table`,
+    );
+  }
+
+  // -- choosing -------------------------------------------------------------------------------------------------------------
+  private nearest(px: number, py: number): { point?: number; event?: number } | null {
+    const p = this.plot,
+      { event_parameter: ex, event_peak: ey } = this.a;
+    if (!p || !this.x) return null;
+    let best: { point?: number; event?: number } | null = null,
+      least = EVENT_REACH ** 2;
+    for (let i = 0; i < ex.length; i++) {
+      const r = (p.X(ex[i]) - px) ** 2 + (p.Y(ey[i]) - py) ** 2;
+      if (r < least) {
+        least = r;
+        best = { event: i };
+      }
+    }
+    if (best) return best;
+    least = REACH ** 2;
+    for (let i = 0; i < this.x.length; i++) {
+      const r = (p.X(this.x[i]) - px) ** 2 + (p.Y(this.y[i]) - py) ** 2;
+      if (r < least) {
+        least = r;
+        best = { point: i };
+      }
+    }
+    return best;
+  }
+  /** The pixel of a point, from the canvas's corner. */
+  pixel([x, y]: [number, number]): [number, number] {
+    return [this.plot!.X(x), this.plot!.Y(y)];
+  }
+  /** A point or an event in words. */
+  text(choice: { point?: number; event?: number }): string {
+    const head = this.head!,
+      ux = parameterOf(this.about, head.parameter)?.unit ?? "",
+      uy = unitOf(this.about, head.quantity),
+      a = this.a;
+    if (choice.event !== undefined) {
+      const i = choice.event;
+      return `${head.events[i]} at ${spoken(a.event_parameter[i], ux, 6)}, peak ${spoken(a.event_peak[i], uy)}`;
+    }
+    const i = choice.point!;
+    return `${periodText(a.point_period[i])}, ${a.point_stable[i] ? "stable" : "unstable"}, ${spoken(this.x[i], ux, 6)}, peak ${spoken(this.y[i], uy)}, branch ${a.point_branch[i]}`;
+  }
+  private choose(choice: { point?: number; event?: number }, ask: boolean): void {
+    this.chosen = choice.event !== undefined ? this.a.event_point[choice.event] : choice.point!;
+    this.draw();
+    this.events.hover(this.text(choice));
+    if (ask) this.events.orbit(choice);
+  }
+  private zoom(factor: number, px: number, py: number): void {
+    const p = this.plot!,
+      [rx, ry] = this.seen ?? this.whole,
+      x = rx[0] + ((rx[1] - rx[0]) * (px - p.left)) / p.width,
+      y = ry[1] - ((ry[1] - ry[0]) * (py - p.top)) / p.height;
+    const near = ([a, b]: Range, v: number): Range => [v + (a - v) * factor, v + (b - v) * factor],
+      next: [Range, Range] = [near(rx, x), near(ry, y)];
+    this.seen = next[0][1] - next[0][0] >= this.whole[0][1] - this.whole[0][0] ? null : next;
+    this.draw();
+  }
+  private listen(): void {
+    const at = this.canvas;
+    let event = -1,
+      grip: { x: number; y: number; seen: [Range, Range] } | null = null,
+      moved = 0;
+    at.addEventListener("pointerdown", e => {
+      if (e.button || !this.plot) return;
+      grip = { x: e.offsetX, y: e.offsetY, seen: this.seen ?? this.whole };
+      moved = 0;
+      at.setPointerCapture(e.pointerId);
+    });
+    at.addEventListener("pointerup", () => {
+      grip = null;
+    });
+    at.addEventListener(
+      "wheel",
+      e => {
+        if (!this.plot || (document.activeElement !== at && !e.ctrlKey)) return;
+        e.preventDefault();
+        this.zoom(Math.exp(0.002 * e.deltaY), e.offsetX, e.offsetY);
+      },
+      { passive: false },
+    );
+    at.addEventListener("dblclick", () => {
+      this.seen = null;
+      this.draw();
+    });
+    at.addEventListener("pointermove", e => {
+      if (grip) {
+        const {
+            seen: [rx, ry],
+          } = grip,
+          dx = ((grip.x - e.offsetX) / this.plot!.width) * (rx[1] - rx[0]),
+          dy = ((e.offsetY - grip.y) / this.plot!.height) * (ry[1] - ry[0]);
+        moved = Math.max(moved, Math.hypot(grip.x - e.offsetX, grip.y - e.offsetY));
+        if (moved > 4) {
+          this.seen = [
+            [rx[0] + dx, rx[1] + dx],
+            [ry[0] + dy, ry[1] + dy],
+          ];
+          this.draw();
+          return;
+        }
+      }
+      const near = this.nearest(e.offsetX, e.offsetY);
+      this.events.hover(near ? this.text(near) : "");
+    });
+    at.addEventListener("pointerleave", () => this.events.hover(""));
+    at.addEventListener("click", e => {
+      const near = moved > 4 ? null : this.nearest(e.offsetX, e.offsetY);
+      if (near) this.choose(near, true);
+    });
+    at.addEventListener("keydown", e => {
+      const n = this.x?.length ?? 0,
+        branch = this.a.point_branch,
+        i = Math.max(this.chosen, 0);
+      if (!n || e.ctrlKey || e.metaKey || e.altKey) return;
+      if (e.key === "ArrowRight") {
+        if (this.chosen < 0 || branch[i + 1] === branch[i]) this.choose({ point: this.chosen < 0 ? 0 : i + 1 }, false);
+      } else if (e.key === "ArrowLeft") {
+        if (this.chosen < 0 || branch[i - 1] === branch[i]) this.choose({ point: this.chosen < 0 ? 0 : i - 1 }, false);
+      } else if (e.key === "]" || e.key === "[") {
+        const starts = Array.from({ length: n }, (_, k) => k).filter(k => branch[k] !== branch[k - 1]),
+          own = starts.filter(k => k <= i).length - 1;
+        this.choose({ point: starts[(own + (e.key === "]" ? 1 : starts.length - 1)) % starts.length] }, false);
+      } else if (e.key === "e") {
+        const count = this.head!.events.length;
+        if (count) {
+          event = (event + 1) % count;
+          this.choose({ event }, false);
+        }
+      } else if (e.key === "+" || e.key === "=" || e.key === "-") {
+        const p = this.plot!,
+          about = this.chosen < 0 ? [p.left + p.width / 2, p.top + p.height / 2] : [p.X(this.x[i]), p.Y(this.y[i])];
+        this.zoom(e.key === "-" ? 1 / 0.7 : 0.7, about[0], about[1]);
+      } else if (e.key === "0") {
+        this.seen = null;
+        this.draw();
+      } else if (e.key === "Enter") this.choose({ point: i }, true);
+      else return;
+      e.preventDefault();
+    });
+  }
+
+  /** The same points as a table; a row's button shows that orbit. */
+  table(head: HTMLElement, body: HTMLElement, most: number): void {
+    const h = this.head;
+    if (!h || !this.x) return;
+    const ux = parameterOf(this.about, h.parameter)?.unit ?? "",
+      uy = unitOf(this.about, h.quantity),
+      sx = scaleFor(ux, h.range),
+      sy = scaleFor(uy, reach([this.y]));
+    head.replaceChildren(
+      cells("th", [
+        "",
+        axisText(plain(h.parameter), sx.unit),
+        axisText(`peak of ${plain(h.quantity)}`, sy.unit),
+        "period",
+        "stability",
+        "branch",
+      ]),
+    );
+    const rows: HTMLElement[] = [],
+      add = (choice: { point?: number; event?: number }, texts: string[], name: string) => {
+        const row = cells("td", ["", ...texts]),
+          button = document.createElement("button");
+        button.type = "button";
+        button.textContent = "orbit";
+        button.setAttribute("aria-label", `show the orbit of ${name}`);
+        button.onclick = () => this.choose(choice, true);
+        row.cells[0].append(button);
+        rows.push(row);
+      };
+    (h.events as string[]).forEach((kind, i) =>
+      add(
+        { event: i },
+        [
+          digits(this.a.event_parameter[i] * sx.factor, 7),
+          digits(this.a.event_peak[i] * sy.factor, 5),
+          kind,
+          "",
+          String(this.a.event_branch[i]),
+        ],
+        kind,
+      ),
+    );
+    for (let i = 0; i < Math.min(this.x.length, most); i++)
+      add(
+        { point: i },
+        [
+          digits(this.x[i] * sx.factor, 7),
+          digits(this.y[i] * sy.factor, 5),
+          periodText(this.a.point_period[i]),
+          this.a.point_stable[i] ? "stable" : "unstable",
+          String(this.a.point_branch[i]),
+        ],
+        `point ${i}`,
+      );
+    body.replaceChildren(...rows);
+  }
+}
