@@ -1,36 +1,56 @@
-"""What the explorer answers, and when: clicks, a slider, maps, stops and memory of its server.
+"""What the explorer costs, beside the bars that it was built to: a prototype's numbers, and goals.
 
-Case b4 of the deLangre rig at 15 Hz. The server is a process of its own, as `saltus explore` starts
-it; this one is the page, and reads every frame without drawing it. CPU time is the server's.
+The rig b4 at 15 Hz, x in [-5, 5] mm, v in [-1, 1] m/s. The prototype ran on two busy cores; its
+column is for orientation. The server is a process of its own, as `saltus explore` starts it; most
+rows are what a page without a picture hears of it, over its socket. The last ones drive the
+system's Chromium (SALTUS_CHROMIUM names another one), drawing by software; without a browser they
+are left out. CPU time is the server's.
 
-    python benchmarks/explore.py               the table
-    python benchmarks/explore.py --size 400    a map of 400 x 400
+    python benchmarks/explore.py            all but the large map
+    python benchmarks/explore.py --large    with 400 x 400 starts, beside sl.basins: two minutes
+    python benchmarks/explore.py --desk     without a browser
 """
 
 from __future__ import annotations
 
+import argparse
+import gzip
 import json
 import os
+import shutil
 import subprocess
 import sys
 import time
-from argparse import ArgumentParser
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from websockets.sync.client import ClientConnection, connect
 
 import saltus as sl
+from saltus.cli.doctor import processor
 from saltus.explore.frames import unpacked
+from saltus.flow import engine
 
+ROOT = Path(__file__).resolve().parent.parent
+sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+
+RIG = sl.models.delangre("b", force="4 N", frequency="15 Hz")
 BOX = {"x": [-5e-3, 5e-3], "v": [-1.0, 1.0]}
-ARGUMENTS = ("delangre", "case=b", "force=4 N", "frequency=15 Hz", "--no-browser")
-CLICKS = 100
+CLICKS = 40
 #: Time between two questions [s]: the server refuses more than 200 a second.
 PACE = 0.006
 TICK = os.sysconf("SC_CLK_TCK")
+#: The same rig on the command line.
+COMMAND = ("delangre", "case=b", "force=4 N", "frequency=15 Hz")
+#: Chromium draws by software, as in the tests.
+DRAWING = (
+    "--disable-gpu-compositing", "--disable-gpu-rasterization", "--disable-accelerated-2d-canvas",
+    "--no-sandbox",
+)  # fmt: skip
 
 
 class Page:
@@ -62,14 +82,25 @@ class Page:
                 self.line.send(json.dumps({"ask": "seen", "id": head["id"]}))
             if head["id"] == number:
                 yield head, len(frame)
-            if head["id"] == number and head["kind"] in LAST:
+            if head["id"] == number and head["kind"] in FAILED:
+                raise RuntimeError(head["why"])
+            if head["id"] == number and head["kind"] in LAST and head.get("done", True):
                 return
+
+    def one(self, ask: str, **fields: Any) -> tuple[dict[str, Any], int]:
+        """The last answer to a question, and its bytes."""
+        time.sleep(PACE)
+        return list(self.answers(self.ask(ask, **fields)))[-1]
 
     def cpu(self) -> float:
         """CPU time of the server so far [s]."""
         with open(f"/proc/{self.process}/stat") as stat:
             fields = stat.read().rsplit(")", 1)[1].split()
         return (int(fields[11]) + int(fields[12])) / TICK
+
+    def threads(self) -> int:
+        """Threads of the server."""
+        return len(os.listdir(f"/proc/{self.process}/task"))
 
     def memory(self) -> float:
         """Memory of the server [MB]."""
@@ -80,17 +111,20 @@ class Page:
 
 #: Kinds that end the answers to a question.
 LAST = (
-    "hello", "about", "motion", "settle", "track", "orbit", "save", "map-end", "map-stopped",
-    "stopped", "refused", "failed",
+    "hello", "about", "motion", "settle", "track", "orbit", "responses", "save", "map-end",
+    "map-stopped", "stopped",
 )  # fmt: skip
+FAILED = ("refused", "failed")
 
 
 @contextmanager
-def opened() -> Iterator[tuple[Page, float]]:
-    """A page, and the seconds until its address was printed."""
+def served(*system: str) -> Iterator[tuple[Page, float]]:
+    """A page of a system, and the seconds until its address was printed."""
     begun = time.perf_counter()
     with subprocess.Popen(
-        [sys.executable, "-m", "saltus", "explore", *ARGUMENTS], stdout=subprocess.PIPE, text=True
+        [sys.executable, "-m", "saltus", "explore", *system, "--no-browser"],
+        stdout=subprocess.PIPE,
+        text=True,
     ) as server:
         assert server.stdout is not None
         url = server.stdout.readline().strip()
@@ -103,84 +137,312 @@ def opened() -> Iterator[tuple[Page, float]]:
         server.terminate()
 
 
-def clicks(page: Page, ask: str, fields: Callable[[int], dict[str, Any]]) -> str:
-    """Median and 95th percentile of the wall time of questions, and CPU time of each [ms]."""
-    waits, begun, size = [], page.cpu(), 0
-    for number in range(CLICKS):
-        time.sleep(PACE)
-        start = time.perf_counter()
-        for _, count in page.answers(page.ask(ask, **fields(number))):
-            size = count
-        waits.append(1e3 * (time.perf_counter() - start))
-    middle, most = np.quantile(waits, [0.5, 0.95])
-    cpu = 1e3 * (page.cpu() - begun) / CLICKS
-    return f"{middle:6.1f} {most:6.1f} {cpu:6.1f}   {size} bytes"
+def row(name: str, ours: str, prototype: str, goal: str) -> None:
+    """Print a row of the table."""
+    print(f"| {name:<62} | {ours:>26} | {prototype:>20} | {goal:>18} |", flush=True)
 
 
-def a_map(page: Page, **fields: Any) -> str:
-    """Seconds until the first cells and the end, CPU time [s] and bytes of a map."""
-    start, begun, first, size = time.perf_counter(), page.cpu(), 0.0, 0
-    for head, count in page.answers(page.ask("map", **{"axes": BOX, **fields})):
-        size += count
-        if head["kind"] == "map-piece" and not first:
-            first = time.perf_counter() - start
-    took = time.perf_counter() - start
-    return f"{first:6.2f} {took:6.2f} {page.cpu() - begun:6.2f}   {size} bytes"
+def spread(times: list[float]) -> str:
+    """Median and 95th percentile, in milliseconds."""
+    return f"{1e3 * np.median(times):.0f}, {1e3 * np.quantile(times, 0.95):.0f} ms"
 
 
-def stops(page: Page, size: int) -> str:
-    """Median and worst wall time from stop to the end of a map [ms]."""
-    waits = []
-    for number in range(10):
-        values = {"frequency": 15.0 + 0.01 * (number + 1)}
-        map_ = page.ask("map", axes=BOX, size=[size, size], values=values)
-        for head, _ in page.answers(map_):
-            if head["kind"] == "map-piece":
-                break
-        start = time.perf_counter()
-        page.ask("stop")
-        list(page.answers(map_))
-        waits.append(1e3 * (time.perf_counter() - start))
-    return f"{np.median(waits):6.1f} {max(waits):6.1f}"
+def timed(work: Callable[[], Any], clock: Callable[[], float]) -> float:
+    """Seconds of a piece of work."""
+    begun = clock()
+    work()
+    return clock() - begun
+
+
+def a_click(starts: np.ndarray) -> None:
+    """CPU time of the work behind a click, by part."""
+
+    def cpu(**how: Any) -> float:
+        each = [
+            timed(
+                lambda s=s: sl.simulate(RIG, s, periods=60, progress=False, **how),
+                time.process_time,
+            )
+            for s in starts
+        ]
+        return 1e3 * float(np.median(each))
+
+    cpu()
+    spent: list[float] = []
+    run = engine.run
+
+    def counted(*given: Any, **named: Any) -> Any:
+        begun = time.process_time()
+        try:
+            return run(*given, **named)
+        finally:
+            spent.append(time.process_time() - begun)
+
+    local, measured = cpu(time_errors="local"), cpu()
+    engine.run = counted
+    try:
+        cpu(time_errors="local")
+    finally:
+        engine.run = run
+    row(
+        "CPU of sl.simulate a click: local errors, measured; the engine",
+        f"{local:.1f}, {measured:.1f}; {1e3 * float(np.median(spent)):.1f} ms",
+        "2.8, 4.2; 1.1 ms", "2, 3 ms",
+    )  # fmt: skip
+
+
+def motions(page: Page, starts: np.ndarray) -> None:
+    """Bytes and times of answers."""
+    size = np.median([page.one("motion", start=s.tolist())[1] for s in starts[:10]])
+    begun = time.perf_counter()
+    _, long = page.one("motion", start=starts[0].tolist(), periods=1000)
+    row(
+        "bytes a click; a click of 1000 periods",
+        f"{size:.0f}; {long / 1e6:.2f} MB, {1e3 * (time.perf_counter() - begun):.0f} ms",
+        "111640; 1.85 MB, 170", "112000; 150 ms",
+    )  # fmt: skip
+
+
+def a_map(page: Page, n: int, box: dict[str, list[float]] = BOX, **fields: Any) -> dict[str, float]:
+    """Wall and CPU time of a map, of its first cells, and its bytes."""
+    begun, cpu = time.perf_counter(), page.cpu()
+    found = {"bytes": 0.0}
+    for head, size in page.answers(page.ask("map", axes=box, size=[n, n], **fields)):
+        found["bytes"] += size
+        if head["kind"] == "map-piece":
+            found.setdefault("first", time.perf_counter() - begun)
+    return found | {"wall": time.perf_counter() - begun, "cpu": page.cpu() - cpu}
+
+
+def maps(large: bool) -> None:
+    """How soon maps begin and end."""
+    with served(*COMMAND) as (page, _):
+        nothing = a_map(page, 25)["first"]
+        known = a_map(page, 26)["first"]
+        zoomed = a_map(page, 25, {"x": [0, 2e-3], "v": [-0.2, 0.2]})["first"]
+        values = [
+            a_map(page, 25, values={"frequency": 15 + 0.05 * k}, coarse=True)["first"]
+            for k in range(1, 9)
+        ]
+    row(
+        "first cells: nothing known; attractors known; zoomed",
+        f"{nothing:.2f}; {known:.2f}; {zoomed:.2f} s", "1.3; 0.06; 0.07 s", "0.5; 0.06; 0.07 s",
+    )  # fmt: skip
+    row(
+        "first cells at new values, median and worst",
+        f"{np.median(values):.2f}, {max(values):.2f} s", "0.32, 2.5 s", "0.2, 0.5 s",
+    )  # fmt: skip
+    sizes = (25, 100, 400) if large else (25, 100)
+    with served(*COMMAND) as (page, _):
+        a_map(page, 16)
+        done = [a_map(page, n) for n in sizes]
+    theirs = timed(
+        lambda: sl.basins(
+            RIG, x=(*BOX["x"], sizes[-1]), v=(*BOX["v"], sizes[-1]), progress=False
+        ),
+        time.process_time,
+    )  # fmt: skip
+    row(
+        " and ".join(f"{n} x {n}" for n in sizes) + " complete",
+        ", ".join(f"{one['wall']:.1f}" for one in done) + " s", "0.9, 2.3, 28 s", "0.6, 2 s",
+    )  # fmt: skip
+    row(
+        f"CPU of {sizes[-1]} x {sizes[-1]}; of sl.basins, which finds its attractors too",
+        f"{done[-1]['cpu']:.1f}; {theirs:.1f} s", "30.9; 31.9 s", "1.0 times",
+    )  # fmt: skip
+    row(
+        f"bytes of a {sizes[-1]} x {sizes[-1]} map",
+        f"{done[-1]['bytes'] / 1e6:.2f} MB, {done[-1]['bytes'] / sizes[-1] ** 2:.1f} a cell",
+        "1.13 MB, 7 a cell", "2 a cell",
+    )  # fmt: skip
+
+
+def stops(page: Page) -> None:
+    """How soon work ends that is asked to."""
+    waited = []
+    for k in range(8):
+        number = page.ask("map", axes=BOX, size=[400, 400], values={"force": 3 + 0.1 * k})
+        time.sleep(0.3 + 0.1 * k)
+        begun = time.perf_counter()
+        page.ask("stop", of="map")
+        for _ in page.answers(number):
+            pass
+        waited.append(time.perf_counter() - begun)
+    row("stop asked -> ended, worst", f"{1e3 * max(waited):.0f} ms", "54 ms", "60 ms")
+
+
+def orbits(page: Page) -> None:
+    """Orbits of the points of a branch."""
+    number = page.ask("responses", parameter="frequency", range=["12 Hz", "18 Hz"])
+    begun, first, head = time.perf_counter(), 0.0, {}
+    for head, _ in page.answers(number):
+        if head["kind"] == "responses":
+            first = first or time.perf_counter() - begun
+    row(
+        "responses from 12 to 18 Hz: first branches, all",
+        f"{first:.1f}, {time.perf_counter() - begun:.1f} s", "7.3 s, all at the end",
+        "points as found",
+    )  # fmt: skip
+    times = [
+        timed(partial(page.one, "orbit", responses=head["key"], point=point), time.perf_counter)
+        for point in range(0, 200, 7)
+    ]
+    row("orbit of a branch point, median and p95", spread(times), "33 ms", "50 ms")
+
+
+def models() -> None:
+    """A click on some models, after the first one."""
+    first, later = [], []
+    for name in ("delangre", "impact_oscillator", "gear_pair", "jeffcott_rotor", "play", "chain"):
+        start = [0.0] * len(getattr(sl.models, name)().states)
+        with served(name) as (page, _):
+            for spent, many in ((first, 1), (later, 20)):
+                begun = page.cpu()
+                for _ in range(many):
+                    page.one("motion", start=start)
+                spent.append(1e3 * (page.cpu() - begun) / many)
+    row(
+        "CPU of a click on six models: later ones; the first",
+        f"{min(later):.1f} to {max(later):.1f}; {max(first):.0f} ms", "2.6 to 16.6; 276 ms",
+        "the same",
+    )  # fmt: skip
+
+
+def mixed(page: Page, seconds: float = 30.0) -> None:
+    """Memory and threads over mixed questions, in two halves."""
+    random, before, kept = np.random.default_rng(1), page.threads(), []
+    for _ in range(2):
+        end = time.monotonic() + seconds / 2
+        while time.monotonic() < end:
+            values = {"frequency": random.uniform(14, 16)}
+            page.ask("map", axes=BOX, size=[100, 100], values=values)
+            start = (random.uniform(-1, 1, 2) * (5e-3, 1.0)).tolist()
+            page.one("motion", start=start, values=values)
+            time.sleep(0.03)
+        kept.append(page.memory())
+    during = page.threads()
+    page.ask("stop")
+    time.sleep(1.0)
+    idle = -page.cpu()
+    time.sleep(1.0)
+    idle += page.cpu()
+    row(
+        f"{seconds:.0f} s of mixed questions: memory; threads; CPU left over",
+        f"{kept[0]:.0f}, {kept[1]:.0f} MB; {before}, {during}, {page.threads()}; {idle:.2f} s",
+        "+23 MB; 11, 15, 11; 0.01", "no growth",
+    )  # fmt: skip
+
+
+def opening() -> None:
+    """From the command to the printed address; the size of the page."""
+    waited = []
+    for _ in range(4):
+        with served("delangre") as (_, took):
+            waited.append(took)
+    row(
+        "saltus explore delangre -> address printed",
+        f"{min(waited):.1f} s",
+        "1.3 to 2.5 s",
+        "1.2 s",
+    )
+    page = ROOT / "src" / "saltus" / "explore" / "page"
+    size = sum(len(gzip.compress(file.read_bytes())) for file in page.iterdir())
+    row("page, compressed", f"{size / 1e3:.1f} kB", "28.7 kB", "40 kB")
+
+
+# -- in a browser ----------------------------------------------------------------------------------
+def in_browser() -> None:
+    """Clicks and drags as a person makes them."""
+    chromium = os.environ.get("SALTUS_CHROMIUM") or next(
+        filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
+    )
+    try:
+        from playwright.sync_api import sync_playwright
+    except ModuleNotFoundError:
+        chromium = None
+    if chromium is None:
+        print("no Chromium, or no Playwright: the rows of the page are left out")
+        return
+    from explorer_page import Seen, opened
+
+    with opened(RIG) as explorer, sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=list(DRAWING))
+        seen = Seen(browser.new_page(viewport={"width": 1400, "height": 900}))
+        seen.page.goto(explorer.url)
+        seen.until("!!window.explorer && !!explorer.motion.head && explorer.map.sheet.covered")
+        row(
+            "click -> drawn while a map is computed, median, p95",
+            clicks(seen),
+            "42, 81 ms",
+            "40, 80 ms",
+        )
+        seen.patience = 300.0
+        seen.rest()
+        row("click -> drawn, idle, median, p95", clicks(seen), "31, 43 ms", "30, 50 ms")
+        row("slider: motions a second", drags(seen), "32 to 39", "30 to 40")
+        heap = seen.get("performance.memory ? performance.memory.usedJSHeapSize / 1e6 : NaN")
+        row("heap of the page", f"{heap:.1f} MB", "7.8 MB", "30 MB")
+        browser.close()
+
+
+def clicks(seen: Any) -> str:
+    """Times from clicks on the map until their motions are drawn."""
+    random, times = np.random.default_rng(2), []
+    a, b, c, d = seen.get("explorer.map.sheet.box")
+    for _ in range(CLICKS):
+        x, v = random.uniform(0.9 * a, 0.9 * b), random.uniform(0.9 * c, 0.9 * d)
+        place = seen.place("#map-canvas", x, v)
+        before = seen.get("explorer.motion.head.id")
+        begun = time.perf_counter()
+        seen.page.mouse.click(*place)
+        while seen.get("explorer.motion.head.id") == before:
+            pass
+        seen.get("new Promise(done => requestAnimationFrame(done))")
+        times.append(time.perf_counter() - begun)
+    return spread(times)
+
+
+def drags(seen: Any) -> str:
+    """Motions drawn in a second while a slider moves."""
+    at = "[aria-label=frequency][type=range]"
+    seen.page.locator(at).scroll_into_view_if_needed()
+    box = seen.page.locator(at).bounding_box()
+    y = box["y"] + box["height"] / 2
+    share = seen.get(f"document.querySelector('{at}').value / 1000")
+    seen.page.mouse.move(box["x"] + share * box["width"], y)
+    seen.page.mouse.down()
+    shown, begun, steps = set(), time.perf_counter(), 0
+    while time.perf_counter() - begun < 5.0:
+        steps += 1
+        offset = 0.05 * np.sin(0.1 * steps)
+        seen.page.mouse.move(box["x"] + (share + offset) * box["width"], y)
+        shown.add(seen.get("explorer.motion.head.id"))
+    seen.page.mouse.up()
+    return f"{len(shown) / 5.0:.0f}"
 
 
 def main() -> None:
-    parser = ArgumentParser()
-    parser.add_argument("--size", type=int, default=100)
-    size = parser.parse_args().size
-    draw = np.random.default_rng(0)
-    at = [{"x": x, "v": v} for x, v in draw.uniform(-1, 1, (CLICKS, 2)) * [2e-3, 0.2]]
-    with opened() as (page, took):
-        print(f"address printed after {took:.1f} s")
-        list(page.answers(page.ask("motion", start=at[0])))
-        print("                            median   95 %    CPU [ms]")
-        for errors in ("local", "measured"):
-            told = clicks(page, "motion", lambda i, e=errors: {"start": at[i], "errors": e})
-            print(f"click, {errors:8} errors      {told}")
-        slider = {"start": at[0], "errors": "local"}
-        told = clicks(page, "motion", lambda i: slider | {"values": {"force": 3.5 + 0.01 * i}})
-        print(f"slider, motion              {told}")
-        begin = {"x": "1 mm", "v": 0}
-        (settled,) = [head for head, _ in page.answers(page.ask("settle", start=begin))]
-        key = settled["attractor"]["key"]
-        told = clicks(
-            page, "track",
-            lambda i: {"key": key, "source": {}, "values": {"frequency": 15 + 2e-4 * i}},
-        )  # fmt: skip
-        print(f"slider, tracked orbit       {told}")
-        print("                             first    all    CPU [s]")
-        print(f"map {size} x {size}               {a_map(page, size=[size, size])}")
-        zoomed = {"x": [-1e-3, 1.5e-3], "v": [-0.1, 0.1]}
-        print(f"zoomed                      {a_map(page, size=[size, size], axes=zoomed)}")
-        coarse = {"size": [size, size], "coarse": True}
-        print(f"new values, coarse          {a_map(page, values={'frequency': 15.05}, **coarse)}")
-        print("                            median  worst [ms]")
-        print(f"stop of a map               {stops(page, 4 * size)}")
-        print(f"memory of the server        {page.memory():6.0f} MB")
-    rig = sl.models.delangre("b", force="4 N", frequency="15 Hz")
-    begun = time.process_time()
-    sl.basins(rig, **{name: (*ends, size) for name, ends in BOX.items()}, progress=False)
-    print(f"sl.basins of the map               CPU {time.process_time() - begun:6.2f} s")
+    """Print the table."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--large", action="store_true", help="a map of 400 x 400 too")
+    parser.add_argument("--desk", action="store_true", help="without a browser")
+    given = parser.parse_args()
+    print(f"{processor()}, {os.cpu_count()} cores, saltus {sl.__version__}")
+    row("", "here", "prototype", "goal")
+    starts = np.random.default_rng(1).uniform(-1, 1, (CLICKS, 2)) * (5e-3, 1.0)
+    a_click(starts)
+    with served(*COMMAND) as (page, _):
+        motions(page, starts)
+        stops(page)
+        orbits(page)
+        mixed(page)
+    maps(given.large)
+    models()
+    opening()
+    if not given.desk:
+        in_browser()
 
 
 if __name__ == "__main__":
