@@ -4,6 +4,7 @@ beginning of the undisturbed answer.
 
 import _thread
 import contextlib
+import itertools
 import os
 import signal
 import sys
@@ -15,7 +16,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
-from saltus.analysis.basins import basins, pipeline
+from saltus.analysis.basins import basins, labels, pipeline
 from saltus.flow import engine
 from saltus.flow.maps import Stroboscope
 from saltus.flow.threads import on_threads
@@ -144,23 +145,25 @@ def test_a_map_ends_on_request_as_it_does_on_ctrl_c(monkeypatch):
         threading.Event(),
     )
     axes = {"x": ("-5 mm", "5 mm", 12), "v": ("-1 m/s", "1 m/s", 12)}
-    monkeypatch.setattr(pipeline, "CHUNK", 24)
+    monkeypatch.setattr(labels, "PIECE", 24)
+    monkeypatch.setattr(labels, "FEWEST", 1)
     monkeypatch.setattr(pipeline, "SCOUTS", 64)
     whole = sl.basins(rig, **axes, threads=1, progress=False)
-    chunk = pipeline.BasinPlan.chunk
+    settle, pieces = basins.settle, itertools.count()
 
-    def held(plan, index, *rest):
-        if index == 3:
+    def held(*given):
+        if next(pieces) == 3:
             holding.here()
-        return chunk(plan, index, *rest)
+        return settle(*given)
 
-    monkeypatch.setattr(pipeline.BasinPlan, "chunk", held)
+    monkeypatch.setattr(basins, "settle", held)
+    scouting = basins.LABELLED * 64 / (64 + 144)
     part = holding.partial(
         lambda: sl.basins(
             rig,
             **axes,
             threads=1,
-            progress=lambda share: share > basins.SCOUTING and labelled.set(),
+            progress=lambda share: share > scouting and labelled.set(),
         ),
         labelled,
     )

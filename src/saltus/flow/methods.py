@@ -72,8 +72,8 @@ def exact_method(method: Any, system: Any, asked: str) -> Method:
 
 
 def note_on(method: Method, system: System) -> str:
-    """Which flow moves a system, and why, where the name of the method doesn't say so; else ``""``:
-    the modal flow is asked for, or would be the default, and doesn't serve the system.
+    """The flow that moves a system, and why, where the name of the method doesn't say so: the modal
+    flow is asked for, or would be the default, and doesn't serve the system. Else ``""``.
     """
     asked = isinstance(method, Modal)
     if not (asked or (isinstance(method, Taylor) and len(system.states) >= MANY_STATES)):

@@ -12,7 +12,7 @@ from saltus.system.linear_friction import is_idle, limit_side
 
 
 def laws_of(linear: LinearSystem) -> np.ndarray:
-    """What the kernel reads of the law of each gap, see layout.KIND: int64[gaps, LAW_COLUMNS]."""
+    """The law of each gap as the kernel reads it, see layout.KIND: int64[gaps, LAW_COLUMNS]."""
     guards, sticking = linear.system.guards, linear.sticking
     table = np.full((len(linear.own_gaps), layout.LAW_COLUMNS), -1, np.int64)
     table[:, layout.KIND], table[:, layout.LIMITS] = NO_LAW, 0

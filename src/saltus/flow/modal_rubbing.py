@@ -61,8 +61,8 @@ class Rubbing:
         return [one for one in self.tables.linear.sticking if mode >> one.hold & 1]
 
     def projection(self, mode: int, held: Sequence[Sticking]) -> np.ndarray:
-        """What the frictions that stick leave of a small change of the start, float64[N, N]: they
-        end its sliding at once.
+        """The share of a small change of the start that the frictions that stick leave,
+        float64[N, N]: they end its sliding at once.
         """
         free = mode & ~sum(1 << one.hold for one in held)
         ways = [
