@@ -52,7 +52,6 @@ def set_item(mapping, name):
         ("nnm", r"sl\.backbone\("),
         ("montecarlo", "values=.*array"),
         ("monte_carlo", "values=.*array"),
-        ("sensitivity", "values=.*array"),
         ("events", r"run\.contact_time.*sl\.poincare"),
         ("Event", r"run\.contact_time.*sl\.poincare"),
         ("concat", r"xarray\.concat"),
@@ -390,7 +389,7 @@ STUDY = '[study]\nname = "s"\n[system]\nmodel = "delangre"\n[simulate]\nperiods 
         ("[events]\nx = 1\n", r"\[poincare\]"),
         ("[solver]\nname = 'a'\n", r"\[method\]"),
         ("[parameters]\nmass = 1\n", r"\[system\]"),
-        ('outputs = { a = "x" }\n', r"key of \[frequency_response\], \[bifurcation_diagram\]"),
+        ('outputs = { a = "x" }\n', r"key of \[sensitivity\], \[frequency_response\], "),
         (
             '[branches]\nvary.mass = { first = "1 kg", last = "2 kg", count = 9 }\n',
             "first and last only",

@@ -46,7 +46,6 @@ _ADVICE: dict[str, str] = {
         "Write sl.backbone(system, ...), of free vibrations."),
     **dict.fromkeys(("montecarlo", "sampling", "ensemble", "ensembleproblem", "parametersweep",
         "parameterscan", "scan", "uncertainty"), _ARRAYS),
-    "sensitivity": f"There is none by name; differences of runs show it. {_ARRAYS}",
     **dict.fromkeys(("events", "event", "eventlocation", "odezero", "makezerocrossevent",
         "terminal", "callback", "continuouscallback", "zerocrossing"), _EVENTS),
     **dict.fromkeys(("concat", "merge", "combine", "join", "append"), _MERGE),

@@ -61,8 +61,8 @@ def test_not_toml(text, parts):
         (HEAD + "[simulat]", "the file has no table 'simulat'. Did you mean 'simulate'?"),
         (
             HEAD,
-            "a study asks something: it has a table [simulate], [sensitivity], [poincare], "
-            "[spectrum], [impacts], [energy], [lyapunov], ",
+            "a study asks something: it has a table [simulate], [poincare], [spectrum], "
+            "[impacts], [energy], [sensitivity], [lyapunov], ",
         ),
         (WHOLE.replace("periods", "# "), "[simulate] give the length once"),
         (WHOLE + 't_end = "2 s"', "[simulate] give the length once"),

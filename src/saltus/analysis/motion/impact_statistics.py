@@ -19,7 +19,7 @@ from saltus.analysis.motion.touchdowns import Touchdowns
 from saltus.analysis.motion.window import Stretch, computed, dataset, stretch
 from saltus.analysis.outcome_messages import warn
 from saltus.contact.guards import is_hold
-from saltus.errors import ParameterError, must_be, nearest, shown
+from saltus.errors import ParameterError, listed, must_be, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.methods import Method, check_method
 from saltus.flow.request import Outcome, Schedule
@@ -198,6 +198,8 @@ def impact_statistics(
 def _by_guard(system: System, given: Mapping[str, Any], argument: str) -> dict[int, Any]:
     """A mapping by the names of guards, by their numbers."""
     names = [guard.name for guard in system.guards]
+    if not isinstance(given, Mapping):
+        raise must_be(argument, f"a mapping by the names of boundaries: {listed(names)}", given)
     for name in given:
         if name not in names:
             raise ParameterError(

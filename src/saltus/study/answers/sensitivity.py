@@ -19,7 +19,7 @@ _TO = Field(
 
 
 @asked(
-    15,
+    55,
     table(
         "sensitivity",
         ["sensitivity"],
