@@ -30,6 +30,7 @@ def test_a_write_that_the_system_refuses_leaves_nothing(tmp_path):
     ]
     script = f"""
         import resource, sys
+        sys.dont_write_bytecode = True  # Python would leave what it writes cut off
         sys.path[:0] = {[str(Path(__file__).parents[2]), *sys.path]!r}
         from results.conftest import sine_run
         from saltus.results import save
