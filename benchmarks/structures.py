@@ -248,6 +248,8 @@ def main(arguments: list[str]) -> None:
         return one_cell(arguments[0], *map(int, arguments[1:]))
     if arguments == ["responses"]:
         return responses()
+    if arguments and not (len(arguments) == 2 and all(one.isdigit() for one in arguments)):
+        sys.exit(__doc__)
     rows = [(int(arguments[0]), int(arguments[1]))] if arguments else ROWS
     print("| modes | stops | contacts saltus / heyoka | saltus: first result [s] | a period [ms] | "
           "again [ms] | memory [MB] | heyoka: compile [s] | a period [ms] | compact: compile [s] | "
