@@ -127,12 +127,12 @@ export class Answers {
   }
   heardTrack(head: Head, arrays: Arrays): void {
     if (head.lost) {
-      clearOrbit(`lost: ${head.lost}`);
+      clearOrbit(head.lost);
       this.of.phase.over(null);
       if (this.of.view.orbit) {
         this.of.orbit = null;
         this.of.go({ orbit: null }, { past: true });
-        this.of.says.say(`The orbit was lost: ${head.lost}. The motion from the start is shown.`);
+        this.of.says.say(`The orbit ${head.lost}. The motion from the start is shown.`);
       }
       return this.of.marks();
     }

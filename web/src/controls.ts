@@ -84,13 +84,14 @@ export function connect(explorer: Explorer): void {
   click("undo", () => explorer.back());
   click("redo", () => explorer.forth());
   click("orbit-leave", () => explorer.leaveOrbit());
-  click("reset", () =>
+  click("reset", () => {
+    explorer.values.forget();
     explorer.go({
       values: { ...explorer.first.values },
       start: startOf(explorer.about, explorer.view.axes, explorer.first.start),
       orbit: null,
-    }),
-  );
+    });
+  });
   click("save-open", () => explorer.openSave());
   click("responses-table", () => explorer.table());
 }

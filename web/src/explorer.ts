@@ -313,9 +313,11 @@ export class Explorer {
     this.status.say("stopped");
   }
   back(): void {
+    this.values.forget();
     this.undo.undo();
   }
   forth(): void {
+    this.values.forget();
     this.undo.redo();
   }
 

@@ -129,4 +129,8 @@ export class Values {
     else field.text.removeAttribute("aria-invalid");
     return true;
   }
+  /** Forget what was refused: the fields show what is computed with. */
+  forget(): void {
+    for (const key of this.fields.keys()) this.refuse(key, "");
+  }
 }

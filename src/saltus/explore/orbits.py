@@ -81,6 +81,7 @@ def _fate(code: int) -> str:
 def attractor_orbit(known: Legend, key: int, method: Method, quantities: Sequence[str]) -> Answer:
     """The orbit of an attractor: a whole period; of one that never repeats some periods on it."""
     row: dict[str, Any] = known.row(key) or {}
+    repeats = bool(row["period"]) or row["kind"] in ("equilibrium", "limit_cycle")
     head, arrays = orbit(
         AskedRun(
             known.map.system,
@@ -91,7 +92,7 @@ def attractor_orbit(known: Legend, key: int, method: Method, quantities: Sequenc
             method,
         ),
         quantities,
-        row,
+        {**row, "repeats": repeats},
     )
     return {**head, "attractor": row}, arrays
 
