@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -26,7 +27,7 @@ from saltus.analysis.motion.sample_times import (
     times_of,
 )
 from saltus.analysis.outcome_messages import warn
-from saltus.errors import ParameterError, among, must_be, unknown
+from saltus.errors import ParameterError, SaltusWarning, among, must_be, unknown
 from saltus.flow import engine
 from saltus.flow.contact_table import ContactTable
 from saltus.flow.methods import Method, check_method
@@ -42,6 +43,8 @@ from saltus.system.outputs import with_more
 from saltus.system.quantity import with_turning_surfaces
 from saltus.system.read_off import Quantity
 
+#: Change of a parameter, in itself, for which derivatives should hold at least.
+SLIGHT = 1e-6
 #: Counters that are kept.
 COUNTED = ("steps", "rejected_steps", "mode_violations", "grazes_unresolved")
 #: Rate of a gap at a contact, in the largest at its contacts, below which the contact's time isn't
@@ -74,7 +77,8 @@ def sensitivity(
     but for rounding, as differences of two runs aren't. They hold for changes so small that the
     contacts stay the same ones in the same order. Where a contact is grazed (a small
     ``contact_velocity``) that range is small; at the graze of a rigid stop the slope on the side
-    with contact is infinite.
+    with contact is infinite. In a chaotic motion the range shrinks with the time: a warning says
+    from when on it is below a millionth.
 
     Parameters
     ----------
@@ -152,7 +156,28 @@ def sensitivity(
         except engine.RunInterrupted as stop:
             raise stop.then(answer) from None
     warn(result, length, system)
+    _warn_of_chaos(result)
     return result
+
+
+def _warn_of_chaos(result: xr.Dataset) -> None:
+    """Say so where a motion is so sensitive that its derivatives hold for no change at all."""
+    size = np.abs(result["to_value"].values)[..., None, None, :]
+    change = SLIGHT * np.abs(result["derivative"].values) * size
+    values = result["value"].values
+    span = np.nanmax(values, axis=-2, initial=-np.inf) - np.nanmin(values, axis=-2, initial=np.inf)
+    beyond = change > np.where(span > 0, span, np.inf)[..., None, :, None]
+    if not beyond.any():
+        return
+    times = np.broadcast_to(result["time"].values, values.shape[:-1])[beyond.any(axis=(-2, -1))]
+    warnings.warn(
+        SaltusWarning(
+            f"the derivatives grow beyond use: from t = {times.min():.6g} s on, a change of a "
+            f"parameter by {SLIGHT:g} of itself would change an output by more than its range. "
+            "Run for a shorter time, or take averages of many motions."
+        ),
+        stacklevel=2,
+    )
 
 
 # -- what is asked for -----------------------------------------------------------------------------

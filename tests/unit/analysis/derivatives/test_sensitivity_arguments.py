@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, SaltusWarning
 
 RIG = sl.models.delangre("b", force="4 N", frequency="15 Hz")
 
@@ -43,6 +43,12 @@ def test_an_account_says_what_the_largest_values_depend_on():
     )
     assert f"{float(share):+.3g} % for 1 % of force" in said
     assert list(found.to_units.values) == ["m", "N"]
+
+
+def test_derivatives_of_a_chaotic_motion_are_said_to_be_beyond_use():
+    chaotic = RIG.with_values(frequency=14.2)
+    with pytest.warns(SaltusWarning, match=r"grow beyond use: from t = [\d.]+ s on"):
+        sl.sensitivity(chaotic, ("1 mm", 0), periods=400, samples=4, to="force", extremes=False)
 
 
 def test_a_resting_contact_has_no_time_of_its_own():
