@@ -199,4 +199,24 @@ def test_methods_are_compared_in_the_history_and_in_words(seen, rig):
     )
     assert np.array_equal(np.float32(other), run["x"].values.astype(np.float32))
     assert "hey part by" in seen.text("#motion-what") or "hey agree" in seen.text("#motion-what")
+    (a, b, c, d), n = seen.get("explorer.view.box"), seen.get("explorer.view.size[0]")
+    axes = {"x": (a, b, n), "v": (c, d, n)}
+    maps = [sl.basins(rig, **axes, method=method) for method in (None, sl.ODE45(1e-4, 1e-7))]
+    agreement = sl.compare(*maps)["agreement"].values
+    shown = seen.get("[...explorer.map.agreement.sheet.label]")
+    assert shown == agreement.ravel().tolist()
+    inner = np.argwhere(np.isin(agreement[1:-1, 1:-1], (0, 1)))[::7] + 1
+    at = np.stack([np.linspace(a, b, n)[inner[:, 0]], np.linspace(c, d, n)[inner[:, 1]]], axis=1)
+    looks = {0: (0xD5, 0x5E, 0x00), 1: (0xE4, 0xE4, 0xE4)}
+    colours = seen.get(COLOURS, at.tolist())
+    known = [
+        (looks[int(agreement[tuple(cell)])], colour)
+        for cell, colour in zip(inner, colours, strict=True)
+        if colour
+    ]
+    assert {wanted for wanted, _ in known} == set(looks.values())
+    assert all(np.abs(np.subtract(wanted, colour)).max() <= 1 for wanted, colour in known)
+    assert "lead to the same attractor" in seen.text("#map-under")
     seen.keep("compare")
+    seen.page.click("#map-differ")
+    assert seen.get("explorer.map.agreement") is None

@@ -45,6 +45,7 @@ export class Explorer {
   readonly answers = new Answers(this);
   motion: Motion | null = null;
   maps = new Map<number, Sheet>();
+  agreeing: { id: number; sheet: Sheet } | null = null;
   undo: Undo;
   orbit: Head | null = null;
   settled: Head | null = null;
@@ -112,6 +113,7 @@ export class Explorer {
       fields => this.link.ask("save", { ...fields, view: this.asks.shownView() }),
       () => this.address(),
       () => this.answers.mapText(),
+      () => this.view.against !== "",
     );
     this.undo = new Undo(
       view => this.go(view, { past: true }),
@@ -164,6 +166,7 @@ export class Explorer {
       this.asks.pickSheet();
       this.later("map", REST, () => this.asks.askMap());
     } else if (released) this.asks.askMap();
+    else if (other("against")) this.asks.askAgreement();
     const apart = Object.keys(next.values).some(
       name => name !== next.over && next.values[name] !== before.values[name],
     );
@@ -209,6 +212,9 @@ export class Explorer {
     this.values.show(v.values, v.start);
     this.map.at = [v.start[v.axes[0]], v.start[v.axes[1]]];
     this.map.look(v.axes, v.box, this.whole);
+    this.map.against = v.differ ? v.against : "";
+    $("map-differ").hidden = v.against === "";
+    $("map-differ").setAttribute("aria-pressed", String(v.differ));
     const only = (v.orbit?.attractor as number | undefined) ?? null;
     if (only !== this.map.only) {
       this.map.only = only;

@@ -33,6 +33,7 @@ export class Sheet {
   words: string[] = [];
   flip = "";
   took = 0;
+  agreement: Agreement | null = null;
   dirty = true;
   private canvas: OffscreenCanvas;
   private image: ImageData;
@@ -128,13 +129,37 @@ export class Sheet {
   }
 }
 
+/** Where a second method leads the starts of a map elsewhere: 1 agree, 0 differ, -1 not settled in one of them. */
+export class Agreement {
+  readonly sheet: Sheet;
+  done = false;
+  words: string[] = [];
+  constructor(
+    readonly against: string,
+    { key, values, plane, box, n, m }: Sheet,
+  ) {
+    this.sheet = new Sheet(key, values, plane, box, n, m);
+  }
+  /** Take in the starts whose indices are multiples of a stride. */
+  take(stride: number, label: Arrays[string]): void {
+    const { n, m } = this.sheet,
+      cell: number[] = [];
+    for (let i = 0; i < n; i += stride) for (let j = 0; j < m; j += stride) cell.push(i * m + j);
+    this.sheet.piece(stride, { cell: Uint32Array.from(cell), label, age: new Uint8Array(cell.length) });
+  }
+}
+
+const word = ([r, g, b]: number[]): number => (0xff000000 | (b << 16) | (g << 8) | r) >>> 0;
+/** Colours of codes, of every age. */
+export function codeTable(colours: Record<string, number[]>): Uint32Array {
+  const table = new Uint32Array(256 * AGES).fill(word(GREY));
+  for (const [code, rgb] of Object.entries(colours))
+    for (let s = 0; s < AGES; s++) table[(+code & 255) * AGES + s] = word(rgb);
+  return table;
+}
 /** Colours of labels: a table of words, one for each label and shade. `only` leaves the hue to one attractor. */
 export function colourTable(about: About, attractors: Attractor[], only: number | null): Uint32Array {
-  const table = new Uint32Array(256 * AGES),
-    word = ([r, g, b]: number[]) => (0xff000000 | (b << 16) | (g << 8) | r) >>> 0;
-  table.fill(word(GREY));
-  for (const [code, rgb] of Object.entries(about.code_colors))
-    for (let s = 0; s < AGES; s++) table[(+code & 255) * AGES + s] = word(rgb);
+  const table = codeTable(about.code_colors);
   for (const one of attractors) {
     const shades = about.hue_shades[one.hue % about.hue_shades.length];
     for (let s = 0; s < AGES; s++) {

@@ -12,6 +12,7 @@ export interface View {
   size: [number, number];
   method: string;
   against: string;
+  differ: boolean; // the map shows where the two methods lead elsewhere
   periods: number;
   over: string;
   range: Range;
@@ -52,6 +53,7 @@ export function firstView(about: About): View {
     size: [...about.size],
     method: about.method,
     against: "",
+    differ: true,
     periods: 60,
     over: response?.parameter ?? "",
     range: response?.range ?? [0, 1],
@@ -103,6 +105,7 @@ export function fromAddress(text: string, first: View, about: About): { view: Vi
     box: v => numbers(4)(v) && (v as Box)[0] < (v as Box)[1] && (v as Box)[2] < (v as Box)[3],
     method: oneOf(about.methods),
     against: oneOf(["", ...about.methods]),
+    differ: v => typeof v === "boolean",
     periods: v => finite(v) && v >= 1 && v <= 1e6 && v % 1 === 0,
     over: oneOf(about.parameters.map(p => p.name)),
     range: v => numbers(2)(v) && (v as Range)[0] < (v as Range)[1],

@@ -127,7 +127,7 @@ def grow_map(
     emit: Emit,
     coarse: bool,
     threads: int | None,
-) -> None:
+) -> KeptMap:
     """Emit a map as it grows: ``map-begin``, ``map-piece`` and ``map-level`` as cells settle,
     ``map-attractors`` where one is found, ``map-end``.
 
@@ -145,6 +145,7 @@ def grow_map(
             growing.grow(coarse, threads)
         else:
             growing.tell_all()
+    return kept
 
 
 @contextmanager

@@ -280,3 +280,27 @@ def test_old_maps_make_room(monkeypatch):
     for plan in plans:
         kept.put(maps.KeptMap(plan, labels.Settling.empty(400, 2), None))
     assert [kept.get(plan) is not None for plan in plans] == [False, False, True, True, True]
+
+
+def test_agreement_of_two_methods_is_that_of_compare():
+    rig, size, found = sl.models.delangre("a", force="1.5 N", frequency="10 Hz"), (32, 16), []
+    desk = Desk(opening_of(rig, None, axes=BOX), 2)
+    box = {name: list(ends) for name, ends in BOX.items()}
+    question = {"id": 1, "axes": box, "size": list(size), "against": "ODE45"}
+    desk.answer(
+        question_of("agreement", question), lambda *one: found.append(unpacked(packed(*one)))
+    )
+    axes = {name: (*ends, n) for (name, ends), n in zip(BOX.items(), size, strict=True)}
+    rough = sl.basins(rig, **axes, method=sl.ODE45(1e-4, 1e-7))
+    theirs = sl.compare(basins(size=size, system=rig), rough)
+    told = [one for one in found if one[0]["kind"] == "agreement"]
+    assert [head["level"] for head, _ in told] == [2, 1, 1]
+    assert [head["done"] for head, _ in told] == [False, False, True]
+    finished = told[-1][1]["agreement"]
+    np.testing.assert_array_equal(finished, theirs["agreement"].values.ravel(), strict=True)
+    assert {0, 1} <= set(finished.tolist())
+    assert f"{100 * theirs.attrs['agreement']:.3g} %" in told[-1][0]["words"][0]
+    coarse = told[0][1]["agreement"]
+    every = theirs["agreement"].values[::2, ::2].ravel()
+    assert (coarse == every)[coarse >= 0].all()
+    assert (coarse >= 0).mean() > 0.5

@@ -95,6 +95,23 @@ def test_the_study_of_the_screen_gives_its_labels_and_motion(desk):
     assert len(pairs) == len(np.unique(screen)) == len(np.unique(again))  # the same, renamed
 
 
+def test_the_study_and_the_script_of_a_comparison_run_both_methods(tmp_path, monkeypatch):
+    monkeypatch.setattr(pipeline, "SCOUTS", 16)
+    monkeypatch.chdir(tmp_path)
+    rig = sl.models.delangre("a", force="1.5 N", frequency="10 Hz")
+    other = sl.ODE45(1e-4, 1e-7)
+    view = View(
+        opening_of(rig), rig, sl.Taylor(), axes={"x": (-5e-3, 5e-3, 6), "v": (-1.0, 1.0, 6)},
+        at={}, against=other,
+    )  # fmt: skip
+    maps = [sl.basins(rig, x=(-5e-3, 5e-3, 6), v=(-1, 1, 6), method=m) for m in (None, other)]
+    expected = sl.compare(*maps)["agreement"].values
+    *_, agreement = [one.dataset for one in ask(study_text(view, "both"))]
+    np.testing.assert_array_equal(agreement["agreement"].values, expected)
+    exec(compile(script_text(view), "seen.py", "exec"), names := {})
+    np.testing.assert_array_equal(names["both"]["agreement"].values, expected)
+
+
 def test_a_system_of_ones_own_says_how_it_is_run():
     own = sl.system(states="x v")(lambda t, x, v, *, k=1.0, c=0.2: (v, -k * x - c * v))
     view = View(opening_of(own), own, sl.Taylor(), {"x": 0.5, "v": 0.0}, {"t_end": 2.0})
