@@ -6,6 +6,7 @@ import threading
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -245,7 +246,7 @@ class Desk:
         look(plan, known, self.threads)
         respond(
             known, method, question.parameter, limits, quantity, plan,
-            self.responses, emit, self.threads,
+            self.responses, emit, self.threads, lambda: self._beside(known, question.parameter),
         )  # fmt: skip
 
     def _save(self, question: asked.Save) -> Answer:
@@ -284,11 +285,29 @@ class Desk:
             if key not in self._known:
                 before = next(reversed(self._known.values()), None)
                 scale = self.plan_of(plan.system, plan.method).scale
-                branches = self.responses.orbits_at(plan.system)
+                branches = partial(self.responses.orbits_at, plan.system)
                 legend = Legend(plan.map(1), scale, before, branches)
                 keep(self._known, key, legend, KEPT_VALUES)
             self._known.move_to_end(key)
             return self._known[key]
+
+    def _beside(self, known: Legend, parameter: str) -> list[Legend]:
+        """Attractors at these values, then those at other values of one parameter, the newest
+        first.
+        """
+        mine, method = known.map.system.values, known.map.method
+        with self._lock:
+            others = [one for one in reversed(self._known.values()) if one is not known]
+        return [known] + [
+            one
+            for one in others
+            if one.map.method == method
+            and all(
+                mine[name] == value
+                for name, value in one.map.system.values.items()
+                if name != parameter
+            )
+        ]
 
     def period_of(self, system: System) -> float:
         """The forcing period at these values; without forcing the turn of the opening [s]."""
