@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
+from explorer_systems import van_der_pol
 from mad_page import mad_message
 from saltus.errors import SaltusError
 from saltus.explore import map as maps
@@ -234,11 +235,16 @@ def test_a_system_without_forcing_has_limit_cycles():
     assert x[0] == pytest.approx(x[-1], abs=1e-5)
     now, _ = one(belt, "track", key=told["key"], source={}, values={"mass": 1.01})
     assert now["lost"] is None
-    branch = sl.branches(sl.models.belt_stribeck(), {"mass": (0.99, 1.01)}, [[2.0, 0.0]])
-    belt.keep_responses(branch)
-    _, arrays = one(belt, "responses", parameter="mass", range=[0.99, 1.01], quantity="x")
-    cycle = branch["branch_kind"].values[branch["point_branch"].values] == "limit_cycle"
-    assert set(arrays["point_hue"][cycle].tolist()) == {told["hue"]}
+
+
+def test_a_branch_of_limit_cycles_has_the_hue_of_its_attractor():
+    desk = desk_of(van_der_pol, None)
+    told = one(desk, "settle", start=[1.0, 0.0])[0]["attractor"]
+    desk.keep_responses(sl.branches(van_der_pol, {"mu": (0.9, 1.1)}, [[1.0, 0.0], [0.0, 0.0]]))
+    head, arrays = one(desk, "responses", parameter="mu", range=[0.9, 1.1], quantity="x")
+    kinds = np.array([row["kind"] for row in head["branches"]])[arrays["point_branch"]]
+    assert set(arrays["point_hue"][kinds == "limit_cycle"].tolist()) == {told["hue"]}
+    assert set(arrays["point_hue"][kinds == "equilibrium"].tolist()) == {NO_HUE}  # it repels
 
 
 def test_a_system_without_forcing_has_equilibria():
