@@ -132,7 +132,7 @@ def served(*system: str) -> Iterator[tuple[Page, float]]:
         port, token = url.split(":")[2].split("/")[0], url.partition("token=")[2]
         with connect(f"ws://127.0.0.1:{port}/socket", max_size=None) as line:
             page = Page(line, server.pid)
-            list(page.answers(page.ask("hello", token=token, wire=1)))
+            list(page.answers(page.ask("hello", token=token, wire=2)))
             yield page, took
         server.terminate()
 

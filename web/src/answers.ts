@@ -193,7 +193,7 @@ export class Answers {
       sheet.dirty = true;
     }
     if (head.kind === "map-piece") {
-      sheet.piece(head.level, arrays);
+      sheet.packed(head.level, arrays);
       sheet.known = head.known;
       sheet.of = head.of;
     }

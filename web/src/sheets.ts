@@ -3,6 +3,9 @@ import type { About, Attractor } from "./about";
 import type { Arrays } from "./link";
 import type { Box } from "./state";
 
+/** Columns of the strips along which cells are counted; a step so long goes on in the next one. */
+const STRIP = 64,
+  FAR = 255;
 /** A label and its age make a place in the table of colours: so many ages a label. */
 const AGES = 16,
   GREY = [150, 156, 162];
@@ -55,6 +58,21 @@ export class Sheet {
     this.pixels = new Uint32Array(this.image.data.buffer);
   }
 
+  /** Take in cells of a level as the desk packs them: steps along strips of columns, and rows of a table of labels and ages. */
+  packed(stride: number, { step, rows, look, label, age }: Arrays): void {
+    const cell = new Uint32Array(look.length),
+      strip = rows[0] * STRIP;
+    let place = 0,
+      k = 0;
+    for (const by of step) {
+      place += by;
+      if (by === FAR) continue;
+      const within = place % strip;
+      cell[k++] = Math.floor(within / STRIP) * this.m + Math.floor(place / strip) * STRIP + (within % STRIP);
+    }
+    const of = Array.from(look);
+    this.piece(stride, { cell, label: Int8Array.from(of, i => label[i]), age: Uint8Array.from(of, i => age[i]) });
+  }
   /** Take in cells of a level: each is one start, drawn as the block about it until finer ones come. */
   piece(stride: number, cells: Arrays): void {
     const { n, m, rank, label, age } = this,

@@ -238,8 +238,9 @@ def _hues(legends: Sequence[Legend], ds: xr.Dataset, free: bool = True) -> np.nd
     if free:
         taken = set(hues.tolist()).union(*(known.hues() for known in legends))
         own = iter(hue for hue in range(NO_HUE) if hue not in taken)
-        at, stable = ds[schema.point_name(str(ds.attrs["parameter"]))].values, ds["point_stable"]
-        for i in sorted(set(stretch.tolist()), key=lambda i: -np.ptp(at[stretch == i])):
-            if hues[i] == NO_HUE and stable.values[stretch == i].any():
+        value = ds[schema.point_name(str(ds.attrs["parameter"]))].values
+        stable = ds["point_stable"].values
+        for i in sorted(set(stretch.tolist()), key=lambda i: -np.ptp(value[stretch == i])):
+            if hues[i] == NO_HUE and stable[stretch == i].any():
                 hues[i] = next(own, NO_HUE)
     return hues

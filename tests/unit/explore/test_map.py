@@ -10,6 +10,7 @@ from saltus.analysis.basins import growing, labels, pipeline
 from saltus.explore import map as maps
 from saltus.explore import responses
 from saltus.explore.attractors import Legend
+from saltus.explore.cells import packed_cells, unpacked_cells
 from saltus.explore.desk import Desk
 from saltus.explore.frames import packed, unpacked
 from saltus.explore.opening import opening_of
@@ -51,6 +52,7 @@ class Screen:
         told, found = unpacked(packed(head, arrays))
         self.heads.append(told)
         if told["kind"] == "map-piece":
+            found = unpacked_cells(found, self.label.shape[1])
             cell = found["cell"]
             rows, columns = np.unravel_index(cell, self.label.shape)
             assert len(np.unique(cell)) == len(cell)
@@ -307,3 +309,21 @@ def test_agreement_of_two_methods_is_that_of_compare():
     every = theirs["agreement"].values[::2, ::2].ravel()
     assert (coarse == every)[coarse >= 0].all()
     assert (coarse >= 0).mean() > 0.5
+
+
+@pytest.mark.parametrize("shape", [(16, 16), (70, 200), (400, 400)])
+def test_cells_are_two_bytes_each_and_come_back(shape):
+    random = np.random.default_rng(4127)
+    for share in (0.0, 0.01, 0.3, 1.0):
+        cells = np.flatnonzero(random.uniform(size=shape[0] * shape[1]) < share)
+        label = random.integers(-5, 127, len(cells)).astype("i1")
+        age = random.choice(np.array([*range(12), 255], "u1"), len(cells))
+        label[:-1000] = label[:-1000] % 7
+        packed_ones = packed_cells(cells, label, age, shape[1])
+        back = unpacked_cells(packed_ones, shape[1])
+        order = np.argsort(back["cell"])
+        np.testing.assert_array_equal(back["cell"][order], cells)
+        np.testing.assert_array_equal(back["label"][order], label)
+        np.testing.assert_array_equal(back["age"][order], age)
+        if share >= 0.3:
+            assert packed_ones["step"].nbytes < 1.05 * len(cells)

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 import saltus as sl
 from saltus.analysis.basins import growing, pipeline
+from saltus.explore.cells import unpacked_cells
 from saltus.explore.desk import Desk
 from saltus.explore.frames import packed, unpacked
 from saltus.explore.opening import opening_of
@@ -38,7 +39,8 @@ def desk():
 
         def take(head, arrays):
             if head["kind"] == "map-piece":
-                labels.ravel()[arrays["cell"]] = arrays["label"]
+                cells = unpacked_cells(arrays, labels.shape[1])
+                labels.ravel()[cells["cell"]] = cells["label"]
 
         one.answer(question_of("map", {"id": 1, **MAP}), take)
         one.labels = labels
