@@ -124,7 +124,7 @@ def test_a_lost_line_is_said_and_tried_again(see, explored):
 
         page.route_web_socket(lambda address: address.endswith("/socket"), route)
 
-    seen = see(small(explored), before=hold)
+    seen = see(small(explored), before=hold, hurried=False)
     line, server = lines[-1]
     server.close()
     line.close(code=1012)
