@@ -13,7 +13,7 @@ import { Phase } from "./phase";
 import { Responses } from "./responses";
 import { SaveSheet } from "./save";
 import { Sheet } from "./sheets";
-import { type Box, firstView, fromAddress, startOf, toAddress, Undo, type View } from "./state";
+import { type Box, firstView, fromAddress, snapped, startOf, toAddress, Undo, type View } from "./state";
 import { Values } from "./values";
 import { $, differing, marked, only, type Says, type Status } from "./words";
 
@@ -89,7 +89,7 @@ export class Explorer {
           { start: { ...this.view.start, [this.view.axes[0]]: at[0], [this.view.axes[1]]: at[1] }, orbit: null },
           { drag: !done },
         ),
-      view: (box, done) => this.go({ box }, { drag: !done }),
+      view: (box, done) => this.go({ box: done ? snapped(box, this.view) : box }, { drag: !done }),
       hover: (where, at, sheet) => this.answers.hover(where, at, sheet),
       settle: () => this.asks.settleNow(),
     });

@@ -28,6 +28,30 @@ const finite = (v: unknown): v is number => typeof v === "number" && Number.isFi
 export const startOf = (about: About, axes: [string, string], known: Record<string, number>): Record<string, number> =>
   Object.fromEntries(coordinates(about, axes).map(name => [name, known[name] ?? 0]));
 
+/** Bits of the step between starts of a panned view, at most; all of a start's. */
+const STEP_BITS = 20,
+  BITS = 52;
+/** A view as wide as the one before, moved so little that its starts are multiples of their step to the bit: what it shares with
+ *  other such views the desk takes from these. */
+export function snapped(box: Box, { box: before, size }: View): Box {
+  const out = [...box] as Box;
+  for (const [i, n] of [
+    [0, size[0]],
+    [2, size[1]],
+  ]) {
+    const [a, b] = [box[i], box[i + 1]],
+      wide = b - a;
+    if (Math.abs(wide - (before[i + 1] - before[i])) > 1e-6 * wide) return box;
+    const step = wide / (n - 1),
+      far = Math.ceil(Math.log2(Math.max(Math.abs(a), Math.abs(b)) / step + 1)),
+      unit = 2 ** (Math.floor(Math.log2(step)) - Math.min(STEP_BITS, BITS - far));
+    const exact = Math.round(step / unit) * unit;
+    out[i] = Math.round(a / exact) * exact;
+    out[i + 1] = out[i] + (n - 1) * exact;
+  }
+  return out;
+}
+
 /** What the phase portrait shows at first: of sensors one and its rate, where there is one. */
 function firstPhase(about: About): [string, string] {
   const first = about.quantities.find(q => q.name === about.panels.history[0])!;
