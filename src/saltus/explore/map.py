@@ -44,6 +44,8 @@ _CELL = 40
 LOOK = 0.1
 #: Time for which cells of fine levels are gathered, so that frames are few [s].
 GATHERED = 0.3
+#: Starts that are looked through for attractors where no map's whole sample follows at once.
+LOOKED = 64
 #: Age of a start that isn't settled.
 _NO_AGE = 255
 #: Numbers of a finished map that the page shows.
@@ -163,14 +165,14 @@ def _held(lock: Any) -> Iterator[None]:
         lock.release()
 
 
-def look(plan: BasinPlan, legend: Legend, threads: int | None) -> None:
-    """Look for attractors from those of the values before, and from a few starts, unless some were
-    looked through.
+def look(plan: BasinPlan, legend: Legend, threads: int | None, scouts: int = LOOKED) -> None:
+    """Look for attractors from those of the values before, and from some starts, unless as many
+    were looked through.
     """
     legend.follow()
-    if not legend.scouts:
-        legend.grow(replace(plan, scouts=FEW_SCOUTS).scout(threads, known=legend.found))
-        legend.scouts = FEW_SCOUTS
+    if legend.scouts < scouts:
+        legend.grow(replace(plan, scouts=scouts).scout(threads, known=legend.found))
+        legend.scouts = scouts
 
 
 class _Growing:
@@ -209,7 +211,7 @@ class _Growing:
             self._end({"coarse": True})
             return
         if not legend.follow():  # else what was known there colours the first cells
-            look(plan, legend, threads)
+            look(plan, legend, threads, FEW_SCOUTS)
         self.take_over([])
         scouted = legend.scouts >= plan.scouts
         found, _ = grow_all(

@@ -199,7 +199,7 @@ def test_a_hue_belongs_to_one_side_of_a_fold(desk, found):
 def test_responses_are_branches_and_their_points_are_orbits(desk, monkeypatch):
     monkeypatch.setattr(responses, "STARTS", 1)
     monkeypatch.setattr(responses, "VALUES", 1)
-    monkeypatch.setattr(maps, "FEW_SCOUTS", 1)
+    monkeypatch.setattr(maps, "LOOKED", 1)
     one(desk, "settle", start={"x": "1 mm", "v": 0})
     answers = asked(desk, "responses", parameter="frequency", range=[15.0, 15.1])
     head, arrays = [one for one in answers if one[0]["kind"] == "responses"][-1]

@@ -28,7 +28,7 @@ def few_scouts(monkeypatch):
     monkeypatch.setattr(pipeline, "SCOUTS", 64)
     monkeypatch.setattr(pipeline, "CHECKED", 32)
     monkeypatch.setattr(growing, "FEW_SCOUTS", 16)
-    monkeypatch.setattr(maps, "FEW_SCOUTS", 16)
+    monkeypatch.setattr(maps, "LOOKED", 16)
 
 
 @pytest.fixture
