@@ -223,7 +223,7 @@ export class Answers {
     agreement.words = head.words ?? [];
     if ((agreement.done = head.done)) {
       this.of.agreeing = null;
-      this.of.status.say(agreement.words[0]);
+      this.of.status.say(`compared with ${agreement.against}`);
     }
     this.legend();
     this.of.map.draw();
