@@ -241,6 +241,6 @@ def _hues(legends: Sequence[Legend], ds: xr.Dataset, free: bool = True) -> np.nd
         value = ds[schema.point_name(str(ds.attrs["parameter"]))].values
         stable = ds["point_stable"].values
         for i in sorted(set(stretch.tolist()), key=lambda i: -np.ptp(value[stretch == i])):
-            if hues[i] == NO_HUE and stable[stretch == i].any():
+            if hues[i] == NO_HUE and stable[stretch == i][1:-1].any():  # ends are at folds
                 hues[i] = next(own, NO_HUE)
     return hues
