@@ -65,14 +65,14 @@ class View:
         Starts of the other states of the map.
     periods : int
         Periods that starts of the map are followed.
-    against : Method or None
-        That the map is compared with.
     vary : (str, float, float) or None
         Parameter and range of the responses.
     starts : mapping of str to list of float
         Where the responses are looked for.
     values_tried : int
         At how many values of the parameter.
+    against : Method or None
+        That the map is compared with.
     """
 
     opening: Opening
@@ -83,10 +83,10 @@ class View:
     axes: Mapping[str, tuple[float, float, int]] | None = None
     at: Mapping[str, float] | None = None
     periods: int = 2000
-    against: Method | None = None
     vary: tuple[str, float, float] | None = None
     starts: Mapping[str, list[float]] | None = None
     values_tried: int = 12
+    against: Method | None = None
 
     def units(self) -> dict[str, str]:
         """Units of states, parameters and sensors."""
