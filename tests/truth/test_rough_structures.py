@@ -225,7 +225,7 @@ def drawn(random):
 
 
 def ours(n, stiffness, ratio, moves, drive, contacts, t_end):
-    """Status and deflections at the end, where stops are rigid by modes too."""
+    """Status and deflections at the end, by both methods that stay on a boundary."""
     names = [f"x{i + 1}" for i in range(n)]
     stops = [
         sl.Contact(**given | {"at": names[given["at"]]}
@@ -238,8 +238,7 @@ def ours(n, stiffness, ratio, moves, drive, contacts, t_end):
         base=sl.Base(moves, lambda t: a * sl.sin(w * t + phase)),
     )  # fmt: skip
     shapes = sl.structure_modes(np.eye(n), stiffness, n)["shape"].values
-    rigid = any("restitution" in given for given in contacts)
-    for method in (sl.Taylor(), sl.Modal())[: 1 + rigid]:
+    for method in (sl.Taylor(), sl.Modal()):
         run = sl.simulate(made, np.zeros(2 * n), t_end=t_end, method=method, progress=False)
         yield str(run["status"].values), shapes @ ends(run)[:n]
 

@@ -305,7 +305,8 @@ class Modal(Method):
     (:func:`saltus.impact`) impacts, rest and release follow the rules of :class:`saltus.Taylor`. So
     do dry friction whose force in motion is linear in the states, and memories
     (:func:`saltus.slider`), which begin within their limits. Systems that it doesn't serve -
-    nonlinear forces, friction beside rigid stops, jumps - are moved by :class:`saltus.Taylor`.
+    nonlinear forces, friction of or along rigid stops, jumps - are moved by
+    :class:`saltus.Taylor`.
 
     Parameters
     ----------
