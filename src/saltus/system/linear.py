@@ -379,8 +379,9 @@ def _inputs(linear: LinearSystem, values: Mapping[str, float]) -> np.ndarray:
     """
     sides = [limit_side(guard) for guard in linear.system.guards]
     within = sum(1 << g for g, side in enumerate(sides) if side < 0)
-    rates: np.ndarray = linear.gaps(values).matrix[[g for g, side in enumerate(sides) if side]]
-    return rates @ linear.piece(values, within).matrix
+    gaps = linear.gaps(values).matrix[[g for g, side in enumerate(sides) if side]]
+    found: np.ndarray = gaps @ linear.piece(values, within).matrix
+    return found
 
 
 def _driving(*roots: Expr) -> Iterator[Expr]:
