@@ -133,7 +133,7 @@ def drawn(system, rng):
     return system.with_values(**{name: float(one) for name, one in values.items()}), start
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(8))
 def test_random_bodies_rub_and_strike_as_by_taylor(system, seed):
     """Every row, of frictions, the memory, impacts, rests."""
     one, start = drawn(system, np.random.default_rng([SEED, seed]))
@@ -147,7 +147,7 @@ def test_random_bodies_rub_and_strike_as_by_taylor(system, seed):
             assert float(modal[f"end_{name}"]) == pytest.approx(known, abs=1e-9)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(3))
 def test_derivatives_are_those_of_the_motion(system, seed):
     """Central differences of 1e-6."""
     one, start = drawn(system, np.random.default_rng([SEED, 1, seed]))
@@ -155,7 +155,7 @@ def test_derivatives_are_those_of_the_motion(system, seed):
     size = 2 * BODIES
     _, found = Stroboscope(one, sl.Modal()).tangent(start[None], 1)
     beside = start + 1e-6 * np.vstack([np.eye(len(start)), -np.eye(len(start))])
-    run = sl.simulate(one, beside, periods=1, method=sl.Modal(), progress=False)
+    run = sl.simulate(one, beside, periods=1, samples=2, method=sl.Modal(), progress=False)
     assert {"impact", "hold", "release"} <= set(run.contact_kind.values.tolist())
     ends = np.array([run[f"end_{name}"].values for name in one.states])
     known = (ends[:, : len(start)] - ends[:, len(start) :]) / 2e-6
