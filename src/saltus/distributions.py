@@ -1,4 +1,4 @@
-"""Distributions of uncertain parameters: what a drawing or a measurement says of a number."""
+"""Distributions of uncertain parameters."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from saltus.units import from_si, to_si
 
 @dataclass(frozen=True)
 class Distribution:
-    """How likely the values of a parameter are; made by :func:`normal` and its like.
+    """Distribution of the values of a parameter; made by :func:`normal` and its like.
 
     Attributes
     ----------

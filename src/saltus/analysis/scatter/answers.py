@@ -1,4 +1,4 @@
-"""What is asked of each set of values: its responses, or numbers that a user's function computes.
+"""Answers for each set of values: its responses, or numbers that a user's function computes.
 
 Each answer is a pure function of the sets' values: how they are divided changes no bit.
 """
@@ -35,7 +35,7 @@ Ask = Callable[..., Mapping[str, Any]]
 
 @dataclass
 class Answers:
-    """What m sets lead to from s starts.
+    """Responses and numbers of m sets from s starts.
 
     Attributes
     ----------

@@ -1,4 +1,6 @@
-"""Statistics of what sets of values lead to: quantiles and Sobol indices, with 95 % intervals."""
+"""Statistics of the numbers of many sets of values: quantiles and Sobol indices, with their
+95 % intervals.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,7 @@ def quantiles(numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """
     from scipy.stats import binom
 
-    columns = numbers.reshape(len(numbers), -1)
+    columns = numbers.reshape(len(numbers), int(np.prod(numbers.shape[1:])))
     found = np.full((3, len(QUANTILES), columns.shape[1]), np.nan)
     for k, column in enumerate(columns.T):
         known = np.sort(column[np.isfinite(column)])
@@ -82,9 +84,7 @@ def sobol_indices(
 
     def index(weight: np.ndarray) -> np.ndarray:
         variance = squares @ weight - (means @ weight) ** 2
-        with np.errstate(divide="ignore", invalid="ignore"):
-            share: np.ndarray = (products @ weight) / variance
-        return share
+        return np.asarray((products @ weight) / (variance if variance > 0 else np.nan))
 
     found[:, 0] = index(np.full(len(a), 1.0 / len(a)))
     rng, again = np.random.default_rng([seed, 1]), []

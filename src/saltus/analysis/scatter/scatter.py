@@ -1,4 +1,4 @@
-"""`scatter`: what uncertain parameters do to motions."""
+"""`scatter`: the effect of uncertain parameters on motions."""
 
 from __future__ import annotations
 
@@ -55,8 +55,8 @@ def scatter(
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
 ) -> xr.Dataset:
-    """What uncertain parameters do to a motion: quantiles of its numbers, the probability that each
-    response exists and that a start reaches it, and which parameter matters.
+    """Effect of uncertain parameters on motions: quantiles of their numbers, the probability that
+    each response exists and that a start reaches it, and the share of each parameter.
 
     1. Sets of values are drawn by scrambled Sobol points, which fill the space of the parameters
        more evenly than independent draws: errors of means fall nearly as 1/samples.

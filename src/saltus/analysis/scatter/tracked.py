@@ -1,4 +1,4 @@
-"""Which responses of two sets of values are one: an orbit of one set is followed to all others.
+"""Responses that are one in several sets of values: an orbit of one set is followed to all others.
 
 All sets are followed at once, each by steps of its own along the straight way between the values.
 Newton's method begins on the secant; where it fails, goes to another period or farther than a tenth
@@ -25,6 +25,8 @@ from saltus.results.dataset.kinds import Kind
 SHORTEST = 1.0 / 256
 #: Most steps that are tried, failed ones included.
 MOST_STEPS = 100
+#: Tries to reach a set, each from the nearest one in which the orbit is known.
+PASSES = 3
 #: Farthest that a point goes from where it is expected in one step, in ranges of the orbit.
 FARTHEST = 0.1
 #: Most responses that are told apart: each is followed to all sets.
@@ -59,6 +61,9 @@ class TrackedResponse:
 def track_all(map_: Stroboscope, motion: ClosedMotion, at: int, scale: np.ndarray) -> ClosedMotions:
     """An orbit of one row of a map followed to all others.
 
+    Where the straight way to a row leaves the range of the orbit, it is tried again from the
+    nearest row in which the orbit was found, PASSES times.
+
     Parameters
     ----------
     map_ : Stroboscope
@@ -75,18 +80,40 @@ def track_all(map_: Stroboscope, motion: ClosedMotion, at: int, scale: np.ndarra
     ClosedMotions
         Of each row; of period 0 where it was lost.
     """
-    count, size = len(map_), len(scale)
-    found = ClosedMotions.none(count, size)
-    before, n = map_.parameters[at], motion.period
-    share, step, older = np.zeros(count), np.ones(count), np.zeros(count)
-    here = np.tile(motion.points[0], (count, 1))
-    last = here.copy()
-    who = np.arange(count)
+    from scipy.spatial import cKDTree
+
+    found = ClosedMotions.none(len(map_), len(scale))
+    found.period[at], found.points[at, : motion.period] = motion.period, motion.points
+    found.multipliers[at], found.mismatch[at] = motion.multipliers, motion.mismatch
+    spread = np.ptp(map_.parameters, axis=0)
+    places = map_.parameters[:, spread > 0] / spread[spread > 0]
+    for _ in range(PASSES):
+        lost, known = np.flatnonzero(found.period == 0), np.flatnonzero(found.period > 0)
+        if not len(lost):
+            break
+        origin = known[cKDTree(places[known]).query(places[lost])[1]]
+        _track(map_, found, origin, lost, motion.period, scale)
+        if (found.period[lost] == 0).all():
+            break
+    return found
+
+
+def _track(
+    map_: Stroboscope, found: ClosedMotions, origin: np.ndarray, rows: np.ndarray, n: int,
+    scale: np.ndarray,
+) -> None:  # fmt: skip
+    """Follow the orbits of rows ``origin`` int64[m] to the rows int64[m]; writes those that
+    arrive.
+    """
+    before, after = map_.parameters[origin], map_.parameters[rows]
+    share, step, older = np.zeros(len(rows)), np.ones(len(rows)), np.zeros(len(rows))
+    here = found.points[origin, 0]
+    last, who = here.copy(), np.arange(len(rows))
     for _ in range(MOST_STEPS):
         to = np.minimum(share[who] + step[who], 1.0)
-        rows = before + to[:, None] * (map_.parameters[who] - before)
-        rows[to == 1.0] = map_.parameters[who[to == 1.0]]
-        way = Stroboscope(map_.system, map_.method, rows, threads=map_.threads)
+        there = before[who] + to[:, None] * (after[who] - before[who])
+        there[to == 1.0] = after[who[to == 1.0]]
+        way = Stroboscope(map_.system, map_.method, there, threads=map_.threads)
         gone = share[who] - older[who]
         ahead = np.where(gone > 0, (to - share[who]) / np.where(gone > 0, gone, 1.0), 0.0)
         guess = here[who] + ahead[:, None] * (here[who] - last[who])
@@ -102,11 +129,10 @@ def track_all(map_: Stroboscope, motion: ClosedMotion, at: int, scale: np.ndarra
         here[moved] = orbits.points[np.flatnonzero(good), nearest[good]]
         step[who] *= np.where(good, 2.0, 0.5)
         arrived = good & (to == 1.0)
-        found.put(who[arrived], orbits.rows(arrived))
+        found.put(rows[who[arrived]], orbits.rows(arrived))
         who = who[~arrived & (step[who] >= SHORTEST)]
         if not len(who):
             break
-    return found
 
 
 def tell_apart(

@@ -1,4 +1,4 @@
-"""Result of ``scatter``: sets of uncertain values, what they lead to, and statistics."""
+"""Result of ``scatter``: sets of uncertain values, their motions, and statistics."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import xarray as xr
 
 from saltus.errors import counted
 from saltus.results.dataset.kinds import WITHOUT_WORDS
-from saltus.results.dataset.schema import ResultKind, period_text
+from saltus.results.dataset.schema import ResultKind, kind_text
 from saltus.results.dataset.variable import Variable
 from saltus.results.table import Column, TextTable, interval, left_out, number, table, words
 from saltus.units import from_si
@@ -84,19 +84,15 @@ def account(ds: xr.Dataset) -> list[str]:
     for k in range(ds.sizes.get("response", 0)):
         one = ds.isel(response=k)
         lines.append(
-            f"response {_named(one)}: exists in {_share(one, 'probability_exists')} of the sets, "
+            f"response {named(one)}: exists in {_share(one, 'probability_exists')} of the sets, "
             f"the first start reaches it in {_share(one.isel(start=0), 'probability_reached')}"
         )
     return lines
 
 
-def _named(one: xr.Dataset) -> str:
-    return period_text_of(str(one["response_type"].item()), int(one["response_period"]))
-
-
-def period_text_of(kind: str, n: int) -> str:
+def named(one: xr.Dataset) -> str:
     """A response in a word: ``3T``, ``chaotic``."""
-    return period_text(n) if n > 0 else kind.replace("_", " ")
+    return kind_text(str(one["response_type"].item()), int(one["response_period"]))
 
 
 def _share(one: xr.Dataset, name: str) -> str:
@@ -131,9 +127,8 @@ def rows(title: str, ds: xr.Dataset) -> list[TextTable]:
     tables = [table(title, columns, [*notes, *left_out(starts * outcomes, "outcomes")])]
     if ds.sizes.get("response", 0):
         response, start = (one.ravel() for one in np.indices((ds.sizes["response"], starts)))
-        kinds, periods = ds["response_type"].values, ds["response_period"].values
-        named = [period_text_of(str(kinds[k]), int(periods[k])) for k in response]
-        columns = [words("response", named), words("number", response), words("start", start)]
+        called = [named(ds.isel(response=k)) for k in response]
+        columns = [words("response", called), words("number", response), words("start", start)]
         for heading, name, index in (
             ("exists", "probability_exists", (response,)),
             ("reached", "probability_reached", (start, response)),
