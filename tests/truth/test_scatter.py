@@ -36,18 +36,18 @@ def test_quantiles_of_a_linear_system_are_the_closed_form():
 
 def test_a_response_exists_up_to_its_fold():
     found = sl.scatter(
-        RIG, {"frequency": sl.uniform("12 Hz", "20 Hz")}, ("5 mm", 0), samples=128, seed=7
+        RIG, {"frequency": sl.uniform("15.5 Hz", "17.9 Hz")}, ("5 mm", 0), samples=32, seed=7
     )
     frequency, exists = found["value"].values[:, 0], found["exists"].values.astype(bool)
     period, reached = found["response_period"].values, found["response_of"].values[:, 0]
     peak = found["response_quantile"].sel(quantile=0.5, outcome="x peak").values
     resonant = int(np.argmax(np.where(period == 1, peak, 0.0)))
-    clear = np.abs(frequency - FOLD) > 0.01
+    clear = np.abs(frequency - FOLD) > 0.003
     assert (exists[clear, resonant] == (frequency < FOLD)[clear]).all()
     low, high = (float(found[f"probability_exists_{end}"][resonant]) for end in ("low", "high"))
-    assert low < (FOLD - 12.0) / 8.0 < high
-    assert np.count_nonzero(reached == resonant) > 10
-    assert exists[np.arange(128), reached].all()
+    assert low < (FOLD - 15.5) / 2.4 < high
+    assert np.count_nonzero(reached == resonant) > 3
+    assert exists[np.arange(32), reached].all()
 
 
 def test_sobol_indices_of_ishigamis_function():

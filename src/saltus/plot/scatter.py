@@ -15,8 +15,10 @@ from saltus.results.kinds.scatter import CODES, named
 
 #: Colour of sets whose start reaches no response, and of numbers of a user's function.
 GREY = "0.55"
-#: Bins of a histogram.
+#: Most bins of a histogram.
 BINS = 40
+#: Sets up to which points are drawn large.
+FEW = 500
 
 
 @picture()
@@ -62,7 +64,8 @@ def scatter(ds: xr.Dataset, outcome: str | None = None, start: int = 0) -> np.nd
             _points(axes[k], one, k, up.factor * one["number"].values, groups)
         axes[0].set_ylabel(up.label(name))
         finite = up.factor * one["number"].values[np.isfinite(one["number"].values)]
-        bins = np.histogram_bin_edges(finite, BINS) if finite.size else BINS
+        most = _bins(ds)
+        bins = np.histogram_bin_edges(finite, most) if finite.size else most
         heights = [up.factor * one["number"].values[here] for here, _, _ in groups]
         axes[-1].hist(
             [values[np.isfinite(values)] for values in heights],
@@ -118,7 +121,7 @@ def corner(ds: xr.Dataset, start: int = 0) -> np.ndarray:
                         panel.set_ylabel(scale.label(_words(ds, row)))
                 else:
                     panel.hist(
-                        [values[here] for here, _, _ in groups], BINS, stacked=True,
+                        [values[here] for here, _, _ in groups], _bins(ds), stacked=True,
                         color=[color for _, color, _ in groups],
                         label=[label for *_, label in groups],
                     )  # fmt: skip
@@ -128,6 +131,11 @@ def corner(ds: xr.Dataset, start: int = 0) -> np.ndarray:
         if any(label for *_, label in groups):
             figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="upper right")
     return np.asarray(axes)
+
+
+def _bins(ds: xr.Dataset) -> int:
+    """Bins of a histogram, each with some sets."""
+    return min(BINS, 2 * int(np.ceil(np.cbrt(ds.sizes["set"]))) + 2)
 
 
 def _of_start(ds: xr.Dataset, start: int) -> xr.Dataset:
@@ -163,8 +171,9 @@ def _points(
 ) -> None:  # fmt: skip
     """Points of some numbers over a parameter."""
     scale, values = _parameter(one, k)
+    size = 5.0 if len(values) <= FEW else 2.5
     for here, color, _ in groups:
-        draw_points(ax, values[here], up[here], color=color, marker=".", ms=2.5, mew=0)
+        draw_points(ax, values[here], up[here], color=color, marker=".", ms=size, mew=0)
     if name:
         ax.set_xlabel(scale.label(_words(one, k)))
 

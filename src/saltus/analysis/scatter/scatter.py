@@ -265,19 +265,25 @@ def _responses(
     for k, one in enumerate(found.responses):
         exists[taken, k] = one.exists
     exists, reached, sets = exists[:n], reached[:n], int(done.sum())
-    seen = [k for k in range(len(found.responses)) if exists[:, k].any()]
-    renumber = np.full(len(found.responses) + 1, -1)
+    of_each = []
+    for k in range(len(found.responses)):
+        some, first = (reached == k).any(axis=1), np.argmax(reached == k, axis=1)
+        of_each.append(statistics.quantiles(numbers[:n][some, first[some]])[0])
+    middle = [of_one[len(of_one) // 2, 0] for of_one in of_each]
+    seen = sorted(
+        (k for k in range(len(found.responses)) if exists[:, k].any()),
+        key=lambda k: (
+            found.responses[k].kind,
+            found.responses[k].period,
+            np.nan_to_num(middle[k]),
+        ),
+    )
+    renumber = np.zeros(len(found.responses) + 1, int)
     renumber[seen] = np.arange(len(seen))
     reached = np.where(reached >= 0, renumber[np.maximum(reached, 0)], reached)
-    hits = np.stack(
-        [np.count_nonzero(reached[done] == k, axis=0) for k in range(len(seen))], axis=1
-    ) if seen else np.zeros((reached.shape[1], 0), int)  # fmt: skip
+    each = np.arange(len(seen))[:, None, None]
+    hits = np.count_nonzero(reached[done] == each, axis=1).T
     there = np.count_nonzero(exists[done][:, seen], axis=0)
-    of_each = np.full((len(seen), len(statistics.QUANTILES), numbers.shape[2]), np.nan)
-    for k in range(len(seen)):
-        first = np.argmax(reached == k, axis=1)
-        some = np.flatnonzero((reached == k).any(axis=1))
-        of_each[k] = statistics.quantiles(numbers[some, first[some]])[0]
     responses = [found.responses[k] for k in seen]
     return {
         "response": np.arange(len(seen)),
@@ -288,7 +294,9 @@ def _responses(
         "exists": exists[:, seen].astype(int),
         **_ends("probability_exists", there, sets),
         **_ends("probability_reached", hits, sets),
-        "response_quantile": of_each,
+        "response_quantile": np.array([of_each[k] for k in seen]).reshape(
+            len(seen), len(statistics.QUANTILES), numbers.shape[2]
+        ),
     }  # fmt: skip
 
 

@@ -83,9 +83,14 @@ def account(ds: xr.Dataset) -> list[str]:
     lines = [f"extent   {counted(ds.sizes['set'], 'set')}: {told}", f"drawn    {uncertain}"]
     for k in range(ds.sizes.get("response", 0)):
         one = ds.isel(response=k)
+        middle = float(one["response_quantile"].isel(outcome=0).sel(quantile=0.5))
+        size = from_si(middle, str(one["outcome_units"].values[0]), 4)
+        about = f", median {one['outcome'].values[0]} {size}" if np.isfinite(middle) else ""
+        exists = _share(one, "probability_exists")
+        reached = _share(one.isel(start=0), "probability_reached")
         lines.append(
-            f"response {named(one)}: exists in {_share(one, 'probability_exists')} of the sets, "
-            f"the first start reaches it in {_share(one.isel(start=0), 'probability_reached')}"
+            f"response {named(one)}{about}: exists in {exists} of the sets, "
+            f"the first start reaches it in {reached}"
         )
     return lines
 
