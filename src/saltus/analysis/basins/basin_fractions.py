@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.attractors.attractors import attractors_dataset, looked
+from saltus.analysis.attractors.attractors import attractors_dataset, looked, no_attractor
 from saltus.analysis.attractors.noisy import stray_attrs
 from saltus.analysis.attractors.portrait import portraits
 from saltus.analysis.basins import uncertainty
@@ -136,6 +136,7 @@ def basin_fractions(
     strays = stray_attrs(found.astray if (result.label == Kind.UNCONVERGED).any() else [])
     return ds.assign_attrs(
         **strays,
+        **no_attractor(system, found, result.label),
         smallest_basin_seen=smallest_seen(len(start)),
         samples=samples,
         seed=seed,
