@@ -17,7 +17,7 @@ from saltus.analysis.dataset_parts import guards_over
 from saltus.analysis.inputs.starts import ensemble
 from saltus.analysis.motion.motion_arrays import motion_arrays
 from saltus.errors import SaltusError
-from saltus.explore.motion import REACHED
+from saltus.explore.motion import REACHED, bounded
 from saltus.flow.methods import Method, default_method
 from saltus.system import System
 from saltus.system.structures.told import by_modes
@@ -157,7 +157,13 @@ def _box(system: System, method: Method) -> tuple[dict[str, tuple[float, float]]
     length = {"periods": LOOKED} if forced else {"t_end": LOOKED * turn}
     count = SAMPLES if forced else LOOKED * SAMPLES
     seen = motion_arrays(
-        system, start, method=method, samples=count, time_errors="local", threads=1, **length
+        system,
+        start,
+        method=bounded(method, LOOKED),
+        samples=count,
+        time_errors="local",
+        threads=1,
+        **length,
     )
     moved = np.abs(seen.values[0]).max(axis=0)
     if int(seen.outcome.status[0]) in REACHED and moved.max() < FARTHEST * (reach.max() or 1.0):

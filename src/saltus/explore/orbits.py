@@ -55,14 +55,18 @@ def settle(
     key, periods = settled(known, start)
     unit = "periods" if known.map.system.forced_at is not None else "turns"
     if key < 0:
-        words = f"This start {_fate(key)}."
-        empty = {"kind": "settle", "attractor": None, "code": key, "settles": -1, "words": [words]}
-        return {**empty, "values": dict(known.map.system.values)}, {}
+        return nowhere(known.map.system, f"This start {_fate(key)}.", key)
     head, arrays = attractor_orbit(known, key, method, quantities)
     words = f"settles to {_noun(head['attractor'])}"
     if periods >= 0:
         words += f" after {periods} {unit}"
     return {**head, "kind": "settle", "code": None, "settles": periods, "words": [words]}, arrays
+
+
+def nowhere(system: System, why: str, code: int | None = None) -> Answer:
+    """The answer on a start that settles to nothing, in a sentence."""
+    head = {"kind": "settle", "attractor": None, "code": code, "settles": -1, "words": [why]}
+    return {**head, "values": dict(system.values)}, {}
 
 
 def _noun(row: Mapping[str, Any]) -> str:

@@ -25,7 +25,7 @@ _KEPT = (
     "and each start keeps a motion of its own."
 )
 _GROWS = (
-    "This system is damped negatively (the divergence of its equations is positive): it has no "
+    "This system has negative damping (the divergence of its equations is positive): it has no "
     "attractors, and motions grow."
 )
 

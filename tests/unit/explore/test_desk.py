@@ -2,6 +2,7 @@
 
 import random
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,9 +13,11 @@ from saltus.errors import SaltusError
 from saltus.explore import map as maps
 from saltus.explore import motion as motions
 from saltus.explore import responses
+from saltus.explore.attractors import Legend
 from saltus.explore.desk import Desk, Models
 from saltus.explore.frames import packed, unpacked
 from saltus.explore.opening import Opening, opening_of
+from saltus.explore.orbits import settled
 from saltus.explore.questions import QuestionError, question_of, read
 from saltus.interrupt import Interrupted, Stop
 
@@ -147,6 +150,42 @@ def test_a_start_settles_to_what_attractors_says(desk):
         assert np.abs(x).max() == pytest.approx(told["peak"]["x"], rel=1e-3)
     again, _ = one(desk, "orbit", attractor=told["key"])
     assert again["multipliers"] == told["multipliers"]
+
+
+def test_a_row_of_the_legend_stays_with_its_attractor_when_ids_change(desk):
+    """What is found later may sort before it, and join what nobody had lost."""
+    plan = desk.plan_of(RIG, desk.opening.method)
+    known = Legend(plan.map(1), plan.scale)
+    for x in (1e-3, 3e-3):
+        settled(known, [x, 0.0])
+    peaks = [row["peak"] for row in known.table()]
+    assert len(peaks) > 1
+    backwards = replace(known.found, orbits=known.found.orbits[::-1])
+    assert not known.grow(backwards)
+    assert [row["peak"] for row in known.table()] == peaks
+
+
+@pytest.mark.parametrize(("damping", "words"), [(0.0, "Nothing damps"), (-0.5, "negative damping")])
+def test_where_nothing_attracts_that_is_said_at_once(desk, damping, words):
+    values = {"damping_ratio": damping}
+    head, _ = one(desk, "settle", start=[1e-3, 0.0], values=values)
+    assert words in head["words"][0]
+    axes = {"x": [-1e-3, 1e-3], "v": [-0.1, 0.1]}
+    for ask in (
+        {"ask": "map", "axes": axes, "size": [40, 40]},
+        {"ask": "responses", "parameter": "frequency", "range": [14, 16]},
+    ):
+        with pytest.raises(QuestionError, match=words):
+            asked(desk, **ask, values=values)
+
+
+def test_a_motion_without_end_is_drawn_as_far_as_its_budget(desk, monkeypatch):
+    monkeypatch.setattr(motions, "MOST_MET", 2000)
+    head, arrays = one(desk, "motion", start=[0.0, 0.0], values={"damping_ratio": -0.5})
+    assert head["status"].startswith("budget")
+    assert "It ended at" in head["words"][0]
+    assert head["contacts"] <= motions.MOST_MET
+    assert np.isfinite(arrays["sample:x"][:100]).all()
 
 
 def test_an_orbit_is_tracked_to_where_branches_has_it_and_lost_at_the_fold(desk):
