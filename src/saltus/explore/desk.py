@@ -22,7 +22,7 @@ from saltus.explore.frames import Answer, Emit
 from saltus.explore.kept_responses import KeptResponses
 from saltus.explore.map import KeptMaps, grow_map, look, plan_of_map
 from saltus.explore.motion import AskedRun, motion
-from saltus.explore.opening import Opening
+from saltus.explore.opening import Opening, first_quantity
 from saltus.explore.orbits import (
     MOST_PERIODS,
     attractor_orbit,
@@ -226,8 +226,7 @@ class Desk:
             system.parameter_text(question.parameter)
         with about("range"):
             limits = range_of(system, question.parameter, question.range)
-        first = system.outputs.names if system.outputs.first else system.states
-        quantity = self.quantities_of((question.quantity or first[0],))[0]
+        quantity = self.quantities_of((question.quantity or first_quantity(system),))[0]
         along = [system.with_values(**{question.parameter: one}) for one in limits]
         if all(reasons := [nothing_attracts(one) for one in (system, *along)]):
             raise QuestionError(f"{reasons[0]} Responses are followed from attractors.")

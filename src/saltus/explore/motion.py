@@ -211,10 +211,12 @@ def _words(found: MotionArrays, status: int) -> list[str]:
     """Sentences on a motion's end."""
     if status == st.OK:
         return []
-    name, meaning = STATUS[status]
+    meaning = STATUS[status][1]
     if status in REACHED:
-        return [f"{name}: {meaning}."]
-    return [f"It ended at {from_si(float(found.outcome.time[0]), 's')}: {name}, {meaning}."]
+        return [f"It {meaning}."]
+    if status in (st.BUDGET_STEPS, st.BUDGET_EVENTS):
+        meaning = "it meets too many contacts, or takes too many steps, to be followed further here"
+    return [f"It ended at {from_si(float(found.outcome.time[0]), 's')}: {meaning}."]
 
 
 def _parting(
@@ -241,5 +243,5 @@ def _parting(
     if number < len(theirs.contacts):
         late = float(theirs.contacts.time[number] - ours.contacts.time[number])
         when = "late" if late > 0 else "early"
-        words += f", which {method.label} meets {from_si(abs(late), 's', 2)} {when}"
+        words += f", which {method.name} meets {from_si(abs(late), 's', 2)} {when}"
     return {"method": method.name, "parts": time, "contact": number, "words": f"{words}."}
