@@ -12,14 +12,14 @@ from mad_page import mad_message
 from saltus.errors import SaltusError
 from saltus.explore import map as maps
 from saltus.explore import motion as motions
-from saltus.explore import responses
+from saltus.explore import orbits, responses
 from saltus.explore.attractors import Legend
 from saltus.explore.desk import Desk, Models
 from saltus.explore.frames import packed, unpacked
 from saltus.explore.opening import Opening, opening_of
 from saltus.explore.orbits import settled
 from saltus.explore.questions import QuestionError, question_of, read
-from saltus.interrupt import Interrupted, Stop
+from saltus.interrupt import Interrupted, Stop, check_stop
 
 RIG = sl.models.delangre("b", force="4 N", frequency="15 Hz")
 BOX = {"x": (-5e-3, 5e-3), "v": (-1.0, 1.0)}
@@ -119,7 +119,7 @@ def test_a_motion_that_fails_is_drawn_as_far_as_it_went():
     desk = Desk(Opening(grows, sl.Taylor(), {"x": (-1, 1), "y": (-1, 1)}, turn=0.05), 1)
     head, arrays = one(desk, "motion", start=[2.0, 1.0], periods=20)  # x = 2/(1 - 2 t)
     assert head["status"] == "nonfinite"
-    assert head["words"][0].startswith("It ended at 500 ms: nonfinite")
+    assert head["words"][0].startswith("It ended at 500 ms: the state")
     times = head["dt"] * np.arange(head["count"])
     reached = times < 0.499
     exact = 2 / (1 - 2 * times[reached])
@@ -177,6 +177,23 @@ def test_where_nothing_attracts_that_is_said_at_once(desk, damping, words):
     ):
         with pytest.raises(QuestionError, match=words):
             asked(desk, **ask, values=values)
+
+
+def test_a_start_that_takes_too_long_is_left(desk, monkeypatch):
+    def wanders(*_):
+        while True:
+            check_stop()
+
+    monkeypatch.setattr(orbits, "settled", wanders)
+    monkeypatch.setattr(orbits, "WITHIN", 0.01)
+    head, _ = one(desk, "settle", start=[1e-3, 0.0])
+    assert head["attractor"] is None
+    assert "hasn't settled within 0.01 s" in head["words"][0]
+    monkeypatch.setattr(orbits, "WITHIN", 60.0)
+    stop = Stop()
+    stop.set()
+    with stop, pytest.raises(Interrupted):
+        one(desk, "settle", start=[1e-3, 0.0])
 
 
 def test_a_motion_without_end_is_drawn_as_far_as_its_budget(desk, monkeypatch):
