@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import time
+
 import pytest
+
+from explorer_page import PATIENCE, small
 
 
 def typed(seen, at, text):
@@ -89,3 +93,11 @@ def test_the_map_tells_the_pointer_from_the_start_of_its_cell(seen):
         "k => explorer.map.sheet.attractors.find(o => o.key === k).name", cell["label"]
     )
     assert f"settles to {label}" in seen.text("#motion-what")
+
+
+def test_what_is_shown_first_is_known_to_python_before_a_click(see, explored):
+    see(small(explored))
+    end = time.monotonic() + PATIENCE
+    while "motion" not in explored.view and time.monotonic() < end:
+        time.sleep(0.05)
+    assert "[simulate]" in explored.study()

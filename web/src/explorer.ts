@@ -135,8 +135,8 @@ export class Explorer {
     this.show();
     this.kept = toAddress(this.view, this.first);
     this.keptView = this.view;
-    this.undo.replace(this.view, this.kept);
     this.asks.askAll();
+    this.keep();
     setInterval(() => this.answers.tick(), 1000);
   }
 
