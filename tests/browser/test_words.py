@@ -49,7 +49,7 @@ def test_a_range_is_refused_beside_its_field(seen):
 def test_without_damping_every_panel_says_that_nothing_attracts(seen):
     typed(seen, "[id='values.damping_ratio']", "0")
     seen.rest()
-    for panel in ("#motion-what", "#orbit-what", "#map-words", "#responses-words"):
+    for panel in ("#map-words", "#responses-words"):
         assert "has no attractors" in seen.text(panel), panel
     assert seen.page.locator("#legend tbody tr").count() == 0
     assert seen.page.locator("#says").is_hidden()
