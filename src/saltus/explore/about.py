@@ -10,7 +10,8 @@ import numpy as np
 from saltus.analysis.basins.labels import OPEN
 from saltus.explore.frames import Answer
 from saltus.explore.opening import STEPS, Opening, choices, first_quantity
-from saltus.flow.methods import METHODS, Modal
+from saltus.flow.methods import METHODS
+from saltus.flow.modal import Modal
 from saltus.kernels import status as st
 from saltus.models import describe
 from saltus.plot.palette import hues, shades
