@@ -72,7 +72,7 @@ def settle(
 
 
 def _in_time(work: Callable[[], tuple[int, int]]) -> tuple[int, int] | None:
-    """What work finds within :data:`WITHIN`; None if it takes longer. Raises Interrupted if it is
+    """Return the findings of work within :data:`WITHIN`; None if it takes longer. Raises Interrupted if it is
     asked to stop from outside.
     """
     late, stop = threading.Event(), Stop()
