@@ -12,11 +12,12 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.dataset_parts import provenance, subject
+from saltus.analysis.fits.growth import grow
 from saltus.analysis.fits.measurement import Measurement, history, per_output
 from saltus.analysis.fits.motion import Motions
 from saltus.analysis.fits.search import Search
 from saltus.analysis.fits.unknowns import INSIDE, Unknowns
-from saltus.analysis.fits.verdict import UNKNOWN, noise_of, valleys, verdict
+from saltus.analysis.fits.verdict import UNKNOWN, follow, noise_of, valleys, verdict
 from saltus.analysis.inputs.given import Range, Starts, Value
 from saltus.analysis.inputs.starts import at_values, check_system
 from saltus.analysis.inputs.verb import verb
@@ -27,6 +28,7 @@ from saltus.flow.progress import reporting, stage
 from saltus.interrupt import Interrupted
 from saltus.results import build
 from saltus.results.dataset import schema
+from saltus.results.kinds.fit import FOLLOW, TOO_LARGE
 from saltus.system import System
 from saltus.system.outputs import with_more
 from saltus.system.read_off import Quantity
@@ -34,6 +36,11 @@ from saltus.units import to_si
 
 #: Smallest noise that is estimated, in the size of what was measured: rounding.
 LEAST_NOISE = 1e-14
+
+#: Times as many places from which a search on short beginnings of the data begins.
+MORE = 4
+#: Residuals of this share of what was measured are small: they needn't be noise.
+SMALL = 0.05
 
 Measured = xr.Dataset | Mapping[str, Any] | str | PathLike[str] | bytes
 
@@ -51,7 +58,7 @@ def fit(
     weights: float | Mapping[str, float] | None = None,
     missing: bool = False,
     starts: int = 16,
-    flows: int = 1000,
+    flows: int = 2000,
     seed: int = 1,
     values: Mapping[str, Value] | None = None,
     method: Method | None = None,
@@ -158,8 +165,11 @@ def fit(
     with reporting(progress) as show:
         try:
             search.run(places, stage(show, 0.0, 0.3))
-            if not search.spent and not confirmed(search, spread, data):
-                search.grow(places, stage(show, 0.3, 0.9))
+            described = functools.partial(_described, spread, data)
+            alone = valleys(search.minima)[0][1] == 1 if search.minima else True
+            if not search.spent and (alone or not described(search)):
+                more = _places(system, model, MORE * starts, seed)
+                grow(search, more, described, stage(show, 0.3, 0.9))
             if spread.each and len(data.outputs) > 1 and not search.spent:
                 search.reweigh(np.tile(spread.seen(search, data), (len(data.at), 1)))
                 assert search.best is not None
@@ -238,11 +248,17 @@ class Spread:
         return np.asarray(np.maximum(factor * search.deviation[0], LEAST_NOISE * data.size))
 
 
-def confirmed(search: Search, spread: Spread, data: Measurement) -> bool:
-    """True if two descents at least ended in the best valley."""
-    search.reweigh(np.tile(spread.seen(search, data), (len(data.at), 1)))
-    found = valleys(search.minima)
-    return bool(found) and found[0][1] > 1
+def _described(spread: Spread, data: Measurement, search: Search) -> bool:
+    """True if the residuals of the best place are noise: as large as it was said to be, or else
+    such that neighbours don't follow each other.
+    """
+    noise = spread.seen(search, data)
+    search.reweigh(np.tile(noise, (len(data.at), 1)))
+    assert search.best is not None
+    if not spread.each and not spread.common:
+        return bool(search.best.misfit <= TOO_LARGE**2 * len(search.best.residual))
+    alike = follow(data.values - search.best.fitted)
+    return bool(((alike <= FOLLOW) | (noise < SMALL * data.size)).all())
 
 
 def _places(system: System, model: Motions, starts: int, seed: int) -> np.ndarray:
@@ -309,6 +325,7 @@ def _dataset(
             "fitted": best.fitted,
             "residual": data.values - best.fitted,
             "noise": noise,
+            "residual_correlation": follow(data.values - best.fitted),
             "misfit": np.sqrt(best.misfit / count),
             "flows": search.model.flows,
         },

@@ -16,12 +16,8 @@ from saltus.interrupt import check_stop
 DESCEND = 0.25
 #: Share of the work that comes before them.
 SCREENING = 0.1
-#: Beginnings of the data on which a search grows, in shares of them.
-BEGINNINGS = (1 / 16, 1 / 8, 1 / 4, 1 / 2)
-#: Samples of the shortest one, for each unknown.
-LEAST_BEGINNING = 4
-#: Most steps of a descent.
-STEPS = 60
+#: Most steps of a descent, and of one on a beginning of the data.
+STEPS, SHORT = 60, 20
 #: Share of a descent that is left to show after each of its steps: their number isn't known.
 SLOWING = 0.9
 #: A value that can't be computed counts as so many standard deviations of what was measured.
@@ -86,9 +82,13 @@ class Search:
     best : Point, optional
         The best place so far.
     minima : list of Point
-        Where descents ended.
+        Where descents ended, the best first.
+    last, ended : Point, optional
+        The place computed last, and where the last descent ended.
     spent : bool
         Whether the budget ended the search.
+    steps : int
+        Most steps of a descent.
     """
 
     model: Model
@@ -98,47 +98,35 @@ class Search:
     most: int
     best: Point | None = None
     minima: list[Point] = field(default_factory=list)
+    last: Point | None = None
+    ended: Point | None = None
     spent: bool = False
-    _last: Point | None = None
+    steps: int = STEPS
 
-    def run(self, starts: np.ndarray, show: Callable[[float], None] | None) -> None:
-        """Descend from the best of some starts, float64[n, p] shares."""
+    def run(
+        self, starts: np.ndarray, show: Callable[[float], None] | None, descend: float = DESCEND
+    ) -> None:
+        """Descend from the best of some starts, float64[n, p] shares, as far as the budget goes."""
         ranked = self._ranked(starts[: max(self.most - 1, 1)])
-        self.descend_all(
-            ranked[: max(round(DESCEND * len(starts)), 1)], stage(show, SCREENING, 1.0)
-        )
-
-    def descend_all(self, starts: np.ndarray, show: Callable[[float], None] | None) -> None:
-        """Descend from each of some shares, float64[n, p], as far as the budget goes."""
-        for i, start in enumerate(starts):
+        best = ranked[: max(round(descend * len(starts)), 1)]
+        for i, start in enumerate(best):
             if not self.spent:
-                begin, end = (j / len(starts) for j in (i, i + 1))
+                begin, end = (SCREENING + (1 - SCREENING) * j / len(best) for j in (i, i + 1))
                 self.descend(start, stage(show, begin, end))
 
-    def grow(self, starts: np.ndarray, show: Callable[[float], None] | None) -> None:
-        """Descend on ever longer beginnings of the data, from the best of some starts: what a
-        motion is sensitive to grows with its length, and with it the number of valleys.
-        """
-        least = LEAST_BEGINNING * (len(self.unknowns) + 1)
-        for i, share in enumerate(BEGINNINGS):
-            count = min(max(round(share * len(self.data)), least), len(self.data))
-            part = Search(
-                self.model.beginning(count), self.unknowns, self.data[:count],
-                self.deviation[:count], self.most - self.model.flows,
-            )  # fmt: skip
-            begin, end = (j / (len(BEGINNINGS) + 1) for j in (i, i + 1))
-            if i == 0:
-                part.run(starts, stage(show, begin, end))
-            else:
-                part.descend_all(starts, stage(show, begin, end))
-            self.model.flows += part.model.flows
-            self.spent = part.spent
-            if self.spent or not part.minima:
-                return
-            starts = np.array([one.shares for one in part.minima])
-        self.descend_all(starts, stage(show, end, 1.0))
+    def beginning(self, count: int) -> Search:
+        """The search on the first samples of the data, with what is left of the budget."""
+        return Search(
+            self.model.beginning(count), self.unknowns, self.data[:count], self.deviation[:count],
+            self.most - self.model.flows, steps=SHORT,
+        )  # fmt: skip
 
-    def descend(self, start: np.ndarray, show: Callable[[float], None] | None = None) -> None:
+    def take(self, part: Search) -> None:
+        """Count what was computed on a beginning."""
+        self.model.flows += part.model.flows
+        self.spent |= part.spent
+
+    def descend(self, start: np.ndarray, show: Callable[[float], None] | None) -> None:
         """Descend from shares float64[p] to a minimum."""
         from scipy.optimize import least_squares
 
@@ -155,16 +143,17 @@ class Search:
         try:
             end = least_squares(
                 residual, start, lambda shares: self.at(shares).slopes, bounds=(0.0, 1.0),
-                max_nfev=STEPS,
+                max_nfev=self.steps,
             )  # fmt: skip
-            self.minima.append(self.at(end.x))
+            self.ended = self.at(end.x)
+            self.minima.append(self.ended)
         except _SpentError:
             self.spent = True
         self.minima.sort(key=lambda one: one.misfit)
 
     def at(self, shares: np.ndarray) -> Point:
         """A place; computed once for a residual and its derivatives."""
-        known = [one for one in (self._last, self.best) if one is not None]
+        known = [one for one in (self.last, self.best) if one is not None]
         for one in known:
             if np.array_equal(one.shares, shares):
                 return one
@@ -174,16 +163,16 @@ class Search:
         values = self.unknowns.values(shares)
         fitted, slopes = self.model.with_derivatives(values)
         slopes = slopes * self.unknowns.widths(values)
-        self._last = self._point(np.array(shares), fitted, slopes)
-        if self.best is None or self._last.misfit < self.best.misfit:
-            self.best = self._last
-        return self._last
+        self.last = self._point(np.array(shares), fitted, slopes)
+        if self.best is None or self.last.misfit < self.best.misfit:
+            self.best = self.last
+        return self.last
 
     def reweigh(self, deviation: np.ndarray) -> None:
         """Go on with other standard deviations of the data, from the best place."""
         assert self.best is not None
         change = (self.deviation / deviation)[np.isfinite(self.data)]
-        self.deviation, self._last = deviation, None
+        self.deviation, self.last = deviation, None
         moved = [
             Point(one.shares, one.fitted, one.residual * change, one.slopes * change[:, None])
             for one in (self.best, *self.minima)

@@ -14,6 +14,8 @@ UNKNOWN = 1.0 / np.sqrt(12.0)
 #: Minima are in one valley if they differ by this share of the ranges at most, or by this many
 #: standard errors.
 SAME_SHARE, SAME_ERRORS = 1e-4, 1.0
+#: Fewer neighbouring residuals than these tell nothing.
+FEW = 20
 
 
 @dataclass(frozen=True)
@@ -73,6 +75,19 @@ def noise_of(
     counts = there.sum(axis=0)
     left = counts * (1.0 - unknowns / counts.sum())
     return np.asarray(np.sqrt((whole**2).sum(axis=0) / left))
+
+
+def follow(residual: np.ndarray) -> np.ndarray:
+    """Correlation of neighbouring residuals of each output, float64[K], of float64[M, K] with NaN
+    where a sample is missing; 0 of fewer than :data:`FEW` neighbours.
+    """
+    both = np.isfinite(residual[1:] * residual[:-1])
+    product = np.where(both, residual[1:] * residual[:-1], 0.0).sum(axis=0)
+    power = 0.5 * sum(
+        np.where(both, one**2, 0.0).sum(axis=0) for one in (residual[1:], residual[:-1])
+    )
+    known = (both.sum(axis=0) >= FEW) & (power > 0)
+    return np.asarray(np.where(known, product / np.where(known, power, 1.0), 0.0))
 
 
 def valleys(minima: Sequence[Point]) -> list[tuple[Point, int]]:

@@ -51,6 +51,7 @@ VARIABLES = {
     "fitted": Variable(_SAMPLE, "<output>", "what the equations say"),
     "residual": Variable(_SAMPLE, "<output>", "measured less fitted"),
     "noise": Variable(("output",), "<output>", "standard deviation of the noise"),
+    "residual_correlation": Variable(("output",), "1", "correlation of neighbouring residuals"),
     "misfit": Variable(
         (), "1", "root mean square of the residuals, in standard deviations of the noise"
     ),
@@ -118,22 +119,12 @@ def _noise(ds: xr.Dataset) -> list[str]:
             f"The residuals are {misfit:.3g} times as large: the equations don't describe the data "
             "to within the noise, and the standard errors are too small."
         )
-    elif _follow(ds):
+    elif (ds["residual_correlation"].values > FOLLOW).any():
         lines.append(
             "Neighbouring residuals follow each other: they aren't noise alone, and the standard "
             "errors are too small."
         )
     return lines
-
-
-def _follow(ds: xr.Dataset) -> bool:
-    """True if neighbouring residuals of an output are alike."""
-    for column in ds["residual"].values.T:
-        kept = column[np.isfinite(column)]
-        power = float(kept @ kept)
-        if len(kept) > 20 and power > 0 and float(kept[1:] @ kept[:-1]) > FOLLOW * power:
-            return True
-    return False
 
 
 def _identified(ds: xr.Dataset) -> list[str]:
