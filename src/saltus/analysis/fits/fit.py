@@ -37,6 +37,8 @@ from saltus.units import to_si
 #: Smallest noise that is estimated, in the size of what was measured: rounding.
 LEAST_NOISE = 1e-14
 
+#: Rounds in which the noise of several outputs is estimated, and a change in one that is none.
+ROUNDS, SETTLED = 20, 1e-3
 #: Times as many places from which a search on short beginnings of the data begins.
 MORE = 4
 #: Residuals of this share of what was measured are small: they needn't be noise.
@@ -170,11 +172,8 @@ def fit(
             if not search.spent and (alone or not described(search)):
                 more = _places(system, model, MORE * starts, seed)
                 grow(search, more, described, stage(show, 0.3, 0.9))
-            if spread.each and len(data.outputs) > 1 and not search.spent:
-                search.reweigh(np.tile(spread.seen(search, data), (len(data.at), 1)))
-                assert search.best is not None
-                search.minima.clear()
-                search.descend(search.best.shares, stage(show, 0.9, 1.0))
+            if spread.each and len(data.outputs) > 1:
+                _settle(search, spread, data)
         except KeyboardInterrupt:
             raise Interrupted(answer if search.best is not None else None) from None
         return answer()
@@ -246,6 +245,20 @@ class Spread:
         else:
             factor = noise_of(search.best.residual, search.deviation, there, len(search.unknowns))
         return np.asarray(np.maximum(factor * search.deviation[0], LEAST_NOISE * data.size))
+
+
+def _settle(search: Search, spread: Spread, data: Measurement) -> None:
+    """Descend from the best place until the noise of each output is that of its own residuals
+    there.
+    """
+    for _ in range(ROUNDS):
+        noise = spread.seen(search, data)
+        search.reweigh(np.tile(noise, (len(data.at), 1)))
+        assert search.best is not None
+        search.minima.clear()
+        search.descend(search.best.shares, None)
+        if search.spent or np.abs(spread.seen(search, data) / noise - 1.0).max() < SETTLED:
+            return
 
 
 def _described(spread: Spread, data: Measurement, search: Search) -> bool:
