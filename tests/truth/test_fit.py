@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
-from saltus.analysis.fits.measurement import history
+from saltus.analysis.fits.measurement import measurement
 from saltus.analysis.fits.motion import Motions
 from saltus.analysis.fits.unknowns import Unknowns
 from saltus.flow.methods import check_method
@@ -50,7 +50,7 @@ def test_derivatives_of_what_was_measured_are_the_limits_of_differences():
         {"force": lambda t, x, stop, f: stop * x * sl.cos(2 * sl.pi * f * t)}
     )
     t = np.array([0.1, 0.33, 0.9, 1.7, 2.05])
-    measured = history(system, {"t": t, "x": t**2, "force": np.sin(t)}, missing=False)
+    measured = measurement(system, {"t": t, "x": t**2, "force": np.sin(t)}, missing=False)
     names = ("gap", "stop", "x(0)", "t_start", "f")
     middle = np.array([0.02, 300.0, 0.01, 0.2, 1.0])
     free = {name: (0.5 * one, 2 * one) for name, one in zip(names, middle, strict=True)}

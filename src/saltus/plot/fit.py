@@ -76,9 +76,11 @@ def fit(
         marks = {"marker": "o", "ms": 2.6, "mfc": "none", "mew": 0.7, "zorder": 2}
         seen = one["measured"].values * up.factor
         draw.draw_points(above, x, seen, mec=QUIET, label="measured", **marks)
+        # responses of one frequency may lie on several branches: no curve joins them
+        line = {"lw": 1.0} if along == "time" else {"ls": "none", "marker": "+"}
         above.plot(
-            x, one["fitted"].values * up.factor, color=OKABE_ITO["vermillion"], lw=1.0,
-            label="fitted", zorder=3,
+            x, one["fitted"].values * up.factor, color=OKABE_ITO["vermillion"],
+            label="fitted", zorder=3, **line,
         )  # fmt: skip
         left = one["residual"].values * low.factor
         band = BAND * noise * low.factor

@@ -6,22 +6,23 @@ import functools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from os import PathLike
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import xarray as xr
 
 from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.fits.growth import grow
-from saltus.analysis.fits.measurement import Measurement, history, per_output
+from saltus.analysis.fits.measurement import Measurement, measurement, per_output
 from saltus.analysis.fits.motion import Motions
 from saltus.analysis.fits.search import Search
+from saltus.analysis.fits.steady import Responses, Size
 from saltus.analysis.fits.unknowns import INSIDE, Unknowns
 from saltus.analysis.fits.verdict import UNKNOWN, follow, noise_of, valleys, verdict
 from saltus.analysis.inputs.given import Range, Starts, Value
 from saltus.analysis.inputs.starts import at_values, check_system
 from saltus.analysis.inputs.verb import verb
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, one_of
 from saltus.flow.counts import whole
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporting, stage
@@ -55,12 +56,13 @@ def fit(
     start: Starts | None = None,
     *,
     t_start: float | str = 0.0,
+    quantity: Size = "amplitude",
     outputs: Mapping[str, Quantity] | None = None,
     noise: Value | Mapping[str, Value] | None = None,
     weights: float | Mapping[str, float] | None = None,
     missing: bool = False,
     starts: int = 16,
-    flows: int = 2000,
+    flows: int = 4000,
     seed: int = 1,
     values: Mapping[str, Value] | None = None,
     method: Method | None = None,
@@ -84,7 +86,9 @@ def fit(
     measured : Dataset, mapping or path
         A history: ``t`` or ``time`` [s], ascending, and states or outputs by name. A Dataset, as
         from :func:`saltus.simulate`, tells units by its attributes; a mapping holds numbers in SI
-        or ``(numbers, "mm")``; a CSV file has units in its heading, ``t [s], x [mm]``.
+        or ``(numbers, "mm")``; a CSV file has units in its heading, ``t [s], x [mm]``. Or sizes of
+        steady responses: the forcing frequency by its name, in any order and repeatedly, in place
+        of the time. Sweeps up and down find the responses, and a point counts to the nearest.
     free : mapping of str to (low, high)
         Unknowns and their bounds: parameters, states at the start as ``"x(0)"``, and ``"t_start"``,
         where it isn't known at which phase of the forcing the measurement begins: its times then
@@ -93,6 +97,9 @@ def fit(
         Start of the motion, as for :func:`saltus.simulate`. Default: at rest.
     t_start : float or str
         Time at the start [s].
+    quantity : {"amplitude", "rms", "peak"}
+        What was measured of responses: the amplitude of the first harmonic, the root mean square,
+        or the largest magnitude.
     outputs : mapping of str to callable, or to (callable, unit)
         More outputs by name, as for :func:`saltus.simulate`, which may be measured.
     noise : float or str, or mapping of str to these, optional
@@ -105,7 +112,8 @@ def fit(
     starts : int
         Places from which the search begins.
     flows : int
-        Most motions that are computed, with derivatives or without.
+        Most motions that are computed, with derivatives or without, of any length; of responses
+        two for each frequency and step.
     seed : int
         Of the places.
     values : mapping, optional
@@ -157,7 +165,12 @@ def fit(
         system, measured, free, outputs=outputs, noise=noise, weights=weights, missing=missing,
         values=values,
     )  # fmt: skip
-    model = Motions.of(system, method, data, unknowns, start, t_start, threads)
+    model: Motions | Responses
+    if data.along == "time":
+        model = Motions.of(system, method, data, unknowns, start, t_start, threads)
+    else:
+        one_of(get_args(Size), quantity=quantity)
+        model = Responses(system, method, data, unknowns, quantity, threads)
     search = Search(
         model, unknowns, data.values, np.tile(spread.deviation, (len(data.at), 1)),
         whole(flows, "flows", 2),
@@ -169,7 +182,8 @@ def fit(
             search.run(places, stage(show, 0.0, 0.3))
             described = functools.partial(_described, spread, data)
             alone = valleys(search.minima)[0][1] == 1 if search.minima else True
-            if not search.spent and (alone or not described(search)):
+            sure = not alone and described(search)
+            if not search.spent and not sure and data.along == "time":
                 more = _places(system, model, MORE * starts, seed)
                 grow(search, more, described, stage(show, 0.3, 0.9))
             if spread.each and len(data.outputs) > 1:
@@ -194,7 +208,7 @@ def check_fit(
     system = at_values(system, values)
     if outputs is not None:
         system = replace(system, outputs=with_more(system, outputs))
-    unknowns, data = Unknowns.of(system, free), history(system, measured, missing)
+    unknowns, data = Unknowns.of(system, free), measurement(system, measured, missing)
     spread, count = Spread.of(data, noise, weights), int(data.there.sum())
     if count <= len(unknowns):
         raise ParameterError(
@@ -274,7 +288,7 @@ def _described(spread: Spread, data: Measurement, search: Search) -> bool:
     return bool(((alike <= FOLLOW) | (noise < SMALL * data.size)).all())
 
 
-def _places(system: System, model: Motions, starts: int, seed: int) -> np.ndarray:
+def _places(system: System, model: Motions | Responses, starts: int, seed: int) -> np.ndarray:
     """Shares at which the search begins: the system's own values, where they lie between the
     bounds, then a Sobol sequence.
     """
@@ -313,6 +327,7 @@ def _dataset(
         "noise_from": "given" if not (spread.each or spread.common) else "residuals",
         "ended": "budget" if search.spent else "ok",
     }
+    at_unit = "s" if data.along == "time" else system.units[data.along]
     return build(
         schema.FIT,
         subject(system, attrs),
@@ -342,5 +357,5 @@ def _dataset(
             "misfit": np.sqrt(best.misfit / count),
             "flows": search.model.flows,
         },
-        words={"<at>": "s", "<along>": data.along, "<unknown>": ""},
+        words={"<at>": at_unit, "<along>": data.along, "<unknown>": ""},
     )

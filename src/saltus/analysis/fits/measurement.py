@@ -1,4 +1,4 @@
-"""What was measured: histories of states and outputs, checked and in SI."""
+"""What was measured of states and outputs, over the time or the frequency: checked and in SI."""
 
 from __future__ import annotations
 
@@ -60,41 +60,50 @@ class Measurement:
         return np.asarray(np.nanstd(self.values, axis=0))
 
 
-def history(system: System, given: Any, missing: bool) -> Measurement:
-    """The measured history of a user.
+def measurement(system: System, given: Any, missing: bool) -> Measurement:
+    """What a user measured: a history, or sizes of responses over the forcing frequency.
 
     Parameters
     ----------
     system : System
         Names and units of states and outputs.
     given : Dataset, mapping, path or bytes
-        By names: ``t`` or ``time`` [s], and states or outputs. Of a Dataset and of a file others
-        are passed over. Numbers are in SI; a Dataset tells units by its attributes, a file by its
-        heading, a mapping by ``(values, "mm")``.
+        By names: ``t`` or ``time`` [s], or the frequency; and states or outputs. Of a Dataset and
+        of a file others are passed over. Numbers are in SI; a Dataset tells units by its
+        attributes, a file by its heading, a mapping by ``(values, "mm")``.
     missing : bool
         Whether NaN is a sample that is missing.
 
     Raises
     ------
     ParameterError, UnitError, ResultFileError
-        If it can't be read, or isn't a history to which anything can be fitted.
+        If it can't be read, or nothing can be fitted to it.
     """
     outputs = outputs_of(system)
     units = dict(zip(outputs.names, outputs.units, strict=True))
-    columns = _columns(given, {**dict.fromkeys(TIMES, "s"), **units}, missing)
-    word = next((name for name in TIMES if name in columns), "")
+    places = dict.fromkeys(TIMES, "s")
+    if system.forced_at is not None:
+        places[system.forced_at] = system.units[system.forced_at]
+    columns = _columns(given, {**places, **units}, missing)
+    word = next((name for name in places if name in columns), "")
     names = tuple(name for name in outputs.names if name in columns)
     if not word or not names:
         raise ParameterError(
-            f"the measurement has no {'times' if not word else 'state or output'}. It needs t [s] "
-            f"and some of {listed(outputs.names)}, under these names."
+            f"the measurement has no {'times' if not word else 'state or output'}. It needs t [s]"
+            + (f", or {system.forced_at} of responses," if system.forced_at else "")
+            + f" and some of {listed(outputs.names)}, under these names."
         )
-    time = columns[word]
     values = _together(columns, word, names)
-    _check_times(time)
+    _check_places(columns[word], word, ascending=word in TIMES)
     _check_values(names, values, missing)
-    places = np.array([outputs.names.index(name) for name in names])
-    return Measurement("time", time, names, places, tuple(units[name] for name in names), values)
+    return Measurement(
+        "time" if word in TIMES else word,
+        columns[word],
+        names,
+        np.array([outputs.names.index(name) for name in names]),
+        tuple(units[name] for name in names),
+        values,
+    )
 
 
 # -- reading ---------------------------------------------------------------------------------------
@@ -162,7 +171,8 @@ def _together(columns: Mapping[str, np.ndarray], word: str, names: tuple[str, ..
 
 
 # -- checks ----------------------------------------------------------------------------------------
-def _check_times(time: np.ndarray, word: str = "the times") -> None:
+def _check_places(time: np.ndarray, name: str, ascending: bool) -> None:
+    word = "the times" if ascending else f"the values of {name}"
     if not len(time):
         raise ParameterError("the measurement holds no samples.")
     if not np.isfinite(time).all():
@@ -171,7 +181,7 @@ def _check_times(time: np.ndarray, word: str = "the times") -> None:
             f"{int(np.argmin(np.isfinite(time)))}). Leave these samples out."
         )
     back = np.flatnonzero(np.diff(time) <= 0)
-    if len(back):
+    if ascending and len(back):
         i = int(back[0])
         raise ParameterError(
             f"{word} of the measurement don't ascend: {time[i + 1]:.9g} follows {time[i]:.9g} at "

@@ -48,6 +48,7 @@ class Motions:
     t_start: float
     threads: int | None = None
     flows: int = 0
+    least_step: float = 1e-8
     _flow: CarriedDerivatives = field(init=False)
     _places: list[int] = field(init=False)
 

@@ -28,6 +28,8 @@ class Model(Protocol):
     """What the equations say to a measurement, by values of the unknowns [SI]."""
 
     flows: int
+    #: Least step of a descent, in the shares.
+    least_step: float
 
     def beginning(self, count: int) -> Model:
         """What they say to the first samples."""
@@ -143,7 +145,7 @@ class Search:
         try:
             end = least_squares(
                 residual, start, lambda shares: self.at(shares).slopes, bounds=(0.0, 1.0),
-                max_nfev=self.steps,
+                max_nfev=self.steps, xtol=self.model.least_step,
             )  # fmt: skip
             self.ended = self.at(end.x)
             self.minima.append(self.ended)

@@ -38,7 +38,7 @@ OF_FITS = OF_RESPONSES | {
     ),
     "weights": WrittenAs(dict[str, float], ({"x": 1.0},), default=None),
     "starts": whole(16),
-    "flows": whole(2000, least=2),
+    "flows": whole(4000, least=2),
 }  # fmt: skip
 
 

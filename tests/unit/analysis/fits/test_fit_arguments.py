@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
+from saltus.analysis.fits.measurement import measurement
 from saltus.errors import ParameterError, SaltusError, UnitError
 
 RIG = sl.models.delangre("a", force="4 N", frequency="8 Hz")
@@ -46,6 +47,9 @@ def changed(array, place, value):
         ({"t": TIME, "x": X}, GAP, {"t_start": 0.5}, "motion starts at 0.5 s"),
         ({"t": TIME, "x": X}, GAP, {"start": {"x": [0, 1], "v": 0}}, "one start"),
         ("none.csv", GAP, {}, "none.csv"),
+        ({"frequency": 8 + TIME, "x": X}, {"x(0)": (0, 1)}, {}, r"x\(0\) can't be free where resp"),
+        ({"frequency": 8 + TIME, "x": X}, {"frequency": (7, 9)}, {}, "frequency can't be free"),
+        ({"frequency": 8 + TIME, "x": X}, GAP, {"quantity": "size"}, "quantity='size'"),
     ],
 )  # fmt: skip
 def test_what_can_not_be_used_is_answered_in_a_sentence(measured, free, more, message):
@@ -82,10 +86,11 @@ def test_units_of_a_mapping_a_dataset_and_a_file_are_read(tmp_path):
         {"t": (1e3 * run.time.values, "ms"), "x": (1e3 * run.x.values, "mm")},
         file,
     )
-    found = [sl.fit(RIG, one, GAP, values={"upper_gap": "0.5 mm"}, starts=4) for one in given]
-    for one in found:
-        assert one.value.item() == pytest.approx(RIG.values["upper_gap"], rel=1e-9)
-        assert one.sizes["sample"] == run.sizes["time"]
+    for one in given:
+        found = measurement(RIG, one, missing=False)
+        assert (found.outputs, found.units, found.along) == (("x",), ("m",), "time")
+        assert found.at == pytest.approx(run.time.values, rel=1e-14)
+        assert found.values[:, 0] == pytest.approx(run.x.values, rel=1e-14)
 
 
 def test_a_missing_sample_counts_for_nothing_where_it_is_said_to_be_one():
