@@ -181,8 +181,9 @@ def fit(
         try:
             search.run(places, stage(show, 0.0, 0.3))
             described = functools.partial(_described, spread, data)
-            alone = valleys(search.minima)[0][1] == 1 if search.minima else True
-            sure = not alone and described(search)
+            sure = described(search) and (
+                len(search.minima) == 1 or valleys(search.minima)[0][1] > 1
+            )
             if not search.spent and not sure and data.along == "time":
                 more = _places(system, model, MORE * starts, seed)
                 grow(search, more, described, stage(show, 0.3, 0.9))
