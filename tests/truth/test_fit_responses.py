@@ -5,7 +5,7 @@ import pytest
 
 import saltus as sl
 from saltus.analysis.fits.measurement import measurement
-from saltus.analysis.fits.steady import SAMPLES, Responses, _size_of
+from saltus.analysis.fits.steady import SAMPLES, SteadyResponses, _size_of
 from saltus.analysis.fits.unknowns import Unknowns
 from saltus.flow.methods import check_method
 
@@ -19,7 +19,7 @@ SIZE = np.array([1.8e-3, 4.7e-3, 5.3e-3, 1.7e-4, 2.0e-4])
 
 
 def model(measured, size="amplitude"):
-    return Responses(
+    return SteadyResponses(
         RIG,
         check_method(None, RIG),
         measurement(RIG, measured, False),

@@ -6,8 +6,9 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from saltus.errors import ParameterError, among, must_be, unknown
+from saltus.errors import ParameterError, must_be
 from saltus.plot import axes as draw
+from saltus.plot.curves import of_output
 from saltus.plot.picture import picture
 from saltus.plot.style import OKABE_ITO, QUIET, display_scale
 
@@ -24,7 +25,7 @@ def fit(
     *,
     legend: bool = True,
 ) -> Axes:
-    """What was measured and what the equations say, with the residuals below them.
+    """Measured values and what the equations say to them, with the residuals below.
 
     The residuals lie mostly within the grey band, two standard deviations of the noise, where the
     equations describe the data.
@@ -52,11 +53,8 @@ def fit(
     ParameterError
         If ``ds`` is not from ``fit``, there is no such output, or nothing lies in the span.
     """
-    names = ds["output"].values.tolist()
-    name = names[0] if output is None else output
-    if not among(name, names):
-        raise unknown("the fit has no output", name, names)
-    one = ds.sel(output=name)
+    name = str(ds["output"].values[0]) if output is None else output
+    one, sizes = of_output(ds, name)
     at = one["at"].values
     if span is not None:
         if not isinstance(span, tuple | list) or len(span) != 2:
@@ -67,7 +65,6 @@ def fit(
         raise ParameterError(f"no sample lies between {span[0]:g} and {span[1]:g}.")  # type: ignore[index]
     along, unit = str(ds.attrs["along"]), str(one["at"].attrs["units"])
     across = display_scale(unit, float(np.abs(at).max()))
-    sizes = one["output_units"].item()
     up = display_scale(sizes, float(np.nanmax(np.abs(one["measured"].values), initial=0.0)))
     noise = float(one["noise"])
     low = display_scale(sizes, max(float(np.nanmax(np.abs(one["residual"]), initial=0.0)), noise))

@@ -16,7 +16,7 @@ from saltus.system import System
 
 @dataclass(frozen=True, kw_only=True)
 class Readings:
-    """What is read off the motions of a flow that carries derivatives: K states and outputs.
+    """Readings of the motions of a flow that carries derivatives: K states and outputs.
 
     Attributes
     ----------

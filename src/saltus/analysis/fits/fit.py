@@ -15,8 +15,8 @@ from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.fits.growth import grow
 from saltus.analysis.fits.measurement import Measurement, measurement, per_output
 from saltus.analysis.fits.motion import Motions
-from saltus.analysis.fits.search import Search
-from saltus.analysis.fits.steady import Responses, Size
+from saltus.analysis.fits.search import MisfitSearch
+from saltus.analysis.fits.steady import Size, SteadyResponses
 from saltus.analysis.fits.unknowns import INSIDE, Unknowns
 from saltus.analysis.fits.verdict import UNKNOWN, follow, noise_of, valleys, verdict
 from saltus.analysis.inputs.given import Range, Starts, Value
@@ -165,13 +165,13 @@ def fit(
         system, measured, free, outputs=outputs, noise=noise, weights=weights, missing=missing,
         values=values,
     )  # fmt: skip
-    model: Motions | Responses
+    model: Motions | SteadyResponses
     if data.along == "time":
         model = Motions.of(system, method, data, unknowns, start, t_start, threads)
     else:
         one_of(get_args(Size), quantity=quantity)
-        model = Responses(system, method, data, unknowns, quantity, threads)
-    search = Search(
+        model = SteadyResponses(system, method, data, unknowns, quantity, threads)
+    search = MisfitSearch(
         model, unknowns, data.values, np.tile(spread.deviation, (len(data.at), 1)),
         whole(flows, "flows", 2),
     )  # fmt: skip
@@ -246,7 +246,7 @@ class Spread:
             return cls(1.0 / known, each=False, common=True)
         return cls(data.size, each=True, common=False)
 
-    def seen(self, search: Search, data: Measurement) -> np.ndarray:
+    def seen(self, search: MisfitSearch, data: Measurement) -> np.ndarray:
         """Standard deviation of the noise of each output, float64[K]: given, or estimated from the
         residuals.
         """
@@ -262,7 +262,7 @@ class Spread:
         return np.asarray(np.maximum(factor * search.deviation[0], LEAST_NOISE * data.size))
 
 
-def _settle(search: Search, spread: Spread, data: Measurement) -> None:
+def _settle(search: MisfitSearch, spread: Spread, data: Measurement) -> None:
     """Descend from the best place until the noise of each output is that of its own residuals
     there.
     """
@@ -276,7 +276,7 @@ def _settle(search: Search, spread: Spread, data: Measurement) -> None:
             return
 
 
-def _described(spread: Spread, data: Measurement, search: Search) -> bool:
+def _described(spread: Spread, data: Measurement, search: MisfitSearch) -> bool:
     """True if the residuals of the best place are noise: as large as it was said to be, or else
     such that neighbours don't follow each other.
     """
@@ -289,7 +289,7 @@ def _described(spread: Spread, data: Measurement, search: Search) -> bool:
     return bool(((alike <= FOLLOW) | (noise < SMALL * data.size)).all())
 
 
-def _places(system: System, model: Motions | Responses, starts: int, seed: int) -> np.ndarray:
+def _places(system: System, model: Motions | SteadyResponses, starts: int, seed: int) -> np.ndarray:
     """Shares at which the search begins: the system's own values, where they lie between the
     bounds, then a Sobol sequence.
     """
@@ -308,7 +308,7 @@ def _places(system: System, model: Motions | Responses, starts: int, seed: int) 
 
 # -- the answer ------------------------------------------------------------------------------------
 def _dataset(
-    system: System, method: Method, data: Measurement, search: Search, spread: Spread
+    system: System, method: Method, data: Measurement, search: MisfitSearch, spread: Spread
 ) -> xr.Dataset:
     """The Dataset of the best place."""
     unknowns = search.unknowns

@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from saltus.analysis.fits.search import Point, Search
+from saltus.analysis.fits.search import MisfitSearch, Point
 from saltus.analysis.fits.verdict import valleys
 from saltus.flow.progress import stage
 
@@ -30,9 +30,9 @@ BEGIN = 0.2
 
 
 def grow(
-    search: Search,
+    search: MisfitSearch,
     starts: np.ndarray,
-    described: Callable[[Search], bool],
+    described: Callable[[MisfitSearch], bool],
     show: Callable[[float], None] | None,
 ) -> None:
     """Descend along such ways, from the minima on the first beginning, until one describes the
@@ -54,14 +54,16 @@ def grow(
             return
 
 
-def _off(search: Search, here: Point) -> float:
+def _off(search: MisfitSearch, here: Point) -> float:
     """Root mean square of what a beginning is missed by, in standard deviations of the data."""
     data = search.data
     off = (here.fitted - data[: len(here.fitted)]) / np.nanstd(data, axis=0)
     return float(np.sqrt(np.nanmean(off**2)))
 
 
-def _follow(search: Search, here: Point, i: int, show: Callable[[float], None] | None) -> None:
+def _follow(
+    search: MisfitSearch, here: Point, i: int, show: Callable[[float], None] | None
+) -> None:
     """Follow the minimum number i on a beginning to the whole history."""
     whole, factor = len(search.data), LONGER
     while (count := len(here.fitted)) < whole and not search.spent:

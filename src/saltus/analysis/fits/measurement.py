@@ -1,4 +1,4 @@
-"""What was measured of states and outputs, over the time or the frequency: checked and in SI."""
+"""Measurements of states and outputs, over the time or the frequency: checked and in SI."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Measurement:
 
     @property
     def there(self) -> np.ndarray:
-        """Whether a sample isn't missing, bool[M, K]."""
+        """True where a sample isn't missing, bool[M, K]."""
         return np.asarray(np.isfinite(self.values))
 
     @property
@@ -61,7 +61,7 @@ class Measurement:
 
 
 def measurement(system: System, given: Any, missing: bool) -> Measurement:
-    """What a user measured: a history, or sizes of responses over the forcing frequency.
+    """The measurement of a user: a history, or sizes of responses over the forcing frequency.
 
     Parameters
     ----------

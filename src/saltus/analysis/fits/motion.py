@@ -1,4 +1,4 @@
-"""What the equations say to a measured history: motions from one start, and their derivatives with
+"""Predictions for a measured history: motions from one start, and their derivatives with
 respect to the unknowns.
 """
 

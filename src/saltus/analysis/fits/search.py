@@ -25,14 +25,14 @@ NOWHERE = 3.0
 
 
 class Model(Protocol):
-    """What the equations say to a measurement, by values of the unknowns [SI]."""
+    """Predictions of the equations for a measurement, by values of the unknowns [SI]."""
 
     flows: int
     #: Least step of a descent, in the shares.
     least_step: float
 
     def beginning(self, count: int) -> Model:
-        """What they say to the first samples."""
+        """Predictions for the first samples."""
 
     def plain(self, values: np.ndarray) -> np.ndarray:
         """For n sets float64[n, p], float64[n, M, K]."""
@@ -68,7 +68,7 @@ class Point:
 
 
 @dataclass
-class Search:
+class MisfitSearch:
     """Search for the least misfit of a model.
 
     Attributes
@@ -116,14 +116,14 @@ class Search:
                 begin, end = (SCREENING + (1 - SCREENING) * j / len(best) for j in (i, i + 1))
                 self.descend(start, stage(show, begin, end))
 
-    def beginning(self, count: int) -> Search:
+    def beginning(self, count: int) -> MisfitSearch:
         """The search on the first samples of the data, with what is left of the budget."""
-        return Search(
+        return MisfitSearch(
             self.model.beginning(count), self.unknowns, self.data[:count], self.deviation[:count],
             self.most - self.model.flows, steps=SHORT,
         )  # fmt: skip
 
-    def take(self, part: Search) -> None:
+    def take(self, part: MisfitSearch) -> None:
         """Count what was computed on a beginning."""
         self.model.flows += part.model.flows
         self.spent |= part.spent

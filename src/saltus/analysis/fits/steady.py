@@ -1,4 +1,4 @@
-"""What the equations say to measured responses: the steady responses that sweeps lead to, and their
+"""Predictions for measured responses: the steady responses that sweeps lead to, and their
 derivatives with respect to the unknowns.
 
 An orbit x0 = P(x0, p) moves with the parameters by dx0/dp = (1 - dP/dx0)^-1 dP/dp; both stand in
@@ -41,7 +41,7 @@ SWEEPS = ("sweep_up", "sweep_down")
 
 
 @dataclass
-class Responses:
+class SteadyResponses:
     """Steady responses of a system at the frequencies of a measurement. A measured point counts to
     the response of the nearest size.
 
@@ -78,7 +78,7 @@ class Responses:
         self.start = np.zeros(len(self.system.states))
         self._flow = CarriedDerivatives(self.system, self.method, self.unknowns.names)
 
-    def beginning(self, count: int) -> Responses:
+    def beginning(self, count: int) -> SteadyResponses:
         """Responses have no beginning."""
         raise NotImplementedError
 

@@ -1,4 +1,4 @@
-"""What the data decide: standard errors, combinations that they leave open, and valleys."""
+"""Verdict of the data: standard errors, combinations that they leave open, and valleys."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FEW = 20
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the data decide of p unknowns.
+    """Verdict of the data on p unknowns.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class Verdict:
 
 
 def verdict(point: Point) -> Verdict:
-    """What the data decide at the best place, by the linear terms there.
+    """Verdict of the data at the best place, by the linear terms there.
 
     The singular vectors of the derivatives are the combinations whose errors are independent; that
     of a combination is one over its singular value.
