@@ -29,7 +29,6 @@ from saltus.flow.progress import reporting, stage
 from saltus.interrupt import Interrupted
 from saltus.results import build
 from saltus.results.dataset import schema
-from saltus.results.kinds.fit import FOLLOW, TOO_LARGE
 from saltus.system import System
 from saltus.system.outputs import with_more
 from saltus.system.read_off import Quantity
@@ -42,6 +41,10 @@ LEAST_NOISE = 1e-14
 ROUNDS, SETTLED = 20, 1e-3
 #: Times as many places from which a search on short beginnings of the data begins.
 MORE = 4
+#: Misfit beyond which residuals are more than the noise that was given.
+TOO_LARGE = 1.5
+#: Correlation of neighbouring residuals beyond which they aren't noise.
+FOLLOW = 0.5
 #: Residuals of this share of what was measured are small: they needn't be noise.
 SMALL = 0.05
 
@@ -323,9 +326,13 @@ def _dataset(
     count = len(best.residual)
     names = dict(zip(unknowns.names, value.tolist(), strict=True))
     parameters = {name: names.get(name, one) for name, one in system.values.items()}
+    given = not (spread.each or spread.common)
+    alike = follow(data.values - best.fitted)
+    larger = given and best.misfit > TOO_LARGE**2 * count
     attrs = provenance(system, method, parameters) | {
+        "residuals": "larger" if larger else "alike" if (alike > FOLLOW).any() else "noise",
         "along": data.along,
-        "noise_from": "given" if not (spread.each or spread.common) else "residuals",
+        "noise_from": "given" if given else "residuals",
         "ended": "budget" if search.spent else "ok",
     }
     at_unit = "s" if data.along == "time" else system.units[data.along]
@@ -354,7 +361,7 @@ def _dataset(
             "fitted": best.fitted,
             "residual": data.values - best.fitted,
             "noise": noise,
-            "residual_correlation": follow(data.values - best.fitted),
+            "residual_correlation": alike,
             "misfit": np.sqrt(best.misfit / count),
             "flows": search.model.flows,
         },

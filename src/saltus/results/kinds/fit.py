@@ -15,10 +15,6 @@ _OF = ("unknown",)
 _SAMPLE = ("sample", "output")
 #: Misfits up to so many times that of the best valley are near.
 NEAR = 2.0
-#: Misfit beyond which residuals are more than the noise that was given.
-TOO_LARGE = 1.5
-#: Correlation of neighbouring residuals beyond which they aren't noise.
-FOLLOW = 0.5
 #: A combination is of the unknowns with this share of it at least.
 TAKES_PART = 0.1
 
@@ -114,12 +110,12 @@ def _noise(ds: xr.Dataset) -> list[str]:
     )
     lines = [f"{each}, {'as given' if given else 'estimated from the residuals'}"]
     misfit = float(ds["misfit"])
-    if given and misfit > TOO_LARGE:
+    if ds.attrs["residuals"] == "larger":
         lines.append(
             f"The residuals are {misfit:.3g} times as large: the equations don't describe the data "
             "to within the noise, and the standard errors are too small."
         )
-    elif (ds["residual_correlation"].values > FOLLOW).any():
+    elif ds.attrs["residuals"] == "alike":
         lines.append(
             "Neighbouring residuals follow each other: they aren't noise alone, and the standard "
             "errors are too small."
