@@ -72,8 +72,8 @@ def settle(
 
 
 def _in_time(work: Callable[[], tuple[int, int]]) -> tuple[int, int] | None:
-    """Return the findings of work within :data:`WITHIN`; None if it takes longer. Raises Interrupted if it is
-    asked to stop from outside.
+    """Return the findings of work within :data:`WITHIN`; None if it takes longer. Raises
+    Interrupted if it is asked to stop from outside.
     """
     late, stop = threading.Event(), Stop()
 
