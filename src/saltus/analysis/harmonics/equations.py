@@ -1,0 +1,242 @@
+"""The equations of harmonic balance: a periodic motion as truncated Fourier series.
+
+The residual of the equations of motion has no component along any of the harmonics kept. Written as
+``own X - L W(X) = 0``: X are the series of the signals, W those of the forces along them, and L is
+the linear response at each harmonic, so that residuals are in units of the motion. Krack & Gross,
+Harmonic Balance for Nonlinear Vibration Problems (2019), chapter 2.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+
+from saltus.analysis.harmonics import series as fourier
+from saltus.analysis.harmonics.forces import Forces, Moving
+from saltus.system import System
+from saltus.system.parametric import parametric
+
+
+class Response(Protocol):
+    """Linear responses of signals to forces."""
+
+    def at(self, harmonics: int, rate: float) -> tuple[np.ndarray, np.ndarray]:
+        """Those at each harmonic k of the angle's rate [rad/s], complex128[H + 1, c, m], to forces
+        times ``period``; and their derivatives by the rate, times the rate.
+        """
+
+    def own(self, harmonics: int) -> np.ndarray:
+        """What the amplitudes of the signals are multiplied by, float64[H + 1, c]."""
+
+
+class Integrals:
+    """The response of signals of which each has one equation for its s-th derivative.
+
+    Parameters
+    ----------
+    orders : sequence of int
+        s of each signal.
+    """
+
+    def __init__(self, orders: Sequence[int]) -> None:
+        self.orders = np.array(orders)
+
+    def at(self, harmonics: int, rate: float) -> tuple[np.ndarray, np.ndarray]:
+        """See :class:`Response`. A mean isn't integrated: there the equation is that the mean of
+        the force vanishes, over the rate for its unit.
+        """
+        turns = np.arange(harmonics + 1) * 1j
+        turns[0] = 1.0
+        each = 1.0 / (turns[:, None] * rate) ** self.orders
+        whole = each[:, :, None] * np.eye(len(self.orders))
+        return whole, -self.orders[:, None] * whole
+
+    def own(self, harmonics: int) -> np.ndarray:
+        """See :class:`Response`."""
+        own = np.ones((harmonics + 1, len(self.orders)))
+        own[0] = 0.0
+        return own
+
+
+class HarmonicOrbits:
+    """Curves of periodic motions of H harmonics over one parameter; a ``CurveEquations``, and what
+    a branch asks of the equations of its orbits.
+
+    Unknowns z: the series of each signal, one after the other, then the parameter [SI].
+
+    Parameters
+    ----------
+    system : System
+        With forcing; its equations and values are those of all curves.
+    name : str
+        The parameter that is followed.
+    harmonics : int
+        Of the fundamental frequency.
+    periods : int
+        Forcing periods in one of the fundamental.
+    scale : float64[k, z]
+        Units of the unknowns.
+    symmetric : bool
+        Whether mirror images of motions are motions: see system/symmetry.py.
+    """
+
+    n, free = 1, False
+
+    def __init__(
+        self, system: System, name: str, harmonics: int, periods: int, scale: np.ndarray,
+        symmetric: bool = False,
+    ) -> None:  # fmt: skip
+        self.system, self.names, self.scale = system, (name,), scale
+        self.harmonics, self.periods, self.symmetric = harmonics, periods, symmetric
+        self.series = 2 * harmonics + 1
+        known = parametric(system, (name,))
+        self._timed = known.timed
+        self.chains = chains_of(system)
+        self.response: Response = Integrals([len(chain) for chain in self.chains])
+        moving = {
+            system.states[i]: Moving(signal, times)
+            for signal, chain in enumerate(self.chains) for times, i in enumerate(chain)
+        }  # fmt: skip
+        self.turn = periods * (1.0 if self._timed else float(system.period()))
+        forces = [known.system.field[chain[-1]] for chain in self.chains]
+        constants = known.system.states[len(system.states) :]
+        self.forces = Forces(known.system, forces, moving, constants, self.turn, periods)
+
+    @property
+    def size(self) -> int:
+        """Number of the unknowns of a motion."""
+        return len(self.chains) * self.series
+
+    @property
+    def width(self) -> int:
+        """Number of unknowns."""
+        return self.size + 1
+
+    # -- unknowns ----------------------------------------------------------------------------------
+    def signals(self, z: np.ndarray) -> np.ndarray:
+        """The series of the signals, float64[..., c, 2H + 1]."""
+        return z[..., : self.size].reshape(*z.shape[:-1], -1, self.series)
+
+    def values(self, z: np.ndarray) -> np.ndarray:
+        """The parameter of motions float64[..., z], float64[..., 1]."""
+        return z[..., self.size :]
+
+    def period(self, z: np.ndarray) -> np.ndarray:
+        """The period of motions float64[..., z] [s], float64[...]."""
+        if self.names[0] != self.system.forced_at:
+            return np.full(z.shape[:-1], self.periods * self.system.period())
+        return np.asarray(self.periods * self.system.period({self.names[0]: z[..., -1]}))
+
+    def _constants(self, value: float) -> tuple[np.ndarray, np.ndarray, float, np.ndarray]:
+        """The states that don't move, their derivatives by the parameter, the rate of the angle
+        [rad/s], and its derivatives by these states over itself.
+        """
+        if not self._timed:
+            rate = 2 * np.pi / self.turn
+            return np.array([value]), np.ones(1), rate, np.zeros(1)
+        period = float(self.system.period({self.names[0]: value}))
+        rate = 2 * np.pi / (self.periods * period)
+        return np.array([period]), np.array([-period / value]), rate, np.array([-1.0 / period])
+
+    def states(self, z: np.ndarray) -> np.ndarray:
+        """The series of the states of a motion float64[z], float64[D, 2H + 1]."""
+        signals, rate = self.signals(z), self._constants(float(z[-1]))[2]
+        found = np.zeros((len(self.system.states), self.series))
+        for signal, chain in zip(signals, self.chains, strict=True):
+            for times, i in enumerate(chain):
+                found[i] = fourier.derivative(signal, times) * rate**times
+        return found
+
+    def points(self, z: np.ndarray) -> np.ndarray:
+        """States at whole forcing periods of motions float64[..., z], float64[..., n, D]."""
+        flat = z.reshape(-1, z.shape[-1])
+        here = fourier.basis(2 * np.pi * np.arange(self.periods) / self.periods, self.harmonics)
+        found = np.array([here @ self.states(one).T for one in flat])
+        return found.reshape(*z.shape[:-1], self.periods, -1)
+
+    def of_states(self, states: np.ndarray, value: float) -> np.ndarray:
+        """The unknowns of a motion with series of the states float64[D, 2h + 1]."""
+        signals = fourier.resized(states[[chain[0] for chain in self.chains]], self.harmonics)
+        return np.append(signals.ravel(), value)
+
+    # -- equations ---------------------------------------------------------------------------------
+    def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """See :class:`saltus.analysis.branches.equations.CurveEquations`."""
+        residual = np.full((len(z), self.size), np.nan)
+        derivative = np.full((len(z), self.size, self.width), np.nan)
+        for i in np.flatnonzero(np.isfinite(z).all(axis=1)):
+            residual[i], derivative[i] = self._of(z[i])
+        unit = self.scale[rows]
+        residual /= unit[:, : self.size]
+        derivative *= unit[:, None] / unit[:, : self.size, None]
+        return residual, derivative
+
+    def _of(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The residual and its derivative, in units of the motion."""
+        signals = self.signals(z)
+        constants, slopes, rate, rate_by = self._constants(float(z[-1]))
+        found = self.forces.coefficients(signals, constants, rate, rate_by)
+        whole, by_rate = (fourier.transfer(one) for one in self.response.at(self.harmonics, rate))
+        own = self.response.own(self.harmonics)
+        own = np.concatenate([own, own[1:]]).T.ravel()
+        size, forces = self.size, found.values.ravel()
+        # rates of the equations are those of a period: forces times the period
+        period = constants[0] if self._timed else 1.0
+        flat, flat_by_rate = (one.reshape(size, -1) / period for one in (whole, by_rate))
+        derivative = np.empty((size, size + 1))
+        derivative[:, :size] = -flat @ found.by_signals.reshape(len(forces), size)
+        derivative[np.arange(size), np.arange(size)] += own
+        by_constants = -flat @ found.by_constants.reshape(len(forces), -1)
+        by_constants -= np.outer(flat_by_rate @ forces, rate_by)
+        if self._timed:
+            by_constants[:, 0] += flat @ forces / period
+        derivative[:, size] = by_constants @ slopes
+        return own * z[:size] - flat @ forces, derivative
+
+    def accepted(self, z: np.ndarray, rows: np.ndarray) -> None:
+        """Nothing depends on it."""
+
+    def near(self, z: np.ndarray, rows: np.ndarray) -> HarmonicOrbits:  # noqa: ARG002
+        """The equations whose row i is curve rows[i], int64[r]."""
+        other = copy.copy(self)
+        other.scale = self.scale[rows]
+        return other
+
+    def alike(self, z: np.ndarray, rows: np.ndarray) -> np.ndarray:  # noqa: ARG002
+        """The same motions from each whole forcing period on, float64[r, n, z]."""
+        angles = 2 * np.pi * np.arange(self.periods) / self.periods
+        return np.stack([self._shifted(z, angle) for angle in angles], axis=1)
+
+    def mirrored(self, z: np.ndarray) -> np.ndarray:
+        """The mirror images -x(t + T/2) of motions float64[r, z]."""
+        return self._shifted(z, np.pi / self.periods, -1.0)
+
+    def _shifted(self, z: np.ndarray, angle: float, factor: float = 1.0) -> np.ndarray:
+        moved = factor * fourier.shifted(self.signals(z), angle)
+        return np.concatenate([moved.reshape(len(z), -1), self.values(z)], axis=1)
+
+
+def chains_of(system: System) -> list[list[int]]:
+    """States that are derivatives of each other by time, each from the signal to its highest
+    derivative.
+    """
+    places = {name: i for i, name in enumerate(system.states)}
+    follows = {
+        i: places[str(entry.payload)] for i, entry in enumerate(system.field) if entry.op == "state"
+    }
+    taken: dict[int, int] = {}
+    for i, j in follows.items():
+        taken.setdefault(j, i)
+    follows = {i: j for i, j in follows.items() if taken[j] == i and i != j}
+    found: list[list[int]] = []
+    for first in range(len(system.states)):
+        if first in taken and follows.get(taken[first]) == first:
+            continue
+        chain = [first]
+        while chain[-1] in follows:
+            chain.append(follows[chain[-1]])
+        found.append(chain)
+    return found

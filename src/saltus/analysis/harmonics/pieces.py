@@ -1,0 +1,188 @@
+"""A truncated motion cut where it meets the boundaries of the equations.
+
+Along a truncated Fourier series the distance from a boundary is a series too where it is a
+polynomial of the states, so that its zeros are found: all of them, to rounding.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from saltus.analysis.harmonics import series as fourier
+from saltus.contact.guards import Guard, bits_in, is_hold
+from saltus.errors import ParameterError
+from saltus.flow import polynomials
+from saltus.language.evaluate import evaluate
+
+#: Amplitude of a gap behind its last harmonic, in units of its largest, that is rounding.
+ROUNDING = 1e-12
+#: Most samples by which a gap is read off as a series.
+MOST_SAMPLES = 2**14
+#: Nodes of Gauss's rule on an interval beyond half its turns.
+BEYOND = 10
+
+_gauss = functools.lru_cache(maxsize=512)(polynomials.gauss)
+#: What expressions need at angles float64[n], but for the bits.
+About = Callable[[np.ndarray], dict[str, object]]
+
+
+@dataclass(frozen=True)
+class Instants:
+    """Angles at which a motion meets boundaries.
+
+    Attributes
+    ----------
+    angle : float64[i]
+        In [0, 2 pi).
+    guard : int64[i]
+        Which boundary.
+    slope : float64[i]
+        Of its gap over the angle.
+    before, behind : bool[i, guards]
+        Sides of all boundaries on both sides of it.
+    """
+
+    angle: np.ndarray
+    guard: np.ndarray
+    slope: np.ndarray
+    before: np.ndarray
+    behind: np.ndarray
+
+
+@dataclass(frozen=True)
+class Sections:
+    """Intervals of the circle in which no boundary is crossed.
+
+    Attributes
+    ----------
+    begin, length : float64[p]
+        [rad]
+    bits : bool[p, guards]
+        Sides of the boundaries.
+    instants : Instants
+    """
+
+    begin: np.ndarray
+    length: np.ndarray
+    bits: np.ndarray
+    instants: Instants
+
+    @property
+    def middle(self) -> np.ndarray:
+        """[rad]"""
+        return self.begin + 0.5 * self.length
+
+    def of(self, angle: np.ndarray) -> np.ndarray:
+        """The intervals that hold angles float64[n], int64[n]."""
+        return (np.searchsorted(self.begin, angle % (2 * np.pi), side="right") - 1) % len(self.begin)
+
+    def nodes(self, degree: int, bent: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Angles and weights by which series of a degree are integrated over the circle to
+        rounding, and the interval of each: float64[n], float64[n], int64[n].
+
+        On the whole circle they are equidistant; between instants they are Gauss's. ``bent``: of
+        forces that aren't polynomials, such as powers of a depth: a sine then takes the angle to
+        either end with no slope, behind which such powers are smooth.
+        """
+        if len(self.begin) == 1 and len(self.instants.angle) == 0:
+            count = degree + 1
+            angle = 2.0 * np.pi * np.arange(count) / count
+            return angle, np.full(count, 2.0 * np.pi / count), np.zeros(count, np.int64)
+        turns = self.length * degree * (0.25 * np.pi if bent else 0.5) * 0.5
+        counts = np.ceil(turns + 3.0 * np.cbrt(turns)).astype(np.int64) + BEYOND * (1 + bent)
+        angles, weights = [], []
+        for begin, length, count in zip(self.begin, self.length, counts, strict=True):
+            place, weight = _gauss(int(count))
+            if bent:
+                turned = np.pi * (place - 0.5)
+                weight = weight * 0.5 * np.pi * np.cos(turned)
+                place = 0.5 + 0.5 * np.sin(turned)
+            angles.append(begin + length * place)
+            weights.append(length * weight)
+        return np.concatenate(angles), np.concatenate(weights), np.repeat(np.arange(len(counts)), counts)
+
+
+def sections_of(name: str, guards: Sequence[Guard], about: About, harmonics: int) -> Sections:
+    """Cut a motion at the boundaries of some guards, each after those whose sides it asks for.
+
+    Parameters
+    ----------
+    name : str
+        Of the system, for a message.
+    guards : sequence of Guard
+        That a contact is held never is: a series isn't held anywhere.
+    about : callable
+        States, parameters and time at angles.
+    harmonics : int
+        Of the motion.
+
+    Raises
+    ------
+    ParameterError
+        If a gap isn't a series: it isn't smooth between the other boundaries.
+    """
+    found: list[tuple[float, int, float]] = []
+    sections = Sections(np.zeros(1), np.full(1, 2 * np.pi), np.zeros((1, len(guards)), bool), _NONE)
+    for number, guard in enumerate(guards):
+        if is_hold(guard):
+            continue
+        asked = sorted(bits_in([guard.gap]))
+        for sides in np.unique(sections.bits[:, asked], axis=0) if asked else [()]:
+            bits = np.zeros(len(guards), bool)
+            bits[asked] = sides
+            gap = _series(name, guard, about, harmonics, bits)
+            angles = fourier.zeros(gap)
+            there = (sections.bits[sections.of(angles)][:, asked] == sides).all(axis=1)
+            angles = angles[there]
+            if len(angles):
+                split = fourier.harmonics_of(len(gap))
+                slopes = fourier.basis(angles, split) @ fourier.derivative(gap)
+                found += [(a, number, s) for a, s in zip(angles.tolist(), slopes, strict=True)]
+        sections = _cut(sections, np.unique([angle for angle, _, _ in found]))
+        middle = sections.middle
+        (values,) = evaluate([guard.gap], **about(middle), bits=list(sections.bits.T))  # type: ignore[arg-type]
+        sections.bits[:, number] = np.asarray(values) > 0
+    if not found:
+        return sections
+    angle, number, slope = (np.array(one) for one in zip(*sorted(found), strict=True))
+    which = np.searchsorted(sections.begin, angle)
+    before, behind = sections.bits[which - 1], sections.bits[which]
+    instants = Instants(angle, number.astype(np.int64), slope, before, behind)
+    return Sections(sections.begin, sections.length, sections.bits, instants)
+
+
+_NONE = Instants(np.zeros(0), np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 0), bool), np.zeros((0, 0), bool))
+
+
+def _cut(sections: Sections, begin: np.ndarray) -> Sections:
+    """Intervals between angles, those before among them, with the sides known so far."""
+    if not len(begin):
+        return sections
+    length = np.diff(np.append(begin, begin[0] + 2 * np.pi))
+    bits = sections.bits[sections.of(begin + 0.5 * length)].copy()
+    return Sections(begin, length, bits, _NONE)
+
+
+def _series(name: str, guard: Guard, about: About, harmonics: int, bits: np.ndarray) -> np.ndarray:
+    """The gap of a guard as a series, the bits that it asks for frozen."""
+    count = 4 * harmonics + 16
+    while count <= MOST_SAMPLES:
+        angle = 2.0 * np.pi * np.arange(count) / count
+        (values,) = evaluate([guard.gap], **about(angle), bits=bits.tolist())  # type: ignore[arg-type]
+        amplitudes = np.fft.rfft(np.broadcast_to(values, count)) * (2.0 / count)
+        amplitudes[0] *= 0.5
+        sizes = np.abs(amplitudes)
+        known = np.flatnonzero(sizes > ROUNDING * sizes.max())
+        last = int(known[-1]) if len(known) else 0
+        if 4 * last <= 3 * (count // 2):
+            return fourier.of_complex(amplitudes[: last + 1])
+        count *= 4
+    raise ParameterError(
+        f"the boundary {guard.name!r} of {name} isn't smooth along a harmonic motion, so where it "
+        "is crossed can't be told by harmonics. Follow the exact orbits: leave out ",
+        lambda say: f"{say.key('by')}.",
+    )

@@ -1,0 +1,164 @@
+"""Truncated Fourier series of H harmonics: their values, derivatives and zeros.
+
+A series is its coefficients float64[2H + 1]: the mean, the H cosines, the H sines, of an angle that
+turns once in the fundamental period.
+"""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+#: Cells of the circle, for each harmonic, in which zeros are looked for first.
+CELLS = 8
+#: Halvings of a cell of which it isn't known how many zeros it holds: what is left is rounding.
+HALVINGS = 40
+#: Steps of Newton's method, or halvings, by which a zero is located.
+STEPS = 60
+#: Length of the last step of Newton's method towards a zero, behind which there is rounding [rad].
+LOCATED = 1e-9
+
+
+def harmonics_of(size: int) -> int:
+    """Number of harmonics of a series of some coefficients."""
+    return (size - 1) // 2
+
+
+def basis(angle: np.ndarray, harmonics: int) -> np.ndarray:
+    """One, the cosines and the sines at angles float64[n], float64[n, 2H + 1]."""
+    turned = angle[:, None] * np.arange(1, harmonics + 1)
+    return np.concatenate([np.ones((len(angle), 1)), np.cos(turned), np.sin(turned)], axis=1)
+
+
+def derivative(series: np.ndarray, times: int = 1) -> np.ndarray:
+    """The derivative of series float64[..., 2H + 1] with respect to the angle, ``times`` times."""
+    if not times:
+        return series
+    order, split = np.arange(1, harmonics_of(series.shape[-1]) + 1), harmonics_of(series.shape[-1])
+    cosines, sines = series[..., 1 : split + 1], series[..., split + 1 :]
+    parts = [0.0 * series[..., :1], order * sines, -order * cosines]
+    return derivative(np.concatenate(parts, axis=-1), times - 1)
+
+
+def to_complex(series: np.ndarray) -> np.ndarray:
+    """Amplitudes c of ``Re(c exp(i k angle))``, k = 0 to H, complex128[..., H + 1]."""
+    split = harmonics_of(series.shape[-1])
+    found = series[..., : split + 1].astype(complex)
+    found[..., 1:] -= 1j * series[..., split + 1 :]
+    return found
+
+
+def of_complex(amplitudes: np.ndarray) -> np.ndarray:
+    """The series of amplitudes complex128[..., H + 1], float64[..., 2H + 1]."""
+    return np.concatenate([amplitudes.real, -amplitudes.imag[..., 1:]], axis=-1)
+
+
+def shifted(series: np.ndarray, angle: float) -> np.ndarray:
+    """The series of what happens an angle later: its values at ``angle`` stand at zero."""
+    amplitudes = to_complex(series)
+    return of_complex(amplitudes * np.exp(1j * angle * np.arange(amplitudes.shape[-1])))
+
+
+def of_samples(samples: np.ndarray, harmonics: int) -> np.ndarray:
+    """The series through values at equidistant angles from zero on, float64[..., n], cut off behind
+    H harmonics; exact for a series of fewer than n/2.
+    """
+    amplitudes = np.fft.rfft(samples)[..., : harmonics + 1] * (2.0 / samples.shape[-1])
+    amplitudes[..., 0] *= 0.5
+    missing = harmonics + 1 - amplitudes.shape[-1]
+    return of_complex(np.pad(amplitudes, [(0, 0)] * (samples.ndim - 1) + [(0, max(missing, 0))]))
+
+
+def resized(series: np.ndarray, harmonics: int) -> np.ndarray:
+    """The series with other numbers of harmonics: new ones are zero."""
+    amplitudes = to_complex(series)[..., : harmonics + 1]
+    missing = harmonics + 1 - amplitudes.shape[-1]
+    return of_complex(np.pad(amplitudes, [(0, 0)] * (series.ndim - 1) + [(0, missing)]))
+
+
+def transfer(blocks: np.ndarray) -> np.ndarray:
+    """The matrix that multiplies each amplitude of series by a complex number: from
+    complex128[H + 1, c, m], float64[c, 2H + 1, m, 2H + 1].
+    """
+    split = len(blocks) - 1
+    whole = np.zeros((blocks.shape[1], 2 * split + 1, blocks.shape[2], 2 * split + 1))
+    cosine, sine = np.arange(split + 1), np.arange(1, split + 1)
+    whole[:, cosine, :, cosine] = blocks.real
+    whole[:, split + sine, :, split + sine] = blocks.real[1:]
+    whole[:, sine, :, split + sine] = blocks.imag[1:]
+    whole[:, split + sine, :, sine] = -blocks.imag[1:]
+    return whole
+
+
+# -- zeros -----------------------------------------------------------------------------------------
+def zeros(series: np.ndarray) -> np.ndarray:
+    """All angles in [0, 2 pi) at which a series float64[2H + 1] changes its sign, ascending.
+
+    A cell of the circle holds no zero where the series is larger than its slope and its largest
+    second derivative allow it to fall there, and at most one where the slope keeps its sign; other
+    cells are halved. Zeros nearer to each other than rounding tells apart are none.
+    """
+    split = harmonics_of(len(series))
+    order = np.arange(1, split + 1)
+    bend = float(order**2 @ np.hypot(series[1 : split + 1], series[split + 1 :]))
+    if bend == 0.0:
+        return np.zeros(0)
+    slopes = derivative(series)
+    middle, at_middle, at_edge = _cells(split)
+    half = np.pi / len(middle)
+    value, slope, edge = at_middle @ series, at_middle @ slopes, at_edge @ series > 0
+    clear = np.abs(value) > np.abs(slope) * half + 0.5 * bend * half**2
+    single = ~clear & (np.abs(slope) > bend * half)
+    first = np.flatnonzero(single & (edge != np.roll(edge, -1)))
+    begins, widths = [middle[first] - half], [np.full(len(first), 2.0 * half)]
+    middle = middle[~clear & ~single]
+    for _ in range(HALVINGS):
+        if not len(middle):
+            break
+        half *= 0.5
+        middle = np.concatenate([middle - half, middle + half])
+        here = basis(middle, split)
+        value, slope = here @ series, here @ slopes
+        clear = np.abs(value) > np.abs(slope) * half + 0.5 * bend * half**2
+        single = ~clear & (np.abs(slope) > bend * half)
+        begins.append(middle[single] - half)
+        widths.append(np.full(np.count_nonzero(single), 2.0 * half))
+        middle = middle[~clear & ~single]
+    begin, width = np.concatenate(begins), np.concatenate(widths)
+    if not len(begin):
+        return begin
+    low, high = basis(begin, split) @ series > 0, basis(begin + width, split) @ series > 0
+    changes = low != high
+    found = _located(series, slopes, begin[changes], width[changes], high[changes])
+    return np.unique(found % (2.0 * np.pi))
+
+
+@functools.lru_cache(maxsize=64)
+def _cells(harmonics: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The middles of the first cells, and the basis there and where they begin."""
+    count = CELLS * (harmonics + 1)
+    begin = 2.0 * np.pi * np.arange(count) / count
+    middle = begin + np.pi / count
+    return middle, basis(middle, harmonics), basis(begin, harmonics)
+
+
+def _located(
+    series: np.ndarray, slopes: np.ndarray, begin: np.ndarray, width: np.ndarray, rising: np.ndarray
+) -> np.ndarray:
+    """The zeros between angles where the sign changes, by Newton's method that stays between."""
+    low, high, way = begin.copy(), begin + width, np.where(rising, 1.0, -1.0)
+    place, split = begin + 0.5 * width, harmonics_of(len(series))
+    for _ in range(STEPS):
+        here = basis(place, split)
+        value, slope = way * (here @ series), way * (here @ slopes)
+        low, high = np.where(value > 0, low, place), np.where(value > 0, place, high)
+        with np.errstate(all="ignore"):
+            step = -value / slope
+        inside = (place + step >= low) & (place + step <= high)
+        step = np.where(inside, step, 0.5 * (low + high) - place)
+        step[value == 0] = 0.0
+        place = place + step
+        if np.abs(step).max(initial=0.0) < LOCATED:
+            break
+    return place
