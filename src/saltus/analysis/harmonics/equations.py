@@ -16,6 +16,7 @@ import numpy as np
 
 from saltus.analysis.harmonics import series as fourier
 from saltus.analysis.harmonics.forces import Forces, Moving
+from saltus.analysis.harmonics.pieces import Sections
 from saltus.system import System
 from saltus.system.parametric import parametric
 
@@ -150,12 +151,25 @@ class HarmonicOrbits:
                 found[i] = fourier.derivative(signal, times) * rate**times
         return found
 
+    def sections(self, z: np.ndarray) -> Sections:
+        """A motion float64[z] between the boundaries that it meets."""
+        constants, _, rate, _ = self._constants(float(z[-1]))
+        return self.forces.sections(self.signals(z), constants, rate)
+
     def points(self, z: np.ndarray) -> np.ndarray:
         """States at whole forcing periods of motions float64[..., z], float64[..., n, D]."""
         flat = z.reshape(-1, z.shape[-1])
         here = fourier.basis(2 * np.pi * np.arange(self.periods) / self.periods, self.harmonics)
         found = np.array([here @ self.states(one).T for one in flat])
         return found.reshape(*z.shape[:-1], self.periods, -1)
+
+    def samples(self, z: np.ndarray) -> np.ndarray:
+        """The states of a motion float64[z] at equidistant angles, eight for each harmonic,
+        float64[n, D].
+        """
+        count = 8 * (self.harmonics + 1)
+        here = fourier.basis(2 * np.pi * np.arange(count) / count, self.harmonics)
+        return np.asarray(here @ self.states(z).T)
 
     def of_states(self, states: np.ndarray, value: float) -> np.ndarray:
         """The unknowns of a motion with series of the states float64[D, 2h + 1]."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -64,12 +64,15 @@ class Sections:
     bits : bool[p, guards]
         Sides of the boundaries.
     instants : Instants
+    gaps : tuple of float64[2h + 1]
+        The series of the gaps that don't ask for the sides of others.
     """
 
     begin: np.ndarray
     length: np.ndarray
     bits: np.ndarray
     instants: Instants
+    gaps: tuple[np.ndarray, ...] = ()
 
     @property
     def middle(self) -> np.ndarray:
@@ -126,6 +129,7 @@ def sections_of(name: str, guards: Sequence[Guard], about: About, harmonics: int
         If a gap isn't a series: it isn't smooth between the other boundaries.
     """
     found: list[tuple[float, int, float]] = []
+    gaps: list[np.ndarray] = []
     sections = Sections(np.zeros(1), np.full(1, 2 * np.pi), np.zeros((1, len(guards)), bool), _NONE)
     for number, guard in enumerate(guards):
         if is_hold(guard):
@@ -135,6 +139,7 @@ def sections_of(name: str, guards: Sequence[Guard], about: About, harmonics: int
             bits = np.zeros(len(guards), bool)
             bits[asked] = sides
             gap = _series(name, guard, about, harmonics, bits)
+            gaps += [] if asked else [gap]
             angles = fourier.zeros(gap)
             there = (sections.bits[sections.of(angles)][:, asked] == sides).all(axis=1)
             angles = angles[there]
@@ -147,12 +152,12 @@ def sections_of(name: str, guards: Sequence[Guard], about: About, harmonics: int
         (values,) = evaluate([guard.gap], **about(middle), bits=list(sections.bits.T))  # type: ignore[arg-type]
         sections.bits[:, number] = np.asarray(values) > 0
     if not found:
-        return sections
+        return replace(sections, gaps=tuple(gaps))
     angle, number, slope = (np.array(one) for one in zip(*sorted(found), strict=True))
     which = np.searchsorted(sections.begin, angle)
     before, behind = sections.bits[which - 1], sections.bits[which]
     instants = Instants(angle, number.astype(np.int64), slope, before, behind)
-    return Sections(sections.begin, sections.length, sections.bits, instants)
+    return replace(sections, instants=instants, gaps=tuple(gaps))
 
 
 _NONE = Instants(np.zeros(0), np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 0), bool), np.zeros((0, 0), bool))

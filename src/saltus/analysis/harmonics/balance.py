@@ -1,0 +1,104 @@
+"""`HarmonicBalance`: the option that asks for truncated Fourier series in place of exact orbits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from saltus.contact.guards import is_hold
+from saltus.errors import ParameterError, must_be
+from saltus.flow.counts import whole
+from saltus.flow.method import explain_unknown_options
+from saltus.language import expression as ex
+from saltus.system import System
+from saltus.system.quantity import is_remembered
+
+#: Most harmonics: matrices have three times as many rows a signal.
+MOST = 500
+
+
+@explain_unknown_options
+@dataclass(frozen=True)
+class HarmonicBalance:
+    """Periodic motions as Fourier series of a few harmonics, for ``by=`` of
+    :func:`saltus.branches`.
+
+    The equations of motion are fulfilled in the mean over a period, against each harmonic that is
+    kept. The only error is that of the truncation: the instants at which the truncated motion meets
+    a contact are located to rounding, and forces are integrated between them, not sampled. How far
+    the motion is from the exact orbit is told for each point of a branch.
+
+    Parameters
+    ----------
+    harmonics : int
+        Number of harmonics of the fundamental frequency, besides the mean.
+    periods : int, optional
+        Forcing periods in a period of the fundamental, more than one for subharmonic motions.
+        Default: those of each orbit that a branch begins with.
+
+    Raises
+    ------
+    ParameterError
+        If a number isn't whole, or too large.
+
+    References
+    ----------
+    Krack & Gross, Harmonic Balance for Nonlinear Vibration Problems (2019).
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> stop = sl.models.soft_stop()
+    >>> found = sl.branches(stop, {"frequency": (1.4, 1.6)}, (0, 0), at=1, by=sl.HarmonicBalance(5))
+    >>> found.attrs["harmonics"]
+    5
+    """
+
+    harmonics: int
+    periods: int | None = None
+
+    def __post_init__(self) -> None:
+        whole(self.harmonics, "harmonics", 1)
+        if self.harmonics > MOST:
+            raise must_be("harmonics", f"at most {MOST}", self.harmonics)
+        if self.periods is not None:
+            whole(self.periods, "periods", 1)
+
+
+def check_balanced(by: Any, system: System) -> None:
+    """Raise a ParameterError for a system whose motions aren't balanced by harmonics, or an option
+    that is none.
+    """
+    if not isinstance(by, HarmonicBalance):
+        raise must_be("by", "sl.HarmonicBalance(...), such as sl.HarmonicBalance(9)", by)
+    reason = _reason_against(system)
+    if reason:
+        raise ParameterError(
+            f"harmonic balance doesn't serve {system.name}: {reason}. Leave out ",
+            lambda say: f"{say.key('by')}: exact orbits are followed then.",
+        )
+
+
+def _reason_against(system: System) -> str:
+    """Why the motions of a system aren't balanced; empty if they are."""
+    if system.forced_at is None:
+        return "it has no forcing, and the period of what repeats isn't known"
+    for guard in system.guards:
+        if guard.law is not None and guard.law.kind == "impact":
+            return (
+                f"at the rigid stop {guard.name!r} velocities jump, which a sum of harmonics doesn't; "
+                "a stop with a stiffness is balanced"
+            )
+        if guard.law is not None and guard.law.kind == "jump":
+            return f"at {guard.name!r} its state jumps, which a sum of harmonics doesn't"
+    if any(map(is_remembered, system.states)):
+        return "it holds past values"
+    gaps = [guard.gap for guard in system.guards if not is_hold(guard)]
+    for node in ex.walk(*system.field, *gaps):
+        clock = node.op in ("mod", "table")
+        asked = node.op == "select" and any(
+            ex.varies(one.gap) for one in ex.relations_in(node.payload)
+        )
+        if clock or asked:
+            return "it switches at instants that the time alone decides"
+    return ""
