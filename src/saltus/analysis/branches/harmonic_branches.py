@@ -26,6 +26,7 @@ from saltus.analysis.harmonics.balance import HarmonicBalance
 from saltus.analysis.harmonics.equations import HarmonicOrbits
 from saltus.analysis.harmonics.sizes import amplitudes
 from saltus.analysis.inputs.outputs import Outputs
+from saltus.analysis.solve.newton import newton
 from saltus.errors import ParameterError
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
@@ -256,4 +257,12 @@ def _begun(orbits: ClosedHarmonics, seed: Seed, method: Method) -> Seed:
     )[0]
     z = orbits.of_states(fourier.of_samples(seen.T, orbits.harmonics), value)
     unit = np.repeat(seed.scale[[chain[0] for chain in orbits.chains]], orbits.series)
-    return Seed(z[None, :-1], z[-1:], unit)
+    orbits.scale = np.append(unit, 1.0)[None]
+
+    def equations(x: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        here = np.append(x, np.full((len(x), 1), value), axis=1)
+        residual, derivative = orbits.evaluate(here, rows)
+        return residual, derivative[..., :-1]
+
+    near = newton(equations, z[None, :-1], unit[None], damped=True)
+    return Seed(near.z if near.found[0] else z[None, :-1], z[-1:], unit)

@@ -28,6 +28,8 @@ from saltus.system import System
 UNEVEN = 6
 #: Highest multiple of the forcing frequency in a force whose integrals are exact.
 MULTIPLES = 12
+#: A jump below this share of a force is rounding.
+ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -189,7 +191,8 @@ class Forces:
             for bits in (instants.before, instants.behind)
         ]  # fmt: skip
         jumps = sides[0] - sides[1]
-        jumps[np.abs(jumps) <= 1e-12 * np.abs(sides).max(axis=0)] = 0.0
+        # a power of a depth isn't defined where rounding makes that negative, and doesn't jump
+        jumps[~(np.abs(jumps) > ROUNDING * np.abs(sides).max(axis=0))] = 0.0
         if not jumps.any():
             return
         here = fourier.basis(instants.angle, harmonics)
