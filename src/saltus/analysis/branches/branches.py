@@ -193,10 +193,16 @@ def branches(
     done = list[Branch]()
     with reporting(progress) as show:
         try:
-            begins, equilibria = seeds_between(
-                system, name, limits, start, box, at, seed, every, method, periods, threads
+            places = np.linspace(*limits, whole(at, "at", 1) + 2)[1:-1]
+            from_rest = by is not None and start is None
+            begins, equilibria = (
+                ([], [])
+                if from_rest
+                else seeds_between(
+                    system, name, limits, start, box, at, seed, every, method, periods, threads
+                )
             )
-            if not begins and not equilibria:
+            if not begins and not equilibria and not from_rest:
                 raise ParameterError(
                     lambda say: (
                         f"no periodic orbit of {system.name} is known between "
@@ -209,7 +215,8 @@ def branches(
             if by is None:
                 follow_all(plan, system, name, begins, equilibria, done, stage(show, 0.0, 0.9))
             else:
-                trace_harmonics(plan, system, name, begins, by, done, method, threads)
+                rest = places if from_rest else ()
+                trace_harmonics(plan, system, name, begins, rest, by, done, method, threads)
         except KeyboardInterrupt:
             partial = functools.partial(table_of, system, name, limits, done, wanted, method, by)
             raise Interrupted(partial) from None

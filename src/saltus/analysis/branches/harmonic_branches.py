@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from saltus.analysis.branches.arclength import Arc, correct
+from saltus.analysis.branches.arclength import Arc, correct, follow
 from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.events import Event
 from saltus.analysis.branches.shooting import PeriodicOrbits
@@ -40,6 +40,10 @@ NEAR = 0.5
 #: Samples of a forcing period by which an exact orbit is read off as a series, and by which it is
 #: held against a truncated one.
 SAMPLES = 256
+#: Most points of the curve from rest to a truncated motion.
+MOST_FROM_REST = 1000
+#: Least share of a linear response whose range is a unit.
+LEAST = 1e-6
 
 
 @dataclass(frozen=True)
@@ -207,19 +211,19 @@ def balanced(branches: Sequence[Branch], outputs: Outputs, harmonics: int) -> di
 
 
 def trace_harmonics(
-    plan: Plan, system: System, name: str, seeds: Sequence[Seed], by: HarmonicBalance,
-    branches: list[Branch], method: Method, threads: int | None,
+    plan: Plan, system: System, name: str, seeds: Sequence[Seed], places: Sequence[float],
+    by: HarmonicBalance, branches: list[Branch], method: Method, threads: int | None,
 ) -> None:  # fmt: skip
-    """Add the branches of truncated motions that exact orbits are near to, and those that cross
-    them, to a list.
+    """Add the branches of truncated motions near exact orbits, of those that Newton's method leads
+    to from rest at some values of the parameter, and those that cross them, to a list.
 
     Raises
     ------
     ParameterError
-        If no truncated motion is near to an orbit.
+        If no truncated motion is found.
     """
     symmetric = is_symmetric(system, {name: plan.limits})
-    for periods, some in _by_periods(seeds, by):
+    for periods, some in _by_periods(seeds, places, by):
 
         def make(_: int, scale: np.ndarray, periods: int = periods) -> ClosedHarmonics:
             return ClosedHarmonics(
@@ -229,8 +233,10 @@ def trace_harmonics(
         follow = functools.partial(both_ways, ends=_goes_on, kind=HarmonicBranch)
         mine = replace(plan, make=make, follow=follow, leave=_leave)
         bare = make(1, np.ones((1, 1)))
-        starts = [_begun(bare, one, method) for one in some]
-        trace(mine, starts, branches)
+        guesses = [_near(bare, one, method) for one in some]
+        guesses += [_from_rest(bare, place) for place in places if periods == (by.periods or 1)]
+        starts = [_begun(bare, *one) for one in guesses]
+        trace(mine, [one for one in starts if one is not None], branches)
     if not branches:
         raise ParameterError(
             f"no motion of {by.harmonics} harmonics was found near the orbits of {system.name} to "
@@ -239,9 +245,11 @@ def trace_harmonics(
         )
 
 
-def _by_periods(seeds: Sequence[Seed], by: HarmonicBalance) -> Iterator[tuple[int, list[Seed]]]:
+def _by_periods(
+    seeds: Sequence[Seed], places: Sequence[float], by: HarmonicBalance
+) -> Iterator[tuple[int, list[Seed]]]:
     """Orbits that share a fundamental period, and the number of forcing periods in it."""
-    found: dict[int, list[Seed]] = {}
+    found: dict[int, list[Seed]] = {by.periods or 1: []} if len(places) else {}
     for seed in seeds:
         periods = by.periods or len(seed.points)
         if periods % len(seed.points) == 0:
@@ -249,15 +257,72 @@ def _by_periods(seeds: Sequence[Seed], by: HarmonicBalance) -> Iterator[tuple[in
     yield from sorted(found.items())
 
 
-def _begun(orbits: ClosedHarmonics, seed: Seed, method: Method) -> Seed:
-    """The truncated series of an exact orbit, with the ranges of the signals as units."""
+def _near(orbits: ClosedHarmonics, seed: Seed, method: Method) -> tuple[np.ndarray, np.ndarray]:
+    """The truncated series of an exact orbit float64[z], and the ranges of the signals."""
     value = float(seed.others[-1])
     seen = samples(
         orbits.system, orbits.names[0], seed.points[:1], np.array([value]), orbits.periods, method
-    )[0]
-    z = orbits.of_states(fourier.of_samples(seen.T, orbits.harmonics), value)
-    unit = np.repeat(seed.scale[[chain[0] for chain in orbits.chains]], orbits.series)
+    )[0].T
+    signals = orbits.source.of_states(seen)
+    z = orbits.of_states(fourier.of_samples(seen, orbits.harmonics), value)
+    return z, units(signals.max(axis=1), signals.min(axis=1))
+
+
+def _from_rest(orbits: ClosedHarmonics, value: float) -> tuple[np.ndarray, np.ndarray]:
+    """Rest at a value of the parameter, and ranges of the signals: those of the linear response,
+    or of so much of it as meets no boundary.
+    """
+    z = np.append(np.zeros(orbits.size), value)
+    orbits.scale = np.ones((1, orbits.width))
+    linear = -orbits.evaluate(z[None], np.zeros(1, np.int64))[0][0]
+    share = 1.0
+    while share > LEAST and len(orbits.sections(np.append(share * linear, value)).instants.angle):
+        share *= 0.5
+    sizes = 2.0 * share * np.abs(linear.reshape(-1, orbits.series)).max(axis=1)
+    return z, np.where(sizes > 0, sizes, 1.0)
+
+
+class _FromRest:
+    """The curve of ``R(X) = (1 - share) R(0)`` from rest to a truncated motion, where the share is
+    1: of drives on a structure at rest it is the share of the drives. A ``CurveEquations``.
+    """
+
+    def __init__(self, orbits: ClosedHarmonics, value: float) -> None:
+        self._orbits, self._value, self.scale = orbits, value, orbits.scale
+        self._first = self._of(np.zeros((1, orbits.size)))[0]
+
+    def _of(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        here = np.append(x, np.full((len(x), 1), self._value), axis=1)
+        residual, derivative = self._orbits.evaluate(here, np.zeros(len(x), np.int64))
+        return residual, derivative[..., :-1]
+
+    def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:  # noqa: ARG002
+        """See :class:`saltus.analysis.branches.equations.CurveEquations`."""
+        residual, derivative = self._of(z[:, :-1])
+        along = np.broadcast_to(self._first * self.scale[0, -1], residual.shape)[..., None]
+        return residual - (1.0 - z[:, -1:]) * self._first, np.append(derivative, along, axis=2)
+
+    def accepted(self, z: np.ndarray, rows: np.ndarray) -> None:
+        """Nothing depends on it."""
+
+    def alike(self, z: np.ndarray, rows: np.ndarray) -> np.ndarray:  # noqa: ARG002
+        """The same points, float64[r, 1, z]."""
+        return z[:, None]
+
+    def end(self) -> np.ndarray | None:
+        """The truncated motion, float64[size]; None if the curve doesn't lead there."""
+        begin = np.zeros((1, self._orbits.width))
+        up = np.eye(self._orbits.width)[-1:]
+        (curve,) = follow(self, begin, up, {self._orbits.size: (0.0, 1.0)}, MOST_FROM_REST)
+        return curve.z[-1][:-1] if curve.end == "range" and curve.z[-1][-1] > 0.5 else None
+
+
+def _begun(orbits: ClosedHarmonics, z: np.ndarray, ranges: np.ndarray) -> Seed | None:
+    """The truncated motion that damped steps lead to; None if they lead to none."""
+    unit = np.repeat(ranges, orbits.series)
     orbits.scale = np.append(unit, 1.0)[None]
+
+    value = float(z[-1])
 
     def equations(x: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         here = np.append(x, np.full((len(x), 1), value), axis=1)
@@ -265,4 +330,11 @@ def _begun(orbits: ClosedHarmonics, seed: Seed, method: Method) -> Seed:
         return residual, derivative[..., :-1]
 
     near = newton(equations, z[None, :-1], unit[None], damped=True)
-    return Seed(near.z if near.found[0] else z[None, :-1], z[-1:], unit)
+    found = near.z[0] if near.found[0] else None
+    if found is None and not z[:-1].any():
+        found = _FromRest(orbits, value).end()
+    if found is None:
+        return None
+    signals = orbits.seen(found)
+    ranges = units(signals.max(axis=0), signals.min(axis=0))
+    return Seed(found[None], z[-1:], np.repeat(ranges, orbits.series))

@@ -91,6 +91,8 @@ def _reason_against(system: System) -> str:
             )
         if guard.law is not None and guard.law.kind == "jump":
             return f"at {guard.name!r} its state jumps, which a sum of harmonics doesn't"
+    if system.made:
+        return "an element of it has a memory: what it remembers is no sum of harmonics"
     if any(map(is_remembered, system.states)):
         return "it holds past values"
     gaps = [guard.gap for guard in system.guards if not is_hold(guard)]

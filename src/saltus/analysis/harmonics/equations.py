@@ -9,57 +9,15 @@ Harmonic Balance for Nonlinear Vibration Problems (2019), chapter 2.
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
-from typing import Protocol
-
+import functools
 import numpy as np
 
 from saltus.analysis.harmonics import series as fourier
 from saltus.analysis.harmonics.forces import Forces, Moving
 from saltus.analysis.harmonics.pieces import Sections
+from saltus.analysis.harmonics.signals import States, signals_of
 from saltus.system import System
 from saltus.system.parametric import parametric
-
-
-class Response(Protocol):
-    """Linear responses of signals to forces."""
-
-    def at(self, harmonics: int, rate: float) -> tuple[np.ndarray, np.ndarray]:
-        """Those at each harmonic k of the angle's rate [rad/s], complex128[H + 1, c, m], to forces
-        times ``period``; and their derivatives by the rate, times the rate.
-        """
-
-    def own(self, harmonics: int) -> np.ndarray:
-        """What the amplitudes of the signals are multiplied by, float64[H + 1, c]."""
-
-
-class Integrals:
-    """The response of signals of which each has one equation for its s-th derivative.
-
-    Parameters
-    ----------
-    orders : sequence of int
-        s of each signal.
-    """
-
-    def __init__(self, orders: Sequence[int]) -> None:
-        self.orders = np.array(orders)
-
-    def at(self, harmonics: int, rate: float) -> tuple[np.ndarray, np.ndarray]:
-        """See :class:`Response`. A mean isn't integrated: there the equation is that the mean of
-        the force vanishes, over the rate for its unit.
-        """
-        turns = np.arange(harmonics + 1) * 1j
-        turns[0] = 1.0
-        each = 1.0 / (turns[:, None] * rate) ** self.orders
-        whole = each[:, :, None] * np.eye(len(self.orders))
-        return whole, -self.orders[:, None] * whole
-
-    def own(self, harmonics: int) -> np.ndarray:
-        """See :class:`Response`."""
-        own = np.ones((harmonics + 1, len(self.orders)))
-        own[0] = 0.0
-        return own
 
 
 class HarmonicOrbits:
@@ -93,23 +51,22 @@ class HarmonicOrbits:
         self.system, self.names, self.scale = system, (name,), scale
         self.harmonics, self.periods, self.symmetric = harmonics, periods, symmetric
         self.series = 2 * harmonics + 1
-        known = parametric(system, (name,))
-        self._timed = known.timed
-        self.chains = chains_of(system)
-        self.response: Response = Integrals([len(chain) for chain in self.chains])
+        self.source = signals_of(system)
+        known = parametric(self.source.system, (name,))
+        self._timed, inner = known.timed, known.system
+        self.count, own = len(self.source.chains), self.source.system.states
         moving = {
-            system.states[i]: Moving(signal, times)
-            for signal, chain in enumerate(self.chains) for times, i in enumerate(chain)
+            own[i]: Moving(signal, times)
+            for signal, chain in enumerate(self.source.chains) for times, i in enumerate(chain)
         }  # fmt: skip
         self.turn = periods * (1.0 if self._timed else float(system.period()))
-        forces = [known.system.field[chain[-1]] for chain in self.chains]
-        constants = known.system.states[len(system.states) :]
-        self.forces = Forces(known.system, forces, moving, constants, self.turn, periods)
+        forces = [inner.field[i] for i in self.source.forces]
+        self.forces = Forces(inner, forces, moving, inner.states[len(own) :], self.turn, periods)
 
     @property
     def size(self) -> int:
         """Number of the unknowns of a motion."""
-        return len(self.chains) * self.series
+        return self.count * self.series
 
     @property
     def width(self) -> int:
@@ -144,12 +101,16 @@ class HarmonicOrbits:
 
     def states(self, z: np.ndarray) -> np.ndarray:
         """The series of the states of a motion float64[z], float64[D, 2H + 1]."""
-        signals, rate = self.signals(z), self._constants(float(z[-1]))[2]
-        found = np.zeros((len(self.system.states), self.series))
-        for signal, chain in zip(signals, self.chains, strict=True):
-            for times, i in enumerate(chain):
-                found[i] = fourier.derivative(signal, times) * rate**times
-        return found
+        constants, _, rate, rate_by = self._constants(float(z[-1]))
+        signals = self.signals(z)
+        if isinstance(self.source, States):
+            return self.source.states(signals, signals, rate)
+        found = self.forces.coefficients(signals, constants, rate, rate_by).values
+        return self.source.states(signals, found / self._pace(constants), rate)
+
+    def _pace(self, constants: np.ndarray) -> float:
+        """What the rates of the equations are multiplied by."""
+        return float(constants[0]) if self._timed else 1.0
 
     def sections(self, z: np.ndarray) -> Sections:
         """A motion float64[z] between the boundaries that it meets."""
@@ -164,16 +125,22 @@ class HarmonicOrbits:
         return found.reshape(*z.shape[:-1], self.periods, -1)
 
     def samples(self, z: np.ndarray) -> np.ndarray:
-        """The states of a motion float64[z] at equidistant angles, eight for each harmonic,
-        float64[n, D].
-        """
+        """The states of a motion float64[z] at equidistant angles, float64[n, D]."""
+        return np.asarray(self._circle @ self.states(z).T)
+
+    def seen(self, signals: np.ndarray) -> np.ndarray:
+        """The signals of a motion float64[size] at equidistant angles, float64[n, c]."""
+        return np.asarray(self._circle @ signals.reshape(self.count, -1).T)
+
+    @functools.cached_property
+    def _circle(self) -> np.ndarray:
+        """The basis at equidistant angles, eight for each harmonic."""
         count = 8 * (self.harmonics + 1)
-        here = fourier.basis(2 * np.pi * np.arange(count) / count, self.harmonics)
-        return np.asarray(here @ self.states(z).T)
+        return fourier.basis(2 * np.pi * np.arange(count) / count, self.harmonics)
 
     def of_states(self, states: np.ndarray, value: float) -> np.ndarray:
         """The unknowns of a motion with series of the states float64[D, 2h + 1]."""
-        signals = fourier.resized(states[[chain[0] for chain in self.chains]], self.harmonics)
+        signals = fourier.resized(self.source.of_states(states), self.harmonics)
         return np.append(signals.ravel(), value)
 
     # -- equations ---------------------------------------------------------------------------------
@@ -193,12 +160,11 @@ class HarmonicOrbits:
         signals = self.signals(z)
         constants, slopes, rate, rate_by = self._constants(float(z[-1]))
         found = self.forces.coefficients(signals, constants, rate, rate_by)
-        whole, by_rate = (fourier.transfer(one) for one in self.response.at(self.harmonics, rate))
-        own = self.response.own(self.harmonics)
+        whole, by_rate = (fourier.transfer(one) for one in self.source.response(self.harmonics, rate))
+        own = self.source.own(self.harmonics)
         own = np.concatenate([own, own[1:]]).T.ravel()
         size, forces = self.size, found.values.ravel()
-        # rates of the equations are those of a period: forces times the period
-        period = constants[0] if self._timed else 1.0
+        period = self._pace(constants)
         flat, flat_by_rate = (one.reshape(size, -1) / period for one in (whole, by_rate))
         derivative = np.empty((size, size + 1))
         derivative[:, :size] = -flat @ found.by_signals.reshape(len(forces), size)
@@ -232,25 +198,3 @@ class HarmonicOrbits:
         moved = factor * fourier.shifted(self.signals(z), angle)
         return np.concatenate([moved.reshape(len(z), -1), self.values(z)], axis=1)
 
-
-def chains_of(system: System) -> list[list[int]]:
-    """States that are derivatives of each other by time, each from the signal to its highest
-    derivative.
-    """
-    places = {name: i for i, name in enumerate(system.states)}
-    follows = {
-        i: places[str(entry.payload)] for i, entry in enumerate(system.field) if entry.op == "state"
-    }
-    taken: dict[int, int] = {}
-    for i, j in follows.items():
-        taken.setdefault(j, i)
-    follows = {i: j for i, j in follows.items() if taken[j] == i and i != j}
-    found: list[list[int]] = []
-    for first in range(len(system.states)):
-        if first in taken and follows.get(taken[first]) == first:
-            continue
-        chain = [first]
-        while chain[-1] in follows:
-            chain.append(follows[chain[-1]])
-        found.append(chain)
-    return found

@@ -19,6 +19,7 @@ from saltus.errors import ParameterError, SaltusWarning, among, must_be, shown
 from saltus.system.structures import matrices, told
 from saltus.system.structures.equations import UNITS, Coordinates, Loads, traced
 from saltus.system.structures.files import matrices_of
+from saltus.system.structures.interfaces import Interfaces
 from saltus.system.structures.matrices import ASYMMETRY
 from saltus.system.structures.parts import Base, Contact, Force, direction, parts
 from saltus.system.structures.reduction import Modes, modal_damping, modes_of
@@ -202,6 +203,9 @@ def structure(
     numbers = dict(zip(sides, numbers_of(sides.values(), made.guards), strict=True))
     named = {number: label for label, number in numbers.items() if number is not None}
     made = replace(made, guards=renamed(made.guards, named), description=words)
+    if touching and all(contact.restitution is None for _, contact in touching):
+        seen = Interfaces(moving, degrees, loads, frequency, unit, name, made.field)
+        made = replace(made, interfaces=seen)
     return made if sensors is None else with_sensors(made, sensors, moving, degrees, loads, unit)
 
 
