@@ -99,10 +99,16 @@ class Forces:
         self._gap_slopes = gradients([guard.gap for guard in system.guards], names)
         self._known = [
             (i, j) for i, row in enumerate(self._slopes) for j, one in enumerate(row)
-            if not (one.op == "const" and one.payload == 0)
+            if not _is_zero(one)
         ]  # fmt: skip
         self._entries = (*forces, *(self._slopes[i][j] for i, j in self._known))
         self._degree = degree(forces, self.moving)
+        names = list(self.moving)
+        self._linear = {
+            i: [(self.moving[name], j) for j, name in enumerate(names) if not _is_zero(row[j])]
+            for i, row in enumerate(self._gap_slopes) if _is_linear(system.guards[i].gap, row[: len(names)], names)
+        }  # fmt: skip
+        self._rest = {name: 0.0 for name in names}
 
     def motion(
         self, angle: np.ndarray, signals: np.ndarray, constants: np.ndarray, rate: float
@@ -123,9 +129,28 @@ class Forces:
         return sections_of(
             self.system.name,
             self.system.guards,
+            self._gaps(signals, constants, rate),
             functools.partial(self.motion, signals=signals, constants=constants, rate=rate),
             fourier.harmonics_of(signals.shape[1]),
         )
+
+    def _gaps(
+        self, signals: np.ndarray, constants: np.ndarray, rate: float
+    ) -> dict[int, np.ndarray]:
+        """The series of the gaps that are linear in the moving states."""
+        resting = self._rest | dict(zip(self.constants, constants.tolist(), strict=True))
+        about: dict[str, Any] = {"states": resting, "values": self.system.values}
+        found = {}
+        for i, terms in self._linear.items():
+            wanted = [self.system.guards[i].gap, *(self._gap_slopes[i][j] for _, j in terms)]
+            level, *slopes = evaluate(wanted, **about)
+            gap = np.zeros(signals.shape[1])
+            gap[0] = level
+            for (one, _), slope in zip(terms, slopes, strict=True):
+                series = fourier.derivative(signals[one.signal], one.times)
+                gap += slope * rate**one.times * series
+            found[i] = gap
+        return found
 
     def nodes(self, sections: Sections, harmonics: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """See :meth:`Sections.nodes`: for products of the forces and a harmonic."""
@@ -212,6 +237,21 @@ class Forces:
             shift = np.outer(jumps[:, k], _norm(harmonics) * here[k]) / -instants.slope[k]
             whole.by_signals[:] += shift[:, :, None, None] * by_signals
             whole.by_constants[:] += shift[:, :, None] * by_constants
+
+
+def _is_zero(entry: Expr) -> bool:
+    return entry.op == "const" and entry.payload == 0
+
+
+def _is_linear(gap: Expr, slopes: Sequence[Expr], moving: Sequence[str]) -> bool:
+    """True for a gap with constant derivatives by the moving states, and nothing else in it that
+    varies.
+    """
+    if ex.depends_on(gap, ("time",)) or gap.bits:
+        return False
+    return not any(
+        node.op == "state" and node.payload in moving for node in ex.walk(*slopes)
+    )  # fmt: skip
 
 
 def _at(about: Mapping[str, Any], k: int) -> dict[str, Any]:

@@ -7,7 +7,7 @@ polynomial of the states, so that its zeros are found: all of them, to rounding.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -109,7 +109,10 @@ class Sections:
         return np.concatenate(angles), np.concatenate(weights), np.repeat(np.arange(len(counts)), counts)
 
 
-def sections_of(name: str, guards: Sequence[Guard], about: About, harmonics: int) -> Sections:
+def sections_of(
+    name: str, guards: Sequence[Guard], linear: Mapping[int, np.ndarray], about: About,
+    harmonics: int,
+) -> Sections:  # fmt: skip
     """Cut a motion at the boundaries of some guards, each after those whose sides it asks for.
 
     Parameters
@@ -118,6 +121,8 @@ def sections_of(name: str, guards: Sequence[Guard], about: About, harmonics: int
         Of the system, for a message.
     guards : sequence of Guard
         That a contact is held never is: a series isn't held anywhere.
+    linear : mapping of int to float64[2H + 1]
+        The gaps that are known as series.
     about : callable
         States, parameters and time at angles.
     harmonics : int
@@ -128,45 +133,66 @@ def sections_of(name: str, guards: Sequence[Guard], about: About, harmonics: int
     ParameterError
         If a gap isn't a series: it isn't smooth between the other boundaries.
     """
-    found: list[tuple[float, int, float]] = []
-    gaps: list[np.ndarray] = []
-    sections = Sections(np.zeros(1), np.full(1, 2 * np.pi), np.zeros((1, len(guards)), bool), _NONE)
-    for number, guard in enumerate(guards):
-        if is_hold(guard):
+    moving = [i for i, guard in enumerate(guards) if not is_hold(guard)]
+    asked = {number: sorted(bits_in([guards[number].gap])) for number in moving}
+    frozen = np.zeros(len(guards), bool)
+    series = {
+        number: linear[number]
+        if number in linear
+        else _series(name, guards[number], about, harmonics, frozen)
+        for number in moving if not asked[number]
+    }  # fmt: skip
+    found = [one for number, gap in series.items() for one in _crossings(number, gap)]
+    sections = _cut(_whole(len(guards)), found)
+    middle = sections.middle
+    for number, gap in series.items():
+        here = fourier.basis(middle, fourier.harmonics_of(len(gap)))
+        sections.bits[:, number] = here @ gap > 0
+    for number in moving:
+        if not (mine := asked[number]):
             continue
-        asked = sorted(bits_in([guard.gap]))
-        for sides in np.unique(sections.bits[:, asked], axis=0) if asked else [()]:
-            bits = np.zeros(len(guards), bool)
-            bits[asked] = sides
-            gap = _series(name, guard, about, harmonics, bits)
-            gaps += [] if asked else [gap]
-            angles = fourier.zeros(gap)
-            there = (sections.bits[sections.of(angles)][:, asked] == sides).all(axis=1)
-            angles = angles[there]
-            if len(angles):
-                split = fourier.harmonics_of(len(gap))
-                slopes = fourier.basis(angles, split) @ fourier.derivative(gap)
-                found += [(a, number, s) for a, s in zip(angles.tolist(), slopes, strict=True)]
-        sections = _cut(sections, np.unique([angle for angle, _, _ in found]))
-        middle = sections.middle
-        (values,) = evaluate([guard.gap], **about(middle), bits=list(sections.bits.T))  # type: ignore[arg-type]
+        for sides in np.unique(sections.bits[:, mine], axis=0):
+            bits = frozen.copy()
+            bits[mine] = sides
+            gap = _series(name, guards[number], about, harmonics, bits)
+            found += [
+                one for one in _crossings(number, gap)
+                if (sections.bits[sections.of(np.array([one[0]]))[0], mine] == sides).all()
+            ]  # fmt: skip
+        sections = _cut(sections, found)
+        here = about(sections.middle)
+        (values,) = evaluate([guards[number].gap], **here, bits=list(sections.bits.T))  # type: ignore[arg-type]
         sections.bits[:, number] = np.asarray(values) > 0
-    if not found:
-        return replace(sections, gaps=tuple(gaps))
-    angle, number, slope = (np.array(one) for one in zip(*sorted(found), strict=True))
-    which = np.searchsorted(sections.begin, angle)
-    before, behind = sections.bits[which - 1], sections.bits[which]
-    instants = Instants(angle, number.astype(np.int64), slope, before, behind)
-    return replace(sections, instants=instants, gaps=tuple(gaps))
+    instants = _NONE
+    if found:
+        angle, which, slope = (np.array(one) for one in zip(*sorted(found), strict=True))
+        at = np.searchsorted(sections.begin, angle)
+        before, behind = sections.bits[at - 1], sections.bits[at]
+        instants = Instants(angle, which.astype(np.int64), slope, before, behind)
+    return replace(sections, instants=instants, gaps=tuple(series.values()))
+
+
+def _crossings(number: int, gap: np.ndarray) -> list[tuple[float, int, float]]:
+    """Angles at which a gap vanishes, its number, and its slopes there."""
+    angles = fourier.zeros(gap)
+    here = fourier.basis(angles, fourier.harmonics_of(len(gap)))
+    slopes = here @ fourier.derivative(gap)
+    return [(a, number, s) for a, s in zip(angles.tolist(), slopes.tolist(), strict=True)]
+
+
+def _whole(guards: int) -> Sections:
+    """The circle, uncut."""
+    return Sections(np.zeros(1), np.full(1, 2 * np.pi), np.zeros((1, guards), bool), _NONE)
 
 
 _NONE = Instants(np.zeros(0), np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 0), bool), np.zeros((0, 0), bool))
 
 
-def _cut(sections: Sections, begin: np.ndarray) -> Sections:
-    """Intervals between angles, those before among them, with the sides known so far."""
-    if not len(begin):
+def _cut(sections: Sections, found: list[tuple[float, int, float]]) -> Sections:
+    """Intervals between the angles of crossings, with the sides known so far."""
+    if not found:
         return sections
+    begin = np.unique([angle for angle, _, _ in found])
     length = np.diff(np.append(begin, begin[0] + 2 * np.pi))
     bits = sections.bits[sections.of(begin + 0.5 * length)].copy()
     return Sections(begin, length, bits, _NONE)

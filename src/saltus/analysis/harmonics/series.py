@@ -28,17 +28,22 @@ def harmonics_of(size: int) -> int:
 def basis(angle: np.ndarray, harmonics: int) -> np.ndarray:
     """One, the cosines and the sines at angles float64[n], float64[n, 2H + 1]."""
     turned = angle[:, None] * np.arange(1, harmonics + 1)
-    return np.concatenate([np.ones((len(angle), 1)), np.cos(turned), np.sin(turned)], axis=1)
+    found = np.ones((len(angle), 2 * harmonics + 1))
+    np.cos(turned, out=found[:, 1 : harmonics + 1])
+    np.sin(turned, out=found[:, harmonics + 1 :])
+    return found
 
 
 def derivative(series: np.ndarray, times: int = 1) -> np.ndarray:
     """The derivative of series float64[..., 2H + 1] with respect to the angle, ``times`` times."""
-    if not times:
-        return series
-    order, split = np.arange(1, harmonics_of(series.shape[-1]) + 1), harmonics_of(series.shape[-1])
-    cosines, sines = series[..., 1 : split + 1], series[..., split + 1 :]
-    parts = [0.0 * series[..., :1], order * sines, -order * cosines]
-    return derivative(np.concatenate(parts, axis=-1), times - 1)
+    split = harmonics_of(series.shape[-1])
+    order = np.arange(1, split + 1)
+    for _ in range(times):
+        found = np.zeros(series.shape)
+        found[..., 1 : split + 1] = order * series[..., split + 1 :]
+        found[..., split + 1 :] = -order * series[..., 1 : split + 1]
+        series = found
+    return series
 
 
 def to_complex(series: np.ndarray) -> np.ndarray:
