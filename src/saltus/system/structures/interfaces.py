@@ -13,7 +13,7 @@ import numpy as np
 from saltus.language.expression import Expr
 from saltus.system.structures import matrices
 from saltus.system.structures.equations import Coordinates, Loads, traced
-from saltus.system.structures.parts import direction, vector_of
+from saltus.system.structures.parts import ways_of
 from saltus.system.system import System
 
 
@@ -50,10 +50,7 @@ class Interfaces:
         """Along which contacts are pressed and slide, each once, in the degrees of freedom."""
         found: list[np.ndarray] = []
         for _, contact in self.loads.contacts:
-            pair = contact.sliding
-            pair = [pair] if isinstance(pair, str) else pair
-            ways = [direction(contact, self.degrees)]
-            ways += [] if pair is None else [vector_of(pair, self.degrees)]
+            ways = ways_of(contact, self.degrees)
             found += [way for way in ways if _place(way, found) is None]
         return found
 

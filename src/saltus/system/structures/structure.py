@@ -21,8 +21,8 @@ from saltus.system.structures.equations import UNITS, Coordinates, Loads, traced
 from saltus.system.structures.files import matrices_of
 from saltus.system.structures.interfaces import Interfaces
 from saltus.system.structures.matrices import ASYMMETRY
-from saltus.system.structures.parts import Base, Contact, Force, direction, parts
-from saltus.system.structures.reduction import Modes, modal_damping, modes_of
+from saltus.system.structures.parts import Base, Contact, Force, direction, parts, ways_of
+from saltus.system.structures.reduction import Modes, modal_damping, modes_of, with_residuals
 from saltus.system.structures.sensors import with_sensors
 from saltus.system.system import System
 from saltus.units import to_si
@@ -59,6 +59,7 @@ def structure(
     frequency: float | str | None = None,
     damping_ratio: Any = None,
     modes: int | None = None,
+    residual: bool = False,
     names: Sequence[str] | str | None = None,
     unit: str = "m",
     name: str = "structure",
@@ -102,6 +103,10 @@ def structure(
         Number of the lowest modes kept; the states are then their coordinates. Default: all
         degrees of freedom, as they are. ``modes=n`` loses nothing, and makes a full mass matrix
         quicker to compile.
+    residual : bool
+        Whether the static deflections that the kept modes miss under the forces of contacts and
+        drives are coordinates too, one more for each of these: nothing of the static flexibility
+        there is lost then, and of the dynamic little (MacNeal, Comput. Struct. 1 (1971) 581-601).
     names : sequence of str, or str
         Names of the degrees of freedom; default ``x1``, ``x2``, ... The velocity of ``x1`` is
         called ``v1``, that of any other name ``NAME_rate``.
@@ -178,7 +183,13 @@ def structure(
             "all entries of stiffness are zero, so all modes have the frequency 0, and none are "
             "the lowest. Give the stiffness matrix, or leave modes= out."
         )
-    known = modes_of(mass, stiffness, count) if reduced else None
+    known, kept = modes_of(mass, stiffness, count) if reduced else None, count
+    if residual:
+        if known is None or modes is None:
+            raise ParameterError("residual=True is of the modes that are left out: give modes=.")
+        ways = [way for _, contact in touching for way in ways_of(contact, degrees)]
+        known = with_residuals(known.lowest(count), mass, stiffness, [*ways, *loads.along])
+        count = len(known.angular)
     if known is not None and damping_ratio is not None:
         damping = _ratio(damping_ratio, known, count if modes is not None else size)
     if known is None or modes is None:
@@ -191,7 +202,7 @@ def structure(
         if damping is not None and damping_ratio is None:
             damping = modal_damping(damping, known, count)
         moving = _modal(known.lowest(count), damping)
-        words = told.reduced(mass, stiffness, known, count, degrees, loads, unit)
+        words = told.reduced(mass, stiffness, known, kept, count, degrees, loads, unit)
     angular = known.angular if known is not None else _angular(moving, stiffness)
     told.doubt(angular)
     made, sides = traced(moving, degrees, loads, frequency, unit=unit, name=name, source=source)
