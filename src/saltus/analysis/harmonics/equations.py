@@ -19,6 +19,9 @@ from saltus.analysis.harmonics.signals import States, signals_of
 from saltus.system import System
 from saltus.system.parametric import parametric
 
+#: Motions whose states are remembered.
+REMEMBERED = 4096
+
 
 class HarmonicOrbits:
     """Curves of periodic motions of H harmonics over one parameter; a ``CurveEquations``, and what
@@ -59,6 +62,7 @@ class HarmonicOrbits:
             own[i]: Moving(signal, times)
             for signal, chain in enumerate(self.source.chains) for times, i in enumerate(chain)
         }  # fmt: skip
+        self._remembered: dict[bytes, tuple[np.ndarray, Sections]] = {}
         self.turn = periods * (1.0 if self._timed else float(system.period()))
         forces = [inner.field[i] for i in self.source.forces]
         self.forces = Forces(inner, forces, moving, inner.states[len(own) :], self.turn, periods)
@@ -101,21 +105,31 @@ class HarmonicOrbits:
 
     def states(self, z: np.ndarray) -> np.ndarray:
         """The series of the states of a motion float64[z], float64[D, 2H + 1]."""
-        constants, _, rate, rate_by = self._constants(float(z[-1]))
-        signals = self.signals(z)
-        if isinstance(self.source, States):
-            return self.source.states(signals, signals, rate)
-        found = self.forces.coefficients(signals, constants, rate, rate_by).values
-        return self.source.states(signals, found / self._pace(constants), rate)
+        return self._along(z)[0]
+
+    def sections(self, z: np.ndarray) -> Sections:
+        """A motion float64[z] between the boundaries that it meets."""
+        return self._along(z)[1]
+
+    def _along(self, z: np.ndarray) -> tuple[np.ndarray, Sections]:
+        """The states and sections of a motion, remembered."""
+        key = z.tobytes()
+        if key not in self._remembered:
+            if len(self._remembered) >= REMEMBERED:
+                self._remembered.clear()
+            constants, _, rate, rate_by = self._constants(float(z[-1]))
+            signals, forces = self.signals(z), None
+            if isinstance(self.source, States):
+                sections = self.forces.sections(signals, constants, rate)
+            else:
+                found = self.forces.coefficients(signals, constants, rate, rate_by)
+                sections, forces = found.sections, found.values / self._pace(constants)
+            self._remembered[key] = self.source.states(signals, forces, rate), sections
+        return self._remembered[key]
 
     def _pace(self, constants: np.ndarray) -> float:
         """What the rates of the equations are multiplied by."""
         return float(constants[0]) if self._timed else 1.0
-
-    def sections(self, z: np.ndarray) -> Sections:
-        """A motion float64[z] between the boundaries that it meets."""
-        constants, _, rate, _ = self._constants(float(z[-1]))
-        return self.forces.sections(self.signals(z), constants, rate)
 
     def points(self, z: np.ndarray) -> np.ndarray:
         """States at whole forcing periods of motions float64[..., z], float64[..., n, D]."""

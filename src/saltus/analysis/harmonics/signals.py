@@ -45,9 +45,11 @@ class Signals(Protocol):
     def own(self, harmonics: int) -> np.ndarray:
         """What the amplitudes of the signals are multiplied by, float64[H + 1, c]."""
 
-    def states(self, signals: np.ndarray, forces: np.ndarray, rate: float) -> np.ndarray:
+    def states(
+        self, signals: np.ndarray, forces: np.ndarray | None, rate: float
+    ) -> np.ndarray:
         """The states of the motion, float64[D, 2H + 1], from the signals float64[c, 2H + 1] and the
-        forces float64[m, 2H + 1].
+        forces float64[m, 2H + 1], which those of equations don't need.
         """
 
     def of_states(self, states: np.ndarray) -> np.ndarray:
@@ -88,7 +90,9 @@ class States:
         own[0] = 0.0
         return own
 
-    def states(self, signals: np.ndarray, forces: np.ndarray, rate: float) -> np.ndarray:  # noqa: ARG002
+    def states(
+        self, signals: np.ndarray, forces: np.ndarray | None, rate: float  # noqa: ARG002
+    ) -> np.ndarray:
         """See :class:`Signals`."""
         found = np.zeros((len(self.system.states), signals.shape[1]))
         for signal, chain in zip(signals, self.chains, strict=True):
@@ -140,8 +144,9 @@ class AtContacts:
         """See :class:`Signals`."""
         return np.ones((harmonics + 1, len(self.chains)))
 
-    def states(self, signals: np.ndarray, forces: np.ndarray, rate: float) -> np.ndarray:
+    def states(self, signals: np.ndarray, forces: np.ndarray | None, rate: float) -> np.ndarray:
         """See :class:`Signals`."""
+        assert forces is not None
         angular = np.arange(fourier.harmonics_of(signals.shape[1]) + 1) * rate
         pushed = (self._forced.T @ fourier.to_complex(forces)).T[:, :, None]
         found = fourier.of_complex(self._solved(angular, pushed)[:, :, 0].T)
