@@ -30,6 +30,8 @@ UNEVEN = 6
 MULTIPLES = 12
 #: A jump below this share of a force is rounding.
 ROUNDING = 1e-12
+#: Random states at which forces are compared on both sides of a boundary.
+TRIED = 16
 
 
 @dataclass(frozen=True)
@@ -152,6 +154,34 @@ class Forces:
             found[i] = gap
         return found
 
+    @functools.cached_property
+    def _jumping(self) -> np.ndarray:
+        """Boundaries at which a force may jump, bool[guards]: it does at random states on a
+        boundary whose gap is linear; of others it isn't asked.
+        """
+        random, names = np.random.default_rng(0), list(self.moving)
+        found = np.ones(len(self.system.guards), bool)
+        for i, terms in self._linear.items():
+            states = {
+                name: random.uniform(0.5, 2.0, TRIED) * random.choice([-1.0, 1.0], TRIED)
+                for name in (*names, *self.constants)
+            }
+            states |= {name: np.abs(states[name]) for name in self.constants}
+            wanted = [self.system.guards[i].gap, *(self._gap_slopes[i][j] for _, j in terms)]
+            about: dict[str, Any] = {"t": random.uniform(0, 1, TRIED), "values": self.system.values}
+            if not terms:
+                continue
+            gap, slope, *_ = evaluate(wanted, **about, states=states)
+            states[names[terms[0][1]]] = states[names[terms[0][1]]] - gap / slope
+            bits = list(random.integers(0, 2, (len(self.system.guards), TRIED)) > 0)
+            sides = []
+            for bits[i] in (np.zeros(TRIED, bool), np.ones(TRIED, bool)):
+                forces = evaluate(self._entries[: self.count], **about, states=states, bits=bits)
+                sides.append(np.array([np.broadcast_to(one, TRIED) for one in forces]))
+            apart, size = np.abs(sides[0] - sides[1]), np.abs(sides).max(axis=0)
+            found[i] = (apart > ROUNDING * np.maximum(size, size.max())).any()
+        return found
+
     def nodes(self, sections: Sections, harmonics: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """See :meth:`Sections.nodes`: for products of the forces and a harmonic."""
         bent = math.isinf(self._degree)
@@ -207,6 +237,8 @@ class Forces:
     ) -> None:  # fmt: skip
         """Add to the derivatives what the shifts of instants do at which forces jump."""
         instants, harmonics = whole.sections.instants, fourier.harmonics_of(signals.shape[1])
+        if not self._jumping[instants.guard].any():
+            return
         about = self.motion(instants.angle, signals, constants, rate)
         sides = [
             np.array([

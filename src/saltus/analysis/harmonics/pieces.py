@@ -142,7 +142,7 @@ def sections_of(
         else _series(name, guards[number], about, harmonics, frozen)
         for number in moving if not asked[number]
     }  # fmt: skip
-    found = [one for number, gap in series.items() for one in _crossings(number, gap)]
+    found = _crossings(series)
     sections = _cut(_whole(len(guards)), found)
     middle = sections.middle
     for number, gap in series.items():
@@ -156,7 +156,7 @@ def sections_of(
             bits[mine] = sides
             gap = _series(name, guards[number], about, harmonics, bits)
             found += [
-                one for one in _crossings(number, gap)
+                one for one in _crossings({number: gap})
                 if (sections.bits[sections.of(np.array([one[0]]))[0], mine] == sides).all()
             ]  # fmt: skip
         sections = _cut(sections, found)
@@ -172,12 +172,15 @@ def sections_of(
     return replace(sections, instants=instants, gaps=tuple(series.values()))
 
 
-def _crossings(number: int, gap: np.ndarray) -> list[tuple[float, int, float]]:
-    """Angles at which a gap vanishes, its number, and its slopes there."""
-    angles = fourier.zeros(gap)
-    here = fourier.basis(angles, fourier.harmonics_of(len(gap)))
-    slopes = here @ fourier.derivative(gap)
-    return [(a, number, s) for a, s in zip(angles.tolist(), slopes.tolist(), strict=True)]
+def _crossings(gaps: Mapping[int, np.ndarray]) -> list[tuple[float, int, float]]:
+    """Angles at which gaps vanish, the numbers of these, and their slopes there."""
+    split = max((fourier.harmonics_of(len(gap)) for gap in gaps.values()), default=1)
+    series = np.reshape([fourier.resized(gap, split) for gap in gaps.values()], (-1, 2 * split + 1))
+    which, angles = fourier.zeros_of(series)
+    here = fourier.basis(angles, split)
+    slopes = np.einsum("ri,ri->r", here, fourier.derivative(series)[which])
+    number = np.array(list(gaps), np.int64)[which]
+    return list(zip(angles.tolist(), number.tolist(), slopes.tolist(), strict=True))
 
 
 def _whole(guards: int) -> Sections:

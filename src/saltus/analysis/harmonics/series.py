@@ -77,6 +77,8 @@ def of_samples(samples: np.ndarray, harmonics: int) -> np.ndarray:
 
 def resized(series: np.ndarray, harmonics: int) -> np.ndarray:
     """The series with other numbers of harmonics: new ones are zero."""
+    if harmonics == harmonics_of(series.shape[-1]):
+        return series
     amplitudes = to_complex(series)[..., : harmonics + 1]
     missing = harmonics + 1 - amplitudes.shape[-1]
     return of_complex(np.pad(amplitudes, [(0, 0)] * (series.ndim - 1) + [(0, missing)]))
@@ -98,45 +100,63 @@ def transfer(blocks: np.ndarray) -> np.ndarray:
 
 # -- zeros -----------------------------------------------------------------------------------------
 def zeros(series: np.ndarray) -> np.ndarray:
-    """All angles in [0, 2 pi) at which a series float64[2H + 1] changes its sign, ascending.
+    """All angles in [0, 2 pi) at which a series float64[2H + 1] changes its sign, ascending."""
+    return zeros_of(series[None])[1]
+
+
+def zeros_of(series: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """All angles in [0, 2 pi) at which series float64[g, 2H + 1] change their sign, float64[r], and
+    which series does, int64[r]; ascending in the series, then in the angle.
 
     A cell of the circle holds no zero where the series is larger than its slope and its largest
     second derivative allow it to fall there, and at most one where the slope keeps its sign; other
     cells are halved. Zeros nearer to each other than rounding tells apart are none.
     """
-    split = harmonics_of(len(series))
+    split = harmonics_of(series.shape[1])
     order = np.arange(1, split + 1)
-    bend = float(order**2 @ np.hypot(series[1 : split + 1], series[split + 1 :]))
-    if bend == 0.0:
-        return np.zeros(0)
+    bend = np.hypot(series[:, 1 : split + 1], series[:, split + 1 :]) @ order**2
     slopes = derivative(series)
-    middle, at_middle, at_edge = _cells(split)
-    half = np.pi / len(middle)
-    value, slope, edge = at_middle @ series, at_middle @ slopes, at_edge @ series > 0
-    clear = np.abs(value) > np.abs(slope) * half + 0.5 * bend * half**2
-    single = ~clear & (np.abs(slope) > bend * half)
-    first = np.flatnonzero(single & (edge != np.roll(edge, -1)))
-    begins, widths = [middle[first] - half], [np.full(len(first), 2.0 * half)]
-    middle = middle[~clear & ~single]
+    circle, at_middle, at_edge = _cells(split)
+    half = np.pi / len(circle)
+    value, slope = series @ at_middle.T, slopes @ at_middle.T
+    edge = series @ at_edge.T > 0
+    clear, single = _told(value, slope, bend[:, None], half)
+    which, place = np.nonzero(single & (edge != np.roll(edge, -1, axis=1)))
+    found = [(which, circle[place] - half, np.full(len(which), 2.0 * half))]
+    which, place = np.nonzero(~clear & ~single & (bend[:, None] > 0))
+    middle = circle[place]
     for _ in range(HALVINGS):
         if not len(middle):
             break
         half *= 0.5
-        middle = np.concatenate([middle - half, middle + half])
+        which, middle = np.tile(which, 2), np.concatenate([middle - half, middle + half])
         here = basis(middle, split)
-        value, slope = here @ series, here @ slopes
-        clear = np.abs(value) > np.abs(slope) * half + 0.5 * bend * half**2
-        single = ~clear & (np.abs(slope) > bend * half)
-        begins.append(middle[single] - half)
-        widths.append(np.full(np.count_nonzero(single), 2.0 * half))
-        middle = middle[~clear & ~single]
-    begin, width = np.concatenate(begins), np.concatenate(widths)
+        value, slope = (np.einsum("ri,ri->r", here, one[which]) for one in (series, slopes))
+        clear, single = _told(value, slope, bend[which], half)
+        found.append((which[single], middle[single] - half, np.full(single.sum(), 2.0 * half)))
+        which, middle = which[~clear & ~single], middle[~clear & ~single]
+    which, begin, width = (np.concatenate(one) for one in zip(*found, strict=True))
     if not len(begin):
-        return begin
-    low, high = basis(begin, split) @ series > 0, basis(begin + width, split) @ series > 0
+        return which, begin
+    low, high = (
+        np.einsum("ri,ri->r", basis(at, split), series[which]) > 0 for at in (begin, begin + width)
+    )
     changes = low != high
-    found = _located(series, slopes, begin[changes], width[changes], high[changes])
-    return np.unique(found % (2.0 * np.pi))
+    which, rising = which[changes], high[changes]
+    angle = _located(series[which], slopes[which], begin[changes], width[changes], rising)
+    angle %= 2.0 * np.pi
+    order = np.lexsort((angle, which))
+    which, angle = which[order], angle[order]
+    new = np.append(True, (np.diff(which) != 0) | (np.diff(angle) != 0))[: len(which)]
+    return which[new], angle[new]
+
+
+def _told(
+    value: np.ndarray, slope: np.ndarray, bend: np.ndarray, half: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Cells without a zero, and others with one at most, by what is known in their middles."""
+    clear = np.abs(value) > np.abs(slope) * half + 0.5 * bend * half**2
+    return clear, ~clear & (np.abs(slope) > bend * half)
 
 
 @functools.lru_cache(maxsize=64)
@@ -151,12 +171,14 @@ def _cells(harmonics: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def _located(
     series: np.ndarray, slopes: np.ndarray, begin: np.ndarray, width: np.ndarray, rising: np.ndarray
 ) -> np.ndarray:
-    """The zeros between angles where the sign changes, by Newton's method that stays between."""
+    """The zeros of series float64[r, 2H + 1] between angles where their signs change, by Newton's
+    method that stays between.
+    """
     low, high, way = begin.copy(), begin + width, np.where(rising, 1.0, -1.0)
-    place, split = begin + 0.5 * width, harmonics_of(len(series))
+    place, split = begin + 0.5 * width, harmonics_of(series.shape[1])
     for _ in range(STEPS):
         here = basis(place, split)
-        value, slope = way * (here @ series), way * (here @ slopes)
+        value, slope = (way * np.einsum("ri,ri->r", here, one) for one in (series, slopes))
         low, high = np.where(value > 0, low, place), np.where(value > 0, place, high)
         with np.errstate(all="ignore"):
             step = -value / slope
