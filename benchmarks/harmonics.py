@@ -1,7 +1,7 @@
 """Harmonic balance: a beam of 2000 degrees of freedom with two stops, and the rig, beside a plain
 alternating frequency-time method (AFT) of our own in the same run, and exact branches.
 
-    python benchmarks/harmonics.py
+    OPENBLAS_NUM_THREADS=1 python benchmarks/harmonics.py
 
 CPU time of one thread. The AFT samples the motion at 1024 places of a period, adds up the force
 there, and takes its Fourier coefficients and their derivatives by FFT, as NLvib and others do; it
@@ -12,21 +12,20 @@ contact instants.
 
 from __future__ import annotations
 
-import os
-
-for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
-    os.environ.setdefault(_name, "1")
-
+import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "src"))
 
 import saltus as sl
 from saltus.analysis.harmonics import series as fourier
 from saltus.analysis.harmonics.equations import HarmonicOrbits
 from saltus.analysis.harmonics.forces import Forces
-from saltus.analysis.harmonics.pieces import _NONE, Sections
+from saltus.analysis.harmonics.pieces import Sections, uncut
 
 SAMPLES = 1024
 
@@ -74,9 +73,9 @@ class Sampled(Forces):
         bits = np.zeros((SAMPLES, len(self.system.guards)), bool)
         for number, gap in gaps.items():
             bits[:, number] = fourier.basis(angle, harmonics) @ gap > 0
-        return Sections(angle, np.full(SAMPLES, 2 * np.pi / SAMPLES), bits, _NONE)
+        return Sections(angle, np.full(SAMPLES, 2 * np.pi / SAMPLES), bits, uncut(0).instants)
 
-    def nodes(self, sections, harmonics):
+    def nodes(self, sections, harmonics):  # noqa: ARG002
         """The samples."""
         return samples(), np.full(SAMPLES, 2 * np.pi / SAMPLES), np.arange(SAMPLES)
 
@@ -119,8 +118,10 @@ def of_beam():
     system = beam()
     made = time.process_time() - begin
     options = {"at": 1, "by": sl.HarmonicBalance(7), "switch": (), "progress": False}
-    print("A clamped beam of 2000 degrees of freedom, 2 stops on both sides, 7 harmonics: "
-          f"{len(system.states) // 2} coordinates, made in {made:.2f} s")
+    print(
+        "A clamped beam of 2000 degrees of freedom, 2 stops on both sides, 7 harmonics: "
+        f"{len(system.states) // 2} coordinates, made in {made:.2f} s"
+    )
     print("| points | CPU time, first point included [s] | folds [Hz] | median error |")
     print("|---|---|---|---|")
     for most in (20, 200):
@@ -128,8 +129,10 @@ def of_beam():
         found = sl.branches(system, {"frequency": ("4.3 Hz", "8 Hz")}, points=most, **options)
         took = time.process_time() - begin
         folds = found.event_frequency.values[found.event_kind.values == "fold"]
-        print(f"| {found.sizes['point']} | {took:.2f} | {', '.join(f'{f:.6f}' for f in folds)} | "
-              f"{float(np.nanmedian(found.point_error)):.1e} |")
+        print(
+            f"| {found.sizes['point']} | {took:.2f} | {', '.join(f'{f:.6f}' for f in folds)} | "
+            f"{float(np.nanmedian(found.point_error)):.1e} |"
+        )
     i = int(np.argmax(found.point_contacts.values))
     c = found.point_harmonic_real.values[i] + 1j * found.point_harmonic_imag.values[i]
     compare(system, 7, fourier.of_complex(c), float(found.point_frequency[i]))
@@ -141,12 +144,14 @@ def compare(system, harmonics, states, frequency):
     z = one.of_states(states[: len(system.states)], frequency)
     unit = np.append(np.full(one.size, np.abs(z[:-1]).max()), 1.0)
     exact, aft = (equations(system, harmonics, unit, how) for how in (False, True))
-    (z, count), (sampled, more) = closed(exact, z), closed(aft, z)
+    (z, _), (sampled, more) = closed(exact, z), closed(aft, z)
     off = np.abs(z - sampled)[:-1].max() / unit[0]
-    print(f"one motion with {len(exact.sections(z).begin)} intervals: exact instants "
-          f"{cost(lambda: exact.evaluate(z[None], np.zeros(1, int))):.2f} ms an evaluation, "
-          f"AFT of {SAMPLES} samples {cost(lambda: aft.evaluate(z[None], np.zeros(1, int))):.2f} ms, "
-          f"off by {off:.1e} of the largest harmonic ({more} steps)\n")
+    print(
+        f"one motion with {len(exact.sections(z).begin)} intervals: exact instants "
+        f"{cost(lambda: exact.evaluate(z[None], np.zeros(1, int))):.2f} ms an evaluation, "
+        f"AFT of {SAMPLES} samples {cost(lambda: aft.evaluate(z[None], np.zeros(1, int))):.2f} ms, "
+        f"off by {off:.1e} of the largest harmonic ({more} steps)\n"
+    )
 
 
 def of_rig():
@@ -157,14 +162,19 @@ def of_rig():
     print("|---|---|---|---|---|")
     for count in (None, 3, 5, 9, 15, 31, 63):
         options = {} if count is None else {"by": sl.HarmonicBalance(count)}
-        sl.branches(rig, {"frequency": (15.0, 15.1)}, start, at=1, progress=False, points=2, **options)
+        sl.branches(
+            rig, {"frequency": (15.0, 15.1)}, start, at=1, progress=False, points=2, **options
+        )
         begin = time.process_time()
         found = sl.branches(rig, limits, start, at=1, switch=(), progress=False, **options)
         took = 1e3 * (time.process_time() - begin) / found.sizes["point"]
         folds = found.event_frequency.values[found.event_kind.values == "fold"]
         error = "" if count is None else f"{float(np.nanmedian(found.point_error)):.1e}"
-        print(f"| {'exact' if count is None else f'H = {count}'} | {found.sizes['point']} | {took:.1f} | "
-              f"{', '.join(f'{f:.8f}' for f in folds)} | {error} |")
+        print(
+            f"| {'exact' if count is None else f'H = {count}'} | {found.sizes['point']} | "
+            f"{took:.1f} | "
+            f"{', '.join(f'{f:.8f}' for f in folds)} | {error} |"
+        )
 
 
 if __name__ == "__main__":

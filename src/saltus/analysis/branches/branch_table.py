@@ -187,7 +187,10 @@ def _branches(branches: Sequence[Branch]) -> dict[str, Any]:
         "branch": np.arange(len(branches)),
         "branch_kind": [_kind(branch) for branch in branches],
         "branch_periods": np.array(
-            [0 if isinstance(one.orbits, EquilibriumCurves) else _periods(one.orbits) for one in branches],
+            [
+                0 if isinstance(one.orbits, EquilibriumCurves) else _periods(one.orbits)
+                for one in branches
+            ],
             np.int64,
         ),
         "branch_closed": np.array([branch.closed for branch in branches], bool),

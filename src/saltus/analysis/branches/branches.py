@@ -215,7 +215,7 @@ def branches(
             if by is None:
                 follow_all(plan, system, name, begins, equilibria, done, stage(show, 0.0, 0.9))
             else:
-                rest = places if from_rest else ()
+                rest = places.tolist() if from_rest else []
                 trace_harmonics(plan, system, name, begins, rest, by, done, method, threads)
         except KeyboardInterrupt:
             partial = functools.partial(table_of, system, name, limits, done, wanted, method, by)

@@ -32,6 +32,7 @@ from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.flow.request import Schedule
 from saltus.system import System
+from saltus.system.modes import mode_number, sides
 from saltus.system.symmetry import is_symmetric
 
 #: Farthest that Newton's method goes from a truncated motion to the exact orbit, in ranges of the
@@ -119,11 +120,12 @@ class ClosedHarmonics(HarmonicOrbits):
         """
         return self.exact(z).multipliers
 
-    def errors(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Largest distances of motions float64[r, z] from their exact orbits at samples of a
-        period, float64[r, D], and the ranges of these, float64[r, D]; NaN where none is near.
+    def errors(self, z: np.ndarray, outputs: Outputs) -> tuple[np.ndarray, np.ndarray]:
+        """Largest distances of outputs of motions float64[r, z] from those of the exact orbits at
+        samples of a period, float64[r, K], and the ranges of these, float64[r, K]; NaN where none
+        is near.
         """
-        apart, ranges = np.full((2, len(z), len(self.system.states)), np.nan)
+        apart, ranges = np.full((2, len(z), len(outputs)), np.nan)
         exact = self.exact(z)
         good = np.flatnonzero(exact.found)
         if not len(good):
@@ -132,11 +134,18 @@ class ClosedHarmonics(HarmonicOrbits):
             self.system, self.names[0], exact.points[good, 0], self.values(z[good])[:, 0],
             self.periods, self._exact.map.method,
         )  # fmt: skip
-        angle = 2 * np.pi * np.arange(seen.shape[1]) / seen.shape[1]
-        here = fourier.basis(angle, self.harmonics)
+        share = np.arange(seen.shape[1]) / seen.shape[1]
+        here = fourier.basis(2 * np.pi * share, self.harmonics)
         for i, one in zip(good, seen, strict=True):
-            apart[i] = np.abs(here @ self.states(z[i]).T - one).max(axis=0)
-            ranges[i] = np.ptp(one, axis=0)
+            about = dict(self.system.values) | {self.names[0]: float(z[i, -1])}
+            time, both = share * float(self.period(z[i])), (here @ self.states(z[i]).T, one)
+            modes = [mode_number(sides(self.system, time, each.T, about)) for each in both]
+            truncated, known = (
+                outputs.values(time, each, about, mode)
+                for each, mode in zip(both, modes, strict=True)
+            )
+            apart[i] = np.abs(truncated - known).max(axis=0)
+            ranges[i] = np.ptp(known, axis=0)
         return apart, ranges
 
 
@@ -163,7 +172,7 @@ def samples(
 class HarmonicBranch(Branch):
     """A branch of motions of a few harmonics."""
 
-    orbits: ClosedHarmonics
+    orbits: ClosedHarmonics  # type: ignore[assignment]
     audited: ClassVar[bool] = False
 
     def _contacts(self) -> list[Event]:
@@ -172,7 +181,10 @@ class HarmonicBranch(Branch):
 
 
 def _leave(
-    branch: HarmonicBranch, number: int, switch: frozenset[str], longest: int  # noqa: ARG001
+    branch: HarmonicBranch,
+    number: int,
+    switch: frozenset[str],
+    longest: int,  # noqa: ARG001
 ) -> Iterator[Seed]:
     """Seeds of the branches that leave one where branches of truncated motions cross."""
     size = branch.orbits.size
@@ -197,9 +209,11 @@ def balanced(branches: Sequence[Branch], outputs: Outputs, harmonics: int) -> di
         orbits = branch.orbits
         assert isinstance(orbits, ClosedHarmonics)
         wide.append(np.array([amplitudes(orbits, z, outputs) for z in branch.z]))
-        off, ranges = orbits.errors(branch.z)
-        share.append((off / np.where(ranges > 0, ranges, np.inf)).max(axis=1))
-        apart.append(np.pad(off, ((0, 0), (0, size - off.shape[1])), constant_values=np.nan))
+        off, ranges = orbits.errors(branch.z, outputs)
+        states = len(orbits.system.states)
+        told = slice(states, None) if orbits.system.outputs.first else slice(states)
+        share.append((off / np.where(ranges > 0, ranges, np.inf))[:, told].max(axis=1))
+        apart.append(off)
     whole = np.concatenate(wide)
     return {
         "harmonic": np.arange(harmonics + 1),
@@ -231,7 +245,7 @@ def trace_harmonics(
             )
 
         follow = functools.partial(both_ways, ends=_goes_on, kind=HarmonicBranch)
-        mine = replace(plan, make=make, follow=follow, leave=_leave)
+        mine = replace(plan, make=make, follow=follow, leave=_leave)  # type: ignore[arg-type]
         bare = make(1, np.ones((1, 1)))
         guesses = [_near(bare, one, method) for one in some]
         guesses += [_from_rest(bare, place) for place in places if periods == (by.periods or 1)]

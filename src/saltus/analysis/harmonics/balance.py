@@ -86,8 +86,8 @@ def _reason_against(system: System) -> str:
     for guard in system.guards:
         if guard.law is not None and guard.law.kind == "impact":
             return (
-                f"at the rigid stop {guard.name!r} velocities jump, which a sum of harmonics doesn't; "
-                "a stop with a stiffness is balanced"
+                f"at the rigid stop {guard.name!r} velocities jump, which a sum of harmonics "
+                "doesn't; a stop with a stiffness is balanced"
             )
         if guard.law is not None and guard.law.kind == "jump":
             return f"at {guard.name!r} its state jumps, which a sum of harmonics doesn't"

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import copy
 import functools
+
 import numpy as np
 
 from saltus.analysis.harmonics import series as fourier
@@ -174,7 +175,9 @@ class HarmonicOrbits:
         signals = self.signals(z)
         constants, slopes, rate, rate_by = self._constants(float(z[-1]))
         found = self.forces.coefficients(signals, constants, rate, rate_by)
-        whole, by_rate = (fourier.transfer(one) for one in self.source.response(self.harmonics, rate))
+        whole, by_rate = (
+            fourier.transfer(one) for one in self.source.response(self.harmonics, rate)
+        )
         own = self.source.own(self.harmonics)
         own = np.concatenate([own, own[1:]]).T.ravel()
         size, forces = self.size, found.values.ravel()
@@ -211,4 +214,3 @@ class HarmonicOrbits:
     def _shifted(self, z: np.ndarray, angle: float, factor: float = 1.0) -> np.ndarray:
         moved = factor * fourier.shifted(self.signals(z), angle)
         return np.concatenate([moved.reshape(len(z), -1), self.values(z)], axis=1)
-

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from saltus.analysis.harmonics import series as fourier
-from saltus.analysis.harmonics.pieces import Instants, Sections, sections_of
+from saltus.analysis.harmonics.pieces import Sections, sections_of
 from saltus.language import expression as ex
 from saltus.language.derivatives import gradients
 from saltus.language.evaluate import evaluate
@@ -105,12 +105,12 @@ class Forces:
         ]  # fmt: skip
         self._entries = (*forces, *(self._slopes[i][j] for i, j in self._known))
         self._degree = degree(forces, self.moving)
-        names = list(self.moving)
+        states, rows = list(self.moving), enumerate(self._gap_slopes)
         self._linear = {
-            i: [(self.moving[name], j) for j, name in enumerate(names) if not _is_zero(row[j])]
-            for i, row in enumerate(self._gap_slopes) if _is_linear(system.guards[i].gap, row[: len(names)], names)
+            i: [(self.moving[name], j) for j, name in enumerate(states) if not _is_zero(row[j])]
+            for i, row in rows if _is_linear(system.guards[i].gap, row[: len(states)], states)
         }  # fmt: skip
-        self._rest = {name: 0.0 for name in names}
+        self._rest = dict.fromkeys(states, 0.0)
 
     def motion(
         self, angle: np.ndarray, signals: np.ndarray, constants: np.ndarray, rate: float
@@ -123,8 +123,14 @@ class Forces:
         for times in {one.times for one in self.moving.values()}:
             known[times] = here @ (fourier.derivative(signals, times) * rate**times).T
         states = {name: known[one.times][:, one.signal] for name, one in self.moving.items()}
-        states |= {name: np.asarray(value) for name, value in zip(self.constants, constants, strict=True)}
-        return {"t": angle * (self.turn / (2 * np.pi)), "states": states, "values": self.system.values}
+        states |= {
+            name: np.asarray(value) for name, value in zip(self.constants, constants, strict=True)
+        }
+        return {
+            "t": angle * (self.turn / (2 * np.pi)),
+            "states": states,
+            "values": self.system.values,
+        }
 
     def sections(self, signals: np.ndarray, constants: np.ndarray, rate: float) -> Sections:
         """A motion between the boundaries that it meets."""
@@ -182,7 +188,9 @@ class Forces:
             found[i] = (apart > ROUNDING * np.maximum(size, size.max())).any()
         return found
 
-    def nodes(self, sections: Sections, harmonics: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def nodes(
+        self, sections: Sections, harmonics: int
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """See :meth:`Sections.nodes`: for products of the forces and a harmonic."""
         bent = math.isinf(self._degree)
         most = UNEVEN if bent else max(int(self._degree), 1)
@@ -196,6 +204,7 @@ class Forces:
         Parameters
         ----------
         signals : float64[c, 2H + 1]
+            The series of the motion.
         constants : float64[e]
             The states that don't move.
         rate : float
@@ -208,7 +217,9 @@ class Forces:
         angle, weight, which = self.nodes(sections, harmonics)
         about = self.motion(angle, signals, constants, rate)
         bits = list(sections.bits[which].T)
-        found = [np.broadcast_to(one, len(angle)) for one in evaluate(self._entries, **about, bits=bits)]
+        found = [
+            np.broadcast_to(one, len(angle)) for one in evaluate(self._entries, **about, bits=bits)
+        ]
         here = fourier.basis(angle, harmonics)
         project = here.T * weight * _norm(harmonics)[:, None]
         values = np.array(found[: self.count]).reshape(self.count, -1) @ project.T
@@ -254,7 +265,7 @@ class Forces:
             return
         here = fourier.basis(instants.angle, harmonics)
         names = list(self.moving)
-        for k in np.flatnonzero(jumps.any(axis=0)):
+        for k in np.flatnonzero(jumps.any(axis=0)).tolist():
             one = _at(about, k)
             slopes = evaluate(
                 self._gap_slopes[instants.guard[k]], **one, bits=instants.before[k].tolist()
@@ -322,8 +333,8 @@ def degree(roots: Sequence[Expr], moving: Collection[str]) -> float:
             case "div":
                 known[node] = below[0] if below[1] == 0 else math.inf
             case "pow":
-                whole = node.args[1].op == "const" and float(node.args[1].payload) % 1 == 0  # type: ignore[arg-type]
-                power = float(node.args[1].payload) if whole else math.inf  # type: ignore[arg-type]
+                whole = node.args[1].op == "const" and float(node.args[1].payload) % 1 == 0
+                power = float(node.args[1].payload) if whole else math.inf
                 known[node] = 0 if not any(below) else below[0] * power if power > 0 else math.inf
             case _:
                 known[node] = math.inf if any(below) else 0

@@ -81,7 +81,9 @@ class Sections:
 
     def of(self, angle: np.ndarray) -> np.ndarray:
         """The intervals that hold angles float64[n], int64[n]."""
-        return (np.searchsorted(self.begin, angle % (2 * np.pi), side="right") - 1) % len(self.begin)
+        return (np.searchsorted(self.begin, angle % (2 * np.pi), side="right") - 1) % len(
+            self.begin
+        )
 
     def nodes(self, degree: int, bent: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles and weights by which series of a degree are integrated over the circle to
@@ -106,7 +108,11 @@ class Sections:
                 place = 0.5 + 0.5 * np.sin(turned)
             angles.append(begin + length * place)
             weights.append(length * weight)
-        return np.concatenate(angles), np.concatenate(weights), np.repeat(np.arange(len(counts)), counts)
+        return (
+            np.concatenate(angles),
+            np.concatenate(weights),
+            np.repeat(np.arange(len(counts)), counts),
+        )
 
 
 def sections_of(
@@ -143,7 +149,7 @@ def sections_of(
         for number in moving if not asked[number]
     }  # fmt: skip
     found = _crossings(series)
-    sections = _cut(_whole(len(guards)), found)
+    sections = _cut(uncut(len(guards)), found)
     middle = sections.middle
     for number, gap in series.items():
         here = fourier.basis(middle, fourier.harmonics_of(len(gap)))
@@ -160,8 +166,8 @@ def sections_of(
                 if (sections.bits[sections.of(np.array([one[0]]))[0], mine] == sides).all()
             ]  # fmt: skip
         sections = _cut(sections, found)
-        here = about(sections.middle)
-        (values,) = evaluate([guards[number].gap], **here, bits=list(sections.bits.T))  # type: ignore[arg-type]
+        there = about(sections.middle)
+        (values,) = evaluate([guards[number].gap], **there, bits=list(sections.bits.T))  # type: ignore[arg-type]
         sections.bits[:, number] = np.asarray(values) > 0
     instants = _NONE
     if found:
@@ -183,12 +189,14 @@ def _crossings(gaps: Mapping[int, np.ndarray]) -> list[tuple[float, int, float]]
     return list(zip(angles.tolist(), number.tolist(), slopes.tolist(), strict=True))
 
 
-def _whole(guards: int) -> Sections:
+def uncut(guards: int) -> Sections:
     """The circle, uncut."""
     return Sections(np.zeros(1), np.full(1, 2 * np.pi), np.zeros((1, guards), bool), _NONE)
 
 
-_NONE = Instants(np.zeros(0), np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 0), bool), np.zeros((0, 0), bool))
+_NONE = Instants(
+    np.zeros(0), np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 0), bool), np.zeros((0, 0), bool)
+)
 
 
 def _cut(sections: Sections, found: list[tuple[float, int, float]]) -> Sections:

@@ -45,9 +45,7 @@ class Signals(Protocol):
     def own(self, harmonics: int) -> np.ndarray:
         """What the amplitudes of the signals are multiplied by, float64[H + 1, c]."""
 
-    def states(
-        self, signals: np.ndarray, forces: np.ndarray | None, rate: float
-    ) -> np.ndarray:
+    def states(self, signals: np.ndarray, forces: np.ndarray | None, rate: float) -> np.ndarray:
         """The states of the motion, float64[D, 2H + 1], from the signals float64[c, 2H + 1] and the
         forces float64[m, 2H + 1], which those of equations don't need.
         """
@@ -91,7 +89,10 @@ class States:
         return own
 
     def states(
-        self, signals: np.ndarray, forces: np.ndarray | None, rate: float  # noqa: ARG002
+        self,
+        signals: np.ndarray,
+        forces: np.ndarray | None,  # noqa: ARG002
+        rate: float,
     ) -> np.ndarray:
         """See :class:`Signals`."""
         found = np.zeros((len(self.system.states), signals.shape[1]))

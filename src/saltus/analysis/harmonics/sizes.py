@@ -50,7 +50,7 @@ class _Motion:
         self.states = orbits.states(z)
         self.sections: Sections = orbits.sections(z)
         self.period = float(orbits.period(z))
-        known = orbits.system.values | {orbits.names[0]: float(orbits.values(z)[0])}
+        known = dict(orbits.system.values) | {orbits.names[0]: float(orbits.values(z)[0])}
         self.parameters: dict[str, Any] = known
 
     def values(self, angle: np.ndarray, which: np.ndarray | None = None) -> np.ndarray:
@@ -98,5 +98,4 @@ class _Motion:
             own = found[np.arange(k), :, np.arange(k)]
             best = around[np.arange(k), own.argmax(axis=1)]
             high, half = np.maximum(high, own.max(axis=1)), half * 2.0 / (PLACES - 1)
-        return high
-
+        return np.asarray(high)

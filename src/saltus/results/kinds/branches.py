@@ -71,20 +71,24 @@ VARIABLES = {
         ("harmonic",), "1", "multiple of the frequency of the orbit", "i8", coord=True
     ),
     "point_error": Variable(
-        _POINT, "1",
-        "of harmonic balance: largest distance of a state from that of the exact orbit, over its "
-        "range; NaN where none is near",
+        _POINT,
+        "1",
+        "of harmonic balance: largest distance of a state, of a structure of a sensor, from that "
+        "of the exact orbit, over its range; NaN where none is near",
     ),
     "point_output_error": Variable(
-        ("point", "output"), "<output>",
-        "of harmonic balance: largest distance from the exact orbit, of the states",
+        ("point", "output"),
+        "<output>",
+        "of harmonic balance: largest distance from that of the exact orbit",
     ),
     "point_harmonic_real": Variable(
-        ("point", "output", "harmonic"), "<output>",
+        ("point", "output", "harmonic"),
+        "<output>",
         "of harmonic balance: amplitude c of Re(c exp(2 pi i k f t)), real part",
     ),
     "point_harmonic_imag": Variable(
-        ("point", "output", "harmonic"), "<output>",
+        ("point", "output", "harmonic"),
+        "<output>",
         "of harmonic balance: amplitude c of Re(c exp(2 pi i k f t)), imaginary part",
     ),
     "branch": Variable(_BRANCH, "1", "branch", "i8", coord=True),

@@ -11,13 +11,18 @@ from saltus.study.answers.question import OneVerb, asked
 from saltus.study.setting import quantities
 from saltus.study.tables.kinds import OF_RESPONSES, whole
 from saltus.study.tables.parts import Interval, Quantity
-from saltus.study.tables.signature import WrittenAs
+from saltus.study.tables.signature import Generated, WrittenAs
 from saltus.study.tables.signature import table as asking
 
 if TYPE_CHECKING:
     from saltus.study.setting.setting import Setting
 
 
+#: Motions of a few harmonics in place of exact orbits.
+By: Any = asking(
+    "branches.by", ["HarmonicBalance"], {"harmonics": whole(9), "periods": whole(3)},
+    base=Generated,
+)  # fmt: skip
 #: Branches go over a range, without steps.
 OF_BRANCHES = OF_RESPONSES | {
     "vary": WrittenAs(
@@ -26,6 +31,11 @@ OF_BRANCHES = OF_RESPONSES | {
     ),
     "at": whole(12, most=MOST_COUNT),
     "longest": whole(8),
+    "by": WrittenAs(
+        By, ({"harmonics": 9},),
+        "Harmonic balance: motions of a few harmonics in place of exact orbits.", None,
+        convert="balance",
+    ),
     "points": whole(1000),
     "switch": WrittenAs(
         list[Literal["period_doubling", "branch_point"]], (["period_doubling"],),

@@ -91,6 +91,15 @@ class Interfaces:
         return traced(at, self.degrees, self.loads, self.frequency, **about)[0]
 
 
+def seen_by_contacts(
+    system: System, moving: Coordinates, degrees: list[str], loads: Loads, frequency: Any, unit: str
+) -> Interfaces | None:
+    """The interfaces of a structure; None without contacts, or with rigid ones."""
+    if not loads.contacts or any(one.restitution is not None for _, one in loads.contacts):
+        return None
+    return Interfaces(moving, degrees, loads, frequency, unit, system.name, system.field)
+
+
 @dataclass(frozen=True)
 class _AtContacts(Coordinates):
     """Coordinates that are the deflections at contacts, and one for each drive."""
@@ -100,12 +109,12 @@ class _AtContacts(Coordinates):
 
     def along(self, vector: np.ndarray) -> np.ndarray:
         """See :meth:`Coordinates.along`."""
-        return np.eye(len(self.names))[_place(vector, self.directions)]
+        return np.asarray(np.eye(len(self.names))[_place(vector, self.directions)])
 
     def load(self, vector: np.ndarray) -> np.ndarray:
         """See :meth:`Coordinates.load`."""
         place = next(i for i, one in enumerate(self.drives) if one is vector)
-        return np.eye(len(self.names))[len(self.directions) + place]
+        return np.asarray(np.eye(len(self.names))[len(self.directions) + place])
 
 
 def _place(vector: np.ndarray, known: list[np.ndarray]) -> int | None:

@@ -92,9 +92,7 @@ def _lowest(mass: Any, stiffness: Any, count: int) -> tuple[np.ndarray, np.ndarr
     return squares[order], shapes[:, order]
 
 
-def with_residuals(
-    kept: Modes, mass: Any, stiffness: Any, forces: Sequence[np.ndarray]
-) -> Modes:
+def with_residuals(kept: Modes, mass: Any, stiffness: Any, forces: Sequence[np.ndarray]) -> Modes:
     """Modes, and behind them the static deflections that they miss under some forces, as shapes of
     unit modal mass that no force of inertia or stiffness joins with each other or the modes.
 

@@ -19,7 +19,7 @@ from saltus.errors import ParameterError, SaltusWarning, among, must_be, shown
 from saltus.system.structures import matrices, told
 from saltus.system.structures.equations import UNITS, Coordinates, Loads, traced
 from saltus.system.structures.files import matrices_of
-from saltus.system.structures.interfaces import Interfaces
+from saltus.system.structures.interfaces import seen_by_contacts
 from saltus.system.structures.matrices import ASYMMETRY
 from saltus.system.structures.parts import Base, Contact, Force, direction, parts, ways_of
 from saltus.system.structures.reduction import Modes, modal_damping, modes_of, with_residuals
@@ -185,10 +185,9 @@ def structure(
         )
     known, kept = modes_of(mass, stiffness, count) if reduced else None, count
     if residual:
-        if known is None or modes is None:
-            raise ParameterError("residual=True is of the modes that are left out: give modes=.")
-        ways = [way for _, contact in touching for way in ways_of(contact, degrees)]
-        known = with_residuals(known.lowest(count), mass, stiffness, [*ways, *loads.along])
+        known = _completed(
+            known if modes is not None else None, count, mass, stiffness, degrees, loads
+        )
         count = len(known.angular)
     if known is not None and damping_ratio is not None:
         damping = _ratio(damping_ratio, known, count if modes is not None else size)
@@ -214,9 +213,7 @@ def structure(
     numbers = dict(zip(sides, numbers_of(sides.values(), made.guards), strict=True))
     named = {number: label for label, number in numbers.items() if number is not None}
     made = replace(made, guards=renamed(made.guards, named), description=words)
-    if touching and all(contact.restitution is None for _, contact in touching):
-        seen = Interfaces(moving, degrees, loads, frequency, unit, name, made.field)
-        made = replace(made, interfaces=seen)
+    made = replace(made, interfaces=seen_by_contacts(made, moving, degrees, loads, frequency, unit))
     return made if sensors is None else with_sensors(made, sensors, moving, degrees, loads, unit)
 
 
@@ -261,6 +258,18 @@ def _count(modes: Any, size: int) -> int:
     if modes > min(size, MOST_COORDINATES):
         raise ParameterError(f"modes = {modes}, but at most {min(size, MOST_COORDINATES)} can be.")
     return int(modes)
+
+
+def _completed(
+    modes: Modes | None, count: int, mass: Any, stiffness: Any, degrees: list[str], loads: Loads
+) -> Modes:
+    """The lowest modes, and the static deflections that they miss under contacts and drives."""
+    if modes is None:
+        raise ParameterError("residual=True is of the modes that are left out: give modes=.")
+    ways = [way for _, contact in loads.contacts for way in ways_of(contact, degrees)]
+    if not ways and not loads.along:
+        return modes.lowest(count)
+    return with_residuals(modes.lowest(count), mass, stiffness, [*ways, *loads.along])
 
 
 def _physical(mass: Any, stiffness: Any, damping: Any, degrees: list[str]) -> Coordinates:

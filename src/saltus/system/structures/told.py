@@ -35,8 +35,14 @@ def unreduced(size: int, angular: np.ndarray) -> str:
 
 
 def reduced(
-    mass: Any, stiffness: Any, modes: Modes, lowest: int, count: int, degrees: list[str],
-    loads: Any, unit: str,
+    mass: Any,
+    stiffness: Any,
+    modes: Modes,
+    lowest: int,
+    count: int,
+    degrees: list[str],
+    loads: Any,
+    unit: str,
 ) -> str:
     """The description of a structure by its lowest modes.
 

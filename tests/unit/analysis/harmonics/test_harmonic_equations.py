@@ -83,12 +83,14 @@ def test_symmetric_systems_have_odd_harmonics_only(by_harmonics):
 def test_derivatives_are_those_of_differences(system):
     random = np.random.default_rng(17)
     gap = 1.0 if system.name != "delangre" else 1e-3
-    for name in list(system.values)[:3] + [system.forced_at]:
+    for name in [*list(system.values)[:3], system.forced_at]:
         orbits = equations(system, 5, name)
         z = np.append(random.normal(size=orbits.size) * gap, system.values[name])
         unit = np.append(np.full(orbits.size, gap), abs(system.values[name]) or 1.0)
         orbits.scale, step = unit[None], 1e-6
-        beside = np.array([z + sign * step * unit * one for one in np.eye(len(z)) for sign in (1, -1)])
+        beside = np.array(
+            [z + sign * step * unit * one for one in np.eye(len(z)) for sign in (1, -1)]
+        )
         residual = orbits.evaluate(beside, np.zeros(len(beside), int))[0]
         slopes = (residual[::2] - residual[1::2]).T / (2 * step)
         derivative = orbits.evaluate(z[None], np.zeros(1, int))[1][0]
@@ -142,9 +144,11 @@ def test_powers_of_a_depth_are_integrated_to_rounding(power):
         np.array([[0.1, 1.0, 0.0]]), np.array([2 * np.pi]), 1.0, np.zeros(1)
     ).values[0] / (2 * np.pi)
     edge = acos(mpf("0.3"))
-    mean, first = (
-        2 * quad(lambda a: max(cos(a) - mpf("0.3"), mpf(0)) ** mpf(power) * k(a), [0, edge])
-        for k in (lambda a: 1 / (2 * mp.pi), lambda a: cos(a) / mp.pi)
-    )
+
+    def depth(a):
+        return max(cos(a) - mpf("0.3"), mpf(0)) ** mpf(power)
+
+    mean = quad(depth, [0, edge]) / mp.pi
+    first = 2 * quad(lambda a: depth(a) * cos(a), [0, edge]) / mp.pi
     assert force[0] == pytest.approx(float(-2 * mean), abs=4e-14)
     assert force[1] == pytest.approx(float(1 - 2 * first), abs=1e-13)
