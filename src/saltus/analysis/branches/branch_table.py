@@ -11,7 +11,7 @@ import xarray as xr
 
 from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.equilibrium_curves import EquilibriumCurves
-from saltus.analysis.branches.harmonic_branches import ClosedHarmonics, balanced
+from saltus.analysis.branches.harmonic_branches import balanced
 from saltus.analysis.branches.resolution import resolve
 from saltus.analysis.branches.same_branch import has_twin
 from saltus.analysis.branches.shooting import PeriodicOrbits
@@ -19,6 +19,7 @@ from saltus.analysis.branches.special_points import outside
 from saltus.analysis.closed.measures import Measures, measure, unknown
 from saltus.analysis.dataset_parts import guards_over, provenance, subject
 from saltus.analysis.harmonics.balance import HarmonicBalance
+from saltus.analysis.harmonics.equations import HarmonicOrbits
 from saltus.analysis.harmonics.sizes import measured
 from saltus.analysis.inputs.outputs import Outputs
 from saltus.flow.maps import Stroboscope
@@ -29,7 +30,7 @@ from saltus.results.dataset import schema
 from saltus.results.dataset.attractors import padded
 from saltus.system import System
 
-Orbits = PeriodicOrbits | EquilibriumCurves | ClosedHarmonics
+Orbits = PeriodicOrbits | EquilibriumCurves | HarmonicOrbits
 #: Samples of a period by which branches are resolved.
 SAMPLES = 64
 #: Multipliers nearer to the unit circle than this don't count as inside: the orbit may not attract.
@@ -148,7 +149,7 @@ def _attracts(multipliers: np.ndarray) -> np.ndarray:
 
 def _periods(orbits: Orbits) -> int:
     """Forcing periods of orbits."""
-    return orbits.periods if isinstance(orbits, ClosedHarmonics) else orbits.n
+    return orbits.periods if isinstance(orbits, HarmonicOrbits) else orbits.n
 
 
 def _parameter(points: Sequence[tuple[Branch, np.ndarray]]) -> np.ndarray:
@@ -212,7 +213,7 @@ def _sampled_peaks(system: System, method: Method, branch: Branch, z: np.ndarray
     """
     if isinstance(branch.orbits, EquilibriumCurves):
         return np.asarray(np.abs(z[:, 0]))
-    if isinstance(branch.orbits, ClosedHarmonics):
+    if isinstance(branch.orbits, HarmonicOrbits):
         return np.array([np.abs(branch.orbits.samples(one)[:, 0]).max() for one in z])
     n = branch.orbits.n if system.forced_at is not None else 1
     map_ = _map_of(system, method, [(branch.orbits, one) for one in z])
@@ -247,12 +248,12 @@ def numbers_of(
     method: Method,
 ) -> Measures:
     """The numbers of orbits, each with its unknowns: extremes, means, contacts and margins."""
-    truncated = [i for i, (orbits, _) in enumerate(points) if isinstance(orbits, ClosedHarmonics)]
+    truncated = [i for i, (orbits, _) in enumerate(points) if isinstance(orbits, HarmonicOrbits)]
     if truncated:
         numbers = unknown(len(points), len(system.states), len(outputs))
         for i in truncated:
             orbits, z = points[i]
-            assert isinstance(orbits, ClosedHarmonics)
+            assert isinstance(orbits, HarmonicOrbits)
             numbers.put(np.array([i]), measured(orbits, z[None], outputs))
         return numbers
     starts = np.array([orbits.points(z)[0] for orbits, z in points])

@@ -69,9 +69,30 @@ def check_balanced(by: Any, system: System) -> None:
     """Raise a ParameterError for a system whose motions aren't balanced by harmonics, or an option
     that is none.
     """
+    _check(by)
+    unforced = "it has no forcing, and the period of what repeats isn't known"
+    _refuse(system, _reason_against_laws(system) if system.forced_at else unforced)
+
+
+def check_free(by: Any, system: System, phase: str) -> None:
+    """The same of free vibrations."""
+    _check(by)
+    if phase != "free":
+        raise ParameterError(
+            lambda say: (
+                f"harmonic balance follows free vibrations, and {say.key(phase=phase)} is of "
+                f"forced ones: leave out {say.key('by')}, or take {say.key(phase='free')}."
+            )
+        )
+    _refuse(system, _reason_against_laws(system))
+
+
+def _check(by: Any) -> None:
     if not isinstance(by, HarmonicBalance):
         raise must_be("by", "sl.HarmonicBalance(...), such as sl.HarmonicBalance(9)", by)
-    reason = _reason_against(system)
+
+
+def _refuse(system: System, reason: str) -> None:
     if reason:
         raise ParameterError(
             f"harmonic balance doesn't serve {system.name}: {reason}. Leave out ",
@@ -79,10 +100,8 @@ def check_balanced(by: Any, system: System) -> None:
         )
 
 
-def _reason_against(system: System) -> str:
+def _reason_against_laws(system: System) -> str:
     """Why the motions of a system aren't balanced; empty if they are."""
-    if system.forced_at is None:
-        return "it has no forcing, and the period of what repeats isn't known"
     for guard in system.guards:
         if guard.law is not None and guard.law.kind == "impact":
             return (

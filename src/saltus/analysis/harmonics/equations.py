@@ -93,16 +93,19 @@ class HarmonicOrbits:
             return np.full(z.shape[:-1], self.periods * self.system.period())
         return np.asarray(self.periods * self.system.period({self.names[0]: z[..., -1]}))
 
-    def _constants(self, value: float) -> tuple[np.ndarray, np.ndarray, float, np.ndarray]:
-        """The states that don't move, their derivatives by the parameter, the rate of the angle
-        [rad/s], and its derivatives by these states over itself.
+    def _constants(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, float, np.ndarray]:
+        """The states that don't move, their derivatives by the unknowns beside the signals
+        float64[e, u], the rate of the angle [rad/s], and its derivatives by these states over
+        itself.
         """
+        value = float(z[-1])
         if not self._timed:
             rate = 2 * np.pi / self.turn
-            return np.array([value]), np.ones(1), rate, np.zeros(1)
+            return np.array([value]), np.ones((1, 1)), rate, np.zeros(1)
         period = float(self.system.period({self.names[0]: value}))
         rate = 2 * np.pi / (self.periods * period)
-        return np.array([period]), np.array([-period / value]), rate, np.array([-1.0 / period])
+        slopes = np.array([[-period / value]])
+        return np.array([period]), slopes, rate, np.array([-1.0 / period])
 
     def states(self, z: np.ndarray) -> np.ndarray:
         """The series of the states of a motion float64[z], float64[D, 2H + 1]."""
@@ -118,7 +121,7 @@ class HarmonicOrbits:
         if key not in self._remembered:
             if len(self._remembered) >= REMEMBERED:
                 self._remembered.clear()
-            constants, _, rate, rate_by = self._constants(float(z[-1]))
+            constants, _, rate, rate_by = self._constants(z)
             signals, forces = self.signals(z), None
             if isinstance(self.source, States):
                 sections = self.forces.sections(signals, constants, rate)
@@ -161,19 +164,20 @@ class HarmonicOrbits:
     # -- equations ---------------------------------------------------------------------------------
     def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See :class:`saltus.analysis.branches.equations.CurveEquations`."""
-        residual = np.full((len(z), self.size), np.nan)
-        derivative = np.full((len(z), self.size, self.width), np.nan)
+        residual = np.full((len(z), self.width - 1), np.nan)
+        derivative = np.full((len(z), self.width - 1, self.width), np.nan)
         for i in np.flatnonzero(np.isfinite(z).all(axis=1)):
             residual[i], derivative[i] = self._of(z[i])
         unit = self.scale[rows]
-        residual /= unit[:, : self.size]
-        derivative *= unit[:, None] / unit[:, : self.size, None]
+        each = unit[:, : self.width - 1]
+        residual /= each
+        derivative *= unit[:, None] / each[..., None]
         return residual, derivative
 
     def _of(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The residual and its derivative, in units of the motion."""
         signals = self.signals(z)
-        constants, slopes, rate, rate_by = self._constants(float(z[-1]))
+        constants, slopes, rate, rate_by = self._constants(z)
         found = self.forces.coefficients(signals, constants, rate, rate_by)
         whole, by_rate = (
             fourier.transfer(one) for one in self.source.response(self.harmonics, rate)
@@ -183,14 +187,14 @@ class HarmonicOrbits:
         size, forces = self.size, found.values.ravel()
         period = self._pace(constants)
         flat, flat_by_rate = (one.reshape(size, -1) / period for one in (whole, by_rate))
-        derivative = np.empty((size, size + 1))
+        derivative = np.empty((size, self.width))
         derivative[:, :size] = -flat @ found.by_signals.reshape(len(forces), size)
         derivative[np.arange(size), np.arange(size)] += own
         by_constants = -flat @ found.by_constants.reshape(len(forces), -1)
         by_constants -= np.outer(flat_by_rate @ forces, rate_by)
         if self._timed:
             by_constants[:, 0] += flat @ forces / period
-        derivative[:, size] = by_constants @ slopes
+        derivative[:, size:] = by_constants @ slopes
         return own * z[:size] - flat @ forces, derivative
 
     def accepted(self, z: np.ndarray, rows: np.ndarray) -> None:
@@ -213,4 +217,4 @@ class HarmonicOrbits:
 
     def _shifted(self, z: np.ndarray, angle: float, factor: float = 1.0) -> np.ndarray:
         moved = factor * fourier.shifted(self.signals(z), angle)
-        return np.concatenate([moved.reshape(len(z), -1), self.values(z)], axis=1)
+        return np.concatenate([moved.reshape(len(z), -1), z[:, self.size :]], axis=1)
