@@ -11,7 +11,7 @@ import xarray as xr
 from saltus.analysis.branches.arclength import Arc, correct, follow
 from saltus.analysis.branches.branch_table import numbers_of, stacked
 from saltus.analysis.branches.forced_vibration import Forcing, QuadratureOrbits, small_vibration
-from saltus.analysis.branches.free_harmonics import ClosedFree
+from saltus.analysis.branches.free_harmonics import ClosedFree, begun
 from saltus.analysis.branches.free_vibration import (
     LONGEST,
     FreeOrbits,
@@ -167,14 +167,14 @@ def backbone(
     if by is not None:
         check_free(by, system, phase)
     with reporting(progress) as show:
-        moving, orbits, z = (
+        start: tuple[System, Orbits, np.ndarray] = (
             _free_start(system, (low, high), mode, state, method, threads)
             if about is None
             else _forced_start(system, about, (low, high), mode, measured, method, threads)
         )
+        moving, orbits, z = start
         if by is not None and isinstance(orbits, FreeOrbits):
-            orbits = ClosedFree(orbits, by.harmonics)
-            z = orbits.begun(z)
+            orbits, z = begun(orbits, by.count, z)
         peak = _Peak(moving, orbits, method, measured)
         whole_z, end = _family(orbits, z, peak, (low, high), points, show)
         # not "mode": SciPy's netCDF-3 keeps its own there, and neither writes nor reads such a file

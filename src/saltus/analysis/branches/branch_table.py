@@ -50,10 +50,10 @@ def table_of(
     values = values_of(system, name, branches, outputs, method)
     values |= {"output": list(outputs.names), "output_units": list(outputs.units)}
     if by is not None:
-        values |= balanced(branches, outputs, by.harmonics)
+        values |= balanced(branches, outputs, by.count)
     fixed = {key: value for key, value in system.values.items() if key != name}
     attrs = provenance(system, method, fixed, (name,)) | attributes_of(name, limits, branches)
-    attrs |= {} if by is None else {"harmonics": by.harmonics}
+    attrs |= {} if by is None else {"harmonics": by.count}
     unit = outputs.units[0] if len(set(outputs.units)) == 1 else ""
     when = "at whole forcing periods" if system.forced_at else "in equal steps of time"
     about = subject(system, attrs, guards_over(system, system.values, ()))

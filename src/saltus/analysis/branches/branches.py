@@ -16,7 +16,7 @@ from saltus.analysis.attractors.grid_responses import find
 from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.branch_table import table_of
 from saltus.analysis.branches.equilibrium_branches import trace_equilibria
-from saltus.analysis.branches.harmonic_branches import trace_harmonics
+from saltus.analysis.branches.harmonic_branches import trace_harmonics, worst
 from saltus.analysis.branches.plans import LONGEST_DOUBLED, POINTS, SWITCHES, plan_of
 from saltus.analysis.branches.seeds import (
     equilibria_between,
@@ -216,7 +216,12 @@ def branches(
                 follow_all(plan, system, name, begins, equilibria, done, stage(show, 0.0, 0.9))
             else:
                 rest = places.tolist() if from_rest else []
-                trace_harmonics(plan, system, name, begins, rest, by, done, method, threads)
+                tries = by.tries
+                for by in tries:
+                    done.clear()
+                    trace_harmonics(plan, system, name, begins, rest, by, done, method, threads)
+                    if by is not tries[-1] and worst(done, wanted, by) < by.accuracy:
+                        break
         except KeyboardInterrupt:
             partial = functools.partial(table_of, system, name, limits, done, wanted, method, by)
             raise Interrupted(partial) from None

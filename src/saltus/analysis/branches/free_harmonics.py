@@ -36,12 +36,6 @@ class ClosedFree(FreeHarmonics):
         own = exact.scale[0, exact.size :]
         self.scale = np.concatenate([np.repeat(units, self.series), own])[None]
 
-    def begun(self, z: np.ndarray) -> np.ndarray:
-        """The truncated series of a small exact vibration float64[1, z], float64[1, z]."""
-        size, seen = self.exact.size, self.exact.sampled(z[0, : self.exact.size], float(z[0, -2]))
-        flat = self.of_states(fourier.of_samples(seen.T, self.harmonics), 0.0)[:-1]
-        return np.concatenate([flat, z[0, size:]])[None]
-
     def closed(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The exact vibrations float64[r, z] of the sizes of truncated ones, and where they were
         found, bool[r].
@@ -79,3 +73,11 @@ class ClosedFree(FreeHarmonics):
             "point_harmonic_real": whole.real,
             "point_harmonic_imag": whole.imag,
         }
+
+
+def begun(exact: FreeOrbits, harmonics: int, z: np.ndarray) -> tuple[ClosedFree, np.ndarray]:
+    """The equations of truncated vibrations, and the series of a small exact one float64[1, z]."""
+    orbits, size = ClosedFree(exact, harmonics), exact.size
+    seen = exact.sampled(z[0, :size], float(z[0, -2]))
+    flat = orbits.of_states(fourier.of_samples(seen.T, harmonics), 0.0)[:-1]
+    return orbits, np.concatenate([flat, z[0, size:]])[None]

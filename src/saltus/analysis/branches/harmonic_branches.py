@@ -201,6 +201,12 @@ def _goes_on(orbits: ClosedHarmonics, curve: Arc) -> str:  # noqa: ARG001
     return ""
 
 
+def worst(branches: Sequence[Branch], outputs: Outputs, by: HarmonicBalance) -> float:
+    """Largest distance of a motion on branches from its exact orbit, over the range."""
+    found = balanced(branches, outputs, by.count)["point_error"]
+    return float(np.nanmax(found, initial=0.0))
+
+
 def balanced(branches: Sequence[Branch], outputs: Outputs, harmonics: int) -> dict[str, Any]:
     """The variables that branches of truncated motions have besides those of exact orbits."""
     size, wide = len(outputs), [np.zeros((0, len(outputs), harmonics + 1), complex)]
@@ -241,7 +247,7 @@ def trace_harmonics(
 
         def make(_: int, scale: np.ndarray, periods: int = periods) -> ClosedHarmonics:
             return ClosedHarmonics(
-                system, name, by.harmonics, periods, scale, symmetric, method, threads
+                system, name, by.count, periods, scale, symmetric, method, threads
             )
 
         follow = functools.partial(both_ways, ends=_goes_on, kind=HarmonicBranch)
@@ -253,7 +259,7 @@ def trace_harmonics(
         trace(mine, [one for one in starts if one is not None], branches)
     if not branches:
         raise ParameterError(
-            f"no motion of {by.harmonics} harmonics was found near the orbits of {system.name} to "
+            f"no motion of {by.count} harmonics was found near the orbits of {system.name} to "
             "begin with: ask for more of them by ",
             lambda say: f"{say.key('harmonics')}, or for other starts.",
         )

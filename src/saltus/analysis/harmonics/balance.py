@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
+
+import numpy as np
 
 from saltus.contact.guards import is_hold
 from saltus.errors import ParameterError, must_be
@@ -15,6 +17,8 @@ from saltus.system.quantity import is_remembered
 
 #: Most harmonics: matrices have three times as many rows a signal.
 MOST = 500
+#: Numbers of harmonics that "auto" tries.
+TRIED = (5, 11, 23, 47, 95)
 
 
 @explain_unknown_options
@@ -30,11 +34,15 @@ class HarmonicBalance:
 
     Parameters
     ----------
-    harmonics : int
-        Number of harmonics of the fundamental frequency, besides the mean.
+    harmonics : int or "auto"
+        Number of harmonics of the fundamental frequency, besides the mean. ``"auto"``: branches are
+        followed with 5, 11, 23, ... until no point is farther from its exact orbit than
+        ``accuracy``, or with 95; the attribute ``harmonics`` of the result is the last number.
     periods : int, optional
         Forcing periods in a period of the fundamental, more than one for subharmonic motions.
         Default: those of each orbit that a branch begins with.
+    accuracy : float
+        For ``"auto"``: largest ``point_error`` [1].
 
     Raises
     ------
@@ -54,15 +62,32 @@ class HarmonicBalance:
     5
     """
 
-    harmonics: int
+    harmonics: int | str
     periods: int | None = None
+    accuracy: float = 0.01
 
     def __post_init__(self) -> None:
-        whole(self.harmonics, "harmonics", 1)
-        if self.harmonics > MOST:
-            raise must_be("harmonics", f"at most {MOST}", self.harmonics)
+        if self.harmonics != "auto":
+            if not isinstance(self.harmonics, int | np.integer) or self.harmonics > MOST:
+                raise must_be(
+                    "harmonics", f'a whole number up to {MOST}, or "auto"', self.harmonics
+                )
+            whole(self.harmonics, "harmonics", 1)
+        if not isinstance(self.accuracy, int | float) or not self.accuracy > 0:
+            raise must_be("accuracy", "a positive number", self.accuracy)
         if self.periods is not None:
             whole(self.periods, "periods", 1)
+
+    @property
+    def count(self) -> int:
+        """Number of harmonics, where it is given."""
+        return int(self.harmonics)
+
+    @property
+    def tries(self) -> list[HarmonicBalance]:
+        """The options with the numbers of harmonics that are tried in turn."""
+        counts = TRIED if self.harmonics == "auto" else (self.count,)
+        return [replace(self, harmonics=one) for one in counts]
 
 
 def check_balanced(by: Any, system: System) -> None:
@@ -77,6 +102,13 @@ def check_balanced(by: Any, system: System) -> None:
 def check_free(by: Any, system: System, phase: str) -> None:
     """The same of free vibrations."""
     _check(by)
+    if by.harmonics == "auto":
+        raise ParameterError(
+            lambda say: (
+                f"of free vibrations give the number of {say.key('harmonics')}: "
+                f"{say.key(harmonics=9)}."
+            )
+        )
     if phase != "free":
         raise ParameterError(
             lambda say: (

@@ -1,4 +1,4 @@
-"""Free vibrations without damping as truncated Fourier series: their families over the amplitude."""
+"""Free vibrations without damping as truncated Fourier series, in families over the amplitude."""
 
 from __future__ import annotations
 

@@ -36,10 +36,13 @@ VARIABLES = {
     **{
         name: branches.VARIABLES[name]
         for name in (
-            "harmonic", "point_error", "point_output_error", "point_harmonic_real",
+            "harmonic",
+            "point_error",
+            "point_output_error",
+            "point_harmonic_real",
             "point_harmonic_imag",
         )
-    },  # fmt: skip
+    },
 }
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,9 +14,12 @@ from saltus.analysis.harmonics.equations import HarmonicOrbits
 from saltus.errors import ParameterError, SaltusError
 
 STOP = sl.models.soft_stop()
+with open(Path(__file__).parents[3] / "reference/backbones_hbm.csv") as table:
+    KNOWN = {row["id"]: float(row["value"]) for row in csv.DictReader(table)}
 RANGE = {"frequency": (1.38, 2.8)}
 #: Folds of the exact branch: S01 and S03 of branches_soft_stop.csv.
 FOLDS = (1.41029487283056, 2.64776845463872)
+END = KNOWN["H10"], KNOWN["H11"]
 
 
 def folds(ds):
@@ -152,3 +157,79 @@ def test_several_results_in_one_picture(balanced):
     assert named >= {"3 harmonics", "15 harmonics"}
     with pytest.raises(ParameterError, match="branches"):
         sl.plot.branches({"a": balanced[3], "b": 3})
+
+
+@sl.system(states="x v")
+def duffing(t, x, v, *, cubic=1.0):
+    return v, -x - cubic * x**3
+
+
+@pytest.mark.parametrize(("row", "cubic", "single"), [
+    ("H01", 0.1, 1.03682206766639), ("H03", 1.0, 1.3228756555323),
+])  # fmt: skip
+def test_backbones_of_the_duffing_oscillator(row, cubic, single):
+    """The exact one by many harmonics; by one the frequency sqrt(1 + 3/4 cubic amplitude^2)."""
+    for count, known in ((1, single), (13, KNOWN[row])):
+        found = sl.backbone(
+            duffing.with_values(cubic=cubic), (0.5, 1.0), by=sl.HarmonicBalance(count),
+            progress=False,
+        )  # fmt: skip
+        angular = 2 * np.pi * float(found.backbone_frequency[-1])
+        assert angular == pytest.approx(known, rel=2e-13)
+    assert float(found.point_error[-1]) < 1e-11
+
+
+def test_end_of_the_resonance_in_one_harmonic():
+    """H10, H11: the largest amplitude of NLvib's example 01 is there, and nowhere beside it."""
+
+    @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
+    def forced(t, x, v, *, damping=0.05, cubic=0.1, force=0.18, w=1.0):
+        return v, force * sl.cos(w * t) - damping * v - x - cubic * x**3
+
+    orbits, (amplitude, w) = HarmonicOrbits(forced, "w", 1, 1, np.ones((1, 4))), END
+    lag = np.arctan2(0.05 * w, 1 + 0.075 * amplitude**2 - w**2)
+    series = amplitude * np.array([0.0, np.cos(lag), np.sin(lag)])
+    residual, derivative = orbits.evaluate(np.append(series, w)[None], np.zeros(1, int))
+    assert np.abs(residual).max() < 1e-14
+    along = np.linalg.svd(derivative[0])[2][-1]
+    assert abs(along[:3] @ series) < 1e-13
+
+
+def test_as_many_harmonics_as_the_error_asks_for():
+    found = sl.branches(
+        STOP, {"frequency": (1.45, 1.6)}, (1.5, 0.0), at=1, progress=False,
+        by=sl.HarmonicBalance("auto", accuracy=4e-3),
+    )  # fmt: skip
+    assert found.attrs["harmonics"] == 11
+    assert float(np.nanmax(found.point_error)) < 4e-3
+    few = sl.branches(
+        STOP, {"frequency": (1.45, 1.6)}, (1.5, 0.0), at=1, progress=False, by=sl.HarmonicBalance(5)
+    )
+    assert float(np.nanmax(few.point_error)) > 4e-3
+
+
+def test_residual_deflections_keep_the_flexibility():
+    """The compliance at a contact beside that of the whole matrices, by a sparse factorisation."""
+    from saltus.analysis.harmonics.signals import AtContacts
+
+    size, at = 60, 45
+    stiffness = 1e6 * (2 * np.eye(size) - np.eye(size, k=1) - np.eye(size, k=-1))
+    damping = 2e-4 * stiffness
+    off = []
+    for residual in (False, True):
+        system = sl.structure(
+            np.eye(size), stiffness, damping, modes=6, residual=residual, frequency="3 Hz",
+            contacts=[sl.Contact(f"x{at + 1}", stiffness="1 kN/m", gap="1 mm")],
+            forces=[sl.Force("x5", "1 N")],
+        )  # fmt: skip
+        rate = 2 * np.pi * 3.0
+        found = AtContacts(system).response(5, rate)[0][:, 0]
+        loads = np.eye(size)[:, [at, 4]]
+        for order, row in enumerate(found):
+            w = order * rate
+            whole = np.linalg.solve(stiffness - w**2 * np.eye(size) + 1j * w * damping, loads)
+            off.append(np.abs(row / whole[at] - 1).max())
+    assert max(off[6:]) < max(off[:6]) / 100
+    assert off[6] < 1e-12  # static: nothing is lost
+    with pytest.raises(ParameterError, match="modes="):
+        sl.structure(np.eye(2), stiffness[:2, :2], residual=True)
