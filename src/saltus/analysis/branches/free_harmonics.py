@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from saltus.analysis.branches.arclength import correct
+from saltus.analysis.branches.closed_harmonics import NEAR
 from saltus.analysis.branches.free_vibration import SAMPLES, FreeOrbits
-from saltus.analysis.branches.harmonic_branches import NEAR
 from saltus.analysis.harmonics import series as fourier
 from saltus.analysis.harmonics.free import FreeHarmonics
 from saltus.analysis.harmonics.sizes import amplitudes

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import copy
 import functools
+from typing import Self
 
 import numpy as np
 
@@ -46,7 +47,8 @@ class HarmonicOrbits:
         Whether mirror images of motions are motions: see system/symmetry.py.
     """
 
-    n, free = 1, False
+    n: int = 1
+    free: bool = False
 
     def __init__(
         self, system: System, name: str, harmonics: int, periods: int, scale: np.ndarray,
@@ -59,6 +61,7 @@ class HarmonicOrbits:
         known = parametric(self.source.system, (name,))
         self._timed, inner = known.timed, known.system
         self.count, own = len(self.source.chains), self.source.system.states
+        self.size = self.count * self.series  # unknowns of a motion
         moving = {
             own[i]: Moving(signal, times)
             for signal, chain in enumerate(self.source.chains) for times, i in enumerate(chain)
@@ -67,11 +70,6 @@ class HarmonicOrbits:
         self.turn = periods * (1.0 if self._timed else float(system.period()))
         forces = [inner.field[i] for i in self.source.forces]
         self.forces = Forces(inner, forces, moving, inner.states[len(own) :], self.turn, periods)
-
-    @property
-    def size(self) -> int:
-        """Number of the unknowns of a motion."""
-        return self.count * self.series
 
     @property
     def width(self) -> int:
@@ -200,7 +198,7 @@ class HarmonicOrbits:
     def accepted(self, z: np.ndarray, rows: np.ndarray) -> None:
         """Nothing depends on it."""
 
-    def near(self, z: np.ndarray, rows: np.ndarray) -> HarmonicOrbits:  # noqa: ARG002
+    def near(self, z: np.ndarray, rows: np.ndarray) -> Self:  # noqa: ARG002
         """The equations whose row i is curve rows[i], int64[r]."""
         other = copy.copy(self)
         other.scale = self.scale[rows]

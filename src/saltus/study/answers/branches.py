@@ -20,8 +20,17 @@ if TYPE_CHECKING:
 
 #: Motions of a few harmonics in place of exact orbits.
 By: Any = asking(
-    "branches.by", ["HarmonicBalance"], {"harmonics": whole(9), "periods": whole(3)},
+    "branches.by", ["HarmonicBalance"], {
+        "harmonics": WrittenAs(int | Literal["auto"], (9,)),
+        "periods": whole(3),
+        "accuracy": WrittenAs(float, (0.01,)),
+    },
     base=Generated,
+)  # fmt: skip
+BY = WrittenAs(
+    By, ({"harmonics": 9},),
+    "Harmonic balance: motions of a few harmonics in place of exact orbits.", None,
+    convert="balance",
 )  # fmt: skip
 #: Branches go over a range, without steps.
 OF_BRANCHES = OF_RESPONSES | {
@@ -31,11 +40,7 @@ OF_BRANCHES = OF_RESPONSES | {
     ),
     "at": whole(12, most=MOST_COUNT),
     "longest": whole(8),
-    "by": WrittenAs(
-        By, ({"harmonics": 9},),
-        "Harmonic balance: motions of a few harmonics in place of exact orbits.", None,
-        convert="balance",
-    ),
+    "by": BY,
     "points": whole(1000),
     "switch": WrittenAs(
         list[Literal["period_doubling", "branch_point"]], (["period_doubling"],),
@@ -52,6 +57,7 @@ OF_BACKBONES = OF_RESPONSES | {
         convert="values"),
     "mode": whole(1),
     "points": whole(400),
+    "by": BY,
 }  # fmt: skip
 
 
