@@ -18,6 +18,7 @@ import numpy as np
 
 from saltus.analysis.harmonics import series as fourier
 from saltus.analysis.harmonics.pieces import Sections, sections_of
+from saltus.contact.guards import is_hold
 from saltus.language import expression as ex
 from saltus.language.derivatives import gradients
 from saltus.language.evaluate import evaluate
@@ -179,13 +180,18 @@ class Forces:
                 continue
             gap, slope, *_ = evaluate(wanted, **about, states=states)
             states[names[terms[0][1]]] = states[names[terms[0][1]]] - gap / slope
-            bits = list(random.integers(0, 2, (len(self.system.guards), TRIED)) > 0)
-            sides = []
+            bits: list[Any] = []
+            for guard in self.system.guards:
+                (gap,) = evaluate([guard.gap], **about, states=states, bits=bits)
+                bits.append(np.broadcast_to(gap > 0, TRIED) & (not is_hold(guard)))
+            both = []
             for bits[i] in (np.zeros(TRIED, bool), np.ones(TRIED, bool)):
                 forces = evaluate(self._entries[: self.count], **about, states=states, bits=bits)
-                sides.append(np.array([np.broadcast_to(one, TRIED) for one in forces]))
-            apart, size = np.abs(sides[0] - sides[1]), np.abs(sides).max(axis=0)
-            found[i] = (apart > ROUNDING * np.maximum(size, size.max())).any()
+                both.append(np.array([np.broadcast_to(one, TRIED) for one in forces]))
+            # a power of a depth isn't defined where rounding makes that negative
+            apart = np.nan_to_num(np.abs(both[0] - both[1]))
+            size = np.nan_to_num(np.abs(both)).max(axis=0)
+            found[i] = (apart > ROUNDING * size.max(axis=1)[:, None]).any()
         return found
 
     def nodes(

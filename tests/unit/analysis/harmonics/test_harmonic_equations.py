@@ -152,3 +152,32 @@ def test_powers_of_a_depth_are_integrated_to_rounding(power):
     first = 2 * quad(lambda a: depth(a) * cos(a), [0, edge]) / mp.pi
     assert force[0] == pytest.approx(float(-2 * mean), abs=4e-14)
     assert force[1] == pytest.approx(float(1 - 2 * first), abs=1e-13)
+
+
+@sl.system(states="x y v w", forced_at="f", units={"f": "rad/s"})
+def jumping(
+    t, x, y, v, w, *, c=0.1, gap=0.3, between=0.4, K=5.0, d=0.2, F=1.0, f=1.0, P=0.1, G=0.2
+):
+    """A damped stop, whose force jumps, a clearance between two masses, a Hertz stop, a cubic."""
+    stop = sl.freeplay(x, stiffness=K, upper_gap=gap, damping=d, velocity=v)
+    push = sl.freeplay(y - x, stiffness=K, gap=between)
+    push = push + sl.hertz(y - G, stiffness=3.0, exponent=1.5)
+    ahead = F * sl.cos(f * t) - c * v - x - 2 * (x - y) - stop + push - 0.1 * x**3
+    return v, w, ahead, P * sl.sin(2 * f * t) - c * w - y - 2 * (y - x) - push
+
+
+def test_derivatives_of_random_forces_that_jump():
+    random = np.random.default_rng(90210)
+    for _ in range(8):
+        values = {name: value * random.uniform(0.3, 2.0) for name, value in jumping.values.items()}
+        name = str(random.choice(list(values)))
+        system, harmonics = jumping.with_values(**values), int(random.integers(2, 9))
+        orbits = equations(system, harmonics, name, int(random.integers(1, 3)))
+        falls = np.tile(np.maximum(np.r_[0, 1 : harmonics + 1, 1 : harmonics + 1], 1), 2)
+        z = np.append(random.normal(size=orbits.size) * 0.5 / falls, values[name])
+        step = 1e-6
+        beside = np.array([z + sign * step * one for one in np.eye(len(z)) for sign in (1, -1)])
+        residual = orbits.evaluate(beside, np.zeros(len(beside), int))[0]
+        slopes = (residual[::2] - residual[1::2]).T / (2 * step)
+        derivative = orbits.evaluate(z[None], np.zeros(1, int))[1][0]
+        assert np.abs(derivative - slopes).max() < 3e-7 * max(1.0, np.abs(derivative).max()), name
