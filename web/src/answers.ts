@@ -12,6 +12,8 @@ import { $, notes } from "./words";
 export const ALL_POINTS = 1000;
 const ORDINAL: Record<number, string> = { 2: "second", 4: "fourth", 8: "eighth" };
 
+const grouped = (n: number): string => String(n).replace(/\B(?=(\d{3})+$)/g, " ");
+
 export class Answers {
   constructor(private of: Explorer) {}
 
@@ -34,6 +36,9 @@ export class Answers {
     else if (kind === "orbit") this.heardOrbit(head, arrays, question);
     else if (kind === "responses-progress")
       $("responses-under").textContent = `the branches are followed: ${Math.round(100 * head.share)} %`;
+    else if (kind === "agreement-progress")
+      this.of.status.say(`by ${head.method}: ${grouped(head.known)} of ${grouped(head.of)} starts`);
+    else if (kind === "agreement") this.heardAgreement(head, arrays);
     else if (kind === "responses") this.heardResponses(head, arrays);
     else if (kind === "save") this.of.save.take(head, arrays);
   }
@@ -188,7 +193,7 @@ export class Answers {
       sheet.dirty = true;
     }
     if (head.kind === "map-piece") {
-      sheet.piece(head.level, arrays);
+      sheet.packed(head.level, arrays);
       sheet.known = head.known;
       sheet.of = head.of;
     }
@@ -209,10 +214,22 @@ export class Answers {
     if (head.kind !== "map-piece") this.legend();
     this.of.map.draw();
     this.of.status.say(this.mapText());
+    if (sheet.done) this.of.asks.askAgreement();
+  }
+  heardAgreement(head: Head, arrays: Arrays): void {
+    const agreement = this.of.agreeing?.id === head.id ? this.of.agreeing.sheet.agreement : null;
+    if (!agreement) return;
+    agreement.take(head.level, arrays.agreement);
+    agreement.words = head.words ?? [];
+    if ((agreement.done = head.done)) {
+      this.of.agreeing = null;
+      this.of.status.say(`compared with ${agreement.against}`);
+    }
+    this.legend();
+    this.of.map.draw();
   }
   mapText(): string {
-    const s = this.of.map.sheet,
-      grouped = (n: number) => String(n).replace(/\B(?=(\d{3})+$)/g, " ");
+    const s = this.of.map.sheet;
     if (!s) return "";
     if (s.done) return `${grouped(s.of)} starts, all known`;
     return `${grouped(s.known)} of ${grouped(s.of)} starts, ${((performance.now() - this.of.begun) / 1000).toFixed(1)} s`;
@@ -229,7 +246,7 @@ export class Answers {
     showLegend(this.of.about, s?.attractors ?? [], codes, this.of.view.history, this.of.map.only, key =>
       this.of.attractor(key),
     );
-    notes($("map-words"), s?.words);
+    notes($("map-words"), [...(s?.words ?? []), ...(this.of.map.agreement?.words.slice(1) ?? [])]);
     this.of.map.tell();
     this.of.map.label(
       `basins of ${plain(this.of.view.axes[0])} and ${plain(this.of.view.axes[1])}, ${s?.attractors.length ?? 0} attractors; arrows move the start, shift and arrows the view, plus and minus zoom, Enter settles; the table of attractors follows`,
@@ -242,6 +259,7 @@ export class Answers {
     if (!at) {
       const s = this.of.map.sheet;
       $("map-under").textContent =
+        this.of.map.agreement?.words[0] ||
         s?.flip ||
         (s?.level && s.level > 1
           ? `shares of the starts in every ${ORDINAL[s.level] ?? `${s.level}th`} row and column`
@@ -256,7 +274,10 @@ export class Answers {
       what = one ? one.name : (this.of.about.codes[String(where.label)] ?? "");
     const when =
       one && where.age < 255 ? `, settles within ${2 ** where.age} ${this.of.about.forced ? "periods" : "turns"}` : "";
+    const other = this.of.map.agreement?.sheet.find(...at),
+      by = this.of.map.agreement?.against,
+      apart = other ? { "0": `, elsewhere by ${by}`, "1": `, the same by ${by}` }[String(other.label)] ?? "" : "";
     $("map-under").textContent =
-      `${say(where.at)}: ${what}${when}${where.stride > 1 ? " (one start for the whole block)" : ""}`;
+      `${say(where.at)}: ${what}${when}${apart}${where.stride > 1 ? " (one start for the whole block)" : ""}`;
   }
 }

@@ -80,6 +80,7 @@ export function connect(explorer: Explorer): void {
   };
   click("map-in", () => explorer.map.zoom(0.7));
   click("map-out", () => explorer.map.zoom(1 / 0.7));
+  click("map-differ", () => explorer.go({ differ: !explorer.view.differ }));
   click("map-whole", () => explorer.map.showWhole());
   click("undo", () => explorer.back());
   click("redo", () => explorer.forth());

@@ -13,7 +13,7 @@ import { Phase } from "./phase";
 import { Responses } from "./responses";
 import { SaveSheet } from "./save";
 import { Sheet } from "./sheets";
-import { type Box, firstView, fromAddress, startOf, toAddress, Undo, type View } from "./state";
+import { type Box, firstView, fromAddress, snapped, startOf, toAddress, Undo, type View } from "./state";
 import { Values } from "./values";
 import { $, differing, marked, only, type Says, type Status } from "./words";
 
@@ -45,6 +45,7 @@ export class Explorer {
   readonly answers = new Answers(this);
   motion: Motion | null = null;
   maps = new Map<number, Sheet>();
+  agreeing: { id: number; sheet: Sheet } | null = null;
   undo: Undo;
   orbit: Head | null = null;
   settled: Head | null = null;
@@ -88,7 +89,7 @@ export class Explorer {
           { start: { ...this.view.start, [this.view.axes[0]]: at[0], [this.view.axes[1]]: at[1] }, orbit: null },
           { drag: !done },
         ),
-      view: (box, done) => this.go({ box }, { drag: !done }),
+      view: (box, done) => this.go({ box: done ? snapped(box, this.view) : box }, { drag: !done }),
       hover: (where, at, sheet) => this.answers.hover(where, at, sheet),
       settle: () => this.asks.settleNow(),
     });
@@ -112,6 +113,7 @@ export class Explorer {
       fields => this.link.ask("save", { ...fields, view: this.asks.shownView() }),
       () => this.address(),
       () => this.answers.mapText(),
+      () => this.view.against !== "",
     );
     this.undo = new Undo(
       view => this.go(view, { past: true }),
@@ -164,6 +166,7 @@ export class Explorer {
       this.asks.pickSheet();
       this.later("map", REST, () => this.asks.askMap());
     } else if (released) this.asks.askMap();
+    else if (other("against")) this.asks.askAgreement();
     const apart = Object.keys(next.values).some(
       name => name !== next.over && next.values[name] !== before.values[name],
     );
@@ -209,6 +212,9 @@ export class Explorer {
     this.values.show(v.values, v.start);
     this.map.at = [v.start[v.axes[0]], v.start[v.axes[1]]];
     this.map.look(v.axes, v.box, this.whole);
+    this.map.against = v.differ ? v.against : "";
+    $("map-differ").hidden = v.against === "";
+    $("map-differ").setAttribute("aria-pressed", String(v.differ));
     const only = (v.orbit?.attractor as number | undefined) ?? null;
     if (only !== this.map.only) {
       this.map.only = only;

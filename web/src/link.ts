@@ -21,7 +21,7 @@ export interface Listener {
   line(text: string, final: boolean): void;
 }
 
-const WIRE = 1;
+const WIRE = 2;
 const VIEWS: Record<string, any> = {
   f4: Float32Array,
   f8: Float64Array,

@@ -25,6 +25,8 @@ export interface ResponseEvents {
 }
 const REACH = 22,
   EVENT_REACH = 12;
+/** The hue of a stretch on which nothing attracts. */
+const NO_HUE = 255;
 /** Events above which their marks are smaller. */
 const MANY = 25;
 
@@ -110,7 +112,7 @@ export class Responses {
     for (let i = 1; i < n; i++) {
       if (branch[i] !== branch[i - 1]) continue;
       const firm = stable[i] && stable[i - 1],
-        rgb = this.about.hues[hue[i]];
+        rgb = hue[i] === NO_HUE ? null : this.about.hues[hue[i] % this.about.hues.length];
       c.strokeStyle = rgb ? `rgb(${rgb})` : ink;
       c.lineWidth = firm ? 2.4 : 1.4;
       c.setLineDash(firm ? [] : [4, 3]);

@@ -14,7 +14,7 @@ from saltus.flow.methods import METHODS, Modal
 from saltus.kernels import status as st
 from saltus.models import describe
 from saltus.plot.palette import hues, shades
-from saltus.plot.unsettled import UNSETTLED, Unsettled
+from saltus.plot.unsettled import AGREEMENT, UNSETTLED, Unsettled
 from saltus.results.dataset.kinds import Kind
 from saltus.system import System, gap_units
 from saltus.units import from_si, to_si
@@ -83,9 +83,8 @@ def about_answer(opening: Opening) -> Answer:
         "hues": _bytes(colors),
         "hue_shades": _bytes(shades(colors, SHADES)),
         "codes": {str(int(code)): one.label for code, one in CODES.items()},
-        "code_colors": {
-            str(int(code)): list(bytes.fromhex(one.color[1:])) for code, one in CODES.items()
-        },
+        "code_colors": _colours(CODES),
+        "agreement_colors": _colours(AGREEMENT),
         "contact_kinds": [st.CONTACT_KIND[i] for i in range(len(st.CONTACT_KIND))],
         "words": [],
         "models": None,
@@ -129,6 +128,10 @@ def _parameter(opening: Opening, name: str) -> dict[str, Any]:
         "least": 0.0 if positive else None,
         "most": None,
     }
+
+
+def _colours(looks: Mapping[int, Unsettled]) -> dict[str, list[int]]:
+    return {str(int(code)): list(bytes.fromhex(one.color[1:])) for code, one in looks.items()}
 
 
 def _bytes(colors: np.ndarray) -> list[Any]:

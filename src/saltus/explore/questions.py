@@ -239,6 +239,14 @@ class MapQuestion(PageQuestion):
 
 
 @dataclass(frozen=True, kw_only=True)
+class AgreementQuestion(MapQuestion):
+    """Question for the starts of a grid that two methods lead to the same attractor."""
+
+    ask = "agreement"
+    against: Annotated[str, _text]
+
+
+@dataclass(frozen=True, kw_only=True)
 class ResponsesQuestion(PageQuestion):
     """Orbits over a parameter, stable or not."""
 
@@ -307,8 +315,8 @@ class Pause(PageQuestion):
 QUESTIONS: Mapping[str, type[PageQuestion]] = {
     one.ask: one
     for one in (
-        Hello, About, Open, MotionQuestion, Settle, Track, MapQuestion, ResponsesQuestion,
-        OrbitQuestion, Save, StopWork, Seen, Show, Pause,
+        Hello, About, Open, MotionQuestion, Settle, Track, MapQuestion, AgreementQuestion,
+        ResponsesQuestion, OrbitQuestion, Save, StopWork, Seen, Show, Pause,
     )
 }  # fmt: skip
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import xarray as xr
 
+from saltus.analysis.basins.compare import compare
 from saltus.analysis.basins.pipeline import BasinPlan
 from saltus.analysis.inputs.starts import range_of
 from saltus.analysis.motion.simulate import simulate
@@ -28,7 +29,8 @@ def shown(desk: Any, fields: Mapping[str, Any]) -> tuple[View, dict[str, Callabl
     desk : Desk
         The desk that it asks.
     fields : mapping
-        The fields of its questions by their kinds: ``motion``, ``map``, ``responses``.
+        The fields of its questions by their kinds: ``motion``, ``map``, ``agreement``,
+        ``responses``.
 
     Returns
     -------
@@ -62,6 +64,10 @@ def shown(desk: Any, fields: Mapping[str, Any]) -> tuple[View, dict[str, Callabl
         }
         given |= {"at": dict(plan.fixed), "periods": plan.periods}
         found["map"] = partial(_finished, desk, plan)
+        if (other := asked.get("agreement")) is not None:
+            given["against"] = desk.method_of(other.against, "against")
+            theirs = desk.plan_of_question(other, other.against, "against")
+            found["agreement"] = partial(_compared, desk, plan, theirs)
     if (responses := asked.get("responses")) is not None:
         limits = range_of(system, responses.parameter, responses.range)
         given["vary"] = responses.parameter, *limits
@@ -86,6 +92,10 @@ def _finished(desk: Any, plan: BasinPlan) -> xr.Dataset:
     if kept is None or kept.dataset is None:
         raise QuestionError("the map isn't finished: let it come to its end first.", "parts")
     return kept.dataset
+
+
+def _compared(desk: Any, plan: BasinPlan, theirs: BasinPlan) -> xr.Dataset:
+    return compare(_finished(desk, plan), _finished(desk, theirs))
 
 
 def _answered(

@@ -205,13 +205,15 @@ class ModalFlow:
             if held and self._tangents:
                 rows = batch.state[who[i], self._states :].reshape(self._states, -1)
                 rows[:] = begin.projection(int(mode[i]), held) @ rows
+        twice, thrice = self._at_rest(given, state, drives, fresh), np.zeros(len(who), np.int64)
         for i in np.flatnonzero(zero.any(axis=1)).tolist():
-            mode[i] |= self._ways(which, int(mode[i]), zero[i], state[i], time[i])
+            up, slow, slower = self._ways(which, int(mode[i]), zero[i], state[i], time[i])
+            mode[i], twice[i], thrice[i] = mode[i] | up, twice[i] | slow, slower
         batch.mode[who], batch.fresh[who] = mode, fresh
         carry = np.zeros((len(who), layout.AMPLITUDES))
         carry[:, layout.AT], carry[:, layout.ENTERS], carry[:, layout.STARTS] = -1.0, 1.0, 1.0
         carry[:, layout.NEXT_STEP] = FIRST_STEP * batch.period[who]
-        carry[:, layout.TWICE] = self._at_rest(given, state, drives, fresh)
+        carry[:, layout.TWICE], carry[:, layout.THRICE] = twice, thrice
         carry[:, layout.LANDED_AT] = time
         carry[:, layout.RIDES] = zero @ bits if gap.shape[1] else 0.0
         batch.carry[who, : layout.AMPLITUDES] = carry
@@ -231,15 +233,17 @@ class ModalFlow:
         found: np.ndarray = (slow & stops) @ bits if slow.shape[1] else fresh
         return found
 
-    def _ways(self, which: int, mode: int, zero: np.ndarray, state: np.ndarray, time: float) -> int:
-        """Bits of the guards at zero whose gaps open upwards: by the first derivative that isn't
-        rounding.
+    def _ways(
+        self, which: int, mode: int, zero: np.ndarray, state: np.ndarray, time: float
+    ) -> tuple[int, int, int]:
+        """Bits of the guards at zero whose gaps open upwards, by the first derivative that isn't
+        rounding; of those whose rate is zero, and of those whose second derivative is too.
         """
         given = self.tables.sets[which]
         piece = self.tables.piece_of(given, mode)
         values, sizes = self._drives_at(which, time)
         rate, size, steady = state, np.abs(state), piece.constant
-        open_, bits = set(np.flatnonzero(zero).tolist()), 0
+        open_, bits = set(np.flatnonzero(zero).tolist()), [0, 0, 0]
         for order in range(1, WAYS + 1):
             rate = piece.matrix @ rate + piece.driven @ values[order - 1] + steady
             size = (
@@ -255,8 +259,9 @@ class ModalFlow:
                 )
                 if abs(value) > order * least:
                     open_.discard(g)
-                    bits |= (1 << g) if value > 0 else 0
-        return bits
+                    for k, holds in enumerate((value > 0, order > 1, order > 2)):
+                        bits[k] |= int(holds) << g
+        return bits[0], bits[1], bits[2]
 
     def _drives_at(self, which: int, time: float) -> tuple[np.ndarray, np.ndarray]:
         """The drives and their derivatives at a time, and what their sizes are at most:
@@ -300,7 +305,8 @@ class Modal(Method):
     (:func:`saltus.impact`) impacts, rest and release follow the rules of :class:`saltus.Taylor`. So
     do dry friction whose force in motion is linear in the states, and memories
     (:func:`saltus.slider`), which begin within their limits. Systems that it doesn't serve -
-    nonlinear forces, friction beside rigid stops, jumps - are moved by :class:`saltus.Taylor`.
+    nonlinear forces, friction of or along rigid stops, jumps - are moved by
+    :class:`saltus.Taylor`.
 
     Parameters
     ----------

@@ -27,9 +27,7 @@ def laws_of(linear: LinearSystem) -> np.ndarray:
             kind, partner = LAW_KINDS[guard.law.kind], guard.law.partner
             table[g, [layout.KIND, layout.PARTNER, layout.HOLDER]] = kind, partner, holds
     for one in sticking:
-        fades = int(one.fades)
         table[one.second, [layout.KIND, layout.PARTNER]] = HOLD_LAW, one.guard
         table[[one.guard, one.hold, one.second], layout.HOLDER] = one.hold
         table[[one.guard, one.hold, one.second], layout.SECOND] = one.second
-        table[[one.guard, one.hold, one.second], layout.FADES] = fades
     return table

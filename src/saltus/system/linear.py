@@ -21,7 +21,7 @@ from saltus.language.derivatives import differentiate
 from saltus.language.evaluate import evaluate
 from saltus.language.expression import Expr
 from saltus.system.courses import TERMS, reason_against, terms_of
-from saltus.system.linear_friction import Sticking, gaps_of, levels_of, sticking_of
+from saltus.system.linear_friction import Sticking, gaps_of, levels_of, limit_side, sticking_of
 from saltus.system.periodic import rate_of
 from saltus.system.quantity import is_remembered, remembered
 from saltus.system.system import System
@@ -356,10 +356,32 @@ def _misfit(linear: LinearSystem, stops: Sequence[Law]) -> str | None:
     """The reason why the laws of a system aren't carried, by their numbers; None if they are."""
     if not all(_only_reverses(linear, law) for law in stops):
         return "an impact of it changes more than velocities"
-    rows = linear.gaps(linear.system.values).matrix[[one.guard for one in linear.sticking]]
+    values = linear.system.values
+    rows = linear.gaps(values).matrix[[one.guard for one in linear.sticking]]
     if len(rows) and np.linalg.matrix_rank(rows) < len(rows):
         return "frictions of it that may stick at once depend on one another"
+    closing = linear.pieces_of(
+        [law.constraint for law in stops if law.constraint is not None], values
+    ).matrix
+    stopped = np.linalg.matrix_rank(closing) if len(closing) else 0
+    if stopped and np.linalg.matrix_rank([*closing, *rows]) < stopped + len(rows):
+        return "a friction of it acts along the direction of its rigid stops"
+    if stopped and any(
+        np.linalg.matrix_rank([*closing, row]) == stopped for row in _inputs(linear, values)
+    ):
+        return "a memory of it follows the direction of its rigid stops"
     return None
+
+
+def _inputs(linear: LinearSystem, values: Mapping[str, float]) -> np.ndarray:
+    """The rates that the inputs of memories have by the states, float64[limits, N]: those of the
+    memories where all of them are within their limits.
+    """
+    sides = [limit_side(guard) for guard in linear.system.guards]
+    within = sum(1 << g for g, side in enumerate(sides) if side < 0)
+    gaps = linear.gaps(values).matrix[[g for g, side in enumerate(sides) if side]]
+    found: np.ndarray = gaps @ linear.piece(values, within).matrix
+    return found
 
 
 def _driving(*roots: Expr) -> Iterator[Expr]:
@@ -414,8 +436,6 @@ def _missing(system: System, size: int) -> str | None:
             return "a restitution of it isn't a number"
     if levels_of(system) is None:
         return "a friction of it may become negative on the way"
-    if any(guard.law and guard.law.kind == "impact" for guard in system.guards):
-        return "it has friction beside rigid stops" if sticking_of(system) else None
     return None
 
 

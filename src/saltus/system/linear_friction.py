@@ -38,15 +38,15 @@ class Sticking:
         Number of the gap that is minus its second margin.
     margins : tuple of Expr
         P - N and P + N.
-    fades : bool
-        Whether its force in motion is the largest at rest, so that nothing jumps at its release.
+    limit : Expr
+        Its largest force at rest, as a multiple of that in motion.
     """
 
     guard: int
     hold: int
     second: int
     margins: tuple[Expr, Expr]
-    fades: bool
+    limit: Expr
 
 
 def sticking_of(system: System) -> tuple[Sticking, ...]:
@@ -62,7 +62,7 @@ def sticking_of(system: System) -> tuple[Sticking, ...]:
         most = ex.neg(ex.mul(limit, law.pivot))
         margins = ex.sub(most, law.drive), ex.add(most, law.drive)
         second = len(system.guards) + len(found)
-        found.append(Sticking(number, law.partner, second, margins, law.zeros == 2))
+        found.append(Sticking(number, law.partner, second, margins, limit))
     return tuple(found)
 
 

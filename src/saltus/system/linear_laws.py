@@ -18,7 +18,7 @@ from scipy.linalg import qr
 from saltus.contact.guards import is_hold
 from saltus.language import expression as ex
 from saltus.language.evaluate import evaluate
-from saltus.system.linear import LinearPiece, LinearSystem
+from saltus.system.linear import SAME, LinearPiece, LinearSystem
 from saltus.system.system import System
 
 #: Least pivot of the constraints of held contacts, relative to their largest: those below it follow
@@ -37,7 +37,8 @@ class Impacts:
     push : float64[gaps, N]
         Change of the state by which the closing velocity becomes one more.
     restitution : float64[gaps]
-        Coefficients of restitution.
+        Coefficients of restitution; of a friction 1 if its largest force at rest is that in motion,
+        so that nothing jumps at its release, else 0.
     """
 
     closing: LinearPiece
@@ -84,6 +85,8 @@ def impacts_of(linear: LinearSystem, values: Mapping[str, float]) -> Impacts:
         constraints[one.guard] = guards[one.guard].gap
         normal = linear.pieces_of([guards[one.guard].gap], values).matrix[0]
         push[one.guard] = normal / (normal @ normal)
+        if not ex.varies(one.limit):
+            restitution[one.guard] = float(evaluate([one.limit], values=values)[0] <= 1 + SAME)
     for g, guard in enumerate(guards):
         law = guard.law
         if law is None or law.constraint is None or law.restitution is None:

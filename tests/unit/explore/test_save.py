@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 import saltus as sl
 from saltus.analysis.basins import growing, pipeline
+from saltus.explore.cells import unpacked_cells
 from saltus.explore.desk import Desk
 from saltus.explore.frames import packed, unpacked
 from saltus.explore.opening import opening_of
@@ -38,7 +39,8 @@ def desk():
 
         def take(head, arrays):
             if head["kind"] == "map-piece":
-                labels.ravel()[arrays["cell"]] = arrays["label"]
+                cells = unpacked_cells(arrays, labels.shape[1])
+                labels.ravel()[cells["cell"]] = cells["label"]
 
         one.answer(question_of("map", {"id": 1, **MAP}), take)
         one.labels = labels
@@ -93,6 +95,23 @@ def test_the_study_of_the_screen_gives_its_labels_and_motion(desk):
     _, again = np.unique(map_["basin"].values, return_inverse=True)
     pairs = set(zip(screen.ravel().tolist(), again.ravel().tolist(), strict=True))
     assert len(pairs) == len(np.unique(screen)) == len(np.unique(again))  # the same, renamed
+
+
+def test_the_study_and_the_script_of_a_comparison_run_both_methods(tmp_path, monkeypatch):
+    monkeypatch.setattr(pipeline, "SCOUTS", 16)
+    monkeypatch.chdir(tmp_path)
+    rig = sl.models.delangre("a", force="1.5 N", frequency="10 Hz")
+    other = sl.ODE45(1e-4, 1e-7)
+    view = View(
+        opening_of(rig), rig, sl.Taylor(), axes={"x": (-5e-3, 5e-3, 6), "v": (-1.0, 1.0, 6)},
+        at={}, against=other,
+    )  # fmt: skip
+    maps = [sl.basins(rig, x=(-5e-3, 5e-3, 6), v=(-1, 1, 6), method=m) for m in (None, other)]
+    expected = sl.compare(*maps)["agreement"].values
+    *_, agreement = [one.dataset for one in ask(study_text(view, "both"))]
+    np.testing.assert_array_equal(agreement["agreement"].values, expected)
+    exec(compile(script_text(view), "seen.py", "exec"), names := {})
+    np.testing.assert_array_equal(names["both"]["agreement"].values, expected)
 
 
 def test_a_system_of_ones_own_says_how_it_is_run():

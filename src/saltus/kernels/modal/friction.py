@@ -82,13 +82,25 @@ def let_slide(i, margin, now, moved, batch, m):
     """
     g, h = m.laws[margin, PARTNER], m.laws[margin, HOLDER]
     upper, lower = margins_of(i, g, batch, m)
-    fades = m.laws[g, FADES] == 1 and (moved or min(upper, lower) >= -margin_noise(i, g, batch, m))
+    fades = restitution_of(i, g, batch, m) == 1.0
+    fades = fades and (moved or min(upper, lower) >= -margin_noise(i, g, batch, m))
     batch.carry[i, CROSSED] = 0.0 if fades else float(1 << margin)
     know_zeros(i, h, 0, batch)
     know_zeros(i, m.laws[h, SECOND], 0, batch)
     know_zeros(i, g, 2 if fades else 1, batch)
     after = batch.mode[i] & ~(1 << h) & ~(1 << g)
     if upper < lower:
+        after |= 1 << g
+    note(i, h, now, RELEASE, -1, 0.0, after, clock_error(i, now, batch), batch, m)
+
+
+@kernel
+def throw(i, g, now, batch, m):
+    """Release a friction that an impact elsewhere makes slide."""
+    h = m.laws[g, HOLDER]
+    know_zeros(i, g, 0, batch)
+    after = batch.mode[i] & ~(1 << h) & ~(1 << g)
+    if closing_of(i, g, batch, m) > 0.0:
         after |= 1 << g
     note(i, h, now, RELEASE, -1, 0.0, after, clock_error(i, now, batch), batch, m)
 

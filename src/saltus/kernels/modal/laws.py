@@ -25,6 +25,7 @@ from saltus.kernels.status import (
     RELEASE,
     RUNNING,
     SLIDING,
+    SURFACE_LAW,
 )
 
 
@@ -410,7 +411,9 @@ def is_hidden(i, g, rebound, pressing, batch, m):
 def turn_over(i, struck, now, batch, m):
     """Change the sides of the guards over whose boundaries an impact has carried the state."""
     for g in range(m.sizes[GUARDS]):
-        asked = g != struck and m.laws[g, KIND] == NO_LAW and known_zeros(i, g, batch) == 0
+        turns = m.laws[g, KIND] == NO_LAW or m.laws[g, KIND] == SURFACE_LAW
+        asked = g != struck and turns and known_zeros(i, g, batch) == 0
+        asked = asked and is_watched(g, batch.mode[i], m)
         gap = value_of(m.acts, law_row(i, g, batch, m), 0, m) if asked else 0.0
         if gap * side_of(g, batch.mode[i]) < 0.0:
             after = batch.mode[i] ^ (1 << g)
@@ -420,15 +423,19 @@ def turn_over(i, struck, now, batch, m):
 
 @kernel
 def loosen(i, struck, now, closing, batch, m):
-    """Release the contacts at rest that feel the impact of another. A free one whose gap and rate
-    were known to be zero closes or opens now.
+    """Release the contacts at rest and the frictions that feel the impact of another. A free one
+    whose gap and rate were known to be zero closes or opens now.
     """
     for g in range(m.sizes[GUARDS]):
-        asked, h = g != struck and m.laws[g, KIND] == IMPACT_LAW, m.laws[g, PARTNER]
+        rubs, h = m.laws[g, KIND] == SURFACE_LAW, m.laws[g, PARTNER]
+        asked = g != struck and (rubs or m.laws[g, KIND] == IMPACT_LAW)
         feels = asked and abs(closing_of(i, g, batch, m)) > FELT * closing
-        if feels and (batch.mode[i] >> h) & 1 == 1:
+        held = feels and (batch.mode[i] >> h) & 1 == 1
+        if held and rubs:
+            throw(i, g, now, batch, m)
+        elif held:
             release(i, h, now, 1, batch, m)
-        elif feels:
+        elif feels and not rubs:
             know_zeros(i, g, min(1, known_zeros(i, g, batch)), batch)
 
 

@@ -51,16 +51,17 @@ AT, ENTERS, NEXT_STEP, LANDED_AT, LANDINGS, RIDES, SET, TABLES, WAITED, CROSSED 
 TWICE, THRICE, STARTS, ASKS, DATED, REVERSED, AMPLITUDES = range(10, 17)
 # Columns of `laws`, for each guard: the kind of its law (status.py), its hold guard (of a hold
 # guard: its contact's), the state that its gap is a level of; the guard whose bit says that the
-# contact is held; of a friction, and of what holds it, the number of the second margin, and whether
-# nothing jumps at its release; -1 where there is none; the side to which the
-# input leads on at the limit of a memory, 0 at other boundaries. Second margins are guards behind
+# contact is held; of a friction, and of what holds it, the number of the second margin; -1 where
+# there is none; the side to which the input leads on at the limit of a memory, 0 at other
+# boundaries. Second margins are guards behind
 # those of the system, whose bits are never set: their gaps are minus the margins.
-KIND, PARTNER, LEVEL, HOLDER, SECOND, FADES, LIMITS, LAW_COLUMNS = range(8)
+KIND, PARTNER, LEVEL, HOLDER, SECOND, LIMITS, LAW_COLUMNS = range(7)
 # Rows of `acts`, where a guard has a law: guards, set by set. Columns: the gap and the closing
 # velocity as functions of the state - N slopes, a constant, slopes for the cosines of the H drives
 # and for the C courses -, the change of the state by a unit of closing velocity, N numbers, the
-# restitution. Rows of `presses`: guards, contact state by contact state. Columns: the acceleration
-# with which the contact closes without its own force, as such a function.
+# restitution; of a friction 1 if nothing jumps at its release, else 0. Rows of `presses`: guards,
+# contact state by contact state. Columns: the acceleration with which the contact closes without
+# its own force, as such a function.
 # Rows of `struck`: the state before impacts and the one behind them in the order of the guards, the
 # way that each state has gone in them.
 AT_FIRST, BY_GUARDS, WAY = range(3)

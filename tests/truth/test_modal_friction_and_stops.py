@@ -1,0 +1,163 @@
+"""Friction beside rigid stops in the modal flow: closed forms, Taylor's method, differences."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import saltus as sl
+from saltus.flow.maps import Stroboscope
+from saltus.system.linear import linear_pieces
+from two_flows import FOLLOWS, runs, same_rows, times
+
+SEED = 20261126
+
+
+# -- closed forms ----------------------------------------------------------------------------------
+@sl.system(states="x y u v")
+def thrown(t, x, y, u, v, *, level=0.5, e=0.5):
+    """A free body, and a rough one that it strikes."""
+    law = sl.impact(x < y, u - v, restitution=e, inertia={"u": 1.0, "v": 1.0})
+    return u, v, 0.0, -sl.friction(v, slip=level), law
+
+
+@pytest.mark.nojit
+def test_a_blow_throws_a_body_that_sticks():
+    """Of its speed c the striker keeps (1 - e) c / 2. The struck body gets (1 + e) c / 2, slides
+    (1 + e)^2 c^2 / (8 level), and sticks until it is overtaken.
+    """
+    assert isinstance(sl.Modal().serving(thrown), sl.Modal)
+    run = sl.simulate(thrown, (-1, 0, 1, 0), t_end=3.95, method=sl.Modal(), **FOLLOWS)
+    speed, now, place, known = 1.0, 1.0, 0.0, []
+    for _ in range(3):
+        push, speed = 0.75 * speed, 0.25 * speed
+        known += [(now, "impact"), (now, "release"), (now + push / 0.5, "hold")]
+        place, now = place + push**2, now + push**2 / speed
+    assert run.contact_kind.values.tolist() == [kind for _, kind in known]
+    assert run.contact_time.values == pytest.approx([time for time, _ in known], rel=1e-13)
+    assert (float(run.end_y), float(run.end_v)) == (pytest.approx(place, rel=1e-13), 0.0)
+    assert float(run.end_u) == pytest.approx(speed, rel=1e-13)
+
+
+def test_friction_along_the_direction_of_a_stop_presses_onto_it():
+    """How both share the force isn't said: friction in motion presses, so the body leaves where the
+    drive pulls with as much, whatever friction holds at rest. Modes leave it to Taylor's method.
+    """
+
+    @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
+    def rubbed(t, x, v, *, w=0.7, level=0.3, stick=0.3, gap=0.2):
+        law = sl.impact(x < gap, v, restitution=0.5)
+        return v, sl.cos(w * t) - x - sl.friction(v, slip=level, stick=stick), law
+
+    @sl.system(states="x v")
+    def jointed(t, x, v):
+        law = sl.impact(x < 1.0, v, restitution=0.5)
+        return v, -x - sl.slider(x, stiffness=2.0, limit=1.0), law
+
+    assert "along the direction" in str(linear_pieces(rubbed))
+    assert "follows the direction" in str(linear_pieces(jointed))
+    for stick in (0.3, 0.45):
+        system = rubbed.with_values(stick=stick)
+        run = sl.simulate(system, (0.2, 0.0), t_end=4.0, method=sl.Modal(), **FOLLOWS)
+        assert times(run, "release")[-1] == pytest.approx(math.acos(-0.1) / 0.7, rel=1e-13)
+
+
+# -- beside other solvers --------------------------------------------------------------------------
+BODIES = 4
+GIVEN = {f"k{i}{j}": 0.0 for i in range(BODIES) for j in range(i, BODIES)}
+GIVEN |= {f"{name}{i}": 0.5 for name in ("force", "lag", "dead", "a") for i in range(BODIES)}
+GIVEN |= {"c": 0.3, "slip": 2.0, "stick": 2.5, "pair": 1.0, "belt": 0.1, "sway": 0.1, "limit": 2.0}
+GIVEN |= {"spring": 300.0, "wall": 0.02, "near": 0.02, "e": 0.5, "f": 0.0, "w": 10.0}
+
+
+def equation(t, *z, **p):
+    """Four bodies on springs: one on a belt, friction between two, a Jenkins element at the last;
+    a stop that all of them meet together, another between the last two.
+    """
+    x, v = z[:BODIES], z[BODIES:]
+    rates = [
+        p[f"force{i}"] * sl.cos(p["w"] * t + p[f"lag{i}"]) + p[f"dead{i}"] - p["c"] * v[i]
+        - sum(p[f"k{min(i, j)}{max(i, j)}"] * x[j] for j in range(BODIES))
+        for i in range(BODIES)
+    ]  # fmt: skip
+    along = [p[f"a{i}"] for i in range(BODIES)]
+    rubbed = sl.friction(v[1] - v[2], slip=p["pair"])
+    speed = p["belt"] + p["sway"] * sl.cos(p["w"] * t)
+    rates[0] -= sl.friction(v[0] - speed, slip=p["slip"], stick=p["stick"])
+    rates[1], rates[2] = rates[1] - rubbed, rates[2] + rubbed
+    rates[3] -= sl.slider(x[3], stiffness=p["spring"], limit=p["limit"])
+    met, closing = (sum(a * one for a, one in zip(along, of, strict=True)) for of in (x, v))
+    laws = [
+        sl.impact(met < p["wall"], closing, restitution=p["e"],
+                  inertia={f"v{i}": 1.0 for i in range(BODIES)}),
+        sl.impact(x[2] < x[3] + p["near"], v[2] - v[3], restitution=p["f"],
+                  inertia={"v2": 1.0, "v3": 1.0}),
+    ]  # fmt: skip
+    return (*v, *rates, *laws)
+
+
+@pytest.fixture(scope="module")
+def system():
+    names = [f"{letter}{i}" for letter in "xv" for i in range(BODIES)]
+    values = ", ".join(f"{name}={value}" for name, value in GIVEN.items())
+    space = {"equation": equation}
+    passed = ", ".join(f"{name}={name}" for name in GIVEN)
+    exec(
+        f"def bodies(t, {', '.join(names)}, *, {values}):\n"
+        f" return equation(t, {', '.join(names)}, {passed})",
+        space,
+    )
+    return sl.system(states=" ".join(names), forced_at="w", units={"w": "rad/s"})(space["bodies"])
+
+
+def drawn(system, rng):
+    """Random values, and a start."""
+    root = rng.normal(size=(BODIES, BODIES))
+    stiffness = 200 * (root @ root.T / BODIES + np.eye(BODIES))
+    way = rng.normal(size=BODIES)
+    values = {f"k{i}{j}": stiffness[i, j] for i in range(BODIES) for j in range(i, BODIES)}
+    for i in range(BODIES):
+        values |= {f"force{i}": rng.uniform(5, 30), f"lag{i}": rng.uniform(0, 6)}
+        values |= {f"dead{i}": rng.normal(0, 3), f"a{i}": way[i] / np.linalg.norm(way)}
+    values |= {"c": rng.choice([0.0, 0.3, 2.0]), "slip": rng.uniform(1, 8), "w": rng.uniform(5, 30)}
+    values |= {"belt": rng.choice([0.0, 0.2]), "sway": rng.choice([0.0, 0.2])}
+    values |= {"stick": values["slip"] * rng.choice([1.0, 1.2]), "pair": rng.uniform(1, 8)}
+    values |= {"limit": rng.uniform(2, 15), "spring": rng.uniform(60, 400)}
+    for name in ("e", "f"):
+        values[name] = rng.choice([0.0, rng.uniform(0, 1), rng.uniform(0.5, 0.95), 1.0])
+    values |= {name: rng.uniform(0.003, 0.04) for name in ("wall", "near")}
+    start = np.zeros(len(system.states))
+    start[BODIES : 2 * BODIES] = rng.normal(0, 0.05, BODIES)
+    return system.with_values(**{name: float(one) for name, one in values.items()}), start
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_random_bodies_rub_and_strike_as_by_taylor(system, seed):
+    """Every row, of frictions, the memory, impacts, rests."""
+    one, start = drawn(system, np.random.default_rng([SEED, seed]))
+    modal, taylor = runs(one, start, periods=5)
+    assert str(modal.status.values) == str(taylor.status.values) == "ok"
+    same = same_rows(modal, taylor, 2 * math.pi / one.values["w"])
+    if same < 40:
+        assert same == modal.sizes["contact"] == taylor.sizes["contact"]
+        for name in one.states:
+            known = float(taylor[f"end_{name}"])
+            assert float(modal[f"end_{name}"]) == pytest.approx(known, abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_derivatives_are_those_of_the_motion(system, seed):
+    """Central differences of 1e-6."""
+    one, start = drawn(system, np.random.default_rng([SEED, 1, seed]))
+    one = one.with_values(e=0.4, f=0.7)
+    size = 2 * BODIES
+    _, found = Stroboscope(one, sl.Modal()).tangent(start[None], 1)
+    beside = start + 1e-6 * np.vstack([np.eye(len(start)), -np.eye(len(start))])
+    run = sl.simulate(one, beside, periods=1, samples=2, method=sl.Modal(), progress=False)
+    assert {"impact", "hold", "release"} <= set(run.contact_kind.values.tolist())
+    ends = np.array([run[f"end_{name}"].values for name in one.states])
+    known = (ends[:, : len(start)] - ends[:, len(start) :]) / 2e-6
+    apart = np.abs(found[0] - known)[:, :size].max()
+    assert apart <= 1e-5 * np.abs(known).max()
