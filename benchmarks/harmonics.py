@@ -25,7 +25,7 @@ import saltus as sl
 from saltus.analysis.harmonics import series as fourier
 from saltus.analysis.harmonics.equations import HarmonicOrbits
 from saltus.analysis.harmonics.forces import Forces
-from saltus.analysis.harmonics.pieces import Sections, uncut
+from saltus.analysis.harmonics.pieces import Intervals, uncut
 
 SAMPLES = 1024
 
@@ -66,16 +66,16 @@ def beam(elements=1000, modes=8):
 class Sampled(Forces):
     """Forces as the AFT of the literature has them: at equidistant samples."""
 
-    def sections(self, signals, constants, rate):
+    def intervals(self, signals, constants, rate):
         """Every sample with the sides on which it lies."""
         angle, harmonics = samples(), fourier.harmonics_of(signals.shape[1])
         gaps = self._gaps(signals, constants, rate)
         bits = np.zeros((SAMPLES, len(self.system.guards)), bool)
         for number, gap in gaps.items():
             bits[:, number] = fourier.basis(angle, harmonics) @ gap > 0
-        return Sections(angle, np.full(SAMPLES, 2 * np.pi / SAMPLES), bits, uncut(0).instants)
+        return Intervals(angle, np.full(SAMPLES, 2 * np.pi / SAMPLES), bits, uncut(0).instants)
 
-    def nodes(self, sections, harmonics):  # noqa: ARG002
+    def nodes(self, intervals, harmonics):  # noqa: ARG002
         """The samples."""
         return samples(), np.full(SAMPLES, 2 * np.pi / SAMPLES), np.arange(SAMPLES)
 
@@ -147,7 +147,7 @@ def compare(system, harmonics, states, frequency):
     (z, _), (sampled, more) = closed(exact, z), closed(aft, z)
     off = np.abs(z - sampled)[:-1].max() / unit[0]
     print(
-        f"one motion with {len(exact.sections(z).begin)} intervals: exact instants "
+        f"one motion with {len(exact.intervals(z).begin)} intervals: exact instants "
         f"{cost(lambda: exact.evaluate(z[None], np.zeros(1, int))):.2f} ms an evaluation, "
         f"AFT of {SAMPLES} samples {cost(lambda: aft.evaluate(z[None], np.zeros(1, int))):.2f} ms, "
         f"off by {off:.1e} of the largest harmonic ({more} steps)\n"
@@ -177,6 +177,39 @@ def of_rig():
         )
 
 
+def of_folds():
+    """Folds and isolas of three models that truncated motions have, misplace and miss."""
+    rig = sl.models.delangre("c", force="4 N", frequency="5 Hz")
+    box = {"x": ("-3 mm", "3 mm"), "v": ("-0.15 m/s", "0.15 m/s")}
+    grid = {"contact_stiffness": ("13 kN/m", "29 kN/m", 5)}
+    seeds = sl.bifurcation_diagram(rig, grid, "random 12", box=box, progress=False)
+    stop, pair = sl.models.soft_stop(), sl.models.two_masses()
+    for system, over, start, at in (
+        (stop, {"frequency": (1.38, 2.8)}, (1.5, 0.0), 1),
+        (pair, {"frequency": (0.6, 0.8)}, np.zeros(4), 4),
+        (rig, {"contact_stiffness": (8e3, 30e3)}, seeds, 1),
+    ):
+        name = next(iter(over))
+        print(f"\n{system.name} over {name}")
+        print("| | branch | from | to | folds |\n|---|---|---|---|---|")
+        for count in (None, 5, 9, 15):
+            options = {} if count is None else {"by": sl.HarmonicBalance(count)}
+            found = sl.branches(
+                system, over, start, at=at, longest=1, switch=(), progress=False, **options
+            )
+            for number in range(found.sizes["branch"]):
+                along = found[f"point_{name}"].values[found.point_branch.values == number]
+                mine = (found.event_branch.values == number) & (found.event_kind.values == "fold")
+                folds = np.sort(found[f"event_{name}"].values[mine])
+                kind = "isola" if found.branch_closed.values[number] else "open"
+                print(
+                    f"| {'exact' if count is None else f'H = {count}'} | {kind} | "
+                    f"{along.min():.6g} | {along.max():.6g} | "
+                    f"{', '.join(f'{one:.8g}' for one in folds)} |"
+                )
+
+
 if __name__ == "__main__":
     of_beam()
     of_rig()
+    of_folds()

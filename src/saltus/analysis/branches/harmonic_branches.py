@@ -155,7 +155,7 @@ def _from_rest(orbits: ClosedHarmonics, value: float) -> tuple[np.ndarray, np.nd
     orbits.scale = np.ones((1, orbits.width))
     linear = -orbits.evaluate(z[None], np.zeros(1, np.int64))[0][0]
     share = 1.0
-    while share > LEAST and len(orbits.sections(np.append(share * linear, value)).instants.angle):
+    while share > LEAST and len(orbits.intervals(np.append(share * linear, value)).instants.angle):
         share *= 0.5
     sizes = 2.0 * share * np.abs(linear.reshape(-1, orbits.series)).max(axis=1)
     return z, np.where(sizes > 0, sizes, 1.0)

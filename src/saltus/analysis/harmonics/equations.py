@@ -16,7 +16,7 @@ import numpy as np
 
 from saltus.analysis.harmonics import series as fourier
 from saltus.analysis.harmonics.forces import Forces, Moving
-from saltus.analysis.harmonics.pieces import Sections
+from saltus.analysis.harmonics.pieces import Intervals
 from saltus.analysis.harmonics.signals import States, signals_of
 from saltus.system import System
 from saltus.system.parametric import parametric
@@ -66,7 +66,7 @@ class HarmonicOrbits:
             own[i]: Moving(signal, times)
             for signal, chain in enumerate(self.source.chains) for times, i in enumerate(chain)
         }  # fmt: skip
-        self._remembered: dict[bytes, tuple[np.ndarray, Sections]] = {}
+        self._remembered: dict[bytes, tuple[np.ndarray, Intervals]] = {}
         self.turn = periods * (1.0 if self._timed else float(system.period()))
         forces = [inner.field[i] for i in self.source.forces]
         self.forces = Forces(inner, forces, moving, inner.states[len(own) :], self.turn, periods)
@@ -109,12 +109,12 @@ class HarmonicOrbits:
         """The series of the states of a motion float64[z], float64[D, 2H + 1]."""
         return self._along(z)[0]
 
-    def sections(self, z: np.ndarray) -> Sections:
+    def intervals(self, z: np.ndarray) -> Intervals:
         """A motion float64[z] between the boundaries that it meets."""
         return self._along(z)[1]
 
-    def _along(self, z: np.ndarray) -> tuple[np.ndarray, Sections]:
-        """The states and sections of a motion, remembered."""
+    def _along(self, z: np.ndarray) -> tuple[np.ndarray, Intervals]:
+        """The states and intervals of a motion, remembered."""
         key = z.tobytes()
         if key not in self._remembered:
             if len(self._remembered) >= REMEMBERED:
@@ -122,11 +122,11 @@ class HarmonicOrbits:
             constants, _, rate, rate_by = self._constants(z)
             signals, forces = self.signals(z), None
             if isinstance(self.source, States):
-                sections = self.forces.sections(signals, constants, rate)
+                intervals = self.forces.intervals(signals, constants, rate)
             else:
                 found = self.forces.coefficients(signals, constants, rate, rate_by)
-                sections, forces = found.sections, found.values / self._pace(constants)
-            self._remembered[key] = self.source.states(signals, forces, rate), sections
+                intervals, forces = found.intervals, found.values / self._pace(constants)
+            self._remembered[key] = self.source.states(signals, forces, rate), intervals
         return self._remembered[key]
 
     def _pace(self, constants: np.ndarray) -> float:

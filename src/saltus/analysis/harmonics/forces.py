@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from saltus.analysis.harmonics import series as fourier
-from saltus.analysis.harmonics.pieces import Sections, sections_of
+from saltus.analysis.harmonics.pieces import Intervals, intervals_of
 from saltus.contact.guards import is_hold
 from saltus.language import expression as ex
 from saltus.language.derivatives import gradients
@@ -62,14 +62,14 @@ class Coefficients:
         Their derivatives with respect to the coefficients of the signals.
     by_constants : float64[m, 2H + 1, e]
         With respect to the states that don't move.
-    sections : Sections
+    intervals : Intervals
         The motion between the boundaries that it meets.
     """
 
     values: np.ndarray
     by_signals: np.ndarray
     by_constants: np.ndarray
-    sections: Sections
+    intervals: Intervals
 
 
 class Forces:
@@ -133,9 +133,9 @@ class Forces:
             "values": self.system.values,
         }
 
-    def sections(self, signals: np.ndarray, constants: np.ndarray, rate: float) -> Sections:
+    def intervals(self, signals: np.ndarray, constants: np.ndarray, rate: float) -> Intervals:
         """A motion between the boundaries that it meets."""
-        return sections_of(
+        return intervals_of(
             self.system.name,
             self.system.guards,
             self._gaps(signals, constants, rate),
@@ -195,12 +195,12 @@ class Forces:
         return found
 
     def nodes(
-        self, sections: Sections, harmonics: int
+        self, intervals: Intervals, harmonics: int
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """See :meth:`Sections.nodes`: for products of the forces and a harmonic."""
+        """See :meth:`Intervals.nodes`: for products of the forces and a harmonic."""
         bent = math.isinf(self._degree)
         most = UNEVEN if bent else max(int(self._degree), 1)
-        return sections.nodes((most + 1) * harmonics + MULTIPLES * self.periods, bent)
+        return intervals.nodes((most + 1) * harmonics + MULTIPLES * self.periods, bent)
 
     def coefficients(
         self, signals: np.ndarray, constants: np.ndarray, rate: float, rate_by: np.ndarray
@@ -218,11 +218,11 @@ class Forces:
         rate_by : float64[e]
             Its derivatives with respect to the constants, over itself.
         """
-        sections = self.sections(signals, constants, rate)
+        intervals = self.intervals(signals, constants, rate)
         harmonics = fourier.harmonics_of(signals.shape[1])
-        angle, weight, which = self.nodes(sections, harmonics)
+        angle, weight, which = self.nodes(intervals, harmonics)
         about = self.motion(angle, signals, constants, rate)
-        bits = list(sections.bits[which].T)
+        bits = list(intervals.bits[which].T)
         found = [
             np.broadcast_to(one, len(angle)) for one in evaluate(self._entries, **about, bits=bits)
         ]
@@ -243,8 +243,8 @@ class Forces:
             if one.times:
                 value = about["states"][names[j]]
                 by_constants[i] += np.outer(project @ (slope * value), one.times * rate_by)
-        whole = Coefficients(values, by_signals, by_constants, sections)
-        if len(sections.instants.angle):
+        whole = Coefficients(values, by_signals, by_constants, intervals)
+        if len(intervals.instants.angle):
             self._add_jumps(whole, signals, constants, rate, rate_by)
         return whole
 
@@ -253,7 +253,7 @@ class Forces:
         rate_by: np.ndarray,
     ) -> None:  # fmt: skip
         """Add to the derivatives what the shifts of instants do at which forces jump."""
-        instants, harmonics = whole.sections.instants, fourier.harmonics_of(signals.shape[1])
+        instants, harmonics = whole.intervals.instants, fourier.harmonics_of(signals.shape[1])
         if not self._jumping[instants.guard].any():
             return
         about = self.motion(instants.angle, signals, constants, rate)

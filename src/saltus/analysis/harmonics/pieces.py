@@ -54,7 +54,7 @@ class Instants:
 
 
 @dataclass(frozen=True)
-class Sections:
+class Intervals:
     """Intervals of the circle in which no boundary is crossed.
 
     Attributes
@@ -115,10 +115,10 @@ class Sections:
         )
 
 
-def sections_of(
+def intervals_of(
     name: str, guards: Sequence[Guard], linear: Mapping[int, np.ndarray], about: About,
     harmonics: int,
-) -> Sections:  # fmt: skip
+) -> Intervals:  # fmt: skip
     """Cut a motion at the boundaries of some guards, each after those whose sides it asks for.
 
     Parameters
@@ -149,33 +149,33 @@ def sections_of(
         for number in moving if not asked[number]
     }  # fmt: skip
     found = _crossings(series)
-    sections = _cut(uncut(len(guards)), found)
-    middle = sections.middle
+    intervals = _cut(uncut(len(guards)), found)
+    middle = intervals.middle
     for number, gap in series.items():
         here = fourier.basis(middle, fourier.harmonics_of(len(gap)))
-        sections.bits[:, number] = here @ gap > 0
+        intervals.bits[:, number] = here @ gap > 0
     for number in moving:
         if not (mine := asked[number]):
             continue
-        for sides in np.unique(sections.bits[:, mine], axis=0):
+        for sides in np.unique(intervals.bits[:, mine], axis=0):
             bits = frozen.copy()
             bits[mine] = sides
             gap = _series(name, guards[number], about, harmonics, bits)
             found += [
                 one for one in _crossings({number: gap})
-                if (sections.bits[sections.of(np.array([one[0]]))[0], mine] == sides).all()
+                if (intervals.bits[intervals.of(np.array([one[0]]))[0], mine] == sides).all()
             ]  # fmt: skip
-        sections = _cut(sections, found)
-        there = about(sections.middle)
-        (values,) = evaluate([guards[number].gap], **there, bits=list(sections.bits.T))  # type: ignore[arg-type]
-        sections.bits[:, number] = np.asarray(values) > 0
+        intervals = _cut(intervals, found)
+        there = about(intervals.middle)
+        (values,) = evaluate([guards[number].gap], **there, bits=list(intervals.bits.T))  # type: ignore[arg-type]
+        intervals.bits[:, number] = np.asarray(values) > 0
     instants = _NONE
     if found:
         angle, which, slope = (np.array(one) for one in zip(*sorted(found), strict=True))
-        at = np.searchsorted(sections.begin, angle)
-        before, behind = sections.bits[at - 1], sections.bits[at]
+        at = np.searchsorted(intervals.begin, angle)
+        before, behind = intervals.bits[at - 1], intervals.bits[at]
         instants = Instants(angle, which.astype(np.int64), slope, before, behind)
-    return replace(sections, instants=instants, gaps=tuple(series.values()))
+    return replace(intervals, instants=instants, gaps=tuple(series.values()))
 
 
 def _crossings(gaps: Mapping[int, np.ndarray]) -> list[tuple[float, int, float]]:
@@ -189,9 +189,9 @@ def _crossings(gaps: Mapping[int, np.ndarray]) -> list[tuple[float, int, float]]
     return list(zip(angles.tolist(), number.tolist(), slopes.tolist(), strict=True))
 
 
-def uncut(guards: int) -> Sections:
+def uncut(guards: int) -> Intervals:
     """The circle, uncut."""
-    return Sections(np.zeros(1), np.full(1, 2 * np.pi), np.zeros((1, guards), bool), _NONE)
+    return Intervals(np.zeros(1), np.full(1, 2 * np.pi), np.zeros((1, guards), bool), _NONE)
 
 
 _NONE = Instants(
@@ -199,14 +199,14 @@ _NONE = Instants(
 )
 
 
-def _cut(sections: Sections, found: list[tuple[float, int, float]]) -> Sections:
+def _cut(intervals: Intervals, found: list[tuple[float, int, float]]) -> Intervals:
     """Intervals between the angles of crossings, with the sides known so far."""
     if not found:
-        return sections
+        return intervals
     begin = np.unique([angle for angle, _, _ in found])
     length = np.diff(np.append(begin, begin[0] + 2 * np.pi))
-    bits = sections.bits[sections.of(begin + 0.5 * length)].copy()
-    return Sections(begin, length, bits, _NONE)
+    bits = intervals.bits[intervals.of(begin + 0.5 * length)].copy()
+    return Intervals(begin, length, bits, _NONE)
 
 
 def _series(name: str, guard: Guard, about: About, harmonics: int, bits: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ import numpy as np
 from saltus.analysis.closed.measures import Measures, unknown
 from saltus.analysis.harmonics import series as fourier
 from saltus.analysis.harmonics.equations import HarmonicOrbits
-from saltus.analysis.harmonics.pieces import Sections
+from saltus.analysis.harmonics.pieces import Intervals
 from saltus.analysis.inputs.outputs import Outputs
 from saltus.system.modes import mode_number
 
@@ -36,7 +36,7 @@ def amplitudes(orbits: HarmonicOrbits, z: np.ndarray, outputs: Outputs) -> np.nd
     complex128[K, H + 1].
     """
     motion = _Motion(orbits, z, outputs)
-    angle, weight, which = orbits.forces.nodes(motion.sections, orbits.harmonics)
+    angle, weight, which = orbits.forces.nodes(motion.intervals, orbits.harmonics)
     turned = np.exp(-1j * np.outer(np.arange(orbits.harmonics + 1), angle)) * (weight / np.pi)
     turned[0] *= 0.5
     return np.asarray((turned @ motion.values(angle, which)).T)
@@ -48,29 +48,29 @@ class _Motion:
     def __init__(self, orbits: HarmonicOrbits, z: np.ndarray, outputs: Outputs) -> None:
         self.orbits, self.outputs = orbits, outputs
         self.states = orbits.states(z)
-        self.sections: Sections = orbits.sections(z)
+        self.intervals: Intervals = orbits.intervals(z)
         self.period = float(orbits.period(z))
         known = dict(orbits.system.values) | {orbits.names[0]: float(orbits.values(z)[0])}
         self.parameters: dict[str, Any] = known
 
     def values(self, angle: np.ndarray, which: np.ndarray | None = None) -> np.ndarray:
-        """The outputs at angles float64[n] in some of the sections, float64[n, K]."""
+        """The outputs at angles float64[n] in some of the intervals, float64[n, K]."""
         here = fourier.basis(angle, self.orbits.harmonics)
-        bits = self.sections.bits[self.sections.of(angle) if which is None else which]
+        bits = self.intervals.bits[self.intervals.of(angle) if which is None else which]
         time = angle * (self.period / (2 * np.pi))
         return self.outputs.values(time, here @ self.states.T, self.parameters, mode_number(bits.T))
 
     def put(self, result: Measures, row: int) -> None:
         """Write its numbers into a row."""
-        sections, periods = self.sections, self.orbits.periods
-        angle, weight, which = self.orbits.forces.nodes(sections, self.orbits.harmonics)
+        intervals, periods = self.intervals, self.orbits.periods
+        angle, weight, which = self.orbits.forces.nodes(intervals, self.orbits.harmonics)
         share, values = weight / (2 * np.pi), self.values(angle, which)
         result.mean[row] = share @ values
         values = values - result.mean[row]
         result.deviation[row] = np.sqrt(share @ values**2)
         result.harmonic[row] = 2.0 * ((share * np.exp(-1j * periods * angle)) @ values)
         result.maximum[row], result.minimum[row] = self._extremes(1.0), -self._extremes(-1.0)
-        instants = sections.instants
+        instants = intervals.instants
         result.contacts[row] = len(instants.angle) / periods
         names = [guard.name for guard in self.orbits.system.guards]
         result.itinerary[row] = " ".join(
@@ -79,7 +79,7 @@ class _Motion:
         )
         gaps = [
             np.abs(fourier.basis(turns, fourier.harmonics_of(len(gap))) @ gap)
-            for gap in sections.gaps for turns in [fourier.zeros(fourier.derivative(gap))]
+            for gap in intervals.gaps for turns in [fourier.zeros(fourier.derivative(gap))]
         ]  # fmt: skip
         result.margin[row] = min((one.min() for one in gaps if len(one)), default=np.inf)
         result.span[row] = max((np.ptp(one) for one in gaps if len(one)), default=0.0)
