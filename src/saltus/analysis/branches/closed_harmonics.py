@@ -15,6 +15,7 @@ from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.closed.cycles import units
 from saltus.analysis.harmonics import series as fourier
 from saltus.analysis.harmonics.equations import HarmonicOrbits
+from saltus.analysis.harmonics.signals import States
 from saltus.analysis.inputs.outputs import Outputs
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
@@ -79,7 +80,7 @@ class ClosedHarmonics(HarmonicOrbits):
         points = self.points(z)
         guess = np.concatenate([points.reshape(len(z), -1), self.values(z)], axis=1)
         seen = [self.samples(one) for one in z]
-        sizes = [units(one.max(axis=0), one.min(axis=0)) for one in seen]
+        sizes = [self._units(one) for one in seen]
         orbits = copy_with(self._exact, np.array([
             np.append(np.tile(size, self.periods), max(abs(float(one[-1])), 1e-300))
             for size, one in zip(sizes, z, strict=True)
@@ -96,6 +97,16 @@ class ClosedHarmonics(HarmonicOrbits):
         ends = orbits.points(point.z)
         for i, one in enumerate(z):
             self._known[one.tobytes()] = bool(point.found[i]), ends[i], multipliers[i]
+
+    def _units(self, seen: np.ndarray) -> np.ndarray:
+        """The ranges of states in samples float64[n, D]; of a structure, whose higher modes move
+        by little, those of the largest deflection and rate.
+        """
+        ranges = units(seen.max(axis=0), seen.min(axis=0))
+        if not isinstance(self.source, States):
+            both = ranges.reshape(2, -1)
+            ranges = np.repeat(both.max(axis=1), both.shape[1])
+        return ranges
 
     def multipliers(self, z: np.ndarray, derivative: np.ndarray, rows: np.ndarray) -> np.ndarray:  # noqa: ARG002
         """Floquet multipliers of the exact orbits, the largest first, complex128[r, D]; NaN where

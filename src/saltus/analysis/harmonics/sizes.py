@@ -4,6 +4,7 @@ graze.
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
@@ -85,17 +86,27 @@ class _Motion:
         result.span[row] = max((np.ptp(one) for one in gaps if len(one)), default=0.0)
 
     def _extremes(self, sign: float) -> np.ndarray:
-        """The largest values of the outputs times a sign, float64[K]."""
-        count = ANGLES * (self.orbits.harmonics + 1)
-        angle = 2 * np.pi * np.arange(count) / count
+        """The largest values of the outputs times a sign, float64[K]: of states where they turn,
+        of functions looked for ever nearer to the best place.
+        """
+        count, states = ANGLES * (self.orbits.harmonics + 1), len(self.states)
+        angle, half = 2 * np.pi * np.arange(count) / count, 2 * np.pi / count
         found = sign * self.values(angle)
-        best, half = angle[np.argmax(found, axis=0)], 2 * np.pi / count
-        high = found.max(axis=0)
-        for _ in range(ROUNDS):
+        high, best = found.max(axis=0), angle[np.argmax(found, axis=0)][states:]
+        turned = sign * fourier.basis(self._turns, self.orbits.harmonics) @ self.states.T
+        high[:states] = np.maximum(high[:states], turned.max(axis=0, initial=-np.inf))
+        functions = len(best)
+        for _ in range(ROUNDS if functions else 0):
             around = best[:, None] + half * np.linspace(-1.0, 1.0, PLACES)
-            k = len(best)
-            found = sign * self.values(around.ravel()).reshape(k, PLACES, k)
-            own = found[np.arange(k), :, np.arange(k)]
-            best = around[np.arange(k), own.argmax(axis=1)]
-            high, half = np.maximum(high, own.max(axis=1)), half * 2.0 / (PLACES - 1)
+            found = sign * self.values(around.ravel())[:, states:]
+            own = found.reshape(functions, PLACES, functions)
+            own = own[np.arange(functions), :, np.arange(functions)]
+            best = around[np.arange(functions), own.argmax(axis=1)]
+            high[states:] = np.maximum(high[states:], own.max(axis=1))
+            half *= 2.0 / (PLACES - 1)
         return np.asarray(high)
+
+    @functools.cached_property
+    def _turns(self) -> np.ndarray:
+        """Angles at which a state turns."""
+        return fourier.zeros_of(fourier.derivative(self.states))[1]
