@@ -176,7 +176,20 @@ def account(ds: xr.Dataset) -> list[str]:
         + (f", {stable.mean():.0%} of them stable" if len(stable) else ""),
     ]
     lines += [f"  {i}: {_one(ds, i)}" for i in range(ds.sizes["branch"])]
+    lines += _truncated(ds)
     return lines + [f"unsure   {one}" for one in _unexplained(ds)]
+
+
+def _truncated(ds: xr.Dataset) -> list[str]:
+    """How far motions of a few harmonics are from exact orbits; nothing of exact ones."""
+    if "point_error" not in ds:
+        return []
+    off = ds["point_error"].values
+    known = off[np.isfinite(off)]
+    words = f"at most {known.max():.2g} of their range from exact orbits" if len(known) else ""
+    lost = f"{counted(len(off) - len(known), 'point')} with no exact orbit near"
+    told = [one for one in (words, lost if len(known) < len(off) else "") if one]
+    return [f"balance  {counted(int(ds.attrs['harmonics']), 'harmonic')}, {', '.join(told)}"]
 
 
 def _unexplained(ds: xr.Dataset) -> Iterator[str]:
