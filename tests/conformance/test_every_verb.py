@@ -157,7 +157,10 @@ CALLS = {
         {"sampling_interval": {"in SI": 1.0, "in units": "1 s"}[how], "dimension": 2, "delay": 1},
     ),
 }
-VERBS = [name for name, home in sl._HOMES.items() if home.startswith("saltus.analysis.")]
+VERBS = [
+    name for name, home in sl._HOMES.items()
+    if home.startswith("saltus.analysis.") and not inspect.isclass(getattr(sl, name))
+]  # fmt: skip
 _given: dict[tuple[str, str], xr.Dataset] = {}
 
 
