@@ -55,6 +55,7 @@ class PictureKind(StrEnum):
     sensitivity = "sensitivity"
     scatter = "scatter"
     corner = "corner"
+    fit = "fit"
     exponents = "exponents"
     methods = "methods"
 

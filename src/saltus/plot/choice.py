@@ -25,6 +25,7 @@ TAKES: dict[str, tuple[str, ...]] = {
     "sensitivity": (schema.SENSITIVITY,),
     "scatter": (schema.SCATTER,),
     "corner": (schema.SCATTER,),
+    "fit": (schema.FIT,),
     "methods": (schema.METHODS,),
     "exponents": (schema.EXPONENTS,),
     "branches": (schema.BRANCHES,),

@@ -11,7 +11,7 @@ from saltus.errors import ParameterError, among, nearest, shown
 from saltus.plot.axes import draw_points
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, Scale, display_scale, style
-from saltus.results.kinds.scatter import CODES, named
+from saltus.results.dataset.schema import kind_text
 
 #: Colour of sets whose start reaches no response, and of numbers of a user's function.
 GREY = "0.55"
@@ -152,17 +152,23 @@ def _groups(one: xr.Dataset) -> list[tuple[np.ndarray, str, str]]:
     done = one["set_status"].values == "computed"
     if "response_of" not in one:
         return [(done, CYCLE[0], "")]
-    reached = one["response_of"].values
+    reached, about = one["response_of"].values, one["response_of"].attrs
+    words = dict(zip(about["flag_values"].tolist(), about["flag_meanings"].split(), strict=True))
     found = []
     for code in np.unique(reached[done])[::-1].tolist():
         color = CYCLE[code % len(CYCLE)] if code >= 0 else GREY
-        label = named(one.isel(response=code)) if code >= 0 else CODES[code].replace("_", " ")
+        label = _motion(one, code) if code >= 0 else words[code].replace("_", " ")
         found.append((done & (reached == code), color, label))
     names = [label for *_, label in found]
     return [
         (here, color, f"{label} (no. {int(reached[here][0])})" if names.count(label) > 1 else label)
         for here, color, label in found[::-1]
     ] or [(done, GREY, "")]
+
+
+def _motion(one: xr.Dataset, k: int) -> str:
+    """A response in a word."""
+    return kind_text(str(one["response_type"].values[k]), int(one["response_period"].values[k]))
 
 
 def _points(

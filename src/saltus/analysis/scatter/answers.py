@@ -109,7 +109,7 @@ def steady(
     reached, responses = motions.kind.reshape(grid.places, count), list[TrackedResponse]()
     if complete:
         try:
-            responses, reached = tell_apart(map_, motions, count, stage(progress, 0.8, 1.0))
+            responses, reached = tell_apart(map_, found, count, stage(progress, 0.8, 1.0))
         except KeyboardInterrupt:
             complete = False
     if not complete:  # what each start reaches is known by its numbers, not by its response

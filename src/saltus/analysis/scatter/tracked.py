@@ -14,7 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from saltus.analysis.attractors.find_responses import SettledMotions, motion_range
+from saltus.analysis.attractors.find_responses import motion_range
+from saltus.analysis.attractors.grid_responses import GridResponses
 from saltus.analysis.closed.motions import ClosedMotion, ClosedMotions
 from saltus.analysis.closed.orbits import find_orbits
 from saltus.analysis.solve.tolerances import SAME
@@ -137,7 +138,7 @@ def _track(
 
 def tell_apart(
     map_: Stroboscope,
-    motions: SettledMotions,
+    settled: GridResponses,
     starts: int,
     progress: Callable[[float], None] | None,
 ) -> tuple[list[TrackedResponse], np.ndarray]:
@@ -151,8 +152,8 @@ def tell_apart(
     ----------
     map_ : Stroboscope
         By an exact method, with a row for each set.
-    motions : SettledMotions
-        Of each start in each set: row set * starts + start.
+    settled : GridResponses
+        Motions of each start in each set: row set * starts + start.
     starts : int
         Number of starts.
     progress : callable, optional
@@ -164,6 +165,7 @@ def tell_apart(
     reached : int64[sets, starts]
         The response, OTHER, or a code of Kind below zero.
     """
+    motions = settled.motions
     label = np.where(motions.kind < 0, motions.kind, OTHER)
     of = np.repeat(np.arange(len(map_)), starts)
     open_, found = motions.kind >= 0, list[TrackedResponse]()
