@@ -76,7 +76,7 @@ class Piece:
     multipliers: np.ndarray
     events: list[Event] = field(default_factory=list, kw_only=True)
     unexplained: list[int] = field(default_factory=list, kw_only=True)
-    #: Whether multipliers are those of the equations that are followed, which events then explain.
+    #: True if multipliers are those of the equations that are followed, which events then explain.
     audited: ClassVar[bool] = True
 
     @property

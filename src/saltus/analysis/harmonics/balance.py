@@ -133,7 +133,7 @@ def _refuse(system: System, reason: str) -> None:
 
 
 def _reason_against_laws(system: System) -> str:
-    """Why the motions of a system aren't balanced; empty if they are."""
+    """The reason why the motions of a system aren't balanced; empty if they are."""
     for guard in system.guards:
         if guard.law is not None and guard.law.kind == "impact":
             return (

@@ -15,7 +15,7 @@ from typing import Self
 import numpy as np
 
 from saltus.analysis.harmonics import series as fourier
-from saltus.analysis.harmonics.forces import Forces, Moving
+from saltus.analysis.harmonics.forces import DerivedState, Forces
 from saltus.analysis.harmonics.pieces import Intervals
 from saltus.analysis.harmonics.signals import States, signals_of
 from saltus.system import System
@@ -63,7 +63,7 @@ class HarmonicOrbits:
         self.count, own = len(self.source.chains), self.source.system.states
         self.size = self.count * self.series  # unknowns of a motion
         moving = {
-            own[i]: Moving(signal, times)
+            own[i]: DerivedState(signal, times)
             for signal, chain in enumerate(self.source.chains) for times, i in enumerate(chain)
         }  # fmt: skip
         self._remembered: dict[bytes, tuple[np.ndarray, Intervals]] = {}
@@ -130,7 +130,7 @@ class HarmonicOrbits:
         return self._remembered[key]
 
     def _pace(self, constants: np.ndarray) -> float:
-        """What the rates of the equations are multiplied by."""
+        """Factor of the rates of the equations."""
         return float(constants[0]) if self._timed else 1.0
 
     def points(self, z: np.ndarray) -> np.ndarray:

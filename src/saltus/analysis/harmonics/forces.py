@@ -36,7 +36,7 @@ TRIED = 16
 
 
 @dataclass(frozen=True)
-class Moving:
+class DerivedState:
     """A state of a system that is a derivative of a signal.
 
     Attributes
@@ -81,7 +81,7 @@ class Forces:
         Its guards are the boundaries; its values those of the parameters.
     forces : sequence of Expr
         What to integrate.
-    moving : mapping of str to Moving
+    moving : mapping of str to DerivedState
         The states that move with signals.
     constants : sequence of str
         The states that don't move.
@@ -92,7 +92,7 @@ class Forces:
     """
 
     def __init__(
-        self, system: System, forces: Sequence[Expr], moving: Mapping[str, Moving],
+        self, system: System, forces: Sequence[Expr], moving: Mapping[str, DerivedState],
         constants: Sequence[str], turn: float, periods: int,
     ) -> None:  # fmt: skip
         self.system, self.moving, self.constants = system, dict(moving), tuple(constants)
@@ -116,7 +116,7 @@ class Forces:
     def motion(
         self, angle: np.ndarray, signals: np.ndarray, constants: np.ndarray, rate: float
     ) -> dict[str, Any]:
-        """What expressions need at angles float64[n], but for the bits: signals float64[c, 2H + 1],
+        """Inputs of expressions at angles float64[n], but for the bits: signals float64[c, 2H + 1],
         the constants float64[e], and the angle's rate.
         """
         here = fourier.basis(angle, fourier.harmonics_of(signals.shape[1]))
@@ -304,14 +304,14 @@ def _is_linear(gap: Expr, slopes: Sequence[Expr], moving: Sequence[str]) -> bool
 
 
 def _at(about: Mapping[str, Any], k: int) -> dict[str, Any]:
-    """What expressions need at one of several angles."""
+    """Inputs of expressions at one of several angles."""
     states = {name: one[k] if np.ndim(one) else one for name, one in about["states"].items()}
     return {"t": about["t"][k], "states": states, "values": about["values"]}
 
 
 @functools.lru_cache(maxsize=64)
 def _norm(harmonics: int) -> np.ndarray:
-    """What integrals over the circle are multiplied by to be coefficients."""
+    """Factors that make coefficients of integrals over the circle."""
     norm = np.full(2 * harmonics + 1, 1.0 / np.pi)
     norm[0] *= 0.5
     return norm

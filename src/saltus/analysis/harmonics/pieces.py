@@ -26,7 +26,7 @@ MOST_SAMPLES = 2**14
 BEYOND = 10
 
 _gauss = functools.lru_cache(maxsize=512)(polynomials.gauss)
-#: What expressions need at angles float64[n], but for the bits.
+#: Inputs of expressions at angles float64[n], but for the bits.
 About = Callable[[np.ndarray], dict[str, object]]
 
 

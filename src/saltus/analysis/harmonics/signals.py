@@ -1,4 +1,4 @@
-"""What harmonic balance asks of a system: the signals that it takes as unknown series, the forces
+"""A system as harmonic balance sees it: the signals that it takes as unknown series, the forces
 along them, and the linear response of the one to the other.
 
 Of equations the signals are the states that are no derivatives of others. Of a structure they are
@@ -43,7 +43,7 @@ class Signals(Protocol):
         """
 
     def own(self, harmonics: int) -> np.ndarray:
-        """What the amplitudes of the signals are multiplied by, float64[H + 1, c]."""
+        """Factors of the amplitudes of the signals, float64[H + 1, c]."""
 
     def states(self, signals: np.ndarray, forces: np.ndarray | None, rate: float) -> np.ndarray:
         """The states of the motion, float64[D, 2H + 1], from the signals float64[c, 2H + 1] and the
@@ -122,7 +122,7 @@ class AtContacts:
         self._plain = all(np.count_nonzero(one - np.diag(np.diag(one))) == 0 for one in parts)
 
     def _solved(self, angular: np.ndarray, right: np.ndarray) -> np.ndarray:
-        """What the coordinates are under forces complex128[h, r, m] at angular frequencies
+        """Coordinates under forces complex128[h, r, m] at angular frequencies
         float64[h] [rad/s].
         """
         at = angular[:, None, None]

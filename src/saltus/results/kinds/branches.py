@@ -181,7 +181,7 @@ def account(ds: xr.Dataset) -> list[str]:
 
 
 def _truncated(ds: xr.Dataset) -> list[str]:
-    """How far motions of a few harmonics are from exact orbits; nothing of exact ones."""
+    """Distances of motions of a few harmonics from exact orbits; nothing of exact ones."""
     if "point_error" not in ds:
         return []
     off = ds["point_error"].values

@@ -56,13 +56,13 @@ class Interfaces:
 
     @functools.cached_property
     def signals(self) -> np.ndarray:
-        """What the deflections at the contacts are of the coordinates, float64[c, r]."""
+        """Deflections at the contacts by each coordinate, float64[c, r]."""
         rows = [self.moving.along(one) for one in self._directions]
         return np.reshape(rows, (len(rows), len(self.moving.names)))
 
     @functools.cached_property
     def forced(self) -> np.ndarray:
-        """What the rates of :attr:`system` push in the coordinates: the contacts, then the drives,
+        """Pushes of the rates of :attr:`system` in the coordinates: the contacts, then the drives,
         float64[c + d, r].
         """
         drives = [self.moving.load(one) for one in self.loads.along]
