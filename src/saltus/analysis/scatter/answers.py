@@ -16,7 +16,8 @@ from saltus.analysis.attractors.grid import Grid
 from saltus.analysis.attractors.grid_responses import find
 from saltus.analysis.inputs.outputs import Outputs
 from saltus.analysis.scatter.sets import Design
-from saltus.analysis.scatter.tracked import TrackedResponse, tell_apart
+from saltus.analysis.scatter.tracked import SCATTERED, TrackedResponse, tell_apart
+from saltus.analysis.solve.tolerances import SAME
 from saltus.errors import ParameterError, shown
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
@@ -106,10 +107,11 @@ def steady(
     exact = method if method.exact else method.companion()
     map_ = Stroboscope(grid.system, exact, grid.rows, grid.every, threads)
     motions, complete = found.motions, found.complete
+    apart = SAME if method.exact else SCATTERED
     reached, responses = motions.kind.reshape(grid.places, count), list[TrackedResponse]()
     if complete:
         try:
-            responses, reached = tell_apart(map_, found, count, stage(progress, 0.8, 1.0))
+            responses, reached = tell_apart(map_, found, count, apart, stage(progress, 0.8, 1.0))
         except KeyboardInterrupt:
             complete = False
     if not complete:  # what each start reaches is known by its numbers, not by its response

@@ -18,7 +18,6 @@ from saltus.analysis.attractors.find_responses import motion_range
 from saltus.analysis.attractors.grid_responses import GridResponses
 from saltus.analysis.closed.motions import ClosedMotion, ClosedMotions
 from saltus.analysis.closed.orbits import find_orbits
-from saltus.analysis.solve.tolerances import SAME
 from saltus.flow.maps import Stroboscope
 from saltus.results.dataset.kinds import Kind
 
@@ -32,6 +31,8 @@ PASSES = 3
 FARTHEST = 0.1
 #: Most responses that are told apart: each is followed to all sets.
 MOST_RESPONSES = 24
+#: Distance of an orbit of a method with errors from the exact one, at most, in its ranges.
+SCATTERED = 0.01
 #: Number of a response beyond these.
 OTHER = -5
 
@@ -140,6 +141,7 @@ def tell_apart(
     map_: Stroboscope,
     settled: GridResponses,
     starts: int,
+    apart: float,
     progress: Callable[[float], None] | None,
 ) -> tuple[list[TrackedResponse], np.ndarray]:
     """The responses that starts reach in any of the sets, and which one each start reaches.
@@ -156,6 +158,8 @@ def tell_apart(
         Motions of each start in each set: row set * starts + start.
     starts : int
         Number of starts.
+    apart : float
+        Distance at which two orbits are one, in ranges of the motion.
     progress : callable, optional
         Gets the share done.
 
@@ -169,7 +173,6 @@ def tell_apart(
     label = np.where(motions.kind < 0, motions.kind, OTHER)
     of = np.repeat(np.arange(len(map_)), starts)
     open_, found = motions.kind >= 0, list[TrackedResponse]()
-    tolerance = np.maximum(SAME, 4.0 * map_.noise_of(motions.scale))
     while open_.any() and len(found) < MOST_RESPONSES:
         row = int(np.argmax(open_))
         kind, n = Kind(int(motions.kind[row])), int(motions.orbits.period[row])
@@ -183,7 +186,7 @@ def tell_apart(
             rows = np.flatnonzero(alike & (motions.orbits.period == n))
             near = orbits.distance(motions.orbits.points[rows, 0], motions.scale[rows], of[rows])
             alike = np.zeros(len(alike), bool)
-            alike[rows] = near <= tolerance[rows]
+            alike[rows] = near <= apart
             alike[row] = True
         label[alike], open_ = len(found), open_ & ~alike
         exists[of[alike]] = True
