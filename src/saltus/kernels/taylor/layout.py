@@ -133,6 +133,8 @@ KEPT = 2.0**-30
 #: Value of `fresh` for a ridden boundary, if contacts have laws: one zero is known, and a motion
 #: that leaves it does so at once.
 RIDDEN = 1.25
+#: Said of the margin of a surface that begins to be held where it was at rest: nothing jumps.
+AT_REST = -1.0
 #: Side of a guard on whose boundary the state is known to be, as `gaps` gets it.
 KNOWN = 2.0
 #: Rounds of flips at one instant before the contact is given up as sliding (EVENTS.md, rule 6).
