@@ -477,6 +477,8 @@ def hold(lanes, lane, batch, g, later, known, slow):
     now = time_of_law(lanes, lane, batch)
     mode = mode_of(lanes, lane) & ~(1 << h)
     settle(now, slow.state, batch.param[who * batch.stride], slow.held, mode, g)
+    if TANGENT and LAW[g] == IMPACT_LAW:
+        settle_held(lanes, lane, batch, now, slow)
     for i in range(NSTATES):
         lanes.y[i, lane] = slow.state[i]
     if LAW[g] == IMPACT_LAW:
@@ -485,6 +487,29 @@ def hold(lanes, lane, batch, g, later, known, slow):
     if LAW[g] == IMPACT_LAW:
         gaps_here(lanes, lane, batch, slow)
         ask_for_paradox(lanes, lane, g, slow)
+
+
+@kernel
+def settle_held(lanes, lane, batch, now, slow):
+    """Bring the tangent in slow.state onto the constraints of all stops at rest, where one begins
+    to be held. What one of them takes off changes the velocities of others: all are asked in turn,
+    until nothing changes.
+    """
+    held, mode = 0, mode_of(lanes, lane)
+    for g in range(NGUARDS):
+        held += LAW[g] == IMPACT_LAW and lanes.side[PARTNER[g], lane] > 0.0
+    first, change, rounds = 0.0, math.inf, 0
+    while held > 1 and change > SETTLED * first and rounds < MOST_SETTLED:
+        for i in range(NSTATES):
+            lanes.probe_y[i, lane] = slow.state[i]
+        change, rounds = 0.0, rounds + 1
+        for g in range(NGUARDS):
+            if LAW[g] == IMPACT_LAW and lanes.side[PARTNER[g], lane] > 0.0:
+                p = batch.param[lanes.memo[lane, WHO] * batch.stride]
+                settle(now, slow.state, p, slow.held, mode & ~(1 << PARTNER[g]), g)
+        for i in range(NMOVED, NSTATES):
+            change += abs(slow.state[i] - lanes.probe_y[i, lane])
+        first = max(first, change)
 
 
 # -- friction of contacts --------------------------------------------------------------------------

@@ -109,6 +109,9 @@ SLOW_START = 1.0e-9
 #: Part of the first closing velocity at which successive impacts of one instant have ended for
 #: good; landings at one instant after which the rest is taken at once.
 CLOSED, MOST_STRIKES = 1.0e-16, 50
+#: Part of the largest change at which the tangent has settled on the constraints of all stops at
+#: rest; rounds at most.
+SETTLED, MOST_SETTLED = 1.0e-13, 1000
 #: Duration of a flight that the clock can't resolve, over the time.
 SHORTEST_FLIGHT = 2.0e-16
 #: Places of `slow.out` where a jump finds DATED and DATES (codegen/saltation.py).
