@@ -21,6 +21,25 @@ COLOURS = """starts => {
     const first = 4 * (row * at.width + column);
     return [...data.slice(first, first + 3)];
   }) }"""
+#: How much longer the script of a draw takes than that of one plain path through its samples: the
+#: quickest of rounds that take turns, so that load weighs on both.
+DRAWN = """(() => {
+  const { history, motion } = explorer, y = motion.sample('x');
+  const c = new OffscreenCanvas(800, 200).getContext('2d');
+  const path = () => {
+    c.beginPath();
+    for (let i = 0; i < y.length; i++) c.lineTo(i * 800 / y.length, 100 + 1e5 * y[i]);
+    c.stroke();
+  };
+  const took = what => {
+    const begun = performance.now();
+    for (let k = 0; k < 10; k++) what();
+    return performance.now() - begun;
+  };
+  const rounds = [...Array(9)].map(() => [took(() => history.paint()), took(path)]);
+  const [draw, plain] = [0, 1].map(i => Math.min(...rounds.map(round => round[i])));
+  return draw / plain;
+})()"""
 #: Panels whose words of values don't agree with their numbers.
 WRONG = """[...document.querySelectorAll('.panel.stale')].filter(
   panel => panel.querySelector('.of').textContent === '').map(panel => panel.id)"""
@@ -75,6 +94,10 @@ def test_a_click_shows_the_motion_of_simulate(seen, rig):
     assert float(rows.first.locator("td").nth(1).inner_text()) == pytest.approx(times[0], abs=1e-7)
     assert f"{len(times)} contacts" in seen.text("#motion-what")
     assert "settles to" in seen.text("#motion-what")
+
+
+def test_a_draw_is_as_quick_as_a_few_paths(seen):
+    assert seen.get(DRAWN) < 4  # one, measured
 
 
 def test_a_dragged_slider_is_followed_and_every_panel_says_of_which_values_it_is(seen):
@@ -199,4 +222,24 @@ def test_methods_are_compared_in_the_history_and_in_words(seen, rig):
     )
     assert np.array_equal(np.float32(other), run["x"].values.astype(np.float32))
     assert "hey part by" in seen.text("#motion-what") or "hey agree" in seen.text("#motion-what")
+    (a, b, c, d), n = seen.get("explorer.view.box"), seen.get("explorer.view.size[0]")
+    axes = {"x": (a, b, n), "v": (c, d, n)}
+    maps = [sl.basins(rig, **axes, method=method) for method in (None, sl.ODE45(1e-4, 1e-7))]
+    agreement = sl.compare(*maps)["agreement"].values
+    shown = seen.get("[...explorer.map.agreement.sheet.label]")
+    assert shown == agreement.ravel().tolist()
+    inner = np.argwhere(np.isin(agreement[1:-1, 1:-1], (0, 1))) + 1
+    at = np.stack([np.linspace(a, b, n)[inner[:, 0]], np.linspace(c, d, n)[inner[:, 1]]], axis=1)
+    looks = {0: (0xD5, 0x5E, 0x00), 1: (0xE4, 0xE4, 0xE4)}
+    colours = seen.get(COLOURS, at.tolist())
+    known = [
+        (looks[int(agreement[tuple(cell)])], colour)
+        for cell, colour in zip(inner, colours, strict=True)
+        if colour
+    ]
+    assert {wanted for wanted, _ in known} == set(looks.values())
+    assert all(np.abs(np.subtract(wanted, colour)).max() <= 1 for wanted, colour in known)
+    assert "lead to the same attractor" in seen.text("#map-under")
     seen.keep("compare")
+    seen.page.click("#map-differ")
+    assert seen.get("explorer.map.agreement") is None

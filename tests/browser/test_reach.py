@@ -4,6 +4,7 @@ line is lost.
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from explorer_page import small
@@ -80,6 +81,16 @@ def test_the_map_is_moved_by_keys(seen):
     seen.page.keyboard.press("0")
     seen.rest()
     assert seen.get("explorer.view.box") == box
+    views = []
+    for key in ("Shift+ArrowRight", "Shift+ArrowUp"):
+        seen.page.keyboard.press(key)
+        seen.rest()
+        views.append(seen.get("explorer.map.sheet.box"))
+    first, second = (
+        [np.linspace(*view[i : i + 2], 40) for i in (0, 2)] for view in views
+    )  # panned views share their starts to the bit
+    assert np.array_equal(first[0], second[0])
+    assert np.array_equal(first[1][4:], second[1][:-4])
     seen.page.keyboard.press("f")
     assert seen.get("document.getElementById('map').classList.contains('whole')")
     seen.page.keyboard.press("f")
@@ -124,7 +135,7 @@ def test_a_lost_line_is_said_and_tried_again(see, explored):
 
         page.route_web_socket(lambda address: address.endswith("/socket"), route)
 
-    seen = see(small(explored), before=hold)
+    seen = see(small(explored), before=hold, hurried=False)
     line, server = lines[-1]
     server.close()
     line.close(code=1012)

@@ -51,6 +51,7 @@ export interface About extends Head {
   hue_shades: number[][][];
   codes: Record<string, string>;
   code_colors: Record<string, number[]>;
+  agreement_colors: Record<string, number[]>;
   contact_kinds: string[];
   models: { name: string; words: string }[] | null;
 }

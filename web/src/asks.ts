@@ -2,7 +2,7 @@
 import { isOutput, states } from "./about";
 import type { Explorer } from "./explorer";
 import type { Question } from "./link";
-import { Sheet } from "./sheets";
+import { Agreement, Sheet } from "./sheets";
 
 /** Milliseconds of rest before a start is settled; between two coarse maps of a drag. */
 export const SETTLE = 300;
@@ -51,6 +51,7 @@ export class Asks {
     return {
       motion: this.motionFields(),
       map: this.mapFields(),
+      ...(this.of.view.against ? { agreement: { ...this.mapFields(), against: this.of.view.against } } : {}),
       ...(this.of.view.over ? { responses: this.responseFields() } : {}),
     };
   }
@@ -146,7 +147,7 @@ export class Asks {
     if (sheet.done) {
       this.of.link.tell("stop", { of: "map" });
       this.of.status.say(this.of.answers.mapText());
-      return;
+      return this.askAgreement();
     }
     this.of.begun = performance.now();
     this.of.status.say(this.of.answers.mapText());
@@ -155,5 +156,16 @@ export class Asks {
       this.of.maps.clear();
       this.of.maps.set(id, sheet);
     }
+  }
+  /** Of a map that is finished: where a second method leads elsewhere. */
+  askAgreement(): void {
+    const sheet = this.of.map.sheet,
+      against = this.of.view.against;
+    if (this.of.agreeing) this.of.link.tell("stop", { of: "map" });
+    this.of.agreeing = null;
+    if (!against || !sheet?.done || (sheet.agreement?.against === against && sheet.agreement.done)) return this.of.answers.legend();
+    sheet.agreement = new Agreement(against, sheet);
+    const id = this.of.link.ask("agreement", { ...this.mapFields(), against });
+    if (id >= 0) this.of.agreeing = { id, sheet };
   }
 }

@@ -10,10 +10,11 @@ import type { Arrays, Head, Link } from "./link";
 import { BasinMap } from "./map";
 import type { Motion } from "./motion";
 import { Phase } from "./phase";
+import { RangeFields } from "./range";
 import { Responses } from "./responses";
 import { SaveSheet } from "./save";
 import { Sheet } from "./sheets";
-import { type Box, firstView, fromAddress, startOf, toAddress, Undo, type View } from "./state";
+import { type Box, firstView, fromAddress, snapped, startOf, toAddress, Undo, type View } from "./state";
 import { Values } from "./values";
 import { $, differing, marked, only, type Says, type Status } from "./words";
 
@@ -43,13 +44,18 @@ export class Explorer {
   readonly save: SaveSheet;
   readonly asks = new Asks(this);
   readonly answers = new Answers(this);
+  readonly range = new RangeFields(this);
   motion: Motion | null = null;
   maps = new Map<number, Sheet>();
+  agreeing: { id: number; sheet: Sheet } | null = null;
   undo: Undo;
   orbit: Head | null = null;
   settled: Head | null = null;
   timers: Record<string, number> = {};
   kept = "";
+  keptView: View;
+  moves = false;
+  slid = "";
   dragging = false;
   dragged = "";
   heard = 0;
@@ -88,7 +94,7 @@ export class Explorer {
           { start: { ...this.view.start, [this.view.axes[0]]: at[0], [this.view.axes[1]]: at[1] }, orbit: null },
           { drag: !done },
         ),
-      view: (box, done) => this.go({ box }, { drag: !done }),
+      view: (box, done) => this.go({ box: done ? snapped(box, this.view) : box }, { drag: !done }),
       hover: (where, at, sheet) => this.answers.hover(where, at, sheet),
       settle: () => this.asks.settleNow(),
     });
@@ -112,6 +118,7 @@ export class Explorer {
       fields => this.link.ask("save", { ...fields, view: this.asks.shownView() }),
       () => this.address(),
       () => this.answers.mapText(),
+      () => this.view.against !== "",
     );
     this.undo = new Undo(
       view => this.go(view, { past: true }),
@@ -129,8 +136,10 @@ export class Explorer {
     });
     this.show();
     this.kept = toAddress(this.view, this.first);
-    this.undo.replace(this.view, this.kept);
+    this.keptView = this.view;
     this.asks.askAll();
+    this.keep();
+    setInterval(() => this.answers.tick(), 1000);
   }
 
   // -- what is looked at ------------------------------------------------------------------------------------------------------
@@ -143,7 +152,7 @@ export class Explorer {
     this.dragging = drag;
     if (other("start", "values", "method")) this.settled = null;
     if (other("start")) this.phase.over(null);
-    if (other("orbit") && next.orbit === null) this.responses.chosen = -1;
+    if (other("orbit") && next.orbit === null) this.responses.unchoose();
     if (past && other("axes")) this.whole = this.wholeOf(next.axes);
     this.show();
     const values = other("values");
@@ -164,12 +173,18 @@ export class Explorer {
       this.asks.pickSheet();
       this.later("map", REST, () => this.asks.askMap());
     } else if (released) this.asks.askMap();
+    else if (other("against")) this.asks.askAgreement();
     const apart = Object.keys(next.values).some(
       name => name !== next.over && next.values[name] !== before.values[name],
     );
     if (!drag && !shown && (apart || other("over", "range", "quantity") || released)) this.asks.askResponses();
     if (!past) this.later("keep", KEEP, () => this.keep(), drag || half);
-    else this.kept = toAddress(next, this.first);
+    else {
+      this.later("keep", 0, () => {}, true);
+      this.kept = toAddress(next, this.first);
+      this.keptView = next;
+      this.moves = false;
+    }
   }
   askMotions(values: boolean, motion: boolean, start: boolean, orbit: boolean): void {
     if (values && this.view.orbit && !orbit) return this.asks.track();
@@ -191,12 +206,15 @@ export class Explorer {
   get rests(): boolean {
     return this.link.quiet && Object.keys(this.timers).every(name => name === "told") && this.motion !== null;
   }
+  /** Keep the view for undo; moves of the map one after the other are one step. */
   keep(): void {
-    const address = toAddress(this.view, this.first);
-    if (address !== this.kept) {
-      this.kept = address;
-      this.undo.push(this.view, address);
-    } else this.undo.replace(this.view, address);
+    const address = toAddress(this.view, this.first),
+      moved = JSON.stringify({ ...this.keptView, box: this.view.box }) === JSON.stringify(this.view);
+    if (address !== this.kept && !(moved && this.moves)) this.undo.push(this.view, address);
+    else this.undo.replace(this.view, address);
+    if (address !== this.kept) this.moves = moved;
+    this.kept = address;
+    this.keptView = this.view;
     this.later("told", TELL, () => this.link.tell("show", { view: this.asks.shownView() }));
   }
   address(): string {
@@ -209,6 +227,9 @@ export class Explorer {
     this.values.show(v.values, v.start);
     this.map.at = [v.start[v.axes[0]], v.start[v.axes[1]]];
     this.map.look(v.axes, v.box, this.whole);
+    this.map.against = v.differ ? v.against : "";
+    $("map-differ").hidden = v.against === "";
+    $("map-differ").setAttribute("aria-pressed", String(v.differ));
     const only = (v.orbit?.attractor as number | undefined) ?? null;
     if (only !== this.map.only) {
       this.map.only = only;
@@ -228,12 +249,7 @@ export class Explorer {
       ["quantity", v.quantity],
     ] as const)
       $<HTMLSelectElement>(id).value = value;
-    const unit = this.about.parameters.find(p => p.name === v.over)?.unit ?? "";
-    for (const [id, value] of [
-      ["range-low", v.range[0]],
-      ["range-high", v.range[1]],
-    ] as const)
-      if (document.activeElement?.id !== id) $<HTMLInputElement>(id).value = spoken(value, unit, 5);
+    this.range.show();
     if (document.activeElement?.id !== "periods") $<HTMLInputElement>("periods").value = String(v.periods);
     this.responses.now = v.values[v.over];
     this.responses.draw();
@@ -278,7 +294,7 @@ export class Explorer {
   // -- what the user does -------------------------------------------------------------------------------------------------------
   slide(name: string, value: number, done: boolean): void {
     this.values.refuse(`values.${name}`, "");
-    this.dragged = name;
+    this.dragged = this.slid = name;
     this.settled = null;
     this.status.say(`${plain(name)} ${spoken(value, this.about.parameters.find(p => p.name === name)!.unit, 5)}`);
     this.go({ values: { ...this.view.values, [name]: value } }, { drag: !done });
@@ -313,6 +329,10 @@ export class Explorer {
     this.status.say("stopped");
   }
   back(): void {
+    if (this.timers.keep) {
+      this.later("keep", 0, () => {}, true);
+      this.keep(); // what was changed just now is a step of its own
+    }
     this.values.forget();
     this.undo.undo();
   }
@@ -362,16 +382,6 @@ export class Explorer {
     $("points-scroll").hidden = !on;
     $("responses-canvas").hidden = on;
     if (on) this.responses.table($("points").querySelector("thead")!, $("points").querySelector("tbody")!, ALL_POINTS);
-  }
-  /** A range is typed with units: the desk reads it. */
-  typeRange(i: number, text: string): void {
-    const p = this.about.parameters.find(q => q.name === this.view.over)!,
-      typed = text.trim().replace("−", "-"),
-      bare = /^[-+]?[\d.,]+(e[-+]?\d+)?$/i.test(typed);
-    const range: (number | string)[] = [...this.view.range];
-    range[i] = bare && p.shown.unit ? `${typed} ${p.shown.unit}` : typed;
-    this.asks.askedValues = "";
-    this.link.ask("responses", { ...this.asks.responseFields(), range });
   }
 }
 /** A system's name without what stands in brackets behind it. */

@@ -1,7 +1,7 @@
 /** The map of basins: sheets of labels on a Canvas 2D, the start as a cross, the attractors' points; pointer and keys. */
 import { type About, type Attractor, plain, unitOf } from "./about";
 import { axisText, colours, fitted, frame, onResize, type Plot, place, type Range, scaleFor, wordsIn } from "./axes";
-import { type Place, Sheet, Sheets, colourTable } from "./sheets";
+import { type Agreement, type Place, Sheet, Sheets, codeTable, colourTable } from "./sheets";
 import type { Box } from "./state";
 
 export interface MapEvents {
@@ -27,8 +27,10 @@ export class BasinMap {
   box: Box;
   at: [number, number] = [0, 0];
   only: number | null = null;
+  against = ""; // the method whose differences are shown
   frames = 0;
   private axes: [string, string];
+  private differing: Uint32Array;
   private whole: Box;
   private asked = false;
   private plot!: Plot;
@@ -45,6 +47,7 @@ export class BasinMap {
     this.axes = Object.keys(about.axes) as [string, string];
     this.whole = [...about.axes[this.axes[0]], ...about.axes[this.axes[1]]];
     this.box = [...this.whole];
+    this.differing = codeTable(about.agreement_colors);
     onResize(canvas, () => this.draw());
     this.listen();
   }
@@ -103,9 +106,11 @@ export class BasinMap {
     if (below) this.stretch(c, p, below, OTHER_VALUES);
     for (const sheet of paler) this.stretch(c, p, sheet, OTHER_VIEW);
     if (own) this.stretch(c, p, own, 1);
+    if (this.agreement) this.stretch(c, p, this.agreement.sheet, 1, () => this.differing);
     if (own) this.points(c, p, own.attractors);
     c.restore();
-    if (!below && !paler.length && !own?.known) wordsIn(c, p, "the first starts are being followed");
+    if (!below && !paler.length && !own?.known)
+      wordsIn(c, p, own?.done ? "no attractors, no map" : "the first starts are being followed");
     frame(
       c,
       place(this.canvas, rx, ry),
@@ -125,7 +130,7 @@ export class BasinMap {
   /** Sheets to be seen where the own one has no cells: of the same values paler, of other values dimmed. */
   private beneath(): { below: Sheet | null; paler: Sheet[] } {
     const own = this.sheet;
-    if (!own || (own.covered && this.inside(own))) return { below: null, paler: [] };
+    if (!own || (own.done && !own.known) || (own.covered && this.inside(own))) return { below: null, paler: [] };
     const others = [...this.sheets].filter(s => s !== own && s.plane === own.plane && s.intersects(this.box));
     const same = JSON.stringify(own.values),
       paler = others.filter(s => JSON.stringify(s.values) === same).sort((s, t) => width(t.box) - width(s.box));
@@ -142,7 +147,13 @@ export class BasinMap {
     return p <= a + w * (b - a) && q >= b - w * (b - a) && r <= e + w * (f - e) && t >= f - w * (f - e);
   }
 
-  private stretch(c: CanvasRenderingContext2D, p: Plot, s: Sheet, alpha: number): void {
+  /** What is drawn of two methods in place of the basins. */
+  get agreement(): Agreement | null {
+    const found = this.sheet?.agreement;
+    return found && found.against === this.against && found.words.length ? found : null;
+  }
+
+  private stretch(c: CanvasRenderingContext2D, p: Plot, s: Sheet, alpha: number, colour = this.colour): void {
     const [x0, x1, y0, y1] = s.box,
       dx = (x1 - x0) / (s.n - 1) / 2,
       dy = (y1 - y0) / (s.m - 1) / 2; // a cell reaches half a step about its start
@@ -151,7 +162,7 @@ export class BasinMap {
       top = p.Y(y1 + dy),
       bottom = p.Y(y0 - dy);
     c.globalAlpha = alpha;
-    c.drawImage(s.picture(this.colour), left, top, right - left, bottom - top);
+    c.drawImage(s.picture(colour), left, top, right - left, bottom - top);
     c.globalAlpha = 1;
   }
 
@@ -295,7 +306,8 @@ export class BasinMap {
       if (!fingers.delete(e.pointerId) || fingers.size) return;
       if (this.moved < 4) {
         if (this.within([e.offsetX, e.offsetY])) {
-          this.at = this.where(e.offsetX, e.offsetY);
+          const here = this.where(e.offsetX, e.offsetY);
+          this.at = (e.shiftKey && this.sheet?.find(...here)?.at) || here;
           this.draw();
           this.events.start(this.at, true);
         }

@@ -11,6 +11,7 @@ const KINDS: [string, string, string[]][] = [
 const PARTS: [string, string][] = [
   ["motion", "motion, contacts"],
   ["map", "map"],
+  ["agreement", "differences of both methods"],
   ["responses", "responses"],
 ];
 
@@ -22,6 +23,7 @@ export class SaveSheet {
     private ask: (fields: Question) => void,
     private address: () => string,
     private known: () => string,
+    private compares: () => boolean,
   ) {}
 
   open(name: string): void {
@@ -53,9 +55,10 @@ export class SaveSheet {
       kinds.append(row(label));
     }
     for (const [value, text] of PARTS) {
+      if (value === "agreement" && !this.compares()) continue;
       const label = element("label"),
         box = element("input");
-      Object.assign(box, { type: "checkbox", name: "part", value, checked: value !== "responses" });
+      Object.assign(box, { type: "checkbox", name: "part", value, checked: value === "motion" || value === "map" });
       label.append(box, text);
       parts.append(label);
     }

@@ -3,6 +3,9 @@ import type { About, Attractor } from "./about";
 import type { Arrays } from "./link";
 import type { Box } from "./state";
 
+/** Columns of the strips along which cells are counted; a step so long goes on in the next one. */
+const STRIP = 64,
+  FAR = 255;
 /** A label and its age make a place in the table of colours: so many ages a label. */
 const AGES = 16,
   GREY = [150, 156, 162];
@@ -33,6 +36,7 @@ export class Sheet {
   words: string[] = [];
   flip = "";
   took = 0;
+  agreement: Agreement | null = null;
   dirty = true;
   private canvas: OffscreenCanvas;
   private image: ImageData;
@@ -54,6 +58,21 @@ export class Sheet {
     this.pixels = new Uint32Array(this.image.data.buffer);
   }
 
+  /** Take in cells of a level as the desk packs them: steps along strips of columns, and rows of a table of labels and ages. */
+  packed(stride: number, { step, rows, look, label, age }: Arrays): void {
+    const cell = new Uint32Array(look.length),
+      strip = rows[0] * STRIP;
+    let place = 0,
+      k = 0;
+    for (const by of step) {
+      place += by;
+      if (by === FAR) continue;
+      const within = place % strip;
+      cell[k++] = Math.floor(within / STRIP) * this.m + Math.floor(place / strip) * STRIP + (within % STRIP);
+    }
+    const of = Array.from(look);
+    this.piece(stride, { cell, label: Int8Array.from(of, i => label[i]), age: Uint8Array.from(of, i => age[i]) });
+  }
   /** Take in cells of a level: each is one start, drawn as the block about it until finer ones come. */
   piece(stride: number, cells: Arrays): void {
     const { n, m, rank, label, age } = this,
@@ -128,13 +147,37 @@ export class Sheet {
   }
 }
 
+/** Where a second method leads the starts of a map elsewhere: 1 agree, 0 differ, -1 not settled in one of them. */
+export class Agreement {
+  readonly sheet: Sheet;
+  done = false;
+  words: string[] = [];
+  constructor(
+    readonly against: string,
+    { key, values, plane, box, n, m }: Sheet,
+  ) {
+    this.sheet = new Sheet(key, values, plane, box, n, m);
+  }
+  /** Take in the starts whose indices are multiples of a stride. */
+  take(stride: number, label: Arrays[string]): void {
+    const { n, m } = this.sheet,
+      cell: number[] = [];
+    for (let i = 0; i < n; i += stride) for (let j = 0; j < m; j += stride) cell.push(i * m + j);
+    this.sheet.piece(stride, { cell: Uint32Array.from(cell), label, age: new Uint8Array(cell.length) });
+  }
+}
+
+const word = ([r, g, b]: number[]): number => (0xff000000 | (b << 16) | (g << 8) | r) >>> 0;
+/** Colours of codes, of every age. */
+export function codeTable(colours: Record<string, number[]>): Uint32Array {
+  const table = new Uint32Array(256 * AGES).fill(word(GREY));
+  for (const [code, rgb] of Object.entries(colours))
+    for (let s = 0; s < AGES; s++) table[(+code & 255) * AGES + s] = word(rgb);
+  return table;
+}
 /** Colours of labels: a table of words, one for each label and shade. `only` leaves the hue to one attractor. */
 export function colourTable(about: About, attractors: Attractor[], only: number | null): Uint32Array {
-  const table = new Uint32Array(256 * AGES),
-    word = ([r, g, b]: number[]) => (0xff000000 | (b << 16) | (g << 8) | r) >>> 0;
-  table.fill(word(GREY));
-  for (const [code, rgb] of Object.entries(about.code_colors))
-    for (let s = 0; s < AGES; s++) table[(+code & 255) * AGES + s] = word(rgb);
+  const table = codeTable(about.code_colors);
   for (const one of attractors) {
     const shades = about.hue_shades[one.hue % about.hue_shades.length];
     for (let s = 0; s < AGES; s++) {

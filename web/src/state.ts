@@ -12,6 +12,7 @@ export interface View {
   size: [number, number];
   method: string;
   against: string;
+  differ: boolean; // the map shows where the two methods lead elsewhere
   periods: number;
   over: string;
   range: Range;
@@ -26,6 +27,30 @@ const finite = (v: unknown): v is number => typeof v === "number" && Number.isFi
 /** A start in the coordinates of a map's axes; what isn't known is zero. */
 export const startOf = (about: About, axes: [string, string], known: Record<string, number>): Record<string, number> =>
   Object.fromEntries(coordinates(about, axes).map(name => [name, known[name] ?? 0]));
+
+/** Bits of the step between starts of a panned view, at most; all of a start's. */
+const STEP_BITS = 20,
+  BITS = 52;
+/** A view as wide as the one before, moved so little that its starts are multiples of their step to the bit: what it shares with
+ *  other such views the desk takes from these. */
+export function snapped(box: Box, { box: before, size }: View): Box {
+  const out = [...box] as Box;
+  for (const [i, n] of [
+    [0, size[0]],
+    [2, size[1]],
+  ]) {
+    const [a, b] = [box[i], box[i + 1]],
+      wide = b - a;
+    if (Math.abs(wide - (before[i + 1] - before[i])) > 1e-6 * wide) return box;
+    const step = wide / (n - 1),
+      far = Math.ceil(Math.log2(Math.max(Math.abs(a), Math.abs(b)) / step + 1)),
+      unit = 2 ** (Math.floor(Math.log2(step)) - Math.min(STEP_BITS, BITS - far));
+    const exact = Math.round(step / unit) * unit;
+    out[i] = Math.round(a / exact) * exact;
+    out[i + 1] = out[i] + (n - 1) * exact;
+  }
+  return out;
+}
 
 /** What the phase portrait shows at first: of sensors one and its rate, where there is one. */
 function firstPhase(about: About): [string, string] {
@@ -52,6 +77,7 @@ export function firstView(about: About): View {
     size: [...about.size],
     method: about.method,
     against: "",
+    differ: true,
     periods: 60,
     over: response?.parameter ?? "",
     range: response?.range ?? [0, 1],
@@ -103,6 +129,7 @@ export function fromAddress(text: string, first: View, about: About): { view: Vi
     box: v => numbers(4)(v) && (v as Box)[0] < (v as Box)[1] && (v as Box)[2] < (v as Box)[3],
     method: oneOf(about.methods),
     against: oneOf(["", ...about.methods]),
+    differ: v => typeof v === "boolean",
     periods: v => finite(v) && v >= 1 && v <= 1e6 && v % 1 === 0,
     over: oneOf(about.parameters.map(p => p.name)),
     range: v => numbers(2)(v) && (v as Range)[0] < (v as Range)[1],

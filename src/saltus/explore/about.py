@@ -9,12 +9,13 @@ import numpy as np
 
 from saltus.analysis.basins.labels import OPEN
 from saltus.explore.frames import Answer
-from saltus.explore.opening import STEPS, Opening, choices
-from saltus.flow.methods import METHODS, Modal
+from saltus.explore.opening import STEPS, Opening, choices, first_quantity
+from saltus.flow.methods import METHODS
+from saltus.flow.modal import Modal
 from saltus.kernels import status as st
 from saltus.models import describe
 from saltus.plot.palette import hues, shades
-from saltus.plot.unsettled import UNSETTLED, Unsettled
+from saltus.plot.unsettled import AGREEMENT, UNSETTLED, Unsettled
 from saltus.results.dataset.kinds import Kind
 from saltus.system import System, gap_units
 from saltus.units import from_si, to_si
@@ -35,6 +36,7 @@ def about_answer(opening: Opening) -> Answer:
     about_ranges = {**opening.box, **opening.axes}
     largest = {name: max(map(abs, ends)) for name, ends in about_ranges.items()}
     first = system.outputs.names if system.outputs.first else tuple(opening.axes)
+    first = tuple(dict.fromkeys((first_quantity(system), *first)))
     units = [system.units[name] for name in system.states]
     quantities = [
         {"name": name, "unit": unit, "kind": "state", "shown": shown_as(unit, largest.get(name))}
@@ -83,9 +85,8 @@ def about_answer(opening: Opening) -> Answer:
         "hues": _bytes(colors),
         "hue_shades": _bytes(shades(colors, SHADES)),
         "codes": {str(int(code)): one.label for code, one in CODES.items()},
-        "code_colors": {
-            str(int(code)): list(bytes.fromhex(one.color[1:])) for code, one in CODES.items()
-        },
+        "code_colors": _colours(CODES),
+        "agreement_colors": _colours(AGREEMENT),
         "contact_kinds": [st.CONTACT_KIND[i] for i in range(len(st.CONTACT_KIND))],
         "words": [],
         "models": None,
@@ -129,6 +130,10 @@ def _parameter(opening: Opening, name: str) -> dict[str, Any]:
         "least": 0.0 if positive else None,
         "most": None,
     }
+
+
+def _colours(looks: Mapping[int, Unsettled]) -> dict[str, list[int]]:
+    return {str(int(code)): list(bytes.fromhex(one.color[1:])) for code, one in looks.items()}
 
 
 def _bytes(colors: np.ndarray) -> list[Any]:

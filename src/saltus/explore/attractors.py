@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, TypeAlias
 
@@ -25,6 +25,8 @@ from saltus.results.dataset.kinds import Kind
 from saltus.results.dataset.schema import kind_text
 
 Attractor: TypeAlias = ClosedMotion | SampledMotion
+#: Attractors with their hues, and all hues of the branches that they lie on.
+Branches: TypeAlias = Callable[[], tuple[Sequence[tuple["Attractor", int]], set[int]]]
 #: Two orbits of neighbouring values are one response if they are nearer than this share of the box.
 NEIGHBOUR = 0.25
 #: An equilibrium nearer to zero than this share of the box is there.
@@ -50,8 +52,9 @@ class Legend:
         Range of each state.
     before : Legend, optional
         Those of the values shown before.
-    branches : sequence of (ClosedMotion, int), optional
-        Orbits at these values that lie on branches with a hue.
+    branches : callable, optional
+        Gives attractors at these values that lie on branches with a hue, with it, and hues that
+        other stretches of these branches have.
     """
 
     def __init__(
@@ -59,7 +62,7 @@ class Legend:
         map_: Stroboscope,
         scale: np.ndarray,
         before: Legend | None = None,
-        branches: Sequence[tuple[ClosedMotion, int]] = (),
+        branches: Branches | None = None,
     ) -> None:
         self.map, self.scale = map_, scale
         self.found = AttractorSet(Neighbourhoods.none(len(map_.states)))
@@ -71,7 +74,7 @@ class Legend:
         self._before = (
             [] if before is None else list(zip(before._members, before._hues, strict=True))
         )
-        self._before += branches
+        self._branches = branches or (lambda: ([], set()))
         self._old = None if before is None else before.found
         self._followed = False
 
@@ -96,12 +99,12 @@ class Legend:
         with self.lock:
             found = self._joined(found)
             fresh = [one for one in found.every if self._key(one) is None]
+            if list(map(id, found.every)) != list(map(id, self.found.every)):
+                self._table = None  # its rows are by ids
             self.found = found
             fresh = fresh[: MOST - len(self._members)]
             self._hues += self._hues_of(fresh)
             self._members += fresh
-            if fresh:
-                self._table = None
             return bool(fresh)
 
     def _joined(self, found: AttractorSet) -> AttractorSet:
@@ -124,11 +127,18 @@ class Legend:
             keys = [self._key(one) for one in (found or self.found).every]
         return np.array([-1 if key is None else key for key in keys], np.int64)
 
-    def members(self) -> list[tuple[int, ClosedMotion]]:
-        """Those that repeat after whole periods, by their keys."""
+    def nearest(self, other: Attractor) -> list[tuple[float, int]]:
+        """Distance of each attractor from one at these values, in ranges of the states, and its
+        hue.
+        """
         with self.lock:
-            every = enumerate(self._members)
-            return [(key, one) for key, one in every if isinstance(one, ClosedMotion)]
+            every = zip(self._members, self._hues, strict=True)
+            return [(_distance(one, other, self.scale), hue) for one, hue in every]
+
+    def hues(self) -> set[int]:
+        """All hues that are taken."""
+        with self.lock:
+            return set(self._hues)
 
     def closed(self, key: int) -> ClosedMotion | None:
         """The attractor of a key, closed by Newton's method; None if there is none, or it never
@@ -148,10 +158,6 @@ class Legend:
         about = provenance(system, self.map.method, system.values)
         with self.lock:
             return attractors_dataset(subject(system, about), portraits(self.map, self.found))
-
-    def hue(self, key: int) -> int:
-        """The number of its hue."""
-        return self._hues[key]
 
     def table(self) -> list[dict[str, Any]]:
         """All of them in words and numbers, by their keys."""
@@ -208,17 +214,21 @@ class Legend:
         """The hues of new attractors: each that of the nearest one of the values shown before, else
         the first that neither these nor those have.
         """
+        if not fresh:
+            return []
+        branches, reserved = self._branches()
+        before = [*self._before, *branches]
         near = [
             (_distance(one, other, self.scale), i, hue)
             for i, one in enumerate(fresh)
-            for other, hue in self._before
+            for other, hue in before
         ]
         taken, found = set(self._hues), dict[int, int]()
         for apart, i, hue in sorted(near):
             if apart < NEIGHBOUR and i not in found and hue not in taken:
                 found[i] = hue
                 taken.add(hue)
-        kept = taken | {hue for _, hue in self._before}
+        kept = taken | reserved | {hue for _, hue in before}
         free = iter(sorted(set(range(len(kept) + len(fresh))) - kept))
         return [found[i] if i in found else next(free) for i in range(len(fresh))]
 
@@ -253,4 +263,5 @@ def _distance(one: Attractor, other: Attractor, scale: np.ndarray) -> float:
         return np.inf
     if isinstance(one, ClosedMotion) and isinstance(other, ClosedMotion):
         return orbit_distance(one.points, other.points, scale)
-    return float(np.abs((one.points.mean(axis=0) - other.points.mean(axis=0)) / scale).max())
+    few, many = sorted((one.points, other.points), key=len)
+    return float(np.abs((few[:, None] - many) / scale).max(axis=2).min(axis=1).mean())

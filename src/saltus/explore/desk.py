@@ -6,6 +6,7 @@ import threading
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,13 +21,21 @@ from saltus.explore.about import about_answer, models_answer
 from saltus.explore.attractors import Legend
 from saltus.explore.frames import Answer, Emit
 from saltus.explore.kept_responses import KeptResponses
-from saltus.explore.map import KeptMaps, grow_map, look, plan_of_map
+from saltus.explore.map import KeptMap, KeptMaps, grow_map, look, plan_of_map
 from saltus.explore.motion import AskedRun, motion
-from saltus.explore.opening import Opening
-from saltus.explore.orbits import MOST_PERIODS, attractor_orbit, orbit_of, settle, tracked
+from saltus.explore.opening import Opening, first_quantity
+from saltus.explore.orbits import (
+    MOST_PERIODS,
+    attractor_orbit,
+    nowhere,
+    orbit_of,
+    settle,
+    tracked,
+)
 from saltus.explore.questions import QuestionError, about
 from saltus.flow.methods import METHODS, Method
 from saltus.system import System
+from saltus.system.volume import nothing_attracts
 from saltus.units import from_si, to_si
 
 #: Quantities that are sent of each motion unless others are named: states, and outputs.
@@ -74,6 +83,9 @@ class Desk:
         Interrupted
             If the work is asked to stop (:class:`saltus.interrupt.Stop`).
         """
+        if isinstance(question, asked.AgreementQuestion):
+            self._agree(question, emit)
+            return
         if isinstance(question, asked.MapQuestion):
             self._map(question, emit)
             return
@@ -156,16 +168,41 @@ class Desk:
         return {**head, "ms": 1e3 * (time.thread_time() - begun)}, arrays
 
     def _map(self, question: asked.MapQuestion, emit: Emit) -> None:
-        system, method = self.system_at(question.values), self.method_of(question.method)
-        plan = plan_of_map(question, system, method)
-        grow_map(plan, self.legend_at(plan), self.maps, emit, question.coarse, self.threads)
+        self.grown(
+            self.plan_of_question(question, question.method, "method"), emit, question.coarse
+        )
+
+    def plan_of_question(
+        self, question: asked.MapQuestion, method: str | None, field: str
+    ) -> BasinPlan:
+        """The map that a question is about, by a method."""
+        system, by = self.system_at(question.values), self.method_of(method, field)
+        if why := nothing_attracts(system):
+            raise QuestionError(f"{why} A map shows attractors.")
+        return plan_of_map(question, system, by)
+
+    def grown(self, plan: BasinPlan, emit: Emit, coarse: bool = False) -> KeptMap:
+        """Grow a map, beside those that are known, and return it."""
+        return grow_map(plan, self.legend_at(plan), self.maps, emit, coarse, self.threads)
+
+    def _agree(self, question: asked.AgreementQuestion, emit: Emit) -> None:
+        from saltus.explore.agreement import agree
+
+        agree(
+            self.plan_of_question(question, question.method, "method"),
+            self.plan_of_question(question, question.against, "against"),
+            self.grown,
+            self.maps,
+            emit,
+        )
 
     def _settle(self, question: asked.Settle) -> Answer:
         system, method = self.system_at(question.values), self.method_of(question.method)
+        start = self.start_of(system, question.start)
+        if why := nothing_attracts(system):
+            return nowhere(system, why)
         known = self.legend_at(self.plan_of(system, method))
-        return settle(
-            known, self.start_of(system, question.start), method, self.quantities_of(None)
-        )
+        return settle(known, start, method, self.quantities_of(None))
 
     def _orbit(self, question: asked.OrbitQuestion) -> Answer:
         system, method = self.system_at(question.values), self.opening.method
@@ -215,13 +252,15 @@ class Desk:
             system.parameter_text(question.parameter)
         with about("range"):
             limits = range_of(system, question.parameter, question.range)
+        quantity = self.quantities_of((question.quantity or first_quantity(system),))[0]
+        along = [system.with_values(**{question.parameter: one}) for one in limits]
+        if all(reasons := [nothing_attracts(one) for one in (system, *along)]):
+            raise QuestionError(f"{reasons[0]} Responses are followed from attractors.")
         known = self.legend_at(plan := self.plan_of(system, method))
-        first = system.outputs.names if system.outputs.first else system.states
-        quantity = self.quantities_of((question.quantity or first[0],))[0]
         look(plan, known, self.threads)
         respond(
             known, method, question.parameter, limits, quantity, plan,
-            self.responses, emit, self.threads,
+            self.responses, emit, self.threads, lambda: self._beside(known, question.parameter),
         )  # fmt: skip
 
     def _save(self, question: asked.Save) -> Answer:
@@ -260,11 +299,29 @@ class Desk:
             if key not in self._known:
                 before = next(reversed(self._known.values()), None)
                 scale = self.plan_of(plan.system, plan.method).scale
-                branches = self.responses.orbits_at(plan.system)
+                branches = partial(self.responses.orbits_at, plan.system)
                 legend = Legend(plan.map(1), scale, before, branches)
                 keep(self._known, key, legend, KEPT_VALUES)
             self._known.move_to_end(key)
             return self._known[key]
+
+    def _beside(self, known: Legend, parameter: str) -> list[Legend]:
+        """Attractors at these values, then those at other values of one parameter, the newest
+        first.
+        """
+        mine, method = known.map.system.values, known.map.method
+        with self._lock:
+            others = [one for one in reversed(self._known.values()) if one is not known]
+        return [known] + [
+            one
+            for one in others
+            if one.map.method == method
+            and all(
+                mine[name] == value
+                for name, value in one.map.system.values.items()
+                if name != parameter
+            )
+        ]
 
     def period_of(self, system: System) -> float:
         """The forcing period at these values; without forcing the turn of the opening [s]."""

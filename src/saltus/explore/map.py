@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -26,6 +27,7 @@ from saltus.analysis.basins.levels import stride_of
 from saltus.analysis.basins.pipeline import BasinPlan, basin_plan
 from saltus.errors import counted
 from saltus.explore.attractors import Legend
+from saltus.explore.cells import packed_cells
 from saltus.explore.frames import Emit
 from saltus.explore.questions import MapQuestion, about
 from saltus.flow.methods import Method
@@ -40,6 +42,10 @@ KEPT = 2**26
 _CELL = 40
 #: Time between two looks whether who waits was asked to stop [s].
 LOOK = 0.1
+#: Time for which cells of fine levels are gathered, so that frames are few [s].
+GATHERED = 0.3
+#: Starts that are looked through for attractors where no map's whole sample follows at once.
+LOOKED = 64
 #: Age of a start that isn't settled.
 _NO_AGE = 255
 #: Numbers of a finished map that the page shows.
@@ -127,7 +133,7 @@ def grow_map(
     emit: Emit,
     coarse: bool,
     threads: int | None,
-) -> None:
+) -> KeptMap:
     """Emit a map as it grows: ``map-begin``, ``map-piece`` and ``map-level`` as cells settle,
     ``map-attractors`` where one is found, ``map-end``.
 
@@ -145,6 +151,7 @@ def grow_map(
             growing.grow(coarse, threads)
         else:
             growing.tell_all()
+    return kept
 
 
 @contextmanager
@@ -158,14 +165,14 @@ def _held(lock: Any) -> Iterator[None]:
         lock.release()
 
 
-def look(plan: BasinPlan, legend: Legend, threads: int | None) -> None:
-    """Look for attractors from those of the values before, and from a few starts, unless some were
-    looked through.
+def look(plan: BasinPlan, legend: Legend, threads: int | None, scouts: int = LOOKED) -> None:
+    """Look for attractors from those of the values before, and from some starts, unless as many
+    were looked through.
     """
     legend.follow()
-    if not legend.scouts:
-        legend.grow(replace(plan, scouts=FEW_SCOUTS).scout(threads, known=legend.found))
-        legend.scouts = FEW_SCOUTS
+    if legend.scouts < scouts:
+        legend.grow(replace(plan, scouts=scouts).scout(threads, known=legend.found))
+        legend.scouts = scouts
 
 
 class _Growing:
@@ -174,7 +181,8 @@ class _Growing:
     def __init__(self, kept: KeptMap, legend: Legend, emit: Emit) -> None:
         self._kept, self._legend, self._emit = kept, legend, emit
         self._whole: list[int] = []
-        self._begun = False
+        self._begun, self._known, self._told = False, 0, 0.0
+        self._waiting: dict[int, list[np.ndarray]] = {}
 
     def take_over(self, others: list[KeptMap]) -> None:
         """Take cells that other maps know."""
@@ -203,7 +211,7 @@ class _Growing:
             self._end({"coarse": True})
             return
         if not legend.follow():  # else what was known there colours the first cells
-            look(plan, legend, threads)
+            look(plan, legend, threads, FEW_SCOUTS)
         self.take_over([])
         scouted = legend.scouts >= plan.scouts
         found, _ = grow_all(
@@ -248,6 +256,7 @@ class _Growing:
 
     def _end(self, more: Mapping[str, Any]) -> None:
         """Tell that nothing follows."""
+        self._tell()
         ds, label = self._kept.dataset, self._kept.result.label
         seen = label[label != Kind.NOT_COMPUTED]
         trust = {name: None if ds is None else ds.attrs.get(name) for name in _TRUST}
@@ -262,6 +271,7 @@ class _Growing:
     # -- cells -------------------------------------------------------------------------------------
     def _take(self, news: Grown | KnownAttractors) -> None:
         if isinstance(news, KnownAttractors):
+            self._tell()
             self._kept.found = news.found
             fresh = self._legend.grow(news.found)
             if not self._begun:
@@ -269,25 +279,30 @@ class _Growing:
             elif fresh:
                 self._emit({"kind": "map-attractors", "attractors": self._legend.table()}, {})
             return
-        self._piece(news.stride, news.cells, news.known)
+        self._waiting.setdefault(news.stride, []).append(news.cells)
+        self._known = news.known
+        if news.stride >= COARSE or news.whole or time.monotonic() > self._told + GATHERED:
+            self._tell()
         if news.whole and news.stride not in self._whole:
             self._whole.append(news.stride)
             stride, shares = self._fair()
             level = {"kind": "map-level", "level": news.stride, "of": stride}
             self._emit({**level, "fractions": shares}, {})
 
+    def _tell(self) -> None:
+        """Send the cells that wait, a level at a time."""
+        waiting, self._waiting, self._told = self._waiting, {}, time.monotonic()
+        for stride, cells in sorted(waiting.items(), reverse=True):
+            self._piece(stride, np.unique(np.concatenate(cells)), self._known)
+
     def _piece(self, stride: int, cells: np.ndarray, known: int) -> None:
         result = self._kept.result
         label, periods = result.label[cells], result.periods[cells]
-        age = np.ceil(np.log2(np.maximum(periods, 1))).astype("u1")
-        keys = self._by_key(label)
+        age = np.ceil(np.log2(np.maximum(periods, 1)))
+        age = np.where(periods >= 0, age, _NO_AGE).astype("u1")
+        keys = self._by_key(label).astype("i1")
         head = {"kind": "map-piece", "level": stride, "known": known, "of": self._kept.plan.cells}
-        arrays = {
-            "cell": cells.astype("u4"),
-            "label": keys.astype("i1"),
-            "age": np.where(periods >= 0, age, _NO_AGE).astype("u1"),
-        }
-        self._emit(head, arrays)
+        self._emit(head, packed_cells(cells, keys, age, self._kept.plan.shape[1]))
 
     def _fair(self) -> tuple[int | None, list[dict[str, Any]]]:
         """The stride of the finest grid of which all levels are whole, None if there is none, and

@@ -12,12 +12,11 @@ from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.branch_table import table_of
 from saltus.analysis.branches.branches import follow_all, seeds_between
 from saltus.analysis.branches.plans import LONGEST_DOUBLED, POINTS, SWITCHES, plan_of
-from saltus.analysis.closed.motions import orbit_distance
 from saltus.analysis.inputs.outputs import outputs_of
 from saltus.errors import unknown
 from saltus.explore.attractors import Legend, pairs
 from saltus.explore.frames import Answer, Emit
-from saltus.explore.kept_responses import NO_HUE, KeptResponses, crossings
+from saltus.explore.kept_responses import NO_HUE, KeptResponses, crossings, stretches
 from saltus.explore.motion import AskedRun
 from saltus.explore.orbits import orbit
 from saltus.explore.questions import QuestionError
@@ -46,6 +45,7 @@ def respond(
     kept: KeptResponses,
     emit: Emit,
     threads: int | None,
+    beside: Callable[[], Sequence[Legend]],
 ) -> None:
     """Emit the branches of a system over a parameter: those of the known attractors first, then all
     that starts in a box lead to. Each answer replaces the one before.
@@ -61,7 +61,10 @@ def respond(
     question = (tuple(system.values.values()), method, parameter, limits, quantity)
     number = kept.number(question)
     if number is not None:
-        emit(*_answer(known, kept.get(number)[1], number, quantity, 1.0))
+        every = kept.get(number)[1]
+        if (hues := kept.hues(number)) is None:
+            kept.colour(number, hues := _hues(beside(), every))
+        emit(*_answer(known, every, hues, number, quantity, 1.0))
         return
     told = _Told(emit, parameter, limits, quantity)
     method, done = exact_method(method, system, "responses"), list[Branch]()
@@ -73,8 +76,8 @@ def respond(
         seeds = seeds_between(system, parameter, limits, known.dataset(), method=method)
         follow_all(rules, system, parameter, *seeds, done, told.between(0.0, FIRST))
         first = table_of(system, parameter, limits, done, wanted, method)
-        number = kept.put(None, system, first, _hues(known, first))
-        emit(*_answer(known, first, number, quantity, FIRST))
+        number = kept.put(None, system, first, hues := _hues([known], first, free=False))
+        emit(*_answer(known, first, hues, number, quantity, FIRST))
     seeds = seeds_between(
         system,
         parameter,
@@ -88,8 +91,8 @@ def respond(
     if not done:
         raise QuestionError(f"nothing that repeats is known for this range of {parameter}.")
     every = table_of(system, parameter, limits, done, wanted, method)
-    number = kept.put(question, system, every, _hues(known, every))
-    emit(*_answer(known, every, number, quantity, 1.0))
+    number = kept.put(question, system, every, hues := _hues(beside(), every))
+    emit(*_answer(known, every, hues, number, quantity, 1.0))
 
 
 def response_orbit(
@@ -162,13 +165,14 @@ def starts_from(known: Legend, plan: BasinPlan) -> np.ndarray:
     return np.concatenate([plan.drawn(STARTS), *(one.points[:1] for one in known.found.every)])
 
 
-def _answer(known: Legend, ds: xr.Dataset, number: int, quantity: str, share: float) -> Answer:
+def _answer(
+    known: Legend, ds: xr.Dataset, hues: np.ndarray, number: int, quantity: str, share: float
+) -> Answer:
     """Branches as the page draws them."""
     parameter = str(ds.attrs["parameter"])
     limits = [float(ds.attrs[f"parameter_{end}"]) for end in ("low", "high")]
     branch = ds["point_branch"].values
     periods = ds["branch_periods"].values
-    hue = _hues(known, ds)
     head = {
         "kind": "responses",
         "key": number,
@@ -181,8 +185,8 @@ def _answer(known: Legend, ds: xr.Dataset, number: int, quantity: str, share: fl
         "events": ds["event_kind"].values.tolist(),
         "event_guards": ds["event_guard"].values.tolist(),
         "branches": [
-            {"kind": str(kind), "period": int(n), "hue": int(color)}
-            for kind, n, color in zip(ds["branch_kind"].values, periods, hue, strict=True)
+            {"kind": str(kind), "period": int(n)}
+            for kind, n in zip(ds["branch_kind"].values, periods, strict=True)
         ],
         "words": [],
     }
@@ -192,7 +196,7 @@ def _answer(known: Legend, ds: xr.Dataset, number: int, quantity: str, share: fl
         "point_stable": ds["point_stable"].values.astype("u1"),
         "point_branch": branch.astype("u2"),
         "point_period": periods[branch].astype("u1"),
-        "point_hue": hue[branch],
+        "point_hue": hues[stretches(ds)],
         "event_parameter": ds[schema.event_name(parameter)].values,
         "event_peak": _peaks(ds, quantity, "event"),
         "event_branch": ds["event_branch"].values.astype("u2"),
@@ -215,11 +219,28 @@ def _peaks(ds: xr.Dataset, quantity: str, what: str) -> np.ndarray:
     return np.asarray(peaks, "f4")
 
 
-def _hues(known: Legend, ds: xr.Dataset) -> np.ndarray:
-    """The hue of each branch: that of the known attractor which lies on it, uint8[branch]."""
-    hues = np.full(ds.sizes["branch"], NO_HUE, "u1")
-    for branch, points in crossings(ds, known.map.system):
-        for key, one in known.members():
-            if orbit_distance(one.points, points, known.scale) < _NEAR:
-                hues[branch] = known.hue(key)
+def _hues(legends: Sequence[Legend], ds: xr.Dataset, free: bool = True) -> np.ndarray:
+    """The hue of each stretch of the branches, uint8[n]: that of the attractor which lies on it at
+    the values of one of the legends, the first that has one. With ``free`` other stretches that
+    attract have a hue of their own, the longest first, which attractors take when they are found.
+    """
+    stretch = stretches(ds)
+    hues = np.full(int(stretch.max(initial=-1)) + 1, NO_HUE, "u1")
+    for known in legends:
+        near = [
+            (apart, hue, at)
+            for at, one in crossings(ds, known.map.system)
+            for apart, hue in known.nearest(one)
+        ]
+        for apart, hue, at in sorted(near):
+            if apart < _NEAR and hues[at] == NO_HUE and hue not in hues:
+                hues[at] = hue
+    if free:
+        taken = set(hues.tolist()).union(*(known.hues() for known in legends))
+        own = iter(hue for hue in range(NO_HUE) if hue not in taken)
+        value = ds[schema.point_name(str(ds.attrs["parameter"]))].values
+        stable = ds["point_stable"].values
+        for i in sorted(set(stretch.tolist()), key=lambda i: -np.ptp(value[stretch == i])):
+            if hues[i] == NO_HUE and stable[stretch == i][1:-1].any():  # ends are at folds
+                hues[i] = next(own, NO_HUE)
     return hues

@@ -39,7 +39,7 @@ _MEDIA = {
     "mat": "application/octet-stream", "zip": "application/zip",
 }  # fmt: skip
 #: Parts of a view that can be saved.
-PARTS = ("motion", "map", "responses")
+PARTS = ("motion", "map", "agreement", "responses")
 #: One picture at a time: the settings of matplotlib are everybody's.
 _DRAWING = threading.Lock()
 
@@ -71,6 +71,8 @@ class View:
         Where the responses are looked for.
     values_tried : int
         At how many values of the parameter.
+    against : Method or None
+        That the map is compared with.
     """
 
     opening: Opening
@@ -84,6 +86,7 @@ class View:
     vary: tuple[str, float, float] | None = None
     starts: Mapping[str, list[float]] | None = None
     values_tried: int = 12
+    against: Method | None = None
 
     def units(self) -> dict[str, str]:
         """Units of states, parameters and sensors."""
@@ -133,7 +136,7 @@ def study_text(view: View, name: str) -> str:
     system, units = view.system, view.units()
     tables: dict[str, Any] = {"study": {"name": name}, "system": _system_table(view)}
     if view.method != default_method(system) or _options(view.method):
-        tables["method"] = {"name": view.method.name, **_options(view.method)}
+        tables["method"] = _method_table(view.method)
     if view.start is not None and view.length is not None:
         length = {
             key: with_unit(value, "s") if key == "t_end" else value
@@ -151,6 +154,12 @@ def study_text(view: View, name: str) -> str:
         }
         at = with_units(view.at or {}, units)
         tables["basins"] = {"axes": axes, **({"at": at} if at else {}), "periods": view.periods}
+        if view.against is not None:
+            mine, theirs = (_method_table(one) for one in (view.method, view.against))
+            tables["basins"]["map"] = [
+                {"name": view.method.name, "method": mine},
+                {"name": view.against.name, "method": theirs, "compare": view.method.name},
+            ]
     if view.vary is not None and view.starts is not None:
         parameter, low, high = view.vary
         ends = [with_unit(one, units[parameter]) for one in (low, high)]
@@ -163,7 +172,8 @@ def study_text(view: View, name: str) -> str:
         }  # fmt: skip
     text = write(tables)
     if not _is_model(system) and "rates" not in tables["system"]:
-        text = f"# saltus run {name}.toml --system FILE.py:{system.name}\n{text}"
+        own = view.opening.file or f"FILE.py:{system.name}"
+        text = f"# saltus run {name}.toml --system {own}\n{text}"
     return text
 
 
@@ -179,8 +189,7 @@ def script_text(view: View) -> str:
         lines[2:3] = ["import json", "", "import saltus as sl"]
         lines.append(f"rig = sl.System.from_dict(json.loads({data!r}))")
     if view.method != default_method(system) or _options(view.method):
-        given = ", ".join(f"{name}={value!r}" for name, value in _options(view.method).items())
-        lines.append(f"method = sl.{view.method.name}({given})")
+        lines.append(f"method = {_call(view.method)}")
         method = ", method=method"
     if view.start is not None and view.length is not None:
         length = ", ".join(f"{name}={value!r}" for name, value in view.length.items())
@@ -191,6 +200,13 @@ def script_text(view: View) -> str:
         more = f"at={dict(view.at or {})!r}, periods={view.periods}{method}"
         lines += ["", f"found = sl.basins(rig, **{axes!r}, {more})"]
         lines += ["print(sl.describe(found))", 'sl.plot.basins(found).figure.savefig("map.png")']
+        if view.against is not None:
+            more = f"at={dict(view.at or {})!r}, periods={view.periods}"
+            lines.append(
+                f"other = sl.basins(rig, **{axes!r}, {more}, method={_call(view.against)})"
+            )
+            lines += ["both = sl.compare(found, other)", "print(sl.describe(both))"]
+            lines += ['sl.plot.agreement(both)[0].figure.savefig("agreement.png")']
     if view.vary is not None and view.starts is not None:
         parameter, low, high = view.vary
         starts = {name: list(column) for name, column in view.starts.items()}
@@ -218,6 +234,8 @@ def picture(part: str, ds: xr.Dataset, view: View, ending: str) -> bytes:
             plot.history(ds, state=first, ax=ax)
         elif part == "map":
             plot.basins(ds, ax=ax)
+        elif part == "agreement":
+            plot.agreement(ds, ax=ax)
         else:
             plot.branches(ds, ax=ax)
         if part == "motion":
@@ -241,6 +259,16 @@ def _is_model(system: System) -> bool:
     """True for the equations of one of saltus's models."""
     model = MODELS.get(system.name)
     return model is not None and model().fingerprint() == system.fingerprint()
+
+
+def _call(method: Method) -> str:
+    """A method as it is written in Python."""
+    given = ", ".join(f"{name}={value!r}" for name, value in _options(method).items())
+    return f"sl.{method.name}({given})"
+
+
+def _method_table(method: Method) -> dict[str, Any]:
+    return {"name": method.name, **_options(method)}
 
 
 def _options(method: Method) -> dict[str, Any]:

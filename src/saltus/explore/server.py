@@ -28,7 +28,7 @@ from saltus.explore.questions import LONGEST, Hello, QuestionError, read
 from saltus.explore.session import AnswersQuestions, Outbox, Session
 
 #: Version of frames and questions; a page of another one is told to reload.
-WIRE = 1
+WIRE = 2
 #: Most pages at once, and how long a page may take to say its token [s].
 MOST_PAGES, HELLO = 8, 5.0
 #: Codes of why a socket is closed: 4400 and the code of HTTP for the same.

@@ -39,6 +39,8 @@ RATE = 200
 WAITING = 2**24
 #: Kinds of question of which a newer one stops the older. Of others one is finished and one waits.
 STOPPED_BY_NEWER = ("map", "responses", "settle")
+#: Questions that are under way as those of another kind are: a newer one of either stops the older.
+AS = {"agreement": "map"}
 #: Time between two looks whether waiting work was asked to stop [s].
 LOOK = 0.1
 
@@ -196,9 +198,10 @@ class Session:
         with self._lock:
             if self._closed:
                 return
-            lane = self._lanes.setdefault(question.ask, _Lane())
+            kind = AS.get(question.ask, question.ask)
+            lane = self._lanes.setdefault(kind, _Lane())
             replaced, lane.waiting = lane.waiting, question
-            if question.ask in STOPPED_BY_NEWER and lane.stop is not None:
+            if kind in STOPPED_BY_NEWER and lane.stop is not None:
                 lane.stop.set()
             begins, lane.busy = not lane.busy, True
             if begins:

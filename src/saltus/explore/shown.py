@@ -8,10 +8,12 @@ from typing import Any
 
 import xarray as xr
 
+from saltus.analysis.basins.compare import compare
 from saltus.analysis.basins.pipeline import BasinPlan
 from saltus.analysis.inputs.starts import range_of
 from saltus.analysis.motion.simulate import simulate
 from saltus.explore.map import KeptMap, plan_of_map
+from saltus.explore.opening import first_quantity
 from saltus.explore.questions import MotionQuestion, QuestionError, ResponsesQuestion, question_of
 from saltus.explore.responses import VALUES, starts_from
 from saltus.explore.save import PARTS, View, starts_of
@@ -28,7 +30,8 @@ def shown(desk: Any, fields: Mapping[str, Any]) -> tuple[View, dict[str, Callabl
     desk : Desk
         The desk that it asks.
     fields : mapping
-        The fields of its questions by their kinds: ``motion``, ``map``, ``responses``.
+        The fields of its questions by their kinds: ``motion``, ``map``, ``agreement``,
+        ``responses``.
 
     Returns
     -------
@@ -62,6 +65,10 @@ def shown(desk: Any, fields: Mapping[str, Any]) -> tuple[View, dict[str, Callabl
         }
         given |= {"at": dict(plan.fixed), "periods": plan.periods}
         found["map"] = partial(_finished, desk, plan)
+        if (other := asked.get("agreement")) is not None:
+            given["against"] = desk.method_of(other.against, "against")
+            theirs = desk.plan_of_question(other, other.against, "against")
+            found["agreement"] = partial(_compared, desk, plan, theirs)
     if (responses := asked.get("responses")) is not None:
         limits = range_of(system, responses.parameter, responses.range)
         given["vary"] = responses.parameter, *limits
@@ -88,12 +95,15 @@ def _finished(desk: Any, plan: BasinPlan) -> xr.Dataset:
     return kept.dataset
 
 
+def _compared(desk: Any, plan: BasinPlan, theirs: BasinPlan) -> xr.Dataset:
+    return compare(_finished(desk, plan), _finished(desk, theirs))
+
+
 def _answered(
     desk: Any, system: System, method: Method, question: ResponsesQuestion, limits: Any
 ) -> xr.Dataset:
-    first = system.outputs.names if system.outputs.first else system.states
     about = (tuple(system.values.values()), method, question.parameter, limits)
-    number = desk.responses.number((*about, question.quantity or first[0]))
+    number = desk.responses.number((*about, question.quantity or first_quantity(system)))
     if number is None:
         raise QuestionError("the responses aren't finished: wait for their end.", "parts")
     ds: xr.Dataset = desk.responses.get(number)[1]

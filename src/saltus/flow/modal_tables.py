@@ -101,6 +101,7 @@ class Tables:
         self._equations: dict[tuple[object, ...], _Equations] = {}
         self._pieces: dict[tuple[float, ...], Callable[[int], LinearPiece]] = {}
         self._fast: dict[tuple[float, ...], float] = {}
+        self._finite: dict[tuple[float, ...], bool] = {}
         self._parts: dict[tuple[int, int], Known] = {}
         self._smooth: dict[tuple[object, ...], bool] = {}
         self._known: dict[tuple[int, bytes], int] = {}
@@ -222,11 +223,12 @@ class Tables:
     def is_finite(self, which: int, mode: int) -> bool:
         """True if the equations of a contact state are made of numbers, whatever formulas say."""
         given = self.sets[which]
-        pieces = self.piece_of(given, mode), given.gaps, given.impacts.closing
-        parts = [part for one in pieces for part in (one.matrix, one.constant, one.driven)]
-        parts += [given.rates, given.lags, given.impacts.push, given.impacts.restitution]
-        parts += [one.terms for one in given.courses]
-        return all(bool(np.isfinite(part).all()) for part in parts)
+        key = mode, *(given.values[name] for name in self.linear.parameters)
+        if key not in self._finite:
+            piece = self.piece_of(given, mode)
+            parts = piece.matrix, piece.constant, piece.driven
+            self._finite[key] = all(bool(np.isfinite(part).all()) for part in parts)
+        return self._finite[key] and given.is_finite
 
     def state_of(self, which: int, mode: int) -> int:
         """Number of a contact state, made if it isn't known."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,3 +25,12 @@ class ValueSet:
     courses: tuple[Course, ...]
     impacts: Impacts
     pushes: bool
+
+    @functools.cached_property
+    def is_finite(self) -> bool:
+        """True if they are made of numbers, whatever formulas say."""
+        pieces = self.gaps, self.impacts.closing
+        parts = [part for one in pieces for part in (one.matrix, one.constant, one.driven)]
+        parts += [self.rates, self.lags, self.impacts.push, self.impacts.restitution]
+        parts += [one.terms for one in self.courses]
+        return all(bool(np.isfinite(part).all()) for part in parts)

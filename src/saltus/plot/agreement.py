@@ -18,16 +18,10 @@ from saltus.plot import cells
 from saltus.plot.axes import Panels
 from saltus.plot.palette import hues
 from saltus.plot.picture import picture
-from saltus.plot.style import OKABE_ITO, style
-from saltus.plot.unsettled import UNSETTLED
+from saltus.plot.style import style
+from saltus.plot.unsettled import AGREEMENT, UNSETTLED
 from saltus.results.dataset.schema import kind_text
 
-#: Colour and name of each value of the agreement; differences are the news.
-_LOOKS = {
-    1: ("#E4E4E4", "agree"),
-    0: (OKABE_ITO["vermillion"], "differ"),
-    -1: ("#3C3C3C", "not settled in one of them"),
-}
 _WHERE = {(True, True): "in both", (True, False): "left only", (False, True): "right only"}
 #: More attractors than this are not named in a legend of their own: the maps of plot.basins do
 #: that.
@@ -104,7 +98,7 @@ def _three(panels: np.ndarray, ds: xr.Dataset, sides: cells.Sides) -> np.ndarray
 def _difference(ax: Axes, ds: xr.Dataset, sides: cells.Sides) -> None:
     """Draw the cells in which the maps differ. The title gives the share that agrees."""
     values = ds["agreement"].values
-    colors = {key: np.array(to_rgb(color)) for key, (color, _) in _LOOKS.items()}
+    colors = {key: np.array(to_rgb(look.color)) for key, look in AGREEMENT.items()}
     cells.draw_cells(ax, sides, cells.paint(np.nan_to_num(values, nan=-1), colors))
     settled = int((values >= 0).sum())
     ax.set_title(
@@ -113,8 +107,8 @@ def _difference(ax: Axes, ds: xr.Dataset, sides: cells.Sides) -> None:
         else "nothing settles in both"
     )
     handles = [
-        Patch(fc=color, label=f"{name}, {int((values == key).sum())}")
-        for key, (color, name) in _LOOKS.items()
+        Patch(fc=look.color, label=f"{look.label}, {int((values == key).sum())}")
+        for key, look in AGREEMENT.items()
         if (values == key).any()
     ]
     _below(ax, handles, columns=1)

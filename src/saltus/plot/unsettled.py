@@ -1,4 +1,4 @@
-"""Colours and names of starts that lead to no attractor. Nothing here needs matplotlib."""
+"""Colours and names of starts that have no hue. Nothing here needs matplotlib."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from saltus.results.dataset.kinds import Kind
 
 @dataclass(frozen=True)
 class Unsettled:
-    """A code for starts that lead to no attractor: its name in a legend and its colour."""
+    """A code for starts: its name in a legend and its colour."""
 
     label: str
     color: str
@@ -22,4 +22,11 @@ UNSETTLED: dict[int, Unsettled] = {
     Kind.UNCONVERGED: Unsettled("not settled", "#1E1E1E"),
     Kind.FAILED: Unsettled("failed", "#3C3C3C"),
     Kind.NOT_COMPUTED: Unsettled("not computed", "#E9E9E9"),
+}
+
+#: Two maps lead a start to the same attractor, or elsewhere; differences are the news.
+AGREEMENT: dict[int, Unsettled] = {
+    1: Unsettled("agree", "#E4E4E4"),
+    0: Unsettled("differ", "#D55E00"),
+    -1: Unsettled("not settled in one of them", "#3C3C3C"),
 }

@@ -2,21 +2,26 @@
 
 import random
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import saltus as sl
+from explorer_systems import van_der_pol
 from mad_page import mad_message
 from saltus.errors import SaltusError
 from saltus.explore import map as maps
 from saltus.explore import motion as motions
-from saltus.explore import responses
+from saltus.explore import orbits, responses
+from saltus.explore.attractors import Legend
 from saltus.explore.desk import Desk, Models
 from saltus.explore.frames import packed, unpacked
+from saltus.explore.kept_responses import NO_HUE
 from saltus.explore.opening import Opening, opening_of
+from saltus.explore.orbits import settled
 from saltus.explore.questions import QuestionError, question_of, read
-from saltus.interrupt import Interrupted, Stop
+from saltus.interrupt import Interrupted, Stop, check_stop
 
 RIG = sl.models.delangre("b", force="4 N", frequency="15 Hz")
 BOX = {"x": (-5e-3, 5e-3), "v": (-1.0, 1.0)}
@@ -116,7 +121,7 @@ def test_a_motion_that_fails_is_drawn_as_far_as_it_went():
     desk = Desk(Opening(grows, sl.Taylor(), {"x": (-1, 1), "y": (-1, 1)}, turn=0.05), 1)
     head, arrays = one(desk, "motion", start=[2.0, 1.0], periods=20)  # x = 2/(1 - 2 t)
     assert head["status"] == "nonfinite"
-    assert head["words"][0].startswith("It ended at 500 ms: nonfinite")
+    assert head["words"][0].startswith("It ended at 500 ms: the state")
     times = head["dt"] * np.arange(head["count"])
     reached = times < 0.499
     exact = 2 / (1 - 2 * times[reached])
@@ -149,10 +154,68 @@ def test_a_start_settles_to_what_attractors_says(desk):
     assert again["multipliers"] == told["multipliers"]
 
 
-def test_an_orbit_is_tracked_to_where_branches_has_it_and_lost_at_the_fold(desk):
+def test_a_row_of_the_legend_stays_with_its_attractor_when_ids_change(desk):
+    """What is found later may sort before it, and join what nobody had lost."""
+    plan = desk.plan_of(RIG, desk.opening.method)
+    known = Legend(plan.map(1), plan.scale)
+    for x in (1e-3, 3e-3):
+        settled(known, [x, 0.0])
+    peaks = [row["peak"] for row in known.table()]
+    assert len(peaks) > 1
+    backwards = replace(known.found, orbits=known.found.orbits[::-1])
+    assert not known.grow(backwards)
+    assert [row["peak"] for row in known.table()] == peaks
+
+
+@pytest.mark.parametrize(("damping", "words"), [(0.0, "Nothing damps"), (-0.5, "negative damping")])
+def test_where_nothing_attracts_that_is_said_at_once(desk, damping, words):
+    values = {"damping_ratio": damping}
+    head, _ = one(desk, "settle", start=[1e-3, 0.0], values=values)
+    assert words in head["words"][0]
+    axes = {"x": [-1e-3, 1e-3], "v": [-0.1, 0.1]}
+    for ask in (
+        {"ask": "map", "axes": axes, "size": [40, 40]},
+        {"ask": "responses", "parameter": "frequency", "range": [14, 16]},
+    ):
+        with pytest.raises(QuestionError, match=words):
+            asked(desk, **ask, values=values)
+
+
+def test_a_start_that_takes_too_long_is_left(desk, monkeypatch):
+    def wanders(*_):
+        while True:
+            check_stop()
+
+    monkeypatch.setattr(orbits, "settled", wanders)
+    monkeypatch.setattr(orbits, "WITHIN", 0.01)
+    head, _ = one(desk, "settle", start=[1e-3, 0.0])
+    assert head["attractor"] is None
+    assert "hasn't settled within 0.01 s" in head["words"][0]
+    monkeypatch.setattr(orbits, "WITHIN", 60.0)
+    stop = Stop()
+    stop.set()
+    with stop, pytest.raises(Interrupted):
+        one(desk, "settle", start=[1e-3, 0.0])
+
+
+def test_a_motion_without_end_is_drawn_as_far_as_its_budget(desk, monkeypatch):
+    monkeypatch.setattr(motions, "MOST_MET", 2000)
+    head, arrays = one(desk, "motion", start=[0.0, 0.0], values={"damping_ratio": -0.5})
+    assert head["status"].startswith("budget")
+    assert "It ended at" in head["words"][0]
+    assert head["contacts"] <= motions.MOST_MET
+    assert np.isfinite(arrays["sample:x"][:100]).all()
+
+
+@pytest.fixture(scope="module")
+def found():
+    """Branches of the orbit that a start settles to, with a fold."""
+    return sl.branches(RIG, {"frequency": (14.9, 15.5)}, sl.attractors(RIG, {"x": 1e-3, "v": 0.0}))
+
+
+def test_an_orbit_is_tracked_to_where_branches_has_it_and_lost_at_the_fold(desk, found):
     head, _ = one(desk, "settle", start={"x": "1 mm", "v": 0})
     key = head["attractor"]["key"]
-    found = sl.branches(RIG, {"frequency": (14.9, 15.5)}, sl.attractors(RIG, {"x": 1e-3, "v": 0.0}))
     mine = found["branch_periods"].values == 3
     points = mine[found["point_branch"].values] & (found["point_stable"].values == 1)
     frequency = found["point_frequency"].values[points]
@@ -168,10 +231,32 @@ def test_an_orbit_is_tracked_to_where_branches_has_it_and_lost_at_the_fold(desk)
     assert np.abs(fold - lost["values"]["frequency"]).min() < 2e-3
 
 
+def test_a_hue_belongs_to_one_side_of_a_fold(desk, found):
+    three = one(desk, "settle", start={"x": "1 mm", "v": 0})[0]["attractor"]["hue"]
+    desk.keep_responses(found)
+    ((head, arrays),) = asked(
+        desk, "responses", parameter="frequency", range=[14.9, 15.5], quantity="x"
+    )
+    assert head["done"]
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(found["point_frequency"].values))) != 0) + 1
+    fold = found["event_point"].values[found["event_kind"].values == "fold"]
+    assert len(fold)
+    for point in fold.tolist():
+        near = int(turns[np.argmin(np.abs(turns - point))])
+        assert abs(near - point) <= 1
+        sides = arrays["point_hue"][near - 1], arrays["point_hue"][near + 2]
+        assert sides[0] != sides[1]
+    stable = arrays["point_stable"] == 1
+    here = np.abs(arrays["point_parameter"] - 15.0) < 0.02
+    assert three in arrays["point_hue"][stable & here & (arrays["point_period"] == 3)]
+    far = np.abs(np.arange(len(stable))[:, None] - turns).min(axis=1) > 2
+    assert NO_HUE not in arrays["point_hue"][stable & far]
+
+
 def test_responses_are_branches_and_their_points_are_orbits(desk, monkeypatch):
     monkeypatch.setattr(responses, "STARTS", 1)
     monkeypatch.setattr(responses, "VALUES", 1)
-    monkeypatch.setattr(maps, "FEW_SCOUTS", 1)
+    monkeypatch.setattr(maps, "LOOKED", 1)
     one(desk, "settle", start={"x": "1 mm", "v": 0})
     answers = asked(desk, "responses", parameter="frequency", range=[15.0, 15.1])
     head, arrays = [one for one in answers if one[0]["kind"] == "responses"][-1]
@@ -191,8 +276,7 @@ def test_responses_are_branches_and_their_points_are_orbits(desk, monkeypatch):
     again = asked(desk, "responses", parameter="frequency", range=[15.0, 15.1])
     assert [one[0]["key"] for one in again] == [head["key"]]  # kept
     hue = one(desk, "settle", start={"x": "1 mm", "v": 0})[0]["attractor"]["hue"]
-    of_three = [row["hue"] for row in head["branches"] if row["period"] == 3]
-    assert hue in of_three
+    assert hue in arrays["point_hue"][arrays["point_period"] == 3]
 
 
 # -- other systems ---------------------------------------------------------------------------------
@@ -208,6 +292,16 @@ def test_a_system_without_forcing_has_limit_cycles():
     assert x[0] == pytest.approx(x[-1], abs=1e-5)
     now, _ = one(belt, "track", key=told["key"], source={}, values={"mass": 1.01})
     assert now["lost"] is None
+
+
+def test_a_branch_of_limit_cycles_has_the_hue_of_its_attractor():
+    desk = desk_of(van_der_pol, None)
+    told = one(desk, "settle", start=[1.0, 0.0])[0]["attractor"]
+    desk.keep_responses(sl.branches(van_der_pol, {"mu": (0.9, 1.1)}, [[1.0, 0.0], [0.0, 0.0]]))
+    head, arrays = one(desk, "responses", parameter="mu", range=[0.9, 1.1], quantity="x")
+    kinds = np.array([row["kind"] for row in head["branches"]])[arrays["point_branch"]]
+    assert set(arrays["point_hue"][kinds == "limit_cycle"].tolist()) == {told["hue"]}
+    assert set(arrays["point_hue"][kinds == "equilibrium"].tolist()) == {NO_HUE}  # it repels
 
 
 def test_a_system_without_forcing_has_equilibria():

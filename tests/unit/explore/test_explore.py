@@ -15,6 +15,7 @@ from saltus.analysis.basins import growing, pipeline
 from saltus.cli.commands import app
 from saltus.errors import ParameterError, SaltusError
 from saltus.explore import studies
+from saltus.explore.cells import unpacked_cells
 from saltus.explore.frames import packed, unpacked
 from saltus.explore.questions import question_of
 from saltus.study.read import parse
@@ -62,7 +63,7 @@ def test_explore_returns_at_once_with_a_page_that_answers():
     assert page.view == {}
     with connect(f"ws://127.0.0.1:{port}/socket") as socket:
         token = page.url.partition("token=")[2]
-        socket.send(json.dumps({"ask": "hello", "id": 0, "token": token, "wire": 1}))
+        socket.send(json.dumps({"ask": "hello", "id": 0, "token": token, "wire": 2}))
         socket.recv()
         with pytest.raises(ParameterError, match="no page shows anything yet"):
             page.study()
@@ -200,7 +201,8 @@ def test_finished_results_are_there_at_once(tmp_path, monkeypatch):
     shown = np.full((16, 17), -100)
     for head, arrays in pieces:
         if head["kind"] == "map-piece":
-            shown.ravel()[arrays["cell"]] = arrays["label"]
+            cells = unpacked_cells(arrays, shown.shape[1])
+            shown.ravel()[cells["cell"]] = cells["label"]
     ds = sl.load(out / "basins.nc")
     np.testing.assert_array_equal(shown, ds["basin"].values)
     assert end["flip_rate"] == ds.attrs["flip_rate"]

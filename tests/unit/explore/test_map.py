@@ -10,6 +10,7 @@ from saltus.analysis.basins import growing, labels, pipeline
 from saltus.explore import map as maps
 from saltus.explore import responses
 from saltus.explore.attractors import Legend
+from saltus.explore.cells import packed_cells, unpacked_cells
 from saltus.explore.desk import Desk
 from saltus.explore.frames import packed, unpacked
 from saltus.explore.opening import opening_of
@@ -27,7 +28,7 @@ def few_scouts(monkeypatch):
     monkeypatch.setattr(pipeline, "SCOUTS", 64)
     monkeypatch.setattr(pipeline, "CHECKED", 32)
     monkeypatch.setattr(growing, "FEW_SCOUTS", 16)
-    monkeypatch.setattr(maps, "FEW_SCOUTS", 16)
+    monkeypatch.setattr(maps, "LOOKED", 16)
 
 
 @pytest.fixture
@@ -51,6 +52,7 @@ class Screen:
         told, found = unpacked(packed(head, arrays))
         self.heads.append(told)
         if told["kind"] == "map-piece":
+            found = unpacked_cells(found, self.label.shape[1])
             cell = found["cell"]
             rows, columns = np.unravel_index(cell, self.label.shape)
             assert len(np.unique(cell)) == len(cell)
@@ -243,16 +245,19 @@ def test_a_hue_follows_a_branch_to_other_values(desk, monkeypatch):
     question = {"id": 2, "parameter": "frequency", "range": [15.0, 15.08]}
     desk.answer(question_of("responses", question), lambda *answer: found.append(answer))
     away = RIG.with_values(frequency=15.06)
-    orbits = desk.responses.orbits_at(away)
-    assert {one.period: hue for one, hue in orbits} == hues
-    assert desk.responses.orbits_at(away.with_values(force=2.0)) == []
-    assert desk.responses.orbits_at(RIG.with_values(frequency=15.1)) == []
+    orbits, reserved = desk.responses.orbits_at(away)
+    on_branches = {one.period: hue for one, hue in orbits}
+    assert {1, 3, 4, 5} <= set(on_branches)
+    assert on_branches == {period: hues[period] for period in on_branches}
+    assert reserved >= set(hues.values())
+    for other in (away.with_values(force=2.0), RIG.with_values(frequency=15.1)):
+        assert desk.responses.orbits_at(other) == ([], set())
     plan = desk.plan_of(away, sl.Taylor())
     told = [(one, hue + 7) for one, hue in orbits]  # what no order of discovery gives
-    legend = Legend(plan.map(1), plan.scale, None, told)
+    legend = Legend(plan.map(1), plan.scale, None, lambda: (told, set()))
     legend.grow(plan.scout())
     shown = {row["period"]: row["hue"] for row in legend.table()}
-    known = {period: hue for period, hue in shown.items() if period in hues}
+    known = {period: hue for period, hue in shown.items() if period in on_branches}
     assert known
     assert known == {period: hues[period] + 7 for period in known}
 
@@ -280,3 +285,45 @@ def test_old_maps_make_room(monkeypatch):
     for plan in plans:
         kept.put(maps.KeptMap(plan, labels.Settling.empty(400, 2), None))
     assert [kept.get(plan) is not None for plan in plans] == [False, False, True, True, True]
+
+
+def test_agreement_of_two_methods_is_that_of_compare():
+    rig, size, found = sl.models.delangre("a", force="1.5 N", frequency="10 Hz"), (32, 16), []
+    desk = Desk(opening_of(rig, None, axes=BOX), 2)
+    box = {name: list(ends) for name, ends in BOX.items()}
+    question = {"id": 1, "axes": box, "size": list(size), "against": "ODE45"}
+    desk.answer(
+        question_of("agreement", question), lambda *one: found.append(unpacked(packed(*one)))
+    )
+    axes = {name: (*ends, n) for (name, ends), n in zip(BOX.items(), size, strict=True)}
+    rough = sl.basins(rig, **axes, method=sl.ODE45(1e-4, 1e-7))
+    theirs = sl.compare(basins(size=size, system=rig), rough)
+    told = [one for one in found if one[0]["kind"] == "agreement"]
+    assert [head["level"] for head, _ in told] == [2, 1, 1]
+    assert [head["done"] for head, _ in told] == [False, False, True]
+    finished = told[-1][1]["agreement"]
+    np.testing.assert_array_equal(finished, theirs["agreement"].values.ravel(), strict=True)
+    assert {0, 1} <= set(finished.tolist())
+    assert f"{100 * theirs.attrs['agreement']:.3g} %" in told[-1][0]["words"][0]
+    coarse = told[0][1]["agreement"]
+    every = theirs["agreement"].values[::2, ::2].ravel()
+    assert (coarse == every)[coarse >= 0].all()
+    assert (coarse >= 0).mean() > 0.5
+
+
+@pytest.mark.parametrize("shape", [(16, 16), (70, 200), (400, 400)])
+def test_cells_are_two_bytes_each_and_come_back(shape):
+    random = np.random.default_rng(4127)
+    for share in (0.0, 0.01, 0.3, 1.0):
+        cells = np.flatnonzero(random.uniform(size=shape[0] * shape[1]) < share)
+        label = random.integers(-5, 127, len(cells)).astype("i1")
+        age = random.choice(np.array([*range(12), 255], "u1"), len(cells))
+        label[:-1000] = label[:-1000] % 7
+        packed_ones = packed_cells(cells, label, age, shape[1])
+        back = unpacked_cells(packed_ones, shape[1])
+        order = np.argsort(back["cell"])
+        np.testing.assert_array_equal(back["cell"][order], cells)
+        np.testing.assert_array_equal(back["label"][order], label)
+        np.testing.assert_array_equal(back["age"][order], age)
+        if share >= 0.3:
+            assert packed_ones["step"].nbytes < 1.05 * len(cells)

@@ -180,9 +180,9 @@ def test_a_page_is_kept_to_itself(server, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     "words",
     [
-        "", "{}", '{"ask": "about", "id": 1}', '{"ask": "hello", "id": 0, "wire": 1}',
-        '{"ask": "hello", "id": 0, "wire": 1, "token": ""}',
-        '{"ask": "hello", "id": 0, "wire": 1, "token": "\\ud800é"}', b"\x00\xff",
+        "", "{}", '{"ask": "about", "id": 1}', '{"ask": "hello", "id": 0, "wire": 2}',
+        '{"ask": "hello", "id": 0, "wire": 2, "token": ""}',
+        '{"ask": "hello", "id": 0, "wire": 2, "token": "\\ud800é"}', b"\x00\xff",
     ],
 )  # fmt: skip
 def test_who_does_not_know_the_token_is_not_answered(server, words):

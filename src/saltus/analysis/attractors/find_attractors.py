@@ -50,6 +50,7 @@ def find_attractors(
     most: int,
     known: AttractorSet | None = None,
     progress: Callable[[float], None] | None = None,
+    kept: bool = False,
 ) -> tuple[AttractorSet, np.ndarray, np.ndarray]:
     """The attractors that trajectories from given starts settle to.
 
@@ -67,6 +68,9 @@ def find_attractors(
         Attractors that are known already.
     progress : callable, optional
         Called with the share done.
+    kept : bool
+        Whether a trajectory that keeps to a known attractor that never repeats has arrived, as in a
+        map's cells. Else it is followed as one that hasn't settled.
 
     Returns
     -------
@@ -82,12 +86,14 @@ def find_attractors(
     owner: Owners = [None] * len(start)
     settled = np.full(len(start), -1, np.int64)
     travel, going = map_.launch(start, most), np.arange(len(start))
-    noisy = Kind.NOISY_PERIODIC.word
+    noisy, never = Kind.NOISY_PERIODIC.word, (Kind.CHAOTIC.word, Kind.QUASI_PERIODIC.word)
     turns = isinstance(map_, Stroboscope) and autonomous(map_.system)
     while len(going) and travel.age < most:
         points = travel.advance(ROUND)
         here = np.flatnonzero(~_captured(found, points, going, travel.age - ROUND, owner, settled))
-        here = here[~_keeping(found, noisy, points[here], going[here], travel.age, owner, settled)]
+        for kind in (noisy, *(never if kept else ())):
+            on = _keeping(found, kind, points[here], going[here], travel.age, owner, settled)
+            here = here[~on]
         while len(here) and _add_orbits(map_, points[here], scale, found, most):
             here = here[
                 ~_keeping(found, noisy, points[here], going[here], travel.age, owner, settled)

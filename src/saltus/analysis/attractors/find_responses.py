@@ -26,6 +26,7 @@ from saltus.analysis.closed.field_zeros import autonomous
 from saltus.analysis.closed.motions import ClosedMotions
 from saltus.analysis.solve.tolerances import BESIDE, NEAR, RESTS, ROUND, SETTLED
 from saltus.flow.maps import Stroboscope
+from saltus.flow.modal import Modal
 from saltus.flow.request import Schedule
 from saltus.flow.threads import on_threads, usable_processors
 from saltus.kernels import status as st
@@ -36,8 +37,9 @@ from saltus.results.dataset.kinds import Kind
 PIECE = 512
 #: Most of them times the square of the number of states: each takes longer.
 PIECE_STATES = 2048
-#: Trajectories that fill the lanes: fewer aren't followed at a time.
-LANES = 8
+#: Trajectories that fill the lanes: fewer aren't followed at a time, but by flows that move one
+#: after the other. There a thread computes numbers of one while another one follows the next.
+LANES, ALONE = 8, 1
 #: Trajectories that each thread gets at least: its lanes are filled some times.
 SHARED = 64
 #: Share of the work on a trajectory that is done when it has been followed.
@@ -125,7 +127,9 @@ def find_responses(
     were followed together and what they settled to, on the thread that followed them.
     """
     result = SettledMotions.empty(*start.shape) if result is None else result
-    pieces = _pieces(len(start), start.shape[1], threads or usable_processors())
+    alone = isinstance(map_.method.serving(map_.system.origin), Modal)
+    fewest = ALONE if alone else LANES
+    pieces = _pieces(len(start), start.shape[1], threads or usable_processors(), fewest)
     parts = [SettledMotions.empty(len(piece), start.shape[1]) for piece in pieces]
 
     def work(number: int) -> None:
@@ -146,11 +150,11 @@ def find_responses(
     return result
 
 
-def _pieces(count: int, states: int, threads: int) -> list[np.ndarray]:
+def _pieces(count: int, states: int, threads: int, fewest: int = LANES) -> list[np.ndarray]:
     """Trajectories piece by piece, int64[..] each: in their order, so that Ctrl-C finds the first
     ones done; all that are under way at once have some of every place, as hard ones stand together.
     """
-    size = min(PIECE, max(LANES, PIECE_STATES // states**2))
+    size = min(PIECE, max(fewest, PIECE_STATES // states**2))
     every = np.arange(count)
     if (at_once := min(threads, count // SHARED)) * size > count:
         return [every[first::at_once] for first in range(at_once)]

@@ -201,9 +201,12 @@ def settle_all(
     most: int,
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
+    result: Settling | None = None,
 ) -> Settling:
-    """:func:`settle` for any number of starts, in pieces on threads."""
-    result = Settling.empty(len(start), start.shape[1])
+    """:func:`settle` for any number of starts, in pieces on threads. What is known when Ctrl-C ends
+    it stands in ``result``, if that is given.
+    """
+    result = Settling.empty(len(start), start.shape[1]) if result is None else result
     on_threads(
         lambda piece: settle(map_, start[piece], found, most), pieces_of(*start.shape), result.put,
         threads, progress,

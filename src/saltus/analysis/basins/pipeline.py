@@ -9,7 +9,7 @@ labels what no known attractor captured and makes the Dataset.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -17,6 +17,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.attractors.attractor_set import AttractorSet
+from saltus.analysis.attractors.attractors import no_attractor
 from saltus.analysis.attractors.noisy import stray_attrs
 from saltus.analysis.attractors.portrait import portraits
 from saltus.analysis.basins import uncertainty
@@ -27,10 +28,10 @@ from saltus.analysis.closed.spread import spread
 from saltus.analysis.closed.turns import ASKED, looks_every
 from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.inputs.axes import along, count_along
+from saltus.analysis.inputs.box import fixed_of, states_at, units_of
 from saltus.analysis.inputs.halton import halton
-from saltus.analysis.inputs.sensed import sensed
-from saltus.analysis.inputs.starts import check_system, fill, fixed_states
-from saltus.errors import ParameterError, unknown
+from saltus.analysis.inputs.starts import check_system
+from saltus.errors import ParameterError
 from saltus.flow.counts import whole
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
@@ -43,7 +44,6 @@ from saltus.results.dataset.attractors import basin_meanings
 from saltus.results.dataset.kinds import Kind
 from saltus.results.provenance import to_json
 from saltus.system import System
-from saltus.system.structures.told import by_modes
 from saltus.units import to_si
 
 #: Cells of one task: seconds of work at most, and enough cells to keep lanes full to the end.
@@ -134,12 +134,7 @@ class BasinPlan:
 
     def _states(self, columns: Mapping[str, np.ndarray]) -> np.ndarray:
         """States float64[k, D] at places float64[k] along both axes."""
-        if set(columns) <= set(self.system.states):
-            return fill(self.system, columns, self.fixed)
-        count = len(next(iter(columns.values())))
-        given = {name: np.full(count, value) for name, value in self.fixed.items()}
-        found = sensed(self.system, {**columns, **given})
-        return np.stack([found[name] for name in self.system.states], axis=1)
+        return states_at(self.system, columns, self.fixed)
 
     def cells_of(self, chunk: int) -> np.ndarray:
         """Cells of a chunk, int64[k]."""
@@ -228,7 +223,11 @@ class BasinPlan:
         )
         strays = found.astray if (labels == Kind.UNCONVERGED).any() else []
         return ds.assign_attrs(
-            uncertainty.measure(ds), **stray_attrs(strays), flip_rate=np.nan, flip_checked=0
+            uncertainty.measure(ds),
+            **stray_attrs(strays),
+            **no_attractor(self.system, found, labels),
+            flip_rate=np.nan,
+            flip_checked=0,
         )
 
     def attrs(self) -> dict[str, Any]:
@@ -284,8 +283,7 @@ def basin_plan(
         If an axis isn't a state, a range is empty, or the grid is too large.
     """
     check_system(system)
-    by_sensors = by_modes(system) and not any(name in system.states for name in axes)
-    fixed = (_fixed_sensors if by_sensors else fixed_states)(system, at, axes)
+    fixed = fixed_of(system, at, axes)
     if len(axes) != 2:
         example = ", ".join(
             f'{name}=("-1 {system.units[name]}", "1 {system.units[name]}", 400)'
@@ -302,22 +300,11 @@ def basin_plan(
         f"{first} x {second} cells",
         lambda say: f"Take a coarser grid, or {say.verb('basin_fractions')}.",
     )
-    units = {**system.units, **dict(zip(system.outputs.names, system.outputs.units, strict=True))}
+    units = units_of(system)
     values = {name: _axis(units[name], name, given) for name, given in axes.items()}
     plan = BasinPlan(system, method, values, fixed, periods)
     some = plan.starts(np.linspace(0, plan.cells - 1, ASKED).astype(int))
     return replace(plan, every=looks_every(system, every, some))
-
-
-def _fixed_sensors(system: System, at: Any, moving: Iterable[str]) -> dict[str, float]:
-    """Return the values [SI] that sensors show besides those of a map."""
-    units, given = dict(zip(system.outputs.names, system.outputs.units, strict=True)), at or {}
-    for name in (*moving, *given):
-        if name not in units:
-            raise unknown(f"{system.name} has no state and no sensor", name, units)
-    return {
-        name: to_si(value, units[name], name) for name, value in given.items() if name not in moving
-    }
 
 
 def _axis(unit: str, name: str, given: Any) -> np.ndarray:

@@ -39,8 +39,9 @@ def scouted(
     known: AttractorSet | None = None,
 ) -> Iterator[AttractorSet]:
     """The attractors that some of the starts float64[k, D] lead to, more and more of them: those of
-    the first ones, then of as many as their cost allows. Followed for ``most`` iterates each.
-    ``known`` ones are among them.
+    the first ones, then of as many as their cost allows. Followed for ``most`` iterates each, the
+    later ones until they keep to an attractor that the first have shown. ``known`` ones are among
+    them.
     """
     count, states = start.shape
     whole = affordable(most + SURVEY_ITERATES, states, count) >= count
@@ -54,4 +55,5 @@ def scouted(
     more = affordable(float(cost), states, count)
     if more > first:
         rest = start[first:more]
-        yield find_attractors(map_, rest, scale, most, found, stage(progress, 0.5, 1.0))[0]
+        half = stage(progress, 0.5, 1.0)
+        yield find_attractors(map_, rest, scale, most, found, half, kept=True)[0]

@@ -183,6 +183,7 @@ def follow(
     longest: float = LONGEST,
     foresee: bool = False,
     enough: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray] | None = None,
+    curves: list[Arc] | None = None,
 ) -> list[Arc]:
     """Curves from points float64[k, m + 1] on them, until they leave the range of an unknown, are
     closed or have ``points`` points.
@@ -213,10 +214,14 @@ def follow(
     enough : callable, optional
         Which curves go no farther, bool[r], from points float64[r, m + 1] that were reached, the
         derivatives there and their curves int64[r].
+    curves : list of Arc, optional
+        Takes the curves as they grow: what is known when Ctrl-C ends this.
     """
     rows = np.arange(len(start))
+    curves = [] if curves is None else curves
+    curves += [Arc() for _ in rows]
     here = correct(equations, start, tangents_at(equations, start, along, rows), rows, 1.0)
-    fronts = _Fronts(equations, bounds, [Arc() for _ in rows], first, longest, foresee, group)
+    fronts = _Fronts(equations, bounds, curves, first, longest, foresee, group)
     fronts.begin(here, tangents(_finite(here.derivative), along))
     while len(fronts.going):
         taken = fronts.step()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -25,7 +26,8 @@ from saltus.analysis.inputs.verb import verb
 from saltus.errors import ParameterError, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.methods import Method, exact_method
-from saltus.flow.progress import reporting
+from saltus.flow.progress import reporting, stage
+from saltus.interrupt import Interrupted
 from saltus.results import build
 from saltus.results.dataset import schema
 from saltus.results.dataset.attractors import padded
@@ -34,6 +36,11 @@ from saltus.sentences import Word
 from saltus.system import System
 from saltus.system.leg import MOST_STATES, has_legs
 
+#: Most points in each direction, of systems of FEW_STATES states at most.
+POINTS, FEW_STATES = 400, 20
+#: Share of the progress bar at which the curve has been followed.
+TRACED = 0.8
+
 
 @verb
 def bifurcation_curve(
@@ -41,7 +48,7 @@ def bifurcation_curve(
     event: xr.Dataset,
     vary: Mapping[str, Range],
     *,
-    points: int = 400,
+    points: int | None = None,
     method: Method | None = None,
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
@@ -74,8 +81,10 @@ def bifurcation_curve(
     vary : mapping
         Two parameters and their ranges, such as ``{"frequency": ("4 Hz", "30 Hz"), "force": ("0.1
         N", "8 N")}``.
-    points : int
-        Most points in each direction.
+    points : int, optional
+        Most points in each direction. It bounds the work: a point takes some fifteen runs over the
+        orbit's period with all derivatives. Default 400, of more than 20 states as many fewer: 100
+        of forty modes. A curve that they end has ``points`` for its ``begin`` or ``end``.
     method : Method
         Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
         it serves; another one must be exact.
@@ -98,13 +107,17 @@ def bifurcation_curve(
         ``fold_neimark_sacker``, ``flip_neimark_sacker``, ``fold_graze``, ``flip_graze``,
         ``resonant_graze``, ``double_graze``), ``codim2_extremum`` (the parameter that has one),
         both parameters, multipliers and states. Attributes ``bifurcation``, ``parameter_x``,
-        ``parameter_y``, ``begin`` and ``end`` (why it ends), ``periods``, ``guard`` (grazed).
+        ``parameter_y``, ``begin`` and ``end`` (why it ends: ``range``, ``closed``, ``points``,
+        ``lost``, ``interrupted``, or an event), ``periods``, ``guard`` (grazed).
 
     Raises
     ------
     ParameterError, UnitError
         If an argument can't be used, the bifurcation isn't one that can be followed, or the
         equations are others than those of the event.
+    Interrupted
+        On Ctrl-C; its ``partial`` is the Dataset of the curve so far, its points of codimension two
+        not yet looked for.
 
     References
     ----------
@@ -126,7 +139,8 @@ def bifurcation_curve(
     check_system(system)
     method = exact_method(method, system, "sl.bifurcation_curve")
     names, limits = _ranges(system, vary)
-    points = whole(points, "points", 2)
+    most = min(POINTS, POINTS * FEW_STATES // len(system.states))
+    points = most if points is None else whole(points, "points", 2)
     start = _start(system, event)
     for name, (low, high) in zip(names, limits, strict=True):
         if not low <= start.system.values[name] <= high:
@@ -138,13 +152,19 @@ def bifurcation_curve(
     with reporting(progress) as show:
         orbits, z = _orbits(start, names, limits, method, threads)
         equations, z = _equations(start, orbits, z)
-        curve = trace_curve(equations, z, limits, points, show)
+        curve = trace_curve(equations, z, limits, points, stage(show, 0.0, TRACED))
         if curve is None:
             raise ParameterError(
                 f"no {start.kind.replace('_', ' ')} was found at the event: it may lie on a graze, "
                 "or the event is of other equations."
             )
-        return _table(start, names, limits, orbits, curve, method)
+        part = functools.partial(_table, start, names, limits, orbits, curve, method)
+        try:
+            if curve.complete:
+                return part()
+        except KeyboardInterrupt:
+            pass
+        raise Interrupted(part)
 
 
 @dataclass(frozen=True)

@@ -34,6 +34,8 @@ class BifurcationCurve:
         ``double_graze``, ``graze_corner`` and ``degenerate_graze``, and ``contacts_change``.
     special : list of Event
         In its order.
+    complete : bool
+        False if Ctrl-C ended it: its ends are ``interrupted``, or its special points aren't known.
     """
 
     equations: Equations
@@ -42,6 +44,7 @@ class BifurcationCurve:
     multipliers: np.ndarray
     ends: tuple[str, str]
     special: list[Event] = field(default_factory=list)
+    complete: bool = True
 
 
 def trace_curve(
@@ -51,7 +54,8 @@ def trace_curve(
     points: int,
     progress: Callable[[float], None] | None = None,
 ) -> BifurcationCurve | None:
-    """The curve through a bifurcation; None if none is found there.
+    """The curve through a bifurcation; None if none is found there. On Ctrl-C what is known of it,
+    with ``complete`` False.
 
     Parameters
     ----------
@@ -87,9 +91,18 @@ def trace_curve(
             beyond[id(curve)] = curve.z[-1]
         return why
 
-    curves = follow(
-        equations, both, np.stack([along, -along]), bounds, points, ends=watch, group=0 * rows
-    )
+    curves: list[Arc] = []
+    try:
+        follow(
+            equations, both, np.stack([along, -along]), bounds, points, ends=watch, group=0 * rows,
+            curves=curves,
+        )  # fmt: skip
+    except KeyboardInterrupt:
+        if not all(curve.z for curve in curves) or not curves:
+            raise
+        for curve in curves:
+            curve.end = curve.end or "interrupted"
+        return _joined(equations, curves, complete=False)
     if not curves[0].z or not curves[1].z:
         return None
     if isinstance(equations, GrazingOrbits):
@@ -113,8 +126,10 @@ def _end_at_double(equations: GrazingOrbits, curve: Arc, beyond: np.ndarray) -> 
     curve.end = "double_graze"
 
 
-def _joined(equations: Equations, curves: list[Arc]) -> BifurcationCurve:
-    """One curve from those in both directions."""
+def _joined(equations: Equations, curves: list[Arc], complete: bool = True) -> BifurcationCurve:
+    """One curve from those in both directions; its special points are looked for if these are
+    ``complete``.
+    """
     for curve in curves:
         curve.end = _end(equations, curve)
     (whole, *back), ends = both_sides(curves)
@@ -122,14 +137,18 @@ def _joined(equations: Equations, curves: list[Arc]) -> BifurcationCurve:
     z, tangent, derivative = (np.array(part) for part in (whole.z, whole.tangent, whole.derivative))
     length = np.array(whole.length) - whole.length[0]
     multipliers = equations.multipliers(z, derivative, np.zeros(len(z), np.int64))
-    special = find(equations, 0, z, tangent, derivative)
+    special: list[Event] = []
+    try:
+        special = find(equations, 0, z, tangent, derivative) if complete else []
+    except KeyboardInterrupt:
+        complete = False
     doubles = [
         Event("double_graze", place, z[place], multipliers[place])
         for place, end in zip((0, len(z) - 1), ends, strict=True)
         if end == "double_graze"
     ]
     special = sorted([*special, *doubles], key=lambda point: point.after)
-    return BifurcationCurve(equations, z, length, multipliers, ends, special)
+    return BifurcationCurve(equations, z, length, multipliers, ends, special, complete)
 
 
 def _end(equations: Equations, curve: Arc) -> str:

@@ -431,7 +431,9 @@ class Legs:
         whole = np.arange(self.n) + np.broadcast_to(begin, len(z))[:, None]
         since = (whole[..., None] - phase[:, None]) % self.n  # of each point and contact
         since[np.minimum(since, self.n - since) < AT_ONCE] = 0.0
-        last = since.argmin(axis=2)
+        # of contacts at once, as at a corner, the last in their order: behind it all have happened
+        latest = since < since.min(axis=2, keepdims=True) + AT_ONCE
+        last = (latest & ~np.roll(latest, -1, axis=2)).argmax(axis=2)
         rows = np.arange(len(z))[:, None]
         span = np.take_along_axis(since, last[..., None], axis=2)[..., 0]
         start = self._states(self.at(z).after[rows, last], others, phase[rows, last], span)

@@ -18,6 +18,7 @@ import numpy as np
 from saltus.analysis.inputs.outputs import Outputs, states_alone
 from saltus.flow import polynomials
 from saltus.flow.maps import Stroboscope
+from saltus.flow.methods import MANY_STATES
 from saltus.flow.modal_motions import wave_motions
 from saltus.flow.motion_series import Pieces
 from saltus.flow.pieces import nodes_of, pieces
@@ -32,6 +33,8 @@ from saltus.kernels import status as st
 APERIODIC_PERIODS = 64
 #: Nodes that a thread holds at a time: some 20 MB.
 HELD = 8192
+#: Motions of many states that a thread takes at a time: each takes ten milliseconds or more.
+TOGETHER = 8
 #: Places of Gauss's rule on a piece: exact for the square of a polynomial of degree 20.
 PLACES = 21
 #: Turning points closer than this are one [forcing periods].
@@ -174,6 +177,7 @@ def measure(
     for n in np.unique(periods):
         rows = np.flatnonzero(periods == n)
         step = max(1, HELD // (nodes_of(map_) * int(n or window)))
+        step = min(step, TOGETHER) if start.shape[1] >= MANY_STATES else step
         parts += [rows[first : first + step] for first in range(0, len(rows), step)]
 
     def work(part: np.ndarray) -> Measures:

@@ -191,7 +191,7 @@ def _misspelt(
         any(name in known for name in _RANGES)
         and isinstance(system, System)
         and word not in system.values
-        and word not in system.states
+        and word not in (*system.states, *system.outputs.names)
         and (meant := closest(word, known)) is not None
         and closest(word, [*known, *system.states]) == meant
     )

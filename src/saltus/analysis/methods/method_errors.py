@@ -48,6 +48,18 @@ def orbit_distances(exact: xr.Dataset, other: xr.Dataset) -> tuple[np.ndarray, n
     return distance, nearest
 
 
+def state_distances(exact: xr.Dataset, other: xr.Dataset) -> np.ndarray:
+    """Distances of the states of a run from those of an exact one at the same times, the largest of
+    all states in units of the range of each in the exact run, float64[..., time].
+    """
+    first, second = (
+        np.stack([ds[name].values for name in states_of(exact)]) for ds in (exact, other)
+    )
+    wide = np.nanmax(first, axis=-1, keepdims=True) - np.nanmin(first, axis=-1, keepdims=True)
+    apart: np.ndarray = (np.abs(second - first) / np.where(wide > 0, wide, 1.0)).max(axis=0)
+    return apart
+
+
 def _points(ds: xr.Dataset) -> np.ndarray:
     """Stroboscopic points, float64[response, phase, D]."""
     return np.stack([ds[response_name(name)].values for name in states_of(ds)], axis=2)

@@ -26,6 +26,7 @@ VARIABLES = {
     ),
     "method_agreement_low": Variable(("method",), "1", "the same, lower end of the 95 % interval"),
     "method_agreement_high": Variable(("method",), "1", "the same, upper end of the 95 % interval"),
+    "method_contacts": Variable(("method",), "1", "contacts of a run", "i8"),
     **{name: responses.VARIABLES[name] for name in ("start", "start_direction")},
     **{
         name: replace(responses.VARIABLES[name], dims=_FIELD)
@@ -43,7 +44,7 @@ VARIABLES = {
         flags=AGREEING,
     ),
     "orbit_distance": Variable(
-        _FIELD, "1", "distance from the reference's response, in units of its size"
+        _FIELD, "1", "distance from the reference's response or state, in units of its size"
     ),
     "step_error": Variable(
         _FIELD,
@@ -61,11 +62,12 @@ VARIABLES = {
 def account(ds: xr.Dataset) -> list[str]:
     """A line on each method: its agreement with the reference, and its cost."""
     names = ds["method"].values.tolist()
+    of = "of the samples" if "method_contacts" in ds else "of the settled starts"
     lines = [f"found    {ds.attrs.get('analysis', 'an analysis')} by {len(names)} methods"]
     for i, name in enumerate(names):
         one = ds.isel(method=i)
         share, cost = float(one["method_agreement"]), float(one["method_cpu_seconds"])
-        agrees = f"{share:.2%} of the settled starts as by the reference" if i else "the reference"
+        agrees = f"{share:.2%} {of} as by the reference" if i else "the reference"
         lines.append(f"  {name}: {agrees}, {cost:.3g} s of processor time")
     return lines
 

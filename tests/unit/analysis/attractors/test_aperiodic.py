@@ -18,6 +18,7 @@ from saltus.analysis.attractors.aperiodic import (
 from saltus.analysis.attractors.find_attractors import find_attractors
 from saltus.analysis.attractors.recurrence import recurrence
 from saltus.analysis.basins.labels import complete, settle
+from saltus.analysis.solve.tolerances import ROUND
 
 GOLDEN = math.pi * (math.sqrt(5) - 1)
 
@@ -148,6 +149,13 @@ def test_henon_is_chaotic_and_what_runs_away_is_told():
     away = ~np.isfinite(map_.launch(start, 1000).advance(1000)).all(axis=(1, 2))
     assert 0 < away.sum() < 100
     np.testing.assert_array_equal(label, np.where(away, -1, 0))
+    with np.errstate(all="ignore"):
+        again, label, settled = find_attractors(map_, start, scale, 1000, found, kept=True)
+        longer = find_attractors(map_, start, scale, 1000, found)[2]
+    assert again.sampled == found.sampled
+    np.testing.assert_array_equal(label, np.where(away, -1, 0))
+    assert set(settled[~away].tolist()) == {ROUND}
+    assert (longer == -1).all()
     np.testing.assert_array_equal(result.label, np.where(away, -1, 0))
 
 

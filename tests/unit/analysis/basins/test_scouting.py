@@ -1,4 +1,4 @@
-"""Scouts within a budget, maps over sensors, and what an interrupted map hands out."""
+"""Scouts within a budget, maps and boxes over sensors, and what they hand out if interrupted."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ import pytest
 
 import saltus as sl
 from saltus.analysis.attractors.aperiodic import SURVEY_ITERATES
-from saltus.analysis.basins import scouting
+from saltus.analysis.basins import basin_fractions as fractions
+from saltus.analysis.basins import labels, scouting
 from saltus.analysis.basins.pipeline import basin_plan
 from saltus.errors import ParameterError
 from saltus.flow.methods import check_method
@@ -84,3 +85,37 @@ def test_what_was_found_is_handed_out_even_before_a_cell_was_followed():
     with pytest.raises(sl.Interrupted) as caught, stop:
         sl.basins(rig, progress=lambda _: stop.set(), **axes)
     assert (caught.value.partial.basin == Kind.NOT_COMPUTED).all()
+
+
+def test_a_box_over_sensors_draws_what_they_show(chain, monkeypatch):
+    begun = []
+
+    def settle_all(map_, start, *rest):
+        begun.append(start)
+        return labels.settle_all(map_, start, *rest)
+
+    monkeypatch.setattr(fractions, "settle_all", settle_all)
+    box = {"tip": ("-5 cm", "5 cm"), "tip speed": ("-1 m/s", "1 m/s")}
+    found = sl.basin_fractions(
+        chain, samples=20, at={"root": "2 mm"}, periods=200, progress=False, **box
+    )
+    assert found.attractor_fraction.values.tolist() == [1.0]
+    shown = sl.simulate(chain, begun[0], periods=1, samples=2, progress=False).isel(time=0)
+    drawn = np.random.default_rng(1).random((20, 2))
+    np.testing.assert_allclose(shown.tip, -0.05 + 0.1 * drawn[:, 0], atol=1e-12)
+    np.testing.assert_allclose(shown["tip speed"], -1 + 2 * drawn[:, 1], atol=1e-12)
+    np.testing.assert_allclose(shown.root, 2e-3, atol=1e-12)
+
+
+def test_shares_so_far_are_of_starts_that_were_followed(chain, monkeypatch):
+    def settle_all(map_, start, found, most, threads, progress, result):
+        result.put(slice(0, 16), labels.settle(map_, start[:16], found, most))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(fractions, "settle_all", settle_all)
+    with pytest.raises(sl.Interrupted) as caught:
+        sl.basin_fractions(chain, samples=48, periods=200, tip=(-0.05, 0.05), progress=False)
+    partial = caught.value.partial
+    assert partial.basin.values.tolist() == [0] * 16 + [Kind.NOT_COMPUTED] * 32
+    assert partial.attractor_fraction.values.tolist() == [1.0]
+    assert partial.attractor_fraction_low.item() < 0.9

@@ -10,6 +10,7 @@ from scipy.optimize import minimize_scalar, root
 
 import impact_orbits
 import saltus as sl
+from saltus.analysis.branches import bifurcation_curve as of_curves
 from saltus.errors import ParameterError
 
 NORMAL_FORMS = {
@@ -116,6 +117,24 @@ def test_a_torus_of_a_linear_oscillator_and_its_resonances():
     assert len(curve.codim2) == 2
 
 
+def test_many_states_have_fewer_points_and_what_is_known_is_handed_out(monkeypatch):
+    (event,) = bifurcations(sl.branches(linear, {"a": (-0.1, 0.3)}, (0, 0), at=2), "neimark_sacker")
+    vary, stop = {"omega": (1.1, 3.0), "a": (-0.2, 0.3)}, sl.Stop()
+    with pytest.raises(sl.Interrupted) as caught, stop:
+        sl.bifurcation_curve(
+            linear, event, vary, points=60, progress=lambda share: share > 0.05 and stop.set()
+        )
+    curve = caught.value.partial
+    assert (curve.attrs["begin"], curve.attrs["end"]) == ("interrupted", "interrupted")
+    assert len(curve.point) > 6
+    np.testing.assert_allclose(curve.point_a.values, 0, atol=1e-12)
+    monkeypatch.setattr(of_curves, "POINTS", 8)
+    monkeypatch.setattr(of_curves, "FEW_STATES", 1)
+    curve = sl.bifurcation_curve(linear, event, vary)
+    assert len(curve.point) == 4 + 4 - 1
+    assert {curve.attrs["begin"], curve.attrs["end"]} == {"points"}
+
+
 # -- normal forms ----------------------------------------------------------------------------------
 #: Where the branch over p is followed, and what its folds are over both parameters.
 FOLDS = {
@@ -208,6 +227,7 @@ def across(at, matrix, z, n, c, step=1e-4):
     ],
     ids=["cusp", "isola of three periods"],
 )
+@pytest.mark.slow
 def test_a_point_of_codimension_two_by_scipy(kind, values, n, last):
     system, c = duffing.with_values(**values), values["c"]
     if n == 1:

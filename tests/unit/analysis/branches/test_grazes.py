@@ -95,6 +95,14 @@ def test_two_contacts_at_once_change_their_order_and_are_no_graze():
     assert not len(events(found, "graze"))
 
 
+def test_corners_are_found_wherever_the_steps_of_the_branch_lie():
+    """Which of the two contacts at once is the later one by rounding says nothing."""
+    for low in np.linspace(0.05, 0.07, 7):
+        found = sl.branches(two_levels, {"other": (low, 0.4)}, (0, 0, 0), at=1, progress=False)
+        exact = sorted(filtered(2, t) for t in crossings(1, 0.3) if low < filtered(2, t) < 0.4)
+        assert events(found, "corner") == pytest.approx(exact, rel=1e-13)
+
+
 def test_a_contact_that_crosses_the_whole_period_is_no_event():
     # x is above its level at the whole period as long as the level is below 1/2
     found = sl.branches(two_levels, {"level": (0.4, 0.6)}, (0, 0, 0), at=2, progress=False)
