@@ -177,7 +177,7 @@ def test_random_bodies_begin_at_rest_as_by_taylor(system, seed):
     one, start = drawn(system, np.random.default_rng([SEED, 2, seed]))
     v, way = one.values, 1 - 2 * (seed % 2)
     pull = 1.1 * way * v["slip"] - v["force0"] * math.cos(v["lag0"])
-    one = one.with_values(stick=1.2 * v["slip"], belt=0.0, sway=0.0, dead0=pull)
+    one = one.with_values(stick=1.2 * v["slip"], belt=0.0, sway=0.0, dead0=pull, e=0.5, f=0.5)
     modal, taylor = runs(one, 0.0 * start, periods=1)
     assert str(modal.status.values) == str(taylor.status.values) == "ok"
     held = 1 << [guard.name for guard in one.guards].index("v0 = belt + sway*cos(w*t) held")
