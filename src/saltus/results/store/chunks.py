@@ -47,7 +47,9 @@ class Chunks:
     arrays: dict[str, np.dtype] | None
 
     @classmethod
-    def checked(cls, shape: tuple[int, ...], chunk: int, arrays: Mapping[str, Any] | None) -> Chunks:
+    def checked(
+        cls, shape: tuple[int, ...], chunk: int, arrays: Mapping[str, Any] | None
+    ) -> Chunks:
         """Chunks from the arguments of a caller.
 
         Raises

@@ -42,7 +42,9 @@ def head_of(identity: Mapping[str, str], note: Mapping[str, Any], chunks: Chunks
         "note": dict(note),
         "shape": list(chunks.shape),
         "chunk": chunks.chunk,
-        "arrays": chunks.arrays and {name: dtype.name for name, dtype in chunks.arrays.items()},
+        "arrays": None
+        if chunks.arrays is None
+        else {name: dtype.name for name, dtype in chunks.arrays.items()},
     }
 
 
