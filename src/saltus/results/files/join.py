@@ -30,7 +30,8 @@ def join(*results: xr.Dataset | str | os.PathLike[str]) -> xr.Dataset:
     ----------
     *results : Dataset, str or path
         Results of :func:`saltus.simulate` or :func:`saltus.sensitivity`, for several starts or
-        values each, or files of them, in the order in which their trajectories are to stand.
+        values each, or files of them, in the order in which their trajectories are to stand. Where
+        forcing frequencies differ, they differ within each.
 
     Returns
     -------
