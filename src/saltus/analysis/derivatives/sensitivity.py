@@ -13,6 +13,7 @@ import xarray as xr
 
 from saltus.analysis import dataset_parts
 from saltus.analysis.derivatives.carried import HELD, CarriedDerivatives, Places
+from saltus.analysis.derivatives.readings import Readings, slope_of
 from saltus.analysis.inputs.given import Starts, Values
 from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.inputs.spans import Span, span
@@ -33,9 +34,8 @@ from saltus.flow.contact_table import ContactTable
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporting
 from saltus.flow.request import Outcome, Request
-from saltus.language.derivatives import differentiate, time_derivative
 from saltus.language.evaluate import evaluate
-from saltus.language.expression import TIME, Expr, parameter, state
+from saltus.language.expression import TIME, parameter, state
 from saltus.results import build
 from saltus.results.dataset import schema
 from saltus.system import System
@@ -148,7 +148,11 @@ def sensitivity(
         else at_times(length, first_kept(system, length, keep), times)
     )
     request = flow.request(group, length, plan)
-    answer = partial(_dataset, _Run(system, method, group, length, plan, flow, turning), asked)
+    run = _Run(
+        system=system, flow=flow, group=group, method=method, length=length, plan=plan,
+        turning=turning,
+    )  # fmt: skip
+    answer = partial(_dataset, run, asked)
     with reporting(progress) as show:
         try:
             outcome = engine.run(flow.flown, method.suited_to(group.size), request, threads, show)
@@ -270,57 +274,18 @@ def _turning(system: System, method: Method) -> _Turning:
 
 
 # -- the answer ------------------------------------------------------------------------------------
-@dataclass(frozen=True)
-class _Run:
+@dataclass(frozen=True, kw_only=True)
+class _Run(Readings):
     """A run of the flow that carries derivatives."""
 
-    system: System
     method: Method
-    group: Ensemble
     length: Span
     plan: SampleTimes
-    flow: CarriedDerivatives
     turning: _Turning
 
     def again(self, request: Request) -> Outcome:
         """The outcome of another request of the flow."""
         return engine.run(self.flow.flown, self.method.suited_to(1), request, 1)
-
-    def values(self, at: Places, mode: np.ndarray | None = None) -> np.ndarray:
-        """States and outputs, float64[m, K], in the mode there or in another one."""
-        return outputs_of(self.system).values(
-            at.time,
-            at.states,
-            self.flow.parameters(self.group, at.trajectory),
-            at.mode if mode is None else mode,
-        )
-
-    def slopes(
-        self, at: Places, moved: np.ndarray | None = None, mode: np.ndarray | None = None
-    ) -> np.ndarray:
-        """Their derivatives, float64[m, K, C]; along places whose times have the derivatives
-        ``moved`` float64[m, C].
-        """
-        outputs, names = outputs_of(self.system), self.flow.names
-        leaves = [*map(state, self.system.states), *map(parameter, names), TIME]
-        known = self.flow.parameters(self.group, at.trajectory)
-        rate = np.zeros((len(at.time), 0)) if moved is None else self.flow.rates(at, self.group)
-        states = at.slopes if moved is None else at.slopes + rate[..., None] * moved[:, None]
-        if not outputs.formulas:
-            return states
-        size, columns = at.states.shape[1], at.slopes.shape[2]
-        parts = tuple(_slope(one, leaf) for one in outputs.formulas for leaf in leaves)
-        named = (*self.system.states, *map(str, range(len(parts))))
-        gradients = (
-            replace(outputs, names=named, formulas=parts)
-            .values(at.time, at.states, known, at.mode if mode is None else mode)[:, size:]
-            .reshape(len(at.time), len(outputs.formulas), len(leaves))
-        )
-        own = np.einsum("mki,mic->mkc", gradients[..., :size], states)
-        own[..., columns - len(names) :] += gradients[..., size:-1]
-        if moved is not None:
-            own += gradients[..., -1:] * moved[:, None]
-        return np.concatenate([states, own], axis=1)
 
     def contact_times(self, at: Places, table: ContactTable) -> np.ndarray:
         """Derivatives of the times of contacts, float64[m, C]: the gap of each stays zero. NaN
@@ -339,7 +304,7 @@ class _Run:
             gap = system.guards[number].gap
             leaves = [*map(state, system.states), *map(parameter, self.flow.names), TIME]
             found = evaluate(
-                [_slope(gap, leaf) for leaf in leaves],
+                [slope_of(gap, leaf) for leaf in leaves],
                 t=at.time[here],
                 states=dict(zip(system.states, at.states[here].T, strict=True)),
                 values=self.flow.parameters(self.group, at.trajectory[here]),
@@ -354,10 +319,6 @@ class _Run:
             with np.errstate(divide="ignore", invalid="ignore"):
                 moved[here] = np.where(leaves_it[:, None], -change / rate[:, None], np.nan)
         return moved
-
-
-def _slope(formula: Expr, leaf: Expr) -> Expr:
-    return time_derivative(formula) if leaf is TIME else differentiate(formula, leaf)
 
 
 def _dataset(run: _Run, asked: Columns, outcome: Outcome) -> xr.Dataset:
