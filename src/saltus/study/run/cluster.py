@@ -12,6 +12,7 @@ import socket
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError, wait
 from contextlib import contextmanager
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from saltus.errors import StudyError
@@ -79,8 +80,10 @@ def check_scheduler(address: str) -> None:
 
 
 def open_to_all(address: str) -> str:
-    """A line that warns of a scheduler that asks for no secret; empty for one that does."""
-    if address.startswith("tls://"):
+    """A line that warns of a scheduler that asks for no secret; empty for one that does, and
+    without dask, which is told later.
+    """
+    if address.startswith("tls://") or find_spec("distributed") is None:
         return ""
     return (
         f"--scheduler {address} asks for no secret: whoever can reach it can run code as you. "
