@@ -1,4 +1,4 @@
-"""`join`: what the jobs of an array left, as one result."""
+"""`join`: the results of several jobs, as one result."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def _check(parts: Sequence[xr.Dataset]) -> None:
 
 
 def _differing(first: xr.Dataset, other: xr.Dataset) -> str:
-    """What two results differ in besides their trajectories; empty for nothing."""
+    """The difference of two results besides their trajectories; empty for nothing."""
     for name in sorted({*first.attrs, *other.attrs}.difference(_OWN)):
         mine, theirs = (_plain(one.attrs.get(name)) for one in (first, other))
         if mine == theirs:

@@ -44,7 +44,7 @@ class Division(ABC):
         return None
 
     def shared_from(self, data: Any) -> Any:
-        """What all chunks share, from :meth:`share`'s result."""
+        """Data that all chunks share, from :meth:`share`'s result."""
         return data
 
     @abstractmethod

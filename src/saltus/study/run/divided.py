@@ -114,7 +114,7 @@ def compute(
 
 
 def _shared(division: Division, store: Store) -> Any:
-    """What all chunks share. The first process computes it, for all others."""
+    """Data that all chunks share. The first process computes it, for all others."""
     return division.shared_from(store.get(division.kept)) if division.kept else None
 
 
