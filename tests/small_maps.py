@@ -8,7 +8,6 @@ from contextlib import contextmanager
 import pytest
 
 from saltus.analysis.basins import pipeline
-from saltus.study.run import maps
 
 
 @contextmanager
@@ -16,7 +15,6 @@ def small_maps(chunk: int) -> Iterator[None]:
     """Within, a chunk has so many cells."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(pipeline, "CHUNK", chunk)
-        patch.setattr(maps, "CHUNK", chunk)
         patch.setattr(pipeline, "SCOUTS", 256)
         patch.setattr(pipeline, "CHECKED", 64)
         yield

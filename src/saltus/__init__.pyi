@@ -93,6 +93,7 @@ from saltus.language import tan as tan
 from saltus.language import tanh as tanh
 from saltus.language import where as where
 from saltus.results import contacts as contacts
+from saltus.results import join as join
 from saltus.results import load as load
 from saltus.results import samples as samples
 from saltus.results import save as save

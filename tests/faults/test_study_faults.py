@@ -36,8 +36,7 @@ from saltus.results import load
 from saltus.results.kinds.basins import rows
 from saltus.results.store.store import Store
 from saltus.study.read import parse
-from saltus.study.run import maps
-from saltus.study.run.maps import compute, finish, open_store
+from saltus.study.run.divided import compute, finish, open_store
 from saltus.study.run.running import Resources
 from small_maps import small_maps
 from small_study import maps_of, small_study
@@ -60,13 +59,12 @@ saltus.analysis.basins.pipeline.CHUNK = 24
 saltus.analysis.basins.pipeline.SCOUTS, saltus.analysis.basins.pipeline.CHECKED = 64, 64
 
 if __name__ == "__main__":  # a process of --workers computes chunks only
-    import saltus.plot, saltus.study.run.maps, saltus.study.read, saltus.study.run.study
+    import saltus.plot, saltus.study.run.divided, saltus.study.read, saltus.study.run.study
     import saltus.results.files.export
     from saltus.cli import main
     from saltus.results.store.store import Store
 
-    saltus.study.run.maps.CHUNK = 24
-    saltus.study.run.maps.LARGE = 100  # nobody asks how long it will take
+    saltus.study.run.divided.LARGE = 100  # nobody asks how long it will take
     saltus.results.files.export._has = lambda _: False  # netCDF-3 is written sooner
     commit = Store.commit
     committed = []
@@ -559,7 +557,6 @@ def test_a_second_process_is_refused(server, undisturbed, tmp_path, monkeypatch)
     os.kill(first, signal.SIGSTOP)
     assert committed(folder) < CHUNKS
     monkeypatch.setattr(pipeline, "CHUNK", 24)
-    monkeypatch.setattr(maps, "CHUNK", 24)
     second = CliRunner().invoke(
         app, ["resume", str(folder), "--threads", "1", "--progress", "none"], catch_exceptions=False
     )

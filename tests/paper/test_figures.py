@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 
 from saltus.analysis.basins import pipeline
-from saltus.analysis.basins.basins import label_all
 from saltus.analysis.basins.labels import Settling
 from saltus.analysis.motion.settled import settled
 from saltus.results import load
@@ -176,13 +175,8 @@ def test_fig_8_has_a_third_attractor_after_the_grazing():
     for name, whole in jobs.items():
         one = replace(whole, axes=whole.axes | {"x": whole.axes["x"][[0, 83, 84, 89, 90, 199]]})
         found, settled = one.scout(1), Settling.empty(one.cells, 2)
-        label_all(
-            one,
-            found,
-            range(one.chunks),
-            lambda i, part, one=one, to=settled: to.put(one.cells_of(i), part),
-            1,
-        )
+        for chunk in range(one.chunks):
+            settled.put(one.cells_of(chunk), one.chunk(chunk, found))
         counts[name] = one.finish(settled, found, 1).attractor_fraction.values * one.cells
     assert len(counts["25.5 kN per m, exact"]) == 2
     third = sorted(counts["23.2 kN per m, exact"])[0]

@@ -76,16 +76,20 @@ Threads = Annotated[
     int | None, typer.Option(min=1, help="Threads; by default one for each usable core.")
 ]
 Workers = Annotated[
-    int | None, typer.Option(min=1, help="Basins: processes of this machine, in place of threads.")
+    int | None,
+    typer.Option(
+        min=1, help="Processes of this machine, in place of threads, for questions in chunks."
+    ),
 ]
 Scheduler = Annotated[
     str,
     typer.Option(
-        help="Basins: a dask scheduler, tcp://HOST:PORT. Whoever can reach it can run code as you."
+        help="A dask scheduler for questions in chunks, tls://HOST:PORT. Whoever can reach it "
+        "without a secret, tcp://, can run code as you."
     ),
 ]
 Shard = Annotated[
-    str, typer.Option(help="Basins: K/N, the K-th of N jobs that share the folder; K from 0.")
+    str, typer.Option(help="K/N, the K-th of N jobs that share the folder; K from 0.")
 ]
 ProgressKind = Annotated[
     Progress, typer.Option(help="bar; json: a line of JSON on standard error each second; none.")
@@ -183,7 +187,7 @@ def run(
     named = spec.system.model or spec.system.rates or spec.system.structure
     if user_system is None and not named:
         check_beside(study)
-    resources = _resources(spec, threads, workers, scheduler, shard)
+    resources = _resources(threads, workers, scheduler, shard)
     folder = out or Path("saltus-runs") / study.stem
     found = Inputs(study.parent, inputs or [])
     again = _again(folder, system)
@@ -192,16 +196,9 @@ def run(
         _run(spec, text, folder, found, user_system, only or [], resources, progress, again)
 
 
-def _resources(
-    spec: Study, threads: int | None, workers: int | None, scheduler: str, shard: str
-) -> Resources:
+def _resources(threads: int | None, workers: int | None, scheduler: str, shard: str) -> Resources:
     from saltus.study.run.running import Resources, shard_of
 
-    if "basins" not in dict(spec.questions()) and (workers or scheduler or shard):
-        raise StudyError(
-            "--workers, --scheduler and --shard are for studies of basins; this one "
-            "has no [basins]. Leave them out."
-        )
     return Resources(threads, workers, scheduler or None, shard_of(shard) if shard else None)
 
 
@@ -273,7 +270,7 @@ def resume(
 
     spec, text = read(copy_of(store))
     user_system = own_system(system) if system else None
-    resources = _resources(spec, threads, workers, scheduler, shard)
+    resources = _resources(threads, workers, scheduler, shard)
     _run(
         spec,
         text,

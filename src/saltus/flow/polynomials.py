@@ -27,7 +27,8 @@ def value(terms: np.ndarray, x: np.ndarray) -> np.ndarray:
     """
     total: np.ndarray = terms[-1]
     for term in terms[-2::-1]:
-        total = total * x + term
+        total = total * x
+        total += term
     return total
 
 

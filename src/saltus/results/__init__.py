@@ -8,6 +8,7 @@ from saltus.results.describe import describe, headline
 from saltus.results.files.atomic import ResultFileError, usable_folder
 from saltus.results.files.export import save, to_csv, to_mat, to_netcdf
 from saltus.results.files.frames import contacts, samples
+from saltus.results.files.join import join
 from saltus.results.files.load import load
 from saltus.results.provenance import attributes, content_hash, inherited, made_by
 
@@ -25,6 +26,7 @@ __all__ = [
     "content_hash",
     "describe",
     "inherited",
+    "join",
     "load",
     "made_by",
     "samples",

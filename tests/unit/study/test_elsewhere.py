@@ -86,3 +86,11 @@ def test_a_chunk_that_a_cluster_loses_is_asked_for_again():
 def test_a_cluster_without_workers_is_reported():
     with pytest.raises(StudyError, match="the scheduler has no workers"):
         cluster._run(Client(workers=0), Plan(), 10, [3], None, None)
+
+
+def test_a_scheduler_without_a_secret_is_told_in_a_line():
+    pytest.importorskip("distributed")
+    told = cluster.open_to_all("tcp://node7:8786")
+    assert "tcp://node7:8786 asks for no secret" in told
+    assert "\n" not in told
+    assert cluster.open_to_all("tls://node7:8786") == ""

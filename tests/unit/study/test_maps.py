@@ -264,12 +264,12 @@ def test_time_left():
     ],
 )
 def test_dask_only_if_asked_for(resources, where, monkeypatch):
-    import saltus.study.run.maps as maps
+    from saltus.study.run import divided
 
-    monkeypatch.setattr(maps, "label_all", lambda *_: done.append("threads"))
-    monkeypatch.setattr(maps, "run_on_processes", lambda *_: done.append("processes"))
+    monkeypatch.setattr(divided, "run_on_threads", lambda *_: done.append("threads"))
+    monkeypatch.setattr(divided, "run_on_processes", lambda *_: done.append("processes"))
     done = []
-    with maps._runner(resources) as run:
+    with divided._runner(resources) as run:
         run(None, None, [], None, None)
     assert done == [where]
 

@@ -15,7 +15,7 @@ from saltus.results import load
 from saltus.results.store.store import Store, StoreError
 from saltus.study import identity
 from saltus.study.read import parse
-from saltus.study.run import copies, maps
+from saltus.study.run import copies, divided
 from saltus.study.run.copies import copy_of
 from saltus.study.run.running import Resources
 from saltus.study.run.status import status_table, status_tables, stores
@@ -243,7 +243,7 @@ def test_other_code_is_refused(whole, tmp_path, monkeypatch):
 
 def test_chunks_of_another_size_are_refused(whole, tmp_path, monkeypatch):
     folder = copied(whole, tmp_path / "run")
-    monkeypatch.setattr(maps, "CHUNK", 50)
+    monkeypatch.setattr(pipeline, "CHUNK", 50)
     with pytest.raises(StoreError, match="chunk was '48', is '50'"):
         Run(folder)
 
@@ -316,7 +316,7 @@ def test_what_is_written_about_progress(whole):
 
 
 def test_a_large_map_is_estimated_first(tmp_path, monkeypatch):
-    monkeypatch.setattr(maps, "LARGE", 2)
+    monkeypatch.setattr(divided, "LARGE", 2)
     said = Run(tmp_path / "run", STUDY.replace("count = 24", "count = 8")).said
     assert len(said) == 1
     assert said[0].startswith("small: 64 cells: about ")

@@ -295,8 +295,14 @@ def test_only_one_question(tmp_path, no_computing, monkeypatch):
 
 
 def test_other_shards_leave_small_questions_to_the_first(tmp_path):
-    assert Run(tmp_path / "second", HEAD + SIMULATE, shard=(1, 2)).outcome.files == []
-    assert Run(tmp_path / "first", HEAD + SIMULATE, shard=(0, 2)).names == ["run.nc", "run.csv"]
+    text = HEAD + SIMULATE + RESPONSE
+    second = Run(tmp_path / "run", text, shard=(1, 2)).outcome
+    assert (second.files, second.waiting) == ([], ["Frequency response"])
+    assert Run(tmp_path / "run", text, shard=(0, 2)).names[:3] == [
+        "run.nc",
+        "run.csv",
+        "frequency-response.nc",
+    ]
 
 
 # -- what is refused before anything is computed ---------------------------------------------------

@@ -112,19 +112,22 @@ def find(
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
     outputs: Outputs | None = None,
+    places: np.ndarray | None = None,
 ) -> GridResponses:
     """The responses of a grid, with the numbers of ``outputs``; on Ctrl-C those that are known,
-    with ``complete`` False.
+    with ``complete`` False. ``places``: those of some points of a grid without sweeps, int64[p],
+    ascending.
     """
     map_, count = grid.map(method, threads), len(grid.starts)
-    result = SettledMotions.empty(grid.places * count, grid.starts.shape[1])
-    place, complete = np.repeat(np.arange(grid.places), count), True
+    places = np.arange(grid.places) if places is None else places
+    result = SettledMotions.empty(len(places) * count, grid.starts.shape[1])
+    place, complete = np.repeat(places, count), True
     numbers = None if outputs is None else GridNumbers(grid, map_, place, outputs)
     try:
         if grid.sweeps:
             _sweep(grid, map_, most, result, threads, progress, numbers)
         else:
-            starts = np.tile(grid.starts, (grid.places, 1))
+            starts = np.tile(grid.starts, (len(places), 1))
             then = None if numbers is None else numbers.add
             find_responses(map_.rows(place), starts, most, threads, progress, result, then)
     except KeyboardInterrupt:
@@ -132,9 +135,23 @@ def find(
         if numbers is not None:  # to measure motions that don't repeat would keep Ctrl-C waiting
             many = (result.kind >= 0) & ~np.isin(result.kind, CLOSED)
             result.kind[many & ~numbers.done] = Kind.NOT_COMPUTED
-    found = _gathered(result, place, 4.0 * map_.noise_of(result.scale), complete)
+    return gathered(grid, map_, result, places, numbers, complete)
+
+
+def gathered(
+    grid: Grid,
+    map_: Stroboscope,
+    result: SettledMotions,
+    places: np.ndarray,
+    numbers: GridNumbers | None,
+    complete: bool,
+) -> GridResponses:
+    """The responses of what all starts settled to at places int64[p] of a grid."""
+    count = len(grid.starts)
+    place, noise = np.repeat(places, count), map_.noise_of(result.scale)
+    found = _gathered(result, place, 4.0 * noise, complete)
     return replace(
-        found, response_of=found.response_of.reshape(grid.places, count), measured=numbers
+        found, response_of=found.response_of.reshape(len(places), count), measured=numbers
     )
 
 
@@ -174,10 +191,18 @@ class GridNumbers:
             self._measure(new, np.arange(len(self._place)))
         return self._every.rows(found.row)
 
+    def known(self) -> tuple[np.ndarray, Measures]:
+        """Trajectories int64[n] whose own responses were measured, and these numbers."""
+        rows = np.flatnonzero(self._own)
+        return rows, self._every.rows(rows)
+
+    def put(self, rows: np.ndarray, numbers: Measures) -> None:
+        """Take over what another one of them knows of trajectories int64[n]."""
+        self._every.put(rows, numbers)
+        self._own[rows] = True
+
     def _measure(self, found: GridResponses, rows: np.ndarray) -> None:
-        numbers = numbers_of(found, self._outputs, self._grid, self._map)
-        self._every.put(rows[found.row], numbers)
-        self._own[rows[found.row]] = True
+        self.put(rows[found.row], numbers_of(found, self._outputs, self._grid, self._map))
 
 
 def _sweep(

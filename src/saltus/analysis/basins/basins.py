@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import xarray as xr
@@ -136,21 +136,6 @@ def map_of(
         except KeyboardInterrupt:
             scouted = found
             raise Interrupted(lambda: plan.dataset(result, scouted, threads)) from None
-
-
-def label_all(
-    plan: BasinPlan,
-    found: AttractorSet,
-    chunks: Sequence[int],
-    done: Callable[[int, Settling], None],
-    threads: int | None,
-    progress: Callable[[float], None] | None = None,
-) -> None:
-    """Label chunks on threads; ``done(index, settling)`` is called from this thread as each is
-    ready, in any order.
-    """
-    map_ = compiled(plan)
-    on_threads(lambda index: plan.chunk(index, found, map_), chunks, done, threads, progress)
 
 
 def compiled(plan: BasinPlan) -> Stroboscope:

@@ -380,7 +380,6 @@ def _means(
     motion, count = whole.motion, np.diff(np.append(first, len(whole.motion)))
     known, forced = motion[first], map_.system.forced_at is not None
     places, weights = polynomials.gauss(PLACES)
-    powers = places[:, None] ** np.arange(len(whole.terms))
     share = weights[:, None] * (
         whole.length / np.repeat(np.add.reduceat(whole.length, first), count)
     )
@@ -392,7 +391,8 @@ def _means(
         return np.add.reduceat(part.sum(axis=0), first)
 
     for output in range(outputs):
-        values = powers @ whole.terms[:, output]
+        # by Horner's rule: a product of matrices rounds a piece by where it stands among others
+        values = polynomials.value(whole.terms[:, output], places[:, None])
         # a small motion about a large mean keeps its digits
         origin = np.repeat(whole.terms[0, output, first], count)
         mean = sums(share * (values - origin))

@@ -11,7 +11,7 @@ import xarray as xr
 from saltus.analysis.attractors.grid import grid_of
 from saltus.analysis.inputs.given import Axis, Range, Reading, Starts, Value
 from saltus.analysis.inputs.verb import verb
-from saltus.analysis.responses.response_table import respond
+from saltus.analysis.responses.response_table import respond, response_plan
 from saltus.analysis.responses.samples import check_sample, check_unforced_sample
 from saltus.errors import ParameterError
 from saltus.flow.methods import Method, check_method
@@ -106,13 +106,5 @@ def bifurcation_diagram(
     check_sample(sample, method)
     grid = grid_of(system, vary, start, box, values, seed, follow, every)
     check_unforced_sample(sample, grid.system)
-    return respond(
-        grid,
-        method,
-        periods,
-        threads,
-        progress,
-        sample if len(grid.axes) == 1 else "",
-        outputs,
-        unstable,
-    )
+    plan = response_plan(grid, method, periods, sample, outputs, unstable)
+    return respond(plan, threads, progress)

@@ -12,7 +12,7 @@ from saltus.analysis.attractors.grid import grid_of
 from saltus.analysis.inputs.given import Axis, Range, Reading, Starts, Value
 from saltus.analysis.inputs.starts import check_system
 from saltus.analysis.inputs.verb import verb
-from saltus.analysis.responses.response_table import respond
+from saltus.analysis.responses.response_table import respond, response_plan
 from saltus.errors import ParameterError
 from saltus.flow.methods import Method
 from saltus.system import System
@@ -140,4 +140,5 @@ def frequency_response(
             )
         )
     grid = grid_of(system, {system.forced_at: frequency}, start, box, values, seed, follow)
-    return respond(grid, method, periods, threads, progress, outputs=outputs, unstable=unstable)
+    plan = response_plan(grid, method, periods, outputs=outputs, unstable=unstable)
+    return respond(plan, threads, progress)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -26,49 +27,93 @@ from saltus.results.dataset.attractors import padded
 from saltus.results.dataset.responses import SAMPLES, grid_values, response_values
 
 
-def respond(
+@dataclass(frozen=True)
+class ResponsePlan:
+    """Responses to be computed.
+
+    Attributes
+    ----------
+    grid : Grid
+        Values of parameters, and starts.
+    method : Method
+        The method of integration.
+    periods : int
+        Forcing periods that a trajectory is followed at most.
+    sample : str
+        What is kept of each response; empty for nothing.
+    outputs : Outputs
+        What is read off each.
+    unstable : bool
+        Whether unstable parts of branches are followed.
+    """
+
+    grid: Grid
+    method: Method
+    periods: int
+    sample: str
+    outputs: Outputs
+    unstable: bool
+
+    @property
+    def settling(self) -> float:
+        """Share of the progress at which all starts have settled."""
+        return 0.4 if self.unstable else 0.8
+
+
+def response_plan(
     grid: Grid,
     method: Method | None,
     periods: int,
-    threads: int | None,
-    progress: bool | Callable[[float], None] | None,
     sample: str = "",
     outputs: Mapping[str, Any] | None = None,
     unstable: bool = False,
+) -> ResponsePlan:
+    """A checked plan. Raises ParameterError or UnitError if an argument can't be used."""
+    method, periods = check_method(method, grid.system), whole(periods, "periods")
+    check_unstable(unstable, grid, method)
+    asked = outputs_of(grid.system, outputs)
+    return ResponsePlan(
+        grid, method, periods, sample if len(grid.axes) == 1 else "", asked, unstable
+    )
+
+
+def respond(
+    plan: ResponsePlan, threads: int | None, progress: bool | Callable[[float], None] | None
 ) -> xr.Dataset:
     """The Dataset of a grid's responses, with the branches that they lie on if it has one axis.
     Raises Interrupted, with the Dataset of what is known, on Ctrl-C.
     """
-    method, periods = check_method(method, grid.system), whole(periods, "periods")
-    check_unstable(unstable, grid, method)
-    arcs = Arcs(unstable=unstable)
-    asked = outputs_of(grid.system, outputs)
-    part = functools.partial(_dataset, grid, method, periods, sample, asked, threads, arcs)
-    share = 0.4 if unstable else 0.8
     with reporting(progress) as show:
-        found = find(grid, method, periods, threads, stage(show, 0.0, share), asked)
-        if not found.complete:
-            raise Interrupted(lambda: part(found))
-        try:
-            if len(grid.axes) == 1 and grid.places > 1:
-                rest = stage(show, share, 0.95)
-                follow_arcs(found, grid, method, arcs, threads, rest)
-            return part(found)
-        except KeyboardInterrupt:
-            found.complete = False  # the responses are known, not all of their branches
-            raise Interrupted(lambda: part(found)) from None
+        settling = stage(show, 0.0, plan.settling)
+        found = find(plan.grid, plan.method, plan.periods, threads, settling, plan.outputs)
+        return finished(found, plan, threads, show)
+
+
+def finished(
+    found: GridResponses,
+    plan: ResponsePlan,
+    threads: int | None,
+    show: Callable[[float], None] | None,
+) -> xr.Dataset:
+    """The Dataset of responses that were found: their branches are followed first."""
+    arcs, grid = Arcs(unstable=plan.unstable), plan.grid
+    part = functools.partial(_dataset, plan, threads, arcs)
+    if not found.complete:
+        raise Interrupted(lambda: part(found))
+    try:
+        if len(grid.axes) == 1 and grid.places > 1:
+            rest = stage(show, plan.settling, 0.95)
+            follow_arcs(found, grid, plan.method, arcs, threads, rest)
+        return part(found)
+    except KeyboardInterrupt:
+        found.complete = False  # the responses are known, not all of their branches
+        raise Interrupted(lambda: part(found)) from None
 
 
 def _dataset(
-    grid: Grid,
-    method: Method,
-    periods: int,
-    sample: str,
-    outputs: Outputs,
-    threads: int | None,
-    arcs: Arcs,
-    found: GridResponses,
+    plan: ResponsePlan, threads: int | None, arcs: Arcs, found: GridResponses
 ) -> xr.Dataset:
+    grid, method, sample, outputs = plan.grid, plan.method, plan.sample, plan.outputs
     numbers = found.numbers
     table = table_of(found, numbers, grid, method)
     on, branch = np.full(len(found), -1, np.int64), np.full(len(found), -1, np.int64)
@@ -108,7 +153,7 @@ def _dataset(
     output = outputs.units[0] if len(set(outputs.units)) == 1 else ""
     words = {"<when>": table.points_when, "<output>": output, "<sampled>": SAMPLES.get(sample, "")}
     attrs = provenance(system, method, fixed, grid.axes) | {
-        "periods": periods,
+        "periods": plan.periods,
         "random_starts": int(grid.drawn),
         **about_branches,
     }

@@ -1,7 +1,8 @@
 """Grid of a map, divided into chunks, and the bytes of a chunk, which name their place. store.py
 writes them, whole_files.py makes them durable; nothing here touches the disk.
 
-A chunk is one file: its arrays in the order of their names, as little-endian numbers; then its
+A chunk is one file: its arrays in the order of their names, as little-endian numbers (behind a line
+that names their shapes where chunks differ in size: arrays.py); then its
 number and the hash of its store; then the SHA-256 of all that. In another place, or another store,
 it doesn't fit, and no bit of it can change unseen. The same numbers give the same bytes on every
 machine and version.
@@ -19,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import ParameterError
+from saltus.results.store.arrays import packed, unpacked
 
 #: Number of the chunk, and hash of the store's head.
 _PLACE = struct.Struct("<q32s")
@@ -36,16 +38,18 @@ class Chunks:
         Size of the grid along each of its dims; cells are counted in C order.
     chunk : int
         Cells in one chunk, the last one excepted.
-    arrays : dict of str to dtype
-        Values kept of each cell, by name.
+    arrays : dict of str to dtype, or None
+        Values kept of each cell, by name; None if each chunk has arrays of its own shapes.
     """
 
     shape: tuple[int, ...]
     chunk: int
-    arrays: dict[str, np.dtype]
+    arrays: dict[str, np.dtype] | None
 
     @classmethod
-    def checked(cls, shape: tuple[int, ...], chunk: int, arrays: Mapping[str, Any]) -> Chunks:
+    def checked(
+        cls, shape: tuple[int, ...], chunk: int, arrays: Mapping[str, Any] | None
+    ) -> Chunks:
         """Chunks from the arguments of a caller.
 
         Raises
@@ -59,6 +63,9 @@ class Chunks:
                 f"a grid of shape {shape} can't be cut into chunks of {chunk} "
                 f"cells. Give sizes of at least 1."
             )
+        chunk = min(int(chunk), math.prod(shape))
+        if arrays is None:
+            return cls(shape, chunk, None)
         types = {name: np.dtype(dtype).newbyteorder("=") for name, dtype in sorted(arrays.items())}
         for name, dtype in types.items():
             if not name.isidentifier() or dtype.kind not in "biufc":
@@ -68,7 +75,7 @@ class Chunks:
                 )
         if not types:
             raise ParameterError("a store needs at least one array.")
-        return cls(shape, min(int(chunk), math.prod(shape)), types)
+        return cls(shape, chunk, types)
 
     @property
     def cells(self) -> int:
@@ -99,12 +106,16 @@ class Chunks:
         return {
             "shape": " x ".join(map(str, self.shape)),
             "chunk": str(self.chunk),
-            "arrays": ", ".join(f"{name} {dtype.name}" for name, dtype in self.arrays.items()),
+            "arrays": "of any shape"
+            if self.arrays is None
+            else ", ".join(f"{name} {dtype.name}" for name, dtype in self.arrays.items()),
         }
 
-    def size(self, index: int) -> int:
-        """Bytes of the file of a chunk."""
+    def size(self, index: int) -> int | None:
+        """Bytes of the file of a chunk; None if chunks differ in size."""
         extent = self.extent(index)
+        if self.arrays is None:
+            return None
         cells: int = extent.stop - extent.start
         return cells * sum(dtype.itemsize for dtype in self.arrays.values()) + TRAILER
 
@@ -116,7 +127,7 @@ class Chunks:
         index : int
             Number of the chunk.
         values : mapping of str to ndarray (cells,)
-            Every array.
+            Every array; where chunks differ in size arrays of any shape.
         store : str
             Hash of the store's head, 64 hexadecimal digits.
 
@@ -126,6 +137,12 @@ class Chunks:
             If an array is missing or unknown, there are too few or too many values, or their dtype
             would lose digits.
         """
+        parts = [packed(values)] if self.arrays is None else self._parts(index, values)
+        content = b"".join([*parts, _place(index, store)])
+        return content + hashlib.sha256(content).digest()
+
+    def _parts(self, index: int, values: Mapping[str, np.ndarray]) -> list[bytes]:
+        assert self.arrays is not None
         if set(values) != set(self.arrays):
             raise ParameterError(
                 f"chunk {index} has the arrays {sorted(values)}, the store keeps "
@@ -143,19 +160,20 @@ class Chunks:
                     f"{dtype}, not {array.shape} of {array.dtype}."
                 )
             parts.append(array.astype(dtype.newbyteorder("<")).tobytes())
-        content = b"".join([*parts, _place(index, store)])
-        return content + hashlib.sha256(content).digest()
+        return parts
 
     def decode(self, index: int, data: bytes, store: str) -> dict[str, np.ndarray] | None:
         """Values of a chunk, by array; None if the file isn't this chunk of this
         store, bit by bit.
         """
         if (
-            len(data) != self.size(index)
+            self.size(index) not in (None, len(data))
             or not self.fits(index, data[-TRAILER:], store)
             or not is_whole(data)
         ):
             return None
+        if self.arrays is None:
+            return unpacked(data[:-TRAILER])
         extent, values, begin = self.extent(index), {}, 0
         for name, dtype in self.arrays.items():
             stored = np.frombuffer(data, dtype.newbyteorder("<"), extent.stop - extent.start, begin)

@@ -42,7 +42,9 @@ def head_of(identity: Mapping[str, str], note: Mapping[str, Any], chunks: Chunks
         "note": dict(note),
         "shape": list(chunks.shape),
         "chunk": chunks.chunk,
-        "arrays": {name: dtype.name for name, dtype in chunks.arrays.items()},
+        "arrays": None
+        if chunks.arrays is None
+        else {name: dtype.name for name, dtype in chunks.arrays.items()},
     }
 
 
@@ -108,11 +110,8 @@ def _says_what_a_head_says(head: Mapping[str, Any]) -> bool:
         shape and all(isinstance(one, int) and 0 < one <= MOST_CELLS for one in (*shape, chunk))
     ):
         return False
-    return (
-        math.prod(shape) <= MOST_CELLS
-        and isinstance(arrays, dict)
-        and _texts(arrays)
-        and set(arrays.values()) <= _TYPES
+    return math.prod(shape) <= MOST_CELLS and (
+        arrays is None or (_texts(arrays) and set(arrays.values()) <= _TYPES)
     )
 
 

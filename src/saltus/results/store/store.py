@@ -27,6 +27,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from saltus import fence
 from saltus.errors import ParameterError, shown
 from saltus.results.store.chunks import TRAILER, Chunks
 from saltus.results.store.draft_folder import remove_old_drafts, write_folder
@@ -117,7 +118,7 @@ class Store:
         *,
         shape: tuple[int, ...],
         chunk: int,
-        arrays: Mapping[str, Any],
+        arrays: Mapping[str, Any] | None,
         note: Mapping[str, Any] | None = None,
     ) -> Store:
         """Make an empty store. It appears under its name complete or not at all.
@@ -133,8 +134,8 @@ class Store:
             Size of the grid along each dim.
         chunk : int
             Cells of the flattened grid (C order) that are one task.
-        arrays : mapping of str to dtype
-            Values kept of each cell.
+        arrays : mapping of str to dtype, or None
+            Values kept of each cell; None for chunks of arrays of any shape.
         note : mapping, optional
             Anything else worth keeping with it, as plain values; never compared.
 
@@ -193,7 +194,7 @@ class Store:
         *,
         shape: tuple[int, ...],
         chunk: int,
-        arrays: Mapping[str, Any],
+        arrays: Mapping[str, Any] | None,
         note: Mapping[str, Any] | None = None,
     ) -> Store:
         """:meth:`create` if there is no store yet, else :meth:`open`; ``shape``, ``chunk`` and
@@ -342,7 +343,7 @@ class Store:
             If it isn't committed, or isn't what was committed.
         """
         self.chunks.extent(index)
-        data = read(self._file(index), self.chunks.size(index))
+        data = self._bytes(index)
         values = self.chunks.decode(index, data, self._made_under) if data is not None else None
         if values is None and not self._file(index).exists():
             raise StoreError(
@@ -369,6 +370,7 @@ class Store:
                 f"{self.path} isn't complete: {len(missing)} of {self.chunks.count} chunks are "
                 f"missing (first: {missing[0]}). Resume it."
             )
+        assert self.chunks.arrays is not None
         values = {
             name: np.empty(self.chunks.cells, dtype) for name, dtype in self.chunks.arrays.items()
         }
@@ -402,14 +404,17 @@ class Store:
         return [int(index) for index in np.flatnonzero(self.done()) if not intact(int(index))]
 
     def _is_intact(self, index: int) -> bool:
-        data = read(self._file(index), self.chunks.size(index))
+        data = self._bytes(index)
         return data is not None and self.chunks.decode(index, data, self._made_under) is not None
 
     def _seems_intact(self, index: int) -> bool:
         file = self._file(index)
-        return size(file) == self.chunks.size(index) and self.chunks.fits(
+        return self.chunks.size(index) in (None, size(file)) and self.chunks.fits(
             index, tail(file, TRAILER), self._made_under
         )
+
+    def _bytes(self, index: int) -> bytes | None:
+        return read(self._file(index), self.chunks.size(index) or fence.STORED_BYTES)
 
     def _file(self, index: int) -> Path:
         return self.path / CHUNKS / f"{index}.chunk"

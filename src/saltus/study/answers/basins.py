@@ -4,11 +4,13 @@ agreement.
 
 from __future__ import annotations
 
+import functools
 from typing import TYPE_CHECKING, Any
 
 from pydantic import Field, model_validator
 
 from saltus.analysis.basins.basins import map_of
+from saltus.analysis.basins.divided import DividedMap
 from saltus.analysis.basins.pipeline import BasinPlan, basin_plan
 from saltus.fence import MOST_COUNT
 from saltus.results.kinds.agreement import rows
@@ -180,6 +182,11 @@ class BasinMap(Question):
         }
         asked = {"axes": axes, "at": dict(plan.fixed), "periods": plan.periods, "every": plan.every}
         return identity(plan.system, plan.method, asked)
+
+    @functools.cached_property
+    def division(self) -> DividedMap:
+        """Chunks of cells."""
+        return DividedMap(self.plan)
 
     def compute(self, found: Answers, threads: int | None, progress: Show) -> xr.Dataset:  # noqa: ARG002
         """The map, all at once; nothing is stored before it is complete."""

@@ -4,6 +4,7 @@ a file.
 
 from __future__ import annotations
 
+import functools
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from saltus.study.tables.toml import fault
 if TYPE_CHECKING:
     import xarray as xr
 
+    from saltus.results.store.division import Division
     from saltus.results.table import TextTable
     from saltus.study.setting.inputs import Input
     from saltus.study.setting.setting import Setting
@@ -100,7 +102,8 @@ class Question(ABC):
     needs : tuple of str
         Stems of the questions whose answers it takes.
     shared : bool
-        Whether several jobs (shards) may work on it; else it is left to the first of them.
+        Whether every job (shard) answers it that has the answers it needs; else, if it doesn't
+        divide into chunks, it is left to the first of them.
     all_rows : str
         End of the name of a CSV file of every row of the Dataset; "" if the table holds them all.
     inputs : list of Input
@@ -126,6 +129,13 @@ class Question(ABC):
         once from other answers.
         """
         return None
+
+    @functools.cached_property
+    def division(self) -> Division | str:
+        """Its work in independent chunks; the reason why it doesn't divide, a sentence without its
+        end, if it doesn't.
+        """
+        return "is answered at once"
 
     def join(self, asked: Sequence[Question]) -> None:  # noqa: ARG002
         """Find the questions whose answers this question needs. Raises StudyError if there are

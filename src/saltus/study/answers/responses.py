@@ -4,6 +4,7 @@ parameter, or over two.
 
 from __future__ import annotations
 
+import functools
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -19,6 +20,8 @@ from saltus.study.tables.toml import fault
 if TYPE_CHECKING:
     import xarray as xr
 
+    from saltus.analysis.attractors.grid import Grid
+    from saltus.results.store.division import Division
     from saltus.study.setting.setting import Setting
 
 
@@ -50,13 +53,35 @@ class Responses(OneVerb):
 
     def check(self, table: Any, setting: Setting) -> None:  # noqa: ARG002
         """Check the arguments of the analysis before anything is computed."""
+        self.grid()
+
+    def grid(self) -> Grid:
+        """Values of parameters, and starts."""
         from saltus.analysis.attractors.grid import grid_of
 
         start, box, seed, follow = (
             self.arguments[name] for name in ("start", "box", "seed", "follow")
         )
-        grid_of(
+        return grid_of(
             self.system, self.varied(), start, box, None, seed, follow, self.arguments.get("every")
+        )
+
+    @functools.cached_property
+    def division(self) -> Division | str:
+        """Chunks of values, unless each begins where the one before ended."""
+        from saltus.analysis.responses import divided
+
+        if (grid := self.grid()).sweeps:
+            return "sweeps: each value begins where the one before ended"
+        given = self.arguments
+        return divided.DividedResponses(
+            grid,
+            self.method,
+            given["periods"],
+            given.get("sample", ""),
+            given["outputs"],
+            given["unstable"],
+            max(1, divided.TRAJECTORIES // len(grid.starts)),
         )
 
     def varied(self) -> dict[str, Any]:

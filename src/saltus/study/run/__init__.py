@@ -1,3 +1,3 @@
-"""Running studies: answers in a folder, maps in crash-safe stores, threads, processes
+"""Running studies: answers in a folder, chunks in crash-safe stores, threads, processes
 and clusters.
 """

@@ -9,21 +9,21 @@ from __future__ import annotations
 import logging
 import re
 import socket
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError, wait
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
 
 from saltus.errors import StudyError
 from saltus.flow.threads import on_threads
 from saltus.interrupt import check_stop
 
 if TYPE_CHECKING:
+    import numpy as np
     from distributed import Client
 
-    from saltus.analysis.attractors.attractor_set import AttractorSet
-    from saltus.analysis.basins.labels import Settling
-    from saltus.analysis.basins.pipeline import BasinPlan
+    from saltus.results.store.division import Division
 
 #: Chunks handed out at a time, for each worker: enough to keep it busy, few enough that a large map
 #: doesn't fill the scheduler.
@@ -40,7 +40,7 @@ _SILENT = (
 
 @contextmanager
 def cluster_runner(scheduler: str) -> Iterator[Callable[..., None]]:
-    """Yields ``run(plan, found, missing, keep, show)`` on a cluster.
+    """Yields ``run(division, shared, missing, keep, show)`` on a cluster.
 
     Parameters
     ----------
@@ -79,12 +79,24 @@ def check_scheduler(address: str) -> None:
         raise StudyError(_SILENT.format(address, error.strerror or error)) from error
 
 
+def open_to_all(address: str) -> str:
+    """A line that warns of a scheduler that asks for no secret; empty for one that does, and
+    without dask, which is told later.
+    """
+    if address.startswith("tls://") or find_spec("distributed") is None:
+        return ""
+    return (
+        f"--scheduler {address} asks for no secret: whoever can reach it can run code as you. "
+        "Where others can, start it with TLS and write tls://HOST:PORT (docs/cluster.md)."
+    )
+
+
 def _run(
     client: Client,
-    plan: BasinPlan,
-    found: AttractorSet,
+    division: Division,
+    shared: Any,
     missing: Sequence[int],
-    keep: Callable[[int, Settling], None],
+    keep: Callable[[int, Mapping[str, np.ndarray]], None],
     show: Callable[[float], None],
 ) -> None:
     """Compute chunks; one thread waits for each chunk that is handed out."""
@@ -95,12 +107,12 @@ def _run(
 
     _find_workers(client, 30.0)
     width = CHUNKS_PER_WORKER * len(client.scheduler_info()["workers"])
-    on_threads(lambda index: _chunk(client, plan, found, index), missing, keep, width, watch)
+    on_threads(lambda index: _chunk(client, division, shared, index), missing, keep, width, watch)
 
 
-def _chunk(client: Client, plan: BasinPlan, found: AttractorSet, index: int) -> Settling:
-    """Compute one chunk on the cluster. The plan goes with each chunk: it is small, and a worker
-    that dies loses what it keeps.
+def _chunk(client: Client, division: Division, shared: Any, index: int) -> Mapping[str, np.ndarray]:
+    """Compute one chunk on the cluster. The division goes with each chunk: it is small, and a
+    worker that dies loses what it keeps.
 
     Raises
     ------
@@ -109,11 +121,11 @@ def _chunk(client: Client, plan: BasinPlan, found: AttractorSet, index: int) -> 
     """
     problem: Exception | None = None
     for _ in range(MAX_TRIES):
-        future = client.get_executor(pure=False).submit(plan.chunk, index, found)
+        future = client.get_executor(pure=False).submit(division.chunk, index, shared)
         while not wait([future], PATIENCE).done:
             check_stop()
         try:
-            chunk: Settling = future.result()
+            chunk: Mapping[str, np.ndarray] = future.result()
         except (Exception, CancelledError) as error:  # its workers have died, one after the other
             problem = error
             continue

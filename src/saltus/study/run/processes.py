@@ -6,20 +6,22 @@ from __future__ import annotations
 
 import multiprocessing
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from saltus.errors import StudyError
 from saltus.flow.threads import on_threads, usable_processors
 from saltus.interrupt import check_stop
 
 if TYPE_CHECKING:
-    from saltus.analysis.attractors.attractor_set import AttractorSet
-    from saltus.analysis.basins.labels import Settling
-    from saltus.analysis.basins.pipeline import BasinPlan
+    import numpy as np
+
+    from saltus.results.store.division import Division
+
+    Chunk = Mapping[str, np.ndarray]
 
 #: Processes that a chunk is given to, one after the other, when they die.
 MAX_TRIES = 6
@@ -29,13 +31,13 @@ PATIENCE = 0.1
 
 def run_on_processes(
     workers: int | None,
-    plan: BasinPlan,
-    found: AttractorSet,
+    division: Division,
+    shared: Any,
     missing: Sequence[int],
-    keep: Callable[[int, Settling], None],
+    keep: Callable[[int, Chunk], None],
     show: Callable[[float], None],
 ) -> None:
-    """Compute chunks; ``keep(index, settling)`` is called from this thread as each is ready, in any
+    """Compute chunks; ``keep(index, arrays)`` is called from this thread as each is ready, in any
     order.
 
     A thread waits for each process. The chunk of a process that dies goes to another one. On
@@ -45,8 +47,10 @@ def run_on_processes(
     ----------
     workers : int, optional
         Processes; by default one for each usable core.
-    plan, found : BasinPlan, AttractorSet
-        The map, and its attractors.
+    division : Division
+        The work.
+    shared : object
+        What all chunks share.
     missing : sequence of int
         Chunks to compute.
     keep, show : callable
@@ -57,9 +61,8 @@ def run_on_processes(
     StudyError
         If a chunk can't be computed, or its processes die again and again.
     """
-    # Compile once here, so that no process compiles.
-    plan.map(1).launch(plan.starts(plan.cells_of(missing[0])[:1]), 1)
-    team = _Team(plan, found)
+    division.prepare()  # compiles once here, so that no process compiles
+    team = _Team(division, shared)
     try:
         on_threads(team.chunk, missing, keep, workers or usable_processors(), show)
     finally:
@@ -69,11 +72,11 @@ def run_on_processes(
 class _Team:
     """Team of processes: one for each thread that asks for a chunk."""
 
-    def __init__(self, plan: BasinPlan, found: AttractorSet):
-        self._job = plan, found
+    def __init__(self, division: Division, shared: Any):
+        self._job = division, shared
         self._idle: list[_Worker] = []
 
-    def chunk(self, index: int) -> Settling:
+    def chunk(self, index: int) -> Chunk:
         """One chunk, by a process that is idle. Raises StudyError with what went wrong there."""
         code = None
         for _ in range(MAX_TRIES):
@@ -104,22 +107,22 @@ class _Team:
 class _Worker:
     """Process, and the pipe to it."""
 
-    def __init__(self, plan: BasinPlan, found: AttractorSet):
+    def __init__(self, division: Division, shared: Any):
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
-        self._process = context.Process(target=_work, args=(theirs, plan, found), daemon=True)
+        self._process = context.Process(target=_work, args=(theirs, division, shared), daemon=True)
         with _without_ctrl_c():
             self._process.start()
         theirs.close()
 
-    def chunk(self, index: int) -> tuple[Settling | None, str]:
+    def chunk(self, index: int) -> tuple[Chunk | None, str]:
         """A chunk, or what went wrong. Raises EOFError or OSError if the process dies, Interrupted
         if the work is to stop.
         """
         self._pipe.send(index)
         while not self._pipe.poll(PATIENCE):
             check_stop()
-        answer: tuple[Settling | None, str] = self._pipe.recv()
+        answer: tuple[Chunk | None, str] = self._pipe.recv()
         return answer
 
     def end(self) -> int | None:
@@ -149,7 +152,7 @@ def _without_ctrl_c() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 
-def _work(pipe: Connection, plan: BasinPlan, found: AttractorSet) -> None:
+def _work(pipe: Connection, division: Division, shared: Any) -> None:
     """Loop of a process: it receives chunks and sends answers until the other end of the pipe is
     closed.
     """
@@ -157,12 +160,11 @@ def _work(pipe: Connection, plan: BasinPlan, found: AttractorSet) -> None:
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with suppress(EOFError, OSError), silent():
-        map_ = plan.map(1)
         while True:
             index = pipe.recv()
-            answer: tuple[Settling | None, str]
+            answer: tuple[Chunk | None, str]
             try:
-                answer = plan.chunk(index, found, map_), ""
+                answer = division.chunk(index, shared), ""
             except Exception as error:
                 answer = None, f"{type(error).__name__}: {error}"
             pipe.send(answer)

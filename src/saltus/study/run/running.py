@@ -20,11 +20,11 @@ class Resources:
     threads : int or None
         Threads of this process; all usable cores by default.
     workers : int or None
-        Basins: processes of this machine.
+        Processes of this machine, for questions that divide into chunks.
     scheduler : str or None
-        Basins: address of a dask scheduler, or ``"local"`` for processes of this machine.
+        For these: address of a dask scheduler, or ``"local"`` for processes of this machine.
     shard : (k, n) or None
-        Basins: only the chunks i with i % n == k, one of n jobs that share the store and nothing
+        Of these only the chunks i with i % n == k: one of n jobs that share the folder and nothing
         else. All other questions are left to shard 0.
     """
 
@@ -32,6 +32,11 @@ class Resources:
     workers: int | None = None
     scheduler: str | None = None
     shard: tuple[int, int] | None = None
+
+    @property
+    def divide(self) -> bool:
+        """True if questions are to be divided into chunks."""
+        return any(one is not None for one in (self.workers, self.scheduler, self.shard))
 
 
 def shard_of(text: str) -> tuple[int, int]:
@@ -44,7 +49,7 @@ def shard_of(text: str) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class Report:
-    """Progress of a question. For a map it is read from the store, so the work of other machines
+    """Progress of a question. Of chunks it is read from the store, so the work of other machines
     counts too.
 
     ``what`` is counted: chunks, or per cent.

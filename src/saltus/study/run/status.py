@@ -11,7 +11,7 @@ from saltus.errors import SaltusError, StudyError
 from saltus.results.table import TextTable
 from saltus.study.read import read
 from saltus.study.run.copies import COPY, copy_of, inputs_of
-from saltus.study.run.maps import STORES
+from saltus.study.run.divided import STORES
 from saltus.study.run.stored import PARTIAL
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import json
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from saltus.interrupt import Interrupted
 from saltus.results import load, save
@@ -20,6 +20,8 @@ from saltus.study.run.running import Report, Running
 if TYPE_CHECKING:
     import xarray as xr
 
+#: A Dataset; or None, where other jobs have yet to work on it.
+Answer = TypeVar("Answer", "xr.Dataset", "xr.Dataset | None")
 #: Attribute of a result that holds its identity.
 IDENTITY = "study_identity"
 #: End of the name of a file with a result that was stopped.
@@ -30,9 +32,9 @@ def load_or_compute(
     stem: str,
     title: str,
     identity: Mapping[str, str],
-    compute: Callable[[Callable[[float], None]], xr.Dataset],
+    compute: Callable[[Callable[[float], None]], Answer],
     at: Running,
-) -> xr.Dataset:
+) -> Answer:
     """Load the result in ``STEM.nc`` if it has this question's identity, else compute it and store
     it there.
 
@@ -43,7 +45,7 @@ def load_or_compute(
     identity : mapping of str to str
         Hashes and texts that the file must have to be the answer.
     compute : callable
-        Takes the progress callable.
+        Takes the progress callable; returns None if other jobs have yet to work on it.
     at : Running
         Where.
 
@@ -86,9 +88,9 @@ def _computed(
     file: Path,
     title: str,
     identity: Mapping[str, str],
-    compute: Callable[[Callable[[float], None]], xr.Dataset],
+    compute: Callable[[Callable[[float], None]], Answer],
     at: Running,
-) -> xr.Dataset:
+) -> Answer:
 
     begin = time.perf_counter()
 
@@ -99,12 +101,15 @@ def _computed(
     labels: dict[str, Any] = {"study": at.text, "title": title, IDENTITY: to_json(dict(identity))}
     partial = file.with_stem(f"{file.stem}{PARTIAL}")
     try:
-        ds = compute(show).assign_attrs(labels)
+        answer = compute(show)
     except Interrupted as stopped:
         if stopped.has_partial:
             at.say(f"{title}: what was computed so far goes to {partial}")
             save(stopped.partial.assign_attrs(labels), partial)
         raise
+    if answer is None:
+        return answer
+    ds = answer.assign_attrs(labels)
     save(ds, file)
     partial.unlink(missing_ok=True)
     show(1.0, last=True)

@@ -6,12 +6,14 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from saltus.errors import StudyError
 from saltus.results import save
 from saltus.results.files.atomic import remove_old_drafts
+from saltus.results.store.division import Division
 from saltus.study.answers.basins import BasinMap
 from saltus.study.ask import naming_table, questions_of
 from saltus.study.run.copies import keep_copy
-from saltus.study.run.maps import compute, finish, open_store
+from saltus.study.run.divided import answer_in_chunks, compute, finish, open_store, place_of
 from saltus.study.run.running import Report, Resources, Running, StudyOutcome
 from saltus.study.run.stored import load_or_compute
 from saltus.study.run.write import write
@@ -73,13 +75,18 @@ def run_study(
     remove_old_drafts(folder)
     inputs = inputs or Inputs(folder)
     asked = questions_of(study, own, inputs, only)
+    divided = [question for question in asked if isinstance(question.division, Division)]
+    if resources.divide:
+        _check_divided(asked, divided)
     if resources.scheduler not in (None, "local"):
-        from saltus.study.run.cluster import check_scheduler
+        from saltus.study.run.cluster import check_scheduler, open_to_all
 
         check_scheduler(str(resources.scheduler))
+        if warning := open_to_all(str(resources.scheduler)):
+            say(warning)
     stores = {
         question.stem: open_store(question, folder)
-        for question in asked
+        for question in divided
         if isinstance(question, BasinMap)
     }
     keep_copy(folder, text, inputs.taken)
@@ -87,7 +94,8 @@ def run_study(
     found: dict[str, xr.Dataset] = {}
     for question in asked:
         first = resources.shard is None or resources.shard[0] == 0
-        if (first or question.shared) and found.keys() >= set(question.needs):
+        shared = question in divided or question.shared
+        if (first or shared) and found.keys() >= set(question.needs):
             with naming_table(question.place):
                 ds = _answer(question, found, at, stores)
                 if ds is None:
@@ -98,12 +106,23 @@ def run_study(
     return outcome
 
 
+def _check_divided(asked: Sequence[Question], divided: Sequence[Question]) -> None:
+    """Raise StudyError if none of the questions divides into chunks."""
+    if not divided:
+        why = ". ".join(dict.fromkeys(f"[{one.place}] {one.division}" for one in asked))
+        raise StudyError(
+            "--workers, --scheduler and --shard divide questions into chunks, and none of this "
+            f"study's can be divided: {why}. Leave them out."
+        )
+
+
 def _answer(
     question: Question, found: Mapping[str, xr.Dataset], at: Running, stores: Mapping[str, Store]
 ) -> xr.Dataset | None:
     """Load or compute an answer; None if other shards have yet to work on it."""
+    resources = at.resources
     if (identity := question.identity()) is None:
-        ds = question.compute(found, at.resources.threads, lambda _: None)
+        ds = question.compute(found, resources.threads, lambda _: None)
         save(ds, at.folder / f"{question.stem}.nc")
         return ds
     if not isinstance(question, BasinMap):
@@ -111,14 +130,28 @@ def _answer(
             question.stem,
             question.title,
             identity,
-            lambda show: question.compute(found, at.resources.threads, show),
+            lambda show: _one(question, found, at, show),
             at,
         )
     store = stores[question.stem]
-    if not compute(question, store, at.resources, at.report, at.say):
+    if not compute(question, store, resources, at.report, at.say):
         return None
-    ds = finish(question, store, at.resources.threads).assign_attrs(
+    ds = finish(question, store, resources.threads).assign_attrs(
         study=at.text, title=question.title
     )
     save(ds, at.folder / f"{question.stem}.nc")
     return ds
+
+
+def _one(
+    question: Question,
+    found: Mapping[str, xr.Dataset],
+    at: Running,
+    show: Callable[[float], None],
+) -> xr.Dataset | None:
+    """Compute an answer: in chunks if that is asked for, or some of them are there already."""
+    divides = isinstance(question.division, Division)
+    if divides and (at.resources.divide or place_of(question, at.folder).exists()):
+        store = open_store(question, at.folder)
+        return answer_in_chunks(question, store, at.resources, at.report, at.say, show)
+    return question.compute(found, at.resources.threads, show)
