@@ -13,6 +13,7 @@ _WORDS = {
         "of two maps of basins",
     "responses": "responses", "section": "a section", "spectrum": "a spectrum",
     "impacts": "impacts", "energy": "energies", "sensitivity": "derivatives",
+    "event_sensitivity": "derivatives of a bifurcation",
     "methods": "one question by several methods", "exponents": "exponents",
     "branches": "branches of periodic orbits", "orbits": "periodic orbits",
     "bifurcation_curve": "a curve of bifurcations", "backbone": "a backbone",

@@ -58,7 +58,7 @@ def given_orbits(system: System, found: xr.Dataset) -> tuple[Ensemble, Span]:
     names = [NAMES[prefix](name) for name in (*system.states, *system.values)]
     lasting = [f"{prefix}_cycle", f"{prefix}_period"]
     mine = found[[name for name in (*names, *lasting) if name in found]].reset_coords()
-    mine = mine if batch else mine.expand_dims(prefix)
+    mine = mine if batch else mine.drop_vars(prefix, errors="ignore").expand_dims(prefix)
     mine = mine.transpose(prefix, ...)
     points = np.stack([mine[name].values for name in names[: len(system.states)]], axis=2)
     counts, time = _lasting(system, mine, prefix, points)
