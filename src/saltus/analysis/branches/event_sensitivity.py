@@ -13,6 +13,7 @@ from saltus.analysis.branches.bifurcation_curve import (
     event_orbit,
     orbits_over,
 )
+from saltus.analysis.branches.singular_orbits import SingularOrbits
 from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.derivatives.sensitivity import Columns
 from saltus.analysis.inputs.starts import check_system
@@ -158,7 +159,11 @@ def _place(
             "the event is of other equations."
         )
     there = np.insert(zeros.z, fixed, z[fixed], 1)
-    slopes = equations.evaluate(there, np.zeros(1, np.int64))[1][0]
+    row = np.zeros(1, np.int64)
+    slopes = equations.evaluate(there, row)[1][0]
+    if isinstance(equations, SingularOrbits):  # its second derivatives are differences
+        equations.beside = 0.5 * equations.beside
+        slopes = (4.0 * equations.evaluate(there, row)[1][0] - slopes) / 3.0
     moved = np.linalg.solve(slopes[:, free], -slopes[:, fixed])
     where = int(np.flatnonzero(free == place)[0])
     return float(there[0, place]), float(moved[where] * unit[0, place] / unit[0, fixed])

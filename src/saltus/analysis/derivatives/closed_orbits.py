@@ -127,7 +127,7 @@ class _Shots:
     def unit(self, group: Ensemble, length: Span) -> np.ndarray:
         """Size of the motion of each state, float64[n, D]."""
         turn = length.period[:, None] / (2.0 * np.pi)
-        return np.maximum(np.abs(group.start), np.abs(self.rates(group)) * turn)
+        return np.asarray(np.maximum(np.abs(group.start), np.abs(self.rates(group)) * turn))
 
     def period_slope(self, end: Places, group: Ensemble) -> np.ndarray:
         """Derivative of the period of forced orbits, float64[n, P]."""
