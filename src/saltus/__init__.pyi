@@ -14,6 +14,8 @@ from saltus.analysis.branches.event_sensitivity import event_sensitivity as even
 from saltus.analysis.closed.equilibria import equilibria as equilibria
 from saltus.analysis.closed.periodic_orbits import periodic_orbits as periodic_orbits
 from saltus.analysis.derivatives.sensitivity import sensitivity as sensitivity
+from saltus.analysis.fits.fit import fit as fit
+from saltus.analysis.harmonics.balance import HarmonicBalance as HarmonicBalance
 from saltus.analysis.lyapunov.lyapunov import lyapunov as lyapunov
 from saltus.analysis.methods.compare_methods import compare_methods as compare_methods
 from saltus.analysis.methods.regularisation_widths import (

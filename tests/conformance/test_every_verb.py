@@ -52,6 +52,13 @@ def spring_force(x, mass, natural_frequency):
     return mass * (2 * sl.pi * natural_frequency) ** 2 * x
 
 
+@cache
+def a_run(how):
+    """What might have been measured."""
+    run = sl.simulate(RIG, START["in SI"], periods=3, samples=8)
+    return {"in SI": {"t": run.time.values, "x": run.x.values}, "in units": run[["x"]]}[how]
+
+
 def started(**arguments):
     """Arguments of a verb that takes a start."""
     return lambda how: (RIG, {"start": START[how], **arguments})
@@ -117,6 +124,15 @@ CALLS = {
         sl.models.double_scroll(),
         {"start": {"x": {"in SI": 1.0, "in units": "1"}[how], "y": 0, "z": 0}},
     ),
+    "fit": lambda how: (
+        RIG,
+        {
+            "measured": a_run(how),
+            "free": {"natural_frequency": {"in SI": (4.0, 6.0), "in units": ("4 Hz", "6 Hz")}[how]},
+            "start": START[how],
+            "starts": 4,
+        },
+    ),
     "frequency_response": lambda how: (
         RIG,
         {
@@ -142,7 +158,10 @@ CALLS = {
         {"sampling_interval": {"in SI": 1.0, "in units": "1 s"}[how], "dimension": 2, "delay": 1},
     ),
 }
-VERBS = [name for name, home in sl._HOMES.items() if home.startswith("saltus.analysis.")]
+VERBS = [
+    name for name, home in sl._HOMES.items()
+    if home.startswith("saltus.analysis.") and not inspect.isclass(getattr(sl, name))
+]  # fmt: skip
 _given: dict[tuple[str, str], xr.Dataset] = {}
 
 

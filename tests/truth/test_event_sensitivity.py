@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
+from saltus.errors import SaltusWarning
 
 #: Differences of fourth order, and their step.
 WEIGHTS = np.array([1.0, -8.0, 8.0, -1.0]) / 12.0
@@ -33,6 +34,9 @@ def test_the_graze_of_a_rigid_stop_moves_as_its_formula_says():
     assert slopes.event_derivative.values == pytest.approx(-by / by_f, rel=1e-11)
     assert abs(float(slopes.sqrt_coefficient)) > 0  # the orbit's own slope is infinite there
     assert "infinite" in sl.describe(slopes)
+    near = np.abs(found.point_f - event.event_f).where(found.point_contacts > 0)
+    with pytest.warns(SaltusWarning, match="nearly grazes gap"):
+        sl.sensitivity(hammer, found.isel(point=int(near.argmin())), to="gap")
 
 
 @pytest.mark.parametrize(

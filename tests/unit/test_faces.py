@@ -14,7 +14,7 @@ LARGER = {
     "system": (85, "what is added to a system, structures, linear pieces for the modal flow"),
     "results": (95, "names of kinds and of variables, which pictures and verbs share"),
     "kernels": (55, "codes of what happened, columns of the tables that kernels fill"),
-    "flow": (55, "maps, requests, series of a motion, threads, progress"),
+    "flow": (60, "maps, requests, series of a motion, threads, progress"),
     "analysis.closed": (35, "closed motions, their measures, cycles and equilibria"),
     "analysis.inputs": (35, "types of arguments, and the readers of each"),
     "language": (30, "expressions and what is made of them"),

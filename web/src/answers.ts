@@ -8,6 +8,14 @@ import { clearOrbit, showLegend, showOrbit, stability } from "./orbit";
 import type { Place, Sheet } from "./sheets";
 import { $, notes } from "./words";
 
+/** Seconds after which the page says what it waits for; and what that is. */
+const PATIENCE = 1.5,
+  DOING: Record<string, string> = {
+    motion: "the motion is being computed",
+    settle: "the start is being followed",
+    map: "looking for what starts settle to",
+    responses: "branches are being followed",
+  };
 /** Most points of branches that their table holds. */
 export const ALL_POINTS = 1000;
 const ORDINAL: Record<number, string> = { 2: "second", 4: "fourth", 8: "eighth" };
@@ -15,7 +23,23 @@ const ORDINAL: Record<number, string> = { 2: "second", 4: "fourth", 8: "eighth" 
 const grouped = (n: number): string => String(n).replace(/\B(?=(\d{3})+$)/g, " ");
 
 export class Answers {
+  private waits: Record<string, string> = {};
   constructor(private of: Explorer) {}
+
+  /** Say what lasts, and for how long by now. */
+  tick(): void {
+    const lasting = this.of.link.underWay,
+      kind = ["motion", "settle", "map", "responses"].find(k => lasting[k] > PATIENCE);
+    if (!kind) return;
+    const waits = Object.keys(this.waits).find(k => k in lasting),
+      known = this.of.map.sheet?.known ?? 0;
+    const text =
+      !waits && kind === "map" && known
+        ? this.mapText()
+        : `${waits ? this.waits[waits] : DOING[kind]}, ${Math.round(lasting[waits ?? kind])} s`;
+    if (!this.of.motion) $("motion-what").textContent = text;
+    this.of.status.say(text);
+  }
 
   hear(head: Head, arrays: Arrays, question: Question): void {
     const { ask, kind } = head;
@@ -27,7 +51,11 @@ export class Answers {
         `Something went wrong at the desk: ${head.why} (number ${head.number}, in the terminal too).`,
       );
     }
-    if (kind === "waits") return this.of.status.say((head.words ?? []).join(" "));
+    if (kind === "waits") {
+      this.waits[ask] = (head.words ?? []).join(" ").replace(/, \d+ s so far$/, "");
+      return this.tick();
+    }
+    delete this.waits[ask];
     if (kind.startsWith("map-")) return this.heardMap(head, arrays);
     if (kind === "motion") {
       if (!this.of.view.orbit) this.showMotion(head, arrays);
@@ -66,11 +94,28 @@ export class Answers {
     const why = String(head.why),
       field: string = head.field ?? "";
     if (head.ask === "save" && this.of.save.shown) return this.of.save.refuse(why);
-    if (field && this.of.values.refuse(field, why)) return;
+    if (field && this.of.values.refuse(field === "values" ? `values.${this.of.slid}` : field, why)) return;
+    if (head.ask === "map" || head.ask === "agreement") return this.noMap(head, why);
+    if (head.ask === "responses") {
+      if (field.startsWith("range")) return this.of.range.refuse(why);
+      $("responses-under").textContent = "";
+      return notes($("responses-words"), [why]);
+    }
     if (head.ask === "track" && !this.of.view.orbit) return clearOrbit(why);
     if ((head.ask === "orbit" || head.ask === "track") && this.of.view.orbit)
       this.of.go({ orbit: null }, { past: true });
     this.of.says.say(why);
+  }
+  /** The map can't be: its panel says why. */
+  noMap(head: Head, why: string): void {
+    const sheet = this.of.maps.get(head.id);
+    if (!sheet) return;
+    sheet.done = true;
+    sheet.words = [why];
+    if (sheet !== this.of.map.sheet) return;
+    this.legend();
+    this.of.map.draw();
+    this.of.status.say("no map");
   }
   showMotion(head: Head, arrays: Arrays): void {
     this.of.heard = performance.now();
@@ -174,6 +219,8 @@ export class Answers {
   }
   heardResponses(head: Head, arrays: Arrays): void {
     this.of.responses.show(head, arrays);
+    this.of.range.refuse("");
+    if (head.done) this.of.status.say(this.mapText());
     notes($("responses-words"), head.words);
     if (JSON.stringify(head.range) !== JSON.stringify(this.of.view.range) || head.quantity !== this.of.view.quantity)
       this.of.go({ range: head.range, quantity: head.quantity }, { shown: true });
@@ -231,6 +278,7 @@ export class Answers {
   mapText(): string {
     const s = this.of.map.sheet;
     if (!s) return "";
+    if (s.done && !s.known) return "no map";
     if (s.done) return `${grouped(s.of)} starts, all known`;
     return `${grouped(s.known)} of ${grouped(s.of)} starts, ${((performance.now() - this.of.begun) / 1000).toFixed(1)} s`;
   }
@@ -242,7 +290,7 @@ export class Answers {
       .map(
         ([code, name]) => [name, this.of.about.code_colors[code] ?? [120, 120, 120], ""] as [string, number[], string],
       );
-    if (s && !s.known && !s.attractors.length) return; // the one before stays, dim, until there is another
+    if (s && !s.done && !s.known && !s.attractors.length) return; // the one before stays, dim, until there is another
     showLegend(this.of.about, s?.attractors ?? [], codes, this.of.view.history, this.of.map.only, key =>
       this.of.attractor(key),
     );
@@ -274,10 +322,13 @@ export class Answers {
       what = one ? one.name : (this.of.about.codes[String(where.label)] ?? "");
     const when =
       one && where.age < 255 ? `, settles within ${2 ** where.age} ${this.of.about.forced ? "periods" : "turns"}` : "";
-    const other = this.of.map.agreement?.sheet.find(...at),
+    const here = say(at),
+      cell = say(where.at),
+      block = where.stride > 1 ? "block" : "cell",
+      other = this.of.map.agreement?.sheet.find(...at),
       by = this.of.map.agreement?.against,
-      apart = other ? { "0": `, elsewhere by ${by}`, "1": `, the same by ${by}` }[String(other.label)] ?? "" : "";
+      apart = other ? ({ "0": `, elsewhere by ${by}`, "1": `, the same by ${by}` }[String(other.label)] ?? "") : "";
     $("map-under").textContent =
-      `${say(where.at)}: ${what}${when}${apart}${where.stride > 1 ? " (one start for the whole block)" : ""}`;
+      `${here}${here === cell ? "" : `; the ${block} shows the start ${cell}`}: ${what}${when}${apart}`;
   }
 }

@@ -61,7 +61,7 @@ export function connect(explorer: Explorer): void {
     ["range-low", 0],
     ["range-high", 1],
   ] as const)
-    $<HTMLInputElement>(id).onchange = e => explorer.typeRange(i, (e.target as HTMLInputElement).value);
+    $<HTMLInputElement>(id).onchange = e => explorer.range.type(i, (e.target as HTMLInputElement).value);
   $("responses").hidden = !about.parameters.length;
   $("periods").previousElementSibling!.textContent = about.forced ? "periods shown" : "turns shown";
   $<HTMLInputElement>("periods").onchange = e => {

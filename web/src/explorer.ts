@@ -10,6 +10,7 @@ import type { Arrays, Head, Link } from "./link";
 import { BasinMap } from "./map";
 import type { Motion } from "./motion";
 import { Phase } from "./phase";
+import { RangeFields } from "./range";
 import { Responses } from "./responses";
 import { SaveSheet } from "./save";
 import { Sheet } from "./sheets";
@@ -43,6 +44,7 @@ export class Explorer {
   readonly save: SaveSheet;
   readonly asks = new Asks(this);
   readonly answers = new Answers(this);
+  readonly range = new RangeFields(this);
   motion: Motion | null = null;
   maps = new Map<number, Sheet>();
   agreeing: { id: number; sheet: Sheet } | null = null;
@@ -51,6 +53,9 @@ export class Explorer {
   settled: Head | null = null;
   timers: Record<string, number> = {};
   kept = "";
+  keptView: View;
+  moves = false;
+  slid = "";
   dragging = false;
   dragged = "";
   heard = 0;
@@ -131,8 +136,10 @@ export class Explorer {
     });
     this.show();
     this.kept = toAddress(this.view, this.first);
-    this.undo.replace(this.view, this.kept);
+    this.keptView = this.view;
     this.asks.askAll();
+    this.keep();
+    setInterval(() => this.answers.tick(), 1000);
   }
 
   // -- what is looked at ------------------------------------------------------------------------------------------------------
@@ -145,7 +152,7 @@ export class Explorer {
     this.dragging = drag;
     if (other("start", "values", "method")) this.settled = null;
     if (other("start")) this.phase.over(null);
-    if (other("orbit") && next.orbit === null) this.responses.chosen = -1;
+    if (other("orbit") && next.orbit === null) this.responses.unchoose();
     if (past && other("axes")) this.whole = this.wholeOf(next.axes);
     this.show();
     const values = other("values");
@@ -172,7 +179,12 @@ export class Explorer {
     );
     if (!drag && !shown && (apart || other("over", "range", "quantity") || released)) this.asks.askResponses();
     if (!past) this.later("keep", KEEP, () => this.keep(), drag || half);
-    else this.kept = toAddress(next, this.first);
+    else {
+      this.later("keep", 0, () => {}, true);
+      this.kept = toAddress(next, this.first);
+      this.keptView = next;
+      this.moves = false;
+    }
   }
   askMotions(values: boolean, motion: boolean, start: boolean, orbit: boolean): void {
     if (values && this.view.orbit && !orbit) return this.asks.track();
@@ -194,12 +206,15 @@ export class Explorer {
   get rests(): boolean {
     return this.link.quiet && Object.keys(this.timers).every(name => name === "told") && this.motion !== null;
   }
+  /** Keep the view for undo; moves of the map one after the other are one step. */
   keep(): void {
-    const address = toAddress(this.view, this.first);
-    if (address !== this.kept) {
-      this.kept = address;
-      this.undo.push(this.view, address);
-    } else this.undo.replace(this.view, address);
+    const address = toAddress(this.view, this.first),
+      moved = JSON.stringify({ ...this.keptView, box: this.view.box }) === JSON.stringify(this.view);
+    if (address !== this.kept && !(moved && this.moves)) this.undo.push(this.view, address);
+    else this.undo.replace(this.view, address);
+    if (address !== this.kept) this.moves = moved;
+    this.kept = address;
+    this.keptView = this.view;
     this.later("told", TELL, () => this.link.tell("show", { view: this.asks.shownView() }));
   }
   address(): string {
@@ -234,12 +249,7 @@ export class Explorer {
       ["quantity", v.quantity],
     ] as const)
       $<HTMLSelectElement>(id).value = value;
-    const unit = this.about.parameters.find(p => p.name === v.over)?.unit ?? "";
-    for (const [id, value] of [
-      ["range-low", v.range[0]],
-      ["range-high", v.range[1]],
-    ] as const)
-      if (document.activeElement?.id !== id) $<HTMLInputElement>(id).value = spoken(value, unit, 5);
+    this.range.show();
     if (document.activeElement?.id !== "periods") $<HTMLInputElement>("periods").value = String(v.periods);
     this.responses.now = v.values[v.over];
     this.responses.draw();
@@ -284,7 +294,7 @@ export class Explorer {
   // -- what the user does -------------------------------------------------------------------------------------------------------
   slide(name: string, value: number, done: boolean): void {
     this.values.refuse(`values.${name}`, "");
-    this.dragged = name;
+    this.dragged = this.slid = name;
     this.settled = null;
     this.status.say(`${plain(name)} ${spoken(value, this.about.parameters.find(p => p.name === name)!.unit, 5)}`);
     this.go({ values: { ...this.view.values, [name]: value } }, { drag: !done });
@@ -319,6 +329,10 @@ export class Explorer {
     this.status.say("stopped");
   }
   back(): void {
+    if (this.timers.keep) {
+      this.later("keep", 0, () => {}, true);
+      this.keep(); // what was changed just now is a step of its own
+    }
     this.values.forget();
     this.undo.undo();
   }
@@ -368,16 +382,6 @@ export class Explorer {
     $("points-scroll").hidden = !on;
     $("responses-canvas").hidden = on;
     if (on) this.responses.table($("points").querySelector("thead")!, $("points").querySelector("tbody")!, ALL_POINTS);
-  }
-  /** A range is typed with units: the desk reads it. */
-  typeRange(i: number, text: string): void {
-    const p = this.about.parameters.find(q => q.name === this.view.over)!,
-      typed = text.trim().replace("−", "-"),
-      bare = /^[-+]?[\d.,]+(e[-+]?\d+)?$/i.test(typed);
-    const range: (number | string)[] = [...this.view.range];
-    range[i] = bare && p.shown.unit ? `${typed} ${p.shown.unit}` : typed;
-    this.asks.askedValues = "";
-    this.link.ask("responses", { ...this.asks.responseFields(), range });
   }
 }
 /** A system's name without what stands in brackets behind it. */

@@ -57,6 +57,7 @@ export class Link {
   private desk = "";
   private welcome = false;
   private asked = new Map<number, Question>();
+  private since = new Map<number, [string, number]>();
   private flying = new Map<string, number>();
   private waiting = new Map<string, Question>();
   bytes = 0;
@@ -83,6 +84,7 @@ export class Link {
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {
       this.asked.clear();
+      this.since.clear();
       this.flying.clear();
       this.waiting.clear();
       this.ask("hello", { token: this.token, wire: WIRE, desk: this.desk });
@@ -105,6 +107,7 @@ export class Link {
     if (head.kind === "hello") {
       const first = !this.desk;
       this.asked.delete(head.id);
+      this.since.delete(head.id);
       this.desk = head.desk;
       this.wait = FIRST_WAIT;
       this.welcome = true;
@@ -119,6 +122,7 @@ export class Link {
         : head.kind !== "waits" && head.kind !== "responses-progress" && head.done !== false;
     if (head.kind === "map-piece") this.send({ ask: "seen", id: head.id });
     if (last) this.asked.delete(head.id);
+    if (last) this.since.delete(head.id);
     if (last && this.flying.get(kind) === head.id) {
       this.flying.delete(kind);
       const next = this.waiting.get(kind);
@@ -130,6 +134,13 @@ export class Link {
     this.listener.hear(head, arrays, question);
   }
 
+  /** Seconds for which the oldest question of each kind has been under way. */
+  get underWay(): Record<string, number> {
+    const now = performance.now(),
+      found: Record<string, number> = {};
+    for (const [kind, at] of this.since.values()) found[kind] = Math.max(found[kind] ?? 0, (now - at) / 1000);
+    return found;
+  }
   private send(message: Question): void {
     if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(message));
   }
@@ -144,8 +155,10 @@ export class Link {
     if (!this.welcome && kind !== "hello") return -1;
     const id = this.id++;
     this.asked.set(id, fields);
+    this.since.set(id, [kind, performance.now()]);
     this.send({ ask: kind, id, ...fields });
     if (this.asked.size > 400) this.asked.delete(this.asked.keys().next().value!);
+    if (this.since.size > 400) this.since.delete(this.since.keys().next().value!);
     return id;
   }
 

@@ -109,7 +109,8 @@ export class BasinMap {
     if (this.agreement) this.stretch(c, p, this.agreement.sheet, 1, () => this.differing);
     if (own) this.points(c, p, own.attractors);
     c.restore();
-    if (!below && !paler.length && !own?.known) wordsIn(c, p, "the first starts are being followed");
+    if (!below && !paler.length && !own?.known)
+      wordsIn(c, p, own?.done ? "no attractors, no map" : "the first starts are being followed");
     frame(
       c,
       place(this.canvas, rx, ry),
@@ -129,7 +130,7 @@ export class BasinMap {
   /** Sheets to be seen where the own one has no cells: of the same values paler, of other values dimmed. */
   private beneath(): { below: Sheet | null; paler: Sheet[] } {
     const own = this.sheet;
-    if (!own || (own.covered && this.inside(own))) return { below: null, paler: [] };
+    if (!own || (own.done && !own.known) || (own.covered && this.inside(own))) return { below: null, paler: [] };
     const others = [...this.sheets].filter(s => s !== own && s.plane === own.plane && s.intersects(this.box));
     const same = JSON.stringify(own.values),
       paler = others.filter(s => JSON.stringify(s.values) === same).sort((s, t) => width(t.box) - width(s.box));
@@ -305,7 +306,8 @@ export class BasinMap {
       if (!fingers.delete(e.pointerId) || fingers.size) return;
       if (this.moved < 4) {
         if (this.within([e.offsetX, e.offsetY])) {
-          this.at = this.where(e.offsetX, e.offsetY);
+          const here = this.where(e.offsetX, e.offsetY);
+          this.at = (e.shiftKey && this.sheet?.find(...here)?.at) || here;
           this.draw();
           this.events.start(this.at, true);
         }

@@ -104,6 +104,10 @@ function swatch(rgb: number[]): HTMLElement {
 }
 function share(one: Attractor): string {
   if (one.fraction === null || one.fraction === undefined) return "";
-  const percent = (v: number) => digits(100 * v, 3);
-  return `${percent(one.fraction)} %${one.low != null && one.high != null ? ` (${percent(one.low)} to ${percent(one.high)})` : ""}`;
+  const { fraction, low, high } = one,
+    percent = (v: number, count = 3) => digits(100 * v, count);
+  if (low == null || high == null) return `${percent(fraction)} %`;
+  let count = 3;
+  while (count < 7 && percent(low, count) === percent(high, count)) count++;
+  return `${percent(fraction)} % (${percent(low, count)} to ${percent(high, count)})`;
 }

@@ -33,6 +33,7 @@ const MANY = 25;
 export class Responses {
   head: Head | null = null;
   chosen = -1;
+  event = -1; // an event that is chosen rather than the point beside it
   now = NaN;
   private a: Arrays = {};
   private plot: Plot | null = null;
@@ -51,7 +52,7 @@ export class Responses {
   }
 
   show(head: Head, arrays: Arrays): void {
-    if (this.head?.key !== head.key || this.chosen >= (arrays.point_peak?.length ?? 0)) this.chosen = -1;
+    if (this.head?.key !== head.key || this.chosen >= (arrays.point_peak?.length ?? 0)) this.unchoose();
     if (
       this.head?.parameter !== head.parameter ||
       this.head?.quantity !== head.quantity ||
@@ -63,6 +64,9 @@ export class Responses {
     this.draw();
   }
 
+  unchoose(): void {
+    this.chosen = this.event = -1;
+  }
   private get x(): Numbers {
     return this.a.point_parameter;
   }
@@ -139,7 +143,9 @@ export class Responses {
       c.strokeStyle = accent;
       c.lineWidth = 2.4;
       c.beginPath();
-      c.arc(p.X(x[this.chosen]), p.Y(y[this.chosen]), 7, 0, 7);
+      const e = this.event,
+        [at, peak] = e < 0 ? [x[this.chosen], y[this.chosen]] : [this.a.event_parameter[e], this.a.event_peak[e]];
+      c.arc(p.X(at), p.Y(peak), 7, 0, 7);
       c.stroke();
     }
     if (!n)
@@ -148,7 +154,7 @@ export class Responses {
     const branches = new Set(Array.from(branch ?? [])).size;
     this.canvas.setAttribute(
       "aria-label",
-      `responses: peak of ${plain(head.quantity)} over ${plain(head.parameter)}, ${branches} branches, ${n} points, ${head.events.length} events; left and right go along a branch, e to the next event, Enter shows the orbit, t the table`,
+      `responses: peak of ${plain(head.quantity)} over ${plain(head.parameter)}, ${branches} branches, ${n} points, ${head.events.length} events; left and right go along a branch, e to the next event of that branch, Enter shows the orbit, t the table`,
     );
   }
 
@@ -195,10 +201,20 @@ export class Responses {
     return `${periodText(a.point_period[i])}, ${a.point_stable[i] ? "stable" : "unstable"}, ${spoken(this.x[i], ux, 6)}, peak ${spoken(this.y[i], uy)}, branch ${a.point_branch[i]}`;
   }
   private choose(choice: { point?: number; event?: number }, ask: boolean): void {
+    this.event = choice.event ?? -1;
     this.chosen = choice.event !== undefined ? this.a.event_point[choice.event] : choice.point!;
     this.draw();
     this.events.hover(this.text(choice));
     if (ask) this.events.orbit(choice);
+  }
+  /** The next event of the branch that one is on; of none, the first of all. */
+  private nextEvent(): number | null {
+    const { event_point: point, event_branch: on, point_branch: branch } = this.a,
+      own = this.chosen < 0 ? null : branch[this.chosen],
+      here = [...point.keys()].filter(k => own === null || on[k] === own).sort((j, k) => point[j] - point[k] || j - k);
+    if (!here.length) return null;
+    if (this.event >= 0) return here[(here.indexOf(this.event) + 1) % here.length];
+    return here.find(k => point[k] >= this.chosen) ?? here[0];
   }
   private zoom(factor: number, px: number, py: number): void {
     const p = this.plot!,
@@ -212,8 +228,7 @@ export class Responses {
   }
   private listen(): void {
     const at = this.canvas;
-    let event = -1,
-      grip: { x: number; y: number; seen: [Range, Range] } | null = null,
+    let grip: { x: number; y: number; seen: [Range, Range] } | null = null,
       moved = 0;
     at.addEventListener("pointerdown", e => {
       if (e.button || !this.plot) return;
@@ -276,11 +291,9 @@ export class Responses {
           own = starts.filter(k => k <= i).length - 1;
         this.choose({ point: starts[(own + (e.key === "]" ? 1 : starts.length - 1)) % starts.length] }, false);
       } else if (e.key === "e") {
-        const count = this.head!.events.length;
-        if (count) {
-          event = (event + 1) % count;
-          this.choose({ event }, false);
-        }
+        const event = this.nextEvent();
+        if (event !== null) this.choose({ event }, false);
+        else this.events.hover("no event on this branch: [ and ] go to another");
       } else if (e.key === "+" || e.key === "=" || e.key === "-") {
         const p = this.plot!,
           about = this.chosen < 0 ? [p.left + p.width / 2, p.top + p.height / 2] : [p.X(this.x[i]), p.Y(this.y[i])];
@@ -288,7 +301,7 @@ export class Responses {
       } else if (e.key === "0") {
         this.seen = null;
         this.draw();
-      } else if (e.key === "Enter") this.choose({ point: i }, true);
+      } else if (e.key === "Enter") this.choose(this.event < 0 ? { point: i } : { event: this.event }, true);
       else return;
       e.preventDefault();
     });

@@ -43,8 +43,13 @@ export class Values {
     box.append(label, note);
     this.own[key] = shown;
     text.onchange = () => {
-      const typed = text.value.trim(),
-        bare = /^[-+−]?[\d.,]+(e[-+]?\d+)?$/i.test(typed);
+      const typed = text.value.trim();
+      if (!typed) {
+        text.value = this.fields.get(key)!.spoken;
+        this.refuse(key, "");
+        return;
+      }
+      const bare = /^[-+−]?[\d.,]+(e[-+]?\d+)?$/i.test(typed);
       this.events.type(
         group,
         name,

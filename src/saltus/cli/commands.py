@@ -53,6 +53,7 @@ class PictureKind(StrEnum):
     contact_forces = "contact_forces"
     energy = "energy"
     sensitivity = "sensitivity"
+    fit = "fit"
     exponents = "exponents"
     methods = "methods"
 

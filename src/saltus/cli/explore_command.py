@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -78,15 +79,19 @@ def _desk_of(what: str, values: list[str], system: str, threads: int | None) -> 
     path = Path(what)
     if ".py" in path.suffix:
         _no_values(what, values)
-        return _desk(own_system(what), threads)
+        return _desk(own_system(what), threads, what)
     if path.is_dir() or path.suffix == ".toml":
         from saltus.explore.studies import desk_of_results, opening_of_study
 
         _no_values(what, values)
         own = own_system(system) if system else None
-        if path.is_dir():
-            return desk_of_results(path, own, threads)
-        return Desk(opening_of_study(path, own), threads)
+        desk = (
+            desk_of_results(path, own, threads)
+            if path.is_dir()
+            else Desk(opening_of_study(path, own), threads)
+        )
+        desk.opening = replace(desk.opening, file=system)
+        return desk
     return _desk(_model(what, values), threads)
 
 
@@ -110,8 +115,8 @@ def _model(name: str, values: list[str]) -> System:
     return find(name)(**given)
 
 
-def _desk(system: System, threads: int | None) -> Desk:
+def _desk(system: System, threads: int | None, file: str = "") -> Desk:
     from saltus.explore.desk import Desk
     from saltus.explore.opening import opening_of
 
-    return Desk(opening_of(system), threads)
+    return Desk(opening_of(system, file=file), threads)

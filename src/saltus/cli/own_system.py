@@ -39,24 +39,23 @@ def own_system(reference: str) -> System:
     path = Path(file)
     if path.suffix != ".py" or not path.is_file():
         raise ParameterError(
-            f"--system {reference}: there is no Python file {str(path)!r}. Write "
-            f"--system my_rig.py:rig."
+            f"{reference}: there is no Python file {str(path)!r}. Write "
+            "FILE.py:NAME, such as my_rig.py:rig."
         )
     found = {key: value for key, value in vars(_module(path)).items() if isinstance(value, System)}
     if name in found:
         return found[name]
     if not found:
         raise ParameterError(
-            f"--system {reference}: {path} holds no system. Put "
-            f"@sl.system(states=...) above the equation."
+            f"{reference}: {path} holds no system. Put @sl.system(states=...) above the equation."
         )
     if name:
         raise ParameterError(
-            f"--system {reference}: {path} holds no system {name!r}. {nearest(name, found)}"
+            f"{reference}: {path} holds no system {name!r}. {nearest(name, found)}"
         )
     if len(found) > 1:
         raise ParameterError(
-            f"--system {reference}: {path} holds {', '.join(found)}. Say which: "
+            f"{reference}: {path} holds {', '.join(found)}. Say which: "
             f"--system {file}:{next(iter(found))}"
         )
     return next(iter(found.values()))

@@ -32,7 +32,7 @@ from saltus.interrupt import check_stop, ctrl_c_waits
 CHECK_INTERVAL = 0.1
 #: Announced times of LLVM [s]: for a million characters of an equation, for a template, and for
 #: lowering templates.
-SECONDS_PER_MEGABYTE, SECONDS_OF_TEMPLATE, SECONDS_OF_LOWERING = 1.0, 2.5, 20.0
+SECONDS_PER_MEGABYTE, SECONDS_OF_TEMPLATE, SECONDS_OF_LOWERING = 0.35, 2.5, 20.0
 #: Estimated times [s] above which another process compiles, and above which a compilation is
 #: announced.
 OTHER_PROCESS, ANNOUNCEMENT = 0.5, 1.0

@@ -17,10 +17,10 @@ from saltus.errors import CacheError, ParameterError, nearest, shown
 
 #: Version of the code made from the same templates and equations; it is part of the names of cache
 #: entries.
-PIPELINE = 4
-#: LLVM's level for a template, and for an equation alone: straight lines of lanes, which level 3
-#: doesn't make faster (0026).
-LEVEL, LEVEL_ALONE = 3, 1
+PIPELINE = 5
+#: LLVM's level for a template, for its passes if its sizes are open, and for an equation alone:
+#: straight lines of lanes, ready in a third of the time that level 1 takes (0085).
+LEVEL, LEVEL_OPEN, LEVEL_ALONE = 3, 1, 0
 #: Lock on LLVM: it keeps modules in one context.
 _LLVM = threading.Lock()
 _NUMBER = itertools.count()
@@ -162,7 +162,7 @@ def _optimise_open(module: llvm.ModuleRef, machine: llvm.TargetMachine) -> None:
     across functions. Its pipeline for modules takes three times as long: it follows pointers to
     functions, of which there are none, and simplifies everything twice (0028).
     """
-    options = _options(LEVEL_ALONE)
+    options = _options(LEVEL_OPEN)
     options.loop_unrolling, options.inlining_threshold = False, 0
     builder = llvm.create_pass_builder(machine, options)
     first = llvm.create_new_module_pass_manager()

@@ -9,8 +9,9 @@ import numpy as np
 
 from saltus.analysis.basins.labels import OPEN
 from saltus.explore.frames import Answer
-from saltus.explore.opening import STEPS, Opening, choices
-from saltus.flow.methods import METHODS, Modal
+from saltus.explore.opening import STEPS, Opening, choices, first_quantity
+from saltus.flow.methods import METHODS
+from saltus.flow.modal import Modal
 from saltus.kernels import status as st
 from saltus.models import describe
 from saltus.plot.palette import hues, shades
@@ -35,6 +36,7 @@ def about_answer(opening: Opening) -> Answer:
     about_ranges = {**opening.box, **opening.axes}
     largest = {name: max(map(abs, ends)) for name, ends in about_ranges.items()}
     first = system.outputs.names if system.outputs.first else tuple(opening.axes)
+    first = tuple(dict.fromkeys((first_quantity(system), *first)))
     units = [system.units[name] for name in system.states]
     quantities = [
         {"name": name, "unit": unit, "kind": "state", "shown": shown_as(unit, largest.get(name))}

@@ -99,12 +99,12 @@ class Legend:
         with self.lock:
             found = self._joined(found)
             fresh = [one for one in found.every if self._key(one) is None]
+            if list(map(id, found.every)) != list(map(id, self.found.every)):
+                self._table = None  # its rows are by ids
             self.found = found
             fresh = fresh[: MOST - len(self._members)]
             self._hues += self._hues_of(fresh)
             self._members += fresh
-            if fresh:
-                self._table = None
             return bool(fresh)
 
     def _joined(self, found: AttractorSet) -> AttractorSet:

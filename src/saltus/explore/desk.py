@@ -23,11 +23,19 @@ from saltus.explore.frames import Answer, Emit
 from saltus.explore.kept_responses import KeptResponses
 from saltus.explore.map import KeptMap, KeptMaps, grow_map, look, plan_of_map
 from saltus.explore.motion import AskedRun, motion
-from saltus.explore.opening import Opening
-from saltus.explore.orbits import MOST_PERIODS, attractor_orbit, orbit_of, settle, tracked
+from saltus.explore.opening import Opening, first_quantity
+from saltus.explore.orbits import (
+    MOST_PERIODS,
+    attractor_orbit,
+    nowhere,
+    orbit_of,
+    settle,
+    tracked,
+)
 from saltus.explore.questions import QuestionError, about
 from saltus.flow.methods import METHODS, Method
 from saltus.system import System
+from saltus.system.volume import nothing_attracts
 from saltus.units import from_si, to_si
 
 #: Quantities that are sent of each motion unless others are named: states, and outputs.
@@ -168,7 +176,10 @@ class Desk:
         self, question: asked.MapQuestion, method: str | None, field: str
     ) -> BasinPlan:
         """The map that a question is about, by a method."""
-        return plan_of_map(question, self.system_at(question.values), self.method_of(method, field))
+        system, by = self.system_at(question.values), self.method_of(method, field)
+        if why := nothing_attracts(system):
+            raise QuestionError(f"{why} A map shows attractors.")
+        return plan_of_map(question, system, by)
 
     def grown(self, plan: BasinPlan, emit: Emit, coarse: bool = False) -> KeptMap:
         """Grow a map, beside those that are known, and return it."""
@@ -187,10 +198,11 @@ class Desk:
 
     def _settle(self, question: asked.Settle) -> Answer:
         system, method = self.system_at(question.values), self.method_of(question.method)
+        start = self.start_of(system, question.start)
+        if why := nothing_attracts(system):
+            return nowhere(system, why)
         known = self.legend_at(self.plan_of(system, method))
-        return settle(
-            known, self.start_of(system, question.start), method, self.quantities_of(None)
-        )
+        return settle(known, start, method, self.quantities_of(None))
 
     def _orbit(self, question: asked.OrbitQuestion) -> Answer:
         system, method = self.system_at(question.values), self.opening.method
@@ -240,9 +252,11 @@ class Desk:
             system.parameter_text(question.parameter)
         with about("range"):
             limits = range_of(system, question.parameter, question.range)
+        quantity = self.quantities_of((question.quantity or first_quantity(system),))[0]
+        along = [system.with_values(**{question.parameter: one}) for one in limits]
+        if all(reasons := [nothing_attracts(one) for one in (system, *along)]):
+            raise QuestionError(f"{reasons[0]} Responses are followed from attractors.")
         known = self.legend_at(plan := self.plan_of(system, method))
-        first = system.outputs.names if system.outputs.first else system.states
-        quantity = self.quantities_of((question.quantity or first[0],))[0]
         look(plan, known, self.threads)
         respond(
             known, method, question.parameter, limits, quantity, plan,

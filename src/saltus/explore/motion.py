@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -23,10 +24,22 @@ KEPT = 250
 COLUMNS = 2000
 #: Most contacts that are sent: the last ones.
 MOST_CONTACTS = 2000
+#: Most contacts that a motion may meet: what meets more never ends, as where it is driven on.
+MOST_MET = 200_000
+#: Most steps of a motion: so many, and so many more in each period.
+LEAST_STEPS, STEPS = 1_000_000, 500
 #: Two motions have parted where they differ by this share of the range.
 PARTED = 0.01
 #: Statuses of a motion that reached its end.
 REACHED = (st.OK, st.GRAZE_UNRESOLVED)
+
+
+def bounded(method: Method, periods: int) -> Method:
+    """A method with the budgets of a motion on the page: some seconds at most."""
+    own: Any = method
+    steps = min(own.max_steps or math.inf, LEAST_STEPS + STEPS * periods)
+    within: Method = replace(own, max_events=min(own.max_events, MOST_MET), max_steps=steps)
+    return within
 
 
 @dataclass(frozen=True)
@@ -74,7 +87,7 @@ class AskedRun:
         return motion_arrays(
             self.system,
             tuple(self.start),
-            method=method or self.method,
+            method=bounded(method or self.method, self.periods or 1),
             threads=1,
             time_errors="measured" if self.measured else "local",
             **length,
@@ -198,10 +211,12 @@ def _words(found: MotionArrays, status: int) -> list[str]:
     """Sentences on a motion's end."""
     if status == st.OK:
         return []
-    name, meaning = STATUS[status]
+    meaning = STATUS[status][1]
     if status in REACHED:
-        return [f"{name}: {meaning}."]
-    return [f"It ended at {from_si(float(found.outcome.time[0]), 's')}: {name}, {meaning}."]
+        return [f"It {meaning}."]
+    if status in (st.BUDGET_STEPS, st.BUDGET_EVENTS):
+        meaning = "it meets too many contacts, or takes too many steps, to be followed further here"
+    return [f"It ended at {from_si(float(found.outcome.time[0]), 's')}: {meaning}."]
 
 
 def _parting(
@@ -228,5 +243,5 @@ def _parting(
     if number < len(theirs.contacts):
         late = float(theirs.contacts.time[number] - ours.contacts.time[number])
         when = "late" if late > 0 else "early"
-        words += f", which {method.label} meets {from_si(abs(late), 's', 2)} {when}"
+        words += f", which {method.name} meets {from_si(abs(late), 's', 2)} {when}"
     return {"method": method.name, "parts": time, "contact": number, "words": f"{words}."}

@@ -17,7 +17,7 @@ from saltus.analysis.dataset_parts import guards_over
 from saltus.analysis.inputs.starts import ensemble
 from saltus.analysis.motion.motion_arrays import motion_arrays
 from saltus.errors import SaltusError
-from saltus.explore.motion import REACHED
+from saltus.explore.motion import REACHED, bounded
 from saltus.flow.methods import Method, default_method
 from saltus.system import System
 from saltus.system.structures.told import by_modes
@@ -25,7 +25,7 @@ from saltus.system.structures.told import by_modes
 #: Periods of the motion from rest, and its samples in each, by which the box of the map is guessed.
 LOOKED, SAMPLES = 60, 32
 #: Times the largest motion and gap that this box reaches.
-WIDER = 2.5
+WIDER = 5.0
 #: Times the widest gap beyond which a motion has left the picture.
 FARTHEST = 1e3
 #: Starts along each axis of the first map.
@@ -66,6 +66,8 @@ class Opening:
         The table [system] of a study.
     box : mapping of str to (float, float)
         A range of each state and output that holds the motion from rest [SI].
+    file : str
+        The file of a user's own system, and its name there: ``my_rig.py:rig``.
     """
 
     system: System
@@ -81,6 +83,7 @@ class Opening:
     results: Mapping[str, Any] = field(default_factory=dict)
     system_table: Mapping[str, Any] = field(default_factory=dict)
     box: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    file: str = ""
 
 
 def opening_of(system: System, method: Method | None = None, **known: Any) -> Opening:
@@ -99,11 +102,13 @@ def opening_of(system: System, method: Method | None = None, **known: Any) -> Op
 
 def sliders(system: System) -> dict[str, tuple[float, float]]:
     """A decade about the value of each parameter, ends of two digits; symmetric about zero for
-    values that aren't positive [SI].
+    values that aren't positive, of zero as wide as for the largest value of its unit [SI].
     """
     found = {}
     for name, value in system.values.items():
-        size = abs(value) or 1.0
+        like = [abs(system.values[one]) for one, unit in system.units.items()
+                if one in system.values and unit == system.units[name] and unit != "1"]  # fmt: skip
+        size = abs(value) or max(like, default=0.0) or 1.0
         low, high = (float(f"{size * by:.1e}") for by in (10**-0.5, 10**0.5))
         found[name] = (low, high) if value > 0 else (-high, high)
     return found
@@ -121,19 +126,33 @@ def choices(system: System) -> list[str]:
     return [*found, *system.states]
 
 
+def bounded_states(system: System) -> list[str]:
+    """States that meet a boundary, as they stand in the equations."""
+    met = {guard.state for guard in system.guards}
+    return [name for name in system.states if name in met]
+
+
 def _plane(system: System) -> tuple[str, str]:
-    """The two axes of the first map: a state and its rate where there is one; of a structure by its
-    modes what a sensor of a deflection and one of a velocity show.
+    """The two axes of the first map: a state and its rate where there is one, if it can be a state
+    that meets a boundary; of a structure by its modes what a sensor of a deflection and one of a
+    velocity show.
     """
     if by_modes(system):
         units = dict(zip(system.outputs.names, system.outputs.units, strict=True))
         shown = {units.get(name): name for name in reversed(choices(system))}
         if "m" in shown and "m/s" in shown:
             return shown["m"], shown["m/s"]
-    for i, name in enumerate(system.states):
-        for j, rate in enumerate(system.field):
-            if i != j and rate.op == "state" and rate.payload == name:
-                return system.states[j], name
+    rate_of = {
+        system.states[j]: str(rate.payload)
+        for j, rate in reversed(list(enumerate(system.field)))
+        if rate.op == "state" and rate.payload != system.states[j]
+    }
+    if (bound := next((one for one in bounded_states(system) if one in rate_of), None)) is not None:
+        return bound, rate_of[bound]
+    for name in system.states:
+        for place, rate in rate_of.items():
+            if rate == name:
+                return place, name
     return system.states[0], system.states[1 % len(system.states)]
 
 
@@ -157,7 +176,13 @@ def _box(system: System, method: Method) -> tuple[dict[str, tuple[float, float]]
     length = {"periods": LOOKED} if forced else {"t_end": LOOKED * turn}
     count = SAMPLES if forced else LOOKED * SAMPLES
     seen = motion_arrays(
-        system, start, method=method, samples=count, time_errors="local", threads=1, **length
+        system,
+        start,
+        method=bounded(method, LOOKED),
+        samples=count,
+        time_errors="local",
+        threads=1,
+        **length,
     )
     moved = np.abs(seen.values[0]).max(axis=0)
     if int(seen.outcome.status[0]) in REACHED and moved.max() < FARTHEST * (reach.max() or 1.0):
@@ -196,5 +221,12 @@ def _responses(found: Opening) -> dict[str, Any] | None:
     value = system.values[name]
     if name == system.forced_at:  # an octave: a decade takes minutes
         low, high = (float(f"{value * by:.3g}") for by in (2**-0.5, 2**0.5))
-    first = system.outputs.names[0] if system.outputs.first else system.states[0]
-    return {"parameter": name, "range": [low, high], "quantity": first}
+    return {"parameter": name, "range": [low, high], "quantity": first_quantity(system)}
+
+
+def first_quantity(system: System) -> str:
+    """The quantity that histories and responses show first: a sensor, else a state that meets a
+    boundary, else the first state.
+    """
+    names = system.outputs.names if system.outputs.first else (*bounded_states(system),)
+    return str((*names, *system.states)[0])

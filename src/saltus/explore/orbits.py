@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -18,12 +19,15 @@ from saltus.explore.frames import Answer
 from saltus.explore.motion import AskedRun, motion
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
+from saltus.interrupt import Interrupted, Stop, check_stop
 from saltus.results.dataset.kinds import WITHOUT, Kind
 from saltus.results.dataset.schema import kind_text
 from saltus.system import System
 
 #: Periods that a start is followed at most, as by sl.basins.
 MOST_PERIODS = 2000
+#: Time for which a start is followed on the page [s].
+WITHIN = 20.0
 #: Periods that are shown of an attractor that never repeats.
 NEVER_REPEATS = 60
 
@@ -52,17 +56,50 @@ def settle(
     known: Legend, start: Sequence[float], method: Method, quantities: Sequence[str]
 ) -> Answer:
     """The attractor that a start settles to, and its orbit."""
-    key, periods = settled(known, start)
+    found = _in_time(lambda: settled(known, start))
+    if found is None:
+        words = f"This start hasn't settled within {WITHIN:g} s: it may never repeat."
+        return nowhere(known.map.system, words, int(Kind.UNCONVERGED))
+    key, periods = found
     unit = "periods" if known.map.system.forced_at is not None else "turns"
     if key < 0:
-        words = f"This start {_fate(key)}."
-        empty = {"kind": "settle", "attractor": None, "code": key, "settles": -1, "words": [words]}
-        return {**empty, "values": dict(known.map.system.values)}, {}
+        return nowhere(known.map.system, f"This start {_fate(key)}.", key)
     head, arrays = attractor_orbit(known, key, method, quantities)
     words = f"settles to {_noun(head['attractor'])}"
     if periods >= 0:
         words += f" after {periods} {unit}"
     return {**head, "kind": "settle", "code": None, "settles": periods, "words": [words]}, arrays
+
+
+def _in_time(work: Callable[[], tuple[int, int]]) -> tuple[int, int] | None:
+    """Return the findings of work within :data:`WITHIN`; None if it takes longer. Raises
+    Interrupted if it is asked to stop from outside.
+    """
+    late, stop = threading.Event(), Stop()
+
+    def end() -> None:
+        late.set()
+        stop.set()
+
+    timer = threading.Timer(WITHIN, end)
+    timer.daemon = True
+    timer.start()
+    try:
+        with stop:
+            return work()
+    except Interrupted:
+        check_stop()
+        if late.is_set():
+            return None
+        raise
+    finally:
+        timer.cancel()
+
+
+def nowhere(system: System, why: str, code: int | None = None) -> Answer:
+    """The answer on a start that settles to nothing, in a sentence."""
+    head = {"kind": "settle", "attractor": None, "code": code, "settles": -1, "words": [why]}
+    return {**head, "values": dict(system.values)}, {}
 
 
 def _noun(row: Mapping[str, Any]) -> str:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import MISSING, dataclass, field, fields
@@ -49,12 +50,20 @@ def about(name: str) -> Iterator[None]:
     except QuestionError:
         raise
     except SaltusError as error:
-        raise QuestionError(error, name) from error
+        raise QuestionError(_without_code(str(error)), name) from error
+
+
+def _without_code(text: str) -> str:
+    """A message without the sentences that are for whoever writes Python."""
+    sentences = re.split(r"(?<=[.!?]) (?=[A-Z])", text)
+    return " ".join(one for one in sentences if not re.search(r"\bsl\.|=\{", one)) or text
 
 
 # -- values of fields ------------------------------------------------------------------------------
 def _wrong(what: str, given: Any, name: str) -> QuestionError:
-    return QuestionError(f"{name} must be {what}, not {shown(given)}.", name)
+    group, _, own = name.partition(".")
+    called = own if group in ("values", "start", "source", "at") and own else name
+    return QuestionError(f"{called} must be {what}, not {shown(given)}.", name)
 
 
 def _number(given: Any, name: str) -> Number:

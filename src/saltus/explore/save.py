@@ -172,7 +172,8 @@ def study_text(view: View, name: str) -> str:
         }  # fmt: skip
     text = write(tables)
     if not _is_model(system) and "rates" not in tables["system"]:
-        text = f"# saltus run {name}.toml --system FILE.py:{system.name}\n{text}"
+        own = view.opening.file or f"FILE.py:{system.name}"
+        text = f"# saltus run {name}.toml --system {own}\n{text}"
     return text
 
 

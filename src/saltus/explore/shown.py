@@ -13,6 +13,7 @@ from saltus.analysis.basins.pipeline import BasinPlan
 from saltus.analysis.inputs.starts import range_of
 from saltus.analysis.motion.simulate import simulate
 from saltus.explore.map import KeptMap, plan_of_map
+from saltus.explore.opening import first_quantity
 from saltus.explore.questions import MotionQuestion, QuestionError, ResponsesQuestion, question_of
 from saltus.explore.responses import VALUES, starts_from
 from saltus.explore.save import PARTS, View, starts_of
@@ -101,9 +102,8 @@ def _compared(desk: Any, plan: BasinPlan, theirs: BasinPlan) -> xr.Dataset:
 def _answered(
     desk: Any, system: System, method: Method, question: ResponsesQuestion, limits: Any
 ) -> xr.Dataset:
-    first = system.outputs.names if system.outputs.first else system.states
     about = (tuple(system.values.values()), method, question.parameter, limits)
-    number = desk.responses.number((*about, question.quantity or first[0]))
+    number = desk.responses.number((*about, question.quantity or first_quantity(system)))
     if number is None:
         raise QuestionError("the responses aren't finished: wait for their end.", "parts")
     ds: xr.Dataset = desk.responses.get(number)[1]

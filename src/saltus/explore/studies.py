@@ -19,7 +19,7 @@ from saltus.analysis.closed.motions import ClosedMotion
 from saltus.errors import SaltusError
 from saltus.explore.desk import Desk
 from saltus.explore.map import KeptMap
-from saltus.explore.opening import Opening, opening_of
+from saltus.explore.opening import Opening, first_quantity, opening_of
 from saltus.kernels import status as st
 from saltus.results import load
 from saltus.results.dataset import schema
@@ -122,7 +122,7 @@ def _start(system: System, start: Any) -> dict[str, float] | None:
 
 def _responses(asked: Mapping[str, Any], system: System) -> dict[str, Any] | None:
     """The parameter and the range of the first responses that a study asks for."""
-    first = system.outputs.names[0] if system.outputs.first else system.states[0]
+    first = first_quantity(system)
     for name, low, high in _ranges(asked):
         ends = [to_si(one, system.units[name], name) for one in (low, high)]
         return {"parameter": name, "range": ends, "quantity": first}

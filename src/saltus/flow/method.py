@@ -44,13 +44,15 @@ def check_positive(name: str, value: Any) -> None:
         raise must_be(name, "a positive number", value)
 
 
-_M = TypeVar("_M", bound="Method")
+_M = TypeVar("_M")
 #: Options of ode45 by their names in MATLAB.
 _MATLAB: Mapping[str, str] = {"reltol": "rtol", "abstol": "atol", "events": "events"}
 
 
 def explain_unknown_options(cls: type[_M]) -> type[_M]:
-    """Raise a clear error for options that a method doesn't have."""
+    """Raise a clear error for options that a method, or another small option object, doesn't
+    have.
+    """
     signature, made = inspect.signature(cls), cls.__init__
 
     @functools.wraps(made)

@@ -64,7 +64,7 @@ def exact_method(method: Any, system: Any, asked: str) -> Method:
     if not checked.exact:
         raise ParameterError(
             lambda say: say.either(f"{asked} needs", "needs"),
-            f" a method whose errors are rounding, not {checked.name}: Newton's method doesn't "
+            f" a method whose errors are rounding, not {checked.label}: Newton's method doesn't "
             "close its orbits. ",
             lambda say: f"Leave {say.key('method')} out.",
         )

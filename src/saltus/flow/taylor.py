@@ -21,6 +21,8 @@ SMALL_BATCH = 4
 #: Share of its span that LONG_CHECK_STEPS steps must bring: a trajectory of 1e9 steps, minutes of
 #: work, runs to its end.
 SLOWEST_SHARE = 1e-3
+#: Largest tolerance with which Newton's method closes the rig's orbits; 1e-8 loses some, 1e-6 all.
+EXACT = 1e-10
 
 
 @explain_unknown_options
@@ -37,7 +39,8 @@ class Taylor(Method):
     tolerance : float
         Size of the last two terms of a step relative to the leading ones [-]. The default, 2**-56,
         leaves rounding only, over any number of periods; 2**-46 leaves 3e-15 m of error on the rig
-        after five periods and takes a quarter less time.
+        after five periods and takes a quarter less time. Beyond 1e-10 orbits are means of their
+        returns, as with ode45, and branches are refused.
     lanes : int, optional
         Trajectories moved at once: 2, 4, 8 or 16. Default: what suits the processor, and a short
         run of few. Results don't depend on it.
@@ -110,13 +113,14 @@ class Taylor(Method):
 
     @property
     def exact(self) -> bool:
-        """True: the errors are rounding."""
-        return True
+        """True where the errors are rounding, or so small that Newton's method closes orbits: a
+        step's length jumps where its order of truncation does, and the map with it.
+        """
+        return self.tolerance <= EXACT
 
     def companion(self) -> Taylor:
-        """The same series with steps an eighth shorter, which leave a twentieth of the truncation;
-        it uses the same compiled kernel.
+        """The same series with steps an eighth shorter, which leave a twentieth of the truncation,
+        or the default tolerance where its own isn't exact; it uses the same compiled kernel.
         """
-        return Taylor(
-            self.order, self.tolerance * 2.0**-4, self.lanes, self.max_steps, self.max_events
-        )
+        finer = self.tolerance * 2.0**-4 if self.exact else Taylor.tolerance
+        return replace(self, tolerance=finer)

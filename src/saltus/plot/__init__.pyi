@@ -8,6 +8,7 @@ from saltus.plot.bifurcation_curves import bifurcation_curves as bifurcation_cur
 from saltus.plot.branches import branches as branches
 from saltus.plot.contact_forces import contact_forces as contact_forces
 from saltus.plot.exponents import exponents as exponents
+from saltus.plot.fit import fit as fit
 from saltus.plot.frequency_response import frequency_response as frequency_response
 from saltus.plot.gallery import gallery as gallery
 from saltus.plot.history import history as history

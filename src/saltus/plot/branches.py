@@ -4,22 +4,26 @@ bifurcations marked.
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal, get_args
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
+from saltus.errors import ParameterError, counted
 from saltus.plot import curves
-from saltus.plot.picture import picture
+from saltus.plot.picture import check, picture
 from saltus.plot.response_points import Shown
 
+#: Input of the picture: a Dataset, or several.
+Source = xr.Dataset | Sequence[xr.Dataset] | Mapping[str, xr.Dataset]
 Quantity = Literal[curves.Size, "period", "frequency"]
 
 
-@picture()
+@picture(checks=False)
 def branches(
-    ds: xr.Dataset,
+    ds: Source,
     *,
     quantity: Quantity = "peak",
     output: str | None = None,
@@ -32,8 +36,10 @@ def branches(
 
     Parameters
     ----------
-    ds : Dataset
-        Result of :func:`saltus.branches`.
+    ds : Dataset, or several in a list or by their names
+        Result of :func:`saltus.branches`. Several over one parameter are drawn over each other, a
+        colour for each: ``{"exact": a, "9 harmonics": b}``; in a list they have the names
+        ``exact`` and the number of their harmonics.
     quantity : str
         ``"peak"`` (largest magnitude), ``"rms"``, ``"maximum"``, ``"minimum"``,
         ``"peak_to_peak"``, ``"mean"``, ``"rms_about_mean"``; ``"amplitude"`` or ``"phase"`` of the
@@ -57,10 +63,36 @@ def branches(
         If ``ds`` holds no branches, or an argument doesn't fit it.
     """
     curves.check_quantity(quantity, get_args(Quantity))
-    values, unit, long_name = curves.height(ds, quantity, output, "point_")
-    one = Shown(ds, ds.attrs["parameter"], np.empty(0, dtype=int))
-    drawn = [curves.Curves(one, None, [values])]
+    named = _named(ds)
+    heights = [curves.height(one, quantity, output, "point_") for one in named.values()]
+    _, unit, long_name = heights[0]
+    drawn = [
+        curves.Curves(
+            Shown(one, one.attrs["parameter"], np.empty(0, dtype=int), name, rank), None,
+            [of.values],
+        )
+        for rank, ((name, one), of) in enumerate(zip(named.items(), heights, strict=True))
+    ]  # fmt: skip
     up = curves.height_scale(unit, drawn, quantity)
     with curves.frame(ax, 3.4, drawn, up, events=events, legend=legend) as (panel, _):
         curves.height_axis(panel, quantity, long_name, up)
     return panel
+
+
+def _named(source: Any) -> dict[str, xr.Dataset]:
+    """Datasets of branches by their names; of one alone it is empty."""
+    if isinstance(source, xr.Dataset) or not isinstance(source, Mapping | list | tuple):
+        several = {"": source}
+    elif isinstance(source, Mapping):
+        several = {str(name): one for name, one in source.items()}
+    else:
+        several = {}
+        for one in source:
+            count = getattr(one, "attrs", {}).get("harmonics")
+            name = "exact" if count is None else counted(int(count), "harmonic")
+            several[name if name not in several else f"{name} ({len(several) + 1})"] = one
+    for one in several.values():
+        check(one)
+    if len({one.attrs["parameter"] for one in several.values()}) != 1:
+        raise ParameterError("branches over one parameter are drawn over each other: give such.")
+    return several

@@ -23,6 +23,7 @@ TAKES: dict[str, tuple[str, ...]] = {
     "contact_forces": (schema.IMPACTS,),
     "energy": (schema.ENERGY,),
     "sensitivity": (schema.SENSITIVITY,),
+    "fit": (schema.FIT,),
     "methods": (schema.METHODS,),
     "exponents": (schema.EXPONENTS,),
     "branches": (schema.BRANCHES,),

@@ -193,7 +193,7 @@ def frame(
                     panel, drawing, look, across, up
                 )
             for curve in drawing.along:
-                named |= draw_branches(panel, drawing.shown.ds, curve, across, up)
+                named |= draw_branches(panel, drawing.shown, curve, across, up)
                 named |= _lost_ends(panel, drawing.shown.ds, curve, across, up)
                 if events and not drawing.events_above:
                     draw_marks(panel, drawing.shown.ds, curve, across, up)
@@ -274,9 +274,12 @@ def within_view(ds: xr.Dataset, values: np.ndarray, drawn: np.ndarray) -> np.nda
 
 
 def draw_branches(
-    ax: Axes, ds: xr.Dataset, values: np.ndarray, across: Scale, up: Scale
+    ax: Axes, shown: points.Shown, values: np.ndarray, across: Scale, up: Scale
 ) -> dict[str, Any]:
-    """Draw lines along the branches; return the entries of the legend."""
+    """Draw lines along the branches, in a colour each kind of motion, or each of several Datasets;
+    return the entries of the legend.
+    """
+    ds = shown.ds
     kind = ds["branch_kind"].values
     codes = motion_colors.codes(kind, np.where(kind == "periodic", ds["branch_periods"].values, 0))
     periods = points.periods_of(ds)
@@ -284,7 +287,8 @@ def draw_branches(
     position, height = position * across.factor, height * up.factor
     named: dict[str, Any] = {}
     for code in np.unique(codes).tolist():
-        color = tuple(motion_colors.color(code).tolist())
+        own = motion_colors.color(code).tolist()
+        color = points.dataset_color(shown) if shown.name else tuple(own)
         mine = np.flatnonzero(codes[branch_of] == code)
         for solid in (False, True):
             ax.plot(
@@ -295,7 +299,8 @@ def draw_branches(
                 zorder=3 if solid else 2,
                 gid=f"{'stable' if solid else 'unstable'} {code}",
             )
-        named[motion_colors.label(code, periods)] = Line2D([], [], color=color, lw=1.3)
+        label = shown.name or motion_colors.label(code, periods)
+        named[label] = Line2D([], [], color=color, lw=1.3)
     if (ds["point_unstable_multipliers"].values > 0).any():
         named["unstable"] = Line2D([], [], color=QUIET, lw=0.9, ls=DASHES)
     return named

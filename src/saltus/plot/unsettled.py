@@ -24,7 +24,7 @@ UNSETTLED: dict[int, Unsettled] = {
     Kind.NOT_COMPUTED: Unsettled("not computed", "#E9E9E9"),
 }
 
-#: Whether two maps lead a start to the same attractor; differences are the news.
+#: Two maps lead a start to the same attractor, or elsewhere; differences are the news.
 AGREEMENT: dict[int, Unsettled] = {
     1: Unsettled("agree", "#E4E4E4"),
     0: Unsettled("differ", "#D55E00"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict, is_dataclass
 from typing import TYPE_CHECKING, Any
 
 from saltus.results.provenance import to_json, version
@@ -35,9 +36,11 @@ def identity(system: System, method: Any, arguments: Mapping[str, Any]) -> dict[
 
 
 def _plain(value: Any) -> Any:
-    """Convert a value to plain data: formulas become data."""
+    """Convert a value to plain data: formulas and options become data."""
     if isinstance(value, Mapping):
         return {name: _plain(one) for name, one in value.items()}
     if isinstance(value, list | tuple):
         return [_plain(one) for one in value]
-    return value.data() if isinstance(value, Formula) else value
+    if isinstance(value, Formula):
+        return value.data()
+    return asdict(value) if is_dataclass(value) and not isinstance(value, type) else value

@@ -49,6 +49,10 @@ _ELSEWHERE = {
         _DRAWN,
     ),
     **dict.fromkeys(
+        ("identification", "calibration", "least_squares", "regression"),
+        'Write [fit] with measured = "measured.csv" and free.gap = ["0.1 mm", "2 mm"].',
+    ),
+    **dict.fromkeys(
         ("continuation", "arclength"), 'Write [branches] with vary.gap = ["1 mm", "2 mm"].'
     ),
     **dict.fromkeys(("sweep", "frf", "resonance"), _SWEPT),

@@ -54,12 +54,16 @@ class System(EquationsOfMotion):
     outputs : NamedOutputs
         Named functions of the motion, which results hold besides the states (see
         :meth:`with_outputs`).
+    interfaces : Interfaces or None
+        Of a structure with spring stops: its contacts and the linear structure between them, for
+        methods that ask for no more (see structures/interfaces.py).
     made : int
         How many of the last states elements with a memory have brought (see contact/memory.py); a
         start that doesn't give them is zero.
     """
 
     tangent_of: System | None = None
+    interfaces: Any = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "values", Values(self.values))

@@ -2,6 +2,7 @@
 
 import random
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,13 +13,15 @@ from mad_page import mad_message
 from saltus.errors import SaltusError
 from saltus.explore import map as maps
 from saltus.explore import motion as motions
-from saltus.explore import responses
+from saltus.explore import orbits, responses
+from saltus.explore.attractors import Legend
 from saltus.explore.desk import Desk, Models
 from saltus.explore.frames import packed, unpacked
 from saltus.explore.kept_responses import NO_HUE
 from saltus.explore.opening import Opening, opening_of
+from saltus.explore.orbits import settled
 from saltus.explore.questions import QuestionError, question_of, read
-from saltus.interrupt import Interrupted, Stop
+from saltus.interrupt import Interrupted, Stop, check_stop
 
 RIG = sl.models.delangre("b", force="4 N", frequency="15 Hz")
 BOX = {"x": (-5e-3, 5e-3), "v": (-1.0, 1.0)}
@@ -118,7 +121,7 @@ def test_a_motion_that_fails_is_drawn_as_far_as_it_went():
     desk = Desk(Opening(grows, sl.Taylor(), {"x": (-1, 1), "y": (-1, 1)}, turn=0.05), 1)
     head, arrays = one(desk, "motion", start=[2.0, 1.0], periods=20)  # x = 2/(1 - 2 t)
     assert head["status"] == "nonfinite"
-    assert head["words"][0].startswith("It ended at 500 ms: nonfinite")
+    assert head["words"][0].startswith("It ended at 500 ms: the state")
     times = head["dt"] * np.arange(head["count"])
     reached = times < 0.499
     exact = 2 / (1 - 2 * times[reached])
@@ -149,6 +152,59 @@ def test_a_start_settles_to_what_attractors_says(desk):
         assert np.abs(x).max() == pytest.approx(told["peak"]["x"], rel=1e-3)
     again, _ = one(desk, "orbit", attractor=told["key"])
     assert again["multipliers"] == told["multipliers"]
+
+
+def test_a_row_of_the_legend_stays_with_its_attractor_when_ids_change(desk):
+    """What is found later may sort before it, and join what nobody had lost."""
+    plan = desk.plan_of(RIG, desk.opening.method)
+    known = Legend(plan.map(1), plan.scale)
+    for x in (1e-3, 3e-3):
+        settled(known, [x, 0.0])
+    peaks = [row["peak"] for row in known.table()]
+    assert len(peaks) > 1
+    backwards = replace(known.found, orbits=known.found.orbits[::-1])
+    assert not known.grow(backwards)
+    assert [row["peak"] for row in known.table()] == peaks
+
+
+@pytest.mark.parametrize(("damping", "words"), [(0.0, "Nothing damps"), (-0.5, "negative damping")])
+def test_where_nothing_attracts_that_is_said_at_once(desk, damping, words):
+    values = {"damping_ratio": damping}
+    head, _ = one(desk, "settle", start=[1e-3, 0.0], values=values)
+    assert words in head["words"][0]
+    axes = {"x": [-1e-3, 1e-3], "v": [-0.1, 0.1]}
+    for ask in (
+        {"ask": "map", "axes": axes, "size": [40, 40]},
+        {"ask": "responses", "parameter": "frequency", "range": [14, 16]},
+    ):
+        with pytest.raises(QuestionError, match=words):
+            asked(desk, **ask, values=values)
+
+
+def test_a_start_that_takes_too_long_is_left(desk, monkeypatch):
+    def wanders(*_):
+        while True:
+            check_stop()
+
+    monkeypatch.setattr(orbits, "settled", wanders)
+    monkeypatch.setattr(orbits, "WITHIN", 0.01)
+    head, _ = one(desk, "settle", start=[1e-3, 0.0])
+    assert head["attractor"] is None
+    assert "hasn't settled within 0.01 s" in head["words"][0]
+    monkeypatch.setattr(orbits, "WITHIN", 60.0)
+    stop = Stop()
+    stop.set()
+    with stop, pytest.raises(Interrupted):
+        one(desk, "settle", start=[1e-3, 0.0])
+
+
+def test_a_motion_without_end_is_drawn_as_far_as_its_budget(desk, monkeypatch):
+    monkeypatch.setattr(motions, "MOST_MET", 2000)
+    head, arrays = one(desk, "motion", start=[0.0, 0.0], values={"damping_ratio": -0.5})
+    assert head["status"].startswith("budget")
+    assert "It ended at" in head["words"][0]
+    assert head["contacts"] <= motions.MOST_MET
+    assert np.isfinite(arrays["sample:x"][:100]).all()
 
 
 @pytest.fixture(scope="module")

@@ -22,15 +22,19 @@ from saltus.study.setting.setting import setting_of
 
 RIG = sl.models.delangre("b", force="4 N", frequency="15 Hz")
 BOX = {"x": (-5e-3, 5e-3), "v": (-1.0, 1.0)}
-OPENING = opening_of(RIG, None, axes=BOX)
 VALUES = {"force": 3.7, "upper_gap": 3.25e-4}
 MOTION = {"start": [1e-3, 0.0], "values": VALUES, "periods": 5}
 MAP = {"axes": {name: list(ends) for name, ends in BOX.items()}, "size": [16, 17], "values": VALUES}
 
 
 @pytest.fixture(scope="module")
-def desk():
-    one = Desk(OPENING, 2)
+def opening():
+    return opening_of(RIG, None, axes=BOX)
+
+
+@pytest.fixture(scope="module")
+def desk(opening):
+    one = Desk(opening, 2)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(pipeline, "SCOUTS", 64)
         patch.setattr(growing, "FEW_SCOUTS", 16)
@@ -67,10 +71,10 @@ RANGES = st.tuples(NUMBERS, NUMBERS).filter(lambda pair: pair[0] != pair[1]).map
     over=st.tuples(st.floats(0.1, 10.0), st.floats(11.0, 99.0)),
 )  # fmt: skip
 def test_a_study_of_a_view_opens_as_that_view(
-    force, gap, x, v, over_x, over_v, sizes, periods, over
+    opening, force, gap, x, v, over_x, over_v, sizes, periods, over
 ):
     view = View(
-        OPENING, RIG.with_values(force=force, upper_gap=gap), sl.Taylor(), {"x": x, "v": v},
+        opening, RIG.with_values(force=force, upper_gap=gap), sl.Taylor(), {"x": x, "v": v},
         {"periods": periods}, {"x": (*over_x, sizes[0]), "v": (*over_v, sizes[1])}, {}, periods,
         ("frequency", *over), {"x": [x, 0.0], "v": [v, 1.0]},
     )  # fmt: skip
@@ -125,12 +129,12 @@ def test_a_system_of_ones_own_says_how_it_is_run():
 
 # -- scripts ---------------------------------------------------------------------------------------
 @pytest.mark.parametrize("own", [False, True])
-def test_the_script_runs_and_finds_the_same(tmp_path, own, monkeypatch, capsys):
+def test_the_script_runs_and_finds_the_same(opening, tmp_path, own, monkeypatch, capsys):
     system = RIG.with_values(force=3.7123456789)
     if own:
         system = replace(system, name="mine")
     view = View(
-        OPENING, system, sl.Taylor(), {"x": 1e-3, "v": 0.0}, {"periods": 3},
+        opening, system, sl.Taylor(), {"x": 1e-3, "v": 0.0}, {"periods": 3},
         {"x": (-1e-3, 1e-3, 2), "v": (-0.1, 0.1, 2)}, {}, 400,
     )  # fmt: skip
     text = script_text(view)

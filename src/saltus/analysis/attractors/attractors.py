@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from saltus.analysis.attractors.attractor_set import AttractorSet
 from saltus.analysis.attractors.find_attractors import find_attractors
 from saltus.analysis.attractors.noisy import stray_attrs
 from saltus.analysis.attractors.portrait import portraits
@@ -27,6 +28,7 @@ from saltus.results.dataset import schema
 from saltus.results.dataset.attractors import basin_meanings
 from saltus.results.dataset.kinds import Kind
 from saltus.system import System
+from saltus.system.volume import nothing_attracts
 
 
 @verb
@@ -126,6 +128,7 @@ def attractors(
         provenance(system, map_.method, system.values)
         | looked(periods, map_)
         | stray_attrs(found.astray)
+        | no_attractor(system, found, label)
         | {"smallest_basin_seen": smallest_seen(group.size)}
     )
     return attractors_dataset(subject(system, attrs), portraits(map_, found), starts)
@@ -135,6 +138,16 @@ def looked(periods: int, map_: Stroboscope) -> dict[str, Any]:
     """Settings of a result that say how often motions were looked at, and for how long at most."""
     every = {} if map_.system.forced_at else {"every": float(map_.period[0])}
     return {"periods": periods} | every
+
+
+def no_attractor(system: System, found: AttractorSet, labels: np.ndarray) -> dict[str, str]:
+    """The reason why what was found is no attractor, as an attribute of a result; {} where all
+    starts settled to orbits, or where there may be attractors.
+    """
+    if not found.sampled and (labels >= 0).all():
+        return {}
+    why = nothing_attracts(system)
+    return {"no_attractor": why} if why else {}
 
 
 def attractors_dataset(

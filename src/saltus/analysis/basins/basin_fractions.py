@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.attractors.attractor_set import AttractorSet
-from saltus.analysis.attractors.attractors import attractors_dataset, looked
+from saltus.analysis.attractors.attractors import attractors_dataset, looked, no_attractor
 from saltus.analysis.attractors.noisy import stray_attrs
 from saltus.analysis.attractors.portrait import portraits
 from saltus.analysis.basins import uncertainty
@@ -164,6 +164,7 @@ def _dataset(
     strays = stray_attrs(found.astray if (result.label == Kind.UNCONVERGED).any() else [])
     return ds.assign_attrs(
         **strays,
+        **no_attractor(map_.system, found, result.label),
         smallest_basin_seen=smallest_seen(samples),
         samples=samples,
         seed=seed,

@@ -17,6 +17,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.attractors.attractor_set import AttractorSet
+from saltus.analysis.attractors.attractors import no_attractor
 from saltus.analysis.attractors.noisy import stray_attrs
 from saltus.analysis.attractors.portrait import portraits
 from saltus.analysis.basins import uncertainty
@@ -222,7 +223,11 @@ class BasinPlan:
         )
         strays = found.astray if (labels == Kind.UNCONVERGED).any() else []
         return ds.assign_attrs(
-            uncertainty.measure(ds), **stray_attrs(strays), flip_rate=np.nan, flip_checked=0
+            uncertainty.measure(ds),
+            **stray_attrs(strays),
+            **no_attractor(self.system, found, labels),
+            flip_rate=np.nan,
+            flip_checked=0,
         )
 
     def attrs(self) -> dict[str, Any]:

@@ -11,6 +11,7 @@ import xarray as xr
 from saltus.analysis.branches.arclength import Arc, correct, follow
 from saltus.analysis.branches.branch_table import numbers_of, stacked
 from saltus.analysis.branches.forced_vibration import Forcing, QuadratureOrbits, small_vibration
+from saltus.analysis.branches.free_harmonics import ClosedFree, begun
 from saltus.analysis.branches.free_vibration import (
     LONGEST,
     FreeOrbits,
@@ -20,6 +21,7 @@ from saltus.analysis.branches.free_vibration import (
 )
 from saltus.analysis.branches.special_points import zeros
 from saltus.analysis.dataset_parts import provenance, subject
+from saltus.analysis.harmonics.balance import HarmonicBalance, check_free
 from saltus.analysis.inputs.given import Range, Value
 from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.inputs.starts import at_values, check_system
@@ -37,7 +39,7 @@ from saltus.system.modes import sides
 from saltus.system.quantity import formula_of, unit_of
 from saltus.units import to_si
 
-Orbits = FreeOrbits | QuadratureOrbits
+Orbits = FreeOrbits | QuadratureOrbits | ClosedFree
 #: Vibrations begin at this share of the smallest amplitude.
 BEFORE = 0.9
 #: Largest fictitious damping, in units of the frequency, that is rounding.
@@ -64,6 +66,7 @@ def backbone(
     values: Mapping[str, Value] | None = None,
     points: int = 400,
     method: Method | None = None,
+    by: HarmonicBalance | None = None,
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
 ) -> xr.Dataset:
@@ -106,6 +109,9 @@ def backbone(
     method : Method
         Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
         it serves; another one must be exact.
+    by : HarmonicBalance, optional
+        Of free vibrations: motions of a few harmonics in place of exact ones, each held against the
+        exact one of its size.
     threads : int, optional
         Default all processors.
     progress : bool or callable
@@ -158,12 +164,17 @@ def backbone(
             lambda say: f'{say.key("phase")} is "free" or "quadrature", not {shown(phase)}.'
         )
     about = Forcing.of(system, force, state) if phase == "quadrature" else None
+    if by is not None:
+        check_free(by, system, phase)
     with reporting(progress) as show:
-        moving, orbits, z = (
+        start: tuple[System, Orbits, np.ndarray] = (
             _free_start(system, (low, high), mode, state, method, threads)
             if about is None
             else _forced_start(system, about, (low, high), mode, measured, method, threads)
         )
+        moving, orbits, z = start
+        if by is not None and isinstance(orbits, FreeOrbits):
+            orbits, z = begun(orbits, by.count, z)
         peak = _Peak(moving, orbits, method, measured)
         whole_z, end = _family(orbits, z, peak, (low, high), points, show)
         # not "mode": SciPy's netCDF-3 keeps its own there, and neither writes nor reads such a file
@@ -355,13 +366,14 @@ def _table(
     period, outputs = orbits.period(z), outputs_of(moving, None)
     numbers = numbers_of(moving, [(orbits, one) for one in z], outputs, method)
     rows = np.zeros(len(z), np.int64)
-    multipliers = stacked([orbits.multipliers(z, orbits.evaluate(z, rows)[1], rows)], orbits.size)
+    found = orbits.multipliers(z, orbits.evaluate(z, rows)[1], rows)
+    multipliers = stacked([found], len(moving.states))
     by_name = numbers.by_name()
     data: dict[str, Any] = {
         "point": np.arange(len(z)),
         "backbone_frequency": 1 / period,
         "point_period": period,
-        "point_stable": np.nanmax(np.abs(multipliers), axis=1) < STABLE,
+        "point_stable": np.nanmax(np.abs(multipliers), axis=1, initial=0.0) < STABLE,
         "point_itinerary": list(numbers.itinerary),
         "point_multiplier_real": multipliers.real,
         "point_multiplier_imag": multipliers.imag,
@@ -370,7 +382,9 @@ def _table(
         "output_units": list(outputs.units),
         **{f"point_output_{key}": by_name[key] for key in ("maximum", "minimum", "peak", "rms")},
     }
-    if isinstance(orbits, FreeOrbits):
+    if isinstance(orbits, ClosedFree):
+        data |= orbits.told(z)
+    if not isinstance(orbits, QuadratureOrbits):
         data["fictitious_damping"] = _conserved(system, z[:, -1], period)
         about, when = (
             provenance(system, method, system.values),

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from saltus.analysis.branches.closed_harmonics import ClosedHarmonics
 from saltus.analysis.branches.equilibrium_curves import EquilibriumCurves
 from saltus.analysis.branches.events import Event
 from saltus.analysis.branches.piece import Piece, in_order
@@ -21,7 +22,8 @@ _LOSES_STABILITY = ("fold", "branch_point", "period_doubling", "neimark_sacker",
 
 @dataclass
 class Branch(Piece):
-    """A branch of periodic orbits of n periods, by their points at whole periods, or of equilibria.
+    """A branch of periodic orbits of n periods, by their points at whole periods, of motions of a
+    few harmonics, or of equilibria.
 
     Attributes
     ----------
@@ -37,7 +39,7 @@ class Branch(Piece):
         The branch and its event that it leaves.
     """
 
-    orbits: PeriodicOrbits | EquilibriumCurves
+    orbits: PeriodicOrbits | EquilibriumCurves | ClosedHarmonics
     ends: tuple[str, str]
     parent: tuple[int, int] | None = None
     limits: tuple[float, float] = (np.nan, np.nan)
@@ -53,9 +55,9 @@ class Branch(Piece):
         self.events = in_order(self, [*self.events, *self._contacts()])
 
     def _contacts(self) -> list[Event]:
-        """Events at which the contact sequence changes."""
+        """Events at which the contact sequence changes; of truncated motions they aren't known."""
         orbits = self.orbits
-        if isinstance(orbits, EquilibriumCurves):
+        if not isinstance(orbits, PeriodicOrbits):
             return []
         return contact_points(orbits, self.row, self.z, self.tangent)
 

@@ -11,12 +11,16 @@ import xarray as xr
 
 from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.equilibrium_curves import EquilibriumCurves
+from saltus.analysis.branches.harmonic_branches import balanced
 from saltus.analysis.branches.resolution import resolve
 from saltus.analysis.branches.same_branch import has_twin
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.special_points import outside
 from saltus.analysis.closed.measures import Measures, measure, unknown
 from saltus.analysis.dataset_parts import guards_over, provenance, subject
+from saltus.analysis.harmonics.balance import HarmonicBalance
+from saltus.analysis.harmonics.equations import HarmonicOrbits
+from saltus.analysis.harmonics.sizes import measured
 from saltus.analysis.inputs.outputs import Outputs
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
@@ -26,7 +30,7 @@ from saltus.results.dataset import schema
 from saltus.results.dataset.attractors import padded
 from saltus.system import System
 
-Orbits = PeriodicOrbits | EquilibriumCurves
+Orbits = PeriodicOrbits | EquilibriumCurves | HarmonicOrbits
 #: Samples of a period by which branches are resolved.
 SAMPLES = 64
 #: Multipliers nearer to the unit circle than this don't count as inside: the orbit may not attract.
@@ -40,12 +44,16 @@ def table_of(
     branches: Sequence[Branch],
     outputs: Outputs,
     method: Method,
+    by: HarmonicBalance | None = None,
 ) -> xr.Dataset:
     """The Dataset of branches over a parameter."""
     values = values_of(system, name, branches, outputs, method)
     values |= {"output": list(outputs.names), "output_units": list(outputs.units)}
+    if by is not None:
+        values |= balanced(branches, outputs, by.count)
     fixed = {key: value for key, value in system.values.items() if key != name}
     attrs = provenance(system, method, fixed, (name,)) | attributes_of(name, limits, branches)
+    attrs |= {} if by is None else {"harmonics": by.count}
     unit = outputs.units[0] if len(set(outputs.units)) == 1 else ""
     when = "at whole forcing periods" if system.forced_at else "in equal steps of time"
     about = subject(system, attrs, guards_over(system, system.values, ()))
@@ -88,14 +96,14 @@ def values_of(
     )
     eigenvalues = _eigenvalues(points, size)
     event_eigenvalues = _eigenvalues(at_events, size)
-    periods = np.array([branch.orbits.n for branch, _ in points], np.int64)
+    periods = np.array([_periods(branch.orbits) for branch, _ in points], np.int64)
     states = padded([branch.orbits.points(z) for branch, z in [*points, *at_events]], size)
     return {
         "point": np.arange(len(points)),
         "point_branch": np.repeat(np.arange(len(branches)), counts),
         "point_<parameter>": {name: _parameter(points)},
         "point_arclength": np.concatenate([b.length for b in branches] or [np.zeros(0)]),
-        "point_stable": np.nanmax(np.abs(multipliers), axis=1, initial=0.0) < 1.0 - MARGINAL,
+        "point_stable": _attracts(multipliers),
         "point_unstable_multipliers": outside(multipliers).sum(axis=1),
         "point_period": np.array(
             [
@@ -129,6 +137,19 @@ def values_of(
         **_complex("event_eigenvalue", event_eigenvalues),
         "event_<state>": states[len(points) :],
     }
+
+
+def _attracts(multipliers: np.ndarray) -> np.ndarray:
+    """True where all multipliers complex128[p, D] lie inside the unit circle, and some are known,
+    bool[p].
+    """
+    inside = np.nanmax(np.abs(multipliers), axis=1, initial=0.0) < 1.0 - MARGINAL
+    return np.asarray(inside & ~np.isnan(multipliers).all(axis=1))
+
+
+def _periods(orbits: Orbits) -> int:
+    """Forcing periods of orbits."""
+    return orbits.periods if isinstance(orbits, HarmonicOrbits) else orbits.n
 
 
 def _parameter(points: Sequence[tuple[Branch, np.ndarray]]) -> np.ndarray:
@@ -167,7 +188,10 @@ def _branches(branches: Sequence[Branch]) -> dict[str, Any]:
         "branch": np.arange(len(branches)),
         "branch_kind": [_kind(branch) for branch in branches],
         "branch_periods": np.array(
-            [0 if isinstance(one.orbits, EquilibriumCurves) else one.orbits.n for one in branches],
+            [
+                0 if isinstance(one.orbits, EquilibriumCurves) else _periods(one.orbits)
+                for one in branches
+            ],
             np.int64,
         ),
         "branch_closed": np.array([branch.closed for branch in branches], bool),
@@ -189,6 +213,8 @@ def _sampled_peaks(system: System, method: Method, branch: Branch, z: np.ndarray
     """
     if isinstance(branch.orbits, EquilibriumCurves):
         return np.asarray(np.abs(z[:, 0]))
+    if isinstance(branch.orbits, HarmonicOrbits):
+        return np.array([np.abs(branch.orbits.samples(one)[:, 0]).max() for one in z])
     n = branch.orbits.n if system.forced_at is not None else 1
     map_ = _map_of(system, method, [(branch.orbits, one) for one in z])
     starts = branch.orbits.points(z)[:, 0]
@@ -222,6 +248,14 @@ def numbers_of(
     method: Method,
 ) -> Measures:
     """The numbers of orbits, each with its unknowns: extremes, means, contacts and margins."""
+    truncated = [i for i, (orbits, _) in enumerate(points) if isinstance(orbits, HarmonicOrbits)]
+    if truncated:
+        numbers = unknown(len(points), len(system.states), len(outputs))
+        for i in truncated:
+            orbits, z = points[i]
+            assert isinstance(orbits, HarmonicOrbits)
+            numbers.put(np.array([i]), measured(orbits, z[None], outputs))
+        return numbers
     starts = np.array([orbits.points(z)[0] for orbits, z in points])
     starts = starts.reshape(len(points), len(system.states))
     if not len(points):

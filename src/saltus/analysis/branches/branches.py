@@ -16,6 +16,7 @@ from saltus.analysis.attractors.grid_responses import find
 from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.branch_table import table_of
 from saltus.analysis.branches.equilibrium_branches import trace_equilibria
+from saltus.analysis.branches.harmonic_branches import trace_harmonics, worst
 from saltus.analysis.branches.plans import LONGEST_DOUBLED, POINTS, SWITCHES, plan_of
 from saltus.analysis.branches.seeds import (
     equilibria_between,
@@ -27,6 +28,7 @@ from saltus.analysis.branches.seeds import (
 from saltus.analysis.branches.switching import Seed
 from saltus.analysis.branches.tracing import Plan, trace
 from saltus.analysis.closed.field_zeros import autonomous
+from saltus.analysis.harmonics.balance import HarmonicBalance, check_balanced
 from saltus.analysis.inputs.given import Range, Reading, Starts, Value
 from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.inputs.starts import at_values, check_system, range_of
@@ -55,6 +57,7 @@ def branches(
     outputs: Mapping[str, Reading] | None = None,
     every: float | str | None = None,
     method: Method | None = None,
+    by: HarmonicBalance | None = None,
     periods: int = 2000,
     seed: int = 1,
     threads: int | None = None,
@@ -117,6 +120,9 @@ def branches(
     method : Method
         Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
         it serves; another one must be exact.
+    by : HarmonicBalance, optional
+        Motions of a few harmonics are followed in place of exact orbits, and each is held against
+        the exact orbit beside it: see :class:`saltus.HarmonicBalance`.
     periods : int
         For starts: forcing periods after which a trajectory hasn't settled.
     seed : int
@@ -179,16 +185,24 @@ def branches(
     check_system(system)
     method, system = exact_method(method, system, "sl.branches"), at_values(system, values)
     name, limits = _range(system, vary)
+    if by is not None:
+        check_balanced(by, system)
     chosen = frozenset(_kinds(switch))
     wanted = outputs_of(system, outputs)
     longest, points = whole(longest, "longest", 1), whole(points, "points", 2)
     done = list[Branch]()
     with reporting(progress) as show:
         try:
-            begins, equilibria = seeds_between(
-                system, name, limits, start, box, at, seed, every, method, periods, threads
+            places = np.linspace(*limits, whole(at, "at", 1) + 2)[1:-1]
+            from_rest = by is not None and start is None
+            begins, equilibria = (
+                ([], [])
+                if from_rest
+                else seeds_between(
+                    system, name, limits, start, box, at, seed, every, method, periods, threads
+                )
             )
-            if not begins and not equilibria:
+            if not begins and not equilibria and not from_rest:
                 raise ParameterError(
                     lambda say: (
                         f"no periodic orbit of {system.name} is known between "
@@ -198,11 +212,20 @@ def branches(
                     )
                 )
             plan = plan_of(system, name, limits, method, threads, points, longest, chosen)
-            follow_all(plan, system, name, begins, equilibria, done, stage(show, 0.0, 0.9))
+            if by is None:
+                follow_all(plan, system, name, begins, equilibria, done, stage(show, 0.0, 0.9))
+            else:
+                rest = places.tolist() if from_rest else []
+                tries = by.tries
+                for by in tries:
+                    done.clear()
+                    trace_harmonics(plan, system, name, begins, rest, by, done, method, threads)
+                    if by is not tries[-1] and worst(done, wanted, by) < by.accuracy:
+                        break
         except KeyboardInterrupt:
-            partial = functools.partial(table_of, system, name, limits, done, wanted, method)
+            partial = functools.partial(table_of, system, name, limits, done, wanted, method, by)
             raise Interrupted(partial) from None
-        return table_of(system, name, limits, done, wanted, method)
+        return table_of(system, name, limits, done, wanted, method, by)
 
 
 def seeds_between(

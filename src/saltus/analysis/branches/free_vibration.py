@@ -121,7 +121,7 @@ class FreeOrbits(PeriodicOrbits):
     ) -> None:
         super().__init__(system, (name,), 1, scale, method, threads)
         self.phase[:, 0], self.phase[:, 1] = rest, np.eye(self.size)[column]
-        self.rest, self._column = rest, column
+        self.rest, self.column = rest, column
 
     def first_return(self, start: np.ndarray, longest: float) -> tuple[float, np.ndarray]:
         """Time after which a motion from float64[D] first passes the place of rest again in the
@@ -129,7 +129,7 @@ class FreeOrbits(PeriodicOrbits):
         on the way.
         """
         seen = self.sampled(start, longest)
-        above = seen[:, self._column] > self.rest[self._column]
+        above = seen[:, self.column] > self.rest[self.column]
         back = np.flatnonzero(above[1:] & ~above[:-1] & (np.arange(SAMPLES - 1) > 0))
         if not len(back):
             return np.nan, np.full(self.size, np.nan)

@@ -6,6 +6,7 @@ import functools
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -75,6 +76,8 @@ class Piece:
     multipliers: np.ndarray
     events: list[Event] = field(default_factory=list, kw_only=True)
     unexplained: list[int] = field(default_factory=list, kw_only=True)
+    #: True if multipliers are those of the equations that are followed, which events then explain.
+    audited: ClassVar[bool] = True
 
     @property
     def scale(self) -> np.ndarray:
@@ -204,6 +207,8 @@ def _unexplained(piece: Piece, turning: bool = False) -> list[int]:
     """Points after which the count of multipliers outside the circle isn't explained by events;
     ``turning``: a branch may keep its stability where it turns back at a branch point.
     """
+    if not piece.audited:
+        return []
     count = outside(piece.multipliers).sum(axis=1)
     vertical = _vertical(piece)
     result = []

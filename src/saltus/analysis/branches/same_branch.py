@@ -10,6 +10,7 @@ from scipy.interpolate import CubicHermiteSpline
 from saltus.analysis.branches.arclength import correct
 from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.shooting import PeriodicOrbits
+from saltus.analysis.harmonics.equations import HarmonicOrbits
 
 #: Orbits nearer than this, in units of the scale, are one.
 SAME = 1e-6
@@ -44,7 +45,7 @@ def _mirrored(z: np.ndarray, branch: Branch) -> np.ndarray:
     otherwise.
     """
     orbits = branch.orbits
-    if isinstance(orbits, PeriodicOrbits) and orbits.symmetric:
+    if isinstance(orbits, PeriodicOrbits | HarmonicOrbits) and orbits.symmetric:
         return orbits.mirrored(z)
     return z[:0]
 

@@ -8,19 +8,23 @@ Numerical Algorithms for Chaotic Systems (1989), chapter 5.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
-from saltus.analysis.derivatives.carried import CarriedDerivatives, Places
+from saltus.analysis.derivatives.carried import HELD, CarriedDerivatives, Places
 from saltus.analysis.inputs.orbits import cycles, ensemble_of
 from saltus.analysis.inputs.spans import Span, span
 from saltus.analysis.inputs.starts import Ensemble
 from saltus.analysis.motion.sample_times import NO_SAMPLES
 from saltus.analysis.solve.floquet import across, multipliers
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, SaltusWarning
 from saltus.flow.request import Outcome, Request
+from saltus.system import System
 from saltus.system.modes import field
 
 #: Newton's steps that close what is nearly an orbit, and the shortest of them, in its size.
@@ -31,6 +35,12 @@ CLOSED = 1e-8
 #: of fourth order (Abramowitz and Stegun, 25.3.6).
 STEP, SHIFTS = 5e-5, np.array([-2.0, -1.0, 1.0, 2.0])
 WEIGHTS = np.array([1.0, -8.0, 8.0, -1.0]) / 12.0
+
+#: Distance of a multiplier from 1 at which an orbit lies at a fold.
+FOLD = 1e-6
+#: Speed of an impact, in that of a swing of its state, at which a rigid stop is grazed: the changes
+#: for which derivatives hold, a millionth here, are as its square.
+GRAZE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -196,3 +206,59 @@ class _Shots:
         found = np.take_along_axis(found, nearest, axis=1).reshape(n, len(SHIFTS), -1)
         slopes: np.ndarray = np.einsum("s,nsm->nm", WEIGHTS, found)
         return slopes / step.reshape(n, -1)[:, :1]
+
+
+# -- what is said ----------------------------------------------------------------------------------
+def check_orbits(
+    names: Sequence[str], parameters: Sequence[str], periods: Any, t_end: Any, t_start: Any,
+    values: Any,
+) -> None:  # fmt: skip
+    """Raise a ParameterError for what periodic orbits have of their own."""
+    given = {"periods": periods, "t_end": t_end, "t_start": t_start or None, "values": values}
+    wrong = [name for name, value in given.items() if value not in (None, "0 s")]
+    if wrong:
+        raise ParameterError(
+            lambda say: (
+                f"periodic orbits have a period and values of their own. Leave {say.key(wrong[0])} "
+                "out."
+            )
+        )
+    if len(parameters) < len(names):
+        raise ParameterError(
+            "a periodic orbit has no start of its own: its derivatives are with respect to "
+            "parameters. Leave the starts out of to."
+        )
+
+
+def warn_of_orbits(system: System, result: xr.Dataset, closed: ClosedOrbits) -> None:
+    """Say so where derivatives of orbits are infinite, or nearly: at a fold, or at a graze of a
+    rigid stop.
+    """
+    shortest = float(closed.length.period.min())
+    near = np.abs(closed.multipliers - 1.0).min(axis=1)
+    if (near < FOLD).any():
+        warnings.warn(
+            SaltusWarning(
+                f"a multiplier is within {near.min():.1g} of 1: at a fold the derivatives of an "
+                "orbit are infinite, so near to it they hold for no change of use. The fold's own "
+                "place has derivatives: sl.event_sensitivity."
+            ),
+            stacklevel=4,
+        )
+    guards, names = result["contact_guard"].values, result["contact_kind"].values
+    for one in system.guards:
+        rigid = one.law is not None and one.law.kind == "impact"
+        met = guards == one.name
+        if not rigid or one.state not in result["output"] or np.isin(names, HELD).any():
+            continue
+        swing = np.ptp(result["value"].sel(output=one.state).values)
+        slow = np.abs(result["contact_velocity"].values[met]) < GRAZE * swing * np.pi / shortest
+        if slow.any():
+            warnings.warn(
+                SaltusWarning(
+                    f"the orbit nearly grazes {one.name}. At the graze of a rigid stop the slope "
+                    "is infinite on the side with contact, as one over the root of the distance: "
+                    "these derivatives hold for very small changes, and for none on the other side."
+                ),
+                stacklevel=4,
+            )

@@ -15,7 +15,13 @@ import xarray as xr
 
 from saltus.analysis import dataset_parts
 from saltus.analysis.derivatives.carried import HELD, CarriedDerivatives, Places
-from saltus.analysis.derivatives.closed_orbits import ClosedOrbits, closed_orbits
+from saltus.analysis.derivatives.closed_orbits import (
+    ClosedOrbits,
+    check_orbits,
+    closed_orbits,
+    warn_of_orbits,
+)
+from saltus.analysis.derivatives.readings import Readings, slope_of
 from saltus.analysis.inputs.given import Starts, Values
 from saltus.analysis.inputs.orbits import given_orbits
 from saltus.analysis.inputs.outputs import outputs_of
@@ -37,9 +43,8 @@ from saltus.flow.contact_table import ContactTable
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporting
 from saltus.flow.request import Outcome, Request
-from saltus.language.derivatives import differentiate, time_derivative
 from saltus.language.evaluate import evaluate
-from saltus.language.expression import TIME, Expr, parameter, state
+from saltus.language.expression import TIME, parameter, state
 from saltus.results import build
 from saltus.results.dataset import schema
 from saltus.system import System
@@ -49,10 +54,6 @@ from saltus.system.read_off import Quantity
 
 #: Change of a parameter, in itself, for which derivatives should hold at least.
 SLIGHT = 1e-6
-#: Distance of a multiplier from 1 at which an orbit lies at a fold.
-FOLD = 1e-6
-#: Rate of a gap at a contact, in the largest, at which a stop is grazed.
-GRAZE = 1e-4
 #: Counters that are kept.
 COUNTED = ("steps", "rejected_steps", "mode_violations", "grazes_unresolved")
 #: Rate of a gap at a contact, in the largest at its contacts, below which the contact's time isn't
@@ -158,7 +159,7 @@ def sensitivity(
         system = replace(system, outputs=with_more(system, outputs))
     orbits = isinstance(start, xr.Dataset)
     if isinstance(start, xr.Dataset):
-        _check_orbits(asked, periods, t_end, t_start, values)
+        check_orbits(asked.names, asked.parameters, periods, t_end, t_start, values)
         group, around = given_orbits(system, start)
     else:
         group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
@@ -183,7 +184,10 @@ def sensitivity(
             if times is None
             else at_times(length, first_kept(system, length, keep), times)
         )
-        run = _Run(system, method, group, length, plan, flow, turning, asked, closed)
+        run = _Run(
+            system=system, flow=flow, group=group, method=method, length=length, plan=plan,
+            turning=turning, asked=asked, closed=closed,
+        )  # fmt: skip
         answer = partial(_dataset, run)
         try:
             result = answer(fly(flow.request(group, length, plan), threads, show))
@@ -193,56 +197,8 @@ def sensitivity(
     if closed is None:
         _warn_of_chaos(result)
     else:
-        _warn_of_orbits(system, result, closed)
+        warn_of_orbits(system, result, closed)
     return result
-
-
-def _check_orbits(asked: Columns, periods: Any, t_end: Any, t_start: Any, values: Any) -> None:
-    """Raise a ParameterError for what periodic orbits have of their own."""
-    given = {"periods": periods, "t_end": t_end, "t_start": t_start or None, "values": values}
-    wrong = [name for name, value in given.items() if value not in (None, "0 s")]
-    if wrong:
-        raise ParameterError(
-            lambda say: (
-                f"periodic orbits have a period and values of their own. Leave {say.key(wrong[0])} "
-                "out."
-            )
-        )
-    if len(asked.parameters) < len(asked.names):
-        raise ParameterError(
-            "a periodic orbit has no start of its own: its derivatives are with respect to "
-            "parameters. Leave the starts out of to."
-        )
-
-
-def _warn_of_orbits(system: System, result: xr.Dataset, closed: ClosedOrbits) -> None:
-    """Say so where derivatives of orbits are infinite, or nearly: at a fold, or at a graze of a
-    rigid stop.
-    """
-    near = np.abs(closed.multipliers - 1.0).min(axis=1)
-    if (near < FOLD).any():
-        warnings.warn(
-            SaltusWarning(
-                f"a multiplier is within {near.min():.1g} of 1: at a fold the derivatives of an "
-                "orbit are infinite, so near to it they hold for no change of use. The fold's own "
-                "place has derivatives: sl.event_sensitivity."
-            ),
-            stacklevel=3,
-        )
-    rigid = [one.name for one in system.guards if one.law is not None and one.law.kind == "impact"]
-    held = np.isin(result["contact_kind"].values, HELD)
-    speed = np.abs(result["contact_velocity"].values)
-    slow = np.isin(result["contact_guard"].values, rigid) & (speed < GRAZE * speed.max(initial=0.0))
-    if slow.any() and not held.any():
-        warnings.warn(
-            SaltusWarning(
-                f"{result['contact_guard'].values[slow][0]} is grazed at {speed[slow].min():.3g} "
-                "of its rate. At the graze of a rigid stop the slope is infinite on the side with "
-                "contact, as one over the root of the distance: these derivatives hold for very "
-                "small changes, and for none on the other side."
-            ),
-            stacklevel=3,
-        )
 
 
 def _warn_of_chaos(result: xr.Dataset) -> None:
@@ -355,16 +311,13 @@ def _turning(system: System, method: Method) -> _Turning:
 
 
 # -- the answer ------------------------------------------------------------------------------------
-@dataclass(frozen=True)
-class _Run:
+@dataclass(frozen=True, kw_only=True)
+class _Run(Readings):
     """A run of the flow that carries derivatives."""
 
-    system: System
     method: Method
-    group: Ensemble
     length: Span
     plan: SampleTimes
-    flow: CarriedDerivatives
     turning: _Turning
     asked: Columns
     closed: ClosedOrbits | None
@@ -381,42 +334,6 @@ class _Run:
     def again(self, request: Request) -> Outcome:
         """The outcome of another request of the flow."""
         return engine.run(self.flow.flown, self.method.suited_to(1), request, 1)
-
-    def values(self, at: Places, mode: np.ndarray | None = None) -> np.ndarray:
-        """States and outputs, float64[m, K], in the mode there or in another one."""
-        return outputs_of(self.system).values(
-            at.time,
-            at.states,
-            self.flow.parameters(self.group, at.trajectory),
-            at.mode if mode is None else mode,
-        )
-
-    def slopes(
-        self, at: Places, moved: np.ndarray | None = None, mode: np.ndarray | None = None
-    ) -> np.ndarray:
-        """Their derivatives, float64[m, K, C]; along places whose times have the derivatives
-        ``moved`` float64[m, C].
-        """
-        outputs, names = outputs_of(self.system), self.flow.names
-        leaves = [*map(state, self.system.states), *map(parameter, names), TIME]
-        known = self.flow.parameters(self.group, at.trajectory)
-        rate = np.zeros((len(at.time), 0)) if moved is None else self.flow.rates(at, self.group)
-        states = at.slopes if moved is None else at.slopes + rate[..., None] * moved[:, None]
-        if not outputs.formulas:
-            return states
-        size, columns = at.states.shape[1], at.slopes.shape[2]
-        parts = tuple(_slope(one, leaf) for one in outputs.formulas for leaf in leaves)
-        named = (*self.system.states, *map(str, range(len(parts))))
-        gradients = (
-            replace(outputs, names=named, formulas=parts)
-            .values(at.time, at.states, known, at.mode if mode is None else mode)[:, size:]
-            .reshape(len(at.time), len(outputs.formulas), len(leaves))
-        )
-        own = np.einsum("mki,mic->mkc", gradients[..., :size], states)
-        own[..., columns - len(names) :] += gradients[..., size:-1]
-        if moved is not None:
-            own += gradients[..., -1:] * moved[:, None]
-        return np.concatenate([states, own], axis=1)
 
     def contact_times(self, at: Places, table: ContactTable) -> np.ndarray:
         """Derivatives of the times of contacts, float64[m, C]: the gap of each stays zero. NaN
@@ -435,7 +352,7 @@ class _Run:
             gap = system.guards[number].gap
             leaves = [*map(state, system.states), *map(parameter, self.flow.names), TIME]
             found = evaluate(
-                [_slope(gap, leaf) for leaf in leaves],
+                [slope_of(gap, leaf) for leaf in leaves],
                 t=at.time[here],
                 states=dict(zip(system.states, at.states[here].T, strict=True)),
                 values=self.flow.parameters(self.group, at.trajectory[here]),
@@ -450,10 +367,6 @@ class _Run:
             with np.errstate(divide="ignore", invalid="ignore"):
                 moved[here] = np.where(leaves_it[:, None], -change / rate[:, None], np.nan)
         return moved
-
-
-def _slope(formula: Expr, leaf: Expr) -> Expr:
-    return time_derivative(formula) if leaf is TIME else differentiate(formula, leaf)
 
 
 def _dataset(run: _Run, outcome: Outcome) -> xr.Dataset:

@@ -330,7 +330,8 @@ def range_of(system: System, name: Any, ends: Any) -> tuple[float, float]:
         )
     low, high = (single(system, name, end) for end in ends)
     if not low < high:
-        raise ParameterError(f"the range of {name} must ascend, not {shown(ends)}.")
+        first, last = map(str, ends)
+        raise ParameterError(f"the range of {name} must ascend, not go from {first} to {last}.")
     return low, high
 
 

@@ -1,4 +1,4 @@
-"""Measured points from a file: two columns, each with its unit in the header."""
+"""Measured points and histories from a file: columns, each with its unit in the header."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import csv
 import math
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -79,6 +79,58 @@ def measured_points(
             for i, (name, unit) in enumerate(units.items())
         }
     )
+
+
+def read_series(
+    source: str | os.PathLike[str] | bytes, units: Mapping[str, str], missing: bool = False
+) -> dict[str, np.ndarray]:
+    """Read columns of a file by their names, in SI.
+
+    Parameters
+    ----------
+    source : str or path, or bytes
+        A CSV file, or its content: ``t [s], x [mm]``. Lines that begin with # are comments.
+    units : mapping of str to str
+        Columns that are taken, and their SI units. Others are passed over.
+    missing : bool
+        Whether an empty cell is a sample that is missing, NaN.
+
+    Returns
+    -------
+    dict of str to float64[n]
+        The columns that it has.
+
+    Raises
+    ------
+    ResultFileError
+        If the file can't be read, a unit is missing or wrong, or a cell isn't a number.
+    """
+    path = Path("the file") if isinstance(source, bytes) else path_of(source)
+    try:
+        data = source if isinstance(source, bytes) else content(path, TABLE_BYTES)
+    except RefusedError as refused:
+        raise ResultFileError(f"{path} {refused}") from None
+    rows = _rows(data, path)
+    header = next(rows, (0, []))[1]
+    names = [match["name"] if (match := _HEADER.fullmatch(one)) else one.strip() for one in header]
+    places = {
+        name: _column(path, header, name, units[name], {name: units[name]})
+        for name in names
+        if name in units
+    }
+    cells = list(rows)
+    return {
+        name: np.array(
+            [
+                math.nan
+                if missing and not "".join(row[place[0] : place[0] + 1]).strip()
+                else _number(path, line, row, *place)
+                for line, row in cells
+            ],
+            float,
+        )
+        for name, place in places.items()
+    }
 
 
 def columns(data: bytes, path: Path) -> np.ndarray:

@@ -55,6 +55,9 @@ def account(ds: xr.Dataset) -> list[str]:
 
 def found(ds: xr.Dataset) -> list[str]:
     """The lines on attractors and on starts that maps have too."""
+    if why := ds.attrs.get("no_attractor"):
+        many = counted(ds.sizes["attractor"], "motion")
+        return [f"found    {many}", *_attractors(ds), f"damping  {why}"]
     lines = [f"found    {counted(ds.sizes['attractor'], 'attractor')}", *_attractors(ds)]
     if "basin" not in ds:
         return lines
@@ -223,7 +226,9 @@ def _share(ds: xr.Dataset) -> list[Column]:
 
 def _notes(ds: xr.Dataset) -> Iterator[str]:
     """Sentences on how far the numbers can be trusted."""
-    if "basin" in ds:
+    if why := ds.attrs.get("no_attractor"):
+        yield str(why)
+    elif "basin" in ds:
         yield from (f"{one}." for one in missed(_computed(ds["basin"])))
     yield from _trust(ds)
     for note in sentences(ds["basin"].values) if "basin" in ds else ():

@@ -33,6 +33,16 @@ VARIABLES = {
         f"point_output_{name}": branches.VARIABLES[f"point_output_{name}"]
         for name in ("maximum", "minimum", "peak", "rms")
     },
+    **{
+        name: branches.VARIABLES[name]
+        for name in (
+            "harmonic",
+            "point_error",
+            "point_output_error",
+            "point_harmonic_real",
+            "point_harmonic_imag",
+        )
+    },
 }
 
 

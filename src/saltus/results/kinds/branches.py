@@ -67,6 +67,30 @@ VARIABLES = {
     "point_<state>": Variable(("point", "orbit_point"), "<state>", "<state> <when>"),
     **OUTPUT,
     **of_outputs("point", "point_"),
+    "harmonic": Variable(
+        ("harmonic",), "1", "multiple of the frequency of the orbit", "i8", coord=True
+    ),
+    "point_error": Variable(
+        _POINT,
+        "1",
+        "of harmonic balance: largest distance of a state, of a structure of a sensor, from that "
+        "of the exact orbit, over its range; NaN where none is near",
+    ),
+    "point_output_error": Variable(
+        ("point", "output"),
+        "<output>",
+        "of harmonic balance: largest distance from that of the exact orbit",
+    ),
+    "point_harmonic_real": Variable(
+        ("point", "output", "harmonic"),
+        "<output>",
+        "of harmonic balance: amplitude c of Re(c exp(2 pi i k f t)), real part",
+    ),
+    "point_harmonic_imag": Variable(
+        ("point", "output", "harmonic"),
+        "<output>",
+        "of harmonic balance: amplitude c of Re(c exp(2 pi i k f t)), imaginary part",
+    ),
     "branch": Variable(_BRANCH, "1", "branch", "i8", coord=True),
     "branch_kind": Variable(
         _BRANCH, "", "what lies on it: periodic, limit_cycle, equilibrium", "str"
@@ -152,7 +176,20 @@ def account(ds: xr.Dataset) -> list[str]:
         + (f", {stable.mean():.0%} of them stable" if len(stable) else ""),
     ]
     lines += [f"  {i}: {_one(ds, i)}" for i in range(ds.sizes["branch"])]
+    lines += _truncated(ds)
     return lines + [f"unsure   {one}" for one in _unexplained(ds)]
+
+
+def _truncated(ds: xr.Dataset) -> list[str]:
+    """Distances of motions of a few harmonics from exact orbits; nothing of exact ones."""
+    if "point_error" not in ds:
+        return []
+    off = ds["point_error"].values
+    known = off[np.isfinite(off)]
+    words = f"at most {known.max():.2g} of their range from exact orbits" if len(known) else ""
+    lost = f"{counted(len(off) - len(known), 'point')} with no exact orbit near"
+    told = [one for one in (words, lost if len(known) < len(off) else "") if one]
+    return [f"balance  {counted(int(ds.attrs['harmonics']), 'harmonic')}, {', '.join(told)}"]
 
 
 def _unexplained(ds: xr.Dataset) -> Iterator[str]:

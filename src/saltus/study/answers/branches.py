@@ -11,13 +11,27 @@ from saltus.study.answers.question import OneVerb, asked
 from saltus.study.setting import quantities
 from saltus.study.tables.kinds import OF_RESPONSES, whole
 from saltus.study.tables.parts import Interval, Quantity
-from saltus.study.tables.signature import WrittenAs
+from saltus.study.tables.signature import Generated, WrittenAs
 from saltus.study.tables.signature import table as asking
 
 if TYPE_CHECKING:
     from saltus.study.setting.setting import Setting
 
 
+#: Motions of a few harmonics in place of exact orbits.
+By: Any = asking(
+    "branches.by", ["HarmonicBalance"], {
+        "harmonics": WrittenAs(int | Literal["auto"], (9,)),
+        "periods": whole(3),
+        "accuracy": WrittenAs(float, (0.01,)),
+    },
+    base=Generated,
+)  # fmt: skip
+BY = WrittenAs(
+    By, ({"harmonics": 9},),
+    "Harmonic balance: motions of a few harmonics in place of exact orbits.", None,
+    convert="balance",
+)  # fmt: skip
 #: Branches go over a range, without steps.
 OF_BRANCHES = OF_RESPONSES | {
     "vary": WrittenAs(
@@ -26,6 +40,7 @@ OF_BRANCHES = OF_RESPONSES | {
     ),
     "at": whole(12, most=MOST_COUNT),
     "longest": whole(8),
+    "by": BY,
     "points": whole(1000),
     "switch": WrittenAs(
         list[Literal["period_doubling", "branch_point"]], (["period_doubling"],),
@@ -42,6 +57,7 @@ OF_BACKBONES = OF_RESPONSES | {
         convert="values"),
     "mode": whole(1),
     "points": whole(400),
+    "by": BY,
 }  # fmt: skip
 
 

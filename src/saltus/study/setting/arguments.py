@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from saltus.study.setting import quantities
 from saltus.study.tables.methods import OWN_METHOD
+from saltus.study.tables.signature import verb
 
 if TYPE_CHECKING:
     from saltus.study.setting.setting import Setting
@@ -120,5 +121,8 @@ _READINGS: dict[str, Callable[[Any, _At], Any]] = {
     "vary": _vary,
     "ranges": lambda value, at: quantities.ranges(at.system, value, f"{at.place}.{at.key}"),
     "outputs": lambda value, at: at.setting.outputs(at.system, value, at.place),
+    "balance": lambda value, _: verb("HarmonicBalance")(
+        **value.model_dump(include=value.model_fields_set)
+    ),
     "at": lambda value, at: quantities.states(at.system, value, f"{at.place}.{at.key}"),
 }

@@ -91,6 +91,7 @@ Structure: Any = table(
         "frequency": WrittenAs(examples=("15 Hz",)),
         "damping_ratio": WrittenAs(Quantity | list[Quantity], ("2 %",)),
         "modes": whole(8),
+        "residual": WrittenAs(examples=(True,)),
         "names": WrittenAs(str | list[str], ("x1 x2",)),
         "sensors": WrittenAs(
             dict[str, str],

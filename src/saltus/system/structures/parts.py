@@ -371,6 +371,12 @@ def direction(part: Contact | Force | Base, names: list[str]) -> np.ndarray:
     return vector_of([part.at] if to is None else [part.at, to], names)
 
 
+def ways_of(contact: Contact, names: list[str]) -> list[np.ndarray]:
+    """The directions in which a contact presses and, if it is rough, slides."""
+    pair = [contact.sliding] if isinstance(contact.sliding, str) else contact.sliding
+    return [direction(contact, names), *([] if pair is None else [vector_of(pair, names)])]
+
+
 def _moved(given: Any, names: list[str]) -> np.ndarray:
     """The motion of each degree of freedom with the base."""
     if isinstance(given, str):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +15,8 @@ from saltus.system.structures.matrices import check_positive, dense, len_of
 MOST_DENSE = 1500
 #: A frequency below this share of the next is that of a rigid body.
 RIGID = 1e-7
+#: Least square of the share of a static deflection that the modes, and others, miss.
+INDEPENDENT = 1e-18
 #: Roundings of the largest term that an eigenvalue may be off.
 _FEW = 16
 
@@ -87,6 +90,42 @@ def _lowest(mass: Any, stiffness: Any, count: int) -> tuple[np.ndarray, np.ndarr
     )
     order = np.argsort(squares)
     return squares[order], shapes[:, order]
+
+
+def with_residuals(kept: Modes, mass: Any, stiffness: Any, forces: Sequence[np.ndarray]) -> Modes:
+    """Modes, and behind them the static deflections that they miss under some forces, as shapes of
+    unit modal mass that no force of inertia or stiffness joins with each other or the modes.
+
+    Raises
+    ------
+    ParameterError
+        If the stiffness matrix is singular: a rigid body moves.
+    """
+    from scipy.linalg import eigh
+    from scipy.sparse import csc_matrix
+    from scipy.sparse.linalg import splu
+
+    if kept.angular.min() <= RIGID * kept.angular.max():
+        raise ParameterError(
+            "residual=True needs the static deflection under a force, and a rigid body moves "
+            "here. Leave it out."
+        )
+    pushed = np.stack(forces, axis=1)
+    pushed = pushed / np.abs(pushed).max(axis=0)
+    missed = splu(csc_matrix(stiffness)).solve(pushed)
+    size = np.sqrt((missed * (mass @ missed)).sum(axis=0))
+    for _ in range(2):
+        missed -= kept.shapes @ (kept.shapes.T @ (mass @ missed))
+    within = missed.T @ (mass @ missed)
+    within /= np.outer(size, size)
+    share, ways = np.linalg.eigh(within)  # forces may push alike, or as the modes do already
+    span = (missed / size) @ ways[:, share > INDEPENDENT]
+    if not span.shape[1]:
+        return kept
+    span /= np.sqrt((span * (mass @ span)).sum(axis=0))
+    squares, turned = eigh(span.T @ (stiffness @ span), span.T @ (mass @ span))
+    angular = np.concatenate([kept.angular, np.sqrt(squares)])
+    return Modes(angular, np.concatenate([kept.shapes, span @ turned], axis=1))
 
 
 def flexibility(

@@ -19,9 +19,10 @@ from saltus.errors import ParameterError, SaltusWarning, among, must_be, shown
 from saltus.system.structures import matrices, told
 from saltus.system.structures.equations import UNITS, Coordinates, Loads, traced
 from saltus.system.structures.files import matrices_of
+from saltus.system.structures.interfaces import seen_by_contacts
 from saltus.system.structures.matrices import ASYMMETRY
-from saltus.system.structures.parts import Base, Contact, Force, direction, parts
-from saltus.system.structures.reduction import Modes, modal_damping, modes_of
+from saltus.system.structures.parts import Base, Contact, Force, direction, parts, ways_of
+from saltus.system.structures.reduction import Modes, modal_damping, modes_of, with_residuals
 from saltus.system.structures.sensors import with_sensors
 from saltus.system.system import System
 from saltus.units import to_si
@@ -58,6 +59,7 @@ def structure(
     frequency: float | str | None = None,
     damping_ratio: Any = None,
     modes: int | None = None,
+    residual: bool = False,
     names: Sequence[str] | str | None = None,
     unit: str = "m",
     name: str = "structure",
@@ -101,6 +103,10 @@ def structure(
         Number of the lowest modes kept; the states are then their coordinates. Default: all
         degrees of freedom, as they are. ``modes=n`` loses nothing, and makes a full mass matrix
         quicker to compile.
+    residual : bool
+        Whether the static deflections that the kept modes miss under the forces of contacts and
+        drives are coordinates too, one more for each of these: nothing of the static flexibility
+        there is lost then, and of the dynamic little (MacNeal, Comput. Struct. 1 (1971) 581-601).
     names : sequence of str, or str
         Names of the degrees of freedom; default ``x1``, ``x2``, ... The velocity of ``x1`` is
         called ``v1``, that of any other name ``NAME_rate``.
@@ -177,7 +183,12 @@ def structure(
             "all entries of stiffness are zero, so all modes have the frequency 0, and none are "
             "the lowest. Give the stiffness matrix, or leave modes= out."
         )
-    known = modes_of(mass, stiffness, count) if reduced else None
+    known, kept = modes_of(mass, stiffness, count) if reduced else None, count
+    if residual:
+        known = _completed(
+            known if modes is not None else None, count, mass, stiffness, degrees, loads
+        )
+        count = len(known.angular)
     if known is not None and damping_ratio is not None:
         damping = _ratio(damping_ratio, known, count if modes is not None else size)
     if known is None or modes is None:
@@ -190,7 +201,7 @@ def structure(
         if damping is not None and damping_ratio is None:
             damping = modal_damping(damping, known, count)
         moving = _modal(known.lowest(count), damping)
-        words = told.reduced(mass, stiffness, known, count, degrees, loads, unit)
+        words = told.reduced(mass, stiffness, known, kept, count, degrees, loads, unit)
     angular = known.angular if known is not None else _angular(moving, stiffness)
     told.doubt(angular)
     made, sides = traced(moving, degrees, loads, frequency, unit=unit, name=name, source=source)
@@ -202,6 +213,7 @@ def structure(
     numbers = dict(zip(sides, numbers_of(sides.values(), made.guards), strict=True))
     named = {number: label for label, number in numbers.items() if number is not None}
     made = replace(made, guards=renamed(made.guards, named), description=words)
+    made = replace(made, interfaces=seen_by_contacts(made, moving, degrees, loads, frequency, unit))
     return made if sensors is None else with_sensors(made, sensors, moving, degrees, loads, unit)
 
 
@@ -246,6 +258,18 @@ def _count(modes: Any, size: int) -> int:
     if modes > min(size, MOST_COORDINATES):
         raise ParameterError(f"modes = {modes}, but at most {min(size, MOST_COORDINATES)} can be.")
     return int(modes)
+
+
+def _completed(
+    modes: Modes | None, count: int, mass: Any, stiffness: Any, degrees: list[str], loads: Loads
+) -> Modes:
+    """The lowest modes, and the static deflections that they miss under contacts and drives."""
+    if modes is None:
+        raise ParameterError("residual=True is of the modes that are left out: give modes=.")
+    ways = [way for _, contact in loads.contacts for way in ways_of(contact, degrees)]
+    if not ways and not loads.along:
+        return modes.lowest(count)
+    return with_residuals(modes.lowest(count), mass, stiffness, [*ways, *loads.along])
 
 
 def _physical(mass: Any, stiffness: Any, damping: Any, degrees: list[str]) -> Coordinates:

@@ -35,7 +35,14 @@ def unreduced(size: int, angular: np.ndarray) -> str:
 
 
 def reduced(
-    mass: Any, stiffness: Any, modes: Modes, count: int, degrees: list[str], loads: Any, unit: str
+    mass: Any,
+    stiffness: Any,
+    modes: Modes,
+    lowest: int,
+    count: int,
+    degrees: list[str],
+    loads: Any,
+    unit: str,
 ) -> str:
     """The description of a structure by its lowest modes.
 
@@ -43,8 +50,8 @@ def reduced(
     with each base.
     """
     words = (
-        f"{STRUCTURE} {len(degrees)} degrees of freedom, by its lowest {count} modes, up to "
-        f"{modes.angular[count - 1] / (2 * math.pi):.6g} Hz{_frequencies(modes.angular)}."
+        f"{STRUCTURE} {len(degrees)} degrees of freedom, by its lowest {lowest} modes, up to "
+        f"{modes.angular[lowest - 1] / (2 * math.pi):.6g} Hz{_frequencies(modes.angular[:lowest])}."
     )
     compliance, inertia = _UNITS[unit]
     words += _kept_at_contacts(stiffness, modes, count, degrees, loads.contacts, compliance)

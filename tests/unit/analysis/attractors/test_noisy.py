@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import saltus as sl
 from function_maps import FunctionMap, orbit_near
 from saltus.analysis.attractors.attractor_set import AttractorSet
 from saltus.analysis.attractors.find_attractors import find_attractors
@@ -270,3 +271,15 @@ def test_a_store_keeps_it_to_the_last_bit(cycle):
     assert (again.kind, again.exponent, again.stray) == (one.kind, one.exponent, one.stray)
     assert again.orbit.multipliers.tobytes() == one.orbit.multipliers.tobytes()
     assert json.dumps(found_data(found_from(data, 2))) == json.dumps(data)
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8, 1e-10])
+def test_loose_series_settle_to_the_orbits_of_the_exact_ones(tolerance):
+    rig = sl.models.delangre(case="b", frequency="15 Hz")
+    exact = sl.attractors(rig, [[1e-3, 0.0], [-1e-3, 0.1]])
+    first = exact.isel(phase=0)
+    near = np.column_stack([first.attractor_x, first.attractor_v]) * (1.0 + 1e-3)
+    loose = sl.attractors(rig, near, method=sl.Taylor(tolerance=tolerance))
+    assert (loose.basin >= 0).all()
+    peak = loose.attractor_peak.values[loose.basin.values]
+    assert peak == pytest.approx(exact.attractor_peak.values, rel=1e-2)

@@ -1,0 +1,83 @@
+"""Descents on ever longer beginnings of a history.
+
+What a motion is sensitive to grows with its length, and with it the number of valleys: from a short
+beginning most starts lead to the right one, and each longer beginning is predicted well by what the
+shorter one has told. Pisarenko & Sornette, Phys. Rev. E 69 (2004) 036122, on why a misfit over a
+long chaotic history has no use.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from saltus.analysis.fits.search import MisfitSearch, Point
+from saltus.analysis.fits.verdict import valleys
+from saltus.flow.progress import stage
+
+#: The first beginning, in shares of the history, and its samples for each unknown at least.
+FIRST, LEAST = 1 / 32, 4
+#: Most ways from there.
+WAYS = 6
+#: A longer beginning follows where its data are predicted to within this share of their standard
+#: deviations; else a shorter step does.
+PREDICTED = 0.25
+#: Factors between beginnings: the first one, and the shortest.
+LONGER, SHORTEST = 2.0, 1.05
+#: Share of the work that finds the minima on the first beginning.
+BEGIN = 0.2
+
+
+def grow(
+    search: MisfitSearch,
+    starts: np.ndarray,
+    described: Callable[[MisfitSearch], bool],
+    show: Callable[[float], None] | None,
+) -> None:
+    """Descend along such ways, from the minima on the first beginning, until one describes the
+    data.
+    """
+    whole = len(search.data)
+    count = min(max(round(FIRST * whole), LEAST * (len(search.unknowns) + 1)), whole)
+    part = search.beginning(count)
+    part.run(starts, stage(show, 0.0, BEGIN), descend=1.0)
+    search.take(part)
+    search.minima.clear()
+    for i, (one, count) in enumerate(valleys(part.minima)[:WAYS]):
+        begin, end = (BEGIN + (1.0 - BEGIN) * j / WAYS for j in (i, i + 1))
+        search.ended = None
+        _follow(search, one, i, stage(show, begin, end))
+        if search.ended is not None:  # as many descents as led to where it began
+            search.minima += [search.ended] * (count - 1)
+        if search.spent or described(search):
+            return
+
+
+def _off(search: MisfitSearch, here: Point) -> float:
+    """Root mean square of what a beginning is missed by, in standard deviations of the data."""
+    data = search.data
+    off = (here.fitted - data[: len(here.fitted)]) / np.nanstd(data, axis=0)
+    return float(np.sqrt(np.nanmean(off**2)))
+
+
+def _follow(
+    search: MisfitSearch, here: Point, i: int, show: Callable[[float], None] | None
+) -> None:
+    """Follow the minimum number i on a beginning to the whole history."""
+    whole, factor = len(search.data), LONGER
+    while (count := len(here.fitted)) < whole and not search.spent:
+        longer = min(max(round(count * factor), count + 1), whole)
+        part = search if longer == whole else search.beginning(longer)
+        there = part.at(here.shares)
+        if _off(part, there) > max(PREDICTED, 1.5 * _off(search, here)) and factor > SHORTEST:
+            factor = np.sqrt(factor)
+        else:
+            part.descend(here.shares, stage(show, count / whole, longer / whole))
+            if part is search or not part.minima:
+                return
+            here = part.minima[0]
+            if i and _off(search, here) > PREDICTED:  # others are better
+                return
+        if part is not search:
+            search.take(part)

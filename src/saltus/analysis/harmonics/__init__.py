@@ -1,0 +1,1 @@
+"""Periodic motions as truncated Fourier series, with contacts where the series has them."""

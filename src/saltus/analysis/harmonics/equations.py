@@ -1,0 +1,218 @@
+"""The equations of harmonic balance: a periodic motion as truncated Fourier series.
+
+The residual of the equations of motion has no component along any of the harmonics kept. Written as
+``own X - L W(X) = 0``: X are the series of the signals, W those of the forces along them, and L is
+the linear response at each harmonic, so that residuals are in units of the motion. Krack & Gross,
+Harmonic Balance for Nonlinear Vibration Problems (2019), chapter 2.
+"""
+
+from __future__ import annotations
+
+import copy
+import functools
+from typing import Self
+
+import numpy as np
+
+from saltus.analysis.harmonics import series as fourier
+from saltus.analysis.harmonics.forces import DerivedState, Forces
+from saltus.analysis.harmonics.pieces import Intervals
+from saltus.analysis.harmonics.signals import States, signals_of
+from saltus.system import System
+from saltus.system.parametric import parametric
+
+#: Motions whose states are remembered.
+REMEMBERED = 4096
+
+
+class HarmonicOrbits:
+    """Curves of periodic motions of H harmonics over one parameter; a ``CurveEquations``, and what
+    a branch asks of the equations of its orbits.
+
+    Unknowns z: the series of each signal, one after the other, then the parameter [SI].
+
+    Parameters
+    ----------
+    system : System
+        With forcing; its equations and values are those of all curves.
+    name : str
+        The parameter that is followed.
+    harmonics : int
+        Of the fundamental frequency.
+    periods : int
+        Forcing periods in one of the fundamental.
+    scale : float64[k, z]
+        Units of the unknowns.
+    symmetric : bool
+        Whether mirror images of motions are motions: see system/symmetry.py.
+    """
+
+    n: int = 1
+    free: bool = False
+
+    def __init__(
+        self, system: System, name: str, harmonics: int, periods: int, scale: np.ndarray,
+        symmetric: bool = False,
+    ) -> None:  # fmt: skip
+        self.system, self.names, self.scale = system, (name,), scale
+        self.harmonics, self.periods, self.symmetric = harmonics, periods, symmetric
+        self.series = 2 * harmonics + 1
+        self.source = signals_of(system)
+        known = parametric(self.source.system, (name,))
+        self._timed, inner = known.timed, known.system
+        self.count, own = len(self.source.chains), self.source.system.states
+        self.size = self.count * self.series  # unknowns of a motion
+        moving = {
+            own[i]: DerivedState(signal, times)
+            for signal, chain in enumerate(self.source.chains) for times, i in enumerate(chain)
+        }  # fmt: skip
+        self._remembered: dict[bytes, tuple[np.ndarray, Intervals]] = {}
+        self.turn = periods * (1.0 if self._timed else float(system.period()))
+        forces = [inner.field[i] for i in self.source.forces]
+        self.forces = Forces(inner, forces, moving, inner.states[len(own) :], self.turn, periods)
+
+    @property
+    def width(self) -> int:
+        """Number of unknowns."""
+        return self.size + 1
+
+    # -- unknowns ----------------------------------------------------------------------------------
+    def signals(self, z: np.ndarray) -> np.ndarray:
+        """The series of the signals, float64[..., c, 2H + 1]."""
+        return z[..., : self.size].reshape(*z.shape[:-1], -1, self.series)
+
+    def values(self, z: np.ndarray) -> np.ndarray:
+        """The parameter of motions float64[..., z], float64[..., 1]."""
+        return z[..., self.size :]
+
+    def period(self, z: np.ndarray) -> np.ndarray:
+        """The period of motions float64[..., z] [s], float64[...]."""
+        if self.names[0] != self.system.forced_at:
+            return np.full(z.shape[:-1], self.periods * self.system.period())
+        return np.asarray(self.periods * self.system.period({self.names[0]: z[..., -1]}))
+
+    def _constants(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, float, np.ndarray]:
+        """The states that don't move, their derivatives by the unknowns beside the signals
+        float64[e, u], the rate of the angle [rad/s], and its derivatives by these states over
+        itself.
+        """
+        value = float(z[-1])
+        if not self._timed:
+            rate = 2 * np.pi / self.turn
+            return np.array([value]), np.ones((1, 1)), rate, np.zeros(1)
+        period = float(self.system.period({self.names[0]: value}))
+        rate = 2 * np.pi / (self.periods * period)
+        slopes = np.array([[-period / value]])
+        return np.array([period]), slopes, rate, np.array([-1.0 / period])
+
+    def states(self, z: np.ndarray) -> np.ndarray:
+        """The series of the states of a motion float64[z], float64[D, 2H + 1]."""
+        return self._along(z)[0]
+
+    def intervals(self, z: np.ndarray) -> Intervals:
+        """A motion float64[z] between the boundaries that it meets."""
+        return self._along(z)[1]
+
+    def _along(self, z: np.ndarray) -> tuple[np.ndarray, Intervals]:
+        """The states and intervals of a motion, remembered."""
+        key = z.tobytes()
+        if key not in self._remembered:
+            if len(self._remembered) >= REMEMBERED:
+                self._remembered.clear()
+            constants, _, rate, rate_by = self._constants(z)
+            signals, forces = self.signals(z), None
+            if isinstance(self.source, States):
+                intervals = self.forces.intervals(signals, constants, rate)
+            else:
+                found = self.forces.coefficients(signals, constants, rate, rate_by)
+                intervals, forces = found.intervals, found.values / self._pace(constants)
+            self._remembered[key] = self.source.states(signals, forces, rate), intervals
+        return self._remembered[key]
+
+    def _pace(self, constants: np.ndarray) -> float:
+        """Factor of the rates of the equations."""
+        return float(constants[0]) if self._timed else 1.0
+
+    def points(self, z: np.ndarray) -> np.ndarray:
+        """States at whole forcing periods of motions float64[..., z], float64[..., n, D]."""
+        flat = z.reshape(-1, z.shape[-1])
+        here = fourier.basis(2 * np.pi * np.arange(self.periods) / self.periods, self.harmonics)
+        found = np.array([here @ self.states(one).T for one in flat])
+        return found.reshape(*z.shape[:-1], self.periods, -1)
+
+    def samples(self, z: np.ndarray) -> np.ndarray:
+        """The states of a motion float64[z] at equidistant angles, float64[n, D]."""
+        return np.asarray(self._circle @ self.states(z).T)
+
+    def seen(self, signals: np.ndarray) -> np.ndarray:
+        """The signals of a motion float64[size] at equidistant angles, float64[n, c]."""
+        return np.asarray(self._circle @ signals.reshape(self.count, -1).T)
+
+    @functools.cached_property
+    def _circle(self) -> np.ndarray:
+        """The basis at equidistant angles, eight for each harmonic."""
+        count = 8 * (self.harmonics + 1)
+        return fourier.basis(2 * np.pi * np.arange(count) / count, self.harmonics)
+
+    def of_states(self, states: np.ndarray, value: float) -> np.ndarray:
+        """The unknowns of a motion with series of the states float64[D, 2h + 1]."""
+        signals = fourier.resized(self.source.of_states(states), self.harmonics)
+        return np.append(signals.ravel(), value)
+
+    # -- equations ---------------------------------------------------------------------------------
+    def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """See :class:`saltus.analysis.branches.equations.CurveEquations`."""
+        residual = np.full((len(z), self.width - 1), np.nan)
+        derivative = np.full((len(z), self.width - 1, self.width), np.nan)
+        for i in np.flatnonzero(np.isfinite(z).all(axis=1)):
+            residual[i], derivative[i] = self._of(z[i])
+        unit = self.scale[rows]
+        each = unit[:, : self.width - 1]
+        residual /= each
+        derivative *= unit[:, None] / each[..., None]
+        return residual, derivative
+
+    def _of(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The residual and its derivative, in units of the motion."""
+        signals = self.signals(z)
+        constants, slopes, rate, rate_by = self._constants(z)
+        found = self.forces.coefficients(signals, constants, rate, rate_by)
+        whole, by_rate = (
+            fourier.transfer(one) for one in self.source.response(self.harmonics, rate)
+        )
+        own = self.source.own(self.harmonics)
+        own = np.concatenate([own, own[1:]]).T.ravel()
+        size, forces = self.size, found.values.ravel()
+        period = self._pace(constants)
+        flat, flat_by_rate = (one.reshape(size, -1) / period for one in (whole, by_rate))
+        derivative = np.empty((size, self.width))
+        derivative[:, :size] = -flat @ found.by_signals.reshape(len(forces), size)
+        derivative[np.arange(size), np.arange(size)] += own
+        by_constants = -flat @ found.by_constants.reshape(len(forces), -1)
+        by_constants -= np.outer(flat_by_rate @ forces, rate_by)
+        if self._timed:
+            by_constants[:, 0] += flat @ forces / period
+        derivative[:, size:] = by_constants @ slopes
+        return own * z[:size] - flat @ forces, derivative
+
+    def accepted(self, z: np.ndarray, rows: np.ndarray) -> None:
+        """Nothing depends on it."""
+
+    def near(self, z: np.ndarray, rows: np.ndarray) -> Self:  # noqa: ARG002
+        """The equations whose row i is curve rows[i], int64[r]."""
+        other = copy.copy(self)
+        other.scale = self.scale[rows]
+        return other
+
+    def alike(self, z: np.ndarray, rows: np.ndarray) -> np.ndarray:  # noqa: ARG002
+        """The same motions from each whole forcing period on, float64[r, n, z]."""
+        angles = 2 * np.pi * np.arange(self.periods) / self.periods
+        return np.stack([self._shifted(z, angle) for angle in angles], axis=1)
+
+    def mirrored(self, z: np.ndarray) -> np.ndarray:
+        """The mirror images -x(t + T/2) of motions float64[r, z]."""
+        return self._shifted(z, np.pi / self.periods, -1.0)
+
+    def _shifted(self, z: np.ndarray, angle: float, factor: float = 1.0) -> np.ndarray:
+        moved = factor * fourier.shifted(self.signals(z), angle)
+        return np.concatenate([moved.reshape(len(z), -1), z[:, self.size :]], axis=1)

@@ -1,0 +1,235 @@
+"""Branches of motions of a few harmonics beside those of exact orbits."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import saltus as sl
+from saltus.analysis.harmonics.equations import HarmonicOrbits
+from saltus.errors import ParameterError, SaltusError
+
+STOP = sl.models.soft_stop()
+with open(Path(__file__).parents[3] / "reference/backbones_hbm.csv") as table:
+    KNOWN = {row["id"]: float(row["value"]) for row in csv.DictReader(table)}
+RANGE = {"frequency": (1.38, 2.8)}
+#: Folds of the exact branch: S01 and S03 of branches_soft_stop.csv.
+FOLDS = (1.41029487283056, 2.64776845463872)
+END = KNOWN["H10"], KNOWN["H11"]
+
+
+def folds(ds):
+    return np.sort(ds.event_frequency.values[ds.event_kind.values == "fold"])
+
+
+@pytest.fixture(scope="module")
+def balanced():
+    return {
+        count: sl.branches(
+            STOP, RANGE, (1.5, 0.0), at=1, by=sl.HarmonicBalance(count), progress=False
+        )
+        for count in (3, 15)
+    }
+
+
+def test_folds_come_to_those_of_the_exact_branch(balanced):
+    off = np.abs([folds(ds) - FOLDS for ds in balanced.values()])
+    # forces with a kink: at least the second order; the contact at the lower fold, beside a graze,
+    # is so short that its harmonics fall late
+    assert off[1, 1] < off[0, 1] / 25
+    assert off[1, 0] < off[0, 0]
+
+
+def test_distance_to_the_exact_orbit_falls_by_its_order(balanced):
+    """A force with kinks has harmonics that fall as k^-2, a deflection k^-4, a velocity k^-3: cut
+    off behind H they are off by H^-3 and H^-2 at worst.
+    """
+    for ds in balanced.values():
+        assert np.isfinite(ds.point_error.values).mean() > 0.95
+    off = [
+        np.nanmedian(ds.point_output_error.values[ds.point_contacts > 0], axis=0)
+        for ds in balanced.values()
+    ]
+    order = np.log(off[0] / off[1]) / np.log(5)
+    assert np.abs(order - [3, 2]).max() < 0.5
+
+
+def test_distance_is_that_of_the_exact_orbit(balanced):
+    ds = balanced[15]
+    i = int(np.argmax(ds.point_peak.values * (ds.point_stable.values > 0)))
+    system = STOP.with_values(frequency=float(ds.point_frequency[i]))
+    start = np.array([float(ds.point_x[i, 0]), float(ds.point_v[i, 0])])
+    run = sl.attractors(system, start[None], progress=False)
+    apart = np.abs(run.attractor_peak.values - float(ds.point_peak[i])).min()
+    assert 0 < apart <= float(ds.point_output_error.sel(output="x")[i])
+
+
+def test_harmonics_are_those_of_the_motion(balanced):
+    ds = balanced[15].isel(point=5)
+    c = ds.point_harmonic_real.values + 1j * ds.point_harmonic_imag.values
+    assert np.hypot(c[0, 0].real, np.linalg.norm(c[0, 1:]) / np.sqrt(2)) == pytest.approx(
+        float(ds.point_rms), rel=1e-13
+    )
+    rate = float(ds.point_frequency)
+    velocity = 1j * np.arange(16) * rate * c[0]
+    assert np.abs(c[1] - velocity).max() < 1e-13 * np.abs(velocity).max()
+
+
+def test_events_of_two_masses():
+    """The exact fold is at 0.6534401345 (NLvib, example 03)."""
+    found = sl.branches(
+        sl.models.two_masses(), {"frequency": (0.648, 0.66)}, at=1,
+        by=sl.HarmonicBalance(7), points=30, progress=False,
+    )  # fmt: skip
+    assert np.abs(folds(found) - 0.6534401345).min() < 1e-9
+
+
+def beam():
+    """A chain of eight masses with two stops, four of its modes kept."""
+    size = 8
+    stiffness = 1e4 * (2 * np.eye(size) - np.eye(size, k=1) - np.eye(size, k=-1))
+    return sl.structure(
+        np.eye(size), stiffness, modes=4, damping_ratio=0.02, frequency="5 Hz", name="chain",
+        contacts=[sl.Contact("x8", stiffness="30 kN/m", gap="1 mm"),
+                  sl.Contact("x4", stiffness="20 kN/m", gap="1.5 mm", side="both")],
+        forces=[sl.Force("x3", "8 N"), sl.Force("x1", "3 N", harmonic=2, phase="30 deg")],
+    )  # fmt: skip
+
+
+def test_a_structure_is_condensed_to_its_contacts():
+    """The same motion with the deflections at the contacts for unknowns as with all modes."""
+    system = beam()
+    found = sl.branches(
+        system, {"frequency": ("5 Hz", "5.6 Hz")}, at=1, by=sl.HarmonicBalance(9), points=12,
+        progress=False,
+    )  # fmt: skip
+    whole = HarmonicOrbits(replace(system, interfaces=None), "frequency", 9, 1, np.ones((1, 1)))
+    few = HarmonicOrbits(system, "frequency", 9, 1, np.ones((1, 1)))
+    assert (whole.count, few.count) == (4, 2)
+    assert (found.point_contacts > 0).any()
+    c = found.point_harmonic_real.values + 1j * found.point_harmonic_imag.values
+    for i in (0, -1):
+        states = np.concatenate([c[i, :4].real, -c[i, :4, 1:].imag], axis=1)
+        z = np.append(states, float(found.point_frequency[i]))
+        whole.scale = np.append(np.full(whole.size, np.abs(states).max()), 1.0)[None]
+        residual = whole.evaluate(z[None], np.zeros(1, int))[0]
+        assert np.abs(residual).max() < 1e-11
+
+
+def test_subharmonic_motions():
+    off = []
+    for count in (12, 36):
+        found = sl.branches(
+            sl.models.bilinear_rig(), {"frequency": (0.83, 0.86)}, at=1, start=(0.1, 0.8), points=4,
+            by=sl.HarmonicBalance(count, periods=2), progress=False,
+        )  # fmt: skip
+        assert (found.branch_periods == 2).all()
+        assert (np.abs(found.point_harmonic_real.sel(output="x", harmonic=1)) > 1e-3).all()
+        off.append(float(np.nanmedian(found.point_error)))
+    assert off[1] < off[0] / 3
+
+
+def test_what_is_refused_says_why():
+    hb = sl.HarmonicBalance(3)
+    for system, words in (
+        (sl.models.impact_oscillator(), "rigid stop"),
+        (sl.models.jenkins_oscillator(), "memory"),
+        (sl.models.bang_bang(), "time alone decides"),
+        (sl.models.aeroelastic(), "no forcing"),
+    ):
+        name = next(iter(system.values))
+        with pytest.raises(ParameterError, match=words):
+            sl.branches(system, {name: (0.9, 1.1)}, by=hb)
+    with pytest.raises(ParameterError, match="HarmonicBalance"):
+        sl.branches(STOP, RANGE, by="harmonics")
+    for wrong in ({"harmonics": 0}, {"harmonics": 2.5}, {"harmonics": 10**6}, {"H": 3}):
+        with pytest.raises(SaltusError):
+            sl.HarmonicBalance(**wrong)
+
+
+def test_several_results_in_one_picture(balanced):
+    ax = sl.plot.branches(list(balanced.values()))
+    named = {text.get_text() for text in ax.get_legend().get_texts()}
+    assert named >= {"3 harmonics", "15 harmonics"}
+    with pytest.raises(ParameterError, match="branches"):
+        sl.plot.branches({"a": balanced[3], "b": 3})
+
+
+@sl.system(states="x v")
+def duffing(t, x, v, *, cubic=1.0):
+    return v, -x - cubic * x**3
+
+
+@pytest.mark.parametrize(("row", "cubic", "single"), [
+    ("H01", 0.1, 1.03682206766639), ("H03", 1.0, 1.3228756555323),
+])  # fmt: skip
+def test_backbones_of_the_duffing_oscillator(row, cubic, single):
+    """The exact one by many harmonics; by one the frequency sqrt(1 + 3/4 cubic amplitude^2)."""
+    for count, known in ((1, single), (13, KNOWN[row])):
+        found = sl.backbone(
+            duffing.with_values(cubic=cubic), (0.5, 1.0), by=sl.HarmonicBalance(count),
+            progress=False,
+        )  # fmt: skip
+        angular = 2 * np.pi * float(found.backbone_frequency[-1])
+        assert angular == pytest.approx(known, rel=2e-13)
+    assert float(found.point_error[-1]) < 1e-11
+
+
+def test_end_of_the_resonance_in_one_harmonic():
+    """H10, H11: the largest amplitude of NLvib's example 01 is there, and nowhere beside it."""
+
+    @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
+    def forced(t, x, v, *, damping=0.05, cubic=0.1, force=0.18, w=1.0):
+        return v, force * sl.cos(w * t) - damping * v - x - cubic * x**3
+
+    orbits, (amplitude, w) = HarmonicOrbits(forced, "w", 1, 1, np.ones((1, 4))), END
+    lag = np.arctan2(0.05 * w, 1 + 0.075 * amplitude**2 - w**2)
+    series = amplitude * np.array([0.0, np.cos(lag), np.sin(lag)])
+    residual, derivative = orbits.evaluate(np.append(series, w)[None], np.zeros(1, int))
+    assert np.abs(residual).max() < 1e-14
+    along = np.linalg.svd(derivative[0])[2][-1]
+    assert abs(along[:3] @ series) < 1e-13
+
+
+def test_as_many_harmonics_as_the_error_asks_for():
+    found = sl.branches(
+        STOP, {"frequency": (1.45, 1.6)}, (1.5, 0.0), at=1, progress=False,
+        by=sl.HarmonicBalance("auto", accuracy=4e-3),
+    )  # fmt: skip
+    assert found.attrs["harmonics"] == 11
+    assert float(np.nanmax(found.point_error)) < 4e-3
+    few = sl.branches(
+        STOP, {"frequency": (1.45, 1.6)}, (1.5, 0.0), at=1, progress=False, by=sl.HarmonicBalance(5)
+    )
+    assert float(np.nanmax(few.point_error)) > 4e-3
+
+
+def test_residual_deflections_keep_the_flexibility():
+    """The compliance at a contact beside that of the whole matrices, by a sparse factorisation."""
+    from saltus.analysis.harmonics.signals import AtContacts
+
+    size, at = 60, 45
+    stiffness = 1e6 * (2 * np.eye(size) - np.eye(size, k=1) - np.eye(size, k=-1))
+    damping = 2e-4 * stiffness
+    off = []
+    for residual in (False, True):
+        system = sl.structure(
+            np.eye(size), stiffness, damping, modes=6, residual=residual, frequency="3 Hz",
+            contacts=[sl.Contact(f"x{at + 1}", stiffness="1 kN/m", gap="1 mm")],
+            forces=[sl.Force("x5", "1 N")],
+        )  # fmt: skip
+        rate = 2 * np.pi * 3.0
+        found = AtContacts(system).response(5, rate)[0][:, 0]
+        loads = np.eye(size)[:, [at, 4]]
+        for order, row in enumerate(found):
+            w = order * rate
+            whole = np.linalg.solve(stiffness - w**2 * np.eye(size) + 1j * w * damping, loads)
+            off.append(np.abs(row / whole[at] - 1).max())
+    assert max(off[6:]) < max(off[:6]) / 100
+    assert off[6] < 1e-12  # static: nothing is lost
+    with pytest.raises(ParameterError, match="modes="):
+        sl.structure(np.eye(2), stiffness[:2, :2], residual=True)
