@@ -364,6 +364,7 @@ def exactly():
 
 
 @APPROXIMATE
+@pytest.mark.slow
 def test_orbits_are_the_exact_ones(exactly, method):
     found = {name: asked(method) for name, asked in IN_QUESTIONS.items()}
     for name in ("attractors", "diagram"):

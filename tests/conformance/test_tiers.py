@@ -77,6 +77,7 @@ def bits(outcome):
 
 
 @pytest.mark.parametrize("case", CASES)
+@pytest.mark.slow
 def test_all_tiers_give_the_same_bits(case):
     system, spread, method = CASES[case]
     flow = method.kernels(system.origin)  # as the engine asks for it
@@ -94,6 +95,7 @@ def test_all_tiers_give_the_same_bits(case):
 
 
 @pytest.mark.parametrize("case", ["walls", "tangent", "chain"])
+@pytest.mark.slow
 def test_registers_one_after_the_other_give_the_same_bits(monkeypatch, case):
     """Two, four or all eight lanes in one."""
     chain = (sl.models.chain(), 1e-3, TAYLOR)
@@ -182,6 +184,7 @@ print(json.dumps(t.bits(t.engine.run(system, method, request, threads=1))))
     ("processor", "lanes"),
     [("x86-64-v3", 8), pytest.param("x86-64-v3", 4, marks=pytest.mark.nightly), ("x86-64-v2", 2)],
 )
+@pytest.mark.slow
 def test_an_older_processor_gives_the_same_bits(processor, lanes):
     """With eight lanes in four registers, with four; without fused multiply-add, which the C
     library then does.

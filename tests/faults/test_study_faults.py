@@ -636,6 +636,7 @@ def poisoned(mapped, monkeypatch):
     ],
 )
 @pytest.mark.parametrize("cell", [70, 96])
+@pytest.mark.slow
 def test_a_poison_cell_hurts_only_itself(healthy, poisoned, start, method, label, status, cell):
     """A start that overflows, isn't a number, or never gets anywhere has a code; all other cells
     are those of a map without it.

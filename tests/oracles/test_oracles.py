@@ -187,6 +187,7 @@ def test_verdict_sees_a_missed_and_an_invented_contact():
 # --- 40 digits ------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_40_digits_give_all_contacts_of_figure_2b():
     b4 = {
         **RIG,

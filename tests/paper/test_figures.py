@@ -138,6 +138,7 @@ def test_the_file_is_planned_as_the_paper_has_it(name):
 
 
 @pytest.mark.parametrize(("name", "one"), list(EXACT), ids=[" ".join(each) for each in EXACT])
+@pytest.mark.slow
 def test_attractors_of_the_exact_maps(name, one):
     job = next(job for job in maps_of(parse(tiny(name))) if job.title == one)
     found = job.plan.scout(1)
@@ -198,6 +199,7 @@ def test_fig_6b_runs_as_a_study(tmp_path):
 
 
 @pytest.mark.parametrize("name", [name for name in MAPS if name != "fig6b"])
+@pytest.mark.slow
 def test_the_maps_of_one_value_run(name, tmp_path, brief):
     """Exact, located, not located: the whole way with few scouts and short transients. Only that it
     runs, and that all is written.
@@ -235,6 +237,7 @@ def test_the_motions_run(name, periods, tmp_path):
         ),
     ],
 )
+@pytest.mark.slow
 def test_the_responses_run(name, panels, tmp_path, brief):
     """The whole way with few values and short transients, from soft to hard contact. Only that it
     runs, and that all is written.
@@ -256,6 +259,7 @@ def test_the_responses_run(name, panels, tmp_path, brief):
     assert len(outcome.tables) >= text.count("[[")
 
 
+@pytest.mark.slow
 def test_ode45_survives_orbits_that_do_not_close():
     """ode45's map isn't continuous, so a derivative may expand where the trajectory doesn't: no
     reason to stop the study.

@@ -328,6 +328,7 @@ def exponent_by_runge_kutta(damping, force, count=256, periods=150, steps=50, se
     return rates.mean(), rates.std() / math.sqrt(count)
 
 
+@pytest.mark.slow
 def test_ueda_s_oscillator_is_chaotic_with_the_exponent_of_an_independent_integration():
     ds = attractors(duffing, [[1.0, 0.0], [2.5, -3.0], [0.1, 0.1]], periods=256, progress=False)
     assert ds.attractor_type.values.tolist() == ["chaotic"]
@@ -342,6 +343,7 @@ def test_ueda_s_oscillator_is_chaotic_with_the_exponent_of_an_independent_integr
     assert ds.attractor_exponent_error.item() < 0.02
 
 
+@pytest.mark.slow
 def test_chaos_beside_a_periodic_orbit():
     """x'' + x'/10 + x^3 = 12 cos t: a chaotic attractor and one of period 1, from
     starts on either.

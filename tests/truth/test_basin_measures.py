@@ -252,6 +252,7 @@ def fine() -> np.ndarray:
     return fractal_map(np.pi * cells, cells - 0.5)
 
 
+@pytest.mark.slow
 def test_the_fractal_map_shares_its_plane_equally(fine):
     """(theta, x) -> (pi - theta, -x) exchanges the two fixed points, so the shares are 1/2 each,
     cell by cell.
@@ -325,6 +326,7 @@ def test_the_double_well_is_shared_by_symmetry(wells):
     assert fractions(wells, 2)[0].tolist() == [0.5, 0.5]
 
 
+@pytest.mark.slow
 def test_the_double_well_has_a_smooth_boundary(wells):
     """One branch of the boundary crosses the inner square. The outer one holds windings, whose
     strips the largest distances don't resolve: there alpha comes out low and rises with the grid.

@@ -117,6 +117,7 @@ class Exponentials:
 
 
 @pytest.mark.parametrize("masses", [7, 12])
+@pytest.mark.slow
 def test_orbits_of_branches_close_by_matrix_exponentials(masses):
     rng = np.random.default_rng(100 + masses)
     made, first, parts = random_chain(rng, masses)

@@ -121,6 +121,7 @@ def test_a_ball_in_a_shaken_box():
     assert nearest(found, "fold", fold) == pytest.approx(fold, rel=1e-14)
 
 
+@pytest.mark.slow
 def test_a_branch_goes_on_with_another_impact_behind_a_graze():
     """Of orbits whose impacts are all at one stop: it doesn't turn back upon itself. Their period
     is closed by an independent solver, flight by flight.

@@ -82,6 +82,7 @@ def motions(system, method):
         ("dry", None),
     ],
 )
+@pytest.mark.slow
 def test_loops_and_plain_code_give_the_same_motion(law, lanes, monkeypatch):
     system, method = structure(law, 11), sl.Taylor(lanes=lanes)
     assert "add_up" in taylor_head(system, 20, 4).functions

@@ -84,6 +84,7 @@ def chaos():
     )
 
 
+@pytest.mark.slow
 def test_the_chaotic_motion_of_the_rig(chaos):
     """Stiff contacts; typed as by `attractors`, and the exponent as its one-direction method has
     it.
@@ -420,6 +421,7 @@ def test_a_freeplay_wing_at_rest_has_the_eigenvalues_of_its_jacobian():
     assert np.abs(ds["exponent_sum"] - ds["mean_divergence"]).max() < 1e-12
 
 
+@pytest.mark.slow
 def test_lorenz_at_rho_20_has_two_equilibria_and_nothing_else():
     # mirror images, and so are the places that they lead to
     starts = np.array([(1.0, 1.0, 20.0), (-1.0, -1.0, 20.0)])

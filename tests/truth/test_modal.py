@@ -63,6 +63,7 @@ def agree(one, other, period, tolerance):
 
 
 @pytest.mark.parametrize("seed", range(24))
+@pytest.mark.slow
 def test_random_structures_meet_the_contacts_of_the_taylor_flow(seed):
     """Errors of rounding grow from contact to contact; by the tolerance of the first it is asked
     that they grow no faster than by a third at each.

@@ -158,6 +158,7 @@ def test_an_oscillator_meets_its_stop_where_matrix_exponentials_say(case):
     assert check_contacts(system, (0.0, 0.0), run, 10, 1e-12 * 2 * np.pi) > 5
 
 
+@pytest.mark.slow
 def test_tables_that_are_dropped_and_made_anew_give_the_same_bits(monkeypatch):
     """Many sets of parameter values in memory for a few contact states only, on two threads."""
     from saltus.flow import modal, modal_tables
@@ -253,6 +254,7 @@ BODIES = {
 
 @pytest.mark.parametrize("bodies", BODIES)
 @pytest.mark.parametrize("drive", DRIVES)
+@pytest.mark.slow
 def test_bodies_that_are_shaken_meet_a_stop_where_matrix_exponentials_say(drive, bodies):
     of_time, course = DRIVES[drive]
     system = shaken(of_time).with_values(**BODIES[bodies])

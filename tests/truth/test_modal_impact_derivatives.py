@@ -25,6 +25,7 @@ def compared(system, start, periods):
 
 
 @pytest.mark.parametrize("seed", range(24))
+@pytest.mark.slow
 def test_random_structures_have_the_derivatives_of_taylor(seed):
     """Stops that move, bodies that strike each other, springs beside them, rest and release."""
     rng = np.random.default_rng([20261126, seed])
@@ -171,6 +172,7 @@ def test_areas_shrink_by_the_square_of_the_restitution(damping, n):
     assert np.linalg.det(found[0]) == pytest.approx(shrinks, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_branches_of_orbits_with_impacts_are_those_of_taylor():
     @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
     def stop(t, x, v, *, w=2.5, gap=0.05):

@@ -16,6 +16,7 @@ from two_flows import FOLLOWS, runs, same_rows, structure, times
 
 # -- beside Taylor's method ------------------------------------------------------------------------
 @pytest.mark.parametrize("seed", range(20))
+@pytest.mark.slow
 def test_random_structures_meet_their_stops_as_by_taylor(seed):
     """Every row: impacts, rests, releases. Errors grow from contact to contact; by the tolerance it
     is asked that they grow no faster than by a third at each.

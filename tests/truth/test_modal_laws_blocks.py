@@ -68,6 +68,7 @@ KINDS = ["free", "critical damping", "resonance", *DRIVES]
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", range(5))
+@pytest.mark.slow
 def test_stops_beside_blocks_and_records_act_as_by_taylor(kind, seed):
     """Every row: impacts, rests, releases. Errors grow from contact to contact; by the tolerance it
     is asked that they grow no faster than by a third at each.

@@ -124,6 +124,7 @@ def test_gap_is_a_state_that_modal_serves():
     np.testing.assert_allclose(found, exact, atol=1e-9 * np.abs(exact).max())
 
 
+@pytest.mark.slow
 def test_orbits_and_branches_are_those_of_taylor():
     system = chain(4, damping=15.0)
     both = [

@@ -105,6 +105,7 @@ def exact_end(law, start, look=1e-3):
 
 
 @pytest.mark.parametrize("law", LAWS)
+@pytest.mark.slow
 def test_the_yardstick_is_exact(oscillator, law):
     exact = np.array([exact_end(LAWS[law], start) for start in starts()[:4]])
     assert np.all(np.abs(best(oscillator.with_values(**LAWS[law]))[:4] - exact) < 1e-12)

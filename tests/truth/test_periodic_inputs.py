@@ -68,6 +68,7 @@ def settled_states():
 
 
 @pytest.mark.parametrize("name", ["square", "pulses", "record"])
+@pytest.mark.slow
 def test_the_fixed_point_is_exact_and_stays_for_100_000_periods(name):
     exact = settled_states()[name]
     run = sl.stroboscope(

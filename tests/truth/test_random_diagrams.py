@@ -100,6 +100,7 @@ def unforced(seed):
     np.testing.assert_allclose(hopf, [values["damping"]], rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_bifurcations_of_random_oscillators_are_those_of_an_independent_solver():
     assert sum(forced(seed) for seed in range(12)) > 20
 

@@ -269,6 +269,7 @@ def test_a_graze_of_a_linear_motion_is_where_the_closed_form_says():
 
 
 # -- methods ---------------------------------------------------------------------------------------
+@pytest.mark.slow
 def test_turning_points_of_ode45_come_to_the_exact_ones_as_its_tolerance_shrinks():
     rig = sl.models.delangre("c", force="4 N", frequency="17 Hz")
     stiffness = {"contact_stiffness": np.array([7e3, 2e4])}

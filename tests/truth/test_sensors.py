@@ -262,6 +262,7 @@ def test_a_run_gives_outputs_at_given_times_and_ends_at_one():
 
 
 @pytest.mark.parametrize("state", [None, "tip", "stretch"])
+@pytest.mark.slow
 def test_a_backbone_tells_the_numbers_of_outputs(state):
     free = sl.structure(
         MASS, STIFFNESS, modes=3, contacts=[sl.Contact("x3", stiffness=STOP, gap=GAP)],

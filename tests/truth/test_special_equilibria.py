@@ -42,6 +42,7 @@ def coefficient(system, name, state, scale=None):
     return first_lyapunov(curves, 0, z)
 
 
+@pytest.mark.slow
 def test_the_hopf_point_of_the_valve():
     start = {"x": 2.5, "v": 0.0, "pressure": 12.5}
     value, state, own, _ = events(sl.models.relief_valve(), {"flow": (8.2, 9.0)}, start, "hopf")

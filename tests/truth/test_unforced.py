@@ -303,6 +303,7 @@ ESCAPE = oscillator.with_values(quadratic=-1.0)
         ),
     ],
 )
+@pytest.mark.slow
 def test_a_fold_is_where_an_independent_solver_finds_it(system, name, values, start, follow):
     """The escape equation has two on one curve, at a force of 0.0688 and of 0.0472: each is one
     branch's end.

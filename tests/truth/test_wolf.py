@@ -96,6 +96,7 @@ def assert_mean_is(runs, exact, bias):
 
 
 # -- published values ------------------------------------------------------------------------------
+@pytest.mark.slow
 def test_lorenz_from_one_quantity_with_all_defaults(lorenz):
     """The bias, up to 10 %, isn't in the intervals: a new neighbour isn't quite in the old
     direction.
@@ -248,6 +249,7 @@ def test_series_that_can_not_be_used(series, interval, settings, message):
 
 
 # -- beside the variational method -----------------------------------------------------------------
+@pytest.mark.slow
 def test_on_the_motions_of_the_rig():
     """A periodic motion has the flow's zero; chaotic ones, on average, what the variational method
     has, to 20 %.

@@ -125,6 +125,7 @@ def test_a_column_that_is_new_is_empty_in_older_rows(releases, tmp_path):
     assert "1.2" in releases.as_text(releases.kept(file))
 
 
+@pytest.mark.slow
 def test_all_that_a_release_takes_can_be_measured(releases, monkeypatch, few_scouts):
     monkeypatch.setattr(releases.compile, "measured", lambda *_: (0.5, 0.6))  # takes long, else
     monkeypatch.setattr(releases.size, "SOURCE", releases.size.SOURCE / "cache")

@@ -485,6 +485,7 @@ def test_lines_of_stable_orbits_end_where_stability_does():
     assert heights[np.isfinite(heights)] == pytest.approx(17.0)
 
 
+@pytest.mark.slow
 def test_a_branch_without_bound_does_not_flatten_the_picture():
     """The cycles of the wing grow to thousands of radians towards 13.5002 m/s."""
     wing = sl.models.aeroelastic()

@@ -38,8 +38,10 @@ def test_responses_say_it_of_each_value():
 
 @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
 def turned(t, x, v, *, w=1.0, rate=1 / 101):
-    """Turns by 1/101 of a circle in each forcing period: every orbit has 101 of them."""
-    return rate * w * v, -rate * w * x
+    """Turns by 1/101 of a circle in each forcing period: every orbit has 101 of them, but for a
+    damping that no run of this length sees.
+    """
+    return rate * w * v, -rate * w * x - 1e-12 * w * v
 
 
 def test_one_sentence_says_that_longer_orbits_have_no_type():

@@ -257,6 +257,7 @@ def test_another_title_is_the_same_map(whole, tmp_path):
 
 
 # -- what comes out --------------------------------------------------------------------------------
+@pytest.mark.slow
 def test_two_maps_and_their_agreement(tmp_path):
     run = Run(tmp_path / "run", PAIR, pictures=True)
     names = {file.name for file in run.outcome.files}

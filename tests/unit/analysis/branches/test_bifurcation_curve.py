@@ -227,6 +227,7 @@ def across(at, matrix, z, n, c, step=1e-4):
     ],
     ids=["cusp", "isola of three periods"],
 )
+@pytest.mark.slow
 def test_a_point_of_codimension_two_by_scipy(kind, values, n, last):
     system, c = duffing.with_values(**values), values["c"]
     if n == 1:

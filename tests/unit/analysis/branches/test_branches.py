@@ -284,6 +284,7 @@ def at_rest(vary, **more):
     return sl.branches(gears, {"frequency": vary}, (0.0,) * 4, progress=False, **more)
 
 
+@pytest.mark.slow
 def test_a_loop_within_a_step_is_followed_by_shorter_ones():
     """Of which changes of stability tell that don't add up."""
     whole, near = at_rest((5.6, 5.8), switch=(), at=2), at_rest((5.65, 5.66), switch=(), at=2)
@@ -295,6 +296,7 @@ def test_a_loop_within_a_step_is_followed_by_shorter_ones():
     np.testing.assert_allclose(folds, [located(near, "fold", value) for value in folds], rtol=1e-11)
 
 
+@pytest.mark.slow
 def test_at_each_bifurcation_a_multiplier_lies_on_the_unit_circle():
     """Also where a test of stability changes its sign between branches that run alongside."""
     found = at_rest((5.62, 5.7), switch=(), at=2)
@@ -472,6 +474,7 @@ def test_derivatives_of_a_branch_are_those_at_its_own_points():
     np.testing.assert_allclose(branch.derivative, derivative, rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_branches_followed_side_by_side_are_those_followed_one_after_the_other(monkeypatch):
     """Also if whoever comes by where another began is taken to be on its branch."""
     doubled = frozenset({"period_doubling"})
@@ -498,6 +501,7 @@ def test_branches_followed_side_by_side_are_those_followed_one_after_the_other(m
 
 
 @pytest.mark.parametrize("seed", range(3))
+@pytest.mark.slow
 def test_random_ranges_have_the_same_events_side_by_side_and_alone(monkeypatch, seed):
     """The rig in one of its three cases, with a random force, over a random range."""
     rng = np.random.default_rng(seed)

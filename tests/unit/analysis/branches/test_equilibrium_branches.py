@@ -155,6 +155,7 @@ def test_a_cycle_that_shrinks_ends_at_its_hopf_point():
     assert found.point_excess.values.min() == pytest.approx(2.0, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_the_hopf_point_and_the_graze_of_a_relief_valve():
     """Values of an independent solution: Newton's method on defining systems in mpmath."""
     valve = sl.models.relief_valve()

@@ -20,6 +20,7 @@ def diagram():
     return sl.frequency_response(RIG, (*BAND, 9), "random 10", box=BOX, progress=False)
 
 
+@pytest.mark.slow
 def test_every_event_is_one_of_the_branches_followed_through_instability(diagram):
     whole = sl.branches(RIG, {"frequency": BAND}, diagram, switch=(), progress=False)
     assert diagram.sizes["event"] > 8
@@ -75,6 +76,7 @@ def soft(t, x, v, *, stiffness=10.0, gap=0.01, spring=0.0, w=1.0):
     return v, force
 
 
+@pytest.mark.slow
 def test_a_branch_over_four_decades_has_its_closed_form():
     """The amplitude is 1/sqrt((k - 1)^2 + 0.04); the gap is touched where it is 0.01."""
     found = sl.bifurcation_diagram(soft, {"stiffness": (0.03, 300.0, 9, "log")}, progress=False)
@@ -134,6 +136,7 @@ def test_ctrl_c_while_branches_are_followed_leaves_those_that_are_done_whole(mon
     assert (part.response_branch.values < part.sizes["branch"]).any()
 
 
+@pytest.mark.slow
 def test_responses_of_an_inexact_method_are_on_the_branches_of_the_exact_orbits(diagram):
     starts = {"x": diagram.start_x.values[:4], "v": diagram.start_v.values[:4]}
     values = diagram.frequency.values[::4]
