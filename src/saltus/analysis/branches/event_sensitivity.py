@@ -138,7 +138,7 @@ def event_sensitivity(
 def _place(
     start: EventOrbit, varied: str, name: str, method: Method, threads: int | None
 ) -> tuple[float, float]:
-    """Where the bifurcation lies over ``varied`` [SI], and its slope over ``name``."""
+    """Place of the bifurcation over ``varied`` [SI], and its slope over ``name``."""
     values = [start.system.values[one] for one in (varied, name)]
     limits = [(one - 0.1 * abs(one), one + 0.1 * abs(one) or 1.0) for one in values]
     orbits, z = orbits_over(start, (varied, name), limits, method, threads)

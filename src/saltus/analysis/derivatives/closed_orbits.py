@@ -17,7 +17,6 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.derivatives.carried import HELD, CarriedDerivatives, Places
-from saltus.analysis.inputs.orbits import cycles, ensemble_of
 from saltus.analysis.inputs.spans import Span, span
 from saltus.analysis.inputs.starts import Ensemble
 from saltus.analysis.motion.sample_times import NO_SAMPLES
@@ -91,8 +90,8 @@ def closed_orbits(
         if not (np.abs(step[..., 0]) > SHORTEST * unit).any():
             break
         values = flow.parameters(group, np.arange(n))
-        group = ensemble_of(group.start + step[..., 0], values, group.batch)
-        length = length if shots.forced else cycles(length.period + late[:, 0])
+        group = Ensemble.of(group.start + step[..., 0], values, group.batch)
+        length = length if shots.forced else Span.of_cycles(length.period + late[:, 0])
     if not (np.abs(miss) <= CLOSED * unit).all():
         raise ParameterError(
             "a motion of start= doesn't close after its period: it is no periodic orbit of these "
@@ -194,12 +193,12 @@ class _Shots:
         step = STEP * np.where(values[name] == 0.0, 1.0, np.abs(values[name]))
         shift = np.tile(SHIFTS, n) * step
         values[name] = values[name] + shift
-        others = ensemble_of(group.start[each] + shift[:, None] * move[each], values, True)
+        others = Ensemble.of(group.start[each] + shift[:, None] * move[each], values, True)
         periods = int(length.count[0])
         spans = (
             span(self.flow.system, others, periods, None, 0.0)
             if self.forced
-            else cycles(length.period[each] + shift * late[each])
+            else Span.of_cycles(length.period[each] + shift * late[each])
         )
         found = self.multipliers(self.ends(others, spans), others)
         nearest = np.abs(found[:, None] - own[each][:, :, None]).argmin(axis=2)

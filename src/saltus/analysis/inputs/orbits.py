@@ -80,21 +80,10 @@ def given_orbits(system: System, found: xr.Dataset) -> tuple[Ensemble, Span]:
     columns = {
         name: np.where(np.isfinite(column), column, known[name]) for name, column in columns.items()
     }
-    group = ensemble_of(points[:, 0], columns, batch)
+    group = Ensemble.of(points[:, 0], columns, batch)
     if system.forced_at is None:
-        return group, cycles(time)
+        return group, Span.of_cycles(time)
     return group, span(system, group, int(counts[0]), None, 0.0)
-
-
-def ensemble_of(start: np.ndarray, columns: dict[str, np.ndarray], batch: bool) -> Ensemble:
-    """Trajectories from starts float64[n, D], with values float64[n] of all parameters."""
-    varied = {name: column for name, column in columns.items() if np.ptp(column) > 0}
-    return Ensemble(start, np.stack([*columns.values()], axis=1), varied, batch)
-
-
-def cycles(time: np.ndarray) -> Span:
-    """A period of limit cycles, float64[n] [s]."""
-    return Span(0.0, time, np.ones(len(time), np.int64), np.zeros(len(time)))
 
 
 def _lasting(
