@@ -46,8 +46,8 @@ def test_the_graze_of_a_rigid_stop_moves_as_its_formula_says():
             sl.models.delangre("b", force="4 N"),
             "period_doubling",
             ["force", "upper_gap", "damping_ratio"],
-            {"frequency": (13.17, 13.2)},
-            {"x": "0.4 mm", "v": 0},
+            {"frequency": (12.5, 13.19)},  # a graze is near
+            (0, 0),
         ),
         (hammer, "fold", ["gap", "pull", "k", "d", "e"], {"f": (1.5, 1.7)}, (0, 0)),
     ],
