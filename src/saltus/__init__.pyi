@@ -33,6 +33,7 @@ from saltus.analysis.motion.transmissibility import transmissibility as transmis
 from saltus.analysis.recorded.wolf import wolf as wolf
 from saltus.analysis.responses.bifurcation_diagram import bifurcation_diagram as bifurcation_diagram
 from saltus.analysis.responses.frequency_response import frequency_response as frequency_response
+from saltus.analysis.scatter.scatter import scatter as scatter
 from saltus.contact import clearance as clearance
 from saltus.contact import flores as flores
 from saltus.contact import freeplay as freeplay
@@ -45,6 +46,12 @@ from saltus.contact import jump as jump
 from saltus.contact import lankarani_nikravesh as lankarani_nikravesh
 from saltus.contact import play as play
 from saltus.contact import slider as slider
+from saltus.distributions import distribution as distribution
+from saltus.distributions import lognormal as lognormal
+from saltus.distributions import normal as normal
+from saltus.distributions import triangular as triangular
+from saltus.distributions import truncated as truncated
+from saltus.distributions import uniform as uniform
 from saltus.errors import SaltusError as SaltusError
 from saltus.explore import explore as explore
 from saltus.flow import ODE23 as ODE23

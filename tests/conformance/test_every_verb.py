@@ -146,6 +146,20 @@ CALLS = {
     "periodic_orbits": started(periods=1),
     "poincare": started(surface="x turns", periods=5),
     "regularisation_widths": started(points=2, transient=20, widths=[1e-4, 1e-5]),
+    "scatter": lambda how: (
+        RIG,
+        {
+            "uncertain": {
+                "upper_gap": {
+                    "in SI": sl.normal(0.4e-3, 2e-5),
+                    "in units": sl.normal("0.4 mm", "0.02 mm"),
+                }[how]
+            },
+            "start": START[how],
+            "samples": 4,
+            "indices": True,
+        },
+    ),
     "sensitivity": started(periods=3, to=["upper_gap"]),
     "settled": of_result("simulate"),
     "simulate": started(periods=40),

@@ -109,7 +109,7 @@ def test_names_that_saltus_has_not(name, words):
         ("phase_portrait", r"sl\.plot\.phase\("),
         ("show", r"axes\.figure\.savefig"),
         ("basin", "Did you mean 'basins'"),
-        ("zzz", "Known: .*history"),
+        ("zzz", "Known: .*energy"),
     ],
 )
 def test_pictures_that_saltus_has_not(name, words):
@@ -389,7 +389,7 @@ STUDY = '[study]\nname = "s"\n[system]\nmodel = "delangre"\n[simulate]\nperiods 
         ("[events]\nx = 1\n", r"\[poincare\]"),
         ("[solver]\nname = 'a'\n", r"\[method\]"),
         ("[parameters]\nmass = 1\n", r"\[system\]"),
-        ('outputs = { a = "x" }\n', r"key of \[sensitivity\], \[frequency_response\], "),
+        ('outputs = { a = "x" }\n', r"key of \[sensitivity\], .*\[frequency_response\], "),
         (
             '[branches]\nvary.mass = { first = "1 kg", last = "2 kg", count = 9 }\n',
             "first and last only",

@@ -12,13 +12,13 @@ import pytest
 import saltus as sl
 from conformance.systems import EPS, lab
 from saltus.errors import ParameterError
-from saltus.system.quantity import turning_surface, with_level, with_surface
+from saltus.system.quantity import turning_surfaces, with_level, with_surface
 
 solve_ivp = pytest.importorskip("scipy.integrate").solve_ivp
 
 #: One compilation for most of this file: the shared oscillator, the turning points of x, and a
 #: level of x.
-SYSTEM = with_level(turning_surface(lab, "x"), "x", 0.3)
+SYSTEM = with_level(turning_surfaces(lab, "x")[0], "x", 0.3)
 OSCILLATOR = {"spring": 1.0, "boundary": 5.0}
 STOP = {
     "spring": 1.0,
@@ -271,3 +271,25 @@ def test_a_chatter_ends_where_its_turning_points_are_asked_for():
     impacts = int((run.contact_kind == "impact").sum())
     assert turns.sizes["crossing"] < 3 * impacts
     assert (run.contact_kind.values == "hold").any()
+
+
+@pytest.mark.parametrize("method", [sl.Taylor(), sl.Modal()], ids=lambda one: one.name)
+def test_the_force_of_a_stop_turns_in_contact_alone(method):
+    """Once in each contact, where the velocity is zero: without damping, by closed form."""
+    square, stiffness, gap, speed = 4e3, 5e4, 1e-3, 0.5
+    made = sl.structure(
+        [[1.0]], [[square]], names="x", sensors={"f": sl.contact_force("stop")},
+        contacts=[sl.Contact("x", gap=gap, stiffness=stiffness, name="stop")],
+    )  # fmt: skip
+    section = sl.poincare(made, (0.0, speed), "f turns", t_end=0.3, method=method, progress=False)
+    slow, fast = math.sqrt(square), math.sqrt(square + stiffness)
+    met = math.asin(gap * slow / speed) / slow
+    closing = math.sqrt(speed**2 - square * gap**2)
+    centre = stiffness * gap / fast**2  # of the vibration in contact
+    turn = math.atan2(closing / fast, gap - centre) / fast
+    high = centre + math.hypot(gap - centre, closing / fast)
+    cycle = 2 * (met + turn) + math.pi / slow
+    exact = np.arange(met + turn, 0.3, cycle)
+    assert (str(section["status"].values), len(exact)) == ("ok", 5)
+    assert section.crossing_time.values == pytest.approx(exact, rel=1e-11)
+    assert np.abs(section.f.values) == pytest.approx(stiffness * (high - gap), rel=1e-10)

@@ -53,6 +53,8 @@ class PictureKind(StrEnum):
     contact_forces = "contact_forces"
     energy = "energy"
     sensitivity = "sensitivity"
+    scatter = "scatter"
+    corner = "corner"
     fit = "fit"
     exponents = "exponents"
     methods = "methods"

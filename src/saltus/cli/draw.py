@@ -14,6 +14,7 @@ _WORDS = {
     "responses": "responses", "section": "a section", "spectrum": "a spectrum",
     "impacts": "impacts", "energy": "energies", "sensitivity": "derivatives",
     "event_sensitivity": "derivatives of a bifurcation",
+    "scatter": "sets of values",
     "fit": "a fit to a measurement",
     "methods": "one question by several methods", "exponents": "exponents",
     "branches": "branches of periodic orbits", "orbits": "periodic orbits",

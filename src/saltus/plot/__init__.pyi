@@ -17,6 +17,8 @@ from saltus.plot.measures import impacts as impacts
 from saltus.plot.methods import methods as methods
 from saltus.plot.orbits import periodic_orbits as periodic_orbits
 from saltus.plot.phase import phase as phase
+from saltus.plot.scatter import corner as corner
+from saltus.plot.scatter import scatter as scatter
 from saltus.plot.section import section as section
 from saltus.plot.sensitivity import sensitivity as sensitivity
 from saltus.plot.spectrum import spectrum as spectrum

@@ -23,6 +23,8 @@ TAKES: dict[str, tuple[str, ...]] = {
     "contact_forces": (schema.IMPACTS,),
     "energy": (schema.ENERGY,),
     "sensitivity": (schema.SENSITIVITY,),
+    "scatter": (schema.SCATTER,),
+    "corner": (schema.SCATTER,),
     "fit": (schema.FIT,),
     "methods": (schema.METHODS,),
     "exponents": (schema.EXPONENTS,),

@@ -19,8 +19,8 @@ PACKAGE = Path(__file__).parents[1]
 #: packages and modules import nothing else of saltus, but for messages. Models and the reading of
 #: study files stand in the equations, values and arguments themselves.
 COMPUTING = (
-    "fence", "intervals", "interrupt", "unit_table", "units", "whole_files", "cache",
-    "language", "contact", "system", "kernels", "codegen", "flow", "results", "analysis",
+    "fence", "intervals", "interrupt", "unit_table", "units", "distributions", "whole_files",
+    "cache", "language", "contact", "system", "kernels", "codegen", "flow", "results", "analysis",
 )  # fmt: skip
 #: Fields of Python's syntax tree without effect on the code.
 _IDLE = ("kind", "type_comment", "ctx")

@@ -39,8 +39,9 @@ _SWEPT = (
     'Write [frequency_response] with frequency = { first = "2 Hz", last = "30 Hz", count = 281 }.'
 )
 _DRAWN = (
+    'Write [scatter] with uncertain.gap = { normal = ["1 mm", "0.1 mm"] }. '
     'Lists are a batch, one value for each trajectory: [simulate] with values = { gap = ["1 mm", '
-    '"1.1 mm"] }. Draw many in Python: sl.simulate(..., values={"gap": array}).'
+    '"1.1 mm"] }. In Python: sl.simulate(..., values={"gap": array}).'
 )
 #: Tables that people write, and what is written here.
 _ELSEWHERE = {

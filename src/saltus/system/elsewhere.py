@@ -20,6 +20,7 @@ _FIT = (
     "There is none: give scipy.optimize.least_squares a function that calls "
     "sl.simulate(system.with_values(...), ...)."
 )
+_SCATTER = 'Write sl.scatter(system, {"gap": sl.normal("0.4 mm", "0.02 mm")}).'
 _NOISE = (
     "Draw the numbers once, outside the equation: noise = sl.recorded(times, values), and in the "
     "equation noise(t)."
@@ -44,8 +45,9 @@ _ADVICE: dict[str, str] = {
     ),
     **dict.fromkeys(("nnm", "freevibration"),
         "Write sl.backbone(system, ...), of free vibrations."),
-    **dict.fromkeys(("montecarlo", "sampling", "ensemble", "ensembleproblem", "parametersweep",
-        "parameterscan", "scan", "uncertainty"), _ARRAYS),
+    **dict.fromkeys(("montecarlo", "sampling", "uncertainty"), f"{_SCATTER} {_ARRAYS}"),
+    **dict.fromkeys(("ensemble", "ensembleproblem", "parametersweep", "parameterscan", "scan"),
+        _ARRAYS),
     **dict.fromkeys(("events", "event", "eventlocation", "odezero", "makezerocrossevent",
         "terminal", "callback", "continuouscallback", "zerocrossing"), _EVENTS),
     **dict.fromkeys(("concat", "merge", "combine", "join", "append"), _MERGE),

@@ -112,9 +112,14 @@ def with_level(system: System, name: str, level: float | str) -> System:
     return _with_guard(extended, sub(formula, parameter(key)), guards, key)
 
 
-def turning_surface(system: System, name: str) -> System:
-    """The system with a surface on which a state or an output turns: its rate is zero, from + to -
-    (direction -1) at a maximum.
+def turning_surfaces(
+    system: System, name: str
+) -> tuple[System, dict[int, tuple[tuple[int, int], ...]]]:
+    """The system with the surfaces on which a state or an output turns: its rate is zero, from + to
+    - (direction -1) at a maximum.
+
+    One that contacts switch, such as the force of a stop, has a surface for each of their sides:
+    its rate jumps where they do, and is zero all the time while the stop is open.
 
     Parameters
     ----------
@@ -126,7 +131,10 @@ def turning_surface(system: System, name: str) -> System:
     Returns
     -------
     System
-        The last guard is the surface; its gap is the rate.
+        The surfaces are its last guards; their gaps are the rates.
+    dict of int to tuple of (int, int)
+        By the number of each surface the contact states to which it belongs, as (mask, bits): those
+        whose mode has these bits within the mask.
 
     Raises
     ------
@@ -136,7 +144,34 @@ def turning_surface(system: System, name: str) -> System:
         If the rate depends on no state, so that it turns at given times.
     """
     formula, guards = formula_of(system, name)
-    return _with_guard(system, rate_of(system, formula), guards, f"{name} turns")
+    bits, title = sorted(bits_in([formula])), f"{name} turns"
+    rates = _rates_by_sides(system, formula, bits) if len(bits) <= MOST_SIDES else {}
+    moving = [rate for rate in rates if depends_on(rate, ("state",))]
+    if not moving or any(depends_on(rate, ("time",)) for rate in rates.keys() - set(moving)):
+        found = _with_guard(system, rate_of(system, formula), guards, title)
+        return found, {len(guards): ((0, 0),)}
+    found, of = replace(system, guards=guards), {}
+    mask = sum(1 << bit for bit in bits)
+    for rate in moving:
+        of[len(found.guards)] = tuple(
+            (mask, sum(1 << bit for bit, up in zip(bits, sides, strict=True) if up))
+            for sides in rates[rate]
+        )
+        found = _with_guard(found, rate, found.guards, title)
+    return found, of
+
+
+def _rates_by_sides(
+    system: System, formula: Expr, bits: Sequence[int]
+) -> dict[Expr, list[tuple[bool, ...]]]:
+    """The rates that a formula has on the sides of some guards, each with the sides on which it is
+    that.
+    """
+    rates: dict[Expr, list[tuple[bool, ...]]] = {}
+    for sides in itertools.product((False, True), repeat=len(bits)):
+        rate = rate_of(system, _on_sides(formula, bits, sides))
+        rates.setdefault(_on_sides(rate, bits, sides), []).append(sides)
+    return rates
 
 
 def with_turning_surfaces(
@@ -172,12 +207,8 @@ def with_turning_surfaces(
         bits = sorted(bits_in([formula]))
         if len(guards) > len(system.guards) or len(bits) > MOST_SIDES:
             continue
-        gaps: dict[Expr, None] = {}
-        for sides in itertools.product((False, True), repeat=len(bits)):
-            rate = rate_of(system, _on_sides(formula, bits, sides))
-            gaps[_on_sides(rate, bits, sides)] = None
         left_out = False
-        for gap in gaps:
+        for gap in _rates_by_sides(system, formula, bits):
             if not depends_on(gap, ("state",)):
                 left_out |= depends_on(gap, ("time",))
                 continue

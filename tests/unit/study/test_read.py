@@ -62,7 +62,7 @@ def test_not_toml(text, parts):
         (
             HEAD,
             "a study asks something: it has a table [simulate], [poincare], [spectrum], "
-            "[impacts], [energy], [sensitivity], [fit], [lyapunov], ",
+            "[impacts], [energy], [sensitivity], [scatter], [fit], [lyapunov], ",
         ),
         (WHOLE.replace("periods", "# "), "[simulate] give the length once"),
         (WHOLE + 't_end = "2 s"', "[simulate] give the length once"),
@@ -126,8 +126,8 @@ def test_schema_tells_editors_the_keys():
     schema = Study.model_json_schema()
     json.dumps(schema)
     assert set(schema["properties"]) == {
-        "study", "system", "method", "simulate", "sensitivity", "fit", "compare", "poincare",
-        "spectrum", "impacts", "energy", "lyapunov",
+        "study", "system", "method", "simulate", "sensitivity", "fit", "scatter", "compare",
+        "poincare", "spectrum", "impacts", "energy", "lyapunov",
         "frequency_response", "bifurcation_diagram", "equilibria", "periodic_orbits", "branches",
         "bifurcation_curve", "backbone", "basins",
     }  # fmt: skip

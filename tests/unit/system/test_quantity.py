@@ -10,7 +10,7 @@ from saltus.language.expression import Bit, Not
 from saltus.language.text import to_text
 from saltus.system.quantity import (
     remembering,
-    turning_surface,
+    turning_surfaces,
     with_integrals,
     with_level,
     with_surface,
@@ -136,8 +136,8 @@ def test_a_level_is_a_parameter():
 
 
 def test_a_state_turns_where_its_rate_is_zero():
-    assert to_text(turning_surface(rig, "x").guards[-1].gap) == "v"
-    assert turning_surface(rig, "v").guards[-1].gap is rig.field[1]
+    assert to_text(turning_surfaces(rig, "x")[0].guards[-1].gap) == "v"
+    assert turning_surfaces(rig, "v")[0].guards[-1].gap is rig.field[1]
 
 
 @pytest.mark.parametrize(
@@ -152,7 +152,7 @@ def test_a_state_turns_where_its_rate_is_zero():
             "the boundary 'surface' doesn't repeat",
         ),
         (lambda: with_level(rig, "x", "0.3 s"), UnitError, "level of x"),
-        (lambda: turning_surface(rig, "y"), ParameterError, "no state 'y'"),
+        (lambda: turning_surfaces(rig, "y"), ParameterError, "no state 'y'"),
     ],
 )
 def test_what_is_no_surface_is_refused(make, error, words):

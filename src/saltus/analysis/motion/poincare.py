@@ -18,6 +18,7 @@ from saltus.analysis.motion.window import Stretch, computed, dataset, stretch
 from saltus.analysis.outcome_messages import warn
 from saltus.contact.guards import equation_of
 from saltus.errors import ParameterError, among, must_be, nearest, shown
+from saltus.flow.contact_table import ContactTable
 from saltus.flow.methods import Method, check_method
 from saltus.flow.request import Outcome, Schedule
 from saltus.kernels import status as st
@@ -25,7 +26,7 @@ from saltus.results.dataset import schema
 from saltus.system import System
 from saltus.system.quantity import (
     acting_guards,
-    turning_surface,
+    turning_surfaces,
     unit_of,
     with_level,
     with_surface,
@@ -35,6 +36,8 @@ from saltus.system.read_off import Quantity
 #: Touches closer than this are one [forcing periods; the span if unforced]: where a gap is flat its
 #: minimum is that uncertain.
 SAME_TOUCH = 1e-9
+#: Every contact state, as (mask, bits).
+EVERYWHERE = ((0, 0),)
 
 
 @verb
@@ -67,7 +70,9 @@ def poincare(
     surface : callable, str or tuple
         A function of (t, states, parameters), zero on the surface: ``lambda x, v: v + 10 * x``; its
         arguments are found by name. Or ``("x", "0.3 mm")``, a level of a state or an output; or
-        ``"x turns"``, its turning points; or the name of a guard of the system.
+        ``"x turns"``, its turning points; or the name of a guard of the system. An output that
+        contacts switch, such as the force of a stop, turns where its rate is zero between them: it
+        doesn't while the stop is open, and its jumps and corners are no turning points.
     direction : {0, 1, -1}
         Keep all crossings, or only those where the function rises (1) or falls (-1).
     periods : int
@@ -143,14 +148,23 @@ def poincare(
 
 @dataclass(frozen=True)
 class Crossed:
-    """The system with the surface among its guards, the number of that guard, the unit of its
-    function, and the surface in words.
+    """The system with the surface among its guards, the numbers of these guards with the contact
+    states in which they are the surface (mask, bits), the unit of its function, and the surface in
+    words.
     """
 
     system: System
-    guard: int
+    guards: Mapping[int, tuple[tuple[int, int], ...]]
     unit: str
     text: str
+
+    def rows(self, table: ContactTable) -> np.ndarray:
+        """True for the rows of a table that are crossings or touches of the surface, bool[c]."""
+        found = np.zeros(len(table), dtype=bool)
+        for number, places in self.guards.items():
+            here = [(table.mode_before & mask) == bits for mask, bits in places]
+            found |= (table.guard == number) & np.any(here, axis=0)
+        return found
 
 
 def crossed(system: System, surface: Any, values: Mapping[str, Any]) -> Crossed:
@@ -176,16 +190,12 @@ def crossed(system: System, surface: Any, values: Mapping[str, Any]) -> Crossed:
     if among(surface, names):
         owner = system.guards[names.index(surface)].state
         number = names.index(surface)
-        return Crossed(
-            system, number, system.units[owner] if owner else "", equation_of(number, system.guards)
-        )
+        unit, text = system.units[owner] if owner else "", equation_of(number, system.guards)
+        return Crossed(system, {number: EVERYWHERE}, unit, text)
     turns = {f"{name} turns": name for name in (*system.states, *system.outputs.names)}
     if among(surface, turns):
-        return _last(
-            turning_surface(system, turns[surface]),
-            schema.rate_unit(unit_of(system, turns[surface])),
-            surface,
-        )
+        found, of = turning_surfaces(system, turns[surface])
+        return Crossed(found, of, schema.rate_unit(unit_of(system, turns[surface])), surface)
     raise ParameterError(
         f"{system.name} has no boundary {shown(surface)}. {nearest(surface, (*names, *turns))} Or "
         f"give a function, or a level such as "
@@ -196,7 +206,7 @@ def crossed(system: System, surface: Any, values: Mapping[str, Any]) -> Crossed:
 def _last(system: System, unit: str, text: str) -> Crossed:
     """The last guard as the surface; without a text its equation describes it."""
     number = len(system.guards) - 1
-    return Crossed(system, number, unit, text or equation_of(number, system.guards))
+    return Crossed(system, {number: EVERYWHERE}, unit, text or equation_of(number, system.guards))
 
 
 def _dataset(
@@ -212,7 +222,7 @@ def _dataset(
     who, guard, time = table.trajectory, table.guard, table.time
     flips = table.changes_side | (table.kind == st.IMPACT)
     late = time > seen.begin[who]
-    ours = late & (guard == crossed.guard)
+    ours = late & crossed.rows(table)
     wanted = ours & flips & ((direction == 0) | (table.direction == direction))
     crossings, rows = table.rows(wanted), who[wanted]
 

@@ -202,6 +202,7 @@ def structure(
             damping = modal_damping(damping, known, count)
         moving = _modal(known.lowest(count), damping)
         words = told.reduced(mass, stiffness, known, kept, count, degrees, loads, unit)
+    words += told.travels(loads.drives, unit)
     angular = known.angular if known is not None else _angular(moving, stiffness)
     told.doubt(angular)
     made, sides = traced(moving, degrees, loads, frequency, unit=unit, name=name, source=source)

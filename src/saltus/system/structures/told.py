@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import SaltusWarning, listed
+from saltus.language.inputs import Record
 from saltus.system.display import STRUCTURE
 from saltus.system.equations_of_motion import EquationsOfMotion
 from saltus.system.structures.parts import Base, direction
@@ -21,6 +22,8 @@ _USUAL = (1e-3, 1e6)
 #: A spring on which the structure vibrates more quickly than its highest mode by this factor is
 #: doubted.
 _STIFF = 1e3
+#: Share of the fastest velocity of a record below which it ends at rest.
+_AT_REST = 0.05
 #: Natural frequencies that the description lists, and modes of which it says what mass they move.
 _TOLD = 6
 #: Share of a flexibility that may be left out where all of it is said to be kept.
@@ -58,6 +61,29 @@ def reduced(
     for label, drive in loads.drives:
         if isinstance(drive, Base):
             words += _moved(label, mass, modes.lowest(count), direction(drive, degrees), inertia)
+    return words
+
+
+def travels(drives: list[tuple[str, Any]], unit: str) -> str:
+    """Sentences on the bases whose records leave them in motion: as a shock does, or a record whose
+    baseline isn't corrected.
+    """
+    words = ""
+    for label, drive in drives:
+        if not isinstance(drive, Base) or not isinstance(drive.amplitude, Record):
+            continue
+        record, times = drive.amplitude, drive.amplitude.table.points
+        ends, middles = record(times), record((times[:-1] + times[1:]) / 2)
+        gains = np.diff(times) * (ends[:-1] + 4 * middles + ends[1:]) / 6  # exact: it is cubic
+        velocity = np.cumsum(gains)
+        last, most = velocity[-1], np.abs(velocity).max()
+        if abs(last) > _AT_REST * most:
+            words += (
+                f" The record of {label} leaves it at {last:.3g} {unit}/s, "
+                f"{100 * abs(last) / most:.3g} % of its fastest: the base travels on, which "
+                f"deflections, relative to it, don't show. If it should come to rest, subtract the "
+                f"record's mean, {last / record.duration:.3g} {unit}/s^2."
+            )
     return words
 
 

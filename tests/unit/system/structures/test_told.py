@@ -120,3 +120,13 @@ def test_long_equations_are_not_shown():
     assert r"\dot" not in made._repr_html_()
     few = sl.structure(np.eye(2), chain[:2, :2], modes=2)
     assert "dq1/dt" in repr(few)
+
+
+@pytest.mark.parametrize(("turns", "told"), [(1.0, False), (0.5, True)])
+def test_a_base_record_that_leaves_the_base_in_motion_is_told(turns, told):
+    """A half sine of 1 m/s^2 and 1 s leaves 2/pi m/s; a whole one nothing."""
+    times = np.linspace(0, 1, 201)
+    record = sl.recorded(times, np.sin(2 * np.pi * turns * times), "m/s^2")
+    made = sl.structure(np.eye(2), np.diag([4e3, 9e3]), base=sl.Base("x1", record))
+    assert ("leaves it at 0.637 m/s, 100 %" in made.description) == told
+    assert ("subtract the record's mean, 0.637 m/s^2" in made.description) == told
