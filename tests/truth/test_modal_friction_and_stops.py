@@ -41,15 +41,15 @@ def test_a_blow_throws_a_body_that_sticks():
     assert float(run.end_u) == pytest.approx(speed, rel=1e-13)
 
 
-def test_friction_along_the_direction_of_a_stop_presses_onto_it():
-    """How both share the force isn't said: friction in motion presses, so the body leaves where the
-    drive pulls with as much, whatever friction holds at rest. Modes leave it to Taylor's method.
+def test_a_body_leaves_a_stop_where_static_friction_along_it_is_overcome():
+    """How both share the force isn't said. While they do the body rests, and it rests on until it
+    is pulled away by more than friction holds. Modes leave it to Taylor's method.
     """
 
     @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
-    def rubbed(t, x, v, *, w=0.7, level=0.3, stick=0.3, gap=0.2):
-        law = sl.impact(x < gap, v, restitution=0.5)
-        return v, sl.cos(w * t) - x - sl.friction(v, slip=level, stick=stick), law
+    def rubbed(t, x, v, *, w=0.7, lag=0.0, level=0.3, stick=0.3, gap=0.2, e=0.5):
+        law = sl.impact(x < gap, v, restitution=e)
+        return v, sl.cos(w * t + lag) - x - sl.friction(v, slip=level, stick=stick), law
 
     @sl.system(states="x v")
     def jointed(t, x, v):
@@ -61,7 +61,29 @@ def test_friction_along_the_direction_of_a_stop_presses_onto_it():
     for stick in (0.3, 0.45):
         system = rubbed.with_values(stick=stick)
         run = sl.simulate(system, (0.2, 0.0), t_end=4.0, method=sl.Modal(), **FOLLOWS)
-        assert times(run, "release")[-1] == pytest.approx(math.acos(-0.1) / 0.7, rel=1e-13)
+        assert times(run, "release")[-1] == pytest.approx(math.acos(0.2 - stick) / 0.7, rel=1e-13)
+    # thrown onto the stop without rebound while friction at rest alone can hold it
+    system, lag = rubbed.with_values(stick=0.45, e=0.0, lag=0.7 * 2.45), 0.7 * 2.45
+    run = sl.simulate(system, (0.1, 5.0), t_end=1.0, **FOLLOWS)
+    assert run.contact_kind.values.tolist() == ["impact", "hold", "release"]
+    known = (math.acos(-0.25) - lag) / 0.7
+    assert times(run, "release")[0] == pytest.approx(known, rel=1e-12)
+
+
+@pytest.mark.nojit
+@pytest.mark.parametrize("method", [sl.Modal(), sl.Taylor()])
+@pytest.mark.parametrize("way", [-1.0, 1.0])
+def test_a_body_at_rest_moves_when_static_friction_is_overcome(method, way):
+    """It is pulled by 1.2 + 0.5 sin t, more than friction in motion; friction at rest holds 1.5."""
+
+    @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
+    def pulled(t, x, v, *, w=1.0, mean=1.2, rise=0.5, slip=1.0, stick=1.5):
+        return v, mean + rise * sl.sin(w * t) - sl.friction(v, slip=slip, stick=stick)
+
+    system = pulled.with_values(mean=1.2 * way, rise=0.5 * way)
+    run = sl.simulate(system, (0.0, 0.0), t_end=1.5, method=method, **FOLLOWS)
+    assert times(run, "release") == pytest.approx([math.asin(0.6)], rel=1e-13)
+    assert float(run.end_x) * way > 0.1
 
 
 # -- beside other solvers --------------------------------------------------------------------------
@@ -145,6 +167,22 @@ def test_random_bodies_rub_and_strike_as_by_taylor(system, seed):
         for name in one.states:
             known = float(taylor[f"end_{name}"])
             assert float(modal[f"end_{name}"]) == pytest.approx(known, abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_random_bodies_begin_at_rest_as_by_taylor(system, seed):
+    """From exact rest, the first body pulled by more than friction in motion, by less than friction
+    at rest holds, to either side.
+    """
+    one, start = drawn(system, np.random.default_rng([SEED, 2, seed]))
+    v, way = one.values, 1 - 2 * (seed % 2)
+    pull = 1.1 * way * v["slip"] - v["force0"] * math.cos(v["lag0"])
+    one = one.with_values(stick=1.2 * v["slip"], belt=0.0, sway=0.0, dead0=pull, e=0.5, f=0.5)
+    modal, taylor = runs(one, 0.0 * start, periods=1)
+    assert str(modal.status.values) == str(taylor.status.values) == "ok"
+    held = 1 << [guard.name for guard in one.guards].index("v0 = belt + sway*cos(w*t) held")
+    assert int(modal.mode.values.ravel()[0]) & int(taylor.mode.values.ravel()[0]) & held
+    assert same_rows(modal, taylor, 2 * math.pi / v["w"]) >= min(40, modal.sizes["contact"])
 
 
 @pytest.mark.parametrize("seed", range(3))

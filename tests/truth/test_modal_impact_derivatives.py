@@ -186,3 +186,38 @@ def test_branches_of_orbits_with_impacts_are_those_of_taylor():
     assert one.sizes["branch"] == other.sizes["branch"]
     assert list(one.event_kind.values) == list(other.event_kind.values)
     np.testing.assert_allclose(other.event_gap.values, one.event_gap.values, rtol=0, atol=1e-9)
+
+
+@sl.system(states="x y z u v w_", forced_at="w", units={"w": "rad/s"})
+def clay(t, x, y, z, u, v, w_, *, w=10.0, a=0.6, b=0.8, f=10.0, g=5.0, h=8.0, lag=0.5, wall=0.02,
+         near=0.02):  # fmt: skip
+    """Three bodies on springs, and two stops without rebound that throw each other."""
+    return (
+        u, v, w_,
+        f * sl.cos(w * t) - 200 * x + 50 * y - 0.3 * u,
+        g * sl.cos(w * t + lag) - 300 * y + 50 * x - 40 * z - 0.3 * v,
+        h * sl.sin(w * t) - 250 * z - 40 * y - 0.3 * w_,
+        sl.impact(a * x + b * y < wall, a * u + b * v, restitution=0.0,
+                  inertia={"u": 1.0, "v": 1.0}),
+        sl.impact(z < y + near, w_ - v, restitution=0.0, inertia={"v": 1.0, "w_": 1.0}),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", [1, 2, 4])
+def test_stops_that_come_to_rest_together_have_the_derivatives_of_the_motion(seed):
+    """Central differences of 1e-6. Both stops rest after blows that cause each other without end,
+    so neither closing velocity changes with the start.
+    """
+    rng = np.random.default_rng([20261127, seed])
+    values = {name: float(rng.uniform(5, 30)) for name in "wfgh"} | {
+        "lag": float(rng.uniform(0, 6))
+    }
+    values |= {name: float(rng.uniform(0.003, 0.04)) for name in ("wall", "near")}
+    one, start = clay.with_values(**values), np.r_[np.zeros(3), rng.normal(0, 0.05, 3)]
+    _, found = Stroboscope(one, sl.Modal()).tangent(start[None], 1)
+    beside = start + 1e-6 * np.vstack([np.eye(6), -np.eye(6)])
+    run = sl.simulate(one, beside, periods=1, samples=2, method=sl.Modal(), progress=False)
+    assert (run.contact_mode_after.values == 0b1110).any()
+    ends = np.array([run[f"end_{name}"].values for name in one.states])
+    known = (ends[:, :6] - ends[:, 6:]) / 2e-6
+    assert np.abs(found[0] - known).max() <= 1e-5 * np.abs(known).max()

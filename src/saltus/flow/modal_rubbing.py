@@ -35,9 +35,12 @@ class Rubbing:
 
     def mode(self, mode: int, zero: np.ndarray) -> int:
         """The contact state (bits) of one in which the frictions at zero have no side: those that
-        both margins hold stick, the others slide to the side on which they have less.
+        both margins hold stick, the others slide to the side on which they have less. All are
+        taken as sticking at first.
         """
         asked = [one for one in self.tables.linear.sticking if zero[one.guard]]
+        for one in asked:
+            mode |= 1 << one.hold | 1 << one.guard
         for _ in range(2 * len(asked)):
             before = mode
             for one in asked:

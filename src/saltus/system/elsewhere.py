@@ -16,10 +16,7 @@ _EVENTS = (
     "otherwise=0), and a run holds them all: run.contact_time. sl.poincare(system, start, surface) "
     "records other crossings."
 )
-_FIT = (
-    "There is none: give scipy.optimize.least_squares a function that calls "
-    "sl.simulate(system.with_values(...), ...)."
-)
+_FIT = 'Write sl.fit(system, measured, {"gap": ("0.1 mm", "1 mm")}, start).'
 _SCATTER = 'Write sl.scatter(system, {"gap": sl.normal("0.4 mm", "0.02 mm")}).'
 _NOISE = (
     "Draw the numbers once, outside the equation: noise = sl.recorded(times, values), and in the "
@@ -27,6 +24,7 @@ _NOISE = (
 )
 _STEPS = "The steps are chosen by the method, such as sl.Taylor() or sl.ODE45(rtol=..., atol=...)."
 _BRANCHES = "Write sl.branches(system, {name: (low, high)})."
+_HARMONICS = f"{_BRANCHES[:-2]}, by=sl.HarmonicBalance(9))."
 _SHAPES = (
     "Write sl.structure(mass, stiffness, ...), or sl.structure_modes(mass, stiffness, modes) for "
     "frequencies and mode shapes."
@@ -40,9 +38,10 @@ _EQUATION = "Write the equation as a function, with @sl.system(states=...) above
 _ADVICE: dict[str, str] = {
     **dict.fromkeys(
         ("continuation", "continue", "arclength", "pseudoarclength", "contclass", "auto", "matcont",
-            "coco", "bifurcationkit", "harmonicbalance", "hb", "hbm"),
+            "coco", "bifurcationkit"),
         _BRANCHES,
     ),
+    **dict.fromkeys(("harmonicbalance", "hb", "hbm", "aft"), _HARMONICS),
     **dict.fromkeys(("nnm", "freevibration"),
         "Write sl.backbone(system, ...), of free vibrations."),
     **dict.fromkeys(("montecarlo", "sampling", "uncertainty"), f"{_SCATTER} {_ARRAYS}"),

@@ -337,7 +337,7 @@ def rest_or_go(i, now, modes, steady, batch, m):
         hold(i, g, now, later, batch, m)
         leave(i, before, batch, m)
         if m.sizes[TANGENTS] != 0:
-            settle_columns(i, g, now, batch, m)
+            settle_held(i, now, batch, m)
 
 
 @inner

@@ -95,6 +95,9 @@ MOST_LANDINGS = 100
 #: Landings at one instant after which impacts that cause each other are completed at once, least
 #: part of the first closing velocity then; the most impacts of it.
 MOST_STRIKES, CLOSED, MOST_IMPACTS = 50, 1.0e-16, 50_000
+#: Part of the largest change at which the derivative has settled on the constraints of all contacts
+#: at rest; rounds at most.
+SETTLED, MOST_SETTLED = 1.0e-13, 1000
 #: Least effect of an impact on another contact, and where a comparison of orders ends, as parts of
 #: its closing velocity; rounding of a restitution.
 FELT, ENDED, PART = 1.0e-9, 1.0e-12, 1.0e-12

@@ -21,7 +21,10 @@ by set, one parameter after the other: derivatives of the rates and of the phase
 then for each guard the derivatives of its constant and of its drives, and these drives.
 """
 
+import math
+
 from saltus.kernels.lanes import any_lane, fma, load, select, splat, store
+from saltus.kernels.status import IMPACT_LAW
 
 #: |lambda_j - lambda_k| h, squared, below which D_jk is a series: of terms (x/2 .. x^11/12!).
 CLOSE, CLOSE_TERMS = 0.0625, 12
@@ -279,23 +282,40 @@ def strike_columns(i, g, tau, batch, m):
 
 
 @kernel
+def settle_held(i, tau, batch, m):
+    """Bring the derivative onto the constraints of all contacts at rest, where one begins to be
+    held. What one of them takes off changes the velocities of others: all are asked in turn, until
+    nothing changes. Needs `angle`.
+    """
+    first, change, rounds = 0.0, math.inf, 0
+    while change > SETTLED * first and rounds < MOST_SETTLED:
+        change, rounds = 0.0, rounds + 1
+        for g in range(m.sizes[GUARDS]):
+            stops = m.laws[g, KIND] == IMPACT_LAW
+            if stops and (batch.mode[i] >> m.laws[g, PARTNER]) & 1 == 1:
+                change = max(change, settle_columns(i, g, tau, batch, m))
+        first = max(first, change)
+
+
+@inner
 def settle_columns(i, g, tau, batch, m):
-    """Bring the derivative onto the constraint of a contact that begins to be held: its closing
-    velocity and its gap don't change. See codegen/saltation.py. Needs `angle`.
+    """Bring the derivative onto the constraint of a contact at rest: its closing velocity and its
+    gap don't change. See codegen/saltation.py. Returns the largest change of a closing velocity.
     """
     row, width, square = law_row(i, g, batch, m), width_of(m), 0.0
     for r in range(m.sizes[STATES]):
         square += m.acts[row, r] * m.acts[row, r]
-    project_columns(i, tau, row, width, 2 * width, 1.0, batch, m)
+    change = project_columns(i, tau, row, width, 2 * width, 1.0, batch, m)
     project_columns(i, tau, row, 0, 0, 1.0 / square, batch, m)
+    return change
 
 
 @kernel
 def project_columns(i, tau, row, over, along, factor, batch, m):
     """Take a part off the derivative, by columns of `acts`: what it does to the function that
-    stands in some of them, times a factor, along others.
+    stands in some of them, times a factor, along others. Returns the largest of these parts.
     """
-    states, columns = m.sizes[STATES], m.sizes[TANGENTS]
+    states, columns, largest = m.sizes[STATES], m.sizes[TANGENTS], 0.0
     for c in range(columns):
         total = 0.0
         for r in range(states):
@@ -305,8 +325,10 @@ def project_columns(i, tau, row, over, along, factor, batch, m):
                 lead = lead_of(i, c, d, tau, batch, m) * m.angle[d, 2]
                 total -= m.acts[row, over + states + 1 + d] * lead
         total *= factor
+        largest = max(largest, abs(total))
         for r in range(states):
             batch.state[i, states + columns * r + c] -= total * m.acts[row, along + r]
+    return largest
 
 
 @kernel

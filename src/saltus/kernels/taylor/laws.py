@@ -166,6 +166,7 @@ def strike(lanes, lane, batch, g, rate, slow):
         loosen(lanes, lane, batch, g, closing, slow)
     if LAW[g] == JUMP_LAW:
         after_jump(lanes, lane, batch, g, slow)
+        stick_at_once(lanes, lane, batch, slow)
         return
     face(lanes, lane, batch, g, slow)
     pressing, rebound = slow.gaps[NGUARDS + g], restitution * max(closing, 0.0)
@@ -182,6 +183,7 @@ def strike(lanes, lane, batch, g, rate, slow):
     elif rebound <= 0.0:
         lanes.fresh[g, lane] = 2.0  # it leaves at once: gap and rate are known to be zero
         ask_for_paradox(lanes, lane, g, slow)
+        stick_at_once(lanes, lane, batch, slow)
 
 
 @kernel
@@ -358,6 +360,61 @@ def caught(lanes, lane, batch, g, slow):
 
 
 @inner
+def may_stick(lanes, lane, g, slow):
+    """True if a lane stands on a surface whose force leads back to it. Needs slow.gaps."""
+    free = LAW[g] == SURFACE_LAW and lanes.side[WATCHED + g, lane] > 0.5
+    stands = slow.gaps[g] == 0.0 or stands_at(lanes, lane, g, slow)
+    return free and stands and slow.gaps[2 * NGUARDS + g] < 0.0
+
+
+@inner
+def set_held(lanes, lane, which, side):
+    """Give the hold guards of some surfaces (bits) a side."""
+    for g in range(NGUARDS):
+        if (which >> g) & 1:
+            lanes.side[PARTNER[g], lane] = side
+    watch(lanes, lane)
+
+
+@kernel
+def stick_at_once(lanes, lane, batch, slow):
+    """Hold what static friction holds where a lane stands on surfaces: friction in motion may be
+    too weak to lead back to them. At first all are held, without those that follow from others;
+    then each is asked again and again whether its limit holds it beside the others.
+    """
+    gaps_here(lanes, lane, batch, slow)
+    static, held = False, 0
+    for g in range(NGUARDS):
+        if may_stick(lanes, lane, g, slow):
+            needed, most = slow.gaps[NGUARDS + g] ** 2, slow.gaps[2 * NGUARDS + g] ** 2
+            static = static or slow.gaps[PARTNER[g]] + needed > (1.0 + SLOW_START) * most
+    for g in range(NGUARDS if static else 0):
+        set_held(lanes, lane, held, -1.0)
+        gaps_here(lanes, lane, batch, slow)
+        alone = slow.gaps[2 * NGUARDS + g]
+        set_held(lanes, lane, held, 1.0)
+        gaps_here(lanes, lane, batch, slow)
+        if may_stick(lanes, lane, g, slow) and slow.gaps[2 * NGUARDS + g] < SLOW_START * alone:
+            held |= 1 << g
+            set_held(lanes, lane, held, 1.0)
+    asked, before, rounds = held, -1, 0
+    while held != before and rounds < 2 * NGUARDS:
+        before, rounds = held, rounds + 1
+        for g in range(NGUARDS):
+            if (asked >> g) & 1:
+                gaps_here(lanes, lane, batch, slow)
+                holds = slow.gaps[PARTNER[g]] > 0.0
+                held = held | (1 << g) if holds else held & ~(1 << g)
+                set_held(lanes, lane, 1 << g, 1.0 if holds else -1.0)
+                if not holds:
+                    lanes.side[g, lane] = 1.0 if slow.gaps[NGUARDS + g] > 0.0 else -1.0
+    set_held(lanes, lane, held, -1.0)
+    for g in range(NGUARDS):
+        if (held >> g) & 1:
+            hold(lanes, lane, batch, g, 0.0, AT_REST, slow)
+
+
+@inner
 def holds_any(lanes, lane):
     """True if a contact of a lane is held."""
     held = False
@@ -403,10 +460,10 @@ def strays(lanes, lane, batch, slow):
 @kernel
 def hold(lanes, lane, batch, g, later, known, slow):
     """Begin to hold a contact: state and tangent go onto its constraint, at most `later` [s] after
-    now. Of the margin to its release so many zeros are known.
+    now. Of the margin to its release so many zeros are known; AT_REST says that it was at rest.
     """
     who, before, h = lanes.memo[lane, WHO], mode_of(lanes, lane), PARTNER[g]
-    lanes.side[h, lane], lanes.fresh[h, lane] = 1.0, known
+    lanes.side[h, lane], lanes.fresh[h, lane] = 1.0, max(known, 0.0)
     if known > 0.0:
         lanes.prior[PRIOR_ROWS * h + NEW, lane] = 0.0
     watch(lanes, lane)
@@ -420,6 +477,8 @@ def hold(lanes, lane, batch, g, later, known, slow):
     now = time_of_law(lanes, lane, batch)
     mode = mode_of(lanes, lane) & ~(1 << h)
     settle(now, slow.state, batch.param[who * batch.stride], slow.held, mode, g)
+    if TANGENT and LAW[g] == IMPACT_LAW:
+        settle_held(lanes, lane, batch, now, slow)
     for i in range(NSTATES):
         lanes.y[i, lane] = slow.state[i]
     if LAW[g] == IMPACT_LAW:
@@ -428,6 +487,29 @@ def hold(lanes, lane, batch, g, later, known, slow):
     if LAW[g] == IMPACT_LAW:
         gaps_here(lanes, lane, batch, slow)
         ask_for_paradox(lanes, lane, g, slow)
+
+
+@kernel
+def settle_held(lanes, lane, batch, now, slow):
+    """Bring the tangent in slow.state onto the constraints of all stops at rest, where one begins
+    to be held. What one of them takes off changes the velocities of others: all are asked in turn,
+    until nothing changes.
+    """
+    held, mode = 0, mode_of(lanes, lane)
+    for g in range(NGUARDS):
+        held += LAW[g] == IMPACT_LAW and lanes.side[PARTNER[g], lane] > 0.0
+    first, change, rounds = 0.0, math.inf, 0
+    while held > 1 and change > SETTLED * first and rounds < MOST_SETTLED:
+        for i in range(NSTATES):
+            lanes.probe_y[i, lane] = slow.state[i]
+        change, rounds = 0.0, rounds + 1
+        for g in range(NGUARDS):
+            if LAW[g] == IMPACT_LAW and lanes.side[PARTNER[g], lane] > 0.0:
+                p = batch.param[lanes.memo[lane, WHO] * batch.stride]
+                settle(now, slow.state, p, slow.held, mode & ~(1 << PARTNER[g]), g)
+        for i in range(NMOVED, NSTATES):
+            change += abs(slow.state[i] - lanes.probe_y[i, lane])
+        first = max(first, change)
 
 
 # -- friction of contacts --------------------------------------------------------------------------
@@ -557,3 +639,5 @@ def release(lanes, lane, batch, h, slow):
     for i in range(NSTATES):
         slow.state[i] = lanes.y[i, lane]
     note(lanes, lane, batch, h, RELEASE, -1, 0.0, before, 0.0, slow)
+    if LAW[g] == IMPACT_LAW:
+        stick_at_once(lanes, lane, batch, slow)

@@ -109,6 +109,9 @@ SLOW_START = 1.0e-9
 #: Part of the first closing velocity at which successive impacts of one instant have ended for
 #: good; landings at one instant after which the rest is taken at once.
 CLOSED, MOST_STRIKES = 1.0e-16, 50
+#: Part of the largest change at which the tangent has settled on the constraints of all stops at
+#: rest; rounds at most.
+SETTLED, MOST_SETTLED = 1.0e-13, 1000
 #: Duration of a flight that the clock can't resolve, over the time.
 SHORTEST_FLIGHT = 2.0e-16
 #: Places of `slow.out` where a jump finds DATED and DATES (codegen/saltation.py).
@@ -133,6 +136,8 @@ KEPT = 2.0**-30
 #: Value of `fresh` for a ridden boundary, if contacts have laws: one zero is known, and a motion
 #: that leaves it does so at once.
 RIDDEN = 1.25
+#: Said of the margin of a surface that begins to be held where it was at rest: nothing jumps.
+AT_REST = -1.0
 #: Side of a guard on whose boundary the state is known to be, as `gaps` gets it.
 KNOWN = 2.0
 #: Rounds of flips at one instant before the contact is given up as sliding (EVENTS.md, rule 6).

@@ -71,6 +71,7 @@ def end_impacts(lanes, lane, batch, hits, slow):
         g = look % NGUARDS
         if (stops >> g) & 1 and lanes.side[PARTNER[g], lane] < 0.0:
             rest_or_leave(lanes, lane, batch, g, FELT * fastest, slow)
+    stick_at_once(lanes, lane, batch, slow)
     return True
 
 

@@ -263,6 +263,8 @@ def start_sides(lanes, lane, batch, slow):
                 ask_for_paradox(lanes, lane, g, slow)
     lanes.run[STARTING, lane] = 1.0
     lanes.run[LANDED, lane] = lanes.clock[TAU, lane] + lanes.clock[BASE, lane]
+    if LAWS:
+        stick_at_once(lanes, lane, batch, slow)
 
 
 @kernel
