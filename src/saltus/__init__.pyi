@@ -10,6 +10,7 @@ from saltus.analysis.basins.compare import compare as compare
 from saltus.analysis.branches.backbone import backbone as backbone
 from saltus.analysis.branches.bifurcation_curve import bifurcation_curve as bifurcation_curve
 from saltus.analysis.branches.branches import branches as branches
+from saltus.analysis.branches.event_sensitivity import event_sensitivity as event_sensitivity
 from saltus.analysis.closed.equilibria import equilibria as equilibria
 from saltus.analysis.closed.periodic_orbits import periodic_orbits as periodic_orbits
 from saltus.analysis.derivatives.sensitivity import sensitivity as sensitivity

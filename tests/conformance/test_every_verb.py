@@ -97,6 +97,7 @@ CALLS = {
         RIG,
         {"event": the_fold(), "vary": {"frequency": FOLD[how], "force": FORCE[how]}, "points": 4},
     ),
+    "event_sensitivity": lambda _: (RIG, {"event": the_fold(), "to": ["force"]}),
     "branches": lambda how: (
         RIG,
         {"vary": {"frequency": BRANCH[how]}, "start": START[how], "at": 1, "longest": 1},

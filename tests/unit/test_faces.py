@@ -16,14 +16,14 @@ LARGER = {
     "kernels": (55, "codes of what happened, columns of the tables that kernels fill"),
     "flow": (60, "maps, requests, series of a motion, threads, progress"),
     "analysis.closed": (35, "closed motions, their measures, cycles and equilibria"),
-    "analysis.inputs": (35, "types of arguments, and the readers of each"),
+    "analysis.inputs": (40, "types of arguments, the readers of each, the orbits of a result"),
     "language": (30, "expressions and what is made of them"),
 }
 #: Rooms whose inner files some others may know: pyproject.toml, contracts of type "protected".
 KNOWN_TO = {
     "language": {"contact", "system", "codegen"},
     "contact": {"system", "codegen"},
-    "analysis.solve": {"analysis.closed", "analysis.branches"},
+    "analysis.solve": {"analysis.closed", "analysis.derivatives", "analysis.branches"},
 }
 
 

@@ -141,7 +141,7 @@ def bifurcation_curve(
     names, limits = _ranges(system, vary)
     most = min(POINTS, POINTS * FEW_STATES // len(system.states))
     points = most if points is None else whole(points, "points", 2)
-    start = _start(system, event)
+    start = event_orbit(system, event)
     for name, (low, high) in zip(names, limits, strict=True):
         if not low <= start.system.values[name] <= high:
             raise ParameterError(
@@ -150,8 +150,8 @@ def bifurcation_curve(
                 lambda say: f"{say.key('vary')}.",
             )
     with reporting(progress) as show:
-        orbits, z = _orbits(start, names, limits, method, threads)
-        equations, z = _equations(start, orbits, z)
+        orbits, z = orbits_over(start, names, limits, method, threads)
+        equations, z = equations_at(start, orbits, z)
         curve = trace_curve(equations, z, limits, points, stage(show, 0.0, TRACED))
         if curve is None:
             raise ParameterError(
@@ -168,7 +168,7 @@ def bifurcation_curve(
 
 
 @dataclass(frozen=True)
-class _Start:
+class EventOrbit:
     """The orbit of an event, the system with its values, and how far the states of orbits spread
     along its branch; the guard that is grazed, -1 if none is, and when.
     """
@@ -198,12 +198,12 @@ def _ranges(system: System, vary: Any) -> tuple[tuple[str, str], list[tuple[floa
     return (one, two), [range_of(system, name, ends) for name, ends in vary.items()]
 
 
-def _start(system: System, event: Any) -> _Start:
+def event_orbit(system: System, event: Any) -> EventOrbit:
     """The event, checked."""
     if not isinstance(event, xr.Dataset) or schema.kind_of(event) != schema.BRANCHES:
         raise ParameterError(
-            "sl.bifurcation_curve begins at an event of what sl.branches returned: "
-            f"branches.sel(event=0), not {shown(event)[:60]}."
+            "event must be one of what sl.branches returned: branches.sel(event=0), not "
+            f"{shown(event)[:60]}."
         )
     if "event" in event.dims:
         if event.sizes["event"] != 1:
@@ -237,14 +237,14 @@ def _start(system: System, event: Any) -> _Start:
     along = [event[point_name(state)].values[mine] for state in system.states]
     spread = np.array([np.nanmax(one) - np.nanmin(one) for one in along])
     orbit = orbit[np.isfinite(orbit).all(axis=1)]
-    return _Start(
+    return EventOrbit(
         system.with_values(**values), kind, orbit, period, multiplier, spread, guard,
         float(event["event_phase"]),
     )  # fmt: skip
 
 
-def _orbits(
-    start: _Start,
+def orbits_over(
+    start: EventOrbit,
     names: tuple[str, str],
     limits: list[tuple[float, float]],
     method: Method,
@@ -264,8 +264,8 @@ def _orbits(
     return bare, z
 
 
-def _equations(
-    start: _Start, orbits: PeriodicOrbits, z: np.ndarray
+def equations_at(
+    start: EventOrbit, orbits: PeriodicOrbits, z: np.ndarray
 ) -> tuple[Equations, np.ndarray]:
     """The equations of the bifurcation, and their unknowns."""
     if start.kind != "graze":
@@ -285,7 +285,7 @@ def _equations(
 
 
 def _table(
-    start: _Start,
+    start: EventOrbit,
     names: tuple[str, str],
     limits: list[tuple[float, float]],
     orbits: PeriodicOrbits,

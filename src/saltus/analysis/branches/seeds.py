@@ -13,6 +13,7 @@ from saltus.analysis.branches.switching import Seed
 from saltus.analysis.closed.all_equilibria import all_equilibria
 from saltus.analysis.closed.cycles import ZERO, units
 from saltus.analysis.closed.measures import measure
+from saltus.analysis.inputs.orbits import NAMES, PREFIX, check_equations
 from saltus.errors import ParameterError, shown
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
@@ -25,17 +26,6 @@ RESTING_VALUES = 3
 RESTING_STARTS = 64
 #: An equilibrium so near to zero is there, in units of the starts.
 NOTHING = 1e-8
-#: Names of what a Dataset knows of its orbits: points, period, limit cycles' time.
-_PREFIX = {
-    schema.RESPONSES: "response", schema.ATTRACTORS: "attractor", schema.BASINS: "attractor",
-    schema.ORBITS: "orbit",
-}  # fmt: skip
-#: Names of the variables that hold their points.
-_POINTS = {
-    "response": schema.response_name,
-    "attractor": schema.attractor_name,
-    "orbit": schema.orbit_name,
-}
 
 
 def seeds_of(system: System, name: str, found: xr.Dataset) -> list[Seed]:
@@ -49,19 +39,15 @@ def seeds_of(system: System, name: str, found: xr.Dataset) -> list[Seed]:
     kind = schema.kind_of(found)
     if kind == schema.EQUILIBRIA:
         return []
-    if kind not in _PREFIX:
+    if kind not in PREFIX:
         raise ParameterError(
             "start= takes what sl.frequency_response, sl.bifurcation_diagram, sl.attractors, "
             f"sl.basins or sl.periodic_orbits returned, or starts, not {shown(found)[:60]}."
         )
-    if found.attrs.get("fingerprint") != system.fingerprint():
-        raise ParameterError(
-            f"start= holds orbits of {found.attrs.get('system')}, whose equations are others than "
-            f"those of {system.name}."
-        )
-    prefix = _PREFIX[kind]
+    check_equations(system, found)
+    prefix = PREFIX[kind]
     values = _values(system, name, found, prefix, kind)
-    points = np.stack([found[_POINTS[prefix](state)].values for state in system.states], axis=2)
+    points = np.stack([found[NAMES[prefix](state)].values for state in system.states], axis=2)
     times = found.get(f"{prefix}_cycle")
     cycles = np.full(len(values), np.nan) if times is None else times.values
     periods = np.where(cycles > 0, 1, found[f"{prefix}_period"].values)
@@ -101,8 +87,8 @@ def equilibrium_seeds(system: System, name: str, found: xr.Dataset) -> list[Seed
         prefix = "equilibrium"
         resting = (found["equilibrium_place"] == "region") & (found["equilibrium_dimension"] == 0)
     else:
-        prefix = _PREFIX[kind]
-        names = _POINTS[prefix]
+        prefix = PREFIX[kind]
+        names = NAMES[prefix]
         if f"{prefix}_type" not in found:
             return []
         resting = found[f"{prefix}_type"] == "equilibrium"

@@ -39,7 +39,7 @@ class SingularOrbits:
     """
 
     def __init__(self, orbits: PeriodicOrbits, kind: str) -> None:
-        self.orbits, self.kind = orbits, kind
+        self.orbits, self.kind, self.beside = orbits, kind, BESIDE
         self.multiplier = MULTIPLIER[kind]
         one = np.ones((len(orbits.scale), 1))
         self.scale = orbits.scale if self.torus is False else np.append(orbits.scale, one, axis=1)
@@ -178,7 +178,7 @@ class SingularOrbits:
         of the scale, float64[r, m, z].
         """
         size = np.linalg.norm(along, axis=1)
-        share = BESIDE / np.where(size > 0, size, 1.0)
+        share = self.beside / np.where(size > 0, size, 1.0)
         step = np.zeros_like(z)
         step[:, : along.shape[1]] = (
             share[:, None] * along * self.orbits.scale[rows][:, : along.shape[1]]

@@ -1,4 +1,6 @@
-"""`sensitivity`: derivatives of a motion with respect to parameters, through its contacts."""
+"""`sensitivity`: derivatives of a motion, or of a periodic orbit, with respect to parameters,
+through its contacts.
+"""
 
 from __future__ import annotations
 
@@ -13,8 +15,15 @@ import xarray as xr
 
 from saltus.analysis import dataset_parts
 from saltus.analysis.derivatives.carried import HELD, CarriedDerivatives, Places
+from saltus.analysis.derivatives.closed_orbits import (
+    ClosedOrbits,
+    check_orbits,
+    closed_orbits,
+    warn_of_orbits,
+)
 from saltus.analysis.derivatives.readings import Readings, slope_of
 from saltus.analysis.inputs.given import Starts, Values
+from saltus.analysis.inputs.orbits import given_orbits
 from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.inputs.spans import Span, span
 from saltus.analysis.inputs.starts import Ensemble, check_system, ensemble
@@ -55,7 +64,7 @@ LEAVES = 1e-9
 @verb
 def sensitivity(
     system: System,
-    start: Starts | None = None,
+    start: xr.Dataset | Starts | None = None,
     periods: int | None = None,
     t_end: float | str | None = None,
     *,
@@ -71,7 +80,8 @@ def sensitivity(
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
 ) -> xr.Dataset:
-    """Derivatives of a motion, its contact times and its largest values with respect to parameters.
+    """Derivatives of a motion, its contact times and its largest values with respect to parameters;
+    of a periodic orbit those of its multipliers too.
 
     The flow carries the derivatives along, across contacts by the saltation matrix: they are exact
     but for rounding, as differences of two runs aren't. They hold for changes so small that the
@@ -80,10 +90,22 @@ def sensitivity(
     with contact is infinite. In a chaotic motion the range shrinks with the time: a warning says
     from when on it is below a millionth.
 
+    A periodic orbit, stable or not, moves as a whole: dx/dp = (1 - dP/dx)^-1 dP/dp of the map P
+    over its period. At a fold these are infinite, on the side with contact of a graze of a rigid
+    stop too; a warning says so. Derivatives of multipliers are differences of fourth order of
+    multipliers from the exact tangent map, along the orbit as it moves. NaN or large numbers are
+    those of multipliers that coincide.
+
     Parameters
     ----------
-    system, start, periods, t_end, t_start, samples, at, keep, values, method, threads, progress
+    system, periods, t_end, t_start, samples, at, keep, values, method, threads, progress
         As for :func:`saltus.simulate`.
+    start : Dataset, or starts
+        Starts as for :func:`saltus.simulate`; or what :func:`saltus.periodic_orbits`,
+        :func:`saltus.attractors`, :func:`saltus.frequency_response` or :func:`saltus.branches`
+        returned: periodic orbits of one period, such as ``orbits.sel(orbit=0)``, with their values
+        of the parameters. They are followed over one period from t = 0 on. Limit cycles one at a
+        time.
     to : str or sequence of str
         Parameters, and states at the start as ``"x(0)"``: what the derivatives are with respect to.
     outputs : mapping of str to callable, or to (callable, unit)
@@ -102,7 +124,11 @@ def sensitivity(
         ``contact_time`` and ``contact_time_derivative``, NaN where the time isn't that of a gap's
         zero (release, the end of a chatter) or the motion stays on the boundary; ``maximum``,
         ``maximum_time``, ``maximum_derivative``, ``minimum`` likewise, of what is kept;
-        ``end_derivative``; ``status``. Units in ``output_units``, ``to_units``.
+        ``end_derivative``; ``status``. Units in ``output_units``, ``to_units``. Of periodic orbits
+        also ``period``, ``period_derivative``, and over the dim ``multiplier``
+        ``multiplier_real``, ``multiplier_imag``, ``multiplier_real_derivative`` and
+        ``multiplier_imag_derivative`` (of a limit cycle without the trivial one). The times of a
+        limit cycle count from its first point, which moves across the flow.
 
     Raises
     ------
@@ -131,7 +157,12 @@ def sensitivity(
     asked = Columns.of(system, to)
     if outputs is not None:
         system = replace(system, outputs=with_more(system, outputs))
-    group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
+    orbits = isinstance(start, xr.Dataset)
+    if isinstance(start, xr.Dataset):
+        check_orbits(asked.names, asked.parameters, periods, t_end, t_start, values)
+        group, around = given_orbits(system, start)
+    else:
+        group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
     times = None if at is None else times_of(system, group.size, at)
     if times is not None and samples is not None:
         raise ParameterError(
@@ -139,28 +170,34 @@ def sensitivity(
         )
     if times is not None and periods is None and t_end is None:
         t_end = last_of(times, t_start)
-    length = span(system, group, periods, t_end, t_start)
+    length = around if orbits else span(system, group, periods, t_end, t_start)
     turning = _turning(system, method) if extremes else _Turning(system, {}, [])
     flow = CarriedDerivatives(turning.system, method, asked.parameters)
-    plan = (
-        planned(system, group, length, samples, keep, 2 * len(flow.flown.states))
-        if times is None
-        else at_times(length, first_kept(system, length, keep), times)
-    )
-    request = flow.request(group, length, plan)
-    run = _Run(
-        system=system, flow=flow, group=group, method=method, length=length, plan=plan,
-        turning=turning,
-    )  # fmt: skip
-    answer = partial(_dataset, run, asked)
     with reporting(progress) as show:
+        fly = partial(engine.run, flow.flown, method.suited_to(group.size))
+        closed = None
+        if orbits:
+            closed = closed_orbits(flow, group, length, lambda one: fly(one, threads))
+            group, length = closed.group, closed.length
+        plan = (
+            planned(system, group, length, samples, keep, 2 * len(flow.flown.states))
+            if times is None
+            else at_times(length, first_kept(system, length, keep), times)
+        )
+        run = _Run(
+            system=system, flow=flow, group=group, method=method, length=length, plan=plan,
+            turning=turning, asked=asked, closed=closed,
+        )  # fmt: skip
+        answer = partial(_dataset, run)
         try:
-            outcome = engine.run(flow.flown, method.suited_to(group.size), request, threads, show)
-            result = answer(outcome)
+            result = answer(fly(flow.request(group, length, plan), threads, show))
         except engine.RunInterrupted as stop:
             raise stop.then(answer) from None
     warn(result, length, system)
-    _warn_of_chaos(result)
+    if closed is None:
+        _warn_of_chaos(result)
+    else:
+        warn_of_orbits(system, result, closed)
     return result
 
 
@@ -282,6 +319,17 @@ class _Run(Readings):
     length: Span
     plan: SampleTimes
     turning: _Turning
+    asked: Columns
+    closed: ClosedOrbits | None
+
+    def chosen(self, slopes: np.ndarray, who: np.ndarray) -> np.ndarray:
+        """The derivatives that were asked for, float64[m, ..., to], of all columns float64[m, ...,
+        C] at places of trajectories int64[m].
+        """
+        if self.closed is None:
+            return slopes[..., self.asked.places]
+        weights = self.closed.weights[who]
+        return np.asarray(np.einsum("m...c,mct->m...t", slopes, weights))
 
     def again(self, request: Request) -> Outcome:
         """The outcome of another request of the flow."""
@@ -321,9 +369,10 @@ class _Run(Readings):
         return moved
 
 
-def _dataset(run: _Run, asked: Columns, outcome: Outcome) -> xr.Dataset:
+def _dataset(run: _Run, outcome: Outcome) -> xr.Dataset:
     """The Dataset of a run."""
     system, group, length, turning = run.system, run.group, run.length, run.turning
+    asked = run.asked
     n, forced = group.size, system.forced_at is not None
     unit = length.period if run.flow.timed else np.ones(n)
     time, _ = run.plan.of_result(outcome, length, forced)
@@ -331,9 +380,9 @@ def _dataset(run: _Run, asked: Columns, outcome: Outcome) -> xr.Dataset:
     count = time.shape[-1]
     own = np.broadcast_to(time, (n, count))
     at = run.flow.samples(outcome, group, length, own, kept)
-    outputs, columns = outputs_of(system), asked.places
+    outputs = outputs_of(system)
     value = run.values(at).reshape(n, count, -1)
-    slope = run.slopes(at).reshape(n, count, len(outputs), -1)
+    slope = run.chosen(run.slopes(at), at.trajectory).reshape(n, count, len(outputs), -1)
     table = outcome.contacts
     touch = run.flow.contacts(outcome, group, length, run.again)
     speed = table.velocity / unit[table.trajectory]
@@ -361,15 +410,16 @@ def _dataset(run: _Run, asked: Columns, outcome: Outcome) -> xr.Dataset:
             "output": list(outputs.names),
             "output_units": list(outputs.units),
             "value": value,
-            "derivative": slope[..., columns],
+            "derivative": slope,
             "contact_time": touch.time[mine],
-            "contact_time_derivative": moved[mine][:, columns],
+            "contact_time_derivative": run.chosen(moved, touch.trajectory)[mine],
             "contact_guard": names[table.guard[mine]],
             "contact_kind": table.kind_name[mine],
             "contact_velocity": speed[mine],
             "contact_trajectory": table.trajectory[mine],
-            **(_extremes(run, outcome, touch, moved, at, end, columns) if turning.known else {}),
-            "end_derivative": run.slopes(end)[..., columns],
+            **(_extremes(run, outcome, touch, moved, at, end) if turning.known else {}),
+            "end_derivative": run.chosen(run.slopes(end), end.trajectory),
+            **(_of_orbits(run.closed, end) if run.closed is not None else {}),
             **dataset_parts.endings(outcome, COUNTED),
             "end_time": end.time,
             "end_<state>": run.values(end),
@@ -378,9 +428,21 @@ def _dataset(run: _Run, asked: Columns, outcome: Outcome) -> xr.Dataset:
     )
 
 
+def _of_orbits(closed: ClosedOrbits, end: Places) -> dict[str, np.ndarray]:
+    """The variables that only periodic orbits have."""
+    own, slope = closed.multipliers, closed.multiplier_slope
+    return {
+        "period": end.time,
+        "period_derivative": closed.period_slope,
+        "multiplier_real": own.real,
+        "multiplier_imag": own.imag,
+        "multiplier_real_derivative": slope.real,
+        "multiplier_imag_derivative": slope.imag,
+    }
+
+
 def _extremes(
-    run: _Run, outcome: Outcome, touch: Places, moved: np.ndarray, samples: Places, end: Places,
-    columns: list[int],
+    run: _Run, outcome: Outcome, touch: Places, moved: np.ndarray, samples: Places, end: Places
 ) -> dict[str, np.ndarray]:  # fmt: skip
     """The largest and smallest values of each output, when, and their derivatives: where it turns,
     at a contact, at the first sample that is kept or at the end.
@@ -395,13 +457,14 @@ def _extremes(
     slope = np.concatenate([run.slopes(*part) for part in parts])
     time = np.concatenate([at.time for at, _, _ in parts])
     who = np.concatenate([at.trajectory for at, _, _ in parts])
+    slope = run.chosen(slope, who)
     of = np.full(len(time), -1)
     of[: 2 * len(guard)] = np.tile([run.turning.of.get(int(one), -1) for one in guard], 2)
     width = value.shape[1]
     found = {
         f"{word}{part}": np.full((n, width, *more), np.nan)
         for word in ("maximum", "minimum")
-        for part, more in (("", ()), ("_time", ()), ("_derivative", (len(columns),)))
+        for part, more in (("", ()), ("_time", ()), ("_derivative", slope.shape[2:]))
     }
     for i in range(n):
         mine = np.flatnonzero(who == i)
@@ -414,7 +477,7 @@ def _extremes(
                 place = here[choose(value[here, k])]
                 found[word][i, k] = value[place, k]
                 found[f"{word}_time"][i, k] = time[place]
-                found[f"{word}_derivative"][i, k] = slope[place, k, columns]
+                found[f"{word}_derivative"][i, k] = slope[place, k]
     return found
 
 

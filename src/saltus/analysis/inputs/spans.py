@@ -31,6 +31,11 @@ class Span:
     phase: np.ndarray
     t_end: float = math.inf
 
+    @classmethod
+    def of_cycles(cls, time: np.ndarray) -> Span:
+        """A period of limit cycles, float64[n] [s]."""
+        return cls(0.0, time, np.ones(len(time), np.int64), np.zeros(len(time)))
+
     def request(
         self, start: np.ndarray, parameters: np.ndarray, schedule: Schedule, record_from: int | None
     ) -> Request:

@@ -64,6 +64,12 @@ class Ensemble:
         """Number of trajectories."""
         return len(self.start)
 
+    @classmethod
+    def of(cls, start: np.ndarray, columns: Mapping[str, np.ndarray], batch: bool) -> Ensemble:
+        """Trajectories from starts float64[n, D], with values float64[n] of all parameters."""
+        varied = {name: column for name, column in columns.items() if np.ptp(column) > 0}
+        return cls(start, np.stack([*columns.values()], axis=1), varied, batch)
+
 
 def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> Ensemble:
     """Starts and values of all trajectories, broadcast against each other.

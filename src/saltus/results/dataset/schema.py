@@ -28,12 +28,12 @@ VERSION = 1
 NAMES = (
     TRAJECTORY, STROBOSCOPE, BASINS, ATTRACTORS, AGREEMENT, RESPONSES, METHODS, SECTION, SPECTRUM,
     IMPACTS, ENERGY, EXPONENTS, SETTLED, WIDTHS, MODES, ORBITS, EQUILIBRIA, BRANCHES, CURVE,
-    BACKBONE, SENSITIVITY, FIT, SCATTER,
+    BACKBONE, SENSITIVITY, FIT, SCATTER, EVENT_SENSITIVITY,
 ) = (
     "trajectory", "stroboscope", "basins", "attractors", "agreement", "responses", "methods",
     "section", "spectrum", "impacts", "energy", "exponents", "settled", "widths", "modes", "orbits",
     "equilibria", "branches", "bifurcation_curve", "backbone", "sensitivity", "fit",
-    "scatter",
+    "scatter", "event_sensitivity",
 )  # fmt: skip
 
 

@@ -1,4 +1,6 @@
-"""Result of ``sensitivity``: motions and their derivatives with respect to parameters."""
+"""Result of ``sensitivity``: motions or periodic orbits, and their derivatives with respect to
+parameters.
+"""
 
 from __future__ import annotations
 
@@ -55,6 +57,22 @@ VARIABLES = {
     "end_derivative": Variable(
         (*_EACH, "to"), "<slope>", "derivatives at the end of the trajectory"
     ),
+    "period": Variable(("trajectory",), "s", "period of the orbit"),
+    "period_derivative": Variable(("trajectory", "to"), "<slope>", "derivative of the period"),
+    **{
+        name: row
+        for part, word in (("real", "real"), ("imag", "imaginary"))
+        for name, row in {
+            f"multiplier_{part}": Variable(
+                ("trajectory", "multiplier"), "1", f"Floquet multiplier, {word} part"
+            ),
+            f"multiplier_{part}_derivative": Variable(
+                ("trajectory", "multiplier", "to"),
+                "<slope>",
+                f"derivative of the Floquet multiplier, {word} part",
+            ),
+        }.items()
+    },
     **ENDINGS,
     **OUTPUT,
     **SHARED,
