@@ -12,11 +12,12 @@ USUAL = 25
 #: Rooms that hand out more, and of what kind these are.
 LARGER = {
     "system": (85, "what is added to a system, structures, linear pieces for the modal flow"),
-    "results": (95, "names of kinds and of variables, which pictures and verbs share"),
+    "results": (105, "names of kinds and of variables, which pictures and verbs share"),
     "kernels": (55, "codes of what happened, columns of the tables that kernels fill"),
     "flow": (60, "maps, requests, series of a motion, threads, progress"),
     "analysis.closed": (35, "closed motions, their measures, cycles and equilibria"),
     "analysis.inputs": (40, "types of arguments, the readers of each, the orbits of a result"),
+    "analysis.attractors": (30, "what starts settle to, the search for it, answers over a grid"),
     "language": (30, "expressions and what is made of them"),
 }
 #: Rooms whose inner files some others may know: pyproject.toml, contracts of type "protected".
