@@ -134,6 +134,11 @@ def normal(mean: float | str, deviation: float | str) -> Distribution:
     -------
     Distribution
 
+    Raises
+    ------
+    ParameterError, UnitError
+        If a value can't be read, once the parameter is known: by :func:`saltus.scatter`.
+
     Examples
     --------
     >>> import saltus as sl
@@ -154,6 +159,17 @@ def uniform(low: float | str, high: float | str) -> Distribution:
     Returns
     -------
     Distribution
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If a value can't be read, once the parameter is known: by :func:`saltus.scatter`.
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> sl.uniform("0.3 mm", "0.5 mm").text("m", "gap")
+    'uniform(0.3 mm, 0.5 mm)'
     """
     return Distribution("uniform", (low, high))
 
@@ -171,6 +187,17 @@ def lognormal(median: float | str, factor: float) -> Distribution:
     Returns
     -------
     Distribution
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If a value can't be read, once the parameter is known: by :func:`saltus.scatter`.
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> sl.lognormal("2 N", 1.3).text("N", "force")
+    'lognormal(2 N, 1.3)'
     """
     return Distribution("lognormal", (median, factor))
 
@@ -186,6 +213,17 @@ def triangular(low: float | str, likely: float | str, high: float | str) -> Dist
     Returns
     -------
     Distribution
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If a value can't be read, once the parameter is known: by :func:`saltus.scatter`.
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> sl.triangular("1 N", "2 N", "4 N").text("N", "force")
+    'triangular(1 N, 2 N, 4 N)'
     """
     return Distribution("triangular", (low, likely, high))
 
@@ -210,6 +248,12 @@ def truncated(
     ------
     ParameterError
         If it is no distribution.
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> sl.truncated(sl.normal("0.4 mm", "0.02 mm"), low="0.35 mm").text("m", "gap")
+    'truncated(normal(0.4 mm, 0.02 mm), 0.35 mm)'
     """
     if not isinstance(distribution, Distribution):
         raise must_be("distribution", 'one, such as sl.normal("0.4 mm", "0.02 mm")', distribution)
@@ -234,6 +278,13 @@ def distribution(frozen: Any, unit: str | None = None) -> Distribution:
     ------
     ParameterError
         If it isn't a frozen continuous distribution.
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> from scipy import stats
+    >>> sl.distribution(stats.beta(2, 5), "mm").text("m", "gap")
+    'distribution(beta)'
     """
     if not all(hasattr(frozen, name) for name in ("ppf", "cdf", "pdf", "dist")):
         raise must_be("frozen", "a frozen distribution, such as scipy.stats.beta(2, 5)", frozen)

@@ -19,7 +19,6 @@ from saltus.analysis.basins.labels import Settling
 from saltus.analysis.motion.settled import settled
 from saltus.results import load
 from saltus.study.read import parse, read
-from saltus.study.run import maps
 from saltus.study.run.running import Resources
 from saltus.study.run.study import run_study
 from small_study import maps_of
@@ -262,7 +261,3 @@ def test_ode45_survives_orbits_that_do_not_close():
         job for job in maps_of(parse(tiny("fig6"))) if job.title == "14.75 Hz, ode45 located"
     )
     assert len(job.plan.scout(1)) > 0
-
-
-def test_chunks_of_the_studies_are_those_of_the_plan():
-    assert maps.CHUNK == pipeline.CHUNK

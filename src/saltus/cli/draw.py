@@ -13,7 +13,6 @@ _WORDS = {
         "of two maps of basins",
     "responses": "responses", "section": "a section", "spectrum": "a spectrum",
     "impacts": "impacts", "energy": "energies", "sensitivity": "derivatives",
-    "event_sensitivity": "derivatives of a bifurcation",
     "scatter": "sets of values",
     "fit": "a fit to a measurement",
     "methods": "one question by several methods", "exponents": "exponents",

@@ -14,7 +14,9 @@ def test_every_kind_of_result_is_known():
     in the table, and a word for messages.
     """
     drawn = {kind for kind in NAMES if pictures_of(kind)}
-    assert set(NAMES) == drawn | {"attractors", "equilibria", "settled", "widths", "modes"}
+    assert set(NAMES) == drawn | {"attractors", "equilibria", "settled", "widths", "modes"} | {
+        "event_sensitivity"
+    }
     assert set(draw._WORDS) == drawn
 
 

@@ -193,7 +193,6 @@ def branches(
     done = list[Branch]()
     with reporting(progress) as show:
         try:
-            places = np.linspace(*limits, whole(at, "at", 1) + 2)[1:-1]
             from_rest = by is not None and start is None
             begins, equilibria = (
                 ([], [])
@@ -215,7 +214,8 @@ def branches(
             if by is None:
                 follow_all(plan, system, name, begins, equilibria, done, stage(show, 0.0, 0.9))
             else:
-                rest = places.tolist() if from_rest else []
+                count = whole(at, "at", 1, 1000) if from_rest else 0
+                rest = np.linspace(*limits, count + 2)[1:-1].tolist()
                 tries = by.tries
                 for by in tries:
                     done.clear()
