@@ -374,6 +374,7 @@ def test_orbits_are_the_exact_ones(exactly, method):
         np.testing.assert_allclose(found[name][peak], exactly[name][peak], rtol=1e-4)
 
 
+@pytest.mark.slow
 def test_all_are_compared_side_by_side(monkeypatch):
     monkeypatch.setattr(pipeline, "SCOUTS", 64)
     approximate = [one for one in EVERY if not one.exact]

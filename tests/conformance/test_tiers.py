@@ -26,7 +26,10 @@ from saltus.flow.request import Request, Schedule
 from saltus.kernels import status as st
 from saltus.system.tangent import tangent_system
 
-pytestmark = pytest.mark.skipif(jit_disabled(), reason="nothing is compiled with the JIT off")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(jit_disabled(), reason="nothing is compiled with the JIT off"),
+]
 TAYLOR = sl.Taylor(lanes=2)
 #: (system, spread of the starts, method): contacts, grazes, jumps of a threshold, sliding, a
 #: saltating tangent.
@@ -77,7 +80,6 @@ def bits(outcome):
 
 
 @pytest.mark.parametrize("case", CASES)
-@pytest.mark.slow
 def test_all_tiers_give_the_same_bits(case):
     system, spread, method = CASES[case]
     flow = method.kernels(system.origin)  # as the engine asks for it
@@ -95,7 +97,6 @@ def test_all_tiers_give_the_same_bits(case):
 
 
 @pytest.mark.parametrize("case", ["walls", "tangent", "chain"])
-@pytest.mark.slow
 def test_registers_one_after_the_other_give_the_same_bits(monkeypatch, case):
     """Two, four or all eight lanes in one."""
     chain = (sl.models.chain(), 1e-3, TAYLOR)
@@ -176,7 +177,6 @@ print(json.dumps(t.bits(t.engine.run(system, method, request, threads=1))))
 """
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(
     platform.machine() not in ("x86_64", "AMD64"), reason="these are processors of one family"
 )
@@ -184,7 +184,6 @@ print(json.dumps(t.bits(t.engine.run(system, method, request, threads=1))))
     ("processor", "lanes"),
     [("x86-64-v3", 8), pytest.param("x86-64-v3", 4, marks=pytest.mark.nightly), ("x86-64-v2", 2)],
 )
-@pytest.mark.slow
 def test_an_older_processor_gives_the_same_bits(processor, lanes):
     """With eight lanes in four registers, with four; without fused multiply-add, which the C
     library then does.

@@ -87,6 +87,7 @@ def start(processes, function, *arguments):
 
 # -- killed ----------------------------------------------------------------------------------------
 @posix
+@pytest.mark.slow
 def test_killed_at_random_moments(processes, tmp_path):
     """One map, its writer killed 20 times: a moment after it started, or after it got on by a chunk
     or two. No writer gets on by more than three, so none finishes the map, however fast it is.
@@ -149,6 +150,7 @@ def forget_drafts(path):
 
 
 @posix
+@pytest.mark.slow
 def test_interrupted(undisturbed, tmp_path):
     """Ctrl-C ends the writer, not the map."""
     path = tmp_path / "map" / "map"

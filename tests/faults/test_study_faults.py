@@ -41,7 +41,10 @@ from saltus.study.run.running import Resources
 from small_maps import small_maps
 from small_study import maps_of, small_study
 
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals and fork are POSIX")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(sys.platform == "win32", reason="signals and fork are POSIX"),
+]
 
 STUDY = small_study(24)
 CHUNKS = 24
@@ -633,7 +636,6 @@ def poisoned(mapped, monkeypatch):
     ],
 )
 @pytest.mark.parametrize("cell", [70, 96])
-@pytest.mark.slow
 def test_a_poison_cell_hurts_only_itself(healthy, poisoned, start, method, label, status, cell):
     """A start that overflows, isn't a number, or never gets anywhere has a code; all other cells
     are those of a map without it.

@@ -17,6 +17,8 @@ from saltus.analysis.basins.labels import settle
 from saltus.analysis.basins.pipeline import basin_plan
 from saltus.analysis.closed.capture import Neighbourhoods
 
+pytestmark = pytest.mark.slow
+
 ORBITS = {
     row["name"]: row
     for row in csv.DictReader((Path(__file__).parents[1] / "reference" / "orbits.csv").open())
@@ -101,7 +103,6 @@ def three():
 
 
 # -- labels ----------------------------------------------------------------------------------------
-@pytest.mark.slow
 def test_b4_has_five_basins(five):
     assert five.attractor_period.values.tolist() == [1, 3, 4, 5, 24]
     assert set(np.unique(five.basin)) == {0, 1, 2, 3, 4}
@@ -114,7 +115,6 @@ def test_labels_of_b4_equal_those_of_runs_that_nothing_captured(five):
     np.testing.assert_array_equal(labels_of_plain_runs(B4, starts, five), labels)
 
 
-@pytest.mark.slow
 def test_labels_of_c4_equal_those_of_runs_that_nothing_captured(three):
     starts, labels = cells(three, 300)
     i, j = np.nonzero(three.basin.values == rare_one(three))
@@ -423,7 +423,6 @@ def test_attractors_of_ode45_are_those_that_its_runs_settle_on(events):
     np.testing.assert_array_equal(labels, nearest)
 
 
-@pytest.mark.slow
 def test_what_errors_of_ode45_blur_is_typed_by_the_exact_orbit_about_which_it_scatters(
     five, monkeypatch
 ):
@@ -458,7 +457,6 @@ def test_what_errors_of_ode45_blur_is_typed_by_the_exact_orbit_about_which_it_sc
     assert np.ptp(run.x.values[:, ::24], axis=1).max() > 1e-6  # it doesn't close
 
 
-@pytest.mark.slow
 def test_scatter_about_an_orbit_falls_with_the_tolerance(five):
     """Starts on the exact 24T lead to it, by ode45 too; hundred times the accuracy leaves less than
     half of the scatter.

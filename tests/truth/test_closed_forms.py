@@ -247,6 +247,7 @@ def test_r15_multipliers_and_exponents_of_orbits(row):
 
 
 @pytest.mark.parametrize("length", [24, 25])
+@pytest.mark.slow
 def test_an_oscillator_driven_by_many_harmonics(length, monkeypatch):
     """Its code is cut into blocks, here into short ones, at any place: between sine and cosine of a
     harmonic too.

@@ -52,6 +52,7 @@ def test_the_graze_of_a_rigid_stop_moves_as_its_formula_says():
         (hammer, "fold", ["gap", "pull", "k", "d", "e"], {"f": (1.5, 1.7)}, (0, 0)),
     ],
 )
+@pytest.mark.slow
 def test_places_move_as_differences_say(system, kind, to, vary, start):
     def located(shift, start):
         moved = system.with_values(**dict(zip(to, near + shift * along, strict=True)))

@@ -9,6 +9,8 @@ from saltus.analysis.fits.steady import SAMPLES, SteadyResponses, _size_of
 from saltus.analysis.fits.unknowns import Unknowns
 from saltus.flow.methods import check_method
 
+pytestmark = pytest.mark.slow
+
 RIG = sl.models.delangre("a", force="4 N", frequency="8 Hz")
 METHOD = check_method(None, RIG)
 TRUTH = np.array([4.5e-4, 1e4])

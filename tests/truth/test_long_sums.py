@@ -103,6 +103,7 @@ def test_loops_and_plain_code_give_the_same_motion(law, lanes, monkeypatch):
         assert np.abs(a - b).max() < 1e-11 * np.abs(b).max()
 
 
+@pytest.mark.slow
 def test_a_motion_is_that_of_scipy():
     system = structure("rubbing", 3)
     start = np.zeros(2 * MODES)

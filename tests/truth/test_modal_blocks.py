@@ -151,6 +151,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("case", CASES)
+@pytest.mark.slow
 def test_an_oscillator_meets_its_stop_where_matrix_exponentials_say(case):
     system = struck.with_values(**CASES[case])
     run = moved(system, (0.0, 0.0), periods=40)

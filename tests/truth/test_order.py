@@ -148,6 +148,7 @@ def test_steps_are_fixed(oscillator):
 
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.slow
 def test_taylor_has_its_order_through_contacts(oscillator, law, order):
     spans = [0.125, 0.0625] if law == "bends" else [0.5, 0.25]  # stiffer, faster
     measured = fixed_step_order(

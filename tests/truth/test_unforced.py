@@ -44,6 +44,7 @@ def hopf():
     }
 
 
+@pytest.mark.slow
 def test_a_limit_cycle_has_the_period_size_and_multipliers_of_the_closed_form(hopf):
     ds = hopf[1.0].isel(response=hopf[1.0].response_type.values == "limit_cycle")
     mu = ds.response_mu.values

@@ -71,6 +71,7 @@ def test_a_cycle_is_one_whatever_its_phase_and_deflated_at_all_of_them():
     assert sorted(found.orbit_stable.values) == [0, 1]
 
 
+@pytest.mark.slow
 def test_the_shortest_cycle_of_lorenz_attractor_has_the_published_period(chaotic):
     assert chaotic.orbit_cycle.values[0] == pytest.approx(VISWANATH_AB, rel=1e-14)
     assert chaotic.sizes["orbit"] > 1

@@ -237,6 +237,7 @@ def test_a_wrong_figure_gets_those_that_there_are(tmp_path):
         (["models", "delangre"], "closed on the way"),
     ],
 )
+@pytest.mark.slow
 def test_a_closed_output_ends_quietly(command, how):
     """``saltus models | head``, ``saltus models >&-``: nothing is wrong with a file, so nothing is
     said about one.

@@ -159,6 +159,7 @@ def made_again(name):
         pytest.param("taylor_2", marks=pytest.mark.nightly),
     ],
 )
+@pytest.mark.slow
 def test_the_bitcode_is_what_the_templates_give(name):
     """To the byte, where the same versions make it that made it. The smallest every time: whether
     the others are made of the templates as they stand, the test before says.
@@ -212,6 +213,7 @@ def edited(monkeypatch, tmp_path):
     monkeypatch.setattr(templates, "source_hash", lambda name: f"{'edited':*<64}")
 
 
+@pytest.mark.slow
 def test_edited_templates_are_made_into_bitcode_and_said(edited, capfd):
     assert building.bitcode("capture")[:2] == b"BC"
     assert "edited since" in capfd.readouterr().err

@@ -294,6 +294,7 @@ def test_a_system_without_forcing_has_limit_cycles():
     assert now["lost"] is None
 
 
+@pytest.mark.slow
 def test_a_branch_of_limit_cycles_has_the_hue_of_its_attractor():
     desk = desk_of(van_der_pol, None)
     told = one(desk, "settle", start=[1.0, 0.0])[0]["attractor"]

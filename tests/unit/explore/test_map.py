@@ -211,6 +211,7 @@ def test_an_attractor_that_only_open_cells_reveal_joins_the_legend(desk, monkeyp
     assert [later[key] for key in keys] == hues  # nothing on the screen jumps
 
 
+@pytest.mark.slow
 def test_a_map_that_is_stopped_while_open_cells_settle_keeps_its_labels(desk, monkeypatch):
     monkeypatch.setattr(pipeline, "SCOUTS", 2)
     monkeypatch.setattr(maps, "FEW_SCOUTS", 1)
@@ -237,6 +238,7 @@ def test_a_hue_belongs_to_an_orbit_at_neighbouring_values(desk):
     assert not {row["hue"] for row in fresh} & set(hues.values())
 
 
+@pytest.mark.slow
 def test_a_hue_follows_a_branch_to_other_values(desk, monkeypatch):
     monkeypatch.setattr(responses, "VALUES", 1)
     monkeypatch.setattr(responses, "STARTS", 1)

@@ -345,6 +345,7 @@ def test_the_other_state(diagram):
         bifurcation_diagram(diagram, state="vv")
 
 
+@pytest.mark.slow
 def test_thousands_of_responses_are_few_marks_and_small_in_vector_files():
     ax = bifurcation_diagram(cascade(3000, keep=100))
     assert len(ax.get_children()) < 2 * len(bifurcation_diagram(cascade(30)).get_children())

@@ -209,6 +209,7 @@ def test_what_changes_nothing_does_not(text):
     assert job(text).identity() == job().identity()
 
 
+@pytest.mark.slow
 def test_the_code_is_part_of_the_identity(tmp_path, monkeypatch):
     """A label that comes from other code isn't mixed with this one's: every file that a label
     depends on counts.

@@ -156,6 +156,7 @@ TWENTY = {"G02": 6, "G05": 8, "G09": 6}
 
 
 @pytest.mark.parametrize("number", TWENTY)
+@pytest.mark.slow
 def test_unstable_orbits_close_under_heyoka(number):
     """20 in all, over their one or three periods, to 1e-10 of their size. A solver whose equations
     were written by hand: tests/oracles.
@@ -307,6 +308,7 @@ def test_at_each_bifurcation_a_multiplier_lies_on_the_unit_circle():
         assert np.abs(these - where).min(axis=1).max() < 1e-6
 
 
+@pytest.mark.slow
 def test_each_doubling_is_the_end_of_a_branch_of_twice_the_period():
     """Though those curve away from their beginning within a thousandth of the range."""
     found = at_rest((5.61, 6.35))

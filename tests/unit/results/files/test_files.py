@@ -17,6 +17,7 @@ from unit.results.conftest import sine_run
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="limits of file sizes are POSIX")
+@pytest.mark.slow
 def test_a_write_that_the_system_refuses_leaves_nothing(tmp_path):
     """The kernel refuses to let any file grow beyond 20 kB, which is what a full disk looks like
     from inside.
