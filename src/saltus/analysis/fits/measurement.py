@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.inputs.outputs import outputs_of
-from saltus.errors import ParameterError, UnitError, listed, nearest, shown
+from saltus.errors import ParameterError, UnitError, counted, listed, nearest, shown
 from saltus.results.files.measured import read_series
 from saltus.system import System
 from saltus.units import to_si
@@ -204,7 +204,7 @@ def _check_values(names: tuple[str, ...], values: np.ndarray, missing: bool) -> 
 def _not_finite(name: str, bad: np.ndarray) -> ParameterError:
     return ParameterError(
         lambda say: (
-            f"the measured {name} isn't finite at {int(bad.sum())} samples (first at index "
+            f"the measured {name} isn't finite at {counted(int(bad.sum()), 'sample')} (first at index "
             f"{int(bad.argmax())}). Leave them out, or say that NaN is a sample that is missing: "
             f"{say.key(missing=True)}."
         )
