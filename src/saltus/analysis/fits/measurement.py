@@ -204,8 +204,8 @@ def _check_values(names: tuple[str, ...], values: np.ndarray, missing: bool) -> 
 def _not_finite(name: str, bad: np.ndarray) -> ParameterError:
     return ParameterError(
         lambda say: (
-            f"the measured {name} isn't finite at {counted(int(bad.sum()), 'sample')} (first at index "
-            f"{int(bad.argmax())}). Leave them out, or say that NaN is a sample that is missing: "
+            f"the measured {name} isn't finite at {counted(int(bad.sum()), 'sample')} "
+            f"(first at index {int(bad.argmax())}). Leave them out, or say that NaN is a sample that is missing: "
             f"{say.key(missing=True)}."
         )
     )
