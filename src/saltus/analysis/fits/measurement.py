@@ -205,8 +205,8 @@ def _not_finite(name: str, bad: np.ndarray) -> ParameterError:
     return ParameterError(
         lambda say: (
             f"the measured {name} isn't finite at {counted(int(bad.sum()), 'sample')} "
-            f"(first at index {int(bad.argmax())}). Leave them out, or say that NaN is a sample that is missing: "
-            f"{say.key(missing=True)}."
+            f"(first at index {int(bad.argmax())}). Leave them out, or say that NaN is a sample "
+            f"that is missing: {say.key(missing=True)}."
         )
     )
 
