@@ -21,7 +21,7 @@ from saltus.analysis.harmonics.signals import States, signals_of
 from saltus.system import System
 from saltus.system.parametric import parametric
 
-#: Motions whose states are remembered.
+#: Motions whose forces and boundaries are remembered.
 REMEMBERED = 4096
 
 
@@ -66,8 +66,10 @@ class HarmonicOrbits:
             own[i]: DerivedState(signal, times)
             for signal, chain in enumerate(self.source.chains) for times, i in enumerate(chain)
         }  # fmt: skip
-        self._remembered: dict[bytes, tuple[np.ndarray, Intervals]] = {}
+        self._remembered: dict[bytes, tuple[np.ndarray | None, Intervals]] = {}
         self.turn = periods * (1.0 if self._timed else float(system.period()))
+        own_factors = self.source.own(harmonics)
+        self._own = np.concatenate([own_factors, own_factors[1:]]).T.ravel()
         forces = [inner.field[i] for i in self.source.forces]
         self.forces = Forces(inner, forces, moving, inner.states[len(own) :], self.turn, periods)
 
@@ -116,18 +118,22 @@ class HarmonicOrbits:
     def _along(self, z: np.ndarray) -> tuple[np.ndarray, Intervals]:
         """The states and intervals of a motion, remembered."""
         key = z.tobytes()
+        constants, _, rate, rate_by = self._constants(z)
+        signals = self.signals(z)
         if key not in self._remembered:
-            if len(self._remembered) >= REMEMBERED:
-                self._remembered.clear()
-            constants, _, rate, rate_by = self._constants(z)
-            signals, forces = self.signals(z), None
             if isinstance(self.source, States):
-                intervals = self.forces.intervals(signals, constants, rate)
+                self._remember(z, None, self.forces.intervals(signals, constants, rate))
             else:
                 found = self.forces.coefficients(signals, constants, rate, rate_by)
-                intervals, forces = found.intervals, found.values / self._pace(constants)
-            self._remembered[key] = self.source.states(signals, forces, rate), intervals
-        return self._remembered[key]
+                self._remember(z, found.values / self._pace(constants), found.intervals)
+        forces, intervals = self._remembered[key]
+        return self.source.states(signals, forces, rate), intervals
+
+    def _remember(self, z: np.ndarray, forces: np.ndarray | None, intervals: Intervals) -> None:
+        """Keep the series of the forces along a motion, and where it meets boundaries."""
+        if len(self._remembered) >= REMEMBERED:
+            self._remembered.clear()
+        self._remembered[z.tobytes()] = forces, intervals
 
     def _pace(self, constants: np.ndarray) -> float:
         """Factor of the rates of the equations."""
@@ -177,23 +183,20 @@ class HarmonicOrbits:
         signals = self.signals(z)
         constants, slopes, rate, rate_by = self._constants(z)
         found = self.forces.coefficients(signals, constants, rate, rate_by)
-        whole, by_rate = (
-            fourier.transfer(one) for one in self.source.response(self.harmonics, rate)
-        )
-        own = self.source.own(self.harmonics)
-        own = np.concatenate([own, own[1:]]).T.ravel()
-        size, forces = self.size, found.values.ravel()
         period = self._pace(constants)
-        flat, flat_by_rate = (one.reshape(size, -1) / period for one in (whole, by_rate))
-        derivative = np.empty((size, self.width))
-        derivative[:, :size] = -flat @ found.by_signals.reshape(len(forces), size)
-        derivative[np.arange(size), np.arange(size)] += own
-        by_constants = -flat @ found.by_constants.reshape(len(forces), -1)
-        by_constants -= np.outer(flat_by_rate @ forces, rate_by)
+        self._remember(z, found.values / period, found.intervals)
+        response, by_rate = self.source.response(self.harmonics, rate)
+        moved = fourier.responses(response / period, found.whole).reshape(self.size, -1)
+        turned = fourier.responses(by_rate / period, found.values).ravel()
+        own = self._own
+        derivative = np.empty((self.size, self.width))
+        derivative[:, : self.size] = -moved[:, 1 : 1 + self.size]
+        derivative[np.arange(self.size), np.arange(self.size)] += own
+        by_constants = -moved[:, 1 + self.size :] - np.outer(turned, rate_by)
         if self._timed:
-            by_constants[:, 0] += flat @ forces / period
-        derivative[:, size:] = by_constants @ slopes
-        return own * z[:size] - flat @ forces, derivative
+            by_constants[:, 0] += moved[:, 0] / period
+        derivative[:, self.size :] = by_constants @ slopes
+        return own * z[: self.size] - moved[:, 0], derivative
 
     def accepted(self, z: np.ndarray, rows: np.ndarray) -> None:
         """Nothing depends on it."""

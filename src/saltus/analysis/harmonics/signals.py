@@ -120,6 +120,7 @@ class AtContacts:
         self._mass, self._damping, self._stiffness = seen.dynamics
         parts = (self._mass, self._damping, self._stiffness)
         self._plain = all(np.count_nonzero(one - np.diag(np.diag(one))) == 0 for one in parts)
+        self._diagonals = [np.diag(one)[:, None] for one in parts]
 
     def _solved(self, angular: np.ndarray, right: np.ndarray) -> np.ndarray:
         """Coordinates under forces complex128[h, r, m] at angular frequencies
@@ -127,8 +128,7 @@ class AtContacts:
         """
         at = angular[:, None, None]
         if self._plain:
-            each = (np.diag(one)[:, None] for one in (self._mass, self._damping, self._stiffness))
-            mass, damping, stiffness = each
+            mass, damping, stiffness = self._diagonals
             return np.asarray(right / (stiffness - at**2 * mass + 1j * at * damping))
         whole = self._stiffness - at**2 * self._mass + 1j * at * self._damping
         return np.linalg.solve(whole, right)

@@ -78,12 +78,12 @@ class _Motion:
             f"{names[number]}{'+' if slope > 0 else '-'}"
             for number, slope in zip(instants.guard, instants.slope, strict=True)
         )
-        gaps = [
-            np.abs(fourier.basis(turns, fourier.harmonics_of(len(gap))) @ gap)
-            for gap in intervals.gaps for turns in [fourier.zeros(fourier.derivative(gap))]
-        ]  # fmt: skip
-        result.margin[row] = min((one.min() for one in gaps if len(one)), default=np.inf)
-        result.span[row] = max((np.ptp(one) for one in gaps if len(one)), default=0.0)
+        which, turns, _ = fourier.zeros_of(fourier.derivative(intervals.gaps))
+        here = fourier.basis(turns, fourier.harmonics_of(intervals.gaps.shape[1]))
+        gaps = np.abs(np.einsum("ri,ri->r", here, intervals.gaps[which]))
+        each = [gaps[which == number] for number in np.unique(which)]
+        result.margin[row] = gaps.min(initial=np.inf)
+        result.span[row] = max(map(np.ptp, each), default=0.0)
 
     def _extremes(self, sign: float) -> np.ndarray:
         """The largest values of the outputs times a sign, float64[K]: of states where they turn,
