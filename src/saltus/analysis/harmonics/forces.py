@@ -186,7 +186,7 @@ class Forces:
         """
         resting = self._rest | dict(zip(self.constants, constants, strict=True))
         found = evaluate(self._gap_entries, states=resting, values=self.system.values)
-        rows = np.reshape(np.array(found, float), (len(self._linear), -1))
+        rows = np.reshape(np.array(found, float), (len(self._linear), 1 + len(self.moving)))
         return rows[:, 0], rows[:, 1:]
 
     @functools.cached_property
