@@ -130,6 +130,7 @@ class Forces:
             i for i, row in rows if _is_linear(system.guards[i].gap, row[: len(states)], states)
         ]
         self._linear = {i: self._gap_slopes[i][: len(states)] for i in linear}
+        self._numbers = np.array(linear, np.int64)
         self._gap_entries = [
             one for i, row in self._linear.items() for one in (system.guards[i].gap, *row)
         ]
@@ -173,12 +174,14 @@ class Forces:
             harmonics,
         )
 
-    def _gaps(self, states: np.ndarray, constants: np.ndarray) -> dict[int, np.ndarray]:
-        """The series of the gaps that are linear in the moving states."""
+    def _gaps(self, states: np.ndarray, constants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The guards whose gaps are linear in the moving states, int64[g], and the series of these,
+        float64[g, 2H + 1].
+        """
         level, slope = self._gap_rows or self._rows(constants)
         gaps = slope @ states
         gaps[:, 0] += level
-        return dict(zip(self._linear, gaps, strict=True))
+        return self._numbers, gaps
 
     def _rows(self, constants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Levels of these gaps at rest float64[g], and slopes by the moving states

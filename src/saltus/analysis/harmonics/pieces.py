@@ -112,7 +112,7 @@ class Intervals:
 
 def intervals_of(
     name: str, guards: Sequence[Guard], asked: Mapping[int, list[int]],
-    linear: Mapping[int, np.ndarray], about: About, harmonics: int,
+    linear: tuple[np.ndarray, np.ndarray], about: About, harmonics: int,
 ) -> Intervals:  # fmt: skip
     """Cut a motion at the boundaries of some guards, each after those whose sides it asks for.
 
@@ -124,8 +124,8 @@ def intervals_of(
         That a contact is held never is: a series isn't held anywhere.
     asked : mapping of int to list of int
         Of each of the others, whose sides it asks for.
-    linear : mapping of int to float64[2H + 1]
-        The gaps that are known as series.
+    linear : int64[g], float64[g, 2H + 1]
+        The guards whose gaps are known as series, and these.
     about : callable
         States, parameters and time at angles.
     harmonics : int
@@ -137,19 +137,17 @@ def intervals_of(
         If a gap isn't a series: it isn't smooth between the other boundaries.
     """
     frozen = np.zeros(len(guards), bool)
-    numbers = np.array([number for number, others in asked.items() if not others], np.int64)
-    each = [
-        linear[number]
-        if number in linear
-        else _series(name, guards[number], about, harmonics, frozen)
-        for number in numbers.tolist()
-    ]
-    split = max(map(fourier.harmonics_of, map(len, each)), default=1)
-    gaps = np.reshape([fourier.resized(one, split) for one in each], (-1, 2 * split + 1))
+    numbers, gaps = linear
+    if more := [i for i, others in asked.items() if not others and i not in numbers]:
+        each = [*gaps, *(_series(name, guards[i], about, harmonics, frozen) for i in more)]
+        split = max(fourier.harmonics_of(len(one)) for one in each)
+        numbers = np.append(numbers, more)
+        gaps = np.array([fourier.resized(one, split) for one in each])
     which, angle, slope = fourier.zeros_of(gaps)
     found = np.array([angle, numbers[which], slope])
     intervals = _cut(uncut(len(guards)), found)
-    intervals.bits[:, numbers] = fourier.basis(intervals.middle, split) @ gaps.T > 0
+    here = fourier.basis(intervals.middle, fourier.harmonics_of(gaps.shape[1]))
+    intervals.bits[:, numbers] = here @ gaps.T > 0
     for number, mine in asked.items():
         if not mine:
             continue
@@ -165,7 +163,7 @@ def intervals_of(
         there = about(intervals.middle)
         (values,) = evaluate([guards[number].gap], **there, bits=list(intervals.bits.T))  # type: ignore[arg-type]
         intervals.bits[:, number] = np.asarray(values) > 0
-    angle, which, slope = found[:, np.argsort(found[0], kind="stable")]
+    angle, which, slope = found[:, found[0].argsort(kind="stable")]
     at = np.searchsorted(intervals.begin, angle)
     before, behind = intervals.bits[at - 1], intervals.bits[at]
     instants = Instants(angle, which.astype(np.int64), slope, before, behind)
@@ -189,7 +187,8 @@ def _cut(intervals: Intervals, found: np.ndarray) -> Intervals:
     if not found.size:
         return intervals
     begin = np.sort(found[0])
-    begin = begin[np.append(True, begin[1:] > begin[:-1])]
+    if (begin[1:] == begin[:-1]).any():
+        begin = np.unique(begin)
     length = np.append(begin[1:], begin[0] + 2 * np.pi) - begin
     bits = intervals.bits[intervals.of(begin + 0.5 * length)]
     return Intervals(begin, length, bits, _NONE)

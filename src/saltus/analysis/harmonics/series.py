@@ -131,7 +131,12 @@ def products(coefficients: np.ndarray, harmonics: int) -> np.ndarray:
         H.
     """
     apart, first, sums, second = _places(harmonics)
-    return np.asarray(coefficients[..., apart] * first + coefficients[..., sums] * second)
+    found = coefficients.take(apart, axis=-1)
+    found *= first
+    more = coefficients.take(sums, axis=-1)
+    more *= second
+    found += more
+    return found
 
 
 @functools.lru_cache(maxsize=64)

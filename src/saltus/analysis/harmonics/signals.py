@@ -9,6 +9,7 @@ Nonlinear Vibration Problems (2019), section 2.5.
 
 from __future__ import annotations
 
+import functools
 from typing import Protocol
 
 import numpy as np
@@ -76,10 +77,7 @@ class States:
         """See :class:`Signals`. A mean isn't integrated: there the equation is that the mean of the
         force vanishes, over the rate for its unit.
         """
-        turns = np.arange(harmonics + 1) * 1j
-        turns[0] = 1.0
-        each = 1.0 / (turns[:, None] * rate) ** self._orders
-        whole = each[:, :, None] * np.eye(len(self._orders))
+        whole = _integrals(harmonics, tuple(self._orders)) * (1.0 / rate**self._orders)[:, None]
         return whole, -self._orders[:, None] * whole
 
     def own(self, harmonics: int) -> np.ndarray:
@@ -104,6 +102,14 @@ class States:
     def of_states(self, states: np.ndarray) -> np.ndarray:
         """See :class:`Signals`."""
         return states[[chain[0] for chain in self.chains]]
+
+
+@functools.lru_cache(maxsize=64)
+def _integrals(harmonics: int, orders: tuple[int, ...]) -> np.ndarray:
+    """What integrals of some orders over the angle do to amplitudes, complex128[H + 1, c, c]."""
+    turns = np.arange(harmonics + 1) * 1j
+    turns[0] = 1.0
+    return (1.0 / turns[:, None] ** np.array(orders))[:, :, None] * np.eye(len(orders))
 
 
 class AtContacts:
