@@ -31,6 +31,8 @@ UNEVEN = 6
 MULTIPLES = 12
 #: A jump below this share of a force is rounding.
 ROUNDING = 1e-12
+#: Distance from an instant within which depths are rounding [rad].
+BESIDE = 1e-12
 #: Random states at which forces are compared on both sides of a boundary.
 TRIED = 16
 
@@ -125,6 +127,7 @@ class Forces:
         self._by_moving = sum(j < len(self.moving) for _, j in self._known)
         self._entries = (*forces, *(self._slopes[i][j] for i, j in self._known))
         self._degree = degree(forces, self.moving)
+        self._bent = _bends(forces, system.values) if math.isinf(self._degree) else 0
         states, rows = list(self.moving), enumerate(self._gap_slopes)
         linear = [
             i for i, row in rows if _is_linear(system.guards[i].gap, row[: len(states)], states)
@@ -246,9 +249,8 @@ class Forces:
         self, intervals: Intervals, harmonics: int
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """See :meth:`Intervals.nodes`: for products of the forces and a harmonic."""
-        bent = math.isinf(self._degree)
-        most = UNEVEN if bent else max(int(self._degree), 1)
-        return intervals.nodes((most + 1) * harmonics + MULTIPLES * self.periods, bent)
+        most = UNEVEN if self._bent else max(int(self._degree), 1)
+        return intervals.nodes((most + 1) * harmonics + MULTIPLES * self.periods, self._bent)
 
     def coefficients(
         self, signals: np.ndarray, constants: np.ndarray, rate: float, rate_by: np.ndarray
@@ -278,6 +280,10 @@ class Forces:
         found = np.empty((len(values), len(angle)))
         for row, value in zip(found, values, strict=True):
             row[:] = value
+        if self._bent:  # a power of a depth isn't defined where rounding makes that negative
+            begin = intervals.begin[which]
+            aside = np.minimum(angle - begin, begin + intervals.length[which] - angle) < BESIDE
+            found[:, aside] = np.nan_to_num(found[:, aside], posinf=0.0, neginf=0.0)
         integrals = (found * (weight / np.pi)) @ here
         series = integrals[:, kept]
         series[:, 0] *= 0.5
@@ -373,6 +379,18 @@ def _norm(harmonics: int) -> np.ndarray:
     norm = np.full(2 * harmonics + 1, 1.0 / np.pi)
     norm[0] *= 0.5
     return norm
+
+
+def _bends(roots: Sequence[Expr], values: Mapping[str, float]) -> int:
+    """How often a sine bends the angle so that powers of a depth, and their slopes, are smooth in
+    it: once for square roots, and powers like 3/2; twice for others, such as the root of a root.
+    """
+    powers = [node.args[1] for node in ex.walk(*roots) if node.op == "pow"]
+    known = [one for one in powers if not ex.depends_on(one, ("state", "time", "select"))]
+    halves = len(known) == len(powers) and all(
+        float(2 * one) % 1 == 0 for one in evaluate(known, values=values)
+    )
+    return 1 if halves else 2
 
 
 def degree(roots: Sequence[Expr], moving: Collection[str]) -> float:

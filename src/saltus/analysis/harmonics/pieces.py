@@ -85,23 +85,23 @@ class Intervals:
             self.begin
         )
 
-    def nodes(self, degree: int, bent: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def nodes(self, degree: int, bent: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles and weights by which series of a degree are integrated over the circle to
         rounding, and the interval of each: float64[n], float64[n], int64[n].
 
         On the whole circle they are equidistant; between instants they are Gauss's. ``bent``: of
-        forces that aren't polynomials, such as powers of a depth: a sine then takes the angle to
-        either end with no slope, behind which such powers are smooth.
+        forces that aren't polynomials, such as powers of a depth: a sine, so many times, then takes
+        the angle to either end with no slope, behind which such powers are smooth.
         """
         if len(self.begin) == 1 and len(self.instants.angle) == 0:
             count = degree + 1
             angle = 2.0 * np.pi * np.arange(count) / count
             return angle, np.full(count, 2.0 * np.pi / count), np.zeros(count, np.int64)
-        turns = self.length * degree * (0.25 * np.pi if bent else 0.5) * 0.5
+        turns = self.length * degree * 0.25 * (0.5 * np.pi) ** bent
         counts = np.ceil(turns + 3.0 * np.cbrt(turns)).astype(np.int64) + BEYOND * (1 + bent)
         rules = [_gauss(int(count)) for count in counts]
         place, weight = (np.concatenate(one) for one in zip(*rules, strict=True))
-        if bent:
+        for _ in range(bent):
             turned = np.pi * (place - 0.5)
             weight = weight * 0.5 * np.pi * np.cos(turned)
             place = 0.5 + 0.5 * np.sin(turned)
