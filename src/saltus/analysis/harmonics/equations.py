@@ -160,6 +160,13 @@ class HarmonicOrbits:
         count = 8 * (self.harmonics + 1)
         return fourier.basis(2 * np.pi * np.arange(count) / count, self.harmonics)
 
+    @functools.cached_property
+    def odd(self) -> np.ndarray:
+        """Which unknowns are of odd harmonics: those that twice a period leaves empty."""
+        order = np.concatenate([np.arange(self.harmonics + 1), np.arange(1, self.harmonics + 1)])
+        mine = np.tile(order % 2 == 1, self.count)
+        return np.append(mine, np.zeros(self.width - self.size, bool))
+
     def of_states(self, states: np.ndarray, value: float) -> np.ndarray:
         """The unknowns of a motion with series of the states float64[D, 2h + 1]."""
         signals = fourier.resized(self.source.of_states(states), self.harmonics)

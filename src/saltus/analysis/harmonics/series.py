@@ -85,6 +85,14 @@ def resized(series: np.ndarray, harmonics: int) -> np.ndarray:
     return of_complex(np.pad(amplitudes, [(0, 0)] * (series.ndim - 1) + [(0, missing)]))
 
 
+def doubled(series: np.ndarray) -> np.ndarray:
+    """The same motions over twice the period: harmonic k becomes 2k, float64[..., 4H + 1]."""
+    amplitudes = to_complex(series)
+    found = np.zeros((*amplitudes.shape[:-1], 2 * amplitudes.shape[-1] - 1), complex)
+    found[..., ::2] = amplitudes
+    return of_complex(found)
+
+
 def responses(blocks: np.ndarray, series: np.ndarray) -> np.ndarray:
     """The series of responses to series float64[m, 2H + 1, ...], whose amplitudes are multiplied by
     complex128[H + 1, c, m]; float64[c, 2H + 1, ...].
