@@ -91,7 +91,7 @@ def _program(
 ) -> tuple[
     list[Any], list[tuple[int, str, Any, tuple[int, ...]]], dict[Expr, int], list[int]
 ]:  # fmt: skip
-    """What computes some expressions: the constants in their places; the other operations, each
+    """The program of some expressions: the constants in their places; the other operations, each
     with its place, its payload (a function, if it has operands) and the places of its operands; the
     place of each node's value; and the wanted places.
     """

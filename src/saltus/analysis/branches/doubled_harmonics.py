@@ -1,8 +1,8 @@
-"""Where branches of motions of a few harmonics leave for those of twice the period.
+"""Branches of motions of a few harmonics that leave others for twice the period.
 
-There the derivative of the equations over two periods by the odd harmonics, which a motion of one
-period leaves empty, is singular. That is beside where the exact orbits double theirs, or nowhere if
-the harmonics are too few.
+They leave where the derivative of the equations over two periods by the odd harmonics, which a
+motion of one period leaves empty, is singular. That is beside where the exact orbits double
+theirs, or nowhere if the harmonics are too few.
 """
 
 from __future__ import annotations

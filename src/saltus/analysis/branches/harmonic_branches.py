@@ -65,13 +65,12 @@ def worst(branches: Sequence[Branch], outputs: Outputs, by: HarmonicBalance) -> 
 
 def balanced(branches: Sequence[Branch], outputs: Outputs, harmonics: int) -> dict[str, Any]:
     """The variables that branches of truncated motions have besides those of exact orbits."""
-    most = max((branch.orbits.harmonics for branch in branches), default=harmonics)
+    balances = [one.orbits for one in branches if isinstance(one.orbits, ClosedHarmonics)]
+    most = max((orbits.harmonics for orbits in balances), default=harmonics)
     size, wide = len(outputs), [np.zeros((0, len(outputs), most + 1), complex)]
     unknown: dict[str, Any] = {"constant_values": np.nan}
     apart, share = [np.zeros((0, size))], [np.zeros(0)]
-    for branch in branches:
-        orbits = branch.orbits
-        assert isinstance(orbits, ClosedHarmonics)
+    for branch, orbits in zip(branches, balances, strict=True):
         each = np.array([amplitudes(orbits, z, outputs) for z in branch.z])
         wide.append(np.pad(each, [(0, 0), (0, 0), (0, most - orbits.harmonics)], **unknown))
         off, ranges = orbits.errors(branch.z, outputs)

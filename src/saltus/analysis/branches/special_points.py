@@ -128,7 +128,7 @@ def locate(
                 )
                 tested = tests(direction[some], derivative[some], multipliers, column)
                 values[some] = tested[kind[which[some]], np.arange(len(some))]
-        for i in np.flatnonzero(point.found):
+        for i in np.flatnonzero(point.found).tolist():
             name = KINDS[kind[which[i]]]
             known[int(which[i])] = Event(
                 name, -1, point.z[i], np.zeros(0), direction[i], derivative[i]
@@ -141,8 +141,8 @@ def locate(
     if found:
         ends, matrices = (np.array([getattr(known[i], one) for i in found]) for one in _ENDS)
         each = orbits.multipliers(ends, matrices, rows[found])
-        for i, multipliers in zip(found, each, strict=True):
-            result[i] = replace(known[i], multipliers=multipliers)
+        for place, multipliers in zip(found, each, strict=True):
+            result[place] = replace(known[place], multipliers=multipliers)
     for i in np.flatnonzero(kind == KINDS.index("branch_point")):
         guess = z[i] + 0.5 * length[i] * tangent[i] * orbits.scale[rows[i]]
         near = known.get(int(i))

@@ -162,7 +162,7 @@ class HarmonicOrbits:
 
     @functools.cached_property
     def odd(self) -> np.ndarray:
-        """Which unknowns are of odd harmonics: those that twice a period leaves empty."""
+        """True for unknowns of odd harmonics, empty in motions of half the period, bool[z]."""
         order = np.concatenate([np.arange(self.harmonics + 1), np.arange(1, self.harmonics + 1)])
         mine = np.tile(order % 2 == 1, self.count)
         return np.append(mine, np.zeros(self.width - self.size, bool))

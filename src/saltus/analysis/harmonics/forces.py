@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +18,7 @@ import numpy as np
 
 from saltus.analysis.harmonics import series as fourier
 from saltus.analysis.harmonics.pieces import Intervals, intervals_of
+from saltus.analysis.harmonics.powers import bends, degree
 from saltus.contact.guards import bits_in, is_hold
 from saltus.language import expression as ex
 from saltus.language.derivatives import gradients
@@ -127,7 +128,7 @@ class Forces:
         self._by_moving = sum(j < len(self.moving) for _, j in self._known)
         self._entries = (*forces, *(self._slopes[i][j] for i, j in self._known))
         self._degree = degree(forces, self.moving)
-        self._bent = _bends(forces, system.values) if math.isinf(self._degree) else 0
+        self._bent = bends(forces, system.values) if math.isinf(self._degree) else 0
         states, rows = list(self.moving), enumerate(self._gap_slopes)
         linear = [
             i for i, row in rows if _is_linear(system.guards[i].gap, row[: len(states)], states)
@@ -151,7 +152,7 @@ class Forces:
         for times in range(1, self._times.max() + 1):
             mine = self._times == times
             found[mine] = fourier.derivative(found[mine], times) * rate**times
-        return found
+        return np.asarray(found)
 
     def motion(self, angle: np.ndarray, seen: np.ndarray, constants: np.ndarray) -> dict[str, Any]:
         """Inputs of expressions at angles float64[n], but for the bits: states that move
@@ -369,8 +370,8 @@ def _at(about: Mapping[str, Any], k: int) -> dict[str, Any]:
 
 @functools.lru_cache(maxsize=64)
 def _kept(harmonics: int) -> np.ndarray:
-    """Where the coefficients of a series lie in one of twice the harmonics."""
-    return np.r_[: harmonics + 1, 2 * harmonics + 1 : 3 * harmonics + 1]
+    """Places of the coefficients of a series in one of twice the harmonics."""
+    return np.asarray(np.r_[: harmonics + 1, 2 * harmonics + 1 : 3 * harmonics + 1])
 
 
 @functools.lru_cache(maxsize=64)
@@ -379,38 +380,3 @@ def _norm(harmonics: int) -> np.ndarray:
     norm = np.full(2 * harmonics + 1, 1.0 / np.pi)
     norm[0] *= 0.5
     return norm
-
-
-def _bends(roots: Sequence[Expr], values: Mapping[str, float]) -> int:
-    """How often a sine bends the angle so that powers of a depth, and their slopes, are smooth in
-    it: once for square roots, and powers like 3/2; twice for others, such as the root of a root.
-    """
-    powers = [node.args[1] for node in ex.walk(*roots) if node.op == "pow"]
-    known = [one for one in powers if not ex.depends_on(one, ("state", "time", "select"))]
-    halves = len(known) == len(powers) and all(
-        float(2 * one) % 1 == 0 for one in evaluate(known, values=values)
-    )
-    return 1 if halves else 2
-
-
-def degree(roots: Sequence[Expr], moving: Collection[str]) -> float:
-    """The highest power of moving states in expressions; inf if they are no polynomials."""
-    known: dict[Expr, float] = {}
-    for node in ex.walk(*roots, conditions=False):
-        below = [known[one] for one in node.args]
-        match node.op:
-            case "state":
-                known[node] = 1 if node.payload in moving else 0
-            case "add" | "sub" | "neg" | "select":
-                known[node] = max(below)
-            case "mul":
-                known[node] = sum(below)
-            case "div":
-                known[node] = below[0] if below[1] == 0 else math.inf
-            case "pow":
-                whole = node.args[1].op == "const" and float(node.args[1].payload) % 1 == 0
-                power = float(node.args[1].payload) if whole else math.inf
-                known[node] = 0 if not any(below) else below[0] * power if power > 0 else math.inf
-            case _:
-                known[node] = math.inf if any(below) else 0
-    return max((known[root] for root in roots), default=0)

@@ -156,12 +156,12 @@ def intervals_of(
             bits[mine] = sides
             gap = _series(name, guards[number], about, harmonics, bits)
             _, angle, slope = fourier.zeros_of(gap[None])
-            here = (intervals.bits[intervals.of(angle)][:, mine] == sides).all(axis=1)
-            more = np.array([angle, np.full(len(angle), number), slope])
-            found = np.append(found, more[:, here], axis=1)
+            there = (intervals.bits[intervals.of(angle)][:, mine] == sides).all(axis=1)
+            new = np.array([angle, np.full(len(angle), number), slope])
+            found = np.append(found, new[:, there], axis=1)
         intervals = _cut(intervals, found)
-        there = about(intervals.middle)
-        (values,) = evaluate([guards[number].gap], **there, bits=list(intervals.bits.T))  # type: ignore[arg-type]
+        middle = about(intervals.middle)
+        (values,) = evaluate([guards[number].gap], **middle, bits=list(intervals.bits.T))  # type: ignore[arg-type]
         intervals.bits[:, number] = np.asarray(values) > 0
     angle, which, slope = found[:, found[0].argsort(kind="stable")]
     at = np.searchsorted(intervals.begin, angle)

@@ -106,10 +106,11 @@ class States:
 
 @functools.lru_cache(maxsize=64)
 def _integrals(harmonics: int, orders: tuple[int, ...]) -> np.ndarray:
-    """What integrals of some orders over the angle do to amplitudes, complex128[H + 1, c, c]."""
+    """Factors of integrals of some orders over the angle, complex128[H + 1, c, c]."""
     turns = np.arange(harmonics + 1) * 1j
     turns[0] = 1.0
-    return (1.0 / turns[:, None] ** np.array(orders))[:, :, None] * np.eye(len(orders))
+    each = 1.0 / turns[:, None] ** np.array(orders)
+    return np.asarray(each[:, :, None] * np.eye(len(orders)))
 
 
 class AtContacts:

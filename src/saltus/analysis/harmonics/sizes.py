@@ -138,7 +138,7 @@ class _Motion:
 
     @functools.cached_property
     def _turned(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Where the outputs that are series turn."""
+        """Turning points of the outputs that are series, as :func:`_turns`."""
         series = self.series.copy()
         series[self.others] = 0.0
         return _turns(series)

@@ -105,7 +105,7 @@ def test_a_structure_is_condensed_to_its_contacts():
     system = beam()
     found = sl.branches(
         system, {"frequency": ("5 Hz", "5.6 Hz")}, at=1, by=sl.HarmonicBalance(9), points=12,
-        progress=False,
+        switch=(), progress=False,
     )  # fmt: skip
     whole = HarmonicOrbits(replace(system, interfaces=None), "frequency", 9, 1, np.ones((1, 1)))
     few = HarmonicOrbits(system, "frequency", 9, 1, np.ones((1, 1)))
@@ -131,6 +131,29 @@ def test_subharmonic_motions():
         assert (np.abs(found.point_harmonic_real.sel(output="x", harmonic=1)) > 1e-3).all()
         off.append(float(np.nanmedian(found.point_error)))
     assert off[1] < off[0] / 3
+
+
+def test_branches_of_twice_the_period_leave():
+    """The motions of 14 harmonics of half the frequency are those that start at an exact orbit of
+    two periods, and come to the exact branch; the exact one leaves at 0.802033739.
+    """
+    rig, start, limits = sl.models.bilinear_rig(), (0.1, 0.8), {"frequency": (0.79, 0.81)}
+    found = sl.branches(rig, limits, start, at=1, by=sl.HarmonicBalance(7), progress=False)
+    assert found.branch_periods.values.tolist() == [1, 2]
+    assert found.event_kind.values[0] == "period_doubling"
+    assert found.branch_parent.values.tolist() == [-1, 0]
+    assert (found.branch_begin.values[1], found.branch_end.values[1]) == ("branch", "range")
+    assert found.sizes["harmonic"] == 15
+    double = found.isel(point=found.point_branch == 1)
+    assert float(double.point_frequency.min()) == pytest.approx(0.802033739, abs=1e-3)
+    direct = sl.branches(
+        rig, {"frequency": (0.8, 0.81)}, start, at=1, progress=False,
+        by=sl.HarmonicBalance(14, periods=2),
+    )  # fmt: skip
+    peaks = [one.point_peak.values[one.point_frequency.values.argmax()] for one in (double, direct)]
+    assert peaks[0] == pytest.approx(peaks[1], rel=1e-12)
+    single = found.isel(point=found.point_branch == 0)
+    assert np.isnan(single.point_harmonic_real.values[..., 8:]).all()
 
 
 def test_what_is_refused_says_why():
