@@ -86,7 +86,7 @@ def samples():
 
 def equations(system, harmonics, scale, by_samples=False):
     """Those of one motion over the frequency."""
-    found = HarmonicOrbits(system, "frequency", harmonics, 1, scale[None])
+    found = HarmonicOrbits(system, ("frequency",), harmonics, 1, scale[None])
     if by_samples:
         found.forces.__class__ = Sampled
     return found

@@ -65,7 +65,7 @@ class ClosedHarmonics(HarmonicOrbits):
         self, system: System, name: str, harmonics: int, periods: int, scale: np.ndarray,
         symmetric: bool, method: Method, threads: int | None,
     ) -> None:  # fmt: skip
-        super().__init__(system, name, harmonics, periods, scale, symmetric)
+        super().__init__(system, (name,), harmonics, periods, scale, symmetric)
         none = np.ones((0, periods * len(system.states) + 1))
         self._exact = PeriodicOrbits(system, (name,), periods, none, method, threads)
         self._known: dict[bytes, tuple[bool, np.ndarray, np.ndarray]] = {}

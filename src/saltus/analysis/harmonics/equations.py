@@ -29,14 +29,14 @@ class HarmonicOrbits:
     """Curves of periodic motions of H harmonics over one parameter; a ``CurveEquations``, and what
     a branch asks of the equations of its orbits.
 
-    Unknowns z: the series of each signal, one after the other, then the parameter [SI].
+    Unknowns z: the series of each signal, one after the other, then the parameters [SI].
 
     Parameters
     ----------
     system : System
         With forcing; its equations and values are those of all curves.
-    name : str
-        The parameter that is followed.
+    names : tuple of str
+        The parameters that are unknown, the forcing frequency first.
     harmonics : int
         Of the fundamental frequency.
     periods : int
@@ -51,14 +51,15 @@ class HarmonicOrbits:
     free: bool = False
 
     def __init__(
-        self, system: System, name: str, harmonics: int, periods: int, scale: np.ndarray,
+        self, system: System, names: tuple[str, ...], harmonics: int, periods: int,
+        scale: np.ndarray,
         symmetric: bool = False,
     ) -> None:  # fmt: skip
-        self.system, self.names, self.scale = system, (name,), scale
+        self.system, self.names, self.scale = system, names, scale
         self.harmonics, self.periods, self.symmetric = harmonics, periods, symmetric
         self.series = 2 * harmonics + 1
         self.source = signals_of(system)
-        known = parametric(self.source.system, (name,))
+        known = parametric(self.source.system, names)
         self._timed, inner = known.timed, known.system
         self.count, own = len(self.source.chains), self.source.system.states
         self.size = self.count * self.series  # unknowns of a motion
@@ -76,7 +77,7 @@ class HarmonicOrbits:
     @property
     def width(self) -> int:
         """Number of unknowns."""
-        return self.size + 1
+        return self.size + len(self.names)
 
     # -- unknowns ----------------------------------------------------------------------------------
     def signals(self, z: np.ndarray) -> np.ndarray:
@@ -91,21 +92,21 @@ class HarmonicOrbits:
         """The period of motions float64[..., z] [s], float64[...]."""
         if self.names[0] != self.system.forced_at:
             return np.full(z.shape[:-1], self.periods * self.system.period())
-        return np.asarray(self.periods * self.system.period({self.names[0]: z[..., -1]}))
+        return np.asarray(self.periods * self.system.period({self.names[0]: z[..., self.size]}))
 
     def _constants(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, float, np.ndarray]:
         """The states that don't move, their derivatives by the unknowns beside the signals
         float64[e, u], the rate of the angle [rad/s], and its derivatives by these states over
         itself.
         """
-        value = float(z[-1])
+        constants, by = z[self.size :].astype(float), np.zeros(len(self.names))
+        slopes = np.eye(len(constants))
         if not self._timed:
-            rate = 2 * np.pi / self.turn
-            return np.array([value]), np.ones((1, 1)), rate, np.zeros(1)
-        period = float(self.system.period({self.names[0]: value}))
-        rate = 2 * np.pi / (self.periods * period)
-        slopes = np.array([[-period / value]])
-        return np.array([period]), slopes, rate, np.array([-1.0 / period])
+            return constants, slopes, 2 * np.pi / self.turn, by
+        period = float(self.system.period({self.names[0]: constants[0]}))
+        slopes[0, 0], by[0] = -period / constants[0], -1.0 / period
+        constants[0] = period
+        return constants, slopes, 2 * np.pi / (self.periods * period), by
 
     def states(self, z: np.ndarray) -> np.ndarray:
         """The series of the states of a motion float64[z], float64[D, 2H + 1]."""

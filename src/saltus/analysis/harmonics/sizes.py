@@ -56,12 +56,12 @@ class _Motion:
         self.states = orbits.states(z)
         self.intervals: Intervals = orbits.intervals(z)
         self.period = float(orbits.period(z))
-        known = dict(orbits.system.values) | {orbits.names[0]: float(orbits.values(z)[0])}
-        self.parameters: dict[str, Any] = known
+        own = dict(zip(orbits.names, orbits.values(z).tolist(), strict=True))
+        self.parameters: dict[str, Any] = dict(orbits.system.values) | own
         angle, here = _even(orbits.harmonics)
         self.even = self.values(angle)
-        own = self.even[:, len(self.states) :].T
-        self.series = np.append(self.states, fourier.of_samples(own, orbits.harmonics), axis=0)
+        others = fourier.of_samples(self.even[:, len(self.states) :].T, orbits.harmonics)
+        self.series = np.append(self.states, others, axis=0)
         off = np.abs(self.even - here @ self.series.T).max(axis=0)
         #: outputs that are no series of these harmonics, such as forces of contacts
         self.others = np.flatnonzero(~(off <= ROUNDING * np.abs(self.even).max(axis=0)))

@@ -107,8 +107,8 @@ def test_a_structure_is_condensed_to_its_contacts():
         system, {"frequency": ("5 Hz", "5.6 Hz")}, at=1, by=sl.HarmonicBalance(9), points=12,
         switch=(), progress=False,
     )  # fmt: skip
-    whole = HarmonicOrbits(replace(system, interfaces=None), "frequency", 9, 1, np.ones((1, 1)))
-    few = HarmonicOrbits(system, "frequency", 9, 1, np.ones((1, 1)))
+    whole = HarmonicOrbits(replace(system, interfaces=None), ("frequency",), 9, 1, np.ones((1, 1)))
+    few = HarmonicOrbits(system, ("frequency",), 9, 1, np.ones((1, 1)))
     assert (whole.count, few.count) == (4, 2)
     assert (found.point_contacts > 0).any()
     c = found.point_harmonic_real.values + 1j * found.point_harmonic_imag.values
@@ -202,6 +202,26 @@ def test_backbones_of_the_duffing_oscillator(row, cubic, single):
     assert float(found.point_error[-1]) < 1e-11
 
 
+def test_quadrature_of_few_harmonics():
+    """Of one harmonic the stiffness of the describing function, and a force that the damper takes;
+    of more, the exact family.
+    """
+    limits, given = (0.9, 2.0), {"phase": "quadrature", "progress": False}
+    exact = sl.backbone(STOP, limits, **given)
+    ends = {}
+    for count in (1, 5, 15):
+        found = sl.backbone(STOP, limits, by=sl.HarmonicBalance(count), **given)
+        ends[count] = np.array([found.point_frequency.values[-1], found.point_force.values[-1]])
+        assert float(found.point_error[0]) < 1e-12  # no contact yet
+    edge = 0.5
+    stiffness = 1 + 9 * (np.arccos(edge) - edge * np.sqrt(1 - edge**2)) * 2 / np.pi
+    frequency = np.sqrt(stiffness)
+    assert ends[1] == pytest.approx([frequency, 0.1 * frequency * 2.0], rel=1e-12)
+    known = np.array([exact.point_frequency.values[-1], exact.point_force.values[-1]])
+    off = {count: np.abs(one / known - 1).max() for count, one in ends.items()}
+    assert off[1] > 25 * off[5] > 25**2 * off[15] / 2
+
+
 def test_end_of_the_resonance_in_one_harmonic():
     """H10, H11: the largest amplitude of NLvib's example 01 is there, and nowhere beside it."""
 
@@ -209,7 +229,7 @@ def test_end_of_the_resonance_in_one_harmonic():
     def forced(t, x, v, *, damping=0.05, cubic=0.1, force=0.18, w=1.0):
         return v, force * sl.cos(w * t) - damping * v - x - cubic * x**3
 
-    orbits, (amplitude, w) = HarmonicOrbits(forced, "w", 1, 1, np.ones((1, 4))), END
+    orbits, (amplitude, w) = HarmonicOrbits(forced, ("w",), 1, 1, np.ones((1, 4))), END
     lag = np.arctan2(0.05 * w, 1 + 0.075 * amplitude**2 - w**2)
     series = amplitude * np.array([0.0, np.cos(lag), np.sin(lag)])
     residual, derivative = orbits.evaluate(np.append(series, w)[None], np.zeros(1, int))

@@ -21,7 +21,7 @@ with open(Path(__file__).parents[3] / "reference/backbones_hbm.csv") as table:
 
 
 def equations(system, harmonics, name="frequency", periods=1):
-    found = HarmonicOrbits(system, name, harmonics, periods, np.ones((1, 1)))
+    found = HarmonicOrbits(system, (name,), harmonics, periods, np.ones((1, 1)))
     found.scale = np.ones((1, found.width))
     return found
 
