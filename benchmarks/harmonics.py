@@ -70,10 +70,9 @@ class Sampled(Forces):
     def intervals(self, signals, constants, rate):
         """Every sample with the sides on which it lies."""
         angle, harmonics = samples(), fourier.harmonics_of(signals.shape[1])
-        gaps = self._gaps(signals, constants, rate)
+        numbers, gaps = self._gaps(self.states(signals, rate), constants)
         bits = np.zeros((SAMPLES, len(self.system.guards)), bool)
-        for number, gap in gaps.items():
-            bits[:, number] = fourier.basis(angle, harmonics) @ gap > 0
+        bits[:, numbers] = fourier.basis(angle, harmonics) @ gaps.T > 0
         return Intervals(angle, np.full(SAMPLES, 2 * np.pi / SAMPLES), bits, uncut(0).instants)
 
     def nodes(self, intervals, harmonics):  # noqa: ARG002
@@ -87,7 +86,7 @@ def samples():
 
 def equations(system, harmonics, scale, by_samples=False):
     """Those of one motion over the frequency."""
-    found = HarmonicOrbits(system, "frequency", harmonics, 1, scale[None])
+    found = HarmonicOrbits(system, ("frequency",), harmonics, 1, scale[None])
     if by_samples:
         found.forces.__class__ = Sampled
     return found

@@ -191,6 +191,19 @@ CAPTURE = Interface(
     truths=(),
 )
 
+#: The zeros of Fourier series, which don't depend on an equation.
+HARMONICS = Interface(
+    entry="zeros",
+    arguments=(_F2, _I1, _F1, _F1),
+    layout="",
+    templates=("harmonics",),
+    sizes=(),
+    flags=(),
+    tables=MappingProxyType({}),
+    functions=MappingProxyType({}),
+    truths=(),
+)
+
 _MODAL_TABLES = (
     *(_I1, _I1, _F1, _F2, _F2, _F2, _F2, _F2, _I2, _F2, _F2),
     *(_I2, _F2, _F2, _I1, _F2, _F2),

@@ -18,6 +18,7 @@ from saltus.codegen.interface import (
     ADAMS,
     CAPTURE,
     FIXED_STEP,
+    HARMONICS,
     MODAL,
     NDF,
     PAIR,
@@ -131,6 +132,12 @@ def _printed(system: System, head: Callable[[], Head]) -> Head:
 def capture_module() -> Any:
     """The compiled test of capture, the same for all systems."""
     return _flow(CAPTURE, "capture", Head({}, ""), "capture", "the test of capture")
+
+
+@lru_cache(maxsize=1)
+def harmonics_module() -> Any:
+    """The compiled search for the zeros of Fourier series, the same for all systems."""
+    return _flow(HARMONICS, "harmonics", Head({}, ""), "harmonics", "the zeros of Fourier series")
 
 
 @lru_cache(maxsize=1)

@@ -4,6 +4,7 @@ generated code.
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
@@ -17,6 +18,11 @@ _OPERATIONS: dict[str, Any] = {
     name: getattr(np, one.numpy) for name, one in (ARITHMETIC | FUNCTIONS).items() if one.operands
 }
 _OPERATIONS["mod"] = np.mod
+# the same on arrays, and on scalars in a fifth of the time
+_OPERATIONS |= {
+    "add": operator.add, "sub": operator.sub, "mul": operator.mul, "div": operator.truediv,
+    "neg": operator.neg,
+}  # fmt: skip
 
 
 def evaluate(
@@ -47,8 +53,8 @@ def evaluate(
         One for each expression. Where an operation isn't defined the value is nan or inf, without a
         warning.
     """
-    steps, places, wanted = _program(tuple(expressions))
-    known: list[Any] = []
+    constants, steps, places, wanted = _program(tuple(expressions))
+    known = list(constants)
     leaves = {"state": states or {}, "param": values or {}}
 
     def truth(condition: Condition) -> Any:
@@ -66,37 +72,36 @@ def evaluate(
         raise TypeError(condition)
 
     with np.errstate(all="ignore"):
-        for op, payload, args in steps:
-            if op == "const":
-                known.append(payload)
-            elif op == "time":
-                known.append(np.asarray(t, dtype=np.float64)[()])
+        for place, op, payload, args in steps:
+            if op == "time":
+                known[place] = np.asarray(t, dtype=np.float64)[()]
             elif op in leaves:
-                known.append(np.asarray(leaves[op][payload], dtype=np.float64)[()])
+                known[place] = np.asarray(leaves[op][payload], dtype=np.float64)[()]
             elif op == "select":
                 where, otherwise = (known[i] for i in args)
-                known.append(np.where(truth(payload), where, otherwise)[()])
+                known[place] = np.where(truth(payload), where, otherwise)[()]
             else:
-                known.append(payload(*[known[i] for i in args]))
+                known[place] = payload(*[known[i] for i in args])
     return [known[place] for place in wanted]
 
 
 @lru_cache(maxsize=512)
 def _program(
     expressions: tuple[Expr, ...],
-) -> tuple[list[tuple[str, Any, tuple[int, ...]]], dict[Expr, int], list[int]]:
-    """The operations that compute some expressions, each with its payload (a function, if it has
-    operands) and the indices of its operands; the index of each node's value; and the wanted
-    indices.
+) -> tuple[
+    list[Any], list[tuple[int, str, Any, tuple[int, ...]]], dict[Expr, int], list[int]
+]:  # fmt: skip
+    """The program of some expressions: the constants in their places; the other operations, each
+    with its place, its payload (a function, if it has operands) and the places of its operands; the
+    place of each node's value; and the wanted places.
     """
     places: dict[Expr, int] = {}
-    steps: list[tuple[str, Any, tuple[int, ...]]] = []
+    constants: list[Any] = []
+    steps: list[tuple[int, str, Any, tuple[int, ...]]] = []
     for node in walk(*expressions):
-        payload = node.payload
-        if node.op == "const":
-            payload = np.float64(payload)
-        elif node.op in _OPERATIONS:
-            payload = _OPERATIONS[node.op]
-        steps.append((node.op, payload, tuple(places[child] for child in node.args)))
-        places[node] = len(places)
-    return steps, places, [places[one] for one in expressions]
+        place = places[node] = len(places)
+        constants.append(np.float64(node.payload) if node.op == "const" else None)
+        if node.op != "const":
+            payload = _OPERATIONS.get(node.op, node.payload)
+            steps.append((place, node.op, payload, tuple(places[child] for child in node.args)))
+    return constants, steps, places, [places[one] for one in expressions]

@@ -11,7 +11,7 @@ import xarray as xr
 from saltus.analysis.branches.arclength import Arc, correct, follow
 from saltus.analysis.branches.branch_table import numbers_of, stacked
 from saltus.analysis.branches.forced_vibration import Forcing, QuadratureOrbits, small_vibration
-from saltus.analysis.branches.free_harmonics import ClosedFree, begun
+from saltus.analysis.branches.free_harmonics import BesideFamily, begun
 from saltus.analysis.branches.free_vibration import (
     LONGEST,
     FreeOrbits,
@@ -21,7 +21,7 @@ from saltus.analysis.branches.free_vibration import (
 )
 from saltus.analysis.branches.special_points import zeros
 from saltus.analysis.dataset_parts import provenance, subject
-from saltus.analysis.harmonics.balance import HarmonicBalance, check_free
+from saltus.analysis.harmonics.balance import HarmonicBalance, check_backbone
 from saltus.analysis.inputs.given import Range, Value
 from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.inputs.starts import at_values, check_system
@@ -39,7 +39,7 @@ from saltus.system.modes import sides
 from saltus.system.quantity import formula_of, unit_of
 from saltus.units import to_si
 
-Orbits = FreeOrbits | QuadratureOrbits | ClosedFree
+Orbits = FreeOrbits | QuadratureOrbits | BesideFamily
 #: Vibrations begin at this share of the smallest amplitude.
 BEFORE = 0.9
 #: Largest fictitious damping, in units of the frequency, that is rounding.
@@ -110,8 +110,8 @@ def backbone(
         Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
         it serves; another one must be exact.
     by : HarmonicBalance, optional
-        Of free vibrations: motions of a few harmonics in place of exact ones, each held against the
-        exact one of its size.
+        Motions of a few harmonics in place of exact ones, each held against the exact one of its
+        size.
     threads : int, optional
         Default all processors.
     progress : bool or callable
@@ -165,7 +165,7 @@ def backbone(
         )
     about = Forcing.of(system, force, state) if phase == "quadrature" else None
     if by is not None:
-        check_free(by, system, phase)
+        check_backbone(by, system)
     with reporting(progress) as show:
         start: tuple[System, Orbits, np.ndarray] = (
             _free_start(system, (low, high), mode, state, method, threads)
@@ -173,7 +173,7 @@ def backbone(
             else _forced_start(system, about, (low, high), mode, measured, method, threads)
         )
         moving, orbits, z = start
-        if by is not None and isinstance(orbits, FreeOrbits):
+        if by is not None and not isinstance(orbits, BesideFamily):
             orbits, z = begun(orbits, by.count, z)
         peak = _Peak(moving, orbits, method, measured)
         whole_z, end = _family(orbits, z, peak, (low, high), points, show)
@@ -382,9 +382,9 @@ def _table(
         "output_units": list(outputs.units),
         **{f"point_output_{key}": by_name[key] for key in ("maximum", "minimum", "peak", "rms")},
     }
-    if isinstance(orbits, ClosedFree):
+    if isinstance(orbits, BesideFamily):
         data |= orbits.told(z)
-    if not isinstance(orbits, QuadratureOrbits):
+    if attrs["phase"] == "free":
         data["fictitious_damping"] = _conserved(system, z[:, -1], period)
         about, when = (
             provenance(system, method, system.values),

@@ -7,6 +7,7 @@ determinant would tell rests on the truncated motion, and on how its eigenvalues
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -29,6 +30,8 @@ NEAR = 0.5
 #: Samples of a forcing period by which an exact orbit is read off as a series, and by which it is
 #: held against a truncated one.
 SAMPLES = 256
+#: Numbers that are held at a time, of motions beside exact orbits: some 16 MB.
+TOGETHER = 2**21
 
 
 @dataclass(frozen=True)
@@ -62,7 +65,7 @@ class ClosedHarmonics(HarmonicOrbits):
         self, system: System, name: str, harmonics: int, periods: int, scale: np.ndarray,
         symmetric: bool, method: Method, threads: int | None,
     ) -> None:  # fmt: skip
-        super().__init__(system, name, harmonics, periods, scale, symmetric)
+        super().__init__(system, (name,), harmonics, periods, scale, symmetric)
         none = np.ones((0, periods * len(system.states) + 1))
         self._exact = PeriodicOrbits(system, (name,), periods, none, method, threads)
         self._known: dict[bytes, tuple[bool, np.ndarray, np.ndarray]] = {}
@@ -124,23 +127,30 @@ class ClosedHarmonics(HarmonicOrbits):
         good = np.flatnonzero(exact.found)
         if not len(good):
             return apart, ranges
-        seen = samples(
-            self.system, self.names[0], exact.points[good, 0], self.values(z[good])[:, 0],
-            self.periods, self._exact.map.method,
-        )  # fmt: skip
-        share = np.arange(seen.shape[1]) / seen.shape[1]
-        here = fourier.basis(2 * np.pi * share, self.harmonics)
-        for i, one in zip(good, seen, strict=True):
-            about = dict(self.system.values) | {self.names[0]: float(z[i, -1])}
-            time, both = share * float(self.period(z[i])), (here @ self.states(z[i]).T, one)
-            modes = [mode_number(sides(self.system, time, each.T, about)) for each in both]
-            truncated, known = (
-                outputs.values(time, each, about, mode)
-                for each, mode in zip(both, modes, strict=True)
-            )
-            apart[i] = np.abs(truncated - known).max(axis=0)
-            ranges[i] = np.ptp(known, axis=0)
+        each = SAMPLES * self.periods
+        for some in np.array_split(good, 1 + len(good) * each * len(outputs) // TOGETHER):
+            seen = samples(
+                self.system, self.names[0], exact.points[some, 0], self.values(z[some])[:, 0],
+                self.periods, self._exact.map.method,
+            )  # fmt: skip
+            share = np.arange(each) / each
+            here = fourier.basis(2 * np.pi * share, self.harmonics)
+            truncated = np.array([here @ self.states(one).T for one in z[some]])
+            about = dict(self.system.values) | {self.names[0]: z[some, -1:]}
+            time = share * self.period(z[some])[:, None]
+            truncated, known = (self._read(one, time, about, outputs) for one in (truncated, seen))
+            apart[some] = np.abs(truncated - known).max(axis=1)
+            ranges[some] = np.ptp(known, axis=1)
         return apart, ranges
+
+    def _read(
+        self, states: np.ndarray, time: np.ndarray, about: dict[str, Any], outputs: Outputs
+    ) -> np.ndarray:
+        """Outputs at states float64[r, n, D], float64[r, n, K]."""
+        mode = np.zeros(time.shape, np.int64)
+        if outputs.formulas:
+            mode = mode_number(sides(self.system, time, np.moveaxis(states, 2, 0), about))
+        return outputs.values(time, states, about, mode)
 
 
 def copy_with(orbits: PeriodicOrbits, scale: np.ndarray) -> PeriodicOrbits:

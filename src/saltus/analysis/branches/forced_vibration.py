@@ -169,7 +169,7 @@ class QuadratureOrbits(PeriodicOrbits):
         super().__init__(system, names, 1, scale, method, threads)
         x = ex.state(system.states[force.displacement])
         rate = ex.mul(x, force.rates[force.row])
-        self.rest = rest
+        self.rest, self.force = rest, force
         self._extended = PeriodicOrbits(
             with_states(system, {INTEGRAL: rate}),
             names,

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
 
-from saltus.analysis.branches.arclength import Arc, follow
+from saltus.analysis.branches.arclength import follow
 from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.closed_harmonics import ClosedHarmonics, samples
+from saltus.analysis.branches.doubled_harmonics import doubled, halved
 from saltus.analysis.branches.switching import Seed, crossing
 from saltus.analysis.branches.tracing import Plan, both_ways, trace
 from saltus.analysis.closed.cycles import units
 from saltus.analysis.harmonics import series as fourier
-from saltus.analysis.harmonics.balance import HarmonicBalance
+from saltus.analysis.harmonics.balance import MOST, HarmonicBalance
 from saltus.analysis.harmonics.sizes import amplitudes
 from saltus.analysis.inputs.outputs import Outputs
 from saltus.analysis.solve.newton import newton
@@ -56,10 +57,6 @@ def _leave(
                 )
 
 
-def _goes_on(orbits: ClosedHarmonics, curve: Arc) -> str:  # noqa: ARG001
-    return ""
-
-
 def worst(branches: Sequence[Branch], outputs: Outputs, by: HarmonicBalance) -> float:
     """Largest distance of a motion on branches from its exact orbit, over the range."""
     found = balanced(branches, outputs, by.count)["point_error"]
@@ -68,12 +65,14 @@ def worst(branches: Sequence[Branch], outputs: Outputs, by: HarmonicBalance) -> 
 
 def balanced(branches: Sequence[Branch], outputs: Outputs, harmonics: int) -> dict[str, Any]:
     """The variables that branches of truncated motions have besides those of exact orbits."""
-    size, wide = len(outputs), [np.zeros((0, len(outputs), harmonics + 1), complex)]
+    balances = [one.orbits for one in branches if isinstance(one.orbits, ClosedHarmonics)]
+    most = max((orbits.harmonics for orbits in balances), default=harmonics)
+    size, wide = len(outputs), [np.zeros((0, len(outputs), most + 1), complex)]
+    unknown: dict[str, Any] = {"constant_values": np.nan}
     apart, share = [np.zeros((0, size))], [np.zeros(0)]
-    for branch in branches:
-        orbits = branch.orbits
-        assert isinstance(orbits, ClosedHarmonics)
-        wide.append(np.array([amplitudes(orbits, z, outputs) for z in branch.z]))
+    for branch, orbits in zip(branches, balances, strict=True):
+        each = np.array([amplitudes(orbits, z, outputs) for z in branch.z])
+        wide.append(np.pad(each, [(0, 0), (0, 0), (0, most - orbits.harmonics)], **unknown))
         off, ranges = orbits.errors(branch.z, outputs)
         states = len(orbits.system.states)
         told = slice(states, None) if orbits.system.outputs.first else slice(states)
@@ -81,7 +80,7 @@ def balanced(branches: Sequence[Branch], outputs: Outputs, harmonics: int) -> di
         apart.append(off)
     whole = np.concatenate(wide)
     return {
-        "harmonic": np.arange(harmonics + 1),
+        "harmonic": np.arange(most + 1),
         "point_error": np.concatenate(share),
         "point_output_error": np.concatenate(apart),
         "point_harmonic_real": whole.real,
@@ -102,26 +101,39 @@ def trace_harmonics(
         If no truncated motion is found.
     """
     symmetric = is_symmetric(system, {name: plan.limits})
+
+    def equations(harmonics: int, periods: int, scale: np.ndarray) -> ClosedHarmonics:
+        return ClosedHarmonics(system, name, harmonics, periods, scale, symmetric, method, threads)
+
     for periods, some in _by_periods(seeds, places, by):
-
-        def make(_: int, scale: np.ndarray, periods: int = periods) -> ClosedHarmonics:
-            return ClosedHarmonics(
-                system, name, by.count, periods, scale, symmetric, method, threads
-            )
-
-        follow = functools.partial(both_ways, ends=_goes_on, kind=HarmonicBranch)
-        mine = replace(plan, make=make, follow=follow, leave=_leave)  # type: ignore[arg-type]
-        bare = make(1, np.ones((1, 1)))
+        bare = equations(by.count, periods, np.ones((1, 1)))
         guesses = [_near(bare, one, method) for one in some]
         guesses += [_from_rest(bare, place) for place in places if periods == (by.periods or 1)]
         starts = [_begun(bare, *one) for one in guesses]
-        trace(mine, [one for one in starts if one is not None], branches)
+        begins, harmonics = [one for one in starts if one is not None], by.count
+        while begins:
+            make = functools.partial(_made, equations, harmonics, periods)
+            follow = functools.partial(both_ways, ends=halved, kind=HarmonicBranch)
+            first = len(branches)
+            trace(replace(plan, make=make, follow=follow, leave=_leave), begins, branches)  # type: ignore[arg-type]
+            harmonics, periods, begins = 2 * harmonics, 2 * periods, []
+            if periods <= plan.longest and "period_doubling" in plan.switch and harmonics <= MOST:
+                wide = equations(harmonics, periods, np.ones((1, 1)))
+                for number, branch in enumerate(branches[first:], first):
+                    begins += doubled(branch, number, wide)
     if not branches:
         raise ParameterError(
             f"no motion of {by.count} harmonics was found near the orbits of {system.name} to "
             "begin with: ask for more of them by ",
             lambda say: f"{say.key('harmonics')}, or for other starts.",
         )
+
+
+def _made(
+    equations: Callable[[int, int, np.ndarray], ClosedHarmonics], harmonics: int, periods: int,
+    _: int, scale: np.ndarray,
+) -> ClosedHarmonics:  # fmt: skip
+    return equations(harmonics, periods, scale)
 
 
 def _by_periods(

@@ -11,6 +11,7 @@ Kuznetsov, Elements of Applied Bifurcation Theory (2004), chapter 10.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import elementwise
@@ -23,6 +24,8 @@ from saltus.flow.polynomials import between
 
 #: Tests in the order in which they are made.
 KINDS = ("fold", "branch_point", "period_doubling", "neimark_sacker")
+#: The first of them that asks for multipliers.
+BY_MULTIPLIERS = 2
 #: A pair of multipliers whose imaginary part is smaller than this share of its size is real: two
 #: real ones whose product is one are no bifurcation.
 COMPLEX = 1e-7
@@ -71,6 +74,9 @@ def tests(
     )
 
 
+_ENDS = ("z", "derivative")
+
+
 def locate(
     orbits: OrbitEquations,
     rows: np.ndarray,
@@ -112,24 +118,31 @@ def locate(
         derivative = np.where(point.found[:, None, None], point.derivative, 0.0)
         direction = tangents(derivative, tangent[which])
         values = np.full(len(flat), np.nan)
-        good = np.flatnonzero(point.found)
-        if len(good):
-            multipliers = orbits.multipliers(point.z[good], derivative[good], mine[good])
-            tested = tests(direction[good], derivative[good], multipliers, column)
-            values[good] = tested[kind[which[good]], np.arange(len(good))]
-            for place, i in enumerate(good):
-                known[int(which[i])] = Event(
-                    KINDS[kind[which[i]]],
-                    -1,
-                    point.z[i],
-                    multipliers[place],
-                    direction[i],
-                    derivative[i],
+        asks = kind[which] >= BY_MULTIPLIERS
+        for some in (np.flatnonzero(point.found & asks), np.flatnonzero(point.found & ~asks)):
+            if len(some):
+                multipliers = (
+                    orbits.multipliers(point.z[some], derivative[some], mine[some])
+                    if asks[some[0]]
+                    else np.zeros((len(some), 0), complex)
                 )
+                tested = tests(direction[some], derivative[some], multipliers, column)
+                values[some] = tested[kind[which[some]], np.arange(len(some))]
+        for i in np.flatnonzero(point.found).tolist():
+            name = KINDS[kind[which[i]]]
+            known[int(which[i])] = Event(
+                name, -1, point.z[i], np.zeros(0), direction[i], derivative[i]
+            )
         return values
 
     roots = zeros(at, length)
-    result = [known.get(i) if np.isfinite(roots[i]) else None for i in range(len(rows))]
+    result: list[Event | None] = [None] * len(rows)
+    found = [i for i in sorted(known) if np.isfinite(roots[i])]
+    if found:
+        ends, matrices = (np.array([getattr(known[i], one) for i in found]) for one in _ENDS)
+        each = orbits.multipliers(ends, matrices, rows[found])
+        for place, multipliers in zip(found, each, strict=True):
+            result[place] = replace(known[place], multipliers=multipliers)
     for i in np.flatnonzero(kind == KINDS.index("branch_point")):
         guess = z[i] + 0.5 * length[i] * tangent[i] * orbits.scale[rows[i]]
         near = known.get(int(i))

@@ -99,21 +99,13 @@ def check_balanced(by: Any, system: System) -> None:
     _refuse(system, _reason_against_laws(system) if system.forced_at else unforced)
 
 
-def check_free(by: Any, system: System, phase: str) -> None:
-    """The same of free vibrations."""
+def check_backbone(by: Any, system: System) -> None:
+    """The same of backbones."""
     _check(by)
     if by.harmonics == "auto":
         raise ParameterError(
             lambda say: (
-                f"of free vibrations give the number of {say.key('harmonics')}: "
-                f"{say.key(harmonics=9)}."
-            )
-        )
-    if phase != "free":
-        raise ParameterError(
-            lambda say: (
-                f"harmonic balance follows free vibrations, and {say.key(phase=phase)} is of "
-                f"forced ones: leave out {say.key('by')}, or take {say.key(phase='free')}."
+                f"of a backbone give the number of {say.key('harmonics')}: {say.key(harmonics=9)}."
             )
         )
     _refuse(system, _reason_against_laws(system))

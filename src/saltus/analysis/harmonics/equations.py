@@ -21,7 +21,7 @@ from saltus.analysis.harmonics.signals import States, signals_of
 from saltus.system import System
 from saltus.system.parametric import parametric
 
-#: Motions whose states are remembered.
+#: Motions whose forces and boundaries are remembered.
 REMEMBERED = 4096
 
 
@@ -29,14 +29,14 @@ class HarmonicOrbits:
     """Curves of periodic motions of H harmonics over one parameter; a ``CurveEquations``, and what
     a branch asks of the equations of its orbits.
 
-    Unknowns z: the series of each signal, one after the other, then the parameter [SI].
+    Unknowns z: the series of each signal, one after the other, then the parameters [SI].
 
     Parameters
     ----------
     system : System
         With forcing; its equations and values are those of all curves.
-    name : str
-        The parameter that is followed.
+    names : tuple of str
+        The parameters that are unknown, the forcing frequency first.
     harmonics : int
         Of the fundamental frequency.
     periods : int
@@ -51,14 +51,15 @@ class HarmonicOrbits:
     free: bool = False
 
     def __init__(
-        self, system: System, name: str, harmonics: int, periods: int, scale: np.ndarray,
+        self, system: System, names: tuple[str, ...], harmonics: int, periods: int,
+        scale: np.ndarray,
         symmetric: bool = False,
     ) -> None:  # fmt: skip
-        self.system, self.names, self.scale = system, (name,), scale
+        self.system, self.names, self.scale = system, names, scale
         self.harmonics, self.periods, self.symmetric = harmonics, periods, symmetric
         self.series = 2 * harmonics + 1
         self.source = signals_of(system)
-        known = parametric(self.source.system, (name,))
+        known = parametric(self.source.system, names)
         self._timed, inner = known.timed, known.system
         self.count, own = len(self.source.chains), self.source.system.states
         self.size = self.count * self.series  # unknowns of a motion
@@ -66,15 +67,17 @@ class HarmonicOrbits:
             own[i]: DerivedState(signal, times)
             for signal, chain in enumerate(self.source.chains) for times, i in enumerate(chain)
         }  # fmt: skip
-        self._remembered: dict[bytes, tuple[np.ndarray, Intervals]] = {}
+        self._remembered: dict[bytes, tuple[np.ndarray | None, Intervals]] = {}
         self.turn = periods * (1.0 if self._timed else float(system.period()))
+        own_factors = self.source.own(harmonics)
+        self._own = np.concatenate([own_factors, own_factors[1:]]).T.ravel()
         forces = [inner.field[i] for i in self.source.forces]
         self.forces = Forces(inner, forces, moving, inner.states[len(own) :], self.turn, periods)
 
     @property
     def width(self) -> int:
         """Number of unknowns."""
-        return self.size + 1
+        return self.size + len(self.names)
 
     # -- unknowns ----------------------------------------------------------------------------------
     def signals(self, z: np.ndarray) -> np.ndarray:
@@ -89,21 +92,21 @@ class HarmonicOrbits:
         """The period of motions float64[..., z] [s], float64[...]."""
         if self.names[0] != self.system.forced_at:
             return np.full(z.shape[:-1], self.periods * self.system.period())
-        return np.asarray(self.periods * self.system.period({self.names[0]: z[..., -1]}))
+        return np.asarray(self.periods * self.system.period({self.names[0]: z[..., self.size]}))
 
     def _constants(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, float, np.ndarray]:
         """The states that don't move, their derivatives by the unknowns beside the signals
         float64[e, u], the rate of the angle [rad/s], and its derivatives by these states over
         itself.
         """
-        value = float(z[-1])
+        constants, by = z[self.size :].astype(float), np.zeros(len(self.names))
+        slopes = np.eye(len(constants))
         if not self._timed:
-            rate = 2 * np.pi / self.turn
-            return np.array([value]), np.ones((1, 1)), rate, np.zeros(1)
-        period = float(self.system.period({self.names[0]: value}))
-        rate = 2 * np.pi / (self.periods * period)
-        slopes = np.array([[-period / value]])
-        return np.array([period]), slopes, rate, np.array([-1.0 / period])
+            return constants, slopes, 2 * np.pi / self.turn, by
+        period = float(self.system.period({self.names[0]: constants[0]}))
+        slopes[0, 0], by[0] = -period / constants[0], -1.0 / period
+        constants[0] = period
+        return constants, slopes, 2 * np.pi / (self.periods * period), by
 
     def states(self, z: np.ndarray) -> np.ndarray:
         """The series of the states of a motion float64[z], float64[D, 2H + 1]."""
@@ -116,18 +119,22 @@ class HarmonicOrbits:
     def _along(self, z: np.ndarray) -> tuple[np.ndarray, Intervals]:
         """The states and intervals of a motion, remembered."""
         key = z.tobytes()
+        constants, _, rate, rate_by = self._constants(z)
+        signals = self.signals(z)
         if key not in self._remembered:
-            if len(self._remembered) >= REMEMBERED:
-                self._remembered.clear()
-            constants, _, rate, rate_by = self._constants(z)
-            signals, forces = self.signals(z), None
             if isinstance(self.source, States):
-                intervals = self.forces.intervals(signals, constants, rate)
+                self._remember(z, None, self.forces.intervals(signals, constants, rate))
             else:
                 found = self.forces.coefficients(signals, constants, rate, rate_by)
-                intervals, forces = found.intervals, found.values / self._pace(constants)
-            self._remembered[key] = self.source.states(signals, forces, rate), intervals
-        return self._remembered[key]
+                self._remember(z, found.values / self._pace(constants), found.intervals)
+        forces, intervals = self._remembered[key]
+        return self.source.states(signals, forces, rate), intervals
+
+    def _remember(self, z: np.ndarray, forces: np.ndarray | None, intervals: Intervals) -> None:
+        """Keep the series of the forces along a motion, and where it meets boundaries."""
+        if len(self._remembered) >= REMEMBERED:
+            self._remembered.clear()
+        self._remembered[z.tobytes()] = forces, intervals
 
     def _pace(self, constants: np.ndarray) -> float:
         """Factor of the rates of the equations."""
@@ -154,6 +161,13 @@ class HarmonicOrbits:
         count = 8 * (self.harmonics + 1)
         return fourier.basis(2 * np.pi * np.arange(count) / count, self.harmonics)
 
+    @functools.cached_property
+    def odd(self) -> np.ndarray:
+        """True for unknowns of odd harmonics, empty in motions of half the period, bool[z]."""
+        order = np.concatenate([np.arange(self.harmonics + 1), np.arange(1, self.harmonics + 1)])
+        mine = np.tile(order % 2 == 1, self.count)
+        return np.append(mine, np.zeros(self.width - self.size, bool))
+
     def of_states(self, states: np.ndarray, value: float) -> np.ndarray:
         """The unknowns of a motion with series of the states float64[D, 2h + 1]."""
         signals = fourier.resized(self.source.of_states(states), self.harmonics)
@@ -177,23 +191,20 @@ class HarmonicOrbits:
         signals = self.signals(z)
         constants, slopes, rate, rate_by = self._constants(z)
         found = self.forces.coefficients(signals, constants, rate, rate_by)
-        whole, by_rate = (
-            fourier.transfer(one) for one in self.source.response(self.harmonics, rate)
-        )
-        own = self.source.own(self.harmonics)
-        own = np.concatenate([own, own[1:]]).T.ravel()
-        size, forces = self.size, found.values.ravel()
         period = self._pace(constants)
-        flat, flat_by_rate = (one.reshape(size, -1) / period for one in (whole, by_rate))
-        derivative = np.empty((size, self.width))
-        derivative[:, :size] = -flat @ found.by_signals.reshape(len(forces), size)
-        derivative[np.arange(size), np.arange(size)] += own
-        by_constants = -flat @ found.by_constants.reshape(len(forces), -1)
-        by_constants -= np.outer(flat_by_rate @ forces, rate_by)
+        self._remember(z, found.values / period, found.intervals)
+        response, by_rate = self.source.response(self.harmonics, rate)
+        moved = fourier.responses(response / period, found.whole).reshape(self.size, -1)
+        turned = fourier.responses(by_rate / period, found.values).ravel()
+        own = self._own
+        derivative = np.empty((self.size, self.width))
+        derivative[:, : self.size] = -moved[:, 1 : 1 + self.size]
+        derivative[np.arange(self.size), np.arange(self.size)] += own
+        by_constants = -moved[:, 1 + self.size :] - np.outer(turned, rate_by)
         if self._timed:
-            by_constants[:, 0] += flat @ forces / period
-        derivative[:, size:] = by_constants @ slopes
-        return own * z[:size] - flat @ forces, derivative
+            by_constants[:, 0] += moved[:, 0] / period
+        derivative[:, self.size :] = by_constants @ slopes
+        return own * z[: self.size] - moved[:, 0], derivative
 
     def accepted(self, z: np.ndarray, rows: np.ndarray) -> None:
         """Nothing depends on it."""

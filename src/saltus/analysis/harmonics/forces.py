@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,7 +18,8 @@ import numpy as np
 
 from saltus.analysis.harmonics import series as fourier
 from saltus.analysis.harmonics.pieces import Intervals, intervals_of
-from saltus.contact.guards import is_hold
+from saltus.analysis.harmonics.powers import bends, degree
+from saltus.contact.guards import bits_in, is_hold
 from saltus.language import expression as ex
 from saltus.language.derivatives import gradients
 from saltus.language.evaluate import evaluate
@@ -31,6 +32,8 @@ UNEVEN = 6
 MULTIPLES = 12
 #: A jump below this share of a force is rounding.
 ROUNDING = 1e-12
+#: Distance from an instant within which depths are rounding [rad].
+BESIDE = 1e-12
 #: Random states at which forces are compared on both sides of a boundary.
 TRIED = 16
 
@@ -57,19 +60,36 @@ class Coefficients:
 
     Attributes
     ----------
-    values : float64[m, 2H + 1]
-    by_signals : float64[m, 2H + 1, c, 2H + 1]
-        Their derivatives with respect to the coefficients of the signals.
-    by_constants : float64[m, 2H + 1, e]
-        With respect to the states that don't move.
+    whole : float64[m, 2H + 1, 1 + c (2H + 1) + e]
+        Behind one another :attr:`values`, :attr:`by_signals` and :attr:`by_constants`.
+    signals : int
+        Number of the signals.
     intervals : Intervals
         The motion between the boundaries that it meets.
     """
 
-    values: np.ndarray
-    by_signals: np.ndarray
-    by_constants: np.ndarray
+    whole: np.ndarray
+    signals: int
     intervals: Intervals
+
+    @property
+    def values(self) -> np.ndarray:
+        """The coefficients, float64[m, 2H + 1]."""
+        return self.whole[:, :, 0]
+
+    @property
+    def by_signals(self) -> np.ndarray:
+        """Their derivatives with respect to the coefficients of the signals,
+        float64[m, 2H + 1, c, 2H + 1].
+        """
+        forces, width, _ = self.whole.shape
+        mine = self.whole[:, :, 1 : 1 + self.signals * width]
+        return mine.reshape(forces, width, self.signals, width)
+
+    @property
+    def by_constants(self) -> np.ndarray:
+        """With respect to the states that don't move, float64[m, 2H + 1, e]."""
+        return self.whole[:, :, 1 + self.signals * self.whole.shape[1] :]
 
 
 class Forces:
@@ -100,33 +120,46 @@ class Forces:
         names = (*self.moving, *self.constants)
         self._slopes = gradients(forces, names)
         self._gap_slopes = gradients([guard.gap for guard in system.guards], names)
+        # those by moving states first
         self._known = [
-            (i, j) for i, row in enumerate(self._slopes) for j, one in enumerate(row)
-            if not _is_zero(one)
+            (i, j) for mine in (True, False) for i, row in enumerate(self._slopes)
+            for j, one in enumerate(row) if not _is_zero(one) and mine == (j < len(self.moving))
         ]  # fmt: skip
+        self._by_moving = sum(j < len(self.moving) for _, j in self._known)
         self._entries = (*forces, *(self._slopes[i][j] for i, j in self._known))
         self._degree = degree(forces, self.moving)
+        self._bent = bends(forces, system.values) if math.isinf(self._degree) else 0
         states, rows = list(self.moving), enumerate(self._gap_slopes)
-        self._linear = {
-            i: [(self.moving[name], j) for j, name in enumerate(states) if not _is_zero(row[j])]
-            for i, row in rows if _is_linear(system.guards[i].gap, row[: len(states)], states)
+        linear = [
+            i for i, row in rows if _is_linear(system.guards[i].gap, row[: len(states)], states)
+        ]
+        self._linear = {i: self._gap_slopes[i][: len(states)] for i in linear}
+        self._numbers = np.array(linear, np.int64)
+        self._gap_entries = [
+            one for i, row in self._linear.items() for one in (system.guards[i].gap, *row)
+        ]
+        self._asked = {
+            i: sorted(bits_in([guard.gap]))
+            for i, guard in enumerate(system.guards) if not is_hold(guard)
         }  # fmt: skip
         self._rest = dict.fromkeys(states, 0.0)
+        self._signal = np.array([one.signal for one in self.moving.values()])
+        self._times = np.array([one.times for one in self.moving.values()])
 
-    def motion(
-        self, angle: np.ndarray, signals: np.ndarray, constants: np.ndarray, rate: float
-    ) -> dict[str, Any]:
-        """Inputs of expressions at angles float64[n], but for the bits: signals float64[c, 2H + 1],
-        the constants float64[e], and the angle's rate.
+    def states(self, signals: np.ndarray, rate: float) -> np.ndarray:
+        """The series of the states that move, float64[s, 2H + 1]."""
+        found = signals[self._signal]
+        for times in range(1, self._times.max() + 1):
+            mine = self._times == times
+            found[mine] = fourier.derivative(found[mine], times) * rate**times
+        return np.asarray(found)
+
+    def motion(self, angle: np.ndarray, seen: np.ndarray, constants: np.ndarray) -> dict[str, Any]:
+        """Inputs of expressions at angles float64[n], but for the bits: states that move
+        float64[n, s] and those that don't float64[e].
         """
-        here = fourier.basis(angle, fourier.harmonics_of(signals.shape[1]))
-        known: dict[int, np.ndarray] = {}
-        for times in {one.times for one in self.moving.values()}:
-            known[times] = here @ (fourier.derivative(signals, times) * rate**times).T
-        states = {name: known[one.times][:, one.signal] for name, one in self.moving.items()}
-        states |= {
-            name: np.asarray(value) for name, value in zip(self.constants, constants, strict=True)
-        }
+        states = dict(zip(self.moving, seen.T, strict=True))
+        states |= dict(zip(self.constants, constants, strict=True))
         return {
             "t": angle * (self.turn / (2 * np.pi)),
             "states": states,
@@ -135,31 +168,42 @@ class Forces:
 
     def intervals(self, signals: np.ndarray, constants: np.ndarray, rate: float) -> Intervals:
         """A motion between the boundaries that it meets."""
+        states, harmonics = self.states(signals, rate), fourier.harmonics_of(signals.shape[1])
         return intervals_of(
             self.system.name,
             self.system.guards,
-            self._gaps(signals, constants, rate),
-            functools.partial(self.motion, signals=signals, constants=constants, rate=rate),
-            fourier.harmonics_of(signals.shape[1]),
+            self._asked,
+            self._gaps(states, constants),
+            lambda angle: self.motion(angle, fourier.basis(angle, harmonics) @ states.T, constants),
+            harmonics,
         )
 
-    def _gaps(
-        self, signals: np.ndarray, constants: np.ndarray, rate: float
-    ) -> dict[int, np.ndarray]:
-        """The series of the gaps that are linear in the moving states."""
-        resting = self._rest | dict(zip(self.constants, constants.tolist(), strict=True))
-        about: dict[str, Any] = {"states": resting, "values": self.system.values}
-        found = {}
-        for i, terms in self._linear.items():
-            wanted = [self.system.guards[i].gap, *(self._gap_slopes[i][j] for _, j in terms)]
-            level, *slopes = evaluate(wanted, **about)
-            gap = np.zeros(signals.shape[1])
-            gap[0] = level
-            for (one, _), slope in zip(terms, slopes, strict=True):
-                series = fourier.derivative(signals[one.signal], one.times)
-                gap += slope * rate**one.times * series
-            found[i] = gap
-        return found
+    def _gaps(self, states: np.ndarray, constants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The guards whose gaps are linear in the moving states, int64[g], and the series of these,
+        float64[g, 2H + 1].
+        """
+        level, slope = self._gap_rows or self._rows(constants)
+        gaps = slope @ states
+        gaps[:, 0] += level
+        return self._numbers, gaps
+
+    def _rows(self, constants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Levels of these gaps at rest float64[g], and slopes by the moving states
+        float64[g, s].
+        """
+        resting = self._rest | dict(zip(self.constants, constants, strict=True))
+        found = evaluate(self._gap_entries, states=resting, values=self.system.values)
+        rows = np.reshape(np.array(found, float), (len(self._linear), 1 + len(self.moving)))
+        return rows[:, 0], rows[:, 1:]
+
+    @functools.cached_property
+    def _gap_rows(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """The same where they don't depend on the states that don't move."""
+        moved = any(
+            node.op == "state" and node.payload in self.constants
+            for node in ex.walk(*self._gap_entries)
+        )
+        return None if moved else self._rows(np.zeros(len(self.constants)))
 
     @functools.cached_property
     def _jumping(self) -> np.ndarray:
@@ -168,39 +212,46 @@ class Forces:
         """
         random, names = np.random.default_rng(0), list(self.moving)
         found = np.ones(len(self.system.guards), bool)
-        for i, terms in self._linear.items():
+        for i, slopes in self._linear.items():
+            column = next((j for j, one in enumerate(slopes) if not _is_zero(one)), None)
+            if column is None:
+                continue
             states = {
                 name: random.uniform(0.5, 2.0, TRIED) * random.choice([-1.0, 1.0], TRIED)
                 for name in (*names, *self.constants)
             }
             states |= {name: np.abs(states[name]) for name in self.constants}
-            wanted = [self.system.guards[i].gap, *(self._gap_slopes[i][j] for _, j in terms)]
+            wanted = [self.system.guards[i].gap, slopes[column]]
             about: dict[str, Any] = {"t": random.uniform(0, 1, TRIED), "values": self.system.values}
-            if not terms:
-                continue
-            gap, slope, *_ = evaluate(wanted, **about, states=states)
-            states[names[terms[0][1]]] = states[names[terms[0][1]]] - gap / slope
-            bits: list[Any] = []
-            for guard in self.system.guards:
-                (gap,) = evaluate([guard.gap], **about, states=states, bits=bits)
-                bits.append(np.broadcast_to(gap > 0, TRIED) & (not is_hold(guard)))
-            both = []
-            for bits[i] in (np.zeros(TRIED, bool), np.ones(TRIED, bool)):
-                forces = evaluate(self._entries[: self.count], **about, states=states, bits=bits)
-                both.append(np.array([np.broadcast_to(one, TRIED) for one in forces]))
+            gap, slope = evaluate(wanted, **about, states=states)
+            aside = self._on_both_sides(i, about | {"states": dict(states)})
+            states[names[column]] = states[names[column]] - gap / slope
+            both = self._on_both_sides(i, about | {"states": states})
             # a power of a depth isn't defined where rounding makes that negative
             apart = np.nan_to_num(np.abs(both[0] - both[1]))
-            size = np.nan_to_num(np.abs(both)).max(axis=0)
-            found[i] = (apart > ROUNDING * size.max(axis=1)[:, None]).any()
+            # of a spring alone nothing but rounding is left on the boundary
+            size = np.nan_to_num(np.abs([both, aside])).max(axis=(0, 1, 3))
+            found[i] = (apart > ROUNDING * size[:, None]).any()
         return found
+
+    def _on_both_sides(self, i: int, about: dict[str, Any]) -> np.ndarray:
+        """The forces where a guard's side is taken as either, float64[2, m, TRIED]."""
+        bits: list[Any] = []
+        for guard in self.system.guards:
+            (gap,) = evaluate([guard.gap], **about, bits=bits)
+            bits.append(np.broadcast_to(gap > 0, TRIED) & (not is_hold(guard)))
+        both = []
+        for bits[i] in (np.zeros(TRIED, bool), np.ones(TRIED, bool)):
+            forces = evaluate(self._entries[: self.count], **about, bits=bits)
+            both.append([np.broadcast_to(one, TRIED) for one in forces])
+        return np.array(both)
 
     def nodes(
         self, intervals: Intervals, harmonics: int
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """See :meth:`Intervals.nodes`: for products of the forces and a harmonic."""
-        bent = math.isinf(self._degree)
-        most = UNEVEN if bent else max(int(self._degree), 1)
-        return intervals.nodes((most + 1) * harmonics + MULTIPLES * self.periods, bent)
+        most = UNEVEN if self._bent else max(int(self._degree), 1)
+        return intervals.nodes((most + 1) * harmonics + MULTIPLES * self.periods, self._bent)
 
     def coefficients(
         self, signals: np.ndarray, constants: np.ndarray, rate: float, rate_by: np.ndarray
@@ -219,44 +270,53 @@ class Forces:
             Its derivatives with respect to the constants, over itself.
         """
         intervals = self.intervals(signals, constants, rate)
-        harmonics = fourier.harmonics_of(signals.shape[1])
+        harmonics, c = fourier.harmonics_of(signals.shape[1]), len(signals)
+        width, states = 2 * harmonics + 1, self.states(signals, rate)
         angle, weight, which = self.nodes(intervals, harmonics)
-        about = self.motion(angle, signals, constants, rate)
-        bits = list(intervals.bits[which].T)
-        found = [
-            np.broadcast_to(one, len(angle)) for one in evaluate(self._entries, **about, bits=bits)
-        ]
-        here = fourier.basis(angle, harmonics)
-        project = here.T * weight * _norm(harmonics)[:, None]
-        values = np.array(found[: self.count]).reshape(self.count, -1) @ project.T
-        width, c = 2 * harmonics + 1, len(signals)
-        by_signals = np.zeros((self.count, width, c, width))
-        by_constants = np.zeros((self.count, width, len(constants)))
-        names = list(self.moving)
-        for (i, j), slope in zip(self._known, found[self.count :], strict=True):
-            if j >= len(names):
-                by_constants[i, :, j - len(names)] += project @ slope
-                continue
-            one = self.moving[names[j]]
-            block = (project * slope) @ here
-            by_signals[i, :, one.signal] += _derived(block, one.times) * rate**one.times
-            if one.times:
-                value = about["states"][names[j]]
-                by_constants[i] += np.outer(project @ (slope * value), one.times * rate_by)
-        whole = Coefficients(values, by_signals, by_constants, intervals)
+        here, kept = fourier.basis(angle, 2 * harmonics), _kept(harmonics)
+        seen = here[:, kept] @ states.T
+        values = evaluate(
+            self._entries, **self.motion(angle, seen, constants), bits=list(intervals.bits[which].T)
+        )
+        found = np.empty((len(values), len(angle)))
+        for row, value in zip(found, values, strict=True):
+            row[:] = value
+        if self._bent:  # a power of a depth isn't defined where rounding makes that negative
+            begin = intervals.begin[which]
+            aside = np.minimum(angle - begin, begin + intervals.length[which] - angle) < BESIDE
+            found[:, aside] = np.nan_to_num(found[:, aside], posinf=0.0, neginf=0.0)
+        integrals = (found * (weight / np.pi)) @ here
+        series = integrals[:, kept]
+        series[:, 0] *= 0.5
+        whole = Coefficients(
+            np.zeros((self.count, width, 1 + c * width + len(constants))), c, intervals
+        )
+        whole.values[:], by_constants = series[: self.count], whole.by_constants
+        moving = len(self.moving)
+        blocks = fourier.products(integrals[self.count :][: self._by_moving], harmonics)
+        for (i, j), slope in zip(self._known, series[self.count :], strict=True):
+            if j >= moving:
+                by_constants[i, :, j - moving] += slope
+        for (i, j), block in zip(self._known, blocks, strict=False):
+            times, first = self._times[j], 1 + self._signal[j] * width
+            mine = fourier.before_derivative(block, times) * rate**times
+            whole.whole[i, :, first : first + width] += mine
+            if times:
+                by_constants[i] += np.outer(block @ states[j], times * rate_by)
         if len(intervals.instants.angle):
-            self._add_jumps(whole, signals, constants, rate, rate_by)
+            self._add_jumps(whole, states, constants, rate, rate_by)
         return whole
 
     def _add_jumps(
-        self, whole: Coefficients, signals: np.ndarray, constants: np.ndarray, rate: float,
+        self, whole: Coefficients, states: np.ndarray, constants: np.ndarray, rate: float,
         rate_by: np.ndarray,
     ) -> None:  # fmt: skip
         """Add to the derivatives what the shifts of instants do at which forces jump."""
-        instants, harmonics = whole.intervals.instants, fourier.harmonics_of(signals.shape[1])
+        instants, harmonics = whole.intervals.instants, fourier.harmonics_of(states.shape[1])
         if not self._jumping[instants.guard].any():
             return
-        about = self.motion(instants.angle, signals, constants, rate)
+        here = fourier.basis(instants.angle, harmonics)
+        about = self.motion(instants.angle, here @ states.T, constants)
         sides = [
             np.array([
                 np.broadcast_to(one, len(instants.angle))
@@ -267,25 +327,24 @@ class Forces:
         jumps = sides[0] - sides[1]
         # a power of a depth isn't defined where rounding makes that negative, and doesn't jump
         jumps[~(np.abs(jumps) > ROUNDING * np.abs(sides).max(axis=0))] = 0.0
-        if not jumps.any():
-            return
-        here = fourier.basis(instants.angle, harmonics)
-        names = list(self.moving)
+        jumps[:, ~self._jumping[instants.guard]] = 0.0
+        moving, width = len(self.moving), here.shape[1]
         for k in np.flatnonzero(jumps.any(axis=0)).tolist():
             one = _at(about, k)
-            slopes = evaluate(
-                self._gap_slopes[instants.guard[k]], **one, bits=instants.before[k].tolist()
-            )
-            by_signals = np.zeros(signals.shape)
-            by_constants = np.array(slopes[len(names) :], float)
-            for name, slope in zip(names, slopes, strict=False):
-                state = self.moving[name]
-                row = _derived(here[k][None], state.times)[0] * rate**state.times
-                by_signals[state.signal] += slope * row
-                by_constants += slope * state.times * one["states"][name] * rate_by
+            slopes = np.array(
+                evaluate(
+                    self._gap_slopes[instants.guard[k]], **one, bits=instants.before[k].tolist()
+                ), float,
+            )  # fmt: skip
+            row = np.zeros(whole.whole.shape[2])
+            row[1 + whole.signals * width :] = slopes[moving:]
+            for j, slope in enumerate(slopes[:moving]):
+                times, first = self._times[j], 1 + self._signal[j] * width
+                mine = fourier.before_derivative(here[k], times) * rate**times
+                row[first : first + width] += slope * mine
+                row[1 + whole.signals * width :] += slope * times * (here[k] @ states[j]) * rate_by
             shift = np.outer(jumps[:, k], _norm(harmonics) * here[k]) / -instants.slope[k]
-            whole.by_signals[:] += shift[:, :, None, None] * by_signals
-            whole.by_constants[:] += shift[:, :, None] * by_constants
+            whole.whole[:] += shift[:, :, None] * row
 
 
 def _is_zero(entry: Expr) -> bool:
@@ -310,38 +369,14 @@ def _at(about: Mapping[str, Any], k: int) -> dict[str, Any]:
 
 
 @functools.lru_cache(maxsize=64)
+def _kept(harmonics: int) -> np.ndarray:
+    """Places of the coefficients of a series in one of twice the harmonics."""
+    return np.asarray(np.r_[: harmonics + 1, 2 * harmonics + 1 : 3 * harmonics + 1])
+
+
+@functools.lru_cache(maxsize=64)
 def _norm(harmonics: int) -> np.ndarray:
     """Factors that make coefficients of integrals over the circle."""
     norm = np.full(2 * harmonics + 1, 1.0 / np.pi)
     norm[0] *= 0.5
     return norm
-
-
-def _derived(block: np.ndarray, times: int) -> np.ndarray:
-    """A matrix float64[n, 2H + 1] that multiplies a series, for one that multiplies it in place of
-    the series' derivative: the adjoint of :func:`saltus.analysis.harmonics.series.derivative`.
-    """
-    return fourier.derivative(block, times) * (-1.0) ** times
-
-
-def degree(roots: Sequence[Expr], moving: Collection[str]) -> float:
-    """The highest power of moving states in expressions; inf if they are no polynomials."""
-    known: dict[Expr, float] = {}
-    for node in ex.walk(*roots, conditions=False):
-        below = [known[one] for one in node.args]
-        match node.op:
-            case "state":
-                known[node] = 1 if node.payload in moving else 0
-            case "add" | "sub" | "neg" | "select":
-                known[node] = max(below)
-            case "mul":
-                known[node] = sum(below)
-            case "div":
-                known[node] = below[0] if below[1] == 0 else math.inf
-            case "pow":
-                whole = node.args[1].op == "const" and float(node.args[1].payload) % 1 == 0
-                power = float(node.args[1].payload) if whole else math.inf
-                known[node] = 0 if not any(below) else below[0] * power if power > 0 else math.inf
-            case _:
-                known[node] = math.inf if any(below) else 0
-    return max((known[root] for root in roots), default=0)

@@ -34,7 +34,7 @@ class FreeHarmonics(HarmonicOrbits):
         self, system: System, name: str, harmonics: int, scale: np.ndarray, rest: np.ndarray,
         column: int,
     ) -> None:  # fmt: skip
-        super().__init__(system, name, harmonics, 1, scale)
+        super().__init__(system, (name,), harmonics, 1, scale)
         self._place, self._signal = self.source.of_states(rest), self._number(column)
         series = np.zeros((self.count, self.series))
         series[:, 0] = self._place

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from saltus.analysis.harmonics import series as fourier
-from saltus.contact.guards import Guard, bits_in, is_hold
+from saltus.contact.guards import Guard
 from saltus.errors import ParameterError
 from saltus.flow import polynomials
 from saltus.language.evaluate import evaluate
@@ -64,7 +64,7 @@ class Intervals:
     bits : bool[p, guards]
         Sides of the boundaries.
     instants : Instants
-    gaps : tuple of float64[2h + 1]
+    gaps : float64[g, 2h + 1]
         The series of the gaps that don't ask for the sides of others.
     """
 
@@ -72,7 +72,7 @@ class Intervals:
     length: np.ndarray
     bits: np.ndarray
     instants: Instants
-    gaps: tuple[np.ndarray, ...] = ()
+    gaps: np.ndarray = field(default_factory=lambda: np.zeros((0, 1)))
 
     @property
     def middle(self) -> np.ndarray:
@@ -85,39 +85,34 @@ class Intervals:
             self.begin
         )
 
-    def nodes(self, degree: int, bent: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def nodes(self, degree: int, bent: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles and weights by which series of a degree are integrated over the circle to
         rounding, and the interval of each: float64[n], float64[n], int64[n].
 
         On the whole circle they are equidistant; between instants they are Gauss's. ``bent``: of
-        forces that aren't polynomials, such as powers of a depth: a sine then takes the angle to
-        either end with no slope, behind which such powers are smooth.
+        forces that aren't polynomials, such as powers of a depth: a sine, so many times, then takes
+        the angle to either end with no slope, behind which such powers are smooth.
         """
         if len(self.begin) == 1 and len(self.instants.angle) == 0:
             count = degree + 1
             angle = 2.0 * np.pi * np.arange(count) / count
             return angle, np.full(count, 2.0 * np.pi / count), np.zeros(count, np.int64)
-        turns = self.length * degree * (0.25 * np.pi if bent else 0.5) * 0.5
+        turns = self.length * degree * 0.25 * (0.5 * np.pi) ** bent
         counts = np.ceil(turns + 3.0 * np.cbrt(turns)).astype(np.int64) + BEYOND * (1 + bent)
-        angles, weights = [], []
-        for begin, length, count in zip(self.begin, self.length, counts, strict=True):
-            place, weight = _gauss(int(count))
-            if bent:
-                turned = np.pi * (place - 0.5)
-                weight = weight * 0.5 * np.pi * np.cos(turned)
-                place = 0.5 + 0.5 * np.sin(turned)
-            angles.append(begin + length * place)
-            weights.append(length * weight)
-        return (
-            np.concatenate(angles),
-            np.concatenate(weights),
-            np.repeat(np.arange(len(counts)), counts),
-        )
+        rules = [_gauss(int(count)) for count in counts]
+        place, weight = (np.concatenate(one) for one in zip(*rules, strict=True))
+        for _ in range(bent):
+            turned = np.pi * (place - 0.5)
+            weight = weight * 0.5 * np.pi * np.cos(turned)
+            place = 0.5 + 0.5 * np.sin(turned)
+        which = np.repeat(np.arange(len(counts)), counts)
+        length = self.length[which]
+        return self.begin[which] + length * place, length * weight, which
 
 
 def intervals_of(
-    name: str, guards: Sequence[Guard], linear: Mapping[int, np.ndarray], about: About,
-    harmonics: int,
+    name: str, guards: Sequence[Guard], asked: Mapping[int, list[int]],
+    linear: tuple[np.ndarray, np.ndarray], about: About, harmonics: int,
 ) -> Intervals:  # fmt: skip
     """Cut a motion at the boundaries of some guards, each after those whose sides it asks for.
 
@@ -127,8 +122,10 @@ def intervals_of(
         Of the system, for a message.
     guards : sequence of Guard
         That a contact is held never is: a series isn't held anywhere.
-    linear : mapping of int to float64[2H + 1]
-        The gaps that are known as series.
+    asked : mapping of int to list of int
+        Of each of the others, whose sides it asks for.
+    linear : int64[g], float64[g, 2H + 1]
+        The guards whose gaps are known as series, and these.
     about : callable
         States, parameters and time at angles.
     harmonics : int
@@ -139,54 +136,38 @@ def intervals_of(
     ParameterError
         If a gap isn't a series: it isn't smooth between the other boundaries.
     """
-    moving = [i for i, guard in enumerate(guards) if not is_hold(guard)]
-    asked = {number: sorted(bits_in([guards[number].gap])) for number in moving}
     frozen = np.zeros(len(guards), bool)
-    series = {
-        number: linear[number]
-        if number in linear
-        else _series(name, guards[number], about, harmonics, frozen)
-        for number in moving if not asked[number]
-    }  # fmt: skip
-    found = _crossings(series)
+    numbers, gaps = linear
+    if more := [i for i, others in asked.items() if not others and i not in numbers]:
+        each = [*gaps, *(_series(name, guards[i], about, harmonics, frozen) for i in more)]
+        split = max(fourier.harmonics_of(len(one)) for one in each)
+        numbers = np.append(numbers, more)
+        gaps = np.array([fourier.resized(one, split) for one in each])
+    which, angle, slope = fourier.zeros_of(gaps)
+    found = np.array([angle, numbers[which], slope])
     intervals = _cut(uncut(len(guards)), found)
-    middle = intervals.middle
-    for number, gap in series.items():
-        here = fourier.basis(middle, fourier.harmonics_of(len(gap)))
-        intervals.bits[:, number] = here @ gap > 0
-    for number in moving:
-        if not (mine := asked[number]):
+    here = fourier.basis(intervals.middle, fourier.harmonics_of(gaps.shape[1]))
+    intervals.bits[:, numbers] = here @ gaps.T > 0
+    for number, mine in asked.items():
+        if not mine:
             continue
         for sides in np.unique(intervals.bits[:, mine], axis=0):
             bits = frozen.copy()
             bits[mine] = sides
             gap = _series(name, guards[number], about, harmonics, bits)
-            found += [
-                one for one in _crossings({number: gap})
-                if (intervals.bits[intervals.of(np.array([one[0]]))[0], mine] == sides).all()
-            ]  # fmt: skip
+            _, angle, slope = fourier.zeros_of(gap[None])
+            there = (intervals.bits[intervals.of(angle)][:, mine] == sides).all(axis=1)
+            new = np.array([angle, np.full(len(angle), number), slope])
+            found = np.append(found, new[:, there], axis=1)
         intervals = _cut(intervals, found)
-        there = about(intervals.middle)
-        (values,) = evaluate([guards[number].gap], **there, bits=list(intervals.bits.T))  # type: ignore[arg-type]
+        middle = about(intervals.middle)
+        (values,) = evaluate([guards[number].gap], **middle, bits=list(intervals.bits.T))  # type: ignore[arg-type]
         intervals.bits[:, number] = np.asarray(values) > 0
-    instants = _NONE
-    if found:
-        angle, which, slope = (np.array(one) for one in zip(*sorted(found), strict=True))
-        at = np.searchsorted(intervals.begin, angle)
-        before, behind = intervals.bits[at - 1], intervals.bits[at]
-        instants = Instants(angle, which.astype(np.int64), slope, before, behind)
-    return replace(intervals, instants=instants, gaps=tuple(series.values()))
-
-
-def _crossings(gaps: Mapping[int, np.ndarray]) -> list[tuple[float, int, float]]:
-    """Angles at which gaps vanish, the numbers of these, and their slopes there."""
-    split = max((fourier.harmonics_of(len(gap)) for gap in gaps.values()), default=1)
-    series = np.reshape([fourier.resized(gap, split) for gap in gaps.values()], (-1, 2 * split + 1))
-    which, angles = fourier.zeros_of(series)
-    here = fourier.basis(angles, split)
-    slopes = np.einsum("ri,ri->r", here, fourier.derivative(series)[which])
-    number = np.array(list(gaps), np.int64)[which]
-    return list(zip(angles.tolist(), number.tolist(), slopes.tolist(), strict=True))
+    angle, which, slope = found[:, found[0].argsort(kind="stable")]
+    at = np.searchsorted(intervals.begin, angle)
+    before, behind = intervals.bits[at - 1], intervals.bits[at]
+    instants = Instants(angle, which.astype(np.int64), slope, before, behind)
+    return replace(intervals, instants=instants, gaps=gaps)
 
 
 def uncut(guards: int) -> Intervals:
@@ -199,13 +180,17 @@ _NONE = Instants(
 )
 
 
-def _cut(intervals: Intervals, found: list[tuple[float, int, float]]) -> Intervals:
-    """Intervals between the angles of crossings, with the sides known so far."""
-    if not found:
+def _cut(intervals: Intervals, found: np.ndarray) -> Intervals:
+    """Intervals between the angles of crossings (rows: angle, guard, slope), with the sides known
+    so far.
+    """
+    if not found.size:
         return intervals
-    begin = np.unique([angle for angle, _, _ in found])
-    length = np.diff(np.append(begin, begin[0] + 2 * np.pi))
-    bits = intervals.bits[intervals.of(begin + 0.5 * length)].copy()
+    begin = np.sort(found[0])
+    if (begin[1:] == begin[:-1]).any():
+        begin = np.unique(begin)
+    length = np.append(begin[1:], begin[0] + 2 * np.pi) - begin
+    bits = intervals.bits[intervals.of(begin + 0.5 * length)]
     return Intervals(begin, length, bits, _NONE)
 
 

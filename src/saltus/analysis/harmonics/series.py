@@ -10,14 +10,10 @@ import functools
 
 import numpy as np
 
-#: Cells of the circle, for each harmonic, in which zeros are looked for first.
-CELLS = 8
-#: Halvings of a cell of which it isn't known how many zeros it holds: what is left is rounding.
-HALVINGS = 40
-#: Steps of Newton's method, or halvings, by which a zero is located.
-STEPS = 60
-#: Length of the last step of Newton's method towards a zero, behind which there is rounding [rad].
-LOCATED = 1e-9
+from saltus.codegen.module import harmonics_module
+
+#: Zeros for which there is room, for each harmonic.
+ROOM = 4
 
 
 def harmonics_of(size: int) -> int:
@@ -27,11 +23,16 @@ def harmonics_of(size: int) -> int:
 
 def basis(angle: np.ndarray, harmonics: int) -> np.ndarray:
     """One, the cosines and the sines at angles float64[n], float64[n, 2H + 1]."""
-    turned = angle[:, None] * np.arange(1, harmonics + 1)
-    found = np.ones((len(angle), 2 * harmonics + 1))
-    np.cos(turned, out=found[:, 1 : harmonics + 1])
-    np.sin(turned, out=found[:, harmonics + 1 :])
-    return found
+    turned = np.empty((harmonics, len(angle)), complex)
+    turned[:1] = np.cos(angle) + 1j * np.sin(angle)
+    known = 1
+    while known < harmonics:  # powers of the first, twice as many each time
+        more = min(known, harmonics - known)
+        np.multiply(turned[:more], turned[known - 1], out=turned[known : known + more])
+        known += more
+    found = np.ones((2 * harmonics + 1, len(angle)))
+    found[1 : harmonics + 1], found[harmonics + 1 :] = turned.real, turned.imag
+    return found.T
 
 
 def derivative(series: np.ndarray, times: int = 1) -> np.ndarray:
@@ -84,108 +85,99 @@ def resized(series: np.ndarray, harmonics: int) -> np.ndarray:
     return of_complex(np.pad(amplitudes, [(0, 0)] * (series.ndim - 1) + [(0, missing)]))
 
 
-def transfer(blocks: np.ndarray) -> np.ndarray:
-    """The matrix that multiplies each amplitude of series by a complex number: from
-    complex128[H + 1, c, m], float64[c, 2H + 1, m, 2H + 1].
+def doubled(series: np.ndarray) -> np.ndarray:
+    """The same motions over twice the period: harmonic k becomes 2k, float64[..., 4H + 1]."""
+    amplitudes = to_complex(series)
+    found = np.zeros((*amplitudes.shape[:-1], 2 * amplitudes.shape[-1] - 1), complex)
+    found[..., ::2] = amplitudes
+    return of_complex(found)
+
+
+def responses(blocks: np.ndarray, series: np.ndarray) -> np.ndarray:
+    """The series of responses to series float64[m, 2H + 1, ...], whose amplitudes are multiplied by
+    complex128[H + 1, c, m]; float64[c, 2H + 1, ...].
     """
-    split = len(blocks) - 1
-    whole = np.zeros((blocks.shape[1], 2 * split + 1, blocks.shape[2], 2 * split + 1))
-    cosine, sine = np.arange(split + 1), np.arange(1, split + 1)
-    whole[:, cosine, :, cosine] = blocks.real
-    whole[:, split + sine, :, split + sine] = blocks.real[1:]
-    whole[:, sine, :, split + sine] = blocks.imag[1:]
-    whole[:, split + sine, :, sine] = -blocks.imag[1:]
-    return whole
+    split, behind = len(blocks) - 1, series.shape[2:]
+    amplitudes = series[:, : split + 1].reshape(len(series), split + 1, -1).astype(complex)
+    amplitudes[:, 1:] -= 1j * series[:, split + 1 :].reshape(len(series), split, -1)
+    found = (blocks @ amplitudes.swapaxes(0, 1)).swapaxes(0, 1)
+    whole = np.concatenate([found.real, -found.imag[:, 1:]], axis=1)
+    return whole.reshape(*whole.shape[:2], *behind)
+
+
+@functools.lru_cache(maxsize=64)
+def _places(harmonics: int) -> tuple[np.ndarray, ...]:
+    """Of the entries of a product, see :func:`products`: the two coefficients that each is a sum
+    of, and their factors.
+    """
+    order = np.concatenate([np.arange(harmonics + 1), np.arange(1, harmonics + 1)])
+    sine = np.arange(2 * harmonics + 1) > harmonics
+    (p, p_sine), (q, q_sine) = (order[:, None], sine[:, None]), (order, sine)
+    apart, sums, mixed = np.abs(p - q), p + q, p_sine != q_sine
+    # cos p cos q, sin p sin q by cosines; sin p cos q, cos p sin q by sines
+    ahead = np.where(p_sine, p - q, q - p)
+    first = np.where(mixed & (ahead < 0), -0.5, 0.5) * ~(mixed & (apart == 0))
+    second = np.where(p_sine & q_sine, -0.5, 0.5) * ~(mixed & (sums == 0))
+    first[0], second[0] = 0.5 * first[0], 0.5 * second[0]
+    shift = 2 * harmonics * mixed
+    return (
+        np.where(first == 0, 0, apart + shift), first, np.where(second == 0, 0, sums + shift),
+        second,
+    )  # fmt: skip
+
+
+def products(coefficients: np.ndarray, harmonics: int) -> np.ndarray:
+    """The matrices float64[..., 2H + 1, 2H + 1] that multiply a series by functions and give the
+    series of the products, cut off behind H harmonics.
+
+    Parameters
+    ----------
+    coefficients : float64[..., 4H + 1]
+        Of the functions: the integrals of them times 1, the cosines and the sines up to 2H, over
+        pi.
+    harmonics : int
+        H.
+    """
+    apart, first, sums, second = _places(harmonics)
+    found = coefficients.take(apart, axis=-1)
+    found *= first
+    more = coefficients.take(sums, axis=-1)
+    more *= second
+    found += more
+    return found
+
+
+@functools.lru_cache(maxsize=64)
+def _adjoint(harmonics: int, times: int) -> tuple[np.ndarray, np.ndarray]:
+    derived = derivative(np.eye(2 * harmonics + 1), times)
+    place = np.abs(derived).argmax(axis=1)
+    return place, derived[np.arange(len(place)), place]
+
+
+def before_derivative(matrix: np.ndarray, times: int) -> np.ndarray:
+    """A matrix float64[..., 2H + 1] that multiplies a series, for one that multiplies it in place
+    of the series' derivative.
+    """
+    if not times:
+        return matrix
+    place, factor = _adjoint(harmonics_of(matrix.shape[-1]), times)
+    return np.asarray(matrix[..., place] * factor)
 
 
 # -- zeros -----------------------------------------------------------------------------------------
 def zeros(series: np.ndarray) -> np.ndarray:
-    """All angles in [0, 2 pi) at which a series float64[2H + 1] changes its sign, ascending."""
+    """All angles in [0, 2 pi) at which a series float64[2H + 1] changes its sign."""
     return zeros_of(series[None])[1]
 
 
-def zeros_of(series: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """All angles in [0, 2 pi) at which series float64[g, 2H + 1] change their sign, float64[r], and
-    which series does, int64[r]; ascending in the series, then in the angle.
+def zeros_of(series: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """All angles in [0, 2 pi) at which series float64[g, 2H + 1] change their sign, float64[r];
+    which series does, int64[r], ascending; and its slope there, float64[r].
 
-    A cell of the circle holds no zero where the series is larger than its slope and its largest
-    second derivative allow it to fall there, and at most one where the slope keeps its sign; other
-    cells are halved. Zeros nearer to each other than rounding tells apart are none.
+    Bounds of the slope prove how many zeros a piece of the circle holds (kernels/harmonics.py).
+    Zeros nearer to each other than rounding tells apart are none.
     """
-    split = harmonics_of(series.shape[1])
-    order = np.arange(1, split + 1)
-    bend = np.hypot(series[:, 1 : split + 1], series[:, split + 1 :]) @ order**2
-    slopes = derivative(series)
-    circle, at_middle, at_edge = _cells(split)
-    half = np.pi / len(circle)
-    value, slope = series @ at_middle.T, slopes @ at_middle.T
-    edge = series @ at_edge.T > 0
-    clear, single = _told(value, slope, bend[:, None], half)
-    which, place = np.nonzero(single & (edge != np.roll(edge, -1, axis=1)))
-    found = [(which, circle[place] - half, np.full(len(which), 2.0 * half))]
-    which, place = np.nonzero(~clear & ~single & (bend[:, None] > 0))
-    middle = circle[place]
-    for _ in range(HALVINGS):
-        if not len(middle):
-            break
-        half *= 0.5
-        which, middle = np.tile(which, 2), np.concatenate([middle - half, middle + half])
-        here = basis(middle, split)
-        value, slope = (np.einsum("ri,ri->r", here, one[which]) for one in (series, slopes))
-        clear, single = _told(value, slope, bend[which], half)
-        found.append((which[single], middle[single] - half, np.full(single.sum(), 2.0 * half)))
-        which, middle = which[~clear & ~single], middle[~clear & ~single]
-    which, begin, width = (np.concatenate(one) for one in zip(*found, strict=True))
-    if not len(begin):
-        return which, begin
-    low, high = (
-        np.einsum("ri,ri->r", basis(at, split), series[which]) > 0 for at in (begin, begin + width)
-    )
-    changes = low != high
-    which, rising = which[changes], high[changes]
-    angle = _located(series[which], slopes[which], begin[changes], width[changes], rising)
-    angle %= 2.0 * np.pi
-    order = np.lexsort((angle, which))
-    which, angle = which[order], angle[order]
-    new = np.append(True, (np.diff(which) != 0) | (np.diff(angle) != 0))[: len(which)]
-    return which[new], angle[new]
-
-
-def _told(
-    value: np.ndarray, slope: np.ndarray, bend: np.ndarray, half: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Cells without a zero, and others with one at most, by what is known in their middles."""
-    clear = np.abs(value) > np.abs(slope) * half + 0.5 * bend * half**2
-    return clear, ~clear & (np.abs(slope) > bend * half)
-
-
-@functools.lru_cache(maxsize=64)
-def _cells(harmonics: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The middles of the first cells, and the basis there and where they begin."""
-    count = CELLS * (harmonics + 1)
-    begin = 2.0 * np.pi * np.arange(count) / count
-    middle = begin + np.pi / count
-    return middle, basis(middle, harmonics), basis(begin, harmonics)
-
-
-def _located(
-    series: np.ndarray, slopes: np.ndarray, begin: np.ndarray, width: np.ndarray, rising: np.ndarray
-) -> np.ndarray:
-    """The zeros of series float64[r, 2H + 1] between angles where their signs change, by Newton's
-    method that stays between.
-    """
-    low, high, way = begin.copy(), begin + width, np.where(rising, 1.0, -1.0)
-    place, split = begin + 0.5 * width, harmonics_of(series.shape[1])
-    for _ in range(STEPS):
-        here = basis(place, split)
-        value, slope = (way * np.einsum("ri,ri->r", here, one) for one in (series, slopes))
-        low, high = np.where(value > 0, low, place), np.where(value > 0, place, high)
-        with np.errstate(all="ignore"):
-            step = -value / slope
-        inside = (place + step >= low) & (place + step <= high)
-        step = np.where(inside, step, 0.5 * (low + high) - place)
-        step[value == 0] = 0.0
-        place = place + step
-        if np.abs(step).max(initial=0.0) < LOCATED:
-            break
-    return place
+    room = ROOM * len(series) * (series.shape[1] + 1)
+    which, (angle, slope) = np.empty(room, np.int64), np.empty((2, room))
+    found = harmonics_module().propagate(np.ascontiguousarray(series), which, angle, slope)
+    return which[:found], angle[:found] % (2.0 * np.pi), slope[:found]

@@ -9,6 +9,7 @@ Nonlinear Vibration Problems (2019), section 2.5.
 
 from __future__ import annotations
 
+import functools
 from typing import Protocol
 
 import numpy as np
@@ -76,10 +77,7 @@ class States:
         """See :class:`Signals`. A mean isn't integrated: there the equation is that the mean of the
         force vanishes, over the rate for its unit.
         """
-        turns = np.arange(harmonics + 1) * 1j
-        turns[0] = 1.0
-        each = 1.0 / (turns[:, None] * rate) ** self._orders
-        whole = each[:, :, None] * np.eye(len(self._orders))
+        whole = _integrals(harmonics, tuple(self._orders)) * (1.0 / rate**self._orders)[:, None]
         return whole, -self._orders[:, None] * whole
 
     def own(self, harmonics: int) -> np.ndarray:
@@ -106,6 +104,15 @@ class States:
         return states[[chain[0] for chain in self.chains]]
 
 
+@functools.lru_cache(maxsize=64)
+def _integrals(harmonics: int, orders: tuple[int, ...]) -> np.ndarray:
+    """Factors of integrals of some orders over the angle, complex128[H + 1, c, c]."""
+    turns = np.arange(harmonics + 1) * 1j
+    turns[0] = 1.0
+    each = 1.0 / turns[:, None] ** np.array(orders)
+    return np.asarray(each[:, :, None] * np.eye(len(orders)))
+
+
 class AtContacts:
     """The signals of a structure: the deflections at its contacts."""
 
@@ -120,6 +127,7 @@ class AtContacts:
         self._mass, self._damping, self._stiffness = seen.dynamics
         parts = (self._mass, self._damping, self._stiffness)
         self._plain = all(np.count_nonzero(one - np.diag(np.diag(one))) == 0 for one in parts)
+        self._diagonals = [np.diag(one)[:, None] for one in parts]
 
     def _solved(self, angular: np.ndarray, right: np.ndarray) -> np.ndarray:
         """Coordinates under forces complex128[h, r, m] at angular frequencies
@@ -127,8 +135,7 @@ class AtContacts:
         """
         at = angular[:, None, None]
         if self._plain:
-            each = (np.diag(one)[:, None] for one in (self._mass, self._damping, self._stiffness))
-            mass, damping, stiffness = each
+            mass, damping, stiffness = self._diagonals
             return np.asarray(right / (stiffness - at**2 * mass + 1j * at * damping))
         whole = self._stiffness - at**2 * self._mass + 1j * at * self._damping
         return np.linalg.solve(whole, right)

@@ -18,6 +18,8 @@ from saltus.system.modes import mode_number
 
 #: Angles at which an extreme is looked for first, for each harmonic.
 ANGLES = 16
+#: An output that is off by a smaller share of its size is a series of the harmonics.
+ROUNDING = 1e-12
 #: Places between the neighbours of the best one, in each of the next rounds.
 PLACES = 33
 #: Rounds: the place of an extreme is known to the root of rounding, the extreme to rounding.
@@ -36,11 +38,14 @@ def amplitudes(orbits: HarmonicOrbits, z: np.ndarray, outputs: Outputs) -> np.nd
     """Amplitudes c of ``Re(c exp(i k angle))`` of the outputs of a motion float64[z], k = 0 to H,
     complex128[K, H + 1].
     """
-    motion = _Motion(orbits, z, outputs)
-    angle, weight, which = orbits.forces.nodes(motion.intervals, orbits.harmonics)
-    turned = np.exp(-1j * np.outer(np.arange(orbits.harmonics + 1), angle)) * (weight / np.pi)
-    turned[0] *= 0.5
-    return np.asarray((turned @ motion.values(angle, which)).T)
+    return _Motion(orbits, z, outputs).amplitudes()
+
+
+@functools.lru_cache(maxsize=16)
+def _even(harmonics: int) -> tuple[np.ndarray, np.ndarray]:
+    """Equidistant angles, and the basis there."""
+    angle = 2 * np.pi * np.arange(ANGLES * (harmonics + 1)) / (ANGLES * (harmonics + 1))
+    return angle, fourier.basis(angle, harmonics)
 
 
 class _Motion:
@@ -51,8 +56,16 @@ class _Motion:
         self.states = orbits.states(z)
         self.intervals: Intervals = orbits.intervals(z)
         self.period = float(orbits.period(z))
-        known = dict(orbits.system.values) | {orbits.names[0]: float(orbits.values(z)[0])}
-        self.parameters: dict[str, Any] = known
+        own = dict(zip(orbits.names, orbits.values(z).tolist(), strict=True))
+        self.parameters: dict[str, Any] = dict(orbits.system.values) | own
+        angle, here = _even(orbits.harmonics)
+        self.even = self.values(angle)
+        others = fourier.of_samples(self.even[:, len(self.states) :].T, orbits.harmonics)
+        self.series = np.append(self.states, others, axis=0)
+        off = np.abs(self.even - here @ self.series.T).max(axis=0)
+        #: outputs that are no series of these harmonics, such as forces of contacts
+        self.others = np.flatnonzero(~(off <= ROUNDING * np.abs(self.even).max(axis=0)))
+        self.others = self.others[self.others >= len(self.states)]
 
     def values(self, angle: np.ndarray, which: np.ndarray | None = None) -> np.ndarray:
         """The outputs at angles float64[n] in some of the intervals, float64[n, K]."""
@@ -61,15 +74,31 @@ class _Motion:
         time = angle * (self.period / (2 * np.pi))
         return self.outputs.values(time, here @ self.states.T, self.parameters, mode_number(bits.T))
 
+    @functools.cached_property
+    def _within(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Angles between the instants, their shares of the period, and the other outputs there."""
+        angle, weight, which = self.orbits.forces.nodes(self.intervals, self.orbits.harmonics)
+        return angle, weight / (2 * np.pi), self.values(angle, which)[:, self.others]
+
+    def amplitudes(self) -> np.ndarray:
+        """See :func:`amplitudes`."""
+        found = fourier.to_complex(self.series)
+        if len(self.others):
+            angle, share, values = self._within
+            turned = np.exp(-1j * np.outer(np.arange(found.shape[1]), angle)) * (2.0 * share)
+            turned[0] *= 0.5
+            found[self.others] = (turned @ values).T
+        return found
+
     def put(self, result: Measures, row: int) -> None:
         """Write its numbers into a row."""
-        intervals, periods = self.intervals, self.orbits.periods
-        angle, weight, which = self.orbits.forces.nodes(intervals, self.orbits.harmonics)
-        share, values = weight / (2 * np.pi), self.values(angle, which)
-        result.mean[row] = share @ values
-        values = values - result.mean[row]
-        result.deviation[row] = np.sqrt(share @ values**2)
-        result.harmonic[row] = 2.0 * ((share * np.exp(-1j * periods * angle)) @ values)
+        intervals, periods, found = self.intervals, self.orbits.periods, self.amplitudes()
+        result.mean[row] = found[:, 0].real
+        result.deviation[row] = np.sqrt(0.5 * (np.abs(found[:, 1:]) ** 2).sum(axis=1))
+        result.harmonic[row] = found[:, periods] if periods < found.shape[1] else 0.0
+        if len(self.others):
+            _, share, values = self._within
+            result.deviation[row, self.others] = np.sqrt(share @ (values - share @ values) ** 2)
         result.maximum[row], result.minimum[row] = self._extremes(1.0), -self._extremes(-1.0)
         instants = intervals.instants
         result.contacts[row] = len(instants.angle) / periods
@@ -78,35 +107,45 @@ class _Motion:
             f"{names[number]}{'+' if slope > 0 else '-'}"
             for number, slope in zip(instants.guard, instants.slope, strict=True)
         )
-        gaps = [
-            np.abs(fourier.basis(turns, fourier.harmonics_of(len(gap))) @ gap)
-            for gap in intervals.gaps for turns in [fourier.zeros(fourier.derivative(gap))]
-        ]  # fmt: skip
-        result.margin[row] = min((one.min() for one in gaps if len(one)), default=np.inf)
-        result.span[row] = max((np.ptp(one) for one in gaps if len(one)), default=0.0)
+        which, _, gaps = _turns(intervals.gaps)
+        gaps = np.abs(gaps)
+        each = [gaps[which == number] for number in np.unique(which)]
+        result.margin[row] = gaps.min(initial=np.inf)
+        result.span[row] = max(map(np.ptp, each), default=0.0)
 
     def _extremes(self, sign: float) -> np.ndarray:
-        """The largest values of the outputs times a sign, float64[K]: of states where they turn,
-        of functions looked for ever nearer to the best place.
+        """The largest values of the outputs times a sign, float64[K]: of series where they turn,
+        of others looked for ever nearer to the best place.
         """
-        count, states = ANGLES * (self.orbits.harmonics + 1), len(self.states)
-        angle, half = 2 * np.pi * np.arange(count) / count, 2 * np.pi / count
-        found = sign * self.values(angle)
-        high, best = found.max(axis=0), angle[np.argmax(found, axis=0)][states:]
-        turned = sign * fourier.basis(self._turns, self.orbits.harmonics) @ self.states.T
-        high[:states] = np.maximum(high[:states], turned.max(axis=0, initial=-np.inf))
-        functions = len(best)
-        for _ in range(ROUNDS if functions else 0):
+        angle, _ = _even(self.orbits.harmonics)
+        high = (sign * self.even).max(axis=0)
+        which, _, turned = self._turned
+        np.maximum.at(high, which, sign * turned)
+        if not len(self.others):
+            return np.asarray(high)
+        half, most = 2 * np.pi / len(angle), high[self.others]
+        best = angle[(sign * self.even[:, self.others]).argmax(axis=0)]
+        functions = np.arange(len(best))
+        for _ in range(ROUNDS):
             around = best[:, None] + half * np.linspace(-1.0, 1.0, PLACES)
-            found = sign * self.values(around.ravel())[:, states:]
-            own = found.reshape(functions, PLACES, functions)
-            own = own[np.arange(functions), :, np.arange(functions)]
-            best = around[np.arange(functions), own.argmax(axis=1)]
-            high[states:] = np.maximum(high[states:], own.max(axis=1))
+            found = sign * self.values(around.ravel())[:, self.others]
+            own = found.reshape(len(best), PLACES, len(best))[functions, :, functions]
+            best = around[functions, own.argmax(axis=1)]
+            most = np.maximum(most, own.max(axis=1))
             half *= 2.0 / (PLACES - 1)
+        high[self.others] = most
         return np.asarray(high)
 
     @functools.cached_property
-    def _turns(self) -> np.ndarray:
-        """Angles at which a state turns."""
-        return fourier.zeros_of(fourier.derivative(self.states))[1]
+    def _turned(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Turning points of the outputs that are series, as :func:`_turns`."""
+        series = self.series.copy()
+        series[self.others] = 0.0
+        return _turns(series)
+
+
+def _turns(series: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Angles at which series float64[g, 2H + 1] turn: which does, the angle, and its value."""
+    which, angle, _ = fourier.zeros_of(fourier.derivative(series))
+    here = fourier.basis(angle, fourier.harmonics_of(series.shape[1]))
+    return which, angle, np.einsum("ri,ri->r", here, series[which])

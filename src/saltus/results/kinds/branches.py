@@ -84,12 +84,14 @@ VARIABLES = {
     "point_harmonic_real": Variable(
         ("point", "output", "harmonic"),
         "<output>",
-        "of harmonic balance: amplitude c of Re(c exp(2 pi i k f t)), real part",
+        "of harmonic balance: amplitude c of Re(c exp(2 pi i k f t)), real part; NaN behind "
+        "the last harmonic of a branch",
     ),
     "point_harmonic_imag": Variable(
         ("point", "output", "harmonic"),
         "<output>",
-        "of harmonic balance: amplitude c of Re(c exp(2 pi i k f t)), imaginary part",
+        "of harmonic balance: amplitude c of Re(c exp(2 pi i k f t)), imaginary part; NaN behind "
+        "the last harmonic of a branch",
     ),
     "branch": Variable(_BRANCH, "1", "branch", "i8", coord=True),
     "branch_kind": Variable(

@@ -105,10 +105,10 @@ def test_a_structure_is_condensed_to_its_contacts():
     system = beam()
     found = sl.branches(
         system, {"frequency": ("5 Hz", "5.6 Hz")}, at=1, by=sl.HarmonicBalance(9), points=12,
-        progress=False,
+        switch=(), progress=False,
     )  # fmt: skip
-    whole = HarmonicOrbits(replace(system, interfaces=None), "frequency", 9, 1, np.ones((1, 1)))
-    few = HarmonicOrbits(system, "frequency", 9, 1, np.ones((1, 1)))
+    whole = HarmonicOrbits(replace(system, interfaces=None), ("frequency",), 9, 1, np.ones((1, 1)))
+    few = HarmonicOrbits(system, ("frequency",), 9, 1, np.ones((1, 1)))
     assert (whole.count, few.count) == (4, 2)
     assert (found.point_contacts > 0).any()
     c = found.point_harmonic_real.values + 1j * found.point_harmonic_imag.values
@@ -131,6 +131,29 @@ def test_subharmonic_motions():
         assert (np.abs(found.point_harmonic_real.sel(output="x", harmonic=1)) > 1e-3).all()
         off.append(float(np.nanmedian(found.point_error)))
     assert off[1] < off[0] / 3
+
+
+def test_branches_of_twice_the_period_leave():
+    """The motions of 14 harmonics of half the frequency are those that start at an exact orbit of
+    two periods, and come to the exact branch; the exact one leaves at 0.802033739.
+    """
+    rig, start, limits = sl.models.bilinear_rig(), (0.1, 0.8), {"frequency": (0.79, 0.81)}
+    found = sl.branches(rig, limits, start, at=1, by=sl.HarmonicBalance(7), progress=False)
+    assert found.branch_periods.values.tolist() == [1, 2]
+    assert found.event_kind.values[0] == "period_doubling"
+    assert found.branch_parent.values.tolist() == [-1, 0]
+    assert (found.branch_begin.values[1], found.branch_end.values[1]) == ("branch", "range")
+    assert found.sizes["harmonic"] == 15
+    double = found.isel(point=found.point_branch == 1)
+    assert float(double.point_frequency.min()) == pytest.approx(0.802033739, abs=1e-3)
+    direct = sl.branches(
+        rig, {"frequency": (0.8, 0.81)}, start, at=1, progress=False,
+        by=sl.HarmonicBalance(14, periods=2),
+    )  # fmt: skip
+    peaks = [one.point_peak.values[one.point_frequency.values.argmax()] for one in (double, direct)]
+    assert peaks[0] == pytest.approx(peaks[1], rel=1e-12)
+    single = found.isel(point=found.point_branch == 0)
+    assert np.isnan(single.point_harmonic_real.values[..., 8:]).all()
 
 
 def test_what_is_refused_says_why():
@@ -179,6 +202,26 @@ def test_backbones_of_the_duffing_oscillator(row, cubic, single):
     assert float(found.point_error[-1]) < 1e-11
 
 
+def test_quadrature_of_few_harmonics():
+    """Of one harmonic the stiffness of the describing function, and a force that the damper takes;
+    of more, the exact family.
+    """
+    limits, given = (0.9, 2.0), {"phase": "quadrature", "progress": False}
+    exact = sl.backbone(STOP, limits, **given)
+    ends = {}
+    for count in (1, 5, 15):
+        found = sl.backbone(STOP, limits, by=sl.HarmonicBalance(count), **given)
+        ends[count] = np.array([found.point_frequency.values[-1], found.point_force.values[-1]])
+        assert float(found.point_error[0]) < 1e-12  # no contact yet
+    edge = 0.5
+    stiffness = 1 + 9 * (np.arccos(edge) - edge * np.sqrt(1 - edge**2)) * 2 / np.pi
+    frequency = np.sqrt(stiffness)
+    assert ends[1] == pytest.approx([frequency, 0.1 * frequency * 2.0], rel=1e-12)
+    known = np.array([exact.point_frequency.values[-1], exact.point_force.values[-1]])
+    off = {count: np.abs(one / known - 1).max() for count, one in ends.items()}
+    assert off[1] > 25 * off[5] > 25**2 * off[15] / 2
+
+
 def test_end_of_the_resonance_in_one_harmonic():
     """H10, H11: the largest amplitude of NLvib's example 01 is there, and nowhere beside it."""
 
@@ -186,7 +229,7 @@ def test_end_of_the_resonance_in_one_harmonic():
     def forced(t, x, v, *, damping=0.05, cubic=0.1, force=0.18, w=1.0):
         return v, force * sl.cos(w * t) - damping * v - x - cubic * x**3
 
-    orbits, (amplitude, w) = HarmonicOrbits(forced, "w", 1, 1, np.ones((1, 4))), END
+    orbits, (amplitude, w) = HarmonicOrbits(forced, ("w",), 1, 1, np.ones((1, 4))), END
     lag = np.arctan2(0.05 * w, 1 + 0.075 * amplitude**2 - w**2)
     series = amplitude * np.array([0.0, np.cos(lag), np.sin(lag)])
     residual, derivative = orbits.evaluate(np.append(series, w)[None], np.zeros(1, int))

@@ -21,7 +21,7 @@ with open(Path(__file__).parents[3] / "reference/backbones_hbm.csv") as table:
 
 
 def equations(system, harmonics, name="frequency", periods=1):
-    found = HarmonicOrbits(system, name, harmonics, periods, np.ones((1, 1)))
+    found = HarmonicOrbits(system, (name,), harmonics, periods, np.ones((1, 1)))
     found.scale = np.ones((1, found.width))
     return found
 
@@ -130,28 +130,39 @@ def test_one_harmonic_is_the_describing_function(by_harmonics):
     assert np.hypot(stiffness, 0.1 * z[-1]) * a == pytest.approx(1.0, rel=1e-14)
 
 
-@pytest.mark.parametrize("power", [1.5, 2.0])
+@pytest.mark.parametrize("power", [0.25, 1.5, 2.0])
 def test_powers_of_a_depth_are_integrated_to_rounding(power):
-    """Against mpmath's quadrature of the first harmonic of a Hertz contact."""
-    from mpmath import acos, cos, mp, mpf, quad
+    """Against mpmath's quadrature of the first harmonic of a Hertz contact, and of a root whose
+    slope isn't bounded.
+    """
+    from mpmath import acos, cos, mp, mpf, quad, sin
 
     @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
     def hertz(t, x, v, *, gap=0.4, w=1.0):
-        return v, sl.cos(w * t) - sl.hertz(x - gap, stiffness=2.0, exponent=power)
+        force = sl.piecewise((2.0 * (x - gap) ** power, x > gap), otherwise=0)
+        return v, sl.cos(w * t) - force
 
     orbits, mp.dps = equations(hertz, 1, "w"), 30
-    force = orbits.forces.coefficients(
+    found = orbits.forces.coefficients(
         np.array([[0.1, 1.0, 0.0]]), np.array([2 * np.pi]), 1.0, np.zeros(1)
-    ).values[0] / (2 * np.pi)
+    )
+    force, slope = (one / (2 * np.pi) for one in (found.values[0], found.by_signals[0, :, 0, 0]))
     edge = acos(mpf("0.3"))
 
     def depth(a):
         return max(cos(a) - mpf("0.3"), mpf(0)) ** mpf(power)
 
+    def bent(s):  # of angles edge - s^4, where it is smooth; the depth without cancellation
+        near = 2 * sin(edge - s**4 / 2) * sin(s**4 / 2)
+        return 4 * s**3 * near ** mpf(power - 1) if s else mpf(0)
+
     mean = quad(depth, [0, edge]) / mp.pi
     first = 2 * quad(lambda a: depth(a) * cos(a), [0, edge]) / mp.pi
+    by_mean = -2 * power * quad(bent, [0, edge ** mpf(0.25)]) / mp.pi
     assert force[0] == pytest.approx(float(-2 * mean), abs=4e-14)
     assert force[1] == pytest.approx(float(1 - 2 * first), abs=1e-13)
+    # the depths of the nearest nodes, some 1e-12, are known to the rounding of angles
+    assert slope[0] == pytest.approx(float(by_mean), rel=4e-4 if power < 1 else 1e-12)
 
 
 @sl.system(states="x y v w", forced_at="f", units={"f": "rad/s"})
