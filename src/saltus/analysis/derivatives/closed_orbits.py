@@ -21,6 +21,7 @@ from saltus.analysis.inputs.spans import Span, span
 from saltus.analysis.inputs.starts import Ensemble
 from saltus.analysis.motion.sample_times import NO_SAMPLES
 from saltus.analysis.solve.floquet import across, multipliers
+from saltus.analysis.solve.linear import moves
 from saltus.errors import ParameterError, SaltusWarning
 from saltus.flow.request import Outcome, Request
 from saltus.system import System
@@ -159,20 +160,17 @@ class _Shots:
         move by float64[n, D, c].
         """
         n, size, count = by.shape
-        matrix = np.eye(size) - end.slopes[..., :size]
-        late = np.zeros((n, count))
-        if not self.forced:
-            ahead, there = self.rates(group), self.flow.rates(end, group)
-            unit = length.period[:, None]  # the period is an unknown in periods
-            matrix = np.concatenate([matrix, -(there * unit)[..., None]], axis=2)
-            row = np.pad(ahead, ((0, 0), (0, 1)))[:, None]
-            matrix = np.concatenate([matrix, row], axis=1)
-            by = np.concatenate([by, late[:, None]], axis=1)
-        good = np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(by).all(axis=(1, 2))
-        found = np.full(by.shape, np.nan)
-        for i in np.flatnonzero(good):
-            found[i] = np.linalg.lstsq(matrix[i], by[i])[0]
-        return found[:, :size], late if self.forced else found[:, size] * length.period[:, None]
+        matrix, late = end.slopes[..., :size] - np.eye(size), np.zeros((n, count))
+        if self.forced:
+            return moves(matrix, by), late
+        ahead, there = self.rates(group), self.flow.rates(end, group)
+        unit = length.period[:, None]  # the period is an unknown in periods
+        matrix = np.concatenate([matrix, (there * unit)[..., None]], axis=2)
+        row = np.pad(ahead, ((0, 0), (0, 1)))[:, None]
+        found = moves(
+            np.concatenate([matrix, row], axis=1), np.concatenate([by, late[:, None]], axis=1)
+        )
+        return found[:, :size], found[:, size] * unit
 
     def multipliers(self, end: Places, group: Ensemble) -> np.ndarray:
         """Floquet multipliers, complex128[n, m]."""
