@@ -29,6 +29,8 @@ MASK_WORDS = ("&", "|", "~")
 LAST_EXACT_DIVISOR = 12
 #: Consecutive operations in a sine.
 SINE = 12
+#: Less than any size that counts.
+SMALLEST = 1e-300
 
 
 #: Operations whose coefficients differ from step to step.
@@ -618,6 +620,10 @@ class JetCode:
         x, y = (f"magnitude({self._zero(self.value(s, 0))})" for s in (a, b))
         return f"{x} * {errors[1]} + {y} * {errors[0]}"
 
+    def _size(self, series: Series) -> str:
+        """The size of a series, no divisor of nothing: zero times infinity would be no number."""
+        return f"({SMALLEST!r} + magnitude({self._terms_of(series)}))"
+
     def _slope(self, series: Series) -> str | None:
         """Derivative of a function with respect to its argument; None for what has none here."""
         match series.kind:
@@ -629,14 +635,11 @@ class JetCode:
             case "log":
                 return self._inverse(series.operands[0])
             case "sqrt":
-                return self._inverse(series, 2.0)
+                return f"0.5 / {self._size(series)}"
             case "power":
                 assert isinstance(series.payload, Expr)
-                exponent, inverse = (
-                    self.coefficient(series.payload),
-                    self._inverse(series.operands[0]),
-                )
-                return f"{exponent} * {self._terms_of(series)} * {inverse}"
+                exponent, base = self.coefficient(series.payload), self._size(series.operands[0])
+                return f"{exponent} * {self._terms_of(series)} / {base}"
             case "tan" | "tanh":
                 return self.value(series, 0, "w")
             case "atan":
