@@ -206,11 +206,16 @@ def heartbeat(beat: Callable[[], None]) -> Iterator[None]:
         _HEARTBEAT.reset(token)
 
 
-def check_stop() -> None:
-    """Raise Interrupted if the work that this thread does a part of was asked to stop."""
+def alive() -> None:
+    """Call the function of :func:`heartbeat`, if this is its thread."""
     beat = _HEARTBEAT.get()
     if beat is not None and beat[0] == threading.get_ident():
         beat[1]()
+
+
+def check_stop() -> None:
+    """Raise Interrupted if the work that this thread does a part of was asked to stop."""
+    alive()
     current = _CURRENT.get()
     if current is not None and current.is_set():
         raise Interrupted

@@ -27,7 +27,7 @@ from saltus.flow.request import Outcome, Request, Schedule
 from saltus.flow.room import Contacts
 from saltus.flow.stops import on_allowed_sides
 from saltus.flow.threads import may_wait, on_threads, usable_processors
-from saltus.interrupt import PartInterrupted, Stop, check_stop
+from saltus.interrupt import PartInterrupted, Stop, alive, check_stop
 from saltus.kernels import status as st
 from saltus.kernels.batch import Batch
 from saltus.system import System
@@ -347,6 +347,7 @@ def _advance(
             went_on |= chunk.until()
         if show is not None:
             show(_share_done([chunk]))
+        alive()
         if outcome == st.FINISHED and not went_on:
             return
         if room.full:

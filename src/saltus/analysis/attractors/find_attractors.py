@@ -137,7 +137,7 @@ def _settle(
         travel.keep(stay)
         going = going[stay]
         if progress:
-            progress(max(1.0 - len(going) / len(start), travel.age / most))
+            progress(max(1.0 - len(going) / len(start), min(travel.age / most, 1.0)))
     if len(going):
         _survey(map_, travel, going, scale, found, owner, settled, most)
 
