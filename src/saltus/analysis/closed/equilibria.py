@@ -64,8 +64,8 @@ def equilibria(
     start : sequence, mapping or array, optional
         Starts of Newton's method, as for :func:`saltus.simulate`, in place of a box.
     starts : int
-        Quasi-random starts in the box. Without a box their states have either sign, and magnitudes
-        from 1e-4 to 1e4 in SI.
+        Quasi-random starts in the box, 100 000 at most, for each of up to 1024 modes. Without a
+        box their states have either sign, and magnitudes from 1e-4 to 1e4 in SI.
     at : mapping, optional
         Starts of the states that have no range in the box; default zero.
     **box : (low, high)

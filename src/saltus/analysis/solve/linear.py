@@ -25,8 +25,8 @@ def solutions(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 
 def moves(by_unknowns: np.ndarray, by_parameters: np.ndarray) -> np.ndarray:
-    """How zeros of equations F(z, p) = 0 move with their parameters, by the theorem of implicit
-    functions: dz/dp = -(dF/dz)^-1 dF/dp.
+    """Derivatives of zeros z of equations F(z, p) = 0 with respect to parameters, by the implicit
+    function theorem: dz/dp = -(dF/dz)^-1 dF/dp.
 
     Parameters
     ----------
