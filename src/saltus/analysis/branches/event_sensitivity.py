@@ -15,7 +15,7 @@ from saltus.analysis.branches.bifurcation_curve import (
 )
 from saltus.analysis.branches.singular_orbits import SingularOrbits
 from saltus.analysis.dataset_parts import provenance, subject
-from saltus.analysis.derivatives.sensitivity import Columns
+from saltus.analysis.derivatives.columns import Columns
 from saltus.analysis.inputs.starts import check_system
 from saltus.analysis.inputs.verb import verb
 from saltus.analysis.solve.linear import moves
