@@ -72,9 +72,7 @@ def attractors(
         Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
         it serves.
     periods : int
-        Forcing periods after which a trajectory that hasn't settled is looked at for chaos. It
-        bounds the work with what that takes: 4096 periods more of each, and 32 768 more of up to
-        24 of them; of D states, from eight on, 4/D of both, but 4 motions at least.
+        Forcing periods after which a trajectory that hasn't settled is looked at for chaos.
     every : float or str, optional
         Time between two samples [s] of a system without forcing; default about a turn of its
         motions.
