@@ -187,10 +187,16 @@ def allocate(
         **marks(n),
     }
     outcome = Outcome(
-        arrays["state"], arrays["phase"], arrays["status"], arrays["mode"], arrays["counters"],
-        arrays["minima"], arrays["samples"],
-        arrays["sample_mode"], ContactTable.empty(0, states),
-    )  # fmt: skip
+        arrays["state"],
+        arrays["phase"],
+        arrays["status"],
+        arrays["mode"],
+        arrays["counters"],
+        arrays["minima"],
+        arrays["samples"],
+        arrays["sample_mode"],
+        ContactTable.empty(0, states),
+    )
     return outcome, arrays
 
 

@@ -243,11 +243,19 @@ def branches(
 
 
 def seeds_between(
-    system: System, name: str, limits: tuple[float, float], start: Any, box: Any = None,
-    at: Any = 12, seed: int = 1, every: Any = None, method: Method | None = None,
-    periods: int = 2000, threads: int | None = None,
+    system: System,
+    name: str,
+    limits: tuple[float, float],
+    start: Any,
+    box: Any = None,
+    at: Any = 12,
+    seed: int = 1,
+    every: Any = None,
+    method: Method | None = None,
+    periods: int = 2000,
+    threads: int | None = None,
     progress: Callable[[float], None] | None = None,
-) -> tuple[list[Seed], list[Seed]]:  # fmt: skip
+) -> tuple[list[Seed], list[Seed]]:
     """Seeds of branches over a parameter between two values [SI]: of those of orbits, and those of
     equilibria. Arguments as for :func:`branches`.
     """
@@ -267,9 +275,14 @@ def seeds_between(
 
 
 def follow_all(
-    plan: Plan, system: System, name: str, begins: list[Seed], equilibria: list[Seed],
-    done: list[Branch], progress: Callable[[float], None] | None = None,
-) -> None:  # fmt: skip
+    plan: Plan,
+    system: System,
+    name: str,
+    begins: list[Seed],
+    equilibria: list[Seed],
+    done: list[Branch],
+    progress: Callable[[float], None] | None = None,
+) -> None:
     """Add the branches that seeds lie on to those that are known. Seeds on a known one are left
     out.
     """
@@ -315,9 +328,12 @@ def _inside(seeds: list[Seed], limits: tuple[float, float]) -> list[Seed]:
 
 
 def _found_in(
-    grid: Grid, method: Method, periods: int, threads: int | None,
+    grid: Grid,
+    method: Method,
+    periods: int,
+    threads: int | None,
     progress: Callable[[float], None] | None,
-) -> list[Seed]:  # fmt: skip
+) -> list[Seed]:
     """Seeds from the attractors that starts lead to at some values of the parameter."""
     found = find(grid, method, periods, threads, progress)
     if not found.complete:

@@ -160,9 +160,14 @@ class Cycles(Family[Cycle]):
             return None
         points = samples[:: SAMPLES // LONGEST][:LONGEST]
         return Cycle(
-            points, multipliers, mismatch, float(closed.time[0]), scale=scale, samples=samples,
+            points,
+            multipliers,
+            mismatch,
+            float(closed.time[0]),
+            scale=scale,
+            samples=samples,
             rates=closed.rates(samples[None])[0],
-        )  # fmt: skip
+        )
 
     def same(self, motion: Cycle, closed: Shooting) -> np.ndarray:
         """See :class:`Family`: once or several times round."""

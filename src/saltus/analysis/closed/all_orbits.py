@@ -150,9 +150,12 @@ def all_orbits(
 
 
 def _search(
-    result: Orbits, map_: Map, start: np.ndarray, longest: int,
+    result: Orbits,
+    map_: Map,
+    start: np.ndarray,
+    longest: int,
     progress: Callable[[float], None] | None,
-) -> None:  # fmt: skip
+) -> None:
     """Search for orbits of one period after the other."""
     iterates = _guesses(map_, start, longest)
     for n in range(1, longest + 1):

@@ -121,10 +121,15 @@ def equilibria(
     begin, scale = _starts(system, start, whole(starts, "starts", 1, MOST_STARTS), at, box)
     found = all_equilibria(system, begin, scale)
     attrs = attributes(
-        system=system.name, equations=system.equations(), parameters=system.values,
-        units=system.units, method="Newton", method_options={"starts": len(begin)},
-        fingerprint=system.fingerprint(), source=system.source,
-    )  # fmt: skip
+        system=system.name,
+        equations=system.equations(),
+        parameters=system.values,
+        units=system.units,
+        method="Newton",
+        method_options={"starts": len(begin)},
+        fingerprint=system.fingerprint(),
+        source=system.source,
+    )
     about = Subject(system.states, system.units, attrs, gap_unit=gap_unit(system))
     return build(EQUILIBRIA, about, _columns(system, found))
 

@@ -181,9 +181,14 @@ class _Shots:
         return multipliers(matrices[:, None])
 
     def beside(
-        self, group: Ensemble, length: Span, own: np.ndarray, move: np.ndarray, late: np.ndarray,
+        self,
+        group: Ensemble,
+        length: Span,
+        own: np.ndarray,
+        move: np.ndarray,
+        late: np.ndarray,
         name: str,
-    ) -> np.ndarray:  # fmt: skip
+    ) -> np.ndarray:
         """Derivatives of multipliers complex128[n, m] by one parameter, as the orbit moves."""
         n = group.size
         each = np.repeat(np.arange(n), len(SHIFTS))
@@ -207,9 +212,13 @@ class _Shots:
 
 # -- what is said ----------------------------------------------------------------------------------
 def check_orbits(
-    names: Sequence[str], parameters: Sequence[str], periods: Any, t_end: Any, t_start: Any,
+    names: Sequence[str],
+    parameters: Sequence[str],
+    periods: Any,
+    t_end: Any,
+    t_start: Any,
     values: Any,
-) -> None:  # fmt: skip
+) -> None:
     """Raise a ParameterError for what periodic orbits have of their own."""
     given = {"periods": periods, "t_end": t_end, "t_start": t_start or None, "values": values}
     wrong = [name for name, value in given.items() if value not in (None, "0 s")]

@@ -130,9 +130,19 @@ def simulate(
     (21, True)
     """
     asked = asked_motion(
-        system, start, periods, t_end, t_start=t_start, method=method, samples=samples, at=at,
-        until=until, keep=keep, values=values, time_errors=time_errors,
-    )  # fmt: skip
+        system,
+        start,
+        periods,
+        t_end,
+        t_start=t_start,
+        method=method,
+        samples=samples,
+        at=at,
+        until=until,
+        keep=keep,
+        values=values,
+        time_errors=time_errors,
+    )
 
     def so_far(outcome: Outcome) -> xr.Dataset:
         return _dataset(asked, asked.arrays(outcome, measure.local(outcome)))
