@@ -14,8 +14,10 @@ from contextlib import contextmanager
 from contextvars import ContextVar, Token
 from functools import cache
 from types import FrameType
-from typing import Any
+from typing import Any, TypeVar
 
+Part = TypeVar("Part")
+Answer = TypeVar("Answer")
 #: Exit code of a command that Ctrl-C stopped: 128 + SIGINT, as shells expect.
 EXIT_CODE = 130
 
@@ -60,6 +62,28 @@ class Interrupted(KeyboardInterrupt):
         if not self.has_partial:
             return "stopped before anything was finished."
         return "stopped. What was finished stands in `partial` of this exception."
+
+
+class PartInterrupted(Interrupted):
+    """Ctrl-C within a part of the work of a verb: ``partial`` is of that part, and no answer."""
+
+
+def answered(work: Callable[[], Part], answer: Callable[[Part], Answer]) -> Answer:
+    """The answer that is made of some work.
+
+    Raises
+    ------
+    Interrupted
+        On Ctrl-C. Its ``partial`` is the answer made of what was finished of the work.
+    """
+    try:
+        part = work()
+    except PartInterrupted as stop:
+        raise stop.then(answer) from None
+    try:
+        return answer(part)
+    except KeyboardInterrupt:
+        raise Interrupted(lambda: answer(part)) from None
 
 
 def _interrupted(partial: Any) -> Interrupted:
@@ -182,11 +206,16 @@ def heartbeat(beat: Callable[[], None]) -> Iterator[None]:
         _HEARTBEAT.reset(token)
 
 
-def check_stop() -> None:
-    """Raise Interrupted if the work that this thread does a part of was asked to stop."""
+def alive() -> None:
+    """Call the function of :func:`heartbeat`, if this is its thread."""
     beat = _HEARTBEAT.get()
     if beat is not None and beat[0] == threading.get_ident():
         beat[1]()
+
+
+def check_stop() -> None:
+    """Raise Interrupted if the work that this thread does a part of was asked to stop."""
+    alive()
     current = _CURRENT.get()
     if current is not None and current.is_set():
         raise Interrupted

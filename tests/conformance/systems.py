@@ -214,3 +214,31 @@ def bits(run: xr.Dataset, trajectory: int | None = None) -> dict[str, bytes]:
                 tuple(of_one.get(dim, slice(None)) for dim in variable.dims)
             ].tobytes()
     return found
+
+
+@sl.system(states="T on")
+def thermostat(t, T, on):
+    """A room that is heated from 22 up to 23.5 degrees."""
+    return (
+        -0.1 * (T - 18) + 2 * on, 0.0,
+        sl.jump(T > 23.5, on=0.0), sl.jump(T < 22.0, on=1.0),
+    )  # fmt: skip
+
+
+@sl.system(states="a b c u v w")
+def cradle(t, a, b, c, u, v, w):
+    """Three equal elastic balls in a row."""
+    return (
+        u, v, w, 0.0, 0.0, 0.0,
+        sl.impact(a < b, u - v, restitution=1.0, inertia=(1.0, 1.0)),
+        sl.impact(b < c, v - w, restitution=1.0, inertia=(1.0, 1.0)),
+    )  # fmt: skip
+
+
+@sl.system(states="x y v w")
+def two_balls(t, x, y, v, w):
+    """Two balls that fall on floors of their own."""
+    return (
+        v, w, -1.0, -1.0,
+        sl.impact(x > 0, -v, restitution=0.5), sl.impact(y > 0, -w, restitution=0.9),
+    )  # fmt: skip

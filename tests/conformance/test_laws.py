@@ -11,7 +11,7 @@ import pytest
 from scipy.optimize import brentq
 
 import saltus as sl
-from conformance.systems import ball_of_clay, pinched
+from conformance.systems import ball_of_clay, cradle, pinched, thermostat, two_balls
 from saltus.errors import ParameterError, SaltusWarning
 
 
@@ -193,14 +193,6 @@ def test_three_bodies_share_their_momentum():
 
 
 def test_a_row_of_balls_that_touch_hands_its_momentum_on():
-    @sl.system(states="a b c u v w")
-    def cradle(t, a, b, c, u, v, w):
-        return (
-            u, v, w, 0.0, 0.0, 0.0,
-            sl.impact(a < b, u - v, restitution=1.0, inertia=(1.0, 1.0)),
-            sl.impact(b < c, v - w, restitution=1.0, inertia=(1.0, 1.0)),
-        )  # fmt: skip
-
     run = sl.simulate(cradle, (-1.0, 0.0, 0.0, 1.0, 0.0, 0.0), t_end=3.0, samples=4)
     assert times(run, "impact").tolist() == [1.0, 1.0]
     assert [float(run[f"end_{name}"]) for name in "uvw"] == [0.0, 0.0, 1.0]
@@ -252,14 +244,7 @@ def row_of_four(t, a, b, c, d, u, v, w, z, *, restitution=1.0):
 
 
 def test_impacts_that_have_nothing_to_do_with_each_other_may_coincide():
-    @sl.system(states="x y v w")
-    def two(t, x, y, v, w):
-        return (
-            v, w, -1.0, -1.0,
-            sl.impact(x > 0, -v, restitution=0.5), sl.impact(y > 0, -w, restitution=0.9),
-        )  # fmt: skip
-
-    run = sl.simulate(two, (0.5, 0.5, 0.0, 0.0), t_end=1.5, samples=1)
+    run = sl.simulate(two_balls, (0.5, 0.5, 0.0, 0.0), t_end=1.5, samples=1)
     assert times(run, "impact").tolist() == [1.0, 1.0]
     assert float(run.end_v) == pytest.approx(0.0, abs=1e-15)
     assert float(run.end_w) == pytest.approx(0.4, rel=1e-15)
@@ -322,14 +307,6 @@ def test_a_start_beyond_a_stop_is_invalid():
 
 def test_a_jump_happens_once_each_time_its_condition_becomes_true():
     """A heater with hysteresis: off at 23.5, on at 22."""
-
-    @sl.system(states="T on")
-    def thermostat(t, T, on):
-        return (
-            -0.1 * (T - 18) + 2 * on, 0.0,
-            sl.jump(T > 23.5, on=0.0), sl.jump(T < 22.0, on=1.0),
-        )  # fmt: skip
-
     run = sl.simulate(thermostat, (15.0, 1.0), t_end=30.0, samples=5)
     heat = 10 * math.log((38 - 15) / (38 - 23.5))
     cool, again = 10 * math.log(5.5 / 4.0), 10 * math.log((38 - 22) / (38 - 23.5))

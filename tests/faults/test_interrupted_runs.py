@@ -374,3 +374,53 @@ def test_other_things_that_python_drops_are_told_as_before(monkeypatch):
         Failing()
     assert [str(one.exc_value) for one in seen] == ["at its end"]
     assert sys.unraisablehook == seen.append
+
+
+# -- searches --------------------------------------------------------------------------------------
+def pressed_after(share):
+    """A progress function that is Ctrl-C once so much is done."""
+
+    def progress(done):
+        if done >= share:
+            raise KeyboardInterrupt
+
+    return progress
+
+
+def test_attractors_that_were_found_are_handed_out():
+    rig = sl.models.delangre("b", force="4 N", frequency="15 Hz")
+    whole = sl.attractors(rig, START, progress=False)
+    with pytest.raises(sl.Interrupted) as stopped:
+        sl.attractors(rig, START, progress=pressed_after(0.1))
+    part = stopped.value.partial
+    assert set(part.variables) == set(whole.variables)
+    done = part.basin.values >= 0
+    assert 0 < done.sum() < done.size
+    assert (part.basin.values[~done] == Kind.NOT_COMPUTED).all()
+    mine, theirs = part.basin.values[done], whole.basin.values[done]
+    for name in ("attractor_peak", "attractor_margin", "attractor_contacts"):
+        np.testing.assert_allclose(part[name].values[mine], whole[name].values[theirs], rtol=1e-9)
+    np.testing.assert_array_equal(
+        part.periods_to_settle.values[done], whole.periods_to_settle.values[done]
+    )
+    assert f"missed   {done.sum()} starts" in sl.describe(part)
+
+
+def test_orbits_of_searches_that_ended_are_handed_out():
+    rig = sl.models.delangre("b", force="4 N", frequency="15 Hz")
+    first = sl.periodic_orbits(rig, START, periods=1, progress=False)
+    with pytest.raises(sl.Interrupted) as stopped:  # the search for period 1 is a third of the work
+        sl.periodic_orbits(rig, START, periods=2, progress=pressed_after(0.3))
+    part = stopped.value.partial
+    assert set(part.variables) == set(first.variables)
+    for name in ("orbit_peak", "orbit_found", "orbit_stability", "search_exhausted"):
+        np.testing.assert_array_equal(part[name].values, first[name].values)
+
+
+def test_limit_cycles_that_were_found_are_handed_out():
+    start = np.random.default_rng(1).uniform(-2, 2, (80, 2))  # they are followed in two parts
+    with pytest.raises(sl.Interrupted) as stopped:
+        sl.periodic_orbits(sl.models.belt_stribeck(), start, progress=pressed_after(0.5))
+    part = stopped.value.partial
+    assert part.orbit_cycle.values == pytest.approx([12.0010312948306], rel=1e-12)
+    assert not part.search_exhausted.any()

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
-from conformance.systems import ball_of_clay, pinched
+from conformance.systems import ball_of_clay, cradle, pinched, thermostat, two_balls
 from saltus.errors import ParameterError, SaltusWarning
 from saltus.flow import engine
 from saltus.flow.maps import Stroboscope
@@ -193,14 +193,6 @@ def test_a_start_on_the_stop_with_the_velocity_into_it_rebounds(method):
 @every
 def test_a_heater_with_hysteresis_switches_at_its_times(method):
     """A jump that leads back: off at 23.5, on at 22."""
-
-    @sl.system(states="T on")
-    def thermostat(t, T, on):
-        return (
-            -0.1 * (T - 18) + 2 * on, 0.0,
-            sl.jump(T > 23.5, on=0.0), sl.jump(T < 22.0, on=1.0),
-        )  # fmt: skip
-
     rough = method in NOT_LOCATED
     found = run(thermostat, (15.0, 1.0), method, 25.0, samples=2)
     exact = 10 * math.log((38 - 15) / (38 - 23.5))
@@ -293,14 +285,6 @@ def test_a_jump_may_carry_the_state_over_other_boundaries(method):
 @pytest.mark.nojit
 @located
 def test_a_row_of_balls_that_touch_hands_its_momentum_on(method):
-    @sl.system(states="a b c u v w")
-    def cradle(t, a, b, c, u, v, w):
-        return (
-            u, v, w, 0.0, 0.0, 0.0,
-            sl.impact(a < b, u - v, restitution=1.0, inertia=(1.0, 1.0)),
-            sl.impact(b < c, v - w, restitution=1.0, inertia=(1.0, 1.0)),
-        )  # fmt: skip
-
     found = run(cradle, (-1.0, 0.0, 0.0, 1.0, 0.0, 0.0), method, 3.0, samples=4)
     np.testing.assert_allclose(times(found, "impact"), [1.0, 1.0], rtol=0, atol=1e-12)
     assert [float(found[f"end_{name}"]) for name in "uvw"] == [0.0, 0.0, 1.0]
@@ -340,14 +324,7 @@ def test_one_of_two_impacts_a_little_later_has_its_own_outcome(method):
 
 @every
 def test_impacts_that_have_nothing_to_do_with_each_other_may_coincide(method):
-    @sl.system(states="x y v w")
-    def two(t, x, y, v, w):
-        return (
-            v, w, -1.0, -1.0,
-            sl.impact(x > 0, -v, restitution=0.5), sl.impact(y > 0, -w, restitution=0.9),
-        )  # fmt: skip
-
-    found = run(two, (0.5, 0.5, 0.0, 0.0), method, 1.25, samples=1)
+    found = run(two_balls, (0.5, 0.5, 0.0, 0.0), method, 1.25, samples=1)
     assert str(found.status.values) == "ok"
     late = 0.1 if method in NOT_LOCATED else 1e-6
     assert times(found, "impact") == pytest.approx([1.0, 1.0], abs=late)

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import saltus as sl
-from saltus.system.linear import linear_pieces
+from saltus.system.linearity import linear_pieces
 
 mpmath = pytest.importorskip("mpmath")
 mp = mpmath.mp

@@ -11,7 +11,7 @@ import pytest
 import scipy.interpolate
 
 import saltus as sl
-from saltus.system.linear import linear_pieces
+from saltus.system.linearity import linear_pieces
 
 mpmath = pytest.importorskip("mpmath")
 mp = mpmath.mp

@@ -11,7 +11,7 @@ import saltus as sl
 from rubbing import by_exponentials, random_rubbing
 from saltus.errors import SaltusWarning
 from saltus.flow.maps import Stroboscope
-from saltus.system.linear import linear_pieces
+from saltus.system.linearity import linear_pieces
 from two_flows import same_rows
 
 SEED = 20261126

@@ -9,7 +9,7 @@ import pytest
 
 import saltus as sl
 from saltus.flow.maps import Stroboscope
-from saltus.system.linear import linear_pieces
+from saltus.system.linearity import linear_pieces
 from two_flows import FOLLOWS, runs, same_rows, times
 
 SEED = 20261126

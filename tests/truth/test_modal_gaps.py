@@ -11,7 +11,7 @@ from scipy.linalg import expm
 
 import saltus as sl
 from saltus.kernels.modal.layout import QUEUE
-from saltus.system.linear import linear_pieces
+from saltus.system.linearity import linear_pieces
 
 
 def spread(seed, degrees, contacts):

@@ -10,7 +10,7 @@ import pytest
 import saltus as sl
 from saltus.system import courses
 from saltus.system.courses import SMOOTH_TERMS, course_of
-from saltus.system.linear import linear_pieces
+from saltus.system.linearity import linear_pieces
 from two_flows import FOLLOWS, same_rows
 
 mpmath = pytest.importorskip("mpmath")

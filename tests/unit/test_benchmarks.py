@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from saltus.system.linear import linear_pieces
+from saltus.system.linearity import linear_pieces
 
 ROOT = Path(__file__).resolve().parents[2]
 

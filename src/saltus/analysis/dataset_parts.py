@@ -78,18 +78,25 @@ def trajectories(
 ) -> Subject:
     """The subject of Datasets of some trajectories."""
     about = Subject(
-        states=system.states, units=system.units, guards=guards(system, group), varied=group.varied,
+        states=system.states,
+        units=system.units,
+        guards=guards(system, group),
+        varied=group.varied,
         batch=group.batch,
         forcing_period=forcing_period,
         attrs=provenance(system, method, shared_values(system, group), group.varied),
-    )  # fmt: skip
+    )
     return with_outputs(about, system)
 
 
 def motion_values(
-    system: System, group: Ensemble, time: Any, states: np.ndarray, mode: np.ndarray,
+    system: System,
+    group: Ensemble,
+    time: Any,
+    states: np.ndarray,
+    mode: np.ndarray,
     rows: np.ndarray | None = None,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """The states of a system and its outputs at places of its trajectories.
 
     Parameters

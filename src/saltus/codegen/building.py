@@ -248,9 +248,12 @@ def _answer_of(module: str, options: tuple[str, ...], given: bytes, title: str) 
                 process = subprocess.Popen(
                     # -P: no modules from the working folder
                     [sys.executable, "-P", "-m", module, *options],
-                    stdin=file, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment,
+                    stdin=file,
+                    stdout=subprocess.PIPE,
+                    stderr=subprocess.DEVNULL,
+                    env=environment,
                     start_new_session=True,  # Ctrl-C is for this process
-                )  # fmt: skip
+                )
                 _COMPILING.add(process)
         data = _wait(process)
     except OSError:  # no processes here, or none that can be read

@@ -29,6 +29,8 @@ MASK_WORDS = ("&", "|", "~")
 LAST_EXACT_DIVISOR = 12
 #: Consecutive operations in a sine.
 SINE = 12
+#: Less than any size that counts.
+SMALLEST = 1e-300
 
 
 #: Operations whose coefficients differ from step to step.
@@ -597,19 +599,52 @@ class JetCode:
 
     def _rounding_code(self, series: Series) -> str:
         own = f"magnitude({self._terms_of(series)})"
+        if series.kind == "linear":
+            assert isinstance(series.payload, Linear)
+            return self.rounding(series.payload)
+        if series.kind in ("select", "product", "quotient"):
+            return self._rounding_of_two(series, own)
+        slope = self._slope(series)
+        if slope is None:
+            return own
+        return f"{own} + {self._rounding(series.operands[0])} * magnitude({slope})"
+
+    def _rounding_of_two(self, series: Series, own: str) -> str:
+        a, b = series.operands
+        errors = self._rounding(a), self._rounding(b)
+        if series.kind == "select":
+            assert isinstance(series.payload, ex.Condition)
+            return f"select({self._mask(series.payload)}, {errors[0]}, {errors[1]})"
+        if series.kind == "quotient":
+            return f"{own} + ({errors[0]} + {own} * {errors[1]}) * magnitude({self._inverse(b)})"
+        x, y = (f"magnitude({self._zero(self.value(s, 0))})" for s in (a, b))
+        return f"{x} * {errors[1]} + {y} * {errors[0]}"
+
+    def _size(self, series: Series) -> str:
+        """The size of a series, no divisor of nothing: zero times infinity would be no number."""
+        return f"({SMALLEST!r} + magnitude({self._terms_of(series)}))"
+
+    def _slope(self, series: Series) -> str | None:
+        """Derivative of a function with respect to its argument; None for what has none here."""
         match series.kind:
-            case "linear":
-                assert isinstance(series.payload, Linear)
-                return self.rounding(series.payload)
-            case "product":
-                a, b = series.operands
-                x, y = (f"magnitude({self._zero(self.value(s, 0))})" for s in (a, b))
-                return f"{x} * {self._rounding(b)} + {y} * {self._rounding(a)}"
             case "sin" | "cos" if self._time_frequency(series.operands[0]) is None:
-                angle = series.operands[0]
-                other = self._harmonic(angle, 0, "cosine" if series.kind == "sin" else "sine")
-                return f"{own} + {self._rounding(angle)} * magnitude({other})"
-        return own
+                other = "cosine" if series.kind == "sin" else "sine"
+                return self._harmonic(series.operands[0], 0, other)
+            case "exp":
+                return self._terms_of(series)
+            case "log":
+                return self._inverse(series.operands[0])
+            case "sqrt":
+                return f"0.5 / {self._size(series)}"
+            case "power":
+                assert isinstance(series.payload, Expr)
+                exponent, base = self.coefficient(series.payload), self._size(series.operands[0])
+                return f"{exponent} * {self._terms_of(series)} / {base}"
+            case "tan" | "tanh":
+                return self.value(series, 0, "w")
+            case "atan":
+                return f"1.0 / {self.value(series, 0, 'w')}"
+        return None
 
     def write(self, row: int, value: str | None, of_column: bool = False) -> None:
         """Store a coefficient to a row of ``work``."""

@@ -132,9 +132,11 @@ def equation_ir(
         of_lanes, tree = name in OF_LANES, trees[name]
         width, attributes = (part, "nounwind alignstack(64)") if of_lanes else (lanes, "nounwind")
         signature = Signature(
-            arguments, "i64" if name in interface.truths else "void", attributes,
+            arguments,
+            "i64" if name in interface.truths else "void",
+            attributes,
             lanes if of_lanes else 1,
-        )  # fmt: skip
+        )
         if width < signature.row:
             texts.append(_part_by_part(tree, signature, width, f"part_of_{name}"))
             tree = ast.FunctionDef(f"part_of_{name}", tree.args, tree.body, [])

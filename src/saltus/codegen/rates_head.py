@@ -175,7 +175,9 @@ def rates_head(system: System, numbers: Mapping[str, Constant], jacobian: bool =
         value = prepare.value(node)
         prepare.lines.append(f"c[{i}] = {value}")
     sizes: dict[str, Constant] = dict(
-        NSTATES=len(system.states), NMOVED=count_moved(system), NGUARDS=len(gaps),
+        NSTATES=len(system.states),
+        NMOVED=count_moved(system),
+        NGUARDS=len(gaps),
         NCONST=len(stages.constants.nodes),
         NDRIVE=len(stages.drives.nodes),
         TANGENT=system.tangent_of is not None,
@@ -183,8 +185,9 @@ def rates_head(system: System, numbers: Mapping[str, Constant], jacobian: bool =
         LAWS=any(guard.law and guard.law.reset for guard in system.guards),
         LEVELS=bool(levels_of(system)),
         **tables(LAW=laws["LAW"], LAW_SIDE=laws["LAW_SIDE"]),
-        **stages.clocks.constants(), **numbers,
-    )  # fmt: skip
+        **stages.clocks.constants(),
+        **numbers,
+    )
     functions = [
         f"@kernel\ndef prepare(p, c):\n{indented(prepare.lines)}\n",
         stages.clocks.function(),

@@ -27,7 +27,7 @@ from saltus.flow.request import Outcome, Request, Schedule
 from saltus.flow.room import Contacts
 from saltus.flow.stops import on_allowed_sides
 from saltus.flow.threads import may_wait, on_threads, usable_processors
-from saltus.interrupt import Interrupted, Stop, check_stop
+from saltus.interrupt import PartInterrupted, Stop, alive, check_stop
 from saltus.kernels import status as st
 from saltus.kernels.batch import Batch
 from saltus.system import System
@@ -43,7 +43,7 @@ SLICE = 50_000
 RECORDS = 8192
 
 
-class RunInterrupted(Interrupted):
+class RunInterrupted(PartInterrupted):
     """Ctrl-C during a run of the engine: ``partial`` is the Outcome so far."""
 
 
@@ -187,10 +187,16 @@ def allocate(
         **marks(n),
     }
     outcome = Outcome(
-        arrays["state"], arrays["phase"], arrays["status"], arrays["mode"], arrays["counters"],
-        arrays["minima"], arrays["samples"],
-        arrays["sample_mode"], ContactTable.empty(0, states),
-    )  # fmt: skip
+        arrays["state"],
+        arrays["phase"],
+        arrays["status"],
+        arrays["mode"],
+        arrays["counters"],
+        arrays["minima"],
+        arrays["samples"],
+        arrays["sample_mode"],
+        ContactTable.empty(0, states),
+    )
     return outcome, arrays
 
 
@@ -347,6 +353,7 @@ def _advance(
             went_on |= chunk.until()
         if show is not None:
             show(_share_done([chunk]))
+        alive()
         if outcome == st.FINISHED and not went_on:
             return
         if room.full:

@@ -12,7 +12,7 @@ from saltus.flow.method import Method
 from saltus.flow.modal import Modal
 from saltus.flow.taylor import Taylor
 from saltus.system import System
-from saltus.system.linear import linear_pieces
+from saltus.system.linearity import linear_pieces
 
 __all__ = [
     "METHODS",

@@ -25,7 +25,7 @@ from saltus.kernels.batch import Batch
 from saltus.kernels.isolation import DEEPEST, MOST_TOUCHES
 from saltus.kernels.modal import layout
 from saltus.system import System
-from saltus.system.linear import linear_pieces
+from saltus.system.linearity import linear_pieces
 from saltus.system.quantity import remembered
 from saltus.system.tangent import tangent_states
 

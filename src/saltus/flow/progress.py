@@ -38,7 +38,8 @@ def reporting(
             f"progress must be True, False or a function of the share done, not {progress!r:.80}."
         )
     if callable(progress):
-        yield progress
+        with _alive(progress) as show:
+            yield show
     elif progress is not None and not progress:
         yield None
     elif progress is None and not os.isatty(2) and not _in_notebook():

@@ -28,13 +28,26 @@ from saltus.models.model import model
     "Strganac); pitch spring with freeplay.",
 )
 def aeroelastic(
-    t, plunge, pitch, plunge_rate, pitch_rate, *, airspeed="12 m/s", mass="12.4 kg/m",
-    inertia="0.065 kg*m", imbalance=0.25,
-    half_chord="0.135 m", elastic_axis=-0.6, plunge_stiffness="2840 N/m^2",
-    pitch_stiffness="40 N/rad", pitch_gap="0.01 rad",
-    plunge_damping="27.4 N*s/m^2", pitch_damping="0.036 N*s/rad", air_density="1.225 kg/m^3",
+    t,
+    plunge,
+    pitch,
+    plunge_rate,
+    pitch_rate,
+    *,
+    airspeed="12 m/s",
+    mass="12.4 kg/m",
+    inertia="0.065 kg*m",
+    imbalance=0.25,
+    half_chord="0.135 m",
+    elastic_axis=-0.6,
+    plunge_stiffness="2840 N/m^2",
+    pitch_stiffness="40 N/rad",
+    pitch_gap="0.01 rad",
+    plunge_damping="27.4 N*s/m^2",
+    pitch_damping="0.036 N*s/rad",
+    air_density="1.225 kg/m^3",
     lift_slope="6.28 1/rad",
-):  # fmt: skip
+):
     """Typical wing section with freeplay in pitch, quasi-steady flow.
 
     States are ``plunge`` [m], ``pitch`` [rad] and their rates ``plunge_rate`` [m/s], ``pitch_rate``
@@ -92,9 +105,19 @@ def aeroelastic(
 
 # -- energy ----------------------------------------------------------------------------------------
 def _stored(
-    plunge, pitch, plunge_rate, pitch_rate, *, mass, inertia, imbalance, half_chord,
-    plunge_stiffness, pitch_stiffness, pitch_gap,
-):  # fmt: skip
+    plunge,
+    pitch,
+    plunge_rate,
+    pitch_rate,
+    *,
+    mass,
+    inertia,
+    imbalance,
+    half_chord,
+    plunge_stiffness,
+    pitch_stiffness,
+    pitch_gap,
+):
     """Energy of the section and its two springs, per unit span."""
     kinetic = (
         mass * plunge_rate**2 / 2

@@ -21,9 +21,16 @@ from saltus.models.model import model
     "oscillator with one-sided elastic constraint, Phil. Trans. R. Soc. A 366, 679-705 (2008).",
 )
 def bilinear_rig(
-    t, x, v, *, damping_ratio=0.01, stiffness_ratio=29.0, gap=1.26, amplitude=0.7,
+    t,
+    x,
+    v,
+    *,
+    damping_ratio=0.01,
+    stiffness_ratio=29.0,
+    gap=1.26,
+    amplitude=0.7,
     frequency="0.85 rad/s",
-):  # fmt: skip
+):
     r"""Oscillator on a shaken base with a stiff spring behind a gap on one side (Ing et al.).
 
     States are ``x`` and ``v``; all is dimensionless. It is forced at ``frequency``.

@@ -24,12 +24,25 @@ from saltus.models.model import model
     source="Textbook configuration; round values chosen for saltus.",
 )
 def chain(
-    t, x1, x2, v1, v2, *, first_mass="1 kg", second_mass="0.5 kg", ground_stiffness="1e3 N/m",
+    t,
+    x1,
+    x2,
+    v1,
+    v2,
+    *,
+    first_mass="1 kg",
+    second_mass="0.5 kg",
+    ground_stiffness="1e3 N/m",
     coupling_stiffness="400 N/m",
-    ground_damping="4 N*s/m", coupling_damping="2 N*s/m", ground_contact_stiffness="20e3 N/m",
+    ground_damping="4 N*s/m",
+    coupling_damping="2 N*s/m",
+    ground_contact_stiffness="20e3 N/m",
     ground_gap="1 mm",
-    coupling_contact_stiffness="10e3 N/m", coupling_gap="0.5 mm", force="2 N", frequency="7 Hz",
-):  # fmt: skip
+    coupling_contact_stiffness="10e3 N/m",
+    coupling_gap="0.5 mm",
+    force="2 N",
+    frequency="7 Hz",
+):
     """Chain of two masses with two clearances, shaken harmonically.
 
     States are the displacements ``x1``, ``x2`` [m] and velocities ``v1``, ``v2`` [m/s]; it is
@@ -75,10 +88,20 @@ def chain(
 
 # -- energy ----------------------------------------------------------------------------------------
 def _stored(
-    x1, x2, v1, v2, *, first_mass, second_mass, ground_stiffness, coupling_stiffness,
-    ground_contact_stiffness, ground_gap,
-    coupling_contact_stiffness, coupling_gap,
-):  # fmt: skip
+    x1,
+    x2,
+    v1,
+    v2,
+    *,
+    first_mass,
+    second_mass,
+    ground_stiffness,
+    coupling_stiffness,
+    ground_contact_stiffness,
+    ground_gap,
+    coupling_contact_stiffness,
+    coupling_gap,
+):
     """Energy of the masses, the springs and the contacts."""
     stretch = x2 - x1
     springs = ground_stiffness * x1**2 + coupling_stiffness * stretch**2

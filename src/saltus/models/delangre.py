@@ -38,10 +38,20 @@ CASES = {
 
 @model(states={"x": "m", "v": "m/s"}, forced_at="frequency", source=_SOURCE, cases=CASES, case="b")
 def delangre(
-    t, x, v, *, mass="3 kg", damping_ratio=0.03, natural_frequency="5 Hz", cubic="7e8 N/m^3",
+    t,
+    x,
+    v,
+    *,
+    mass="3 kg",
+    damping_ratio=0.03,
+    natural_frequency="5 Hz",
+    cubic="7e8 N/m^3",
     contact_stiffness="14e3 N/m",
-    lower_gap="0 mm", upper_gap="0.4 mm", force="4 N", frequency="15 Hz",
-):  # fmt: skip
+    lower_gap="0 mm",
+    upper_gap="0.4 mm",
+    force="4 N",
+    frequency="15 Hz",
+):
     """Forced Duffing oscillator with freeplay: the rig of de Langre et al.
 
     States are the displacement ``x`` [m] and velocity ``v`` [m/s] of the block; it is forced at

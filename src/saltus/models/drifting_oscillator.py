@@ -18,9 +18,18 @@ from saltus.models.model import model
     "Phys. Rev. E 64, 056224 (2001).",
 )
 def drifting_oscillator(
-    t, p, y, q, v, *, damping_ratio=0.01, amplitude=0.3, static_force=0.1, gap=0.02,
+    t,
+    p,
+    y,
+    q,
+    v,
+    *,
+    damping_ratio=0.01,
+    amplitude=0.3,
+    static_force=0.1,
+    gap=0.02,
     frequency="0.1 rad/s",
-):  # fmt: skip
+):
     r"""Oscillator with a drift (Pavlovskaia, Wiercigroch and Grebogi), in bounded coordinates.
 
     States are the places ``p`` of the mass and ``q`` of the top of the slider, both from the bottom

@@ -27,10 +27,19 @@ from saltus.models.model import model
     "49-75 (1990); own values.",
 )
 def gear_pair(
-    t, x, v, *, mesh_mass="0.25 kg", damping_ratio=0.05, mesh_stiffness="4e8 N/m",
-    stiffness_variation=0.2, gap="20 um",
-    mean_force="800 N", alternating_force="400 N", mesh_frequency="6e3 Hz",
-):  # fmt: skip
+    t,
+    x,
+    v,
+    *,
+    mesh_mass="0.25 kg",
+    damping_ratio=0.05,
+    mesh_stiffness="4e8 N/m",
+    stiffness_variation=0.2,
+    gap="20 um",
+    mean_force="800 N",
+    alternating_force="400 N",
+    mesh_frequency="6e3 Hz",
+):
     """Spur gear pair with backlash and varying mesh stiffness (after Kahraman and Singh).
 
     States are the dynamic transmission error ``x`` [m] and its rate ``v`` [m/s]; it is forced at

@@ -20,9 +20,19 @@ from saltus.models.model import model
     "43(3), 25 (2016), example 4.",
 )
 def hertz_stop(
-    t, x, v, *, mass=2.0, damping=4.1, stiffness=210.125, stop_stiffness=2.47e6, loss=1.98,
-    gap=0.005, force=2.0, frequency="14 rad/s",
-):  # fmt: skip
+    t,
+    x,
+    v,
+    *,
+    mass=2.0,
+    damping=4.1,
+    stiffness=210.125,
+    stop_stiffness=2.47e6,
+    loss=1.98,
+    gap=0.005,
+    force=2.0,
+    frequency="14 rad/s",
+):
     """Driven oscillator against a Hertz stop that damps on the way in (DISODE45, example 4).
 
     States are ``x`` and ``v``; the source names no units. It is forced at ``frequency``.

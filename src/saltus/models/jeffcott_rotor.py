@@ -27,10 +27,22 @@ from saltus.models.model import model
     "Sound Vib. 210(1), 1-18 (1998); own values.",
 )
 def jeffcott_rotor(
-    t, x, y, u, v, *, mass="2 kg", damping="60 N*s/m", stiffness="50 kN/m",
-    eccentricity="0.1 mm", gap="0.2 mm", stator_stiffness="400 kN/m", friction=0.1,
-    gravity="0 m/s^2", speed="1500 rpm",
-):  # fmt: skip
+    t,
+    x,
+    y,
+    u,
+    v,
+    *,
+    mass="2 kg",
+    damping="60 N*s/m",
+    stiffness="50 kN/m",
+    eccentricity="0.1 mm",
+    gap="0.2 mm",
+    stator_stiffness="400 kN/m",
+    friction=0.1,
+    gravity="0 m/s^2",
+    speed="1500 rpm",
+):
     r"""Jeffcott rotor with unbalance that rubs a stator (after Chu and Zhang).
 
     States are the place of the disk's centre from that of the stator, ``x`` and ``y`` [m], and its

@@ -20,9 +20,17 @@ from saltus.models.model import model
     "(1960).",
 )
 def jenkins_oscillator(
-    t, x, v, *, damping=0.05, stiffness=0.2, joint_stiffness=2.0, joint_limit=1.0, force=1.5,
+    t,
+    x,
+    v,
+    *,
+    damping=0.05,
+    stiffness=0.2,
+    joint_stiffness=2.0,
+    joint_limit=1.0,
+    force=1.5,
     frequency="0.9 rad/s",
-):  # fmt: skip
+):
     r"""Oscillator with a joint that slips (Caughey, Iwan): the bilinear hysteretic oscillator.
 
     States are ``x``, ``v`` and ``joint``, the deflection of the joint's spring; all is

@@ -43,6 +43,9 @@ def latch(
     engages with its spring drawn to h, and lets go when it is drawn to l.
     """
     return (
-        v, force * cos(frequency * t) - damping * v - x - stiffness * m * x, 0.0,
-        jump(x > upper, m=1.0), jump(x < lower, m=0.0),
-    )  # fmt: skip
+        v,
+        force * cos(frequency * t) - damping * v - x - stiffness * m * x,
+        0.0,
+        jump(x > upper, m=1.0),
+        jump(x < lower, m=0.0),
+    )

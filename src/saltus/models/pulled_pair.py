@@ -19,9 +19,20 @@ from saltus.models.model import model
     source="code_aster, Validation manual, test SDND106 (two masses, one with friction).",
 )
 def pulled_pair(
-    t, x1, x2, v1, v2, *, mass="5 kg", stiffness="1e4 N/m", force="3000 N", pull_time="0.2 s",
-    normal_force="1e4 N", static_friction=0.3, kinetic_friction=0.2,
-):  # fmt: skip
+    t,
+    x1,
+    x2,
+    v1,
+    v2,
+    *,
+    mass="5 kg",
+    stiffness="1e4 N/m",
+    force="3000 N",
+    pull_time="0.2 s",
+    normal_force="1e4 N",
+    static_friction=0.3,
+    kinetic_friction=0.2,
+):
     r"""Two masses on a spring; one rubs on the floor, the other is pulled (code_aster, SDND106).
 
     States are ``x1``, ``x2`` [m] and their rates ``v1``, ``v2`` [m/s]. It isn't forced.

@@ -20,9 +20,18 @@ from saltus.models.model import model
     "43(3), 25 (2016), example 1.",
 )
 def two_blocks(
-    t, y1, y2, v1, v2, *, spring=1.0, first_right=1.0, first_left=0.6, second_right=0.2,
+    t,
+    y1,
+    y2,
+    v1,
+    v2,
+    *,
+    spring=1.0,
+    first_right=1.0,
+    first_left=0.6,
+    second_right=0.2,
     second_left=0.5,
-):  # fmt: skip
+):
     r"""Two blocks joined by a spring on floors of two kinds (DISODE45, example 1).
 
     States are ``y1``, ``y2`` and their rates ``v1``, ``v2``; all is dimensionless. It isn't forced.

@@ -23,9 +23,22 @@ from saltus.models.model import model
     "(2019); NLvib, example 03 (two degrees of freedom, unilateral spring).",
 )
 def two_masses(
-    t, x1, x2, v1, v2, *, first_mass=1.0, second_mass=1.0, coupling=1.0, ground=1.0, loss=0.03,
-    stop_stiffness=100.0, gap=1.0, force=0.1, frequency="0.7 rad/s",
-):  # fmt: skip
+    t,
+    x1,
+    x2,
+    v1,
+    v2,
+    *,
+    first_mass=1.0,
+    second_mass=1.0,
+    coupling=1.0,
+    ground=1.0,
+    loss=0.03,
+    stop_stiffness=100.0,
+    gap=1.0,
+    force=0.1,
+    frequency="0.7 rad/s",
+):
     """Two masses with a stiff spring behind a gap on one side (NLvib, example 03).
 
     States are ``x1``, ``x2`` and their rates ``v1``, ``v2``; all is dimensionless. It is forced at

@@ -118,10 +118,17 @@ def _below(ax: Axes, handles: list[Any], columns: int) -> None:
     """Draw a legend below the name of the axis."""
     below = ax.transAxes + ScaledTranslation(0, -0.4, ax.figure.dpi_scale_trans)
     ax.legend(
-        handles=handles, loc="upper left", bbox_to_anchor=(0, 0), bbox_transform=below,
-        ncols=columns, frameon=False, handlelength=1.0,
-        handleheight=0.9, fontsize=7.5, labelspacing=0.35,
-    )  # fmt: skip
+        handles=handles,
+        loc="upper left",
+        bbox_to_anchor=(0, 0),
+        bbox_transform=below,
+        ncols=columns,
+        frameon=False,
+        handlelength=1.0,
+        handleheight=0.9,
+        fontsize=7.5,
+        labelspacing=0.35,
+    )
 
 
 def _occurring(ds: xr.Dataset) -> tuple[list[int], list[int]]:

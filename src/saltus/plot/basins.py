@@ -361,10 +361,17 @@ def _legend(
         small = len(handles) > _LONG_LEGEND
         drawing = {_Ramp: _DrawRamp(), _Ruler: _DrawRuler()}
         ax.legend(
-            handles, texts, handler_map=drawing, loc="upper left", bbox_to_anchor=(1.02, 1),
-            handlelength=5.5, handleheight=0.9,
-            frameon=False, fontsize=6.5 if small else 8, labelspacing=0.35 if small else 0.55,
-        )  # fmt: skip
+            handles,
+            texts,
+            handler_map=drawing,
+            loc="upper left",
+            bbox_to_anchor=(1.02, 1),
+            handlelength=5.5,
+            handleheight=0.9,
+            frameon=False,
+            fontsize=6.5 if small else 8,
+            labelspacing=0.35 if small else 0.55,
+        )
 
 
 def _texts(

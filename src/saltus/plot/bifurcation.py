@@ -141,9 +141,14 @@ def _limits_and_gaps(
         low, high = ax.get_ylim()
         if low <= row[-1] <= high:
             ax.text(
-                1.01, row[-1], str(name).replace("_", " "), transform=ax.get_yaxis_transform(),
-                va="center", color=QUIET, fontsize=7,
-            )  # fmt: skip
+                1.01,
+                row[-1],
+                str(name).replace("_", " "),
+                transform=ax.get_yaxis_transform(),
+                va="center",
+                color=QUIET,
+                fontsize=7,
+            )
         ax.plot(
             first.grid * across.factor,
             row,

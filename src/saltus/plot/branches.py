@@ -68,11 +68,12 @@ def branches(
     _, unit, long_name = heights[0]
     drawn = [
         curves.Curves(
-            Shown(one, one.attrs["parameter"], np.empty(0, dtype=int), name, rank), None,
+            Shown(one, one.attrs["parameter"], np.empty(0, dtype=int), name, rank),
+            None,
             [of.values],
         )
         for rank, ((name, one), of) in enumerate(zip(named.items(), heights, strict=True))
-    ]  # fmt: skip
+    ]
     up = curves.height_scale(unit, drawn, quantity)
     with curves.frame(ax, 3.4, drawn, up, events=events, legend=legend) as (panel, _):
         curves.height_axis(panel, quantity, long_name, up)

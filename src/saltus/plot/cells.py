@@ -249,9 +249,14 @@ def draw_cells(ax: Axes, sides: Sides, colors: np.ndarray) -> None:
     image = np.ascontiguousarray(colors.swapaxes(0, 1))
     if all(_is_even(side) for side in sides):
         ax.imshow(
-            image, origin="lower", extent=(x[0], x[-1], y[0], y[-1]), interpolation="nearest",
-            aspect="auto", zorder=0, rasterized=True,
-        )  # fmt: skip
+            image,
+            origin="lower",
+            extent=(x[0], x[-1], y[0], y[-1]),
+            interpolation="nearest",
+            aspect="auto",
+            zorder=0,
+            rasterized=True,
+        )
     else:
         ax.pcolormesh(x, y, image, zorder=0, rasterized=True)
         for set_scale, side in zip((ax.set_xscale, ax.set_yscale), sides, strict=True):

@@ -75,9 +75,13 @@ def contact_forces(
                 top = height[rows] * y.factor
                 panel.vlines(time[rows] * x.factor, 0.0, top, color=colour, linewidth=0.8)
                 panel.plot(
-                    time[rows] * x.factor, top, "o", color=colour, markersize=3.5,
+                    time[rows] * x.factor,
+                    top,
+                    "o",
+                    color=colour,
+                    markersize=3.5,
                     label=name.replace("_", " "),
-                )  # fmt: skip
+                )
         panel.axhline(0.0, color="0.6", linewidth=0.6)
         panel.set_xlabel(x.label("time"))
         panel.set_ylabel(y.label(_WORDS[shown]))

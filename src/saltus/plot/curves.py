@@ -239,10 +239,16 @@ def _kinds(ax: Axes, drawn: Curves, look: Dots, across: Scale, up: Scale) -> dic
             )
         x, y = _flat(shown, dots, mine, across, up)
         draw.draw_points(
-            ax, x, y, marker=motion_colors.marker(code) if look.marked else "o", mfc=color,
-            mec="none", ms=look.size(x.size, 1.0 if repeats else look.aperiodic),
-            zorder=3 if repeats else 2, gid=f"kind {code}",
-        )  # fmt: skip
+            ax,
+            x,
+            y,
+            marker=motion_colors.marker(code) if look.marked else "o",
+            mfc=color,
+            mec="none",
+            ms=look.size(x.size, 1.0 if repeats else look.aperiodic),
+            zorder=3 if repeats else 2,
+            gid=f"kind {code}",
+        )
     return points.kind_handles(shown, kinds, markers=look.marked)
 
 
@@ -253,10 +259,17 @@ def _compare(ax: Axes, drawn: Curves, look: Dots, across: Scale, up: Scale) -> d
     color, marker = points.dataset_color(shown), points.MARKERS[shown.rank] if look.marked else "o"
     hollow = look.marked and shown.rank == 0
     draw.draw_points(
-        ax, x, y, marker=marker, ms=look.size(x.size, look.first if shown.rank == 0 else 1.0),
-        mfc="none" if hollow else color, mec=color, mew=0.6 if hollow else 0.0,
-        zorder=3 + 0.1 * shown.rank, gid=f"dataset {shown.name}",
-    )  # fmt: skip
+        ax,
+        x,
+        y,
+        marker=marker,
+        ms=look.size(x.size, look.first if shown.rank == 0 else 1.0),
+        mfc="none" if hollow else color,
+        mec=color,
+        mew=0.6 if hollow else 0.0,
+        zorder=3 + 0.1 * shown.rank,
+        gid=f"dataset {shown.name}",
+    )
     return {shown.name: points.dot(color, marker, hollow)}
 
 
@@ -398,7 +411,15 @@ def draw_marks(ax: Axes, ds: xr.Dataset, values: np.ndarray, across: Scale, up: 
         here = ds["event_kind"].values == kind
         if here.any():
             ax.plot(
-                at[here] * across.factor, height[here] * up.factor, ls="none", marker=marker,
-                ms=size, mfc="white", mec=QUIET, mew=0.8, zorder=5, label=text,
+                at[here] * across.factor,
+                height[here] * up.factor,
+                ls="none",
+                marker=marker,
+                ms=size,
+                mfc="white",
+                mec=QUIET,
+                mew=0.8,
+                zorder=5,
+                label=text,
                 gid=f"event {kind}",
-            )  # fmt: skip
+            )

@@ -76,9 +76,13 @@ def fit(
         # responses of one frequency may lie on several branches: no curve joins them
         line = {"lw": 1.0} if along == "time" else {"ls": "none", "marker": "+"}
         above.plot(
-            x, one["fitted"].values * up.factor, color=OKABE_ITO["vermillion"],
-            label="fitted", zorder=3, **line,
-        )  # fmt: skip
+            x,
+            one["fitted"].values * up.factor,
+            color=OKABE_ITO["vermillion"],
+            label="fitted",
+            zorder=3,
+            **line,
+        )
         left = one["residual"].values * low.factor
         band = BAND * noise * low.factor
         below.axhspan(-band, band, color="0.9", zorder=0)

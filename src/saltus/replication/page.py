@@ -62,13 +62,21 @@ def page(result: Replication) -> str:
         )
     )
     return Template(_part("page.html")).substitute(
-        name=_text(paper.name), css=_part("page.css"), version=_text(_version()),
-        kind=_text(kind), title=_text(paper.title), citation=_text(paper.citation),
-        about=_text(paper.about), tally=_tally(result),
-        nav=_nav(result), rule=_text(RULE_OF_ALL), glance=_glance(result),
+        name=_text(paper.name),
+        css=_part("page.css"),
+        version=_text(_version()),
+        kind=_text(kind),
+        title=_text(paper.title),
+        citation=_text(paper.citation),
+        about=_text(paper.about),
+        tally=_tally(result),
+        nav=_nav(result),
+        rule=_text(RULE_OF_ALL),
+        glance=_glance(result),
         figures="\n".join(_figure(result, one) for one in result.figures),
-        made=_made(result), foot=_text(f"Made by: {command(result)}"),
-    )  # fmt: skip
+        made=_made(result),
+        foot=_text(f"Made by: {command(result)}"),
+    )
 
 
 def command(result: Replication, figure: str | None = None) -> str:

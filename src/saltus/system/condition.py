@@ -207,9 +207,12 @@ def _check_quotes(system: System, written: str, text: str) -> None:
 
 
 def _check_sides(
-    formula: Formula, units: dict[str, str], levels: dict[str, str], titles: dict[str, str],
+    formula: Formula,
+    units: dict[str, str],
+    levels: dict[str, str],
+    titles: dict[str, str],
     text: str,
-) -> None:  # fmt: skip
+) -> None:
     """Raise a UnitError where a name is compared with a number of another unit, or of none."""
     for node in ast.walk(formula.tree):
         if not isinstance(node, ast.Compare):

@@ -56,9 +56,13 @@ def with_more(system: EquationsOfMotion, given: Any, variables: bool = True) -> 
 
 
 def with_formula(
-    system: EquationsOfMotion, found: NamedOutputs, name: str, formula: Expr,
-    guards: tuple[Guard, ...], unit: str,
-) -> NamedOutputs:  # fmt: skip
+    system: EquationsOfMotion,
+    found: NamedOutputs,
+    name: str,
+    formula: Expr,
+    guards: tuple[Guard, ...],
+    unit: str,
+) -> NamedOutputs:
     """The outputs and one more: a formula with the guards that its bits number, and its declared
     unit. The guards are those of the system, of the outputs before it, then its own. Raises
     UnitError if the formula is in another one.
@@ -66,9 +70,13 @@ def with_formula(
     after = len(system.guards)
     known, _ = found.behind(system.guards)
     return NamedOutputs(
-        (*found.names, name), (*found.units, _unit(system, formula, name, unit)),
-        (*known, formula), guards[after:], after, found.first,
-    )  # fmt: skip
+        (*found.names, name),
+        (*found.units, _unit(system, formula, name, unit)),
+        (*known, formula),
+        guards[after:],
+        after,
+        found.first,
+    )
 
 
 def check_name(

@@ -123,9 +123,13 @@ def regularise(
     called = law if isinstance(law, str) else getattr(law, "__name__", "law").strip("<>")
     try:
         field, guards, formulas = blended(
-            system.field, system.guards, system.states, step, parameters,
+            system.field,
+            system.guards,
+            system.states,
+            step,
+            parameters,
             (system.outputs.formulas, system.outputs.guards),
-        )  # fmt: skip
+        )
     except TraceError as error:
         raise TraceError(f"{system.name}, regularised: ", error) from error
     slips = " Friction slips only: its static limit is left out." if static else ""

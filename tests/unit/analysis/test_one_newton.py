@@ -18,9 +18,6 @@ WHY = {
     "inputs/sensed.py": "the state of least energy at which sensors read given values",
     "branches/criticality.py": "the Lyapunov coefficient of a Hopf point",
     "branches/codimension_two.py": "the quadratic part at a fold",
-    "branches/event_sensitivity.py": "the move of an event along its equations",
-    "derivatives/closed_orbits.py": "the move of an orbit's start, by least squares",
-    "fits/steady.py": "the move of an orbit's start with the unknowns of a fit",
     "harmonics/signals.py": "dynamic stiffness",
     "branches/forced_vibration.py": "the answer of a rigid body to a static force",
 }

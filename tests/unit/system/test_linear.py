@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
-from saltus.system.linear import linear_pieces
+from saltus.system.linearity import linear_pieces
 
 
 def plate(rng, modes, stops):

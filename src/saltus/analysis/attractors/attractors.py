@@ -22,6 +22,7 @@ from saltus.flow.counts import whole
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporting
+from saltus.interrupt import answered
 from saltus.intervals import smallest_seen
 from saltus.results import AttractorTable, Subject, build
 from saltus.results.dataset import schema
@@ -96,6 +97,9 @@ def attractors(
     ------
     ParameterError, UnitError
         If an argument can't be used.
+    Interrupted
+        On Ctrl-C; its ``partial`` is the Dataset of the attractors that were found; the ``basin``
+        of starts that hadn't settled is ``not_computed``.
 
     References
     ----------
@@ -117,21 +121,28 @@ def attractors(
         threads=threads,
     )
     scale = spread(map_, group.start)
+
+    def dataset(known: tuple[AttractorSet, np.ndarray, np.ndarray]) -> xr.Dataset:
+        found, label, settled = known
+        starts = {
+            "trajectory": np.arange(group.size),
+            "basin": np.where(label == -1, Kind.UNCONVERGED, label),
+            "periods_to_settle": settled,
+        }
+        followed = int(np.count_nonzero(label != Kind.NOT_COMPUTED))
+        attrs = (
+            provenance(system, map_.method, system.values)
+            | looked(periods, map_)
+            | stray_attrs(found.astray)
+            | no_attractor(system, found, label)
+            | {"smallest_basin_seen": smallest_seen(followed)}
+        )
+        return attractors_dataset(subject(system, attrs), portraits(map_, found), starts)
+
     with reporting(progress) as show:
-        found, label, settled = find_attractors(map_, group.start, scale, periods, progress=show)
-    starts = {
-        "trajectory": np.arange(group.size),
-        "basin": np.where(label < 0, Kind.UNCONVERGED, label),
-        "periods_to_settle": settled,
-    }
-    attrs = (
-        provenance(system, map_.method, system.values)
-        | looked(periods, map_)
-        | stray_attrs(found.astray)
-        | no_attractor(system, found, label)
-        | {"smallest_basin_seen": smallest_seen(group.size)}
-    )
-    return attractors_dataset(subject(system, attrs), portraits(map_, found), starts)
+        return answered(
+            lambda: find_attractors(map_, group.start, scale, periods, progress=show), dataset
+        )
 
 
 def looked(periods: int, map_: Stroboscope) -> dict[str, Any]:

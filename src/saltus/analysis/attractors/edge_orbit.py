@@ -66,7 +66,8 @@ def edge_orbit(
         it serves; another one has errors that keep unstable orbits from
         closing.
     periods : int
-        Forcing periods after which a trajectory that hasn't settled is looked at for chaos.
+        Forcing periods after which a trajectory that hasn't settled is looked at for chaos. The
+        boundary is followed for 256 at most.
     threads : int, optional
         Default all processors. Results don't depend on it.
     progress : bool or callable

@@ -26,6 +26,7 @@ from saltus.analysis.closed.motions import ClosedMotion, same
 from saltus.analysis.closed.orbits import find_orbits
 from saltus.analysis.solve.tolerances import NEAR, ROUND, SAME
 from saltus.flow.maps import Map, Stroboscope, Travel
+from saltus.interrupt import PartInterrupted
 from saltus.results.dataset.kinds import Kind
 
 #: The attractor of each trajectory, None as long as it isn't known.
@@ -80,11 +81,35 @@ def find_attractors(
         The attractor of each start; -1 where none was established.
     settled : int64[k]
         Iterates after which it was captured; -1 if it wasn't.
+
+    Raises
+    ------
+    PartInterrupted
+        On Ctrl-C. Its ``partial`` is what was found; the label of starts that haven't settled by
+        then is ``Kind.NOT_COMPUTED``.
     """
     found = known or AttractorSet(Neighbourhoods.none(start.shape[1]))
     found = AttractorSet(found.near, list(found.orbits), list(found.sampled), list(found.unstable))
     owner: Owners = [None] * len(start)
     settled = np.full(len(start), -1, np.int64)
+
+    def known_now(unsettled: int) -> tuple[AttractorSet, np.ndarray, np.ndarray]:
+        result = found.ordered(scale)
+        label = [unsettled if one is None else result.index(one) for one in owner]
+        return result, np.array(label, np.int64), settled
+
+    try:
+        _settle(map_, start, scale, most, found, owner, settled, progress, kept)
+    except KeyboardInterrupt:
+        raise PartInterrupted(lambda: known_now(Kind.NOT_COMPUTED)) from None
+    return known_now(-1)
+
+
+def _settle(
+    map_: Map, start: np.ndarray, scale: np.ndarray, most: int, found: AttractorSet, owner: Owners,
+    settled: np.ndarray, progress: Callable[[float], None] | None, kept: bool,
+) -> None:  # fmt: skip
+    """Follow trajectories until each has settled, or was surveyed; note their owners."""
     travel, going = map_.launch(start, most), np.arange(len(start))
     noisy, never = Kind.NOISY_PERIODIC.word, (Kind.CHAOTIC.word, Kind.QUASI_PERIODIC.word)
     turns = isinstance(map_, Stroboscope) and autonomous(map_.system)
@@ -112,12 +137,9 @@ def find_attractors(
         travel.keep(stay)
         going = going[stay]
         if progress:
-            progress(max(1.0 - len(going) / len(start), travel.age / most))
+            progress(max(1.0 - len(going) / len(start), min(travel.age / most, 1.0)))
     if len(going):
         _survey(map_, travel, going, scale, found, owner, settled, most)
-    result = found.ordered(scale)
-    label = np.array([-1 if one is None else result.index(one) for one in owner], np.int64)
-    return result, label, settled
 
 
 def _captured(

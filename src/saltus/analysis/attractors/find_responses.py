@@ -95,11 +95,16 @@ class SettledMotions:
         """Nothing computed yet."""
         nothing = np.full(count, np.nan)
         return cls(
-            np.full(count, Kind.NOT_COMPUTED, np.int64), ClosedMotions.none(count, size),
-            nothing.copy(), nothing.copy(),
-            np.full(count, -1, np.int64), np.ones((count, size)), {},
-            np.full((count, size), np.nan), np.zeros(count),
-        )  # fmt: skip
+            np.full(count, Kind.NOT_COMPUTED, np.int64),
+            ClosedMotions.none(count, size),
+            nothing.copy(),
+            nothing.copy(),
+            np.full(count, -1, np.int64),
+            np.ones((count, size)),
+            {},
+            np.full((count, size), np.nan),
+            np.zeros(count),
+        )
 
     def put(self, where: np.ndarray, other: SettledMotions) -> None:
         """Write another's results to the rows int64[m]."""

@@ -130,8 +130,11 @@ def map_of(
             map_ = compiled(plan)
             on_threads(
                 lambda piece: settle(map_, plan.starts(every[piece]), found, plan.periods),
-                pieces_of(plan.cells, size), result.put, threads, stage(show, scouting, LABELLED),
-            )  # fmt: skip
+                pieces_of(plan.cells, size),
+                result.put,
+                threads,
+                stage(show, scouting, LABELLED),
+            )
             return plan.finish(result, found, threads, stage(show, LABELLED, 1.0))
         except KeyboardInterrupt:
             scouted = found

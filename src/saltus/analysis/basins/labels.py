@@ -208,9 +208,12 @@ def settle_all(
     """
     result = Settling.empty(len(start), start.shape[1]) if result is None else result
     on_threads(
-        lambda piece: settle(map_, start[piece], found, most), pieces_of(*start.shape), result.put,
-        threads, progress,
-    )  # fmt: skip
+        lambda piece: settle(map_, start[piece], found, most),
+        pieces_of(*start.shape),
+        result.put,
+        threads,
+        progress,
+    )
     return result
 
 

@@ -167,5 +167,10 @@ def settling_arrays(part: Settling, states: tuple[str, ...]) -> dict[str, np.nda
 def settling_from(arrays: Mapping[str, np.ndarray], states: tuple[str, ...]) -> Settling:
     """Outcomes of cells from :func:`settling_arrays`' result."""
     columns = {name: arrays[name].astype(np.int64) for name in CELL}
-    return Settling(columns["label"], columns["periods"], columns["status"], columns["unresolved"],
-                    np.stack([arrays[f"end_{name}"] for name in states], axis=1))  # fmt: skip
+    return Settling(
+        columns["label"],
+        columns["periods"],
+        columns["status"],
+        columns["unresolved"],
+        np.stack([arrays[f"end_{name}"] for name in states], axis=1),
+    )

@@ -9,7 +9,8 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.branches.arclength import Arc, correct, follow
-from saltus.analysis.branches.branch_table import numbers_of, stacked
+from saltus.analysis.branches.backbone_table import Orbits, backbone_dataset
+from saltus.analysis.branches.branch_table import numbers_of
 from saltus.analysis.branches.forced_vibration import Forcing, QuadratureOrbits, small_vibration
 from saltus.analysis.branches.free_harmonics import BesideFamily, begun
 from saltus.analysis.branches.free_vibration import (
@@ -20,7 +21,6 @@ from saltus.analysis.branches.free_vibration import (
     linear_mode,
 )
 from saltus.analysis.branches.special_points import zeros
-from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.harmonics.balance import HarmonicBalance, check_backbone
 from saltus.analysis.inputs.given import Range, Value
 from saltus.analysis.inputs.outputs import outputs_of
@@ -32,20 +32,13 @@ from saltus.flow.methods import Method, exact_method
 from saltus.flow.progress import reporting
 from saltus.language.derivatives import gradient
 from saltus.language.evaluate import evaluate
-from saltus.results import build
-from saltus.results.dataset import schema
 from saltus.system import System
 from saltus.system.modes import sides
 from saltus.system.quantity import formula_of, unit_of
 from saltus.units import to_si
 
-Orbits = FreeOrbits | QuadratureOrbits | BesideFamily
 #: Vibrations begin at this share of the smallest amplitude.
 BEFORE = 0.9
-#: Largest fictitious damping, in units of the frequency, that is rounding.
-CONSERVED = 1e-7
-#: A vibration is stable if no multiplier is larger than this.
-STABLE = 1.0 + 1e-6
 #: A state whose amplitude is a smaller share of the largest rests.
 NODE = 1e-9
 #: Shortest period, as a share of that of small vibrations.
@@ -179,7 +172,7 @@ def backbone(
         whole_z, end = _family(orbits, z, peak, (low, high), points, show)
         # not "mode": SciPy's netCDF-3 keeps its own there, and neither writes nor reads such a file
         attrs = {"vibration_mode": mode, "amplitude_of": state, "end": end, "phase": phase}
-        return _table(system, moving, orbits, whole_z, method, attrs)
+        return backbone_dataset(system, moving, orbits, whole_z, method, attrs)
 
 
 def _free_start(
@@ -352,62 +345,3 @@ def _family(
     if last and np.isfinite(places[1]):
         rows.append(exact[1])
     return np.array(rows), curve.end
-
-
-def _table(
-    system: System,
-    moving: System,
-    orbits: Orbits,
-    z: np.ndarray,
-    method: Method,
-    attrs: dict[str, Any],
-) -> xr.Dataset:
-    """The Dataset of a family."""
-    period, outputs = orbits.period(z), outputs_of(moving, None)
-    numbers = numbers_of(moving, [(orbits, one) for one in z], outputs, method)
-    rows = np.zeros(len(z), np.int64)
-    found = orbits.multipliers(z, orbits.evaluate(z, rows)[1], rows)
-    multipliers = stacked([found], len(moving.states))
-    by_name = numbers.by_name()
-    data: dict[str, Any] = {
-        "point": np.arange(len(z)),
-        "backbone_frequency": 1 / period,
-        "point_period": period,
-        "point_stable": np.nanmax(np.abs(multipliers), axis=1, initial=0.0) < STABLE,
-        "point_itinerary": list(numbers.itinerary),
-        "point_multiplier_real": multipliers.real,
-        "point_multiplier_imag": multipliers.imag,
-        "point_<state>": orbits.points(z)[:, 0],
-        "output": list(outputs.names),
-        "output_units": list(outputs.units),
-        **{f"point_output_{key}": by_name[key] for key in ("maximum", "minimum", "peak", "rms")},
-    }
-    if isinstance(orbits, BesideFamily):
-        data |= orbits.told(z)
-    if attrs["phase"] == "free":
-        data["fictitious_damping"] = _conserved(system, z[:, -1], period)
-        about, when = (
-            provenance(system, method, system.values),
-            "where the vibration passes its rest",
-        )
-    else:
-        data["point_<parameter>"] = dict(zip(orbits.names, z[:, -2:].T, strict=True))
-        fixed = {key: one for key, one in system.values.items() if key not in orbits.names}
-        about, when = provenance(system, method, fixed, orbits.names), "at whole forcing periods"
-    unit = outputs.units[0] if len(set(outputs.units)) == 1 else ""
-    words = {"<output>": unit, "<when>": when}
-    return build(schema.BACKBONE, subject(system, about | attrs), data, words=words)
-
-
-def _conserved(system: System, damping: np.ndarray, period: np.ndarray) -> np.ndarray:
-    """The fictitious damping of orbits, which must be rounding."""
-    if np.abs(damping * period).max() > CONSERVED:
-        raise ParameterError(
-            lambda say: (
-                f"{system.name} doesn't conserve energy: its vibrations need a damping of "
-                f"{damping[np.argmax(np.abs(damping))]:.3g} /s to close. Set what damps to zero by "
-                f"{say.key('values')}, and the restitution of impacts to 1: "
-                f"{say.key(values={'damping': 0, 'restitution': 1})}."
-            )
-        )
-    return damping

@@ -238,9 +238,15 @@ def event_orbit(system: System, event: Any) -> EventOrbit:
     spread = np.array([np.nanmax(one) - np.nanmin(one) for one in along])
     orbit = orbit[np.isfinite(orbit).all(axis=1)]
     return EventOrbit(
-        system.with_values(**values), kind, orbit, period, multiplier, spread, guard,
+        system.with_values(**values),
+        kind,
+        orbit,
+        period,
+        multiplier,
+        spread,
+        guard,
         float(event["event_phase"]),
-    )  # fmt: skip
+    )
 
 
 def orbits_over(

@@ -41,6 +41,9 @@ from saltus.interrupt import Interrupted
 from saltus.sentences import Dialect, Word
 from saltus.system import System
 
+#: Share of the work until seeds are known.
+SEEDING = 0.3
+
 
 @verb
 def branches(
@@ -198,7 +201,18 @@ def branches(
                 ([], [])
                 if from_rest
                 else seeds_between(
-                    system, name, limits, start, box, at, seed, every, method, periods, threads
+                    system,
+                    name,
+                    limits,
+                    start,
+                    box,
+                    at,
+                    seed,
+                    every,
+                    method,
+                    periods,
+                    threads,
+                    stage(show, 0.0, SEEDING),
                 )
             )
             if not begins and not equilibria and not from_rest:
@@ -212,7 +226,7 @@ def branches(
                 )
             plan = plan_of(system, name, limits, method, threads, points, longest, chosen)
             if by is None:
-                follow_all(plan, system, name, begins, equilibria, done, stage(show, 0.0, 0.9))
+                follow_all(plan, system, name, begins, equilibria, done, stage(show, SEEDING, 0.9))
             else:
                 count = whole(at, "at", 1, 1000) if from_rest else 0
                 rest = np.linspace(*limits, count + 2)[1:-1].tolist()
@@ -229,10 +243,19 @@ def branches(
 
 
 def seeds_between(
-    system: System, name: str, limits: tuple[float, float], start: Any, box: Any = None,
-    at: Any = 12, seed: int = 1, every: Any = None, method: Method | None = None,
-    periods: int = 2000, threads: int | None = None,
-) -> tuple[list[Seed], list[Seed]]:  # fmt: skip
+    system: System,
+    name: str,
+    limits: tuple[float, float],
+    start: Any,
+    box: Any = None,
+    at: Any = 12,
+    seed: int = 1,
+    every: Any = None,
+    method: Method | None = None,
+    periods: int = 2000,
+    threads: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> tuple[list[Seed], list[Seed]]:
     """Seeds of branches over a parameter between two values [SI]: of those of orbits, and those of
     equilibria. Arguments as for :func:`branches`.
     """
@@ -246,15 +269,20 @@ def seeds_between(
         grid = grid_of(system, {name: places}, start, box, None, seed, None, every)
         if autonomous(system):
             equilibria = equilibria_between(system, name, limits, grid.starts)
-        begins = _found_in(grid, method, periods, threads)
+        begins = _found_in(grid, method, periods, threads, progress)
     begins = scaled(system, name, _inside(begins, limits), method)
     return begins, _inside(equilibria, limits)
 
 
 def follow_all(
-    plan: Plan, system: System, name: str, begins: list[Seed], equilibria: list[Seed],
-    done: list[Branch], progress: Callable[[float], None] | None = None,
-) -> None:  # fmt: skip
+    plan: Plan,
+    system: System,
+    name: str,
+    begins: list[Seed],
+    equilibria: list[Seed],
+    done: list[Branch],
+    progress: Callable[[float], None] | None = None,
+) -> None:
     """Add the branches that seeds lie on to those that are known. Seeds on a known one are left
     out.
     """
@@ -299,9 +327,15 @@ def _inside(seeds: list[Seed], limits: tuple[float, float]) -> list[Seed]:
     return [seed for seed in seeds if limits[0] <= seed.others[-1] <= limits[1]]
 
 
-def _found_in(grid: Grid, method: Method, periods: int, threads: int | None) -> list[Seed]:
+def _found_in(
+    grid: Grid,
+    method: Method,
+    periods: int,
+    threads: int | None,
+    progress: Callable[[float], None] | None,
+) -> list[Seed]:
     """Seeds from the attractors that starts lead to at some values of the parameter."""
-    found = find(grid, method, periods, threads, None)
+    found = find(grid, method, periods, threads, progress)
     if not found.complete:
         raise KeyboardInterrupt
     ((name, values),) = grid.axes.items()

@@ -86,9 +86,14 @@ class Jumps:
             last, np.cumsum([1, width, 1, size, size, size * width]), axis=2
         )
         return At(
-            gap[..., 0], normal, by_time[..., 0], rate, after,
-            by_state.reshape(r, m, size, width), after_by_time,
-        )  # fmt: skip
+            gap[..., 0],
+            normal,
+            by_time[..., 0],
+            rate,
+            after,
+            by_state.reshape(r, m, size, width),
+            after_by_time,
+        )
 
 
 @lru_cache(maxsize=128)

@@ -94,9 +94,15 @@ def trace_curve(
     curves: list[Arc] = []
     try:
         follow(
-            equations, both, np.stack([along, -along]), bounds, points, ends=watch, group=0 * rows,
+            equations,
+            both,
+            np.stack([along, -along]),
+            bounds,
+            points,
+            ends=watch,
+            group=0 * rows,
             curves=curves,
-        )  # fmt: skip
+        )
     except KeyboardInterrupt:
         if not all(curve.z for curve in curves) or not curves:
             raise

@@ -15,9 +15,10 @@ from saltus.analysis.branches.bifurcation_curve import (
 )
 from saltus.analysis.branches.singular_orbits import SingularOrbits
 from saltus.analysis.dataset_parts import provenance, subject
-from saltus.analysis.derivatives.sensitivity import Columns
+from saltus.analysis.derivatives.columns import Columns
 from saltus.analysis.inputs.starts import check_system
 from saltus.analysis.inputs.verb import verb
+from saltus.analysis.solve.linear import moves
 from saltus.analysis.solve.newton import newton
 from saltus.errors import ParameterError
 from saltus.flow.methods import Method, exact_method
@@ -160,10 +161,10 @@ def _place(
         )
     there = np.insert(zeros.z, fixed, z[fixed], 1)
     row = np.zeros(1, np.int64)
-    slopes = equations.evaluate(there, row)[1][0]
+    slopes = equations.evaluate(there, row)[1]
     if isinstance(equations, SingularOrbits):  # its second derivatives are differences
         equations.beside = 0.5 * equations.beside
-        slopes = (4.0 * equations.evaluate(there, row)[1][0] - slopes) / 3.0
-    moved = np.linalg.solve(slopes[:, free], -slopes[:, fixed])
+        slopes = (4.0 * equations.evaluate(there, row)[1] - slopes) / 3.0
+    moved = moves(slopes[..., free], slopes[..., [fixed]])
     where = int(np.flatnonzero(free == place)[0])
-    return float(there[0, place]), float(moved[where] * unit[0, place] / unit[0, fixed])
+    return float(there[0, place]), float(moved[0, where, 0] * unit[0, place] / unit[0, fixed])

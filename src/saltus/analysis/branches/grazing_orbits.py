@@ -251,7 +251,7 @@ def returned(
     first[:, place], after[:, place], span[:, place] = when, state, legs.n
     if legs.contacts:
         span[:, place] = legs.spans(phase)[:, place] - (when - phase[:, place])
-    onwards = legs.fly(after, others, first, span)[1][:, place, :, :size]
+    onwards = legs.flights.fly(after, others, first, span)[1][:, place, :, :size]
     if not legs.contacts:
         return onwards
     span = np.zeros_like(phase)

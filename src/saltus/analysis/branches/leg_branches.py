@@ -129,10 +129,17 @@ def _branch(
         if not ways or ways[0].end != "closed":
             ways.append(
                 follow_legs(
-                    orbits, sequence, start.z, start.scale, along, plan.limits, plan.points,
-                    start.first, plan.stable,
+                    orbits,
+                    sequence,
+                    start.z,
+                    start.scale,
+                    along,
+                    plan.limits,
+                    plan.points,
+                    start.first,
+                    plan.stable,
                 )
-            )  # fmt: skip
+            )
     ways, ends = both_sides(ways)
     limits = (ways[1].limit if len(ways) > 1 else np.nan, ways[0].limit)
     parts, none = _parts(ways), np.zeros(0)

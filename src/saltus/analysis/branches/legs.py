@@ -18,17 +18,11 @@ import numpy as np
 
 from saltus.analysis.branches.contact_sequences import ContactSequence, sequences, shift
 from saltus.analysis.branches.contacts_along import At, Jumps
+from saltus.analysis.branches.leg_flights import LegFlights
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.solve.floquet import across, multipliers
-from saltus.flow.maps import Stroboscope
-from saltus.flow.request import Schedule
 from saltus.kernels import status as st
-from saltus.system.leg import leg
 
-#: Legs that last less take a detour, in periods.
-BRIEF = 1e-3
-#: Time that the detour takes, in periods.
-DETOUR = 1e-2
 #: Shorter times are rounding, in periods.
 AT_ONCE = 1e-14
 
@@ -61,15 +55,7 @@ class Legs:
         self._beside = _widest_gap(sequence.phase)
         self._jumps = Jumps(orbits.parametric.system, self.contacts, self.size, sequence.mode)
         self.unit = float(orbits.map.period[0])  # of the time, in those of the parametric system
-        self._maps = {
-            mode: Stroboscope(
-                leg(orbits.parametric.system, mode),
-                orbits.map.method,
-                every=1.0,
-                threads=orbits.map.threads,
-            )
-            for mode in set(self._modes)
-        }
+        self.flights = LegFlights(orbits, self._modes)
         self.phase = np.full((len(scale), 2, self.size), np.nan)  # point and direction
 
     @classmethod
@@ -96,7 +82,7 @@ class Legs:
         else:
             span = legs.spans(phase[None])
             before = np.roll(
-                legs.fly(after[None], others[None], phase[None], span)[0][0], 1, axis=0
+                legs.flights.fly(after[None], others[None], phase[None], span)[0][0], 1, axis=0
             )
         nodes = np.concatenate([phase[:, None], before], axis=1)
         return legs, np.append(nodes.ravel(), others)
@@ -158,73 +144,6 @@ class Legs:
         """A unit vector along the curve at an orbit float64[z], in units of the scale."""
         derivative = self.evaluate(z[None], np.zeros(1, np.int64))[1]
         return np.asarray(np.linalg.svd(derivative[0])[2][-1])
-
-    # -- flights -----------------------------------------------------------------------------------
-    def fly(
-        self,
-        after: np.ndarray,
-        others: np.ndarray,
-        phase: np.ndarray,
-        span: np.ndarray,
-        legs: Sequence[int] | None = None,
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Legs from states float64[r, m, D] behind each contact, at times and for times float64[r,
-        m] in periods; ``legs`` says which they are, if not all in their order.
-
-        Returns
-        -------
-        float64[r, m, D], float64[r, m, D, E + 2]
-            Their ends, and the derivatives with respect to the states of the parametric system, the
-            time and the span [periods].
-        """
-        start = self._states(after, others, phase, span)
-        modes = self._modes if legs is None else [self._modes[i] for i in legs]
-        ends, matrices = self._ends(start, np.tile(modes, (len(after), 1)))
-        matrices[..., -2:] *= self.unit
-        return ends, matrices
-
-    def _ends(self, start: np.ndarray, modes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Ends float64[r, m, D] of legs from states float64[r, m, E + 2] in modes int64[r, m], and
-        their derivatives float64[r, m, D, E + 2].
-        """
-        ends = np.empty((*modes.shape, self.size))
-        matrices = np.empty((*ends.shape, start.shape[2]))
-        for mode, map_ in self._maps.items():
-            mine = modes == mode
-            if mine.any():
-                end, matrix = self._flown(map_, start[mine])
-                ends[mine], matrices[mine] = end[:, : self.size], matrix[:, : self.size]
-        return ends, matrices
-
-    def _flown(self, map_: Stroboscope, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Ends of legs float64[k, E + 2] and their tangent maps. One that lasts next to no time
-        goes back first and then forth: all of its rates would be next to nothing.
-        """
-        span, away = start[:, -1], DETOUR * self.unit
-        short = np.flatnonzero((np.abs(span) < BRIEF * self.unit) & (span != 0))
-        if not len(short):
-            return map_.tangent(start, 1)
-        first = start.copy()
-        first[short, -1] = -away
-        end, matrix = map_.tangent(first, 1)
-        onwards = end[short]
-        onwards[:, -2:] = start[short, -2:] + np.array([-away, away])
-        there, second = map_.tangent(onwards, 1)
-        back = matrix[short]
-        back[:, :-1, -1] = 0.0  # the time it goes back is the same for all
-        there[:, -2:] = start[short, -2:]
-        end[short], matrix[short] = there, second @ back
-        return end, matrix
-
-    def _states(
-        self, after: np.ndarray, others: np.ndarray, phase: np.ndarray, span: np.ndarray
-    ) -> np.ndarray:
-        """States of legs, float64[r, m, E + 2]."""
-        carried = np.repeat(
-            self.orbits.parameter_states(others)[0][:, None], after.shape[1], axis=1
-        )
-        times = np.stack([phase, span], axis=2) * self.unit
-        return np.concatenate([after, carried, times], axis=2)
 
     def at(self, z: np.ndarray) -> At:
         """Evaluate the contacts of orbits float64[r, z]: gaps, rates, states behind, and
@@ -296,7 +215,7 @@ class Legs:
         size, used, legs = self.size, self.count * (self.size + 1), [*range(self.count), *more]
         phase, _, others = self.nodes(z)
         _, slopes, order = self.orbits.parameter_states(others)
-        ends, matrices = self.fly(at.after[:, legs], others, phase[:, legs], spans, legs)
+        ends, matrices = self.flights.fly(at.after[:, legs], others, phase[:, legs], spans, legs)
         by_state, by_start, by_span = matrices[..., :size], matrices[..., -2], matrices[..., -1]
         through = by_state @ at.by_state[:, legs]  # with respect to the states before the contact
         jumped = (by_state @ at.by_time[:, legs, :, None])[..., 0] * self.unit
@@ -315,10 +234,8 @@ class Legs:
         """
         phase, _, others = self.nodes(z[None])
         span, after = self.spans(phase)[:, [place]], self.at(z[None]).after[:, [place]]
-        start = self._states(after, others, phase[:, [place]], span)[0]
-        map_ = self._maps[self._modes[place]]
-        schedule = Schedule.even(1, count, beyond=1)
-        states = map_.tangent_samples(start, 1, schedule)[0, :, : self.size]
+        start = self.flights.states(after, others, phase[:, [place]], span)[0]
+        states = self.flights.samples(start, place, count)
         return span[0, 0] * np.linspace(0.0, 1.0, count + 1), states
 
     def _of_gaps(self, at: At, others: np.ndarray) -> np.ndarray:
@@ -436,8 +353,8 @@ class Legs:
         last = (latest & ~np.roll(latest, -1, axis=2)).argmax(axis=2)
         rows = np.arange(len(z))[:, None]
         span = np.take_along_axis(since, last[..., None], axis=2)[..., 0]
-        start = self._states(self.at(z).after[rows, last], others, phase[rows, last], span)
-        points = self._ends(start, np.array(self._modes)[last])[0]
+        start = self.flights.states(self.at(z).after[rows, last], others, phase[rows, last], span)
+        points = self.flights.ends(start, np.array(self._modes)[last])[0]
         return np.concatenate([points.reshape(len(z), self.n * self.size), others], axis=1)
 
     def points(self, z: np.ndarray) -> np.ndarray:

@@ -284,9 +284,15 @@ def retrace(piece: Piece, places: Sequence[int]) -> bool:
             continue
         orbits = piece.orbits.near(piece.z[[after]], np.array([piece.row]))
         (curve,) = follow(
-            orbits, piece.z[[after]], piece.tangent[[after]], {}, MOST_POINTS, whole / SHORTER,
-            ends=functools.partial(_arrived, ahead, unit), longest=whole / SHORTER,
-        )  # fmt: skip
+            orbits,
+            piece.z[[after]],
+            piece.tangent[[after]],
+            {},
+            MOST_POINTS,
+            whole / SHORTER,
+            ends=functools.partial(_arrived, ahead, unit),
+            longest=whole / SHORTER,
+        )
         if curve.end != "arrived" or curve.length[-1] < LONGER * whole:
             continue
         z, tangent, derivative = (

@@ -86,10 +86,15 @@ def event_of(change: ContactChange, begin: float = 0.0, outcome: str = "") -> Ev
     """
     legs = change.legs
     return Event(
-        change.kind, 0, legs.orbit(change.z[None], begin)[0], change.multipliers,
-        guards=change.guards, phase=(change.phase - begin) % legs.n, outcome=outcome,
+        change.kind,
+        0,
+        legs.orbit(change.z[None], begin)[0],
+        change.multipliers,
+        guards=change.guards,
+        phase=(change.phase - begin) % legs.n,
+        outcome=outcome,
         sqrt_coefficient=sqrt_coefficient(change),
-    )  # fmt: skip
+    )
 
 
 def _points(orbits: PeriodicOrbits, z: np.ndarray) -> list[_Point | None]:

@@ -275,11 +275,17 @@ def both_ways(
     orbits = plan.make(starts[0].n, np.array([one.scale for _, one, _ in sides]))
     orbits.accepted(z, rows)
     curves = follow(
-        orbits, z, np.array([side for _, _, side in sides]), {orbits.width - 1: plan.limits},
-        plan.points, np.array([one.first for _, one, _ in sides]),
-        ends=functools.partial(ends, orbits), group=which, foresee=True,
+        orbits,
+        z,
+        np.array([side for _, _, side in sides]),
+        {orbits.width - 1: plan.limits},
+        plan.points,
+        np.array([one.first for _, one, _ in sides]),
+        ends=functools.partial(ends, orbits),
+        group=which,
+        foresee=True,
         enough=functools.partial(unstable, orbits.multipliers) if plan.stable else None,
-    )  # fmt: skip
+    )
     for curve in curves:
         curve.end = "unstable" if curve.end == "enough" else curve.end
         shrunk = curve.end == "lost" and orbits.free and len(curve.z) > 1

@@ -33,6 +33,7 @@ from saltus.analysis.solve.tolerances import AMPLIFIED, CONVERGED, LONGEST, SAME
 from saltus.flow.maps import Stroboscope
 from saltus.flow.polynomials import between
 from saltus.flow.request import Schedule
+from saltus.interrupt import PartInterrupted
 
 #: Windows of time in each of which the nearest return is a guess.
 WINDOWS = 3
@@ -159,9 +160,14 @@ class Cycles(Family[Cycle]):
             return None
         points = samples[:: SAMPLES // LONGEST][:LONGEST]
         return Cycle(
-            points, multipliers, mismatch, float(closed.time[0]), scale=scale, samples=samples,
+            points,
+            multipliers,
+            mismatch,
+            float(closed.time[0]),
+            scale=scale,
+            samples=samples,
             rates=closed.rates(samples[None])[0],
-        )  # fmt: skip
+        )
 
     def same(self, motion: Cycle, closed: Shooting) -> np.ndarray:
         """See :class:`Family`: once or several times round."""
@@ -241,6 +247,11 @@ def all_cycles(
         First guess of the period from starts that don't return [s].
     progress : callable, optional
         Called with the share done.
+
+    Raises
+    ------
+    PartInterrupted
+        On Ctrl-C. Its ``partial`` is what was found.
     """
     search, result = Search(0, len(start)), Cycles(map_, limits[1])
     rotation = float(map_.period[0])
@@ -256,10 +267,16 @@ def all_cycles(
             if progress:
                 progress(0.7 * min(1.0, (first + TOGETHER) / len(start)))
 
-    result.deflate(search, result.hunt(search, guesses()))
     low, high = limits[0] * (1.0 - SAME), limits[1] * (1.0 + SAME)
-    result.order(i for i, one in enumerate(result.motions) if low <= one.time <= high)
-    return result
+
+    def ordered() -> Cycles:
+        return result.ordered(lambda one: low <= one.time <= high)
+
+    try:
+        result.deflate(search, result.hunt(search, guesses()))
+    except KeyboardInterrupt:
+        raise PartInterrupted(ordered) from None
+    return ordered()
 
 
 # -- first guesses ---------------------------------------------------------------------------------

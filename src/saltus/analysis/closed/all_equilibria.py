@@ -174,9 +174,17 @@ def _equilibrium(piece: ModeEquations, state: np.ndarray) -> Equilibrium | None:
     ends = piece.ends(state) if dimension else np.stack([state, state])
     missing = np.full(len(state) - len(eigenvalues), np.nan + 0j)
     return Equilibrium(
-        state + 0.0, piece.mode, place, kind, stable and attracts, (*piece.held, *touched),
-        dimension, np.append(eigenvalues, missing), ends, margin,
-    )  # fmt: skip
+        state + 0.0,
+        piece.mode,
+        place,
+        kind,
+        stable and attracts,
+        (*piece.held, *touched),
+        dimension,
+        np.append(eigenvalues, missing),
+        ends,
+        margin,
+    )
 
 
 def _gap(piece: ModeEquations, gap: Expr, state: np.ndarray) -> tuple[float, float]:

@@ -20,6 +20,7 @@ from saltus.analysis.solve.newton import leading_first
 from saltus.analysis.solve.tolerances import AMPLIFIED, SAME
 from saltus.flow.maps import Map
 from saltus.flow.progress import stage
+from saltus.interrupt import PartInterrupted
 
 #: Most guesses beside known orbits.
 MOST_BESIDE = 1024
@@ -134,9 +135,29 @@ def all_orbits(
     -------
     Orbits
         Ordered by period.
+
+    Raises
+    ------
+    PartInterrupted
+        On Ctrl-C. Its ``partial`` is what was found.
     """
     result = Orbits(map_, scale)
-    iterates = _guesses(before or map_, start, longest)
+    try:
+        _search(result, before or map_, start, longest, progress)
+    except KeyboardInterrupt:
+        raise PartInterrupted(result.ordered) from None
+    return result.ordered()
+
+
+def _search(
+    result: Orbits,
+    map_: Map,
+    start: np.ndarray,
+    longest: int,
+    progress: Callable[[float], None] | None,
+) -> None:
+    """Search for orbits of one period after the other."""
+    iterates = _guesses(map_, start, longest)
     for n in range(1, longest + 1):
         search = Search(n, len(start), given_up=len(start) - len(iterates))
         show = stage(progress, *(m * (m + 1) / (longest * (longest + 1)) for m in (n - 1, n)))
@@ -147,8 +168,6 @@ def all_orbits(
         result.deflate(search, guesses)
         if show:
             show(1.0)
-    result.order(range(len(result.motions)))
-    return result
 
 
 def _guesses(map_: Map, start: np.ndarray, longest: int) -> np.ndarray:

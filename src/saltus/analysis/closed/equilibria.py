@@ -64,8 +64,8 @@ def equilibria(
     start : sequence, mapping or array, optional
         Starts of Newton's method, as for :func:`saltus.simulate`, in place of a box.
     starts : int
-        Quasi-random starts in the box. Without a box their states have either sign, and magnitudes
-        from 1e-4 to 1e4 in SI.
+        Quasi-random starts in the box, 100 000 at most, for each of up to 1024 modes. Without a
+        box their states have either sign, and magnitudes from 1e-4 to 1e4 in SI.
     at : mapping, optional
         Starts of the states that have no range in the box; default zero.
     **box : (low, high)
@@ -121,10 +121,15 @@ def equilibria(
     begin, scale = _starts(system, start, whole(starts, "starts", 1, MOST_STARTS), at, box)
     found = all_equilibria(system, begin, scale)
     attrs = attributes(
-        system=system.name, equations=system.equations(), parameters=system.values,
-        units=system.units, method="Newton", method_options={"starts": len(begin)},
-        fingerprint=system.fingerprint(), source=system.source,
-    )  # fmt: skip
+        system=system.name,
+        equations=system.equations(),
+        parameters=system.values,
+        units=system.units,
+        method="Newton",
+        method_options={"starts": len(begin)},
+        fingerprint=system.fingerprint(),
+        source=system.source,
+    )
     about = Subject(system.states, system.units, attrs, gap_unit=gap_unit(system))
     return build(EQUILIBRIA, about, _columns(system, found))
 

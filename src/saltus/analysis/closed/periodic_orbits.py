@@ -14,7 +14,7 @@ from saltus.analysis.closed.all_cycles import all_cycles
 from saltus.analysis.closed.all_orbits import all_orbits
 from saltus.analysis.closed.field_zeros import autonomous
 from saltus.analysis.closed.orbit_table import table_of
-from saltus.analysis.closed.search import AGES, Search
+from saltus.analysis.closed.search import AGES, Family, Search
 from saltus.analysis.closed.spread import spread
 from saltus.analysis.closed.turns import looks_every
 from saltus.analysis.dataset_parts import provenance, subject
@@ -30,6 +30,7 @@ from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporting
 from saltus.flow.room import check_room
 from saltus.flow.taylor import Taylor
+from saltus.interrupt import answered
 from saltus.results import build
 from saltus.results.dataset import schema
 from saltus.results.dataset.orbits import OrbitTable
@@ -129,7 +130,8 @@ def periodic_orbits(
     ParameterError, UnitError
         If an argument can't be used.
     Interrupted
-        On Ctrl-C.
+        On Ctrl-C; its ``partial`` is the Dataset of the orbits that were found by then. A search
+        that was stopped isn't ``search_exhausted``.
 
     References
     ----------
@@ -164,11 +166,12 @@ def periodic_orbits(
         limits, guess = _range(period, (0.0, (periods + 0.5) * rotation))
         method = _with_budget(method, max(AGES[-1], limits[1] / rotation))
         looks = Stroboscope(system, method, every=rotation, threads=threads)
-        with reporting(progress) as show:
-            cycles = all_cycles(looks, states, limits, guess or rotation, show)
-            table = table_of(looks, cycles.motions, cycles.found)
         attrs |= {"shortest_period": limits[0], "longest_period": limits[1]}
-        return orbits_dataset(system, attrs, table, searches(cycles.searches))
+        with reporting(progress) as show:
+            return answered(
+                lambda: all_cycles(looks, states, limits, guess or rotation, show),
+                lambda found: _dataset(looks, attrs, found),
+            )
     if period is not None:
         raise ParameterError(
             lambda say: (
@@ -179,10 +182,17 @@ def periodic_orbits(
     map_ = Stroboscope(system, _with_budget(method, 1), threads=threads)
     before = map_.by(_with_budget(method, AGES[-1] + periods))
     scale = spread(before, states)
+    attrs |= {"periods": periods}
     with reporting(progress) as show:
-        found = all_orbits(map_, states, periods, scale, show, before)
-        table = table_of(map_, found.motions, found.found)
-    return orbits_dataset(system, attrs | {"periods": periods}, table, searches(found.searches))
+        return answered(
+            lambda: all_orbits(map_, states, periods, scale, show, before),
+            lambda found: _dataset(map_, attrs, found),
+        )
+
+
+def _dataset(map_: Stroboscope, attrs: Mapping[str, Any], found: Family[Any]) -> xr.Dataset:
+    table = table_of(map_, found.motions, found.found)
+    return orbits_dataset(map_.system, attrs, table, searches(found.searches))
 
 
 def _turn(system: System, states: np.ndarray) -> float:

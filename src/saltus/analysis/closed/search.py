@@ -14,9 +14,9 @@ How many motions were missed is estimated from those that a single start led to:
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Generic, Self, TypeVar
 
 import numpy as np
 
@@ -173,11 +173,12 @@ class Family(ABC, Generic[M]):
                 search.exhausted = True
                 return
 
-    def order(self, kept: Iterable[int]) -> None:
-        """Keep some of the motions, in an order that doesn't depend on discovery."""
-        order = sorted(kept, key=lambda i: self.place(self.motions[i]))
-        self.motions = [self.motions[i] for i in order]
-        self.found = [self.found[i] for i in order]
+    def ordered(self, wanted: Callable[[M], bool] = lambda _: True) -> Self:
+        """The family with the wanted motions only, in an order that doesn't depend on discovery."""
+        pairs = zip(self.motions, self.found, strict=False)  # Ctrl-C may come between the two
+        order = sorted((pair for pair in pairs if wanted(pair[0])), key=lambda p: self.place(p[0]))
+        self.motions, self.found = [one for one, _ in order], [count for _, count in order]
+        return self
 
 
 def used_up(flight: Travel) -> np.ndarray:

@@ -136,8 +136,10 @@ class _Way:
         whole = ClosedMotions.none(1, motion.points.shape[1])
         whole.period[0], whole.points[0, : motion.period] = motion.period, motion.points
         whole.multipliers[0], whole.mismatch[0], whole.time[0] = (
-            motion.multipliers, motion.mismatch, time,
-        )  # fmt: skip
+            motion.multipliers,
+            motion.mismatch,
+            time,
+        )
         self._places = [_OnTheWay(0.0, whole, motion.points, time)]
 
     def here(self) -> Tracked:
@@ -217,10 +219,12 @@ class _Way:
         one, other = (self._system(share).values for share in (at, beyond))
         moved = [name for name, value in one.items() if other[name] != value]
         places = [
-            " and ".join(_text(self._start, name, end[name], abs(other[name] - one[name]))
-                         for end in (one, other))
+            " and ".join(
+                _text(self._start, name, end[name], abs(other[name] - one[name]))
+                for end in (one, other)
+            )
             for name in moved
-        ]  # fmt: skip
+        ]
         where = ", ".join(
             text if len(moved) == 1 else f"{name} {text}"
             for name, text in zip(moved, places, strict=True)

@@ -80,9 +80,12 @@ def runs_away(iterates: np.ndarray) -> np.ndarray:
 
 
 def measure_equilibria(
-    map_: Stroboscope, place: np.ndarray, rows: np.ndarray, numbers: Measures,
+    map_: Stroboscope,
+    place: np.ndarray,
+    rows: np.ndarray,
+    numbers: Measures,
     outputs: Outputs | None = None,
-) -> None:  # fmt: skip
+) -> None:
     """Fill in the rows int64[m] of equilibria float64[m, D]: the size of their states and outputs,
     and the distance to the nearest boundary.
     """

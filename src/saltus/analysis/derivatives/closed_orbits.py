@@ -21,6 +21,7 @@ from saltus.analysis.inputs.spans import Span, span
 from saltus.analysis.inputs.starts import Ensemble
 from saltus.analysis.motion.sample_times import NO_SAMPLES
 from saltus.analysis.solve.floquet import across, multipliers
+from saltus.analysis.solve.linear import moves
 from saltus.errors import ParameterError, SaltusWarning
 from saltus.flow.request import Outcome, Request
 from saltus.system import System
@@ -159,20 +160,17 @@ class _Shots:
         move by float64[n, D, c].
         """
         n, size, count = by.shape
-        matrix = np.eye(size) - end.slopes[..., :size]
-        late = np.zeros((n, count))
-        if not self.forced:
-            ahead, there = self.rates(group), self.flow.rates(end, group)
-            unit = length.period[:, None]  # the period is an unknown in periods
-            matrix = np.concatenate([matrix, -(there * unit)[..., None]], axis=2)
-            row = np.pad(ahead, ((0, 0), (0, 1)))[:, None]
-            matrix = np.concatenate([matrix, row], axis=1)
-            by = np.concatenate([by, late[:, None]], axis=1)
-        good = np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(by).all(axis=(1, 2))
-        found = np.full(by.shape, np.nan)
-        for i in np.flatnonzero(good):
-            found[i] = np.linalg.lstsq(matrix[i], by[i])[0]
-        return found[:, :size], late if self.forced else found[:, size] * length.period[:, None]
+        matrix, late = end.slopes[..., :size] - np.eye(size), np.zeros((n, count))
+        if self.forced:
+            return moves(matrix, by), late
+        ahead, there = self.rates(group), self.flow.rates(end, group)
+        unit = length.period[:, None]  # the period is an unknown in periods
+        matrix = np.concatenate([matrix, (there * unit)[..., None]], axis=2)
+        row = np.pad(ahead, ((0, 0), (0, 1)))[:, None]
+        found = moves(
+            np.concatenate([matrix, row], axis=1), np.concatenate([by, late[:, None]], axis=1)
+        )
+        return found[:, :size], found[:, size] * unit
 
     def multipliers(self, end: Places, group: Ensemble) -> np.ndarray:
         """Floquet multipliers, complex128[n, m]."""
@@ -183,9 +181,14 @@ class _Shots:
         return multipliers(matrices[:, None])
 
     def beside(
-        self, group: Ensemble, length: Span, own: np.ndarray, move: np.ndarray, late: np.ndarray,
+        self,
+        group: Ensemble,
+        length: Span,
+        own: np.ndarray,
+        move: np.ndarray,
+        late: np.ndarray,
         name: str,
-    ) -> np.ndarray:  # fmt: skip
+    ) -> np.ndarray:
         """Derivatives of multipliers complex128[n, m] by one parameter, as the orbit moves."""
         n = group.size
         each = np.repeat(np.arange(n), len(SHIFTS))
@@ -209,9 +212,13 @@ class _Shots:
 
 # -- what is said ----------------------------------------------------------------------------------
 def check_orbits(
-    names: Sequence[str], parameters: Sequence[str], periods: Any, t_end: Any, t_start: Any,
+    names: Sequence[str],
+    parameters: Sequence[str],
+    periods: Any,
+    t_end: Any,
+    t_start: Any,
     values: Any,
-) -> None:  # fmt: skip
+) -> None:
     """Raise a ParameterError for what periodic orbits have of their own."""
     given = {"periods": periods, "t_end": t_end, "t_start": t_start or None, "values": values}
     wrong = [name for name, value in given.items() if value not in (None, "0 s")]

@@ -23,6 +23,7 @@ from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.inputs.spans import span
 from saltus.analysis.inputs.starts import Ensemble
 from saltus.analysis.motion.sample_times import planned
+from saltus.analysis.solve.linear import moves
 from saltus.errors import ParameterError
 from saltus.flow import engine
 from saltus.flow.methods import Method
@@ -160,7 +161,7 @@ class SteadyResponses:
         values = read.values(at).reshape(*time.shape, -1)
         slopes = read.slopes(at).reshape(*values.shape, -1)
         end = slopes[:, -1, :size]
-        moved = np.linalg.solve(np.eye(size) - end[..., :size], end[..., size:])
+        moved = moves(end[..., :size] - np.eye(size), end[..., size:])
         along = slopes[..., size:] + np.einsum("ktod,kdp->ktop", slopes[..., :size], moved)
         mine = self.measured.columns
         return _size_of(self.size, values[:, :-1, mine], along[:, :-1, mine])

@@ -72,8 +72,12 @@ def _row(system: System, name: str, size: int) -> np.ndarray:
         )
     formula = outputs.formulas[outputs.names.index(name)]
     probes = np.column_stack([np.zeros(len(names)), np.eye(len(names)), np.arange(len(names))])
-    (found,) = evaluate([formula], states=dict(zip(names, probes, strict=True)),
-        values=system.values, bits=[True] * len(system.guards) * 2)  # fmt: skip
+    (found,) = evaluate(
+        [formula],
+        states=dict(zip(names, probes, strict=True)),
+        values=system.values,
+        bits=[True] * len(system.guards) * 2,
+    )
     shows = np.broadcast_to(found, probes.shape[1])
     row: np.ndarray = shows[1:-1] - shows[0]
     linear = not ex.depends_on(formula, ("time", "select")) and np.isclose(

@@ -43,10 +43,15 @@ class Span:
         ``record_from`` on, or none.
         """
         return Request(
-            start=start, parameters=parameters, period=self.period, end_count=self.count,
-            end_phase=self.phase, origin=self.t_start,
-            schedule=schedule, record_from=record_from,
-        )  # fmt: skip
+            start=start,
+            parameters=parameters,
+            period=self.period,
+            end_count=self.count,
+            end_phase=self.phase,
+            origin=self.t_start,
+            schedule=schedule,
+            record_from=record_from,
+        )
 
 
 def span(system: System, group: Ensemble, periods: Any, t_end: Any, t_start: Any) -> Span:

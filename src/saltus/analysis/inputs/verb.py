@@ -17,8 +17,8 @@ from saltus.announce import silent
 from saltus.arguments import Kinds
 from saltus.errors import MOST_IN_A_ROW, ParameterError, closest, nearest, shown
 from saltus.flow.counts import whole
-from saltus.flow.engine import MOST_THREADS, RunInterrupted
-from saltus.interrupt import Interrupted, no_ctrl_c_is_lost
+from saltus.flow.engine import MOST_THREADS
+from saltus.interrupt import Interrupted, PartInterrupted, no_ctrl_c_is_lost
 from saltus.system import System
 
 P = ParamSpec("P")
@@ -114,9 +114,9 @@ def verb(function: Callable[P, R]) -> Callable[P, R]:
             with quiet, no_ctrl_c_is_lost():
                 return function(*args, **kwargs)
         except KeyboardInterrupt as stop:
-            if isinstance(stop, Interrupted) and not isinstance(stop, RunInterrupted):
+            if isinstance(stop, Interrupted) and not isinstance(stop, PartInterrupted):
                 raise
-            raise Interrupted from None  # a run inside has finished, but that is no answer
+            raise Interrupted from None  # a part has finished, but that is no answer
         finally:
             _INSIDE.reset(token)
 

@@ -78,9 +78,14 @@ class Exponents(Algorithm):
 
             flow = TangentFlow(self.map.rows(rows))
             found = spectrum(
-                flow, self._start[rows], self._periods, self._transient, self._every is None,
-                show, self._most,
-            )  # fmt: skip
+                flow,
+                self._start[rows],
+                self._periods,
+                self._transient,
+                self._every is None,
+                show,
+                self._most,
+            )
             if self._every is not None and autonomous(self.map.system):
                 _of_equilibria(found, flow, self._start[rows], self._every)
             self._keep(rows, flow, found)

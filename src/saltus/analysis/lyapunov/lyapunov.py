@@ -102,7 +102,7 @@ def lyapunov(
         ``sl.ODE45(events="ignore")`` jumps of the tangent are left out, as contacts aren't known.
     periods : int
         Blocks that growth is measured over, at least 64. The error falls with the square root of
-        it.
+        it. With the transient it bounds the work.
     transient : int
         Blocks before them that don't count. In the last 128 of them the directions align.
     every : float or str, optional

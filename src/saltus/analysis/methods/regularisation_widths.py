@@ -66,7 +66,8 @@ def regularisation_widths(
     transient : int
         Forcing periods until the motion counts as settled.
     points : int
-        Periods after them, from which the errors are measured.
+        Periods after them, from which the errors are measured. For each width so many are run, and
+        those of the transient.
     threads : int, optional
         Default: all.
 

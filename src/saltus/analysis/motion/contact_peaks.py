@@ -298,9 +298,11 @@ def _of_parts(
         here = nodes.rows(some)
         of = here.motion if len(seen.group.parameters) > 1 else np.zeros(len(here.motion), int)
         map_ = Stroboscope(
-            system, method, seen.group.parameters[of],
+            system,
+            method,
+            seen.group.parameters[of],
             None if system.forced_at is not None else seen.length.period[here.motion],
-        )  # fmt: skip
+        )
         series = MotionSeries(map_, watched, len(forces.guards))
         numbered = Nodes(
             np.arange(len(here.motion)), here.period, here.phase, here.length, here.state, here.mode
@@ -335,9 +337,13 @@ def _nodes(seen: Stretch, outcome: Outcome, row: np.ndarray, states: int) -> Nod
     if seen.system.forced_at is not None:
         count = np.floor(time / period)
     return Nodes(
-        who, count.astype(np.int64), time - count * period, np.maximum(until - time, 0.0),
-        table.state[row][:, :states], table.mode_after[row],
-    )  # fmt: skip
+        who,
+        count.astype(np.int64),
+        time - count * period,
+        np.maximum(until - time, 0.0),
+        table.state[row][:, :states],
+        table.mode_after[row],
+    )
 
 
 def _extremes(pieces: Pieces, states: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

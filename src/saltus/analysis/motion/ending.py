@@ -89,9 +89,12 @@ class Ending:
         flown = remembering(self.condition.system)
         request = self.asked(NO_SAMPLES.request(group, length, len(flown.states)))
         found = engine.run(
-            flown, method.suited_to(group.size), request, threads,
+            flown,
+            method.suited_to(group.size),
+            request,
+            threads,
             show and (lambda done: show(FINDING * done)),
-        )  # fmt: skip
+        )
         elapsed = np.maximum(found.time - length.t_start, 0.0)
         if system.forced_at is None:
             return evenly(system, group, length.t_start, float(elapsed.max()), samples)

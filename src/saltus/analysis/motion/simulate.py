@@ -66,7 +66,9 @@ def simulate(
         Time at the start [s]; the phase of the forcing is that of this time.
     method : Method
         Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
-        it serves; :class:`saltus.ODE45` for MATLAB's.
+        it serves; :class:`saltus.ODE45` for MATLAB's. Its ``max_steps`` and ``max_events`` are
+        the budget of a trajectory, which ends there with status ``budget_steps`` or
+        ``budget_events``.
     samples : int
         Samples per forcing period (default 200), or over the whole span if the system isn't forced
         (default 10 000, and down to 2000 for many trajectories).
@@ -128,9 +130,19 @@ def simulate(
     (21, True)
     """
     asked = asked_motion(
-        system, start, periods, t_end, t_start=t_start, method=method, samples=samples, at=at,
-        until=until, keep=keep, values=values, time_errors=time_errors,
-    )  # fmt: skip
+        system,
+        start,
+        periods,
+        t_end,
+        t_start=t_start,
+        method=method,
+        samples=samples,
+        at=at,
+        until=until,
+        keep=keep,
+        values=values,
+        time_errors=time_errors,
+    )
 
     def so_far(outcome: Outcome) -> xr.Dataset:
         return _dataset(asked, asked.arrays(outcome, measure.local(outcome)))

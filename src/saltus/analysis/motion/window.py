@@ -136,10 +136,16 @@ def computed(
 
 
 def dataset(
-    kind: str, seen: Stretch, system: System, method: Method, outcome: Outcome,
-    values: Mapping[str, Any], each: Mapping[str, Any],
-    attrs: Mapping[str, Any] | None = None, **options: Any,
-) -> xr.Dataset:  # fmt: skip
+    kind: str,
+    seen: Stretch,
+    system: System,
+    method: Method,
+    outcome: Outcome,
+    values: Mapping[str, Any],
+    each: Mapping[str, Any],
+    attrs: Mapping[str, Any] | None = None,
+    **options: Any,
+) -> xr.Dataset:
     """The Dataset of a stretch: of the system itself, without added guards and states.
 
     ``values`` are tables, ``each`` what belongs to each trajectory; how it ended stands between

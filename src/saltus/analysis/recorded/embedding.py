@@ -34,22 +34,16 @@ def embed(series: np.ndarray, dimension: int, delay: int) -> np.ndarray:
     return np.stack([series[i * delay : i * delay + count] for i in range(dimension)], axis=1)
 
 
-def mutual_information(series: np.ndarray, lag: int) -> float:
-    """Information of a sample about the one ``lag`` later [nat], by a histogram with cells of equal
-    probability.
-    """
-    return _information(*_cells(series), lag)
-
-
-def _cells(series: np.ndarray) -> tuple[np.ndarray, int]:
-    """The cell of each sample, and the number of cells."""
+def cells_of(series: np.ndarray) -> tuple[np.ndarray, int]:
+    """The cell of each sample, of cells of equal probability, and their number."""
     cells = max(int(np.sqrt(len(series) / PER_CELL)), 4)
     rank = np.empty(len(series), np.int64)
     rank[np.argsort(series, kind="stable")] = np.arange(len(series))
     return rank * cells // len(series), cells
 
 
-def _information(cell: np.ndarray, cells: int, lag: int) -> float:
+def mutual_information(cell: np.ndarray, cells: int, lag: int) -> float:
+    """Information of the cell of a sample about that of the one ``lag`` later [nat]."""
     joint = np.bincount(cell[:-lag] * cells + cell[lag:], minlength=cells * cells).reshape(
         cells, cells
     ) / (len(cell) - lag)
@@ -63,10 +57,10 @@ def first_minimum(series: np.ndarray) -> int:
     on either side.
     """
     longest = max(int(LONGEST * len(series)), 3)
-    cell, cells = _cells(series)
+    cell, cells = cells_of(series)
     values: list[float] = []
     for lag in range(1, longest + 3):
-        values.append(_information(cell, cells, lag))
+        values.append(mutual_information(cell, cells, lag))
         if lag > 4 and values[-3] == min(values[-5:]):
             return lag - 2
     return int(np.argmin(values)) + 1

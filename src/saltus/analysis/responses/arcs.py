@@ -111,9 +111,17 @@ def follow_arcs(
     ((name, values),) = grid.axes.items()
     exact = method if method.exact else method.companion()
     plan = plan_of(
-        grid.system, name, (float(values[0]), float(values[-1])), exact, threads, POINTS,
-        LONGEST_DOUBLED, SWITCHES if arcs.unstable else (), stable=not arcs.unstable, twins=True,
-    )  # fmt: skip
+        grid.system,
+        name,
+        (float(values[0]), float(values[-1])),
+        exact,
+        threads,
+        POINTS,
+        LONGEST_DOUBLED,
+        SWITCHES if arcs.unstable else (),
+        stable=not arcs.unstable,
+        twins=True,
+    )
     arcs.branch_of = np.full(len(found), -1, np.int64)
     try:
         parametric(grid.system, (name,))

@@ -127,9 +127,13 @@ class Subject:
 
 
 def subject_of(
-    ds: xr.Dataset, names: Sequence[str], attrs: Mapping[str, Any], batch: bool = True,
-    varied: Mapping[str, Any] | None = None, forcing_period: Any = None,
-) -> Subject:  # fmt: skip
+    ds: xr.Dataset,
+    names: Sequence[str],
+    attrs: Mapping[str, Any],
+    batch: bool = True,
+    varied: Mapping[str, Any] | None = None,
+    forcing_period: Any = None,
+) -> Subject:
     """The subject of a result that is made of another one, with some of its states and outputs."""
     states = [name for name in names if name in schema.states_of(ds)]
     known = [name for name in (*names, *(varied or {})) if name in ds]

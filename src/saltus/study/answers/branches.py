@@ -28,10 +28,12 @@ By: Any = asking(
     base=Generated,
 )  # fmt: skip
 BY = WrittenAs(
-    By, ({"harmonics": 9},),
-    "Harmonic balance: motions of a few harmonics in place of exact orbits.", None,
+    By,
+    ({"harmonics": 9},),
+    "Harmonic balance: motions of a few harmonics in place of exact orbits.",
+    None,
     convert="balance",
-)  # fmt: skip
+)
 #: Branches go over a range, without steps.
 OF_BRANCHES = OF_RESPONSES | {
     "vary": WrittenAs(

@@ -22,11 +22,15 @@ if TYPE_CHECKING:
 
 #: They are looked for in a box, or from starts.
 KEYS = KINDS | {
-    "start": WrittenAs(dict[str, Start], KINDS["start"].examples,
-        "Starts of Newton's method, in place of a box: every state; lists make a batch.", None,
-        convert="start"),
+    "start": WrittenAs(
+        dict[str, Start],
+        KINDS["start"].examples,
+        "Starts of Newton's method, in place of a box: every state; lists make a batch.",
+        None,
+        convert="start",
+    ),
     "starts": whole(256),
-}  # fmt: skip
+}
 _BOX = Field(
     None,
     description="Ranges of the starts of Newton's method.",

@@ -35,7 +35,7 @@ class Derivatives(OneVerb):
 
     def check(self, table: Any, setting: Setting) -> None:  # noqa: ARG002
         """Check start, length and values, and what the derivatives are with respect to."""
-        from saltus.analysis.derivatives.sensitivity import Columns
+        from saltus.analysis.derivatives.columns import Columns
         from saltus.analysis.motion.window import stretch
 
         self.arguments["to"] = table.to

@@ -193,8 +193,9 @@ def _mat(stream: BinaryIO) -> dict[str, Any]:
     from scipy.io import loadmat, whosmat
 
     try:
-        _check_size(sum(8 * int(np.prod(shape)) for _, shape, kind in whosmat(stream)
-            if kind != "sparse"))  # fmt: skip
+        _check_size(
+            sum(8 * int(np.prod(shape)) for _, shape, kind in whosmat(stream) if kind != "sparse")
+        )
         stream.seek(0)
         found = loadmat(stream)
     except NotImplementedError:

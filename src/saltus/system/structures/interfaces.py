@@ -84,9 +84,15 @@ class Interfaces:
         names = [f"deflection_{i}" for i in range(len(self._directions))]
         names += [f"drive_{i}" for i in range(len(self.loads.along))]
         at = _AtContacts(
-            names, [f"{one}_rate" for one in names], None, np.zeros((len(names), len(names))),
-            None, None, self._directions, self.loads.along,
-        )  # fmt: skip
+            names,
+            [f"{one}_rate" for one in names],
+            None,
+            np.zeros((len(names), len(names))),
+            None,
+            None,
+            self._directions,
+            self.loads.along,
+        )
         about = {"unit": self.unit, "name": self.name, "source": ""}
         return traced(at, self.degrees, self.loads, self.frequency, **about)[0]
 

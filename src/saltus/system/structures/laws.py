@@ -99,8 +99,9 @@ def forces(label: str, contact: Contact, at: Moving, values: Mapping[str, Any]) 
     if contact.friction is None:
         return _pressed(label, contact, sides(contact), at, values), None
     pushed = [_pressed(label, contact, (side,), at, values) for side in sides(contact)]
-    normal = [one if side == "upper" else -one for one, side in
-        zip(pushed, sides(contact), strict=True)]  # fmt: skip
+    normal = [
+        one if side == "upper" else -one for one, side in zip(pushed, sides(contact), strict=True)
+    ]
     rubbed = friction(at.slip, slip=values[f"{label}_friction"] * sum(normal[1:], normal[0]))  # type: ignore[arg-type]
     return sum(pushed[1:], pushed[0]), rubbed
 
@@ -113,12 +114,16 @@ def _pressed(
     damping = values[f"{label}_damping"] if contact.damping is not None else None
     rubs = contact.friction is not None
     if contact.power in (None, 1):
-        return as_expr(freeplay(
-            at.deflection, stiffness=stiffness,
-            damping=0.0 if damping is None else damping,
-            velocity=None if damping is None else at.rate,
-            no_tension=rubs, **{f"{side}_gap": gap for side in touching},
-        ))  # fmt: skip
+        return as_expr(
+            freeplay(
+                at.deflection,
+                stiffness=stiffness,
+                damping=0.0 if damping is None else damping,
+                velocity=None if damping is None else at.rate,
+                no_tension=rubs,
+                **{f"{side}_gap": gap for side in touching},
+            )
+        )
     total: Any = 0.0
     for side in touching:
         depth = at.deflection - gap if side == "upper" else -at.deflection - gap

@@ -224,8 +224,9 @@ def parts(kind: type[P], given: Any, word: str, known: Iterable[str]) -> list[tu
     ]
     for name, part in zip(names, found, strict=True):
         if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
-            raise ParameterError(f"{shown(name)} can't be the name of a {word}: use letters, "
-                                 f"digits and _.")  # fmt: skip
+            raise ParameterError(
+                f"{shown(name)} can't be the name of a {word}: use letters, digits and _."
+            )
         if name in degrees:
             raise ParameterError(
                 f"a {word} is called {name!r}, as a degree of freedom is. Give it another name=."

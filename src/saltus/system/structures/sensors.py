@@ -152,7 +152,7 @@ def contact_force(at: str) -> Sensor:
 
 def with_sensors(
     made: System, sensors: Any, moving: Coordinates, degrees: list[str], loads: Loads, unit: str
-) -> System:  # fmt: skip
+) -> System:
     """The structure with sensors as its outputs; in front of the coordinates of modes.
 
     Parameters
@@ -256,9 +256,11 @@ class _Sensors:
     def _force(self, name: str, at: Any, z: list[Expr], w: list[Expr]) -> Expr:
         """The force of the contacts of a name, or at a degree of freedom."""
         contacts = dict(self.loads.contacts)
-        mine = [at] if among(at, contacts) else [
-            label for label, one in contacts.items() if one.at == at
-        ]  # fmt: skip
+        mine = (
+            [at]
+            if among(at, contacts)
+            else [label for label, one in contacts.items() if one.at == at]
+        )
         if not mine:
             known = [*contacts, *(one.at for one in contacts.values())]
             raise ParameterError(

@@ -173,10 +173,11 @@ def structure(
     bases = base if isinstance(base, list | tuple) else [base] if base is not None else []
     shaking = parts(Base, bases, "base", degrees)
     loads = Loads(
-        touching, [*driving, *shaking],
+        touching,
+        [*driving, *shaking],
         [direction(one, degrees) for _, one in driving]
         + [-(mass @ direction(one, degrees)) for _, one in shaking],
-    )  # fmt: skip
+    )
     count = _count(modes, size)
     if count < size and abs(stiffness).max() == 0:
         raise ParameterError(
@@ -283,9 +284,13 @@ def _physical(mass: Any, stiffness: Any, damping: Any, degrees: list[str]) -> Co
 def _modal(modes: Modes, damping: Any) -> Coordinates:
     names = [f"q{i}" for i in range(1, len(modes.angular) + 1)]
     return Coordinates(
-        names, [f"{one}_rate" for one in names], None, np.diag(modes.angular**2), damping,
+        names,
+        [f"{one}_rate" for one in names],
+        None,
+        np.diag(modes.angular**2),
+        damping,
         modes.shapes,
-    )  # fmt: skip
+    )
 
 
 def _angular(moving: Coordinates, stiffness: Any) -> np.ndarray:

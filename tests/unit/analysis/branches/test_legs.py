@@ -71,8 +71,10 @@ def test_legs_that_last_next_to_no_time_have_their_derivatives():
     legs, z, _ = legs_of(STOP, "force", ON_STOP)
     rest, after, phase, step = z[:, 3:], np.array([[[0.0, -0.7]]]), np.array([[0.2]]), 1e-6
     for span in (5e-4, -3e-4, 1e-12):
-        end, matrix = legs.fly(after, rest, phase, np.array([[span]]))
-        ends = [legs.fly(after, rest, phase, np.array([[span + h]]))[0] for h in (step, -step)]
+        end, matrix = legs.flights.fly(after, rest, phase, np.array([[span]]))
+        ends = [
+            legs.flights.fly(after, rest, phase, np.array([[span + h]]))[0] for h in (step, -step)
+        ]
         assert matrix[..., -1] == pytest.approx((ends[0] - ends[1]) / (2 * step), abs=1e-8)
         period = 2 * np.pi / 1.2
         bound = 2 * (span * period) ** 2 + 1e-15  # curvature and rounding

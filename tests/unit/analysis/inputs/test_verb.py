@@ -6,7 +6,8 @@ import pytest
 import saltus as sl
 from saltus.analysis.inputs.verb import verb
 from saltus.announce import announce
-from saltus.flow import progress
+from saltus.flow import engine, progress
+from saltus.flow.maps import Stroboscope
 from saltus.flow.progress import LogLines, reporting
 from saltus.interrupt import check_stop
 
@@ -209,11 +210,25 @@ def test_a_part_of_the_work_that_reports_nothing_is_not_silent(monkeypatch, capf
     assert capfd.readouterr().err == ""
 
 
+def test_a_function_is_called_while_no_share_is_reported(monkeypatch):
+    """A single long run too, slice by slice, before anything is done of the verb."""
+    monkeypatch.setattr(progress, "BEAT", 0.0)
+    monkeypatch.setattr(engine, "SLICE", 100)
+    shares = []
+    with reporting(shares.append) as show:
+        check_stop()
+        show(0.3)
+        check_stop()
+        assert shares == [0.0, 0.3, 0.3]
+        before = len(shares)
+        Stroboscope(rig, sl.Taylor(), threads=1).run(np.array([[1e-3, 0.0]]), 200)
+        assert len(shares) > before + 10
+        assert set(shares) == {0.0, 0.3}
+
+
 def test_what_progress_may_be():
     with reporting(False) as show:
         assert show is None
-    with reporting(print) as show:
-        assert show is print
     with pytest.raises(sl.SaltusError, match="progress must be"), reporting("bar"):
         pass
 

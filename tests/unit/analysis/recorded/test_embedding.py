@@ -7,6 +7,7 @@ import pytest
 
 from saltus.analysis.recorded.embedding import (
     _nearest_allowed,
+    cells_of,
     embed,
     false_neighbours,
     first_minimum,
@@ -33,8 +34,8 @@ def test_mutual_information_of_known_series():
         smooth[i] = 0.8 * smooth[i - 1] + 0.6 * NOISE[i]
     for lag in (1, 2, 3):
         exact = -0.5 * math.log(1 - 0.8 ** (2 * lag))
-        assert mutual_information(smooth, lag) == pytest.approx(exact, abs=0.04)
-    assert mutual_information(NOISE, 1) < 0.02
+        assert mutual_information(*cells_of(smooth), lag) == pytest.approx(exact, abs=0.04)
+    assert mutual_information(*cells_of(NOISE), 1) < 0.02
 
 
 def test_the_delay_of_a_noisy_oscillation_is_a_quarter_of_a_turn():

@@ -1,0 +1,216 @@
+"""From a run of the flow that carries derivatives to the Dataset of `sensitivity`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from saltus.analysis import dataset_parts
+from saltus.analysis.derivatives.carried import HELD, Places
+from saltus.analysis.derivatives.closed_orbits import (
+    ClosedOrbits,
+)
+from saltus.analysis.derivatives.columns import Columns, Turning
+from saltus.analysis.derivatives.readings import Readings, slope_of
+from saltus.analysis.inputs.outputs import outputs_of
+from saltus.analysis.inputs.spans import Span
+from saltus.analysis.motion.sample_times import (
+    SampleTimes,
+)
+from saltus.flow import engine
+from saltus.flow.contact_table import ContactTable
+from saltus.flow.methods import Method
+from saltus.flow.request import Outcome, Request
+from saltus.language.evaluate import evaluate
+from saltus.language.expression import TIME, parameter, state
+from saltus.results import build
+from saltus.results.dataset import schema
+
+#: Counters that are kept.
+COUNTED = ("steps", "rejected_steps", "mode_violations", "grazes_unresolved")
+#: Rate of a gap at a contact, in the largest at its contacts, below which the contact's time isn't
+#: that of a zero of the gap: the motion rests there, or goes along the boundary.
+LEAVES = 1e-9
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensitivityRun(Readings):
+    """A run of the flow that carries derivatives."""
+
+    method: Method
+    length: Span
+    plan: SampleTimes
+    turning: Turning
+    asked: Columns
+    closed: ClosedOrbits | None
+
+    def chosen(self, slopes: np.ndarray, who: np.ndarray) -> np.ndarray:
+        """The derivatives that were asked for, float64[m, ..., to], of all columns float64[m, ...,
+        C] at places of trajectories int64[m].
+        """
+        if self.closed is None:
+            return slopes[..., self.asked.places]
+        weights = self.closed.weights[who]
+        return np.asarray(np.einsum("m...c,mct->m...t", slopes, weights))
+
+    def again(self, request: Request) -> Outcome:
+        """The outcome of another request of the flow."""
+        return engine.run(self.flow.flown, self.method.suited_to(1), request, 1)
+
+    def contact_times(self, at: Places, table: ContactTable) -> np.ndarray:
+        """Derivatives of the times of contacts, float64[m, C]: the gap of each stays zero. NaN
+        where it is zero beside the contact too.
+        """
+        moved = np.full((len(at.time), at.slopes.shape[2]), np.nan)
+        rates, system = self.flow.rates(at, self.group), self.turning.system
+        begins = np.isin(table.kind_name, HELD)
+        met = np.arange(len(system.guards))  # where a contact begins to be held
+        for number, one in enumerate(system.guards):
+            if one.law is not None and one.law.kind == "hold":
+                met[number] = one.law.partner
+        guard = np.where(begins, met[table.guard], table.guard)
+        for number in np.unique(guard):
+            here = guard == number
+            gap = system.guards[number].gap
+            leaves = [*map(state, system.states), *map(parameter, self.flow.names), TIME]
+            found = evaluate(
+                [slope_of(gap, leaf) for leaf in leaves],
+                t=at.time[here],
+                states=dict(zip(system.states, at.states[here].T, strict=True)),
+                values=self.flow.parameters(self.group, at.trajectory[here]),
+                bits=[(at.mode[here] >> i) & 1 == 1 for i in range(len(system.guards))],
+            )
+            slopes = np.stack([np.broadcast_to(one, here.sum()) for one in found], axis=1)
+            size = len(system.states)
+            change = np.einsum("mi,mic->mc", slopes[:, :size], at.slopes[here])
+            change[:, size:] += slopes[:, size:-1]
+            rate = np.einsum("mi,mi->m", slopes[:, :size], rates[here]) + slopes[:, -1]
+            leaves_it = np.abs(rate) > LEAVES * np.abs(rate).max()
+            with np.errstate(divide="ignore", invalid="ignore"):
+                moved[here] = np.where(leaves_it[:, None], -change / rate[:, None], np.nan)
+        return moved
+
+
+def sensitivity_dataset(run: SensitivityRun, outcome: Outcome) -> xr.Dataset:
+    """The Dataset of a run."""
+    system, group, length, turning = run.system, run.group, run.length, run.turning
+    asked = run.asked
+    n, forced = group.size, system.forced_at is not None
+    unit = length.period if run.flow.timed else np.ones(n)
+    time, _ = run.plan.of_result(outcome, length, forced)
+    kept = run.plan.reached(outcome)
+    count = time.shape[-1]
+    own = np.broadcast_to(time, (n, count))
+    at = run.flow.samples(outcome, group, length, own, kept)
+    outputs = outputs_of(system)
+    value = run.values(at).reshape(n, count, -1)
+    slope = run.chosen(run.slopes(at), at.trajectory).reshape(n, count, len(outputs), -1)
+    table = outcome.contacts
+    touch = run.flow.contacts(outcome, group, length, run.again)
+    speed = table.velocity / unit[table.trajectory]
+    moved = run.contact_times(touch, table)
+    mine = np.flatnonzero(table.guard < len(system.guards))
+    names = np.array([guard.name for guard in system.guards] or [""], dtype=np.str_)
+    end = run.flow.ends(outcome, group, length)
+    subject = dataset_parts.trajectories(
+        system,
+        run.method,
+        group,
+        (length.period if np.ptp(length.period) > 0 else float(length.period[0]))
+        if forced
+        else None,
+    )
+    return build(
+        schema.SENSITIVITY,
+        subject,
+        {
+            "trajectory": np.arange(n),
+            "time": time,
+            "to": list(asked.names),
+            "to_units": asked.units(system),
+            "to_value": asked.values(system, group),
+            "output": list(outputs.names),
+            "output_units": list(outputs.units),
+            "value": value,
+            "derivative": slope,
+            "contact_time": touch.time[mine],
+            "contact_time_derivative": run.chosen(moved, touch.trajectory)[mine],
+            "contact_guard": names[table.guard[mine]],
+            "contact_kind": table.kind_name[mine],
+            "contact_velocity": speed[mine],
+            "contact_trajectory": table.trajectory[mine],
+            **(_extremes(run, outcome, touch, moved, at, end) if turning.known else {}),
+            "end_derivative": run.chosen(run.slopes(end), end.trajectory),
+            **(_of_orbits(run.closed, end) if run.closed is not None else {}),
+            **dataset_parts.endings(outcome, COUNTED),
+            "end_time": end.time,
+            "end_<state>": run.values(end),
+        },
+        words={"<slope>": "", "<to>": ""},
+    )
+
+
+def _of_orbits(closed: ClosedOrbits, end: Places) -> dict[str, np.ndarray]:
+    """The variables that only periodic orbits have."""
+    own, slope = closed.multipliers, closed.multiplier_slope
+    return {
+        "period": end.time,
+        "period_derivative": closed.period_slope,
+        "multiplier_real": own.real,
+        "multiplier_imag": own.imag,
+        "multiplier_real_derivative": slope.real,
+        "multiplier_imag_derivative": slope.imag,
+    }
+
+
+def _extremes(
+    run: SensitivityRun,
+    outcome: Outcome,
+    touch: Places,
+    moved: np.ndarray,
+    samples: Places,
+    end: Places,
+) -> dict[str, np.ndarray]:
+    """The largest and smallest values of each output, when, and their derivatives: where it turns,
+    at a contact, at the first sample that is kept or at the end.
+    """
+    n, ahead = run.group.size, outcome.contacts.mode_before
+    guard = outcome.contacts.guard
+    first = _rows(samples, np.searchsorted(samples.trajectory, np.arange(n)))
+    turns = np.isin(guard, list(run.turning.of))
+    still = np.where(turns[:, None], 0.0, moved)
+    parts = [(touch, still, None), (touch, still, ahead), (first, None, None), (end, None, None)]
+    value = np.concatenate([run.values(at, mode) for at, _, mode in parts])
+    slope = np.concatenate([run.slopes(*part) for part in parts])
+    time = np.concatenate([at.time for at, _, _ in parts])
+    who = np.concatenate([at.trajectory for at, _, _ in parts])
+    slope = run.chosen(slope, who)
+    of = np.full(len(time), -1)
+    of[: 2 * len(guard)] = np.tile([run.turning.of.get(int(one), -1) for one in guard], 2)
+    width = value.shape[1]
+    found = {
+        f"{word}{part}": np.full((n, width, *more), np.nan)
+        for word in ("maximum", "minimum")
+        for part, more in (("", ()), ("_time", ()), ("_derivative", slope.shape[2:]))
+    }
+    for i in range(n):
+        mine = np.flatnonzero(who == i)
+        for k in run.turning.known:
+            here = mine[(of[mine] == k) | (of[mine] < 0)]
+            here = here[np.isfinite(value[here, k])]
+            if not len(here):
+                continue
+            for word, choose in (("maximum", np.argmax), ("minimum", np.argmin)):
+                place = here[choose(value[here, k])]
+                found[word][i, k] = value[place, k]
+                found[f"{word}_time"][i, k] = time[place]
+                found[f"{word}_derivative"][i, k] = slope[place, k]
+    return found
+
+
+def _rows(at: Places, which: np.ndarray) -> Places:
+    return Places(
+        at.time[which], at.states[which], at.slopes[which], at.mode[which], at.trajectory[which]
+    )
