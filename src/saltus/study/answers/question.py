@@ -155,6 +155,10 @@ class Question(ABC):
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
         """Figures by the end of their file names; the first one is the usual one."""
 
+    def pictures_with(self, found: Answers) -> dict[str, Any]:  # noqa: ARG002
+        """Figures in which other answers stand too, by the end of their file names."""
+        return {}
+
 
 class OneVerb(Question):
     """Question that one function of the analyses answers. Its table was made from the parameters of
