@@ -230,11 +230,16 @@ class OneVerb(Question):
         kind = default_kind(ds)
         if not kind:
             return {}
-        axes = getattr(plot, kind)(ds)
-        axes.set_title(self.title, loc="left")
-        return {"": first_figure(axes)}
+        first = first_axes(getattr(plot, kind)(ds))
+        first.set_title(self.title, loc="left")
+        return {"": first.figure}
+
+
+def first_axes(axes: Any) -> Any:
+    """The Axes, or the first of the array of Axes, that a picture returns."""
+    return axes.flat[0] if hasattr(axes, "flat") else axes
 
 
 def first_figure(axes: Any) -> Any:
     """Figure of the Axes, or of the array of Axes, that a picture returns."""
-    return (axes.flat[0] if hasattr(axes, "flat") else axes).figure
+    return first_axes(axes).figure

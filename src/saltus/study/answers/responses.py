@@ -69,19 +69,20 @@ class Responses(OneVerb):
     @functools.cached_property
     def division(self) -> Division | str:
         """Chunks of values, unless each begins where the one before ended."""
-        from saltus.analysis.responses import divided
+        from saltus.analysis.attractors.divided_grid import values_together
+        from saltus.analysis.responses.divided import DividedResponses
 
         if (grid := self.grid()).sweeps:
             return "sweeps: each value begins where the one before ended"
         given = self.arguments
-        return divided.DividedResponses(
+        return DividedResponses(
             grid,
             self.method,
             given["periods"],
-            given.get("sample", ""),
             given["outputs"],
+            values_together(len(grid.starts)),
+            given.get("sample", ""),
             given["unstable"],
-            max(1, divided.TRAJECTORIES // len(grid.starts)),
         )
 
     def varied(self) -> dict[str, Any]:
