@@ -56,6 +56,8 @@ from saltus.system.read_off import Quantity
 SLIGHT = 1e-6
 #: Counters that are kept.
 COUNTED = ("steps", "rejected_steps", "mode_violations", "grazes_unresolved")
+#: Kinds of contacts at which states jump.
+JUMPS = ("impact", "jump")
 #: Rate of a gap at a contact, in the largest at its contacts, below which the contact's time isn't
 #: that of a zero of the gap: the motion rests there, or goes along the boundary.
 LEAVES = 1e-9
@@ -445,14 +447,20 @@ def _extremes(
     run: _Run, outcome: Outcome, touch: Places, moved: np.ndarray, samples: Places, end: Places
 ) -> dict[str, np.ndarray]:  # fmt: skip
     """The largest and smallest values of each output, when, and their derivatives: where it turns,
-    at a contact, at the first sample that is kept or at the end.
+    at a contact, just before it, at the first sample that is kept or at the end.
     """
     n, ahead = run.group.size, outcome.contacts.mode_before
     guard = outcome.contacts.guard
     first = _rows(samples, np.searchsorted(samples.trajectory, np.arange(n)))
     turns = np.isin(guard, list(run.turning.of))
     still = np.where(turns[:, None], 0.0, moved)
-    parts = [(touch, still, None), (touch, still, ahead), (first, None, None), (end, None, None)]
+    early = touch  # what an impact changes has one more value, just before it
+    if np.isin(outcome.contacts.kind_name, JUMPS).any():
+        kinds = (*HELD, *JUMPS)
+        early = run.flow.contacts(outcome, run.group, run.length, run.again, kinds)
+    parts = [(touch, still, None), (early, still, ahead), (first, None, None)]
+    if run.closed is None:  # an orbit ends where it begins, whose own slope is known
+        parts.append((end, None, None))
     value = np.concatenate([run.values(at, mode) for at, _, mode in parts])
     slope = np.concatenate([run.slopes(*part) for part in parts])
     time = np.concatenate([at.time for at, _, _ in parts])
