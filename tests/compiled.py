@@ -20,7 +20,7 @@ def compiled(text: str, arguments: tuple[str, ...], lanes: int):
     """The one function of a text, to be called with arrays and numbers."""
     name = text.split("def ", 1)[1].split("(", 1)[0]
     interface = SimpleNamespace(functions={name: arguments}, truths=())
-    code = machine.object_code(None, [equation_ir(text, {}, interface, lanes)], [f"saltus_{name}"])
+    code = machine.object_code(None, [equation_ir(text, (), interface, lanes)], [f"saltus_{name}"])
     loaded = machine.loaded([code], f"saltus_{name}")
     function = ctypes.CFUNCTYPE(None, *(_CTYPES[kind] for kind in arguments))(loaded.address)
 

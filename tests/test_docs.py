@@ -46,7 +46,14 @@ PAGES = sorted(page for page in DOCS.rglob("*.md") if "_build" not in page.parts
 WITH_CODE = [page for page in PAGES if blocks(page)]
 
 
-@pytest.mark.parametrize("page", WITH_CODE, ids=lambda page: page.stem)
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(page, marks=pytest.mark.slow if page.stem == "studies" else ())
+        for page in WITH_CODE
+    ],
+    ids=[page.stem for page in WITH_CODE],
+)
 def test_code_of_a_page_runs(page, tmp_path, monkeypatch):
     """In order, in one namespace and one folder; a study is saved under the name that the next
     command uses. Few starts look for the attractors of a map, and few of its cells are computed

@@ -19,8 +19,10 @@ DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 
 def questions(source: str) -> list[str]:
     """First lines of docstrings, and above constants, that begin with a question word."""
-    found = [ast.get_docstring(node) for node in ast.walk(ast.parse(source))
-             if isinstance(node, DOCUMENTED)]  # fmt: skip
+    found: list[str | None] = []
+    if any(f'"""{word}' in source for word in QUESTION_WORDS):
+        tree = ast.parse(source)
+        found = [ast.get_docstring(one) for one in ast.walk(tree) if isinstance(one, DOCUMENTED)]
     found += FIRST_LINES.findall(source)
     return [text.splitlines()[0] for text in found if text and text.split()[0] in QUESTION_WORDS]
 

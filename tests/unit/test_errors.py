@@ -31,15 +31,15 @@ READING = {
 
 def caught(tree: ast.AST) -> set[str]:
     """Names that hold an exception: of ``except``, and of arguments said to be one."""
-    names = {node.name for node in ast.walk(tree) if isinstance(node, ast.ExceptHandler)}
-    names |= {
-        node.arg
-        for node in ast.walk(tree)
-        if isinstance(node, ast.arg)
-        and node.annotation is not None
-        and ("Error" in ast.unparse(node.annotation) or "Exception" in ast.unparse(node.annotation))
-    }
-    return {name for name in names if name}
+    names = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ExceptHandler) and node.name:
+            names.add(node.name)
+        elif isinstance(node, ast.arg) and node.annotation is not None:
+            kind = ast.unparse(node.annotation)
+            if "Error" in kind or "Exception" in kind:
+                names.add(node.arg)
+    return names
 
 
 def is_text(node: ast.AST, errors: set[str]) -> bool:
@@ -59,6 +59,8 @@ def is_text(node: ast.AST, errors: set[str]) -> bool:
 def reads(tree: ast.AST) -> Iterator[ast.AST]:
     """Places at which the text of an error is compared, searched or taken apart."""
     errors = caught(tree)
+    if not errors:
+        return
     held = {
         target.id
         for node in ast.walk(tree)

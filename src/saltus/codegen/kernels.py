@@ -43,6 +43,8 @@ _BAKED = (
     "ORDER", "NEWTON_DEGREE_1", "NEWTON_DEGREE_2", "HORNER", "FINER", "SHORTEST",
     "STAGES", "STAGE_TIME", "WEIGHT", "ERROR_WEIGHT", "DENSE_WEIGHT", "RULES",
 )  # fmt: skip
+#: Equations of many systems are the same: a tenth of a second for a long one.
+_text_of = lru_cache(maxsize=64)(equation_ir)
 _DTYPES = {"float64": np.dtype(np.float64), "int64": np.dtype(np.int64)}
 
 
@@ -267,8 +269,9 @@ class Kernels:
 
     @cached_property
     def _equation_text(self) -> str:
-        return equation_ir(
-            self._functions, self._constants, self.interface, self._lanes, machine.register_width()
+        sizes = tuple((name, n) for name, n in self._constants.items() if isinstance(n, int))
+        return _text_of(
+            self._functions, sizes, self.interface, self._lanes, machine.register_width()
         )
 
 

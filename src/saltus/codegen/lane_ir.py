@@ -93,7 +93,7 @@ def _numbers_of(tree: ast.Module) -> dict[str, Value]:
 
 def equation_ir(
     functions: str,
-    constants: Mapping[str, Constant],
+    sizes: tuple[tuple[str, int], ...],
     interface: Interface,
     lanes: int,
     register: int | None = None,
@@ -107,8 +107,8 @@ def equation_ir(
     ----------
     functions : str
         Text of the head's functions.
-    constants : mapping
-        Its sizes and tables.
+    sizes : tuple of tuple (name, value)
+        Its whole numbers.
     interface : Interface
         The functions and names that the templates use.
     lanes : int
@@ -118,9 +118,7 @@ def equation_ir(
     """
     part = min(register or lanes, lanes)
     shared, declared = _trigonometry(part)
-    known = {
-        name: Value(INTEGER, str(int(v))) for name, v in constants.items() if isinstance(v, int)
-    }
+    known = {name: Value(INTEGER, str(int(value))) for name, value in sizes}
     needed = set(declared)
     body = templates.tree_of(functions).body
     trees = {node.name: node for node in body if isinstance(node, ast.FunctionDef)}

@@ -28,7 +28,7 @@ WHY = {
 
 def solves(text: str) -> bool:
     """True where a linear system is solved in a text."""
-    return any(
+    return "linalg" in text and any(
         isinstance(node, ast.Attribute)
         and node.attr in SOLVERS
         and isinstance(node.value, ast.Attribute)

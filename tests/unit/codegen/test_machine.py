@@ -30,7 +30,8 @@ MAGIC = {
 
 def equation(system, lanes, order=20):
     head = taylor_head(system, order, lanes)
-    return equation_ir(head.functions, head.constants, TAYLOR, lanes)
+    sizes = tuple((name, n) for name, n in head.constants.items() if isinstance(n, int))
+    return equation_ir(head.functions, sizes, TAYLOR, lanes)
 
 
 @pytest.mark.parametrize("name", TARGETS)

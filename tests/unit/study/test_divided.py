@@ -119,6 +119,7 @@ def test_the_study_is_one_that_can_tell(whole):
     assert kinds.sizes["response"] > 6
 
 
+@pytest.mark.slow
 def test_chunks_change_no_bit(whole, chunks):
     assert chunks.computed == 6
     assert contents(chunks.folder)[1] == contents(whole.folder)[1]

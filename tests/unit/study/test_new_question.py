@@ -4,6 +4,8 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 QUESTION = '''
 """[stroboscope]: motions at whole forcing periods."""
 
@@ -49,6 +51,7 @@ except StudyError as error:
 '''
 
 
+@pytest.mark.slow
 def test_a_new_question_is_one_file(tmp_path):
     (tmp_path / "points.py").write_text(QUESTION, encoding="utf-8")
     code = USE.replace("FOLDER", repr(str(tmp_path)))

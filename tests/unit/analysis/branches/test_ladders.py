@@ -33,6 +33,7 @@ def test_what_is_no_ladder(contacts, values):
     assert math.isnan(accumulation(contacts, values))
 
 
+@pytest.mark.slow
 def test_a_branch_ends_before_its_grazes_accumulate():
     """The ladder of ever more impacts in two periods, each kept for 0.7 of its speed. Followed to
     16 impacts, its grazes are 2.9973952943520854, 2.997369120902456, 2.9973554207981943,

@@ -57,13 +57,13 @@ def test_tables_of_results_are_made_in_the_files_of_their_kinds_only():
 
 
 def _makes_a_table(path: Path) -> bool:
-    called = {
-        node.func.id
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
-    }
     text = path.read_text(encoding="utf-8")
-    return "saltus.results.table" in text and bool(called & {"TextTable", "table", "Column"})
+    return "saltus.results.table" in text and any(
+        isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Name)
+        and node.func.id in ("TextTable", "table", "Column")
+        for node in ast.walk(ast.parse(text))
+    )
 
 
 def test_methods_side_by_side_are_told_beside_the_reference():
