@@ -57,7 +57,7 @@ SLIGHT = 1e-6
 #: Counters that are kept.
 COUNTED = ("steps", "rejected_steps", "mode_violations", "grazes_unresolved")
 #: Kinds of contacts at which states jump.
-JUMPS = ("impact", "jump")
+JUMPS = ("impact",)
 #: Rate of a gap at a contact, in the largest at its contacts, below which the contact's time isn't
 #: that of a zero of the gap: the motion rests there, or goes along the boundary.
 LEAVES = 1e-9
