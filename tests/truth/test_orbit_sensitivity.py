@@ -127,3 +127,21 @@ def test_random_orbits_agree_with_differences(system, contact):
             size = max(np.abs(expected).max(), np.abs(found[word].values).max())
             assert slope == pytest.approx(expected, abs=1e-7 * size), word
     assert contact in seen
+
+
+def test_the_largest_velocity_of_an_impact_oscillator_is_that_before_the_impact():
+    system = hammer.with_values(f=1.9, k=41.0)  # the velocity grows until the impact
+    names, values = [*system.values], np.array([*system.values.values()])
+    found = sl.sensitivity(system, sl.attractors(system, (0, 0)).isel(attractor=0), to=names)
+    (speed,) = found.contact_velocity.values
+    assert found.maximum.values[1] == pytest.approx(speed, rel=1e-13)
+    assert found.minimum.values[1] == pytest.approx(-system.values["e"] * speed, rel=1e-13)
+    for column in range(len(names)):
+        each = []
+        for shift in SHIFTS * STEP:
+            moved = values * np.where(np.arange(len(names)) == column, 1 + shift, 1.0)
+            own = system.with_values(**dict(zip(names, moved, strict=True)))
+            orbit = sl.attractors(own, (0, 0)).isel(attractor=0)
+            each.append(sl.sensitivity(own, orbit, to=names).contact_velocity.values[0])
+        by = WEIGHTS @ np.array(each) / (STEP * values[column])
+        assert found.maximum_derivative.values[1, column] == pytest.approx(by, rel=1e-7)

@@ -47,6 +47,8 @@ class PictureKind(StrEnum):
     bifurcation_curves = "bifurcation_curves"
     periodic_orbits = "periodic_orbits"
     type_map = "type_map"
+    amplitude_map = "amplitude_map"
+    shares = "shares"
     section = "section"
     spectrum = "spectrum"
     impacts = "impacts"

@@ -1,6 +1,7 @@
 """The public names, and where each is at home. `__init__.py` reads them from here."""
 
 from saltus.plot.agreement import agreement as agreement
+from saltus.plot.amplitude_map import amplitude_map as amplitude_map
 from saltus.plot.backbone import backbone as backbone
 from saltus.plot.basins import basins as basins
 from saltus.plot.bifurcation import bifurcation_diagram as bifurcation_diagram
@@ -21,6 +22,7 @@ from saltus.plot.scatter import corner as corner
 from saltus.plot.scatter import scatter as scatter
 from saltus.plot.section import section as section
 from saltus.plot.sensitivity import sensitivity as sensitivity
+from saltus.plot.shares import shares as shares
 from saltus.plot.spectrum import spectrum as spectrum
 from saltus.plot.style import OKABE_ITO as OKABE_ITO
 from saltus.plot.style import style as style

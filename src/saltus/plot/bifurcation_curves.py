@@ -20,7 +20,7 @@ from saltus.plot.picture import PictureError, caller, check, picture
 from saltus.plot.response_points import MARKS
 from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
 from saltus.plot.type_map import type_map
-from saltus.results.dataset.schema import RESPONSES, parameters_of, period_text, point_name
+from saltus.results.dataset.schema import CURVE, RESPONSES, parameters_of, period_text, point_name
 
 #: Name and marker of the points of codimension two.
 _POINTS = {
@@ -64,53 +64,89 @@ def bifurcation_curves(
     ParameterError
         If these are no curves, or the parameters of the curves and the map differ.
     """
-    named = _named(curves)
-    first = named[0][1]
-    pair = first.attrs["parameter_x"], first.attrs["parameter_y"]
+    given = named(curves)
+    pair = _pair(given)
     if over is not None:
         check(over, ("type", "period", "response_of"), kinds=[RESPONSES], argument="over")
         below = parameters_of(over)
-        if len(below) != 2 or set(below) != set(pair):
-            raise PictureError(
-                f"{caller()}: the curves are over {' and '.join(pair)}, the map in over= is over "
-                f"{' and '.join(below)}."
-            )
+        check_pair(given, below, "over=")
         pair = (below[0], below[1])
     with draw.panels(ax, 1, (5.4, 3.9)) as (panel,):
         if over is not None:
             type_map(over, legend=False, ax=panel)
-        scales = [_scale(name, named, over) for name in pair]
-        panel.set_xlabel(scales[0].label(pair[0].replace("_", " ")))
-        panel.set_ylabel(scales[1].label(pair[1].replace("_", " ")))
-        if over is None:
-            panel.set_xlim(*_limits(pair[0], named, scales[0]))
-            panel.set_ylim(*_limits(pair[1], named, scales[1]))
-        for number, (name, ds) in enumerate(named):
-            _draw(panel, name, ds, pair, scales, CYCLE[number % len(CYCLE)])
+            draw_over(
+                panel, given, (cells.parameter(over, pair[0]), cells.parameter(over, pair[1]))
+            )
+        else:
+            scales = [_scale(name, given) for name in pair]
+            panel.set_xlabel(scales[0].label(pair[0].replace("_", " ")))
+            panel.set_ylabel(scales[1].label(pair[1].replace("_", " ")))
+            panel.set_xlim(*_limits(pair[0], given, scales[0]))
+            panel.set_ylim(*_limits(pair[1], given, scales[1]))
+            _draw_all(panel, given, pair, scales)
         if legend:
             points.legend(panel, {})
     return panel
 
 
-def _named(curves: Any) -> list[tuple[str, xr.Dataset]]:
-    """Curves by their names in the legend."""
+#: Curves by their names in the legend.
+Named = list[tuple[str, xr.Dataset]]
+
+
+def named(curves: Any, argument: str = "") -> Named:
+    """Curves by their names in the legend.
+
+    Raises
+    ------
+    ParameterError
+        If these are no curves, or they are over different parameters. ``argument`` is what they
+        were given as.
+    """
     if isinstance(curves, Mapping) and not isinstance(curves, xr.Dataset):
-        named = [(str(name), ds) for name, ds in curves.items()]
+        found = [(str(name), ds) for name, ds in curves.items()]
     else:
         given = curves if isinstance(curves, Sequence) else [curves]
-        named = [("", ds) for ds in given]
-    if not named:
+        found = [("", ds) for ds in given]
+    if not found:
         raise PictureError(f"{caller()} has no curves to draw: {shown(curves)}.")
-    for _, ds in named:
-        check(ds)
-    pairs = {frozenset((ds.attrs["parameter_x"], ds.attrs["parameter_y"])) for _, ds in named}
+    for _, ds in found:
+        check(ds, kinds=[CURVE], argument=argument)
+    pairs = {frozenset((ds.attrs["parameter_x"], ds.attrs["parameter_y"])) for _, ds in found}
     if len(pairs) > 1:
         texts = sorted(" and ".join(sorted(pair)) for pair in pairs)
         raise PictureError(
             f"{caller()}: the curves are over different parameters: {'; '.join(texts)}. Draw them "
             "apart."
         )
-    return [(name or _name(ds), ds) for name, ds in named]
+    return [(name or _name(ds), ds) for name, ds in found]
+
+
+def check_pair(given: Named, below: Sequence[str], argument: str) -> None:
+    """Raise a PictureError unless curves are over the two parameters of the map below them."""
+    pair = _pair(given)
+    if len(below) != 2 or set(below) != set(pair):
+        raise PictureError(
+            f"{caller()}: the curves are over {' and '.join(pair)}, the map in {argument} is over "
+            f"{' and '.join(below)}."
+        )
+
+
+def draw_over(ax: Axes, given: Named, sides: cells.Sides) -> None:
+    """Draw curves on a map with these axes."""
+    _draw_all(ax, given, (sides[0].name, sides[1].name), [side.scale for side in sides])
+
+
+def _draw_all(ax: Axes, given: Named, pair: tuple[str, str], scales: list[Scale]) -> None:
+    """Draw each curve, those of one name in one colour."""
+    names = list(dict.fromkeys(name for name, _ in given))
+    for name, ds in given:
+        _draw(ax, name, ds, pair, scales, CYCLE[names.index(name) % len(CYCLE)])
+
+
+def _pair(given: Named) -> tuple[str, str]:
+    """The parameters on the axes of the first curve."""
+    first = given[0][1]
+    return first.attrs["parameter_x"], first.attrs["parameter_y"]
 
 
 def _name(ds: xr.Dataset) -> str:
@@ -119,18 +155,16 @@ def _name(ds: xr.Dataset) -> str:
     return f"{what} of {period_text(ds.attrs['periods'])}" + (f" at {guard}" if guard else "")
 
 
-def _scale(name: str, named: list[tuple[str, xr.Dataset]], over: xr.Dataset | None) -> Scale:
+def _scale(name: str, given: Named) -> Scale:
     """Unit in which a parameter is shown."""
-    unit = named[0][1][point_name(name)].attrs.get("units", "")
-    if over is not None:
-        return cells.parameter(over, name).scale
-    return display_scale(unit, max(abs(end) for end in _limits(name, named, Scale(1.0, unit))))
+    unit = given[0][1][point_name(name)].attrs.get("units", "")
+    return display_scale(unit, max(abs(end) for end in _limits(name, given, Scale(1.0, unit))))
 
 
-def _limits(name: str, named: list[tuple[str, xr.Dataset]], scale: Scale) -> tuple[float, float]:
+def _limits(name: str, given: Named, scale: Scale) -> tuple[float, float]:
     """The widest range of a parameter."""
     ends = []
-    for _, ds in named:
+    for _, ds in given:
         axis = "x" if ds.attrs["parameter_x"] == name else "y"
         ends.append([ds.attrs[f"{axis}_low"], ds.attrs[f"{axis}_high"]])
     spans = np.array(ends) * scale.factor

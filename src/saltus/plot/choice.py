@@ -17,6 +17,8 @@ TAKES: dict[str, tuple[str, ...]] = {
     "frequency_response": (schema.RESPONSES,),
     "bifurcation_diagram": (schema.RESPONSES,),
     "type_map": (schema.RESPONSES,),
+    "amplitude_map": (schema.RESPONSES,),
+    "shares": (schema.RESPONSES,),
     "section": (schema.SECTION,),
     "spectrum": (schema.SPECTRUM,),
     "impacts": (schema.IMPACTS,),

@@ -30,7 +30,10 @@ _PICTURES: dict[str, str] = {
     **dict.fromkeys(("show", "savefig", "figure"), "A picture gives its axes: "
         "axes.figure.savefig(path), or matplotlib.pyplot.show()."),
     **dict.fromkeys(("amplitude", "heatmap", "contour", "surface"), "Of two parameters "
-        "sl.plot.type_map(diagram) draws the kinds of motion, and diagram.peak.plot() the peaks."),
+        "sl.plot.type_map(diagram) draws the kinds of motion, and sl.plot.amplitude_map(diagram) "
+        "their sizes."),
+    **dict.fromkeys(("basinfractions", "fractions", "stackplot"),
+        "Write sl.plot.shares(responses)."),
 }  # fmt: skip
 #: Likeness from which on a name is a slip of the pen.
 _NEAR = 0.7

@@ -133,7 +133,7 @@ def _of(ds: Any, name: str, rank: int) -> Shown:
         over = (
             (
                 f"{' and '.join(axes)}: choose one value, such as ds.isel({axes[-1]}=0), or draw "
-                f"plot.type_map"
+                f"plot.type_map or plot.amplitude_map"
             )
             if axes
             else "no parameter"

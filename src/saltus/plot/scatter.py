@@ -17,8 +17,9 @@ from saltus.results.dataset.schema import kind_text
 GREY = "0.55"
 #: Most bins of a histogram.
 BINS = 40
-#: Sets up to which points are drawn large.
-FEW = 500
+#: Diameter of a point of a single set, and the ends of that of one of many [pt]: the points
+#: together cover the same share of a picture.
+SPREAD, SIZES = 45.0, (1.25, 5.0)
 
 
 @picture()
@@ -117,6 +118,7 @@ def corner(ds: xr.Dataset, start: int = 0) -> np.ndarray:
                     panel.axis("off")
                 elif column < row:
                     _points(panel, one, column, values, groups, name=row == count - 1)
+                    panel.tick_params(labelleft=column == 0)
                     if column == 0:
                         panel.set_ylabel(scale.label(_words(ds, row)))
                 else:
@@ -135,7 +137,7 @@ def corner(ds: xr.Dataset, start: int = 0) -> np.ndarray:
 
 def _bins(ds: xr.Dataset) -> int:
     """Bins of a histogram, each with some sets."""
-    return min(BINS, 2 * int(np.ceil(np.cbrt(ds.sizes["set"]))) + 2)
+    return min(BINS, int(np.ceil(2.0 * np.cbrt(ds.sizes["set"]))))  # Rice's rule
 
 
 def _of_start(ds: xr.Dataset, start: int) -> xr.Dataset:
@@ -177,9 +179,9 @@ def _points(
 ) -> None:  # fmt: skip
     """Points of some numbers over a parameter."""
     scale, values = _parameter(one, k)
-    size = 5.0 if len(values) <= FEW else 2.5
+    size = float(np.clip(SPREAD / np.sqrt(len(values)), *SIZES))
     for here, color, _ in groups:
-        draw_points(ax, values[here], up[here], color=color, marker=".", ms=size, mew=0)
+        draw_points(ax, values[here], up[here], color=color, marker="o", ms=size, mew=0)
     if name:
         ax.set_xlabel(scale.label(_words(one, k)))
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -18,14 +20,11 @@ from saltus.results.dataset.schema import parameters_of, start_name, states_of
 from saltus.units import from_si
 
 #: Colours of starts that settle to nothing: white and pale greys, as chaos is dark.
-_PALE = {
+_PALE: dict[int, str] = {
     Kind.ESCAPED: "#FFFFFF",
     Kind.UNCONVERGED: "#D2D2D2",
     Kind.FAILED: "#B9A9A0",
     Kind.NOT_COMPUTED: "#F3F3F3",
-}
-_UNSETTLED: dict[int, tuple[str, str]] = {
-    code: (UNSETTLED[code].label, color) for code, color in _PALE.items()
 }
 
 
@@ -59,33 +58,78 @@ def type_map(
     ParameterError
         If ``ds`` isn't over two parameters, or there is no such start.
     """
-    pair = parameters_of(ds)
-    if len(pair) != 2:
-        raise PictureError(
-            f"{caller()} draws two parameters, this Dataset has {', '.join(pair) or 'none'}. See "
-            f"plot.bifurcation_diagram."
-        )
-    chosen = _of_start(ds, start).transpose(*pair, ...)
-    code = np.where(
-        chosen["response_of"].values < 0,
-        chosen["response_of"].values,
-        motion_colors.codes(chosen["type"].values, chosen["period"].values),
-    )
-    sides = cells.parameter(ds, pair[0]), cells.parameter(ds, pair[1])
+    map_ = mapped(ds, start)
     with draw.panels(ax, 1, (5.8, 3.9)) as (panel,):
-        colors = {key: _color(key) for key in _order(code)}
-        cells.draw_cells(panel, sides, cells.paint(code, colors))
-        panel.set_title(_title(ds, start))
+        colors = {code: _color(code) for code in map_.codes}
+        cells.draw_cells(panel, map_.sides, cells.paint(map_.code, colors))
+        panel.set_title(map_.title)
         if legend:
-            handles = [_handle(key, code, chosen["period"].values) for key in _order(code)]
             panel.legend(
-                handles=handles,
+                handles=[
+                    Patch(fc=_color(code), ec="#999999", lw=0.4, label=map_.label(code))
+                    for code in map_.codes
+                ],
                 loc="upper left",
                 bbox_to_anchor=(1.02, 1),
                 handlelength=1.0,
                 handleheight=0.9,
             )
     return panel
+
+
+@dataclass(frozen=True)
+class TypeMap:
+    """The kinds of motion of one start over two parameters.
+
+    Attributes
+    ----------
+    sides : Sides
+        Both axes.
+    response : array of int, shape (A, B)
+        Response of each cell, or a code below zero.
+    code : array of int, shape (A, B)
+        Kind of each cell (:mod:`saltus.plot.motion_colors`), or a code below zero.
+    period : array of int, shape (A, B)
+        Period of each cell in forcing periods.
+    title : str
+        The start in words, or the direction of a sweep.
+    """
+
+    sides: cells.Sides
+    response: np.ndarray
+    code: np.ndarray
+    period: np.ndarray
+    title: str
+
+    @property
+    def codes(self) -> list[int]:
+        """Kinds in the order of the legend: by period, then motion that never repeats, then starts
+        that never settle.
+        """
+        found = np.unique(self.code).tolist()
+        return [code for code in found if code > 0] + [code for code in found[::-1] if code < 0]
+
+    def label(self, code: int) -> str:
+        """A kind in the legend, with its share of the cells."""
+        name = motion_colors.label(code, self.period) if code > 0 else UNSETTLED[code].label
+        return f"{name}, {cells.share_text(float((self.code == code).mean()))}"
+
+
+def mapped(ds: xr.Dataset, start: int) -> TypeMap:
+    """The kinds of motion of one start. Raises ParameterError if ``ds`` isn't over two parameters,
+    or there is no such start.
+    """
+    pair = parameters_of(ds)
+    if len(pair) != 2:
+        raise PictureError(
+            f"{caller()} draws two parameters, this Dataset has {', '.join(pair) or 'none'}. See "
+            f"plot.bifurcation_diagram."
+        )
+    one = _of_start(ds, start).transpose(*pair, ...)
+    response, period = one["response_of"].values, one["period"].values
+    code = np.where(response < 0, response, motion_colors.codes(one["type"].values, period))
+    sides = cells.parameter(ds, pair[0]), cells.parameter(ds, pair[1])
+    return TypeMap(sides, response, code, period, _title(ds, start))
 
 
 def _of_start(ds: xr.Dataset, start: int) -> xr.Dataset:
@@ -99,26 +143,8 @@ def _of_start(ds: xr.Dataset, start: int) -> xr.Dataset:
     return ds.sel(start=start)
 
 
-def _order(code: np.ndarray) -> list[int]:
-    """Kinds in the order of the legend: by period, then motion that never repeats, then starts that
-    never settle.
-    """
-    found = np.unique(code).tolist()
-    return [key for key in found if key > 0] + [key for key in found[::-1] if key < 0]
-
-
-def _color(key: int) -> np.ndarray:
-    return motion_colors.color(key, dots=False) if key > 0 else np.array(to_rgb(_UNSETTLED[key][1]))
-
-
-def _handle(key: int, code: np.ndarray, period: np.ndarray) -> Patch:
-    name = motion_colors.label(key, period) if key > 0 else _UNSETTLED[key][0]
-    return Patch(
-        fc=_color(key),
-        ec="#999999",
-        lw=0.4,
-        label=f"{name}, {cells.share_text(float((code == key).mean()))}",
-    )
+def _color(code: int) -> np.ndarray:
+    return motion_colors.color(code, dots=False) if code > 0 else np.array(to_rgb(_PALE[code]))
 
 
 def _title(ds: xr.Dataset, start: int) -> str:

@@ -6,7 +6,9 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -106,12 +108,25 @@ def check_periodic(system: EquationsOfMotion) -> None:
     unsure = []
     for number, entry in enumerate(_entries(system)):
         timing = timing_of(entry)
-        if not _clocks_repeat(timing, system, period):
+        if not _clocks_repeat(timing, system.values, period):
             raise TraceError(_not_periodic(system, number, period))
-        if not (timing.complete and _phases_repeat(timing, system, period)):
+        if not (timing.complete and _phases_repeat(timing, system.values, period)):
             unsure.append(number)
     if unsure:
         _check_samples(system, period, unsure)
+
+
+def repeats_by_formula(system: EquationsOfMotion, values: Mapping[str, Any]) -> bool:
+    """True if formulas alone show that the equations of a forced system repeat after its period,
+    for each of many values float64[m] of parameters. False says nothing.
+    """
+    values = {**system.values, **values}
+    period = system.period(values)
+    timings = [timing_of(entry) for entry in _entries(system)]
+    return all(
+        one.complete and _clocks_repeat(one, values, period) and _phases_repeat(one, values, period)
+        for one in timings
+    )
 
 
 def _entries(system: EquationsOfMotion) -> list[Expr]:
@@ -128,25 +143,24 @@ def _written(field: tuple[Expr, ...], guards: tuple[Guard, ...]) -> tuple[Expr, 
     return (*free_field(field, guards), *gaps, *resets)
 
 
-def _clocks_repeat(timing: Timing, system: EquationsOfMotion, period: float) -> bool:
+def _clocks_repeat(timing: Timing, values: Mapping[str, Any], period: Any) -> bool:
     """True if every clock has a whole number of cycles in a period. Tested by formula, since
     samples miss pulses.
     """
     cycles = [
-        abs(rate * period)
-        for rate in evaluate([rate for rate, _ in timing.clocks], values=system.values)
+        abs(rate * period) for rate in evaluate([rate for rate, _ in timing.clocks], values=values)
     ]
     counts = [counts for _, counts in timing.clocks]
     return all(
-        not number or (repeats and abs(number - np.round(number)) <= CLOCK_MISS * number)
+        np.all((number == 0) | (repeats & (abs(number - np.round(number)) <= CLOCK_MISS * number)))
         for number, repeats in zip(cycles, counts, strict=True)
     )
 
 
-def _phases_repeat(timing: Timing, system: EquationsOfMotion, period: float) -> bool:
+def _phases_repeat(timing: Timing, values: Mapping[str, Any], period: Any) -> bool:
     """True if every phase has a whole number of cycles in a period."""
-    cycles = [rate * period for rate in evaluate(timing.phases, values=system.values)]
-    return all(abs(number - np.round(number)) <= PHASE_MISS for number in cycles)
+    cycles = [rate * period for rate in evaluate(timing.phases, values=values)]
+    return all(np.all(abs(number - np.round(number)) <= PHASE_MISS) for number in cycles)
 
 
 def _check_samples(system: EquationsOfMotion, period: float, unsure: list[int]) -> None:

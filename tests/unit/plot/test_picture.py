@@ -90,7 +90,8 @@ def test_another_kind_of_result_is_sent_to_its_picture(name):
     where = "Draw it with plot." + (
         "history or plot.phase"
         if name != "history"
-        else "frequency_response, plot.bifurcation_diagram or plot.type_map"
+        else "frequency_response, plot.bifurcation_diagram, plot.type_map, plot.amplitude_map or "
+        "plot.shares"
     )
     arguments = (other, other) if name == "gallery" else (other,)
     with pytest.raises(ParameterError, match=rf"^plot\.{name} takes .*{where}\.$"):

@@ -171,10 +171,16 @@ event = "fold"
 near = "17.8 Hz"
 vary = { frequency = ["17 Hz", "18.5 Hz"], force = ["3.5 N", "4.5 N"] }
 """
+MAP = """over = "map"
+[bifurcation_diagram]
+name = "map"
+vary.force = { first = "3.5 N", last = "4.5 N", count = 2 }
+vary.frequency = { first = "17 Hz", last = "18.5 Hz", count = 2 }
+"""
 
 
 def test_a_fold_of_the_branches_is_followed_over_two_parameters(tmp_path):
-    outcome = run(STUDY + CURVE, tmp_path / "out")
+    outcome = run(STUDY + CURVE + MAP, tmp_path / "out")
     (path,) = (one for one in outcome.files if one.name == "bifurcation-curve.csv")
     with path.open() as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
@@ -182,7 +188,8 @@ def test_a_fold_of_the_branches_is_followed_over_two_parameters(tmp_path):
     assert min(abs(f - 17.81941952) for f, n in zip(at, force, strict=True) if n == 4.0) < 1e-7
     assert min(at) >= 17
     assert max(at) <= 18.5
-    assert any(file.name == "bifurcation-curve.png" for file in outcome.files)
+    names = {file.name for file in outcome.files}
+    assert names >= {"bifurcation-curve.png", "bifurcation-curve-map.png", "map-sizes.png"}
 
 
 @pytest.mark.parametrize(
@@ -192,6 +199,7 @@ def test_a_fold_of_the_branches_is_followed_over_two_parameters(tmp_path):
         ('"fold"', '"folds"', "fold"),
         ('"17.8 Hz"', "17.8", "no unit"),
         ("near =", 'branches = "man"\nnear =', "no .branches. are called"),
+        ("near =", 'over = "map"\nnear =', "no .bifurcation_diagram. over force and frequency is"),
     ],
 )
 def test_mistakes_in_curves(old, new, words, tmp_path):

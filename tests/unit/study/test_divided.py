@@ -5,12 +5,13 @@ found.
 from __future__ import annotations
 
 import itertools
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
 
-from saltus.analysis.responses import divided
-from saltus.errors import StudyError
+from saltus.analysis.attractors import divided_grid
+from saltus.errors import SaltusWarning, StudyError
 from saltus.results import load
 from saltus.results.store.arrays import packed, unpacked
 from saltus.results.store.store import Store, StoreError
@@ -42,6 +43,15 @@ RESPONSE = """
 frequency = { first = "14 Hz", last = "14.1 Hz", count = 2 }
 start = { x = ["0 mm", "1 mm"], v = "0 m/s" }
 """
+#: Sets of uncertain values, of which the system refuses some, with two starts each.
+SCATTER = """
+[scatter]
+samples = 8
+start = { x = ["0 mm", "5 mm"], v = "0 m/s" }
+outputs.stop = { formula = "contact_stiffness*max(x - upper_gap, 0)", unit = "N" }
+uncertain.upper_gap = { normal = ["0.4 mm", "0.3 mm"] }
+uncertain.frequency = { uniform = ["15 Hz", "18 Hz"] }
+"""
 SWEEP = """
 [frequency_response]
 frequency = { first = "15 Hz", last = "17 Hz", count = 3 }
@@ -53,7 +63,7 @@ start = "sweep_up"
 def small():
     """Two trajectories in a chunk, or those of one value."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(divided, "TRAJECTORIES", 2)
+        patch.setattr(divided_grid, "TRAJECTORIES", 2)
         yield
 
 
@@ -122,6 +132,23 @@ def test_responses_and_their_branches(tmp_path):
         jobs = Run(tmp_path / "jobs", HEAD + RESPONSE, shard=(k, 2))
     assert jobs.computed == 1
     assert load(jobs.folder / "frequency-response.nc").sizes["branch"] > 0
+    assert contents(jobs.folder)[1] == contents(plain.folder)[1]
+
+
+def test_sets_of_values(tmp_path):
+    """What is told apart over all sets is told by the last of the jobs; sets that the system
+    refuses are in no chunk.
+    """
+    with pytest.warns(SaltusWarning, match="refused"):
+        plain = Run(tmp_path / "plain", HEAD + SCATTER)
+    answer = load(plain.folder / "scatter.nc")
+    sets = np.count_nonzero(answer["set_status"] == "computed")
+    assert 0 < sets < 8
+    assert answer.sizes["response"] > 1
+    for k in (1, 0):
+        with pytest.warns(SaltusWarning, match="refused") if not k else nullcontext():
+            jobs = Run(tmp_path / "jobs", HEAD + SCATTER, shard=(k, 2))
+    assert jobs.computed == (sets + 1) // 2
     assert contents(jobs.folder)[1] == contents(plain.folder)[1]
 
 

@@ -26,6 +26,7 @@ def test_a_table_asks_as_python_does():
     known = sl.scatter(rig, {"upper_gap": gap}, samples=4)
     assert answer.dataset.attrs["result_hash"] == known.attrs["result_hash"]
     assert [table.title for table in answer.rows] == ["Scatter", "Scatter: probabilities"]
+    assert answer.figure.axes[0].get_title("left") == "Scatter"
     assert "normal" in answer.question.identity()["uncertain"]
 
 

@@ -4,13 +4,15 @@ every new value.
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from saltus.analysis.inputs.starts import ensemble
 from saltus.contact import freeplay
-from saltus.errors import TraceError
+from saltus.errors import ParameterError, TraceError
 from saltus.language import cos, exp, mod, pi, piecewise, sin
 from saltus.system import periodic, system
-from saltus.system.periodic import check_periodic, timing_of
+from saltus.system.periodic import check_periodic, repeats_by_formula, timing_of
 
 # equations that use some of their parameters only
 pytestmark = pytest.mark.filterwarnings("ignore::saltus.errors.UnusedParameterWarning")
@@ -108,3 +110,21 @@ def test_a_step_in_time_is_no_phase():
         forced(
             lambda t, x, a, f, g: a * cos(2 * pi * f * t + piecewise((0.5, t > 0.1), otherwise=0.0))
         )
+
+
+@pytest.mark.parametrize("law", SMOOTH + CLOCKS)
+def test_many_values_repeat_by_formula_only_if_each_of_them_does(law):
+    """Whole multiples of a frequency repeat, a phase that is no clock by its formula too; one value
+    among many that doesn't is enough.
+    """
+    rig = forced(law)
+    good = np.array([value for value, repeats in OTHERS.items() if repeats])
+    known = repeats_by_formula(rig, {"other": good})
+    assert known == all(timing_of(entry).complete for entry in rig.field)
+    frequency = np.array([10.0, 15.0])
+    assert repeats_by_formula(rig, {"frequency": frequency, "other": 3 * frequency}) == known
+    for value, repeats in OTHERS.items():
+        if not repeats:
+            assert not repeats_by_formula(rig, {"other": np.append(good, value)})
+            with pytest.raises(ParameterError, match=r"trajectory 2: .*doesn't repeat"):
+                ensemble(rig, (0, 0), {"other": np.append(good, value)})

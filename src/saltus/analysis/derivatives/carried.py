@@ -6,7 +6,7 @@ Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems (2
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -151,15 +151,20 @@ class CarriedDerivatives:
         return self._places(rows, time.ravel(), mode, who, group, length)
 
     def contacts(
-        self, outcome: Outcome, group: Ensemble, length: Span, run: Callable[[Request], Outcome]
+        self,
+        outcome: Outcome,
+        group: Ensemble,
+        length: Span,
+        run: Callable[[Request], Outcome],
+        early: Sequence[str] = HELD,
     ) -> Places:
-        """The contacts: behind them, before them where the motion is held from there on. What the
-        flow doesn't record comes from a second ``run`` with samples at their times.
+        """The contacts: behind them, before them if they are of the kinds ``early``. What the flow
+        doesn't record comes from a second ``run`` with samples at their times.
         """
         table = outcome.contacts
         unit = length.period[table.trajectory] if self.timed else 1.0
         rows, mode = table.state.copy(), table.mode_after.copy()
-        held = np.isin(table.kind_name, HELD)
+        held = np.isin(table.kind_name, early)
         again = np.full(len(held), True) if self._own else held
         if again.any():
             whole = self.request(group, length, NO_SAMPLES)

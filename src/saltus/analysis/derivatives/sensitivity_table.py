@@ -9,16 +9,12 @@ import xarray as xr
 
 from saltus.analysis import dataset_parts
 from saltus.analysis.derivatives.carried import HELD, Places
-from saltus.analysis.derivatives.closed_orbits import (
-    ClosedOrbits,
-)
+from saltus.analysis.derivatives.closed_orbits import ClosedOrbits
 from saltus.analysis.derivatives.columns import Columns, Turning
 from saltus.analysis.derivatives.readings import Readings, slope_of
 from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.inputs.spans import Span
-from saltus.analysis.motion.sample_times import (
-    SampleTimes,
-)
+from saltus.analysis.motion.sample_times import SampleTimes
 from saltus.flow import engine
 from saltus.flow.contact_table import ContactTable
 from saltus.flow.methods import Method
@@ -30,6 +26,8 @@ from saltus.results.dataset import schema
 
 #: Counters that are kept.
 COUNTED = ("steps", "rejected_steps", "mode_violations", "grazes_unresolved")
+#: Kinds of contacts at which states jump.
+JUMPS = ("impact",)
 #: Rate of a gap at a contact, in the largest at its contacts, below which the contact's time isn't
 #: that of a zero of the gap: the motion rests there, or goes along the boundary.
 LEAVES = 1e-9
@@ -174,14 +172,20 @@ def _extremes(
     end: Places,
 ) -> dict[str, np.ndarray]:
     """The largest and smallest values of each output, when, and their derivatives: where it turns,
-    at a contact, at the first sample that is kept or at the end.
+    at a contact, just before it, at the first sample that is kept or at the end.
     """
     n, ahead = run.group.size, outcome.contacts.mode_before
     guard = outcome.contacts.guard
     first = _rows(samples, np.searchsorted(samples.trajectory, np.arange(n)))
     turns = np.isin(guard, list(run.turning.of))
     still = np.where(turns[:, None], 0.0, moved)
-    parts = [(touch, still, None), (touch, still, ahead), (first, None, None), (end, None, None)]
+    early = touch  # what an impact changes has one more value, just before it
+    if np.isin(outcome.contacts.kind_name, JUMPS).any():
+        kinds = (*HELD, *JUMPS)
+        early = run.flow.contacts(outcome, run.group, run.length, run.again, kinds)
+    parts = [(touch, still, None), (early, still, ahead), (first, None, None)]
+    if run.closed is None:  # an orbit ends where it begins, whose own slope is known
+        parts.append((end, None, None))
     value = np.concatenate([run.values(at, mode) for at, _, mode in parts])
     slope = np.concatenate([run.slopes(*part) for part in parts])
     time = np.concatenate([at.time for at, _, _ in parts])

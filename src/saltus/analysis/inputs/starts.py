@@ -23,7 +23,7 @@ from saltus.errors import (
 from saltus.flow.room import check_room
 from saltus.language import expression as ex
 from saltus.sentences import Word
-from saltus.system import System, check_values
+from saltus.system import System, check_values, repeats_by_formula
 from saltus.system.structures.told import by_modes
 from saltus.units import to_si
 
@@ -260,10 +260,10 @@ def _check_period_of_each(
     """Check that the time dependence repeats with the forcing period for every trajectory, not only
     for the system's own values.
 
-    Only parameters in the explicit time dependence matter; each different combination is checked
-    once.
+    Where formulas don't tell, each different combination is checked once; only parameters in the
+    explicit time dependence matter.
     """
-    if system.forced_at is None:
+    if system.forced_at is None or repeats_by_formula(system, {**shared, **varied}):
         return
     timed = [
         node for rate in system.field for node in ex.walk(rate) if ex.depends_on(node, ("time",))

@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.attractors.grid import Grid
-from saltus.analysis.attractors.grid_responses import find
+from saltus.analysis.attractors.grid_responses import GridResponses, find
 from saltus.analysis.inputs.outputs import Outputs
 from saltus.analysis.scatter.sets import Design
 from saltus.analysis.scatter.tracked import SCATTERED, TrackedResponse, tell_apart
@@ -72,9 +72,9 @@ class SetGrid(Grid):
     values: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
-    def places(self) -> int:
+    def shape(self) -> tuple[int, ...]:
         """Number of sets."""
-        return len(self.values)
+        return (len(self.values),)
 
     @property
     def rows(self) -> np.ndarray:
@@ -94,10 +94,24 @@ def steady(
 
     After Ctrl-C the responses of the sets that were finished, told apart by kind alone.
     """
+    found = find(grid, method, periods, threads, stage(progress, 0.0, 0.8), outputs)
+    return told(found, grid, method, outputs, threads, stage(progress, 0.8, 1.0))
+
+
+def told(
+    found: GridResponses,
+    grid: SetGrid,
+    method: Method,
+    outputs: Outputs,
+    threads: int | None,
+    progress: Callable[[float], None] | None,
+) -> Answers:
+    """The answers of sets in which all starts have settled; if some haven't, responses are told
+    apart by kind alone.
+    """
     count = len(grid.starts)
     names = [f"{name} {number}" for name in outputs.names for number in NUMBERS]
     units = [unit for unit in outputs.units for _ in NUMBERS]
-    found = find(grid, method, periods, threads, stage(progress, 0.0, 0.8), outputs)
     numbers = np.full((grid.places, count, len(names)), np.nan)
     if len(found):
         known = found.numbers.by_name()
@@ -111,7 +125,7 @@ def steady(
     reached, responses = motions.kind.reshape(grid.places, count), list[TrackedResponse]()
     if complete:
         try:
-            responses, reached = tell_apart(map_, found, count, apart, stage(progress, 0.8, 1.0))
+            responses, reached = tell_apart(map_, found, count, apart, progress)
         except KeyboardInterrupt:
             complete = False
     if not complete:  # what each start reaches is known by its numbers, not by its response

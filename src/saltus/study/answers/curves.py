@@ -9,10 +9,11 @@ import numpy as np
 from pydantic import Field
 
 from saltus.errors import StudyError, nearest, shown
-from saltus.results.dataset.schema import event_name
+from saltus.results.dataset.schema import CURVE, event_name, kind_of
 from saltus.results.provenance import to_json
 from saltus.study.answers.branches import Branches
 from saltus.study.answers.question import Answers, OneVerb, Question, Show, asked, first_figure
+from saltus.study.answers.responses import Diagram
 from saltus.study.setting import quantities
 from saltus.study.tables.kinds import OF_RESPONSES, whole
 from saltus.study.tables.parts import Interval, Quantity
@@ -35,6 +36,10 @@ KEYS = OF_RESPONSES | {
     "points": whole(400),
 }  # fmt: skip
 _BRANCHES = Field(None, description="Name of the [branches], of several.", examples=["main"])
+_OVER = Field(
+    None, description="Name of a [bifurcation_diagram] over the same two parameters: a map of "
+    "amplitudes is drawn, with all curves on it so far.", examples=["map"],
+)  # fmt: skip
 _NEAR = Field(None, description="Value of the branches' parameter near it.", examples=["17.8 Hz"])
 
 
@@ -47,14 +52,16 @@ _NEAR = Field(None, description="Value of the branches' parameter near it.", exa
         called="Bifurcation curve",
         branches=(str | None, _BRANCHES),
         near=(Quantity | None, _NEAR),
+        over=(str | None, _OVER),
     ),
 )
 class CurveQuestion(OneVerb):
     """A curve of bifurcations."""
 
     def check(self, table: Any, setting: Setting) -> None:  # noqa: ARG002
-        """Read the event, and the branches that it is on."""
+        """Read the event, the branches that it is on, and the map to draw it on."""
         self.kind, self.near, self.branches_named = table.event, table.near, table.branches
+        self.over = table.over
 
     def join(self, asked: Sequence[Question]) -> None:
         """Find the branches among the questions of the study."""
@@ -75,12 +82,27 @@ class CurveQuestion(OneVerb):
                 f"{nearest(self.branches_named, known)}"
             )
         branches = known[self.branches_named or next(iter(known))]
-        self.needs = (branches.stem,)
+        self.needs = (branches.stem, *self._map(asked))
         self.parent = to_json(branches.identity())
         (name,) = branches.arguments["vary"]
         if self.near is not None:
             place = f"{self.place}.near"
             self.near = quantities.parameters(self.system, {name: self.near}, place)[name]
+
+    def _map(self, asked: Sequence[Question]) -> tuple[str, ...]:
+        """Stem of the map that the curve is drawn on, if there is one."""
+        if self.over is None:
+            return ()
+        pair = set(self.arguments["vary"])
+        maps = {one.title: one for one in asked if isinstance(one, Diagram)}
+        fitting = [name for name, one in maps.items() if set(one.varied()) == pair]
+        if self.over not in fitting:
+            raise StudyError(
+                f"[{self.place}] over: no [bifurcation_diagram] over "
+                f"{' and '.join(sorted(pair))} is called {shown(self.over)}. "
+                f"{nearest(self.over, fitting)}"
+            )
+        return (maps[self.over].stem,)
 
     def identity(self) -> dict[str, str]:
         """Identity of the question, with that of the branches at which the curve begins."""
@@ -115,3 +137,20 @@ class CurveQuestion(OneVerb):
         axes = plot.bifurcation_curves(ds)
         axes.set_title(self.title, loc="left")
         return {"": first_figure(axes)}
+
+    def pictures_with(self, found: Answers) -> dict[str, Any]:
+        """The map of amplitudes, with the curves that are there: on the last one all of them."""
+        from saltus import plot
+
+        if self.over is None:
+            return {}
+        pair = set(self.arguments["vary"])
+        curves = [ds for ds in found.values() if kind_of(ds) == CURVE and pair == _pair(ds)]
+        axes = plot.amplitude_map(found[self.needs[-1]], bifurcations=curves)
+        axes.set_title(f"{self.over}: {axes.get_title('left')}", loc="left")
+        return {"-map": first_figure(axes)}
+
+
+def _pair(ds: xr.Dataset) -> set[str]:
+    """The two parameters of a curve."""
+    return {ds.attrs["parameter_x"], ds.attrs["parameter_y"]}

@@ -155,6 +155,10 @@ class Question(ABC):
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
         """Figures by the end of their file names; the first one is the usual one."""
 
+    def pictures_with(self, found: Answers) -> dict[str, Any]:  # noqa: ARG002
+        """Figures in which other answers stand too, by the end of their file names."""
+        return {}
+
 
 class OneVerb(Question):
     """Question that one function of the analyses answers. Its table was made from the parameters of
@@ -226,11 +230,16 @@ class OneVerb(Question):
         kind = default_kind(ds)
         if not kind:
             return {}
-        axes = getattr(plot, kind)(ds)
-        axes.set_title(self.title, loc="left")
-        return {"": first_figure(axes)}
+        first = first_axes(getattr(plot, kind)(ds))
+        first.set_title(self.title, loc="left")
+        return {"": first.figure}
+
+
+def first_axes(axes: Any) -> Any:
+    """The Axes, or the first of the array of Axes, that a picture returns."""
+    return axes.flat[0] if hasattr(axes, "flat") else axes
 
 
 def first_figure(axes: Any) -> Any:
     """Figure of the Axes, or of the array of Axes, that a picture returns."""
-    return (axes.flat[0] if hasattr(axes, "flat") else axes).figure
+    return first_axes(axes).figure

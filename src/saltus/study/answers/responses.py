@@ -69,19 +69,20 @@ class Responses(OneVerb):
     @functools.cached_property
     def division(self) -> Division | str:
         """Chunks of values, unless each begins where the one before ended."""
-        from saltus.analysis.responses import divided
+        from saltus.analysis.attractors.divided_grid import values_together
+        from saltus.analysis.responses.divided import DividedResponses
 
         if (grid := self.grid()).sweeps:
             return "sweeps: each value begins where the one before ended"
         given = self.arguments
-        return divided.DividedResponses(
+        return DividedResponses(
             grid,
             self.method,
             given["periods"],
-            given.get("sample", ""),
             given["outputs"],
+            values_together(len(grid.starts)),
+            given.get("sample", ""),
             given["unstable"],
-            max(1, divided.TRAJECTORIES // len(grid.starts)),
         )
 
     def varied(self) -> dict[str, Any]:
@@ -97,19 +98,26 @@ class Responses(OneVerb):
         return {}
 
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
-        """The picture that fits."""
+        """The picture that fits; over two parameters that of sizes too, of random starts that of
+        their shares.
+        """
         from saltus import plot
         from saltus.plot.choice import default_kind
 
         kind = default_kind(ds)
-        axes = getattr(plot, kind)(
-            ds, **(self.drawn_with() if kind == "frequency_response" else {})
-        )
-        axes.set_title(
-            self.title if kind != "type_map" else f"{self.title}: {axes.get_title('left')}",
-            loc="left",
-        )
-        return {"": first_figure(axes)}
+        names = {"": kind}
+        if kind == "type_map":
+            names["-sizes"] = "amplitude_map"
+        elif ds.attrs["random_starts"]:
+            names["-shares"] = "shares"
+        figures = {}
+        for end, name in names.items():
+            more = self.drawn_with() if name == "frequency_response" else {}
+            axes = getattr(plot, name)(ds, **more)
+            start = f": {axes.get_title('left')}" if kind == "type_map" else ""
+            axes.set_title(f"{self.title}{start}", loc="left")
+            figures[end] = first_figure(axes)
+        return figures
 
 
 @asked(

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Any
+import functools
+from typing import TYPE_CHECKING, Any
 
 from pydantic import Field, model_validator
 
 from saltus.distributions import Distribution, truncated
-from saltus.study.answers.question import OneVerb, asked
+from saltus.study.answers.question import OneVerb, asked, first_figure
 from saltus.study.identity import identity
 from saltus.study.setting.quantities import number
 from saltus.study.setting.setting import Setting
 from saltus.study.tables.kinds import OF_RESPONSES
 from saltus.study.tables.parts import Quantity, StudyTable
 from saltus.study.tables.signature import Asked, table
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from saltus.results.store.division import Division
 
 #: Quantities that each distribution takes.
 _TAKES = {"normal": 2, "uniform": 2, "lognormal": 2, "triangular": 3}
@@ -102,6 +108,28 @@ class Scatter(OneVerb):
         }
         names = ("uncertain", "samples", "seed", "indices")
         design_of(self.system, *(self.arguments[name] for name in names))
+
+    @functools.cached_property
+    def division(self) -> Division | str:
+        """Chunks of sets."""
+        from saltus.analysis.attractors.divided_grid import values_together
+        from saltus.analysis.scatter.divided import DividedScatter
+        from saltus.analysis.scatter.plan import scatter_plan
+
+        given = dict(self.arguments)
+        outputs, every = given.pop("outputs"), given.pop("every")
+        plan = scatter_plan(self.system, method=self.method, **given)
+        together = values_together(len(plan.starts))
+        grid = plan.grid(every)
+        return DividedScatter(grid, plan.method, plan.periods, outputs, together, plan)
+
+    def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
+        """Numbers over parameters, and parameters over each other if there are some."""
+        from saltus import plot
+
+        several = ds.sizes["uncertain"] > 1
+        corner = {"-corner": first_figure(plot.corner(ds))} if several else {}
+        return {**super().pictures(ds), **corner}
 
     def identity(self) -> dict[str, str]:
         """Texts that must be the same for a file to hold the answer."""

@@ -35,7 +35,10 @@ def write(
         with plot.style():
             files += [
                 save_picture(figure, at.folder / f"{question.stem}{end}.png")
-                for end, figure in question.pictures(ds).items()
+                for end, figure in {
+                    **question.pictures(ds),
+                    **question.pictures_with({**found, question.stem: ds}),
+                }.items()
             ]
     return StudyOutcome(tables, files)
 
