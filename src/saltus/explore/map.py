@@ -36,10 +36,8 @@ from saltus.intervals import wilson
 from saltus.results.dataset.kinds import Kind, sentences
 from saltus.system import System
 
-#: Bytes of maps that are kept.
-KEPT = 2**26
-#: Bytes of a kept cell.
-_CELL = 40
+#: Bytes of maps that are kept, and bytes of a kept cell beside its last state.
+KEPT, CELL = 2**25, 52
 #: Time between two looks whether who waits was asked to stop [s].
 LOOK = 0.1
 #: Time for which cells of fine levels are gathered, so that frames are few [s].
@@ -81,7 +79,7 @@ class KeptMap:
 
 
 class KeptMaps:
-    """Maps that were asked for, the newest 64 MB: Back is instant, and two pages share them."""
+    """Maps that were asked for, the newest 32 MB: Back is instant, and two pages share them."""
 
     def __init__(self) -> None:
         self._maps: OrderedDict[Any, KeptMap] = OrderedDict()
@@ -97,7 +95,7 @@ class KeptMaps:
         with self._lock:
             self._maps[_key(kept.plan)] = kept
             self._maps.move_to_end(_key(kept.plan))
-            while sum(one.plan.cells * _CELL for one in self._maps.values()) > KEPT:
+            while sum(_size(one.plan) for one in self._maps.values()) > KEPT:
                 if len(self._maps) == 1:
                     break
                 self._maps.popitem(last=False)
@@ -107,6 +105,10 @@ class KeptMaps:
         with self._lock:
             mine = _key(plan)[:2]
             return [one for key, one in self._maps.items() if key[:2] == mine]
+
+
+def _size(plan: BasinPlan) -> int:
+    return plan.cells * (CELL + 8 * len(plan.system.states))
 
 
 def _key(plan: BasinPlan) -> tuple[Any, ...]:
