@@ -159,7 +159,9 @@ export class Answers {
     );
   }
   heardSettle(head: Head, arrays: Arrays, question: Question): void {
-    if (this.of.view.orbit || JSON.stringify(question.start) !== JSON.stringify(this.of.view.start)) return;
+    const same = (asked: unknown, now: unknown) => JSON.stringify(asked) === JSON.stringify(now);
+    if (this.of.view.orbit || !same(question.start, this.of.view.start)) return;
+    if (!same(question.values, this.of.asks.changed())) return;
     this.of.settledFrom = JSON.stringify(question.start);
     this.of.settled = head;
     this.of.orbit = head.attractor ? head : null;
@@ -176,6 +178,7 @@ export class Answers {
     this.of.marks();
   }
   heardTrack(head: Head, arrays: Arrays): void {
+    if (!this.of.view.orbit && this.of.settled) return; // what the start settles to is known by now
     if (head.lost) {
       clearOrbit(head.lost);
       this.of.phase.over(null);

@@ -253,7 +253,8 @@ def _hues(legends: Sequence[Legend], ds: xr.Dataset, free: bool = True) -> np.nd
         taken = set(hues.tolist()).union(*(known.hues() for known in legends))
         value = ds[schema.point_name(str(ds.attrs["parameter"]))].values
         stable = ds["point_stable"].values
-        ends = {i: (value[stretch == i].min(), value[stretch == i].max()) for i in set(stretch.tolist())}
+        mine = {i: value[stretch == i] for i in set(stretch.tolist())}
+        ends = {i: (at.min(), at.max()) for i, at in mine.items()}
         for i, (low, high) in sorted(ends.items(), key=lambda one: one[1][0] - one[1][1]):
             if hues[i] == NO_HUE and stable[stretch == i][1:-1].any():  # ends are at folds
                 beside = {int(hues[j]) for j, (a, b) in ends.items() if a <= high and b >= low}

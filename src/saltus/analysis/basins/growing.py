@@ -217,8 +217,7 @@ def grow_all(
 
     def look() -> None:
         nonlocal wider
-        for wider in plan.scouted(1, looked, found):
-            pass
+        *_, wider = plan.scouted(1, looked, found)
 
     def begin() -> None:
         coarsest = plan.levels()[0].stride  # others wait for attractors that take long to be found

@@ -248,7 +248,7 @@ def _affordable(orbit: ClosedMotion, size: int) -> tuple[int, int, int]:
     left = WORK / size**3 / (2 * orbit.period)
     points = int(np.clip(left / (count * returns), 1, points))
     returns = int(np.clip(left / (count * points), 1, returns))
-    while count > FEWEST * size and count * points * returns > left:
+    while count >= 2 * FEWEST * size and count > left:
         count //= 2
     return points, returns, count
 
