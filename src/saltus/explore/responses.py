@@ -258,6 +258,6 @@ def _hues(legends: Sequence[Legend], ds: xr.Dataset, free: bool = True) -> np.nd
         for i, (low, high) in sorted(ends.items(), key=lambda one: one[1][0] - one[1][1]):
             if hues[i] == NO_HUE and stable[stretch == i][1:-1].any():  # ends are at folds
                 beside = {int(hues[j]) for j, (a, b) in ends.items() if a <= high and b >= low}
-                free = (hue for hue in range(NO_HUE) if hue not in taken and hue not in beside)
-                hues[i] = next(free, NO_HUE)
+                own = (hue for hue in range(NO_HUE) if hue not in taken and hue not in beside)
+                hues[i] = next(own, NO_HUE)
     return hues
