@@ -75,6 +75,16 @@ def test_branches_are_walked_by_keys_and_read_in_a_table(seen):
     for key in ("ArrowRight", "ArrowRight", "]", "e"):
         seen.page.keyboard.press(key)
     assert "fold" in seen.text("#responses-under") or "graz" in seen.text("#responses-under")
+    log, peak = seen.page.locator("#responses-log"), unstable(seen)
+    places = []
+    for _ in range(2):
+        before = log.get_attribute("aria-pressed")
+        log.click()
+        assert log.get_attribute("aria-pressed") != before
+        places.append(seen.place("#responses-canvas", *peak))
+    assert places[0][0] == places[1][0]
+    assert places[0][1] != places[1][1]
+    seen.page.focus("#responses-canvas")
     seen.page.keyboard.press("[")
     seen.page.keyboard.press("Enter")
     seen.rest()

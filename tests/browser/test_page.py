@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
+from explorer_page import small
 from saltus.plot.palette import hues, shades
 
 #: Colours of the map at starts; none where a mark lies on it.
@@ -207,7 +208,8 @@ def test_an_address_opens_its_view_and_a_damaged_one_says_so(see, seen, explored
     assert damaged.get("explorer.view.size") == [40, 30]
 
 
-def test_methods_are_compared_in_the_history_and_in_words(seen, rig):
+def test_methods_are_compared_in_the_history_and_in_words(see, explored, rig):
+    seen = see(small(explored, box=[-1e-2, 1e-2, -0.6, 0.6]))  # a twelfth leads elsewhere
     seen.page.select_option("#against", "ODE45")
     seen.rest()
     other = seen.get("[...explorer.motion.arrays['other:x']]")

@@ -32,9 +32,9 @@ export class Answers {
       kind = ["motion", "settle", "map", "responses"].find(k => lasting[k] > PATIENCE);
     if (!kind) return;
     const waits = Object.keys(this.waits).find(k => k in lasting),
-      known = this.of.map.sheet?.known ?? 0;
+      sheet = this.of.map.sheet;
     const text =
-      !waits && kind === "map" && known
+      !waits && kind === "map" && sheet && (sheet.known || sheet.open)
         ? this.mapText()
         : `${waits ? this.waits[waits] : DOING[kind]}, ${Math.round(lasting[waits ?? kind])} s`;
     if (!this.of.motion) $("motion-what").textContent = text;
@@ -63,7 +63,7 @@ export class Answers {
     else if (kind === "track") this.heardTrack(head, arrays);
     else if (kind === "orbit") this.heardOrbit(head, arrays, question);
     else if (kind === "responses-progress")
-      $("responses-under").textContent = `the branches are followed: ${Math.round(100 * head.share)} %`;
+      $("responses-under").textContent = `${head.doing}: ${Math.round(100 * head.share)} %`;
     else if (kind === "agreement-progress")
       this.of.status.say(`by ${head.method}: ${grouped(head.known)} of ${grouped(head.of)} starts`);
     else if (kind === "agreement") this.heardAgreement(head, arrays);
@@ -159,7 +159,9 @@ export class Answers {
     );
   }
   heardSettle(head: Head, arrays: Arrays, question: Question): void {
-    if (this.of.view.orbit || JSON.stringify(question.start) !== JSON.stringify(this.of.view.start)) return;
+    const same = (asked: unknown, now: unknown) => JSON.stringify(asked) === JSON.stringify(now);
+    if (this.of.view.orbit || !same(question.start, this.of.view.start)) return;
+    if (!same(question.values, this.of.asks.changed())) return;
     this.of.settledFrom = JSON.stringify(question.start);
     this.of.settled = head;
     this.of.orbit = head.attractor ? head : null;
@@ -176,6 +178,7 @@ export class Answers {
     this.of.marks();
   }
   heardTrack(head: Head, arrays: Arrays): void {
+    if (!this.of.view.orbit && this.of.settled) return; // what the start settles to is known by now
     if (head.lost) {
       clearOrbit(head.lost);
       this.of.phase.over(null);
@@ -242,8 +245,10 @@ export class Answers {
     if (head.kind === "map-piece") {
       sheet.packed(head.level, arrays);
       sheet.known = head.known;
+      sheet.open = head.open;
       sheet.of = head.of;
     }
+    if (head.kind === "map-look") sheet.looked = head.share;
     if (head.fractions) {
       const by = new Map<number, any>(head.fractions.map((f: any) => [f.key, f]));
       sheet.level = head.level;
@@ -252,6 +257,7 @@ export class Answers {
     }
     if (head.kind === "map-end") {
       sheet.done = !head.coarse;
+      sheet.looked = 1;
       sheet.took = (performance.now() - this.of.begun) / 1000;
       if (head.flip_rate != null)
         sheet.flip = `${digits(100 * head.flip_rate, 2)} % of the starts lead elsewhere when computed more exactly`;
@@ -280,7 +286,13 @@ export class Answers {
     if (!s) return "";
     if (s.done && !s.known) return "no map";
     if (s.done) return `${grouped(s.of)} starts, all known`;
-    return `${grouped(s.known)} of ${grouped(s.of)} starts, ${((performance.now() - this.of.begun) / 1000).toFixed(1)} s`;
+    const parts = [
+      `${grouped(s.known)} of ${grouped(s.of)} starts`,
+      ...(s.open ? [`${grouped(s.open)} not settled yet`] : []),
+      ...(s.looked < 1 ? [`attractors looked for: ${Math.round(100 * s.looked)} %`] : []),
+      `${((performance.now() - this.of.begun) / 1000).toFixed(1)} s`,
+    ];
+    return parts.join(", ");
   }
   legend(): void {
     const s = this.of.map.sheet,

@@ -76,6 +76,16 @@ export function ticks([low, high]: Range, about = 5): number[] {
   return out;
 }
 
+/** Ticks of a logarithmic axis, of which the range and they are the powers of ten, and the numbers there. */
+function decades([low, high]: Range): [number[], { texts: string[]; offset: string }] {
+  const steps = high - low > 3 ? [1] : high - low > 0.7 ? [1, 2, 5] : [1, 1.5, 2, 3, 4, 5, 6, 7, 8, 9],
+    at: number[] = [];
+  for (let ten = Math.floor(low); ten <= high; ten++)
+    at.push(...steps.map(step => ten + Math.log10(step)).filter(v => v >= low && v <= high));
+  if (at.length < 2) at.splice(0, at.length, ...ticks([low, high], 3));
+  return [at, { texts: at.map(v => digits(10 ** v, 3)), offset: "" }];
+}
+
 /** Texts of ticks: as many decimals as their step needs; of a narrow window far from zero what they share is written once. */
 export function tickTexts(at: number[]): { texts: string[]; offset: string } {
   if (at.length < 2) return { texts: at.map(v => digits(v, 6)), offset: "" };
@@ -206,7 +216,7 @@ export function frame(
   rx: Range,
   ry: Range,
   names: [string, string],
-  grid = true,
+  { grid = true, log = false } = {}, // log: ry are powers of ten
 ): void {
   const { ink, quiet, line } = colours(),
     bottom = p.top + p.height,
@@ -218,9 +228,9 @@ export function frame(
   c.strokeStyle = line;
   c.textBaseline = "middle";
   const xs = ticks(rx, Math.min(8, Math.floor(p.width / 70))),
-    ys = ticks(ry, Math.min(8, Math.floor(p.height / 30)));
+    even = ticks(ry, Math.min(8, Math.floor(p.height / 30)));
   const xt = tickTexts(xs),
-    yt = tickTexts(ys);
+    [ys, yt] = log ? decades(ry) : [even, tickTexts(even)];
   c.beginPath();
   for (const v of xs) {
     c.moveTo(half(p.X(v)), grid ? p.top : bottom);

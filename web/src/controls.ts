@@ -95,4 +95,5 @@ export function connect(explorer: Explorer): void {
   });
   click("save-open", () => explorer.openSave());
   click("responses-table", () => explorer.table());
+  click("responses-log", () => explorer.responses.toggle());
 }

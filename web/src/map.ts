@@ -109,7 +109,7 @@ export class BasinMap {
     if (this.agreement) this.stretch(c, p, this.agreement.sheet, 1, () => this.differing);
     if (own) this.points(c, p, own.attractors);
     c.restore();
-    if (!below && !paler.length && !own?.known)
+    if (!below && !paler.length && !own?.known && !own?.open)
       wordsIn(c, p, own?.done ? "no attractors, no map" : "the first starts are being followed");
     frame(
       c,
@@ -117,7 +117,7 @@ export class BasinMap {
       rx,
       ry,
       [axisText(plain(first), sx.unit), axisText(plain(second), sy.unit)],
-      false,
+      { grid: false },
     );
     this.cross(c, p);
     this.frames++;

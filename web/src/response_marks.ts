@@ -3,6 +3,18 @@
 /** T, 2T, ... of an orbit in forcing periods; of others its kind stands with its branch. */
 export const periodText = (n: number): string => (n > 1 ? `${n}T` : n ? "T" : "");
 
+/** Pixels about a mark in which a lesser one isn't drawn: it appears where one looks closer. */
+const APART = 7;
+const RANK = [/fold/, /doubling|Neimark|Hopf|branch point/, /corner|two contacts/, /./];
+/** The events that are drawn of those at given pixels: of some that would overlap the one that says most. */
+export function shownMarks(kinds: string[], x: number[], y: number[]): number[] {
+  const rank = (i: number) => RANK.findIndex(one => one.test(kinds[i].replaceAll("_", " "))),
+    kept: number[] = [];
+  for (const i of [...kinds.keys()].sort((a, b) => rank(a) - rank(b) || a - b))
+    if (!kept.some(k => Math.hypot(x[k] - x[i], y[k] - y[i]) < APART)) kept.push(i);
+  return kept.reverse(); // what says most is drawn last
+}
+
 /** An event by its shape: a fold is a triangle, a doubling a diamond, a graze a triangle upwards, all else a square. */
 export function mark(
   c: CanvasRenderingContext2D,

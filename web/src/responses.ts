@@ -16,8 +16,8 @@ import {
   wordsIn,
 } from "./axes";
 import type { Arrays, Head, Numbers } from "./link";
-import { mark, periodText } from "./response_marks";
-import { cells } from "./words";
+import { mark, periodText, shownMarks } from "./response_marks";
+import { $, cells } from "./words";
 
 export interface ResponseEvents {
   orbit(choice: { point?: number; event?: number }): void;
@@ -27,8 +27,8 @@ const REACH = 22,
   EVENT_REACH = 12;
 /** The hue of a stretch on which nothing attracts. */
 const NO_HUE = 255;
-/** Events above which their marks are smaller. */
-const MANY = 25;
+/** Ratio of the largest peak to the least above which their axis is logarithmic, unless it is chosen. */
+const WIDE = 10;
 
 export class Responses {
   head: Head | null = null;
@@ -36,6 +36,7 @@ export class Responses {
   event = -1; // an event that is chosen rather than the point beside it
   now = NaN;
   private a: Arrays = {};
+  private log: boolean | null = null; // whether the axis of peaks is logarithmic, as chosen
   private plot: Plot | null = null;
   private seen: [Range, Range] | null = null;
   private whole: [Range, Range] = [
@@ -73,12 +74,23 @@ export class Responses {
   private get y(): Numbers {
     return this.a.point_peak;
   }
+  /** Whether the axis of peaks is logarithmic: where no peak is zero. */
+  get logarithmic(): boolean {
+    const least = this.y?.length ? Math.min(...this.y) : 0;
+    return least > 0 && (this.log ?? Math.max(...this.y) > WIDE * least);
+  }
+  /** Change between a linear and a logarithmic axis. */
+  toggle(): void {
+    this.log = !this.logarithmic;
+    this.seen = null;
+    this.draw();
+  }
 
   draw(): void {
     const c = fitted(this.canvas),
       head = this.head;
     if (!head) return wordsIn(c, place(this.canvas, [0, 1], [0, 1]), "the branches are being followed");
-    const { ink, accent, panel } = colours(),
+    const { ink, quiet, accent, panel } = colours(),
       { point_stable: stable, point_branch: branch, point_hue: hue } = this.a,
       x = this.x,
       y = this.y,
@@ -87,18 +99,28 @@ export class Responses {
       uy = unitOf(this.about, head.quantity),
       [low, high] = head.range as Range;
     const pad = 0.02 * (high - low),
-      own = n ? reach([y]) : ([0, 1] as Range);
-    this.whole = [[low - pad, high + pad], own[0] > 0 && own[0] < 0.5 * own[1] ? [0, own[1]] : own];
+      log = this.logarithmic,
+      up = log ? Math.log10 : (v: number) => v,
+      heights = Array.from(y ?? [], up),
+      own = n ? reach([heights]) : ([0, 1] as Range);
+    this.whole = [[low - pad, high + pad], !log && own[0] > 0 && own[0] < 0.5 * own[1] ? [0, own[1]] : own];
+    $("responses-log").setAttribute("aria-pressed", String(log));
     const [rx, ry] = this.seen ?? this.whole;
     const sx = scaleFor(ux, rx),
-      sy = scaleFor(uy, ry),
-      p = (this.plot = place(this.canvas, rx, ry));
+      sy = scaleFor(uy, log ? [10 ** ry[0], 10 ** ry[1]] : ry),
+      linear = place(this.canvas, rx, ry),
+      p = (this.plot = { ...linear, Y: v => linear.Y(up(v)) });
     const fx: Range = [rx[0] * sx.factor, rx[1] * sx.factor],
-      fy: Range = [ry[0] * sy.factor, ry[1] * sy.factor];
-    frame(c, place(this.canvas, fx, fy), fx, fy, [
-      axisText(plain(head.parameter), sx.unit),
-      axisText(`peak of ${plain(head.quantity)}`, sy.unit),
-    ]);
+      shown = (v: number) => (log ? v + Math.log10(sy.factor) : v * sy.factor),
+      fy: Range = [shown(ry[0]), shown(ry[1])];
+    frame(
+      c,
+      place(this.canvas, fx, fy),
+      fx,
+      fy,
+      [axisText(plain(head.parameter), sx.unit), axisText(`peak of ${plain(head.quantity)}`, sy.unit)],
+      { log },
+    );
     c.save();
     c.beginPath();
     c.rect(p.left, p.top, p.width, p.height);
@@ -117,8 +139,9 @@ export class Responses {
       if (branch[i] !== branch[i - 1]) continue;
       const firm = stable[i] && stable[i - 1],
         rgb = hue[i] === NO_HUE ? null : this.about.hues[hue[i] % this.about.hues.length];
-      c.strokeStyle = rgb ? `rgb(${rgb})` : ink;
-      c.lineWidth = firm ? 2.4 : 1.4;
+      c.strokeStyle = rgb ? `rgb(${rgb})` : quiet;
+      c.lineWidth = firm ? 2 : 1;
+      c.globalAlpha = firm ? 1 : 0.75;
       c.setLineDash(firm ? [] : [4, 3]);
       c.lineDashOffset = firm ? 0 : p.X(x[i - 1]) % 7;
       c.beginPath();
@@ -127,6 +150,7 @@ export class Responses {
       c.stroke();
     }
     c.setLineDash([]);
+    c.globalAlpha = 1;
     for (let i = 0; i < n; i++) {
       // a branch of one point would not be seen
       if (branch[i] === branch[i - 1] || branch[i] === branch[i + 1]) continue;
@@ -135,10 +159,12 @@ export class Responses {
       c.arc(p.X(x[i]), p.Y(y[i]), 2.5, 0, 7);
       c.fill();
     }
-    const size = head.events.length > MANY && !this.seen ? 0.65 : 1;
-    (head.events as string[]).forEach((kind, i) => {
-      mark(c, kind, p.X(this.a.event_parameter[i]), p.Y(this.a.event_peak[i]), size, ink, panel);
-    });
+    const at = Array.from(this.a.event_parameter ?? [], p.X),
+      peaks = Array.from(this.a.event_peak ?? [], p.Y);
+    for (const i of shownMarks(head.events, at, peaks)) {
+      const graze = /graz/.test(head.events[i]);
+      mark(c, head.events[i], at[i], peaks[i], graze ? 0.5 : 0.75, graze ? quiet : ink, panel);
+    }
     if (this.chosen >= 0) {
       c.strokeStyle = accent;
       c.lineWidth = 2.4;

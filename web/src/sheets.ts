@@ -29,6 +29,9 @@ export class Sheet {
   readonly age: Uint8Array;
   attractors: Attractor[] = [];
   known = 0;
+  /** Starts that were followed and haven't settled yet; share of the search for all attractors that is done. */
+  open = 0;
+  looked = 1;
   of = 0;
   level = 0;
   done = false;

@@ -7,7 +7,7 @@ import time
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -36,14 +36,14 @@ from saltus.intervals import wilson
 from saltus.results.dataset.kinds import Kind, sentences
 from saltus.system import System
 
-#: Bytes of maps that are kept.
-KEPT = 2**26
-#: Bytes of a kept cell.
-_CELL = 40
+#: Bytes of maps that are kept, and bytes of a kept cell beside its last state.
+KEPT, CELL = 2**25, 52
 #: Time between two looks whether who waits was asked to stop [s].
 LOOK = 0.1
 #: Time for which cells of fine levels are gathered, so that frames are few [s].
 GATHERED = 0.3
+#: Time between two words on the search for attractors [s].
+SAID = 1.0
 #: Starts that are looked through for attractors where no map's whole sample follows at once.
 LOOKED = 64
 #: Age of a start that isn't settled.
@@ -79,7 +79,7 @@ class KeptMap:
 
 
 class KeptMaps:
-    """Maps that were asked for, the newest 64 MB: Back is instant, and two pages share them."""
+    """Maps that were asked for, the newest 32 MB: Back is instant, and two pages share them."""
 
     def __init__(self) -> None:
         self._maps: OrderedDict[Any, KeptMap] = OrderedDict()
@@ -95,7 +95,7 @@ class KeptMaps:
         with self._lock:
             self._maps[_key(kept.plan)] = kept
             self._maps.move_to_end(_key(kept.plan))
-            while sum(one.plan.cells * _CELL for one in self._maps.values()) > KEPT:
+            while sum(_size(one.plan) for one in self._maps.values()) > KEPT:
                 if len(self._maps) == 1:
                     break
                 self._maps.popitem(last=False)
@@ -105,6 +105,10 @@ class KeptMaps:
         with self._lock:
             mine = _key(plan)[:2]
             return [one for key, one in self._maps.items() if key[:2] == mine]
+
+
+def _size(plan: BasinPlan) -> int:
+    return plan.cells * (CELL + 8 * len(plan.system.states))
 
 
 def _key(plan: BasinPlan) -> tuple[Any, ...]:
@@ -135,7 +139,7 @@ def grow_map(
     threads: int | None,
 ) -> KeptMap:
     """Emit a map as it grows: ``map-begin``, ``map-piece`` and ``map-level`` as cells settle,
-    ``map-attractors`` where one is found, ``map-end``.
+    ``map-attractors`` where one is found, ``map-look`` while all are looked for, ``map-end``.
 
     Every label is that of :func:`saltus.basins`; what was known already isn't computed again.
     Raises Interrupted if it is asked to stop; what was finished is kept.
@@ -171,7 +175,7 @@ def look(plan: BasinPlan, legend: Legend, threads: int | None, scouts: int = LOO
     """
     legend.follow()
     if legend.scouts < scouts:
-        legend.grow(replace(plan, scouts=scouts).scout(threads, known=legend.found))
+        legend.grow(plan.glanced(scouts, threads, legend.found))
         legend.scouts = scouts
 
 
@@ -181,7 +185,7 @@ class _Growing:
     def __init__(self, kept: KeptMap, legend: Legend, emit: Emit) -> None:
         self._kept, self._legend, self._emit = kept, legend, emit
         self._whole: list[int] = []
-        self._begun, self._known, self._told = False, 0, 0.0
+        self._begun, self._known, self._told, self._looked_at = False, 0, 0.0, 0.0
         self._waiting: dict[int, list[np.ndarray]] = {}
 
     def take_over(self, others: list[KeptMap]) -> None:
@@ -215,8 +219,9 @@ class _Growing:
         self.take_over([])
         scouted = legend.scouts >= plan.scouts
         found, _ = grow_all(
-            plan, self._take, kept.found, threads, result=kept.result, scouted=scouted
-        )
+            plan, self._take, kept.found, threads, result=kept.result, scouted=scouted,
+            looked=self._looked,
+        )  # fmt: skip
         legend.grow(found)
         legend.scouts = max(legend.scouts, plan.scouts)
         kept.dataset = plan.finish(kept.result, found, threads)
@@ -289,6 +294,12 @@ class _Growing:
             level = {"kind": "map-level", "level": news.stride, "of": stride}
             self._emit({**level, "fractions": shares}, {})
 
+    def _looked(self, share: float) -> None:
+        """Tell how far the search for all attractors is, now and then."""
+        if share == 1.0 or time.monotonic() > self._looked_at + SAID:
+            self._looked_at = time.monotonic()
+            self._emit({"kind": "map-look", "share": share}, {})
+
     def _tell(self) -> None:
         """Send the cells that wait, a level at a time."""
         waiting, self._waiting, self._told = self._waiting, {}, time.monotonic()
@@ -302,6 +313,7 @@ class _Growing:
         age = np.where(periods >= 0, age, _NO_AGE).astype("u1")
         keys = self._by_key(label).astype("i1")
         head = {"kind": "map-piece", "level": stride, "known": known, "of": self._kept.plan.cells}
+        head["open"] = int((result.label == OPEN).sum())
         self._emit(head, packed_cells(cells, keys, age, self._kept.plan.shape[1]))
 
     def _fair(self) -> tuple[int | None, list[dict[str, Any]]]:

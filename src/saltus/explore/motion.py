@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -10,11 +11,14 @@ from typing import Any
 import numpy as np
 
 from saltus.analysis.dataset_parts import guards_over
+from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.motion.motion_arrays import MotionArrays, motion_arrays
+from saltus.contact.guards import is_hold
 from saltus.explore.frames import Answer
 from saltus.flow.methods import Method
 from saltus.flow.until import STATUS
 from saltus.kernels import status as st
+from saltus.language.evaluate import evaluate
 from saltus.system import System
 from saltus.units import from_si
 
@@ -167,16 +171,44 @@ def motion(asked: AskedRun, quantities: Sequence[str], against: Method | None = 
 
 
 def gaps(system: System) -> list[dict[str, Any]]:
-    """Boundaries that are a value of one state, at the values of the system: their guard's name,
-    the state and the value [SI].
+    """Boundaries that are a value of one state or sensor, at the values of the system: their
+    guard's name, the state or sensor and the value [SI].
     """
     about = guards_over(system, system.values, ())
-    rows = zip(about.names, about.states, np.ravel(about.boundaries), strict=True)
+    rows = [*zip(about.names, about.states, np.ravel(about.boundaries), strict=True)]
     return [
-        {"guard": name, "quantity": state, "value": float(value)}
-        for name, state, value in rows
-        if state and np.isfinite(value)
+        {"guard": name, "quantity": quantity, "value": float(value)}
+        for name, quantity, value in [*rows, *_on_sensors(system)]
+        if quantity and np.isfinite(value)
     ]
+
+
+@functools.lru_cache(maxsize=16)
+def _on_sensors(system: System) -> tuple[tuple[str, str, float], ...]:
+    """Boundaries that are a value of one sensor: their guard's name, the sensor and the value. Both
+    are seen at random states to change alike.
+    """
+    sensors, count, found = system.outputs.names, len(system.states), []
+    if not sensors or all(guard.state for guard in system.guards):
+        return ()
+    states = np.random.default_rng(0).normal(size=(count + 3, count))
+    seen = outputs_of(system).values(0.0, states, system.values, np.zeros(len(states), int))
+    named = dict(zip(system.states, states.T, strict=True))
+    shown = seen[:, count:] - seen[0, count:]
+    for guard in system.guards:
+        if guard.state or is_hold(guard):
+            continue
+        (gap,) = evaluate(
+            [guard.gap], states=named, values=system.values, bits=[False] * len(system.guards)
+        )
+        change = np.broadcast_to(gap, len(states)) - np.ravel(gap)[0]
+        with np.errstate(all="ignore"):
+            slopes = change[-1] / shown[-1]
+            alike = np.abs(change[:, None] - slopes * shown).max(axis=0) < 1e-9 * np.ptp(change)
+        for i in np.flatnonzero(alike).tolist():
+            place = seen[0, count + i] - np.ravel(gap)[0] / slopes[i]
+            found.append((guard.name, sensors[i], float(f"{place:.12g}")))
+    return tuple(found)
 
 
 def _columns(system: System) -> tuple[str, ...]:

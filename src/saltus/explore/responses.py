@@ -67,6 +67,7 @@ def respond(
         emit(*_answer(known, every, hues, number, quantity, 1.0))
         return
     told = _Told(emit, parameter, limits, quantity)
+    told.begin("looking for orbits to begin with")
     method, done = exact_method(method, system, "responses"), list[Branch]()
     rules = plan_of(
         system, parameter, limits, method, threads, POINTS, LONGEST_DOUBLED, frozenset(SWITCHES)
@@ -74,10 +75,12 @@ def respond(
     wanted = outputs_of(system)
     if len(known):
         seeds = seeds_between(system, parameter, limits, known.dataset(), method=method)
+        told.begin("following branches")
         follow_all(rules, system, parameter, *seeds, done, told.between(0.0, FIRST))
         first = table_of(system, parameter, limits, done, wanted, method)
         number = kept.put(None, system, first, hues := _hues([known], first, free=False))
         emit(*_answer(known, first, hues, number, quantity, FIRST))
+    told.begin("looking for more orbits")
     seeds = seeds_between(
         system,
         parameter,
@@ -87,6 +90,7 @@ def respond(
         method=method,
         threads=threads,
     )
+    told.begin("following branches")
     follow_all(rules, system, parameter, *seeds, done, told.between(FIRST, 1.0))
     if not done:
         raise QuestionError(f"nothing that repeats is known for this range of {parameter}.")
@@ -140,13 +144,22 @@ def response_orbit(
 
 
 class _Told:
-    """Progress that is told now and then."""
+    """Progress that is told now and then, and what is done."""
 
     def __init__(
         self, emit: Emit, parameter: str, limits: tuple[float, float], quantity: str
     ) -> None:
-        self._emit, self._last = emit, 0.0
+        self._emit, self._last, self._doing = emit, 0.0, ""
         self._about = {"parameter": parameter, "range": list(limits), "quantity": quantity}
+
+    def begin(self, doing: str) -> None:
+        """Tell what is done from now on."""
+        self._doing = doing
+        self._say()
+
+    def _say(self) -> None:
+        about = {"share": self._last, "doing": self._doing, **self._about}
+        self._emit({"kind": "responses-progress", **about}, {})
 
     def between(self, begin: float, end: float) -> Callable[[float], None]:
         """A function that takes the share of a stage."""
@@ -155,7 +168,7 @@ class _Told:
             here = begin + (end - begin) * share
             if here - self._last >= _STEP:
                 self._last = here
-                self._emit({"kind": "responses-progress", "share": here, **self._about}, {})
+                self._say()
 
         return told
 
@@ -222,7 +235,8 @@ def _peaks(ds: xr.Dataset, quantity: str, what: str) -> np.ndarray:
 def _hues(legends: Sequence[Legend], ds: xr.Dataset, free: bool = True) -> np.ndarray:
     """The hue of each stretch of the branches, uint8[n]: that of the attractor which lies on it at
     the values of one of the legends, the first that has one. With ``free`` other stretches that
-    attract have a hue of their own, the longest first, which attractors take when they are found.
+    attract have a hue of their own, the longest first, which attractors take when they are found:
+    the first hue that none has at a value that both run through.
     """
     stretch = stretches(ds)
     hues = np.full(int(stretch.max(initial=-1)) + 1, NO_HUE, "u1")
@@ -237,10 +251,13 @@ def _hues(legends: Sequence[Legend], ds: xr.Dataset, free: bool = True) -> np.nd
                 hues[at] = hue
     if free:
         taken = set(hues.tolist()).union(*(known.hues() for known in legends))
-        own = iter(hue for hue in range(NO_HUE) if hue not in taken)
         value = ds[schema.point_name(str(ds.attrs["parameter"]))].values
         stable = ds["point_stable"].values
-        for i in sorted(set(stretch.tolist()), key=lambda i: -np.ptp(value[stretch == i])):
+        mine = {i: value[stretch == i] for i in set(stretch.tolist())}
+        ends = {i: (at.min(), at.max()) for i, at in mine.items()}
+        for i, (low, high) in sorted(ends.items(), key=lambda one: one[1][0] - one[1][1]):
             if hues[i] == NO_HUE and stable[stretch == i][1:-1].any():  # ends are at folds
+                beside = {int(hues[j]) for j, (a, b) in ends.items() if a <= high and b >= low}
+                own = (hue for hue in range(NO_HUE) if hue not in taken and hue not in beside)
                 hues[i] = next(own, NO_HUE)
     return hues

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import secrets
 import socket
 import threading
@@ -168,9 +169,12 @@ class Server:
 
     def stop(self) -> None:
         """End all pages' work, and the server."""
+        log = logging.getLogger("uvicorn.error")
+        log.disabled = True  # what is cut off at the end is no failure
         self._uvicorn.should_exit = True
         if self._thread.is_alive():
             self._thread.join()
+        log.disabled = False
         self._socket.close()
 
     def wait(self, until_closed: bool = False) -> None:

@@ -4,6 +4,7 @@ and neither sockets nor files.
 
 from __future__ import annotations
 
+import os
 import secrets
 import sys
 import threading
@@ -41,6 +42,8 @@ WAITING = 2**24
 STOPPED_BY_NEWER = ("map", "responses", "settle")
 #: Questions that are under way as those of another kind are: a newer one of either stops the older.
 AS = {"agreement": "map"}
+#: Kinds whose threads give way to others, and by how much: a click doesn't wait for them.
+BEHIND, NICE = ("map", "responses"), 10
 #: Time between two looks whether waiting work was asked to stop [s].
 LOOK = 0.1
 
@@ -147,6 +150,9 @@ class Session:
         self._lanes: dict[str, _Lane] = {}
         self._lock = threading.Lock()
         self._pool = ThreadPoolExecutor(thread_name_prefix="saltus-explore")
+        self._behind = ThreadPoolExecutor(
+            len(BEHIND), thread_name_prefix="saltus-behind", initializer=_give_way
+        )
         self._windows: dict[int, threading.Semaphore] = {}
         self._looked_at = threading.Event()
         self._looked_at.set()
@@ -172,7 +178,8 @@ class Session:
             self._closed = True
         self._stop(None)
         self._outbox.close()
-        self._pool.shutdown(wait=True, cancel_futures=True)
+        for pool in (self._pool, self._behind):
+            pool.shutdown(wait=True, cancel_futures=True)
 
     # -- order -------------------------------------------------------------------------------------
     def _check_rate(self, question: PageQuestion) -> None:
@@ -205,7 +212,7 @@ class Session:
                 lane.stop.set()
             begins, lane.busy = not lane.busy, True
             if begins:
-                self._pool.submit(self._work, lane)
+                (self._behind if kind in BEHIND else self._pool).submit(self._work, lane)
         if replaced is not None:
             self._outbox.put(packed(_stopped(replaced), {}))
 
@@ -275,6 +282,14 @@ class Session:
         while not self._looked_at.wait(LOOK) or not window.acquire(timeout=LOOK):
             if stop.is_set():
                 raise Interrupted
+
+
+def _give_way() -> None:
+    """Let this thread, and those that it begins, run when others don't: on Linux, where a thread
+    can do so by itself.
+    """
+    if sys.platform == "linux":
+        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICE)
 
 
 def _stopped(question: PageQuestion) -> dict[str, Any]:

@@ -6,12 +6,14 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from saltus.analysis.basins.compare import compare
 from saltus.analysis.basins.pipeline import BasinPlan
 from saltus.analysis.inputs.starts import range_of
 from saltus.analysis.motion.simulate import simulate
+from saltus.explore.kept_responses import crossings
 from saltus.explore.map import KeptMap, plan_of_map
 from saltus.explore.opening import first_quantity
 from saltus.explore.questions import MotionQuestion, QuestionError, ResponsesQuestion, question_of
@@ -73,7 +75,12 @@ def shown(desk: Any, fields: Mapping[str, Any]) -> tuple[View, dict[str, Callabl
         limits = range_of(system, responses.parameter, responses.range)
         given["vary"] = responses.parameter, *limits
         plan = desk.plan_of(system, method)
-        starts = starts_from(desk.legend_at(plan), plan)
+        starts = np.concatenate(
+            [
+                starts_from(desk.legend_at(plan), plan),
+                *_on_branches(desk, system, method, responses, limits),
+            ]
+        )
         given |= {"starts": starts_of(system.states, starts), "values_tried": VALUES}
         found["responses"] = partial(_answered, desk, system, method, responses, limits)
     return View(desk.opening, system, method, **given), found
@@ -99,12 +106,32 @@ def _compared(desk: Any, plan: BasinPlan, theirs: BasinPlan) -> xr.Dataset:
     return compare(_finished(desk, plan), _finished(desk, theirs))
 
 
-def _answered(
+def _known(
     desk: Any, system: System, method: Method, question: ResponsesQuestion, limits: Any
-) -> xr.Dataset:
+) -> xr.Dataset | None:
+    """The responses of a view; None if they aren't finished."""
     about = (tuple(system.values.values()), method, question.parameter, limits)
     number = desk.responses.number((*about, question.quantity or first_quantity(system)))
-    if number is None:
+    return None if number is None else desk.responses.get(number)[1]
+
+
+def _answered(*view: Any) -> xr.Dataset:
+    ds = _known(*view)
+    if ds is None:
         raise QuestionError("the responses aren't finished: wait for their end.", "parts")
-    ds: xr.Dataset = desk.responses.get(number)[1]
     return ds
+
+
+def _on_branches(
+    desk: Any, system: System, method: Method, question: ResponsesQuestion, limits: Any
+) -> list[np.ndarray]:
+    """A point of each branch that attracts at a value from which a saved study begins, float64[1,
+    D]: it comes to the branches that are shown, whatever the box leads to.
+    """
+    ds = _known(desk, system, method, question, limits)
+    if ds is None:
+        return []
+    low, high = limits
+    values = np.linspace(low, high, VALUES + 2)[1:-1].tolist()
+    here = [system.with_values(**{question.parameter: one}) for one in values]
+    return [one.points[:1] for each in here for _, one in crossings(ds, each)]

@@ -17,10 +17,11 @@ from saltus.explore import orbits, responses
 from saltus.explore.attractors import Legend
 from saltus.explore.desk import Desk, Models
 from saltus.explore.frames import packed, unpacked
-from saltus.explore.kept_responses import NO_HUE
+from saltus.explore.kept_responses import NO_HUE, crossings, stretches
 from saltus.explore.opening import Opening, opening_of
 from saltus.explore.orbits import settled
 from saltus.explore.questions import QuestionError, question_of, read
+from saltus.explore.shown import shown
 from saltus.interrupt import Interrupted, Stop, check_stop
 
 RIG = sl.models.delangre("b", force="4 N", frequency="15 Hz")
@@ -251,6 +252,13 @@ def test_a_hue_belongs_to_one_side_of_a_fold(desk, found):
     assert three in arrays["point_hue"][stable & here & (arrays["point_period"] == 3)]
     far = np.abs(np.arange(len(stable))[:, None] - turns).min(axis=1) > 2
     assert NO_HUE not in arrays["point_hue"][stable & far]
+    number, way = stretches(found), found["point_frequency"].values
+    coloured = [i for i in set(number.tolist()) if arrays["point_hue"][number == i][0] != NO_HUE]
+    ends = {i: (way[number == i].min(), way[number == i].max()) for i in coloured}
+    for i, (low, high) in ends.items():  # where two exist at one value, their hues differ
+        beside = [j for j, (a, b) in ends.items() if j != i and a <= high and b >= low]
+        mine = arrays["point_hue"][number == i][0]
+        assert mine not in {arrays["point_hue"][number == j][0] for j in beside}
 
 
 def test_responses_are_branches_and_their_points_are_orbits(desk, monkeypatch):
@@ -277,6 +285,12 @@ def test_responses_are_branches_and_their_points_are_orbits(desk, monkeypatch):
     assert [one[0]["key"] for one in again] == [head["key"]]  # kept
     hue = one(desk, "settle", start={"x": "1 mm", "v": 0})[0]["attractor"]["hue"]
     assert hue in arrays["point_hue"][arrays["point_period"] == 3]
+    view = {"responses": {"parameter": "frequency", "range": [15.0, 15.1], "quantity": "x"}}
+    starts = np.stack([*shown(desk, view)[0].starts.values()], axis=1)
+    ds = desk.responses.get(head["key"])[1]
+    on = [one.points[0] for _, one in crossings(ds, RIG.with_values(frequency=15.05))]
+    assert on  # a study that is saved begins on each of them
+    assert all(np.abs(starts - point).max(axis=1).min() < 1e-12 for point in on)
 
 
 # -- other systems ---------------------------------------------------------------------------------
@@ -334,6 +348,8 @@ def test_a_structure_shows_its_sensors():
     run = sl.simulate(rig, {"tip": "2 mm"}, periods=5)
     np.testing.assert_array_equal(arrays["sample:tip"], run["tip"].values.astype("f4"))
     assert head["contacts"] == run.sizes["contact"] > 0
+    gap = {"guard": rig.guards[0].name, "quantity": "tip", "value": 1e-3}
+    assert head["gaps"] == [gap]  # the contact's deflection is the sensor's
 
 
 # -- bad input -------------------------------------------------------------------------------------

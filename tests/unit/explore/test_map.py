@@ -276,7 +276,7 @@ def test_a_map_without_forcing_is_that_of_basins():
 
 
 def test_old_maps_make_room(monkeypatch):
-    monkeypatch.setattr(maps, "KEPT", 3 * 400 * 40)
+    monkeypatch.setattr(maps, "KEPT", 3 * 400 * (maps.CELL + 2 * 8))
     kept = maps.KeptMaps()
     plans = [
         pipeline.basin_plan(

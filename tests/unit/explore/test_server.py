@@ -270,3 +270,24 @@ def test_nothing_listens_when_it_has_ended(server):
     assert other.sessions == []
     with socket.socket() as line, pytest.raises(ConnectionRefusedError):
         line.connect(("127.0.0.1", other.port))
+
+
+class _Deaf:
+    """A desk whose work can't be stopped in time."""
+
+    def answer(self, question, emit):
+        threading.Event().wait(0.4)
+
+
+def test_work_that_outlasts_the_server_leaves_no_traceback(capfd):
+    one = Server(_Deaf())
+    one._uvicorn.config.timeout_graceful_shutdown = 0.05
+    one.start()
+    with page(one) as line:
+        line.send(json.dumps({"ask": "hello", "id": 0, "token": one.token, "wire": WIRE}))
+        line.recv()
+        line.send(json.dumps({"ask": "about", "id": 1}))
+        while not (one.sessions and one.sessions[0]._lanes):
+            threading.Event().wait(0.01)
+        one.stop()
+    assert capfd.readouterr().err == ""

@@ -17,6 +17,7 @@ from saltus.analysis.attractors.aperiodic import (
     survey,
 )
 from saltus.analysis.attractors.attractor_set import INSIDE, AttractorSet, is_about
+from saltus.analysis.attractors.growth import BUDGET, NEWTON, tangent_cost
 from saltus.analysis.attractors.limit_cycles import limit_cycles
 from saltus.analysis.attractors.noisy import Noisy, Stray, blurred, keep_to, stray_of
 from saltus.analysis.attractors.recurrence import recurrence
@@ -33,8 +34,7 @@ from saltus.results.dataset.kinds import Kind
 Owners = list[ClosedMotion | SampledMotion | None]
 #: Candidates for orbits in one round; what isn't tried has its turn in the next.
 MAX_CANDIDATES = 12
-#: Trajectories of up to seven states that never recur whose motion is surveyed; of more states
-#: fewer, as each costs more.
+#: Trajectories of up to seven states that never recur whose motion is surveyed.
 MAX_SURVEYED = 24
 #: Fewest of them.
 FEWEST_SURVEYED = 4
@@ -52,8 +52,13 @@ def find_attractors(
     known: AttractorSet | None = None,
     progress: Callable[[float], None] | None = None,
     kept: bool = False,
+    surveyed: bool = True,
 ) -> tuple[AttractorSet, np.ndarray, np.ndarray]:
     """The attractors that trajectories from given starts settle to.
+
+    Each is followed for ``most`` iterates, and for :data:`SURVEY_ITERATES` more if it hasn't
+    settled; some of these again, for as long as :func:`watched` says. Newton's method may cost
+    :data:`~saltus.analysis.attractors.growth.BUDGET` times what they were followed for.
 
     Parameters
     ----------
@@ -72,6 +77,8 @@ def find_attractors(
     kept : bool
         Whether a trajectory that keeps to a known attractor that never repeats has arrived, as in a
         map's cells. Else it is followed as one that hasn't settled.
+    surveyed : bool
+        Whether trajectories that haven't settled are surveyed; else nothing is said of them.
 
     Returns
     -------
@@ -99,7 +106,7 @@ def find_attractors(
         return result, np.array(label, np.int64), settled
 
     try:
-        _settle(map_, start, scale, most, found, owner, settled, progress, kept)
+        _settle(map_, start, scale, most, found, owner, settled, progress, kept, surveyed)
     except KeyboardInterrupt:
         raise PartInterrupted(lambda: known_now(Kind.NOT_COMPUTED)) from None
     return known_now(-1)
@@ -108,18 +115,26 @@ def find_attractors(
 def _settle(
     map_: Map, start: np.ndarray, scale: np.ndarray, most: int, found: AttractorSet, owner: Owners,
     settled: np.ndarray, progress: Callable[[float], None] | None, kept: bool,
+    surveyed: bool,
 ) -> None:  # fmt: skip
     """Follow trajectories until each has settled, or was surveyed; note their owners."""
     travel, going = map_.launch(start, most), np.arange(len(start))
+    total, purse = most + SURVEY_ITERATES + watched(len(scale))[1], np.zeros(1)
+
+    def tell(age: int) -> None:
+        if progress:
+            progress(max(1.0 - len(going) / len(start), min(age / total, 1.0)))
+
     noisy, never = Kind.NOISY_PERIODIC.word, (Kind.CHAOTIC.word, Kind.QUASI_PERIODIC.word)
     turns = isinstance(map_, Stroboscope) and autonomous(map_.system)
     while len(going) and travel.age < most:
         points = travel.advance(ROUND)
+        purse += BUDGET * ROUND * len(going)
         here = np.flatnonzero(~_captured(found, points, going, travel.age - ROUND, owner, settled))
         for kind in (noisy, *(never if kept else ())):
             on = _keeping(found, kind, points[here], going[here], travel.age, owner, settled)
             here = here[~on]
-        while len(here) and _add_orbits(map_, points[here], scale, found, most):
+        while len(here) and _add_orbits(map_, points[here], scale, found, most, purse):
             here = here[
                 ~_keeping(found, noisy, points[here], going[here], travel.age, owner, settled)
             ]
@@ -136,10 +151,9 @@ def _settle(
         stay[here] = travel.going[here]
         travel.keep(stay)
         going = going[stay]
-        if progress:
-            progress(max(1.0 - len(going) / len(start), min(travel.age / most, 1.0)))
-    if len(going):
-        _survey(map_, travel, going, scale, found, owner, settled, most)
+        tell(travel.age)
+    if len(going) and surveyed:
+        _survey(map_, travel, going, scale, found, owner, settled, most, tell)
 
 
 def _captured(
@@ -177,11 +191,20 @@ def _keeping(
     return on >= 0
 
 
+def watched(states: int) -> tuple[int, int]:
+    """Most trajectories of so many states that never recur whose motion is surveyed, and the
+    iterates for which they are: fewer of many states, as each costs more.
+    """
+    share = max(states // 4, 1)
+    return max(MAX_SURVEYED // share, FEWEST_SURVEYED), WATCHING_ITERATES // share
+
+
 def _add_orbits(
-    map_: Map, points: np.ndarray, scale: np.ndarray, found: AttractorSet, most: int
-) -> bool:
+    map_: Map, points: np.ndarray, scale: np.ndarray, found: AttractorSet, most: int,
+    purse: np.ndarray,
+) -> bool:  # fmt: skip
     """Add the attracting orbits not known yet that some of the trajectories float64[k, ROUND, D]
-    follow; whether there are any.
+    follow; whether there are any. What closing orbits costs is taken off the purse [iterates].
     """
     period, apart = recurrence(points, scale)
     near = max(NEAR, map_.noise)
@@ -190,10 +213,14 @@ def _add_orbits(
         known = any(
             _lies_on(points[i, -1], orbit, scale, 10 * apart[i]) for orbit in found.unstable
         )
-        if not known and not any(
-            np.abs((points[i, -1] - points[j, -1]) / scale).max() < near for j in tried
+        price = NEWTON * period[i] * tangent_cost(len(scale))
+        if (
+            not known
+            and price <= purse[0]
+            and not any(np.abs((points[i, -1] - points[j, -1]) / scale).max() < near for j in tried)
         ):
             tried.append(i)
+            purse -= price
         if len(tried) == MAX_CANDIDATES:
             break
     place, k = points[tried, -1], len(tried)
@@ -277,7 +304,7 @@ def _on_cycles(
 
 def _survey(
     map_: Map, travel: Travel, going: np.ndarray, scale: np.ndarray, found: AttractorSet,
-    owner: Owners, settled: np.ndarray, most: int
+    owner: Owners, settled: np.ndarray, most: int, tell: Callable[[int], None],
 ) -> None:  # fmt: skip
     """Follow unsettled trajectories much longer. Accept an aperiodic attractor only if none leaves
     it.
@@ -285,10 +312,10 @@ def _survey(
     A chaotic saddle holds trajectories for thousands of periods too; what is seen to leave it
     betrays it.
     """
-    survivors, points, leavers = _watch(travel, going, found, owner, settled)
+    survivors, points, leavers = _watch(travel, going, found, owner, settled, tell)
     if not len(survivors):
         return
-    few = max(MAX_SURVEYED // max(len(scale) // 4, 1), FEWEST_SURVEYED)
+    few, watching = watched(len(scale))
     chosen = np.unique(np.linspace(0, len(survivors) - 1, min(few, len(survivors))).astype(int))
     noisy, strays = _blurred(map_, travel.state[chosen], points[chosen], scale, most)
     keeps = keep_to(noisy, points[chosen], INSIDE) >= 0
@@ -298,9 +325,9 @@ def _survey(
     seen = [*noisy, *survey(map_, travel.state[free], points[free], scale)]
     if seen:
         moves = chosen[keeps | ~rests]
-        leavers.append(
-            points[moves][_leave(map_, travel.state[moves], found, noisy, scale), -ROUND:]
-        )
+        going_on = map_.launch(travel.state[moves], watching)
+        leave = _leave(going_on, watching, found, noisy, scale, lambda age: tell(travel.age + age))
+        leavers.append(points[moves][leave, -ROUND:])
     for one in seen:
         if not any((one.share(iterates) >= INSIDE).any() for iterates in leavers if len(iterates)):
             found.add_sampled(one)
@@ -320,8 +347,9 @@ def _survey(
 
 
 def _watch(
-    travel: Travel, going: np.ndarray, found: AttractorSet, owner: Owners, settled: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
+    travel: Travel, going: np.ndarray, found: AttractorSet, owner: Owners, settled: np.ndarray,
+    tell: Callable[[int], None],
+) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:  # fmt: skip
     """Trajectories that don't settle for SURVEY_ITERATES more, int64[k], their iterates, and those
     of the ones that do.
     """
@@ -335,6 +363,7 @@ def _watch(
         stays = ~caught & travel.going
         travel.keep(stays)
         survivors, runs = survivors[stays], [*(iterates[stays] for iterates in runs), points[stays]]
+        tell(travel.age)
         if not len(survivors):
             break
     return survivors, np.concatenate(runs, axis=1), leavers
@@ -362,14 +391,14 @@ def _blurred(
 
 
 def _leave(
-    map_: Map, state: np.ndarray, found: AttractorSet, noisy: list[Noisy], scale: np.ndarray
-) -> np.ndarray:
+    travel: Travel, most: int, found: AttractorSet, noisy: list[Noisy], scale: np.ndarray,
+    tell: Callable[[int], None],
+) -> np.ndarray:  # fmt: skip
     """True where a trajectory, followed for very long, reaches an orbit after all, bool[k]. Those
     near a noisy orbit don't count.
     """
-    most = WATCHING_ITERATES // max(len(scale) // 4, 1)
-    travel, going = map_.launch(state, most), np.arange(len(state))
-    left = np.zeros(len(state), bool)
+    going = np.arange(len(travel.state))
+    left = np.zeros(len(going), bool)
     while len(going) and travel.age < most:
         points = travel.advance(ROUND)
         arrives = found.near.capture(points)[0] >= 0
@@ -381,6 +410,7 @@ def _leave(
         stays = ~arrives & travel.going
         travel.keep(stays)
         going = going[stays]
+        tell(travel.age)
     return left
 
 

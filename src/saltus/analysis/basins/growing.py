@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from queue import Empty, Full, Queue
 
 import numpy as np
@@ -20,6 +20,7 @@ from saltus.analysis.basins.basins import compiled
 from saltus.analysis.basins.labels import OPEN, Settling, Wanderers, complete, fewer, renumber
 from saltus.analysis.basins.levels import stride_of
 from saltus.analysis.basins.pipeline import BasinPlan
+from saltus.analysis.basins.scouting import dear
 from saltus.analysis.closed.capture import Neighbourhoods
 from saltus.flow.maps import Stroboscope
 from saltus.flow.threads import on_threads, usable_processors
@@ -161,6 +162,7 @@ def grow_all(
     *,
     result: Settling | None = None,
     scouted: bool = False,
+    looked: Callable[[float], None] | None = None,
 ) -> tuple[AttractorSet, Settling]:
     """A whole map from nothing, or from some of its attractors, with a first picture early.
 
@@ -191,6 +193,8 @@ def grow_all(
     scouted : bool
         Whether ``known`` is all that a whole sample of starts leads to: none is looked through
         again.
+    looked : callable, optional
+        Called with the share of that look that is done, by another thread.
 
     Returns
     -------
@@ -202,20 +206,22 @@ def grow_all(
     Interrupted
         On Ctrl-C, or a :class:`saltus.Stop`.
     """
+    states = len(plan.system.states)
     if result is None:
-        result = Settling.empty(plan.cells, len(plan.system.states))
-    found = known or AttractorSet(Neighbourhoods.none(len(plan.system.states)))
+        result = Settling.empty(plan.cells, states)
+    found = known or AttractorSet(Neighbourhoods.none(states))
     if not found and not scouted:
-        found = replace(plan, scouts=min(FEW_SCOUTS, plan.scouts)).scout(threads)
+        found = plan.glanced(FEW_SCOUTS, threads)
     take(KnownAttractors(found, np.arange(len(known or ()))))
     wider = found
 
     def look() -> None:
         nonlocal wider
-        wider = plan.scout(1, known=found)
+        *_, wider = plan.scouted(1, looked, found)
 
     def begin() -> None:
-        finest = min(COARSE, plan.levels()[0].stride)
+        coarsest = plan.levels()[0].stride  # others wait for attractors that take long to be found
+        finest = coarsest if dear(plan.periods, states) else min(COARSE, coarsest)
         grow(plan, found, take, result=result, finest=finest, resume=False, threads=threads)
 
     if not scouted:

@@ -23,7 +23,7 @@ from saltus.analysis.attractors.portrait import portraits
 from saltus.analysis.basins import uncertainty
 from saltus.analysis.basins.labels import OPEN, Settling, complete, settle
 from saltus.analysis.basins.levels import GridLevel, levels_of
-from saltus.analysis.basins.scouting import SCOUTS, scouted
+from saltus.analysis.basins.scouting import SCOUTS, glanced, scouted
 from saltus.analysis.closed.spread import spread
 from saltus.analysis.closed.turns import ASKED, looks_every
 from saltus.analysis.dataset_parts import provenance, subject
@@ -159,6 +159,13 @@ class BasinPlan:
         """The same, more and more of them."""
         start = self.drawn(self.scouts)
         return scouted(self.map(threads), start, self.scale, self.periods, progress, known)
+
+    def glanced(
+        self, count: int, threads: int | None = None, known: AttractorSet | None = None
+    ) -> AttractorSet:
+        """Known attractors, and those of ``count`` starts that are seen early."""
+        start = self.drawn(min(count, self.scouts))
+        return glanced(self.map(threads), start, self.scale, self.periods, known)
 
     def drawn(self, count: int) -> np.ndarray:
         """A fixed quasi-random sample of starts from the box, float64[count, D]."""

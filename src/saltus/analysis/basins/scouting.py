@@ -19,6 +19,8 @@ from saltus.flow.progress import stage
 SCOUTS = 1024
 #: Fewest: their mean cost says how many more follow.
 FEWEST = 16
+#: Iterates of a first look at systems of more than four states.
+GLANCE = 256
 #: Work of all of them: iterates times the cube of the number of states. What an iterate costs grows
 #: with the modes and with the contacts that they make; the neighbourhood of an orbit, with its
 #: derivatives. No map of four states comes so far.
@@ -28,6 +30,27 @@ WORK = 2**29
 def affordable(iterates: float, states: int, most: int = SCOUTS) -> int:
     """Number of starts, each followed for so many iterates, that the budget is enough for."""
     return int(np.clip(WORK / (max(iterates, 1.0) * states**3), FEWEST, most))
+
+
+def glanced(
+    map_: Map, start: np.ndarray, scale: np.ndarray, most: int, known: AttractorSet | None = None
+) -> AttractorSet:
+    """Known attractors, and those that some of the starts float64[k, D] are seen to lead to early:
+    of systems of more than four states only what repeats, and what shows within
+    :data:`GLANCE` iterates of :data:`FEWEST` starts.
+    """
+    if not dear(most, start.shape[1]):
+        *_, found = scouted(map_, start, scale, most, known=known)
+        return found
+    first = start[:FEWEST]
+    return find_attractors(map_, first, scale, min(GLANCE, most), known, surveyed=False)[0]
+
+
+def dear(most: int, states: int) -> bool:
+    """True where the budget isn't enough for a whole sample of starts, each followed so long: from
+    five states on, or for many iterates.
+    """
+    return affordable(most + SURVEY_ITERATES, states) < SCOUTS
 
 
 def scouted(

@@ -41,6 +41,12 @@ MOST_RETURNS = 64
 #: Points of an orbit that get a neighbourhood: a trajectory on its way passes all of them in a
 #: response.
 MOST_POINTS = 8
+#: Work of one radius: iterates times the cube of the number of states. What is above it is left
+#: out: points of the orbit first, then returns, directions last. It binds from four states on; of
+#: twenty a radius has 8000 iterates, four times those for which a start is followed.
+WORK = 2**26
+#: Fewest directions for each dimension.
+FEWEST = 2
 #: Part of the verified radius that is used.
 SAFETY = 0.9
 
@@ -164,14 +170,14 @@ def _verified(
 
     Where no radius passes, what lies within the map's own errors of the point is taken to be on it.
     """
-    every = -(-orbit.period // MOST_POINTS)
-    points = orbit.points[::every]
+    size = len(scale)
+    most, returns, count = _affordable(orbit, size)
+    points = orbit.points[:: -(-orbit.period // most)]
     _, monodromy = map_.tangent(points, orbit.period)
-    n, size = points.shape
-    iterates = orbit.period * _returns(orbit)
+    n, iterates = len(points), orbit.period * returns
     norms = np.stack([_norm(matrix, scale) for matrix in monodromy])
     _, own = map_.sequences(points, iterates)
-    outer, asked = sphere(size), _asked(orbit)
+    outer, asked = sphere(size, count), _asked(orbit, returns)
     few = np.arange(2 * len(outer)) % SPARSE == 0
     few[len(outer) :] = False
     shell = np.concatenate([outer, 0.5 * outer])
@@ -234,13 +240,25 @@ def _returns(orbit: ClosedMotion) -> int:
     )
 
 
-def _asked(orbit: ClosedMotion) -> float:
+def _affordable(orbit: ClosedMotion, size: int) -> tuple[int, int, int]:
+    """Points of an orbit that get a neighbourhood, returns, and directions: as many as :data:`WORK`
+    is enough for.
+    """
+    count, returns, points = directions(size), _returns(orbit), min(MOST_POINTS, orbit.period)
+    left = WORK / size**3 / (2 * orbit.period)
+    points = int(np.clip(left / (count * returns), 1, points))
+    returns = int(np.clip(left / (count * points), 1, returns))
+    while count >= 2 * FEWEST * size and count > left:
+        count //= 2
+    return points, returns, count
+
+
+def _asked(orbit: ClosedMotion, returns: int) -> float:
     """Share of a distance that may be left after those returns: half way to what the norm promises,
     where that is more than CONTRACTION.
     """
-    return max(
-        CONTRACTION, 0.5 * (1.0 + _rate(float(np.abs(orbit.multipliers[0]))) ** _returns(orbit))
-    )
+    slowest = float(np.abs(orbit.multipliers[0]))
+    return max(CONTRACTION, 0.5 * (1.0 + _rate(slowest) ** returns))
 
 
 def _rate(radius: float) -> float:
@@ -280,16 +298,21 @@ def _norm(matrix: np.ndarray, scale: np.ndarray) -> np.ndarray:
         return np.diag(1.0 / scale)
 
 
-def sphere(size: int) -> np.ndarray:
+def directions(size: int) -> int:
+    """Points on the outer shell of so many dimensions; powers of two are evenest."""
+    return 2 ** math.ceil(math.log2(DIRECTIONS * (size - 1) * 2)) if size > 1 else 2
+
+
+def sphere(size: int, count: int | None = None) -> np.ndarray:
     """Points on the unit sphere, float64[count, size]: evenly spaced in the plane, a fixed
     quasi-random set beyond it.
     """
     if size == 1:
         return np.array([[1.0], [-1.0]])
+    count = count or directions(size)
     if size == 2:
-        angle = np.arange(2 * DIRECTIONS) * np.pi / DIRECTIONS
+        angle = np.arange(count) * 2.0 * np.pi / count
         return np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    count = 2 ** math.ceil(math.log2(DIRECTIONS * (size - 1) * 2))
     from scipy.stats import qmc  # 0.7 s that systems of one or two states don't need
 
     normal = qmc.MultivariateNormalQMC(np.zeros(size), seed=1).random(count)

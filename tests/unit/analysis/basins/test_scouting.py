@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
+from function_maps import FunctionMap
 from saltus.analysis.attractors.aperiodic import SURVEY_ITERATES
 from saltus.analysis.basins import basin_fractions as fractions
 from saltus.analysis.basins import labels, scouting
@@ -49,6 +50,26 @@ def test_the_first_scouts_say_how_many_follow(chain, monkeypatch):
         assert len(known[0]) == 0
         assert [len(one) for one in known[1:]] == [1] * len(seen)
         assert seen == count if count else (seen[0] == 16 and 0 < seen[1] < 1008)
+
+
+@pytest.mark.parametrize(("states", "found"), [(2, ["quasi_periodic"]), (6, [])])
+def test_a_first_look_at_many_states_waits_for_nothing_that_never_repeats(states, found):
+    turn = np.sqrt(2.0) * np.arange(1, states // 2 + 1)
+    cos, sin = np.diag(np.cos(turn)), np.diag(np.sin(turn))
+    matrix = np.block([[cos, -sin], [sin, cos]])
+    map_ = FunctionMap(
+        lambda z: z @ matrix.T, " ".join(f"x{i}" for i in range(states)),
+        lambda z: np.broadcast_to(matrix, (len(z), states, states)),
+    )  # fmt: skip
+    launch, asked = map_.launch, []
+    map_.launch = lambda start, longest: (
+        asked.append(len(start) * longest),
+        launch(start, longest),
+    )[1]
+    start = np.random.default_rng(2612).uniform(-1, 1, (64, states))
+    seen = scouting.glanced(map_, start[:8], np.ones(states), 512)
+    assert {one.kind for one in seen.every} == set(found)  # a circle of each start
+    assert found or sum(asked) <= 8 * scouting.GLANCE
 
 
 def test_a_map_over_sensors_begins_where_they_show_its_cells(chain):

@@ -11,7 +11,15 @@ from function_maps import FunctionMap, orbit_near
 from saltus.analysis.attractors.attractor_set import AttractorSet
 from saltus.analysis.attractors.find_attractors import find_attractors
 from saltus.analysis.basins.labels import settle
-from saltus.analysis.closed.capture import Neighbourhoods, _alike, neighbourhoods, sphere
+from saltus.analysis.closed.capture import (
+    FEWEST,
+    WORK,
+    Neighbourhoods,
+    _alike,
+    neighbourhoods,
+    sphere,
+)
+from saltus.analysis.closed.motions import ClosedMotion
 
 
 def linear(matrix) -> FunctionMap:
@@ -19,7 +27,7 @@ def linear(matrix) -> FunctionMap:
     matrix = np.array(matrix, float)
     return FunctionMap(
         lambda z: z @ matrix.T,
-        " ".join("xyzw"[: len(matrix)]),
+        " ".join(f"x{i}" for i in range(len(matrix))),
         lambda z: np.broadcast_to(matrix, (len(z), *matrix.shape)),
     )
 
@@ -137,6 +145,28 @@ def test_a_strongly_sheared_contraction_is_verified():
     for _ in range(200):
         points = points @ np.array([[0.6, 0.0], [20.0, 0.6]])
     assert np.abs(points).max() < 1e-12
+
+
+@pytest.mark.parametrize(("size", "period"), [(20, 1), (20, 16), (40, 5)])
+def test_of_many_states_a_neighbourhood_is_verified_within_a_budget(size, period):
+    """Blocks that turn and contract, next to the unit circle: all returns, directions and points of
+    the orbit would take 10 to 1000 times as many iterates.
+    """
+    rng = np.random.default_rng(2611)
+    turn = 2 * np.pi / period
+    block = 0.99 * np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    axes = np.linalg.qr(rng.normal(size=(size, size)))[0]
+    matrix = axes @ np.kron(np.eye(size // 2), block) @ axes.T
+    map_, most, sequences = linear(matrix), max(WORK / size**3, 4 * FEWEST * size * period), []
+    plain = map_.sequences
+    map_.sequences = lambda start, count: (
+        sequences.append(len(start) * count),
+        plain(start, count),
+    )[1]
+    orbit = ClosedMotion(np.zeros((period, size)), np.full(size, 0.99**period + 0j), 0.0)
+    near = neighbourhoods(map_, orbit, 0, np.ones(size))
+    assert max(sequences) <= most
+    assert near.capture(1e-3 * axes[None, :1])[0].tolist() == [0]
 
 
 class Touching(FunctionMap):
