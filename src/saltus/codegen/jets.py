@@ -601,6 +601,10 @@ class JetCode:
             case "linear":
                 assert isinstance(series.payload, Linear)
                 return self.rounding(series.payload)
+            case "select":
+                assert isinstance(series.payload, ex.Condition)
+                sizes = ", ".join(map(self._rounding, series.operands))
+                return f"select({self._mask(series.payload)}, {sizes})"
             case "product":
                 a, b = series.operands
                 x, y = (f"magnitude({self._zero(self.value(s, 0))})" for s in (a, b))
