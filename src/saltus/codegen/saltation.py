@@ -166,7 +166,7 @@ def _reset_of_tangent(
     body = [f"along = {own}"]
     if dated:
         given = f"dated, date, {given}"
-        body = ["if dated == 0.0:", f"    date[0] = {own}", "along = date[0]"]
+        body = [f"along = date[0] if dated != 0.0 else {own}", "date[0] = along"]
     for j in range(size):
         call = given.replace("dated, date", f"out[2], out[{3 + j}:]", 1)
         lines.append(f"reset_of_column(y[{j}:], {call})")
