@@ -251,3 +251,17 @@ def test_stops_that_throw_each_other_have_the_derivatives_of_40_digits(seed):
         np.testing.assert_allclose(
             derivative[0] @ way, known, rtol=0, atol=1e-10 * np.abs(known).max()
         )
+
+
+def test_impacts_that_cause_each_other_turn_accelerations_over():
+    """By parameters: `sl.sensitivity` looks for turning points, and those of
+    a velocity are passed where a stop begins to rest and where it is released.
+    """
+    one, start = drawn_clay(np.random.default_rng([20261126, 55, 2]))
+    exact, found = (
+        sl.sensitivity(one, start, periods=1, samples=5, to=["wall", "f"], method=method)
+        for method in (sl.Modal(), sl.Taylor())
+    )
+    assert str(found.status.values) == "ok"
+    size = np.abs(exact.derivative.values).max()
+    np.testing.assert_allclose(found.derivative, exact.derivative, rtol=0, atol=1e-9 * size)
