@@ -6,9 +6,11 @@ import math
 
 import numpy as np
 import pytest
+from mpmath import mp, mpf
 
 import impact_orbits
 import saltus as sl
+from oracles import resting_stops
 from saltus.codegen.module import jit_disabled
 from saltus.flow.maps import Stroboscope
 from two_flows import structure
@@ -203,17 +205,20 @@ def clay(t, x, y, z, u, v, w_, *, w=10.0, a=0.6, b=0.8, f=10.0, g=5.0, h=8.0, la
     )  # fmt: skip
 
 
+def drawn_clay(rng):
+    """The bodies with random values, and a start."""
+    values = {name: float(rng.uniform(5, 30)) for name in "wfgh"}
+    values["lag"] = float(rng.uniform(0, 6))
+    values |= {name: float(rng.uniform(0.003, 0.04)) for name in ("wall", "near")}
+    return clay.with_values(**values), np.r_[np.zeros(3), rng.normal(0, 0.05, 3)]
+
+
 @pytest.mark.parametrize("seed", [1, 2, 4])
 def test_stops_that_come_to_rest_together_have_the_derivatives_of_the_motion(seed):
     """Central differences of 1e-6. Both stops rest after blows that cause each other without end,
     so neither closing velocity changes with the start.
     """
-    rng = np.random.default_rng([20261127, seed])
-    values = {name: float(rng.uniform(5, 30)) for name in "wfgh"} | {
-        "lag": float(rng.uniform(0, 6))
-    }
-    values |= {name: float(rng.uniform(0.003, 0.04)) for name in ("wall", "near")}
-    one, start = clay.with_values(**values), np.r_[np.zeros(3), rng.normal(0, 0.05, 3)]
+    one, start = drawn_clay(np.random.default_rng([20261127, seed]))
     _, found = Stroboscope(one, sl.Modal()).tangent(start[None], 1)
     beside = start + 1e-6 * np.vstack([np.eye(6), -np.eye(6)])
     run = sl.simulate(one, beside, periods=1, samples=2, method=sl.Modal(), progress=False)
@@ -221,3 +226,42 @@ def test_stops_that_come_to_rest_together_have_the_derivatives_of_the_motion(see
     ends = np.array([run[f"end_{name}"].values for name in one.states])
     known = (ends[:, :6] - ends[:, 6:]) / 2e-6
     assert np.abs(found[0] - known).max() <= 1e-5 * np.abs(known).max()
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_stops_that_throw_each_other_have_the_derivatives_of_40_digits(seed):
+    """Central differences of 1e-12, of a motion that takes each blow by itself."""
+    rng = np.random.default_rng([20261126, 55, seed])
+    (one, start), way = drawn_clay(rng), rng.normal(size=6)
+    w, a, b, f, g, h, lag, wall, near = map(mpf, one.values.values())
+    with mp.workdps(40):
+        bodies = resting_stops.Bodies(
+            [[200, -50, 0], [-50, 300, 40], [0, 40, 250]], mpf(0.3), w,
+            [f, g, h], [0, lag, -mp.pi / 2], [[a, b, 0], [0, -1, 1]], [wall, near],
+        )  # fmt: skip
+        sides = []
+        for step in (mpf("1e-12"), -mpf("1e-12")):
+            z = [mpf(at) + step * mpf(along) for at, along in zip(start, way, strict=True)]
+            sides.append(bodies.after(z[:3], z[3:], 2 * mp.pi / w))
+        known = [float((p - q) / mpf("2e-12")) for p, q in zip(*sides, strict=True)]
+        ends = [float((p + q) / 2) for p, q in zip(*sides, strict=True)]
+    for method in (sl.Modal(), sl.Taylor()):
+        found, derivative = Stroboscope(one, method).tangent(start[None], 1)
+        np.testing.assert_allclose(found[0], ends, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(
+            derivative[0] @ way, known, rtol=0, atol=1e-10 * np.abs(known).max()
+        )
+
+
+def test_impacts_that_cause_each_other_turn_accelerations_over():
+    """By parameters: `sl.sensitivity` looks for turning points, and those of
+    a velocity are passed where a stop begins to rest and where it is released.
+    """
+    one, start = drawn_clay(np.random.default_rng([20261126, 55, 2]))
+    exact, found = (
+        sl.sensitivity(one, start, periods=1, samples=5, to=["wall", "f"], method=method)
+        for method in (sl.Modal(), sl.Taylor())
+    )
+    assert str(found.status.values) == "ok"
+    size = np.abs(exact.derivative.values).max()
+    np.testing.assert_allclose(found.derivative, exact.derivative, rtol=0, atol=1e-9 * size)

@@ -401,8 +401,10 @@ class _Body:
                 self._leave(value)
                 self.do(f"go{label}:")
             case _:
-                condition, before = self.value(test), dict(self.names)
+                condition, before, first = self.value(test), dict(self.names), len(self.lines)
                 self.run(body)
+                if any(not line.name for line in self.lines[first:]):
+                    raise UntranslatableError(ast.unparse(body[0]))  # it would act in any case
                 for name, old in before.items():
                     if (new := self.names[name]) != old:
                         a, b = self.number(new), self.number(old)

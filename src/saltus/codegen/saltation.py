@@ -21,6 +21,9 @@ from saltus.language.expression import Expr
 from saltus.system import System
 from saltus.system.tangent import first_column
 
+#: Part of the size of its terms below which a closing velocity is their rounding, as ROUNDED of
+#: kernels/modal/layout.py.
+_CLOSING_ROUNDING = 16.0 * 2.0**-52
 #: Part of the size of its terms by which rounding, and a landing beside the boundary, may make a
 #: vanishing friction negative.
 _LEVEL_ROUNDING = 1e-9
@@ -78,7 +81,7 @@ def jump_function(system: System, clocks: Clocks) -> str:
 def reset_function(system: System, clocks: Clocks, dated: bool = False) -> str:
     """``reset(t, y, p, h, before, after, g, out)``: put the state after the jump of guard g's law
     into y, and S times the tangent, between two modes (bits); out[0] is the law's restitution,
-    out[1] the closing velocity before.
+    out[1] the closing velocity before, zero if it is the rounding of its terms.
 
     If `dated`, out[3:] holds by how much earlier the instant of the jump comes, for each column of
     the tangent: taken from there if out[2] isn't zero, else written there.
@@ -90,7 +93,7 @@ def reset_function(system: System, clocks: Clocks, dated: bool = False) -> str:
         return head + "    pass\n"
     size, leaf = len(base.states), parameter_leaf(base, "y", clocks.value)
     states = [ex.state(name) for name in base.states]
-    lines = ["restitution = 0.0", "closing_before = 0.0"]
+    lines = ["restitution = 0.0", "closing_before = 0.0", "closing_size = 0.0"]
     lines += [f"new_{i} = y[{i}]" for i in range(size)]
     slopes = {
         (i, k): differentiate(entry, state)
@@ -109,8 +112,9 @@ def reset_function(system: System, clocks: Clocks, dated: bool = False) -> str:
         wanted = {f"new_{i}": entry for i, entry in enumerate(law.reset)}
         if law.restitution is not None and law.constraint is not None:
             wanted |= {"restitution": law.restitution, "closing_before": law.constraint}
+            wanted |= {"closing_size": size_of_terms(law.constraint)}
         else:
-            wanted |= {"closing_before": ex.constant(1.0)}
+            wanted |= {"closing_before": ex.constant(1.0), "closing_size": ex.constant(0.0)}
         if system.tangent_of:
             wanted |= {f"s_{i}_{k}": differentiate(law.reset[i], states[k]) for i, k in carried}
             wanted |= {f"drift_{i}": differentiate(law.reset[i], ex.TIME) for i in range(size)}
@@ -124,7 +128,8 @@ def reset_function(system: System, clocks: Clocks, dated: bool = False) -> str:
     if system.tangent_of:
         helper, more = _reset_of_tangent(system, base, clocks, carried, dated)
         lines += more
-    lines += ["out[0] = restitution", "out[1] = closing_before"]
+    rounded = f"abs(closing_before) <= {_CLOSING_ROUNDING} * closing_size"
+    lines += ["out[0] = restitution", f"out[1] = 0.0 if {rounded} else closing_before"]
     lines += [f"y[{i}] = new_{i}" for i in range(size)]
     return f"{helper}{head}{indented(lines)}\n"
 
@@ -166,7 +171,7 @@ def _reset_of_tangent(
     body = [f"along = {own}"]
     if dated:
         given = f"dated, date, {given}"
-        body = ["if dated == 0.0:", f"    date[0] = {own}", "along = date[0]"]
+        body = [f"along = date[0] if dated != 0.0 else {own}", "date[0] = along"]
     for j in range(size):
         call = given.replace("dated, date", f"out[2], out[{3 + j}:]", 1)
         lines.append(f"reset_of_column(y[{j}:], {call})")

@@ -389,13 +389,17 @@ class _Fronts:
         for i, j in self._come_by(taken):
             curve, other = self.curves[i], self.curves[j]
             if self.group[i] != self.group[j]:
-                if other.z and _has_passed(self.equations, curve, other, i, either_way=True):
+                if other.z and _passed(self.equations, curve, other, i, either_way=True):
                     self._stop(max(self.group[i], self.group[j]), "met")
-            elif len(curve.z) >= LEAST_CLOSED and _has_passed(self.equations, curve, curve, i):
+            elif len(curve.z) >= LEAST_CLOSED and (
+                passed := _passed(self.equations, curve, curve, i)
+            ):
                 for kept in (curve.z, curve.tangent, curve.derivative, curve.length):
                     kept.pop()
-                apart = (curve.z[0] - curve.z[-1]) / self.equations.scale[i]
-                _add(curve, curve.z[0], curve.tangent[0], curve.derivative[0], _size(apart))
+                start, tangent = passed
+                apart = (start - curve.z[-1]) / self.equations.scale[i]
+                _, derivative = self.equations.evaluate(start[None], np.array([i]))
+                _add(curve, start, tangent, derivative[0], _size(apart))
                 self._stop(self.group[i], "stopped")
                 curve.end = "closed"
 
@@ -433,20 +437,21 @@ def passes(curve: Arc, point: np.ndarray, scale: np.ndarray) -> bool:
     return _size(way - on) < PASSED * length
 
 
-def _has_passed(
+def _passed(
     equations: CurveEquations, curve: Arc, other: Arc, row: int, either_way: bool = False
-) -> bool:
-    """True if a curve has passed the start of another one, in the direction in which that one left;
-    with ``either_way``, also in the opposite direction.
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """The start of another curve that a curve has passed, as the curve came by it, and the tangent
+    there: in the direction in which the other one left; with ``either_way``, also in the opposite
+    direction. None if it hasn't.
     """
     scale, one = equations.scale[row], np.array([row])
     starts = equations.alike(other.z[0][None], one)[0]
     ways = equations.alike(other.tangent[0][None] * scale, one)[0] / scale
     along = ways @ curve.tangent[-1]
-    return any(
-        (abs(size) if either_way else size) >= AGAIN and passes(curve, same, scale)
-        for same, size in zip(starts, along, strict=True)
-    )
+    for same, way, size in zip(starts, ways, along, strict=True):
+        if (abs(size) if either_way else size) >= AGAIN and passes(curve, same, scale):
+            return same, way
+    return None
 
 
 def _orientation(derivative: np.ndarray, tangent: np.ndarray) -> np.ndarray:

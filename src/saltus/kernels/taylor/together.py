@@ -2,7 +2,7 @@
 that don't decide the motion. kernels/impacts.py compares their orders.
 """
 
-from saltus.kernels.status import IMPACT_LAW, INVALID_RESTITUTION, OK, SURFACE_LAW
+from saltus.kernels.status import IMPACT_LAW, INVALID_RESTITUTION, NO_LAW, OK, SURFACE_LAW
 
 
 @inner
@@ -95,7 +95,7 @@ def strike_together(lanes, lane, batch, hits, slow):
     """Apply the impacts at the end of a step, one after the other. Returns the guards that are
     left.
     """
-    stops = standing(lanes, lane, hits)
+    stops, mode = standing(lanes, lane, hits), mode_of(lanes, lane)
     strikes = stops & hits != 0
     if strikes and stops & (stops - 1) != 0:
         outcome = orders(lanes, lane, batch, stops, slow)
@@ -115,6 +115,10 @@ def strike_together(lanes, lane, batch, hits, slow):
             elif not endless:
                 strike(lanes, lane, batch, g, gap_rate(lanes, lane, g, d), slow)
                 others = True
+    turned = mode ^ mode_of(lanes, lane)
+    for g in range(NGUARDS):
+        if LAW[g] == NO_LAW and (turned >> g) & 1:
+            hits &= ~(1 << g)  # an impact has carried the state over it
     return hits
 
 

@@ -42,6 +42,36 @@ def test_closed_curves_are_closed_whatever_their_size():
         assert curve.length[-1] == pytest.approx(np.sum(np.hypot(*np.diff(z, axis=0).T)))
 
 
+class Waves(Ellipses):
+    """x = cos s, y = sin s, p = cos 2s, where (-x, -y) means what (x, y) does: the curve is back
+    after half of the circle.
+    """
+
+    def __init__(self):
+        self.scale = np.ones((1, 3))
+
+    def evaluate(self, z, rows):
+        x, y, p = z.T
+        value = np.stack([x**2 + y**2 - 1, x**2 - y**2 - p], axis=1)
+        first, one = np.stack([2 * x, 2 * y, 0 * x], axis=1), np.ones_like(x)
+        return value, np.stack([first, np.stack([2 * x, -2 * y, -one], axis=1)], axis=1)
+
+    def alike(self, z, rows):
+        return np.stack([z, z * [-1, -1, 1]], axis=1)
+
+
+def test_a_curve_is_closed_at_what_means_its_start():
+    """Its last point lies where it came by, not at the start."""
+    start, along = np.array([[0.6, 0.8, -0.28]]), np.array([[-0.8, 0.6, -1.92]])
+    (curve,) = follow(Waves(), start, along, {2: (-10, 10)}, 2000)
+    assert curve.end == "closed"
+    np.testing.assert_allclose(curve.z[-1], [-0.6, -0.8, -0.28], atol=1e-12)
+    np.testing.assert_allclose(curve.tangent[-1], curve.tangent[0] * [-1, -1, 1], atol=1e-12)
+    null = np.array(curve.derivative) @ np.array(curve.tangent)[..., None]
+    np.testing.assert_allclose(null, 0.0, atol=1e-12)
+    assert max(np.diff(curve.length)) < 0.2
+
+
 class Circles(Ellipses):
     """x**2 + y**2 = r**2 for r = 1 and 2: two curves of one equation."""
 

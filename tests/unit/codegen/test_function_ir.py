@@ -1,0 +1,23 @@
+"""Functions of heads as LLVM IR: what isn't translated is refused."""
+
+from __future__ import annotations
+
+import ast
+
+import pytest
+
+from saltus.codegen.function_ir import Signature, UntranslatableError, function_ir
+from saltus.codegen.interface import ARRAY, REAL
+
+
+def translated(line):
+    tree = ast.parse(f"def jump(a, y):\n b = a\n if a > 0.0:\n  {line}\n y[1] = b").body[0]
+    return function_ir(tree, Signature((REAL, ARRAY), "void", ""), 1, {}, set(), {})
+
+
+def test_entries_of_arrays_may_not_be_written_under_a_condition():
+    """Names are selected behind it; an entry would be written in any case."""
+    assert "select" in translated("b = 1.0")
+    for line in ("y[0] = 1.0", "y[0] += 1.0"):
+        with pytest.raises(UntranslatableError, match="y"):
+            translated(line)
