@@ -100,7 +100,7 @@ def test_every_question_is_answered(whole):
         "frequency-response.nc", "frequency-response.csv", "frequency-response-responses.csv",
         "frequency-response.png",
         "soft.nc", "soft.csv", "soft-responses.csv", "soft.png",
-        "a-map.nc", "a-map.csv", "a-map-responses.csv", "a-map.png",
+        "a-map.nc", "a-map.csv", "a-map-responses.csv", "a-map.png", "a-map-sizes.png",
     ]  # fmt: skip
     assert all(file.stat().st_size > 50 for file in whole.outcome.files)
     titles = [table.title for table in whole.outcome.tables]

@@ -70,7 +70,7 @@ class DividedGrid(Division):
 
     @property
     def read(self) -> Outputs:
-        """What is read off each motion."""
+        """Answer that is read off each motion."""
         return outputs_of(self.grid.system, self.outputs)
 
     def prepare(self) -> None:

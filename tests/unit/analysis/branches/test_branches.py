@@ -481,14 +481,14 @@ def test_branches_followed_side_by_side_are_those_followed_one_after_the_other(m
     """Also if whoever comes by where another began is taken to be on its branch."""
     doubled = frozenset({"period_doubling"})
     plan = plan_of(DELANGRE, "frequency", (15.0, 16.0), sl.Taylor(), 1, 400, 2, doubled)
-    found, passed = [], arclength._has_passed
+    found, passed = [], arclength._passed
     for name in ("", "alone", "blind"):
         with monkeypatch.context() as patched:
             if name == "alone":
                 patched.setattr(tracing, "ABREAST", 0)
             if name == "blind":
                 patched.setattr(
-                    arclength, "_has_passed", lambda *a, either_way=False: either_way or passed(*a)
+                    arclength, "_passed", lambda *a, either_way=False: either_way or passed(*a)
                 )
             branches = []
             trace(plan, seeds(), branches)
