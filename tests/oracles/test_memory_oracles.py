@@ -44,10 +44,12 @@ def test_the_drifting_oscillator_is_met_where_other_solvers_meet_it():
 
 
 @pytest.mark.parametrize("seed", [f"3.{i}" for i in range(12)])
+@pytest.mark.slow
 def test_machines_and_rk4_agree(seed):
     assert memory_check.judge(memory_check.case(seed)).apart < 1.0
 
 
+@pytest.mark.slow
 def test_rk4_of_a_text_has_order_four():
     tape = written_equations.read("def f(t, x, v, *, k=4.0):\n    return v, -k*x + sl.cos(t)\n")
     exact = (math.cos(1) - math.cos(2)) / 3
@@ -55,6 +57,7 @@ def test_rk4_of_a_text_has_order_four():
     assert abs(math.log2(off[0] / off[1]) - 4) < 0.1
 
 
+@pytest.mark.slow
 def test_a_jump_of_a_text_happens_where_its_condition_becomes_true():
     source = "def f(t, x, n):\n    return sl.cos(t), 0.0, sl.jump(x > 0.5, n=n + 1)\n"
     tape = written_equations.read(source)

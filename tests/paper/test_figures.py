@@ -148,6 +148,7 @@ def test_attractors_of_the_exact_maps(name, one):
     assert (np.hypot(ds.attractor_multiplier_real, ds.attractor_multiplier_imag) < 1).all()
 
 
+@pytest.mark.slow
 def test_the_second_attractor_of_fig_11_is_the_large_one():
     """The paper has one; the one that it misses has the larger amplitude and few starts."""
     job = next(job for job in maps_of(parse(tiny("fig11"))) if job.title == "8833 N per m, exact")
@@ -183,6 +184,7 @@ def test_fig_8_has_a_third_attractor_after_the_grazing():
     assert 2 <= round(third) <= 8
 
 
+@pytest.mark.slow
 def test_fig_6b_runs_as_a_study(tmp_path):
     """The whole way, once, from the file as it stands but for its grid."""
     text = tiny("fig6b")

@@ -162,6 +162,7 @@ NOT_LOCATED = {"bends": 2.0, "jumps with speed": 1.15, "jumps": 1.05, "none": 5.
 
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("events", ["ignore", "locate"])
+@pytest.mark.slow
 def test_ode45_in_fixed_steps_loses_its_order_at_contacts(oscillator, law, events):
     measured = fixed_step_order(
         oscillator.with_values(**LAWS[law]), sl.ODE45(1.0, 1e9, events=events), [1.0, 0.5, 0.25]

@@ -135,6 +135,7 @@ def test_responses_and_their_branches(tmp_path):
     assert contents(jobs.folder)[1] == contents(plain.folder)[1]
 
 
+@pytest.mark.slow
 def test_sets_of_values(tmp_path):
     """What is told apart over all sets is told by the last of the jobs; sets that the system
     refuses are in no chunk.
