@@ -186,3 +186,23 @@ def test_many_trajectories_are_those_of_one_each():
         assert np.array_equal(
             many.contact_time_derivative.values[here], one.contact_time_derivative.values
         )
+
+
+@sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
+def resting(t, x, v, *, w=9.0, wall=0.02):
+    """A body on a spring that rests on a wall after each impact, until it is pulled off."""
+    return v, 12 * sl.cos(w * t) - 50 * x, sl.impact(x < wall, v, restitution=0)
+
+
+@pytest.mark.parametrize("method", [sl.Taylor(), sl.Modal()], ids=["Taylor", "Modal"])
+def test_times_of_impacts_without_rebound_and_of_releases_move_as_differences_say(method):
+    start, h = (0.0, 0.3), 1e-7
+    found = sl.sensitivity(resting, start, periods=3, to=["wall"], method=method)
+    low, high = (
+        sl.simulate(resting.with_values(wall=0.02 + d), start, periods=3).contact_time.values
+        for d in (-h, h)
+    )
+    assert {"impact", "hold", "release"} == set(found.contact_kind.values)
+    np.testing.assert_allclose(
+        found.contact_time_derivative.values[:, 0], (high - low) / (2 * h), rtol=1e-6
+    )

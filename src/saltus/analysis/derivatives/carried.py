@@ -17,6 +17,7 @@ from saltus.analysis.inputs.starts import Ensemble
 from saltus.analysis.motion.sample_times import NO_SAMPLES, SampleTimes
 from saltus.errors import ParameterError
 from saltus.flow.methods import Method
+from saltus.flow.modal import Modal
 from saltus.flow.request import Outcome, Request
 from saltus.system import System
 from saltus.system.modes import field
@@ -74,6 +75,7 @@ class CarriedDerivatives:
         self.system, self.names, size = system, names, len(system.states)
         own = method.tangents(system, names)
         self._own = own is not None
+        self._unrecorded = self._own or isinstance(method, Modal)  # no derivatives in its contacts
         if own is not None:
             self.flown: System = own
             self.timed, self._order = False, [*range(size + len(names))]
@@ -165,7 +167,7 @@ class CarriedDerivatives:
         unit = length.period[table.trajectory] if self.timed else 1.0
         rows, mode = table.state.copy(), table.mode_after.copy()
         held = np.isin(table.kind_name, early)
-        again = np.full(len(held), True) if self._own else held
+        again = np.full(len(held), True) if self._unrecorded else held
         if again.any():
             whole = self.request(group, length, NO_SAMPLES)
             before = 4.0 * np.spacing(np.maximum(np.abs(table.time), abs(whole.origin)))

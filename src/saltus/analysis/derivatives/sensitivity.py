@@ -106,7 +106,8 @@ def sensitivity(
         Dims ``time``, ``output``, ``to``, ``contact``, and ``trajectory`` for many starts or
         values. ``value`` and ``derivative`` (at fixed times) of states and outputs;
         ``contact_time`` and ``contact_time_derivative``, NaN where the time isn't that of a gap's
-        zero (release, the end of a chatter) or the motion stays on the boundary; ``maximum``,
+        zero (the end of a chatter), the motion stays on the boundary, or an impact at the same
+        instant may have caused the contact; ``maximum``,
         ``maximum_time``, ``maximum_derivative``, ``minimum`` likewise, of what is kept;
         ``end_derivative``; ``status``. Units in ``output_units``, ``to_units``. Of periodic orbits
         also ``period``, ``period_derivative``, and over the dim ``multiplier``

@@ -26,6 +26,8 @@ from saltus.results.dataset import schema
 
 #: Counters that are kept.
 COUNTED = ("steps", "rejected_steps", "mode_violations", "grazes_unresolved")
+#: Relative difference of the derivatives of an instant by two gaps that is rounding.
+ALIKE = 1e-6
 #: Kinds of contacts at which states jump.
 JUMPS = ("impact",)
 #: Rate of a gap at a contact, in the largest at its contacts, below which the contact's time isn't
@@ -59,7 +61,8 @@ class SensitivityRun(Readings):
 
     def contact_times(self, at: Places, table: ContactTable) -> np.ndarray:
         """Derivatives of the times of contacts, float64[m, C]: the gap of each stays zero. NaN
-        where it is zero beside the contact too.
+        where it is zero beside the contact too, and behind an impact at the same instant, if its
+        own gap tells of another one: the impact may have caused it.
         """
         moved = np.full((len(at.time), at.slopes.shape[2]), np.nan)
         rates, system = self.flow.rates(at, self.group), self.turning.system
@@ -88,6 +91,14 @@ class SensitivityRun(Readings):
             leaves_it = np.abs(rate) > LEAVES * np.abs(rate).max()
             with np.errstate(divide="ignore", invalid="ignore"):
                 moved[here] = np.where(leaves_it[:, None], -change / rate[:, None], np.nan)
+        began = np.ones(len(moved), bool)
+        began[1:] = (np.diff(at.time) != 0) | (np.diff(at.trajectory) != 0)
+        for rows in np.split(np.arange(len(moved)), np.flatnonzero(began)[1:]):
+            (struck,) = np.nonzero(np.isin(table.kind_name[rows], JUMPS))
+            if len(struck):
+                behind, first = rows[struck[0] :], moved[rows[struck[0]]]
+                same = np.isclose(moved[behind], first, rtol=ALIKE, atol=0.0).all(axis=1)
+                moved[behind[~same]] = np.nan
         return moved
 
 
@@ -106,9 +117,11 @@ def sensitivity_dataset(run: SensitivityRun, outcome: Outcome) -> xr.Dataset:
     value = run.values(at).reshape(n, count, -1)
     slope = run.chosen(run.slopes(at), at.trajectory).reshape(n, count, len(outputs), -1)
     table = outcome.contacts
-    touch = run.flow.contacts(outcome, group, length, run.again)
+    touch = early = run.flow.contacts(outcome, group, length, run.again)
+    if np.isin(table.kind_name, JUMPS).any():  # a stop without rebound rests behind its impact
+        early = run.flow.contacts(outcome, group, length, run.again, (*HELD, *JUMPS))
     speed = table.velocity / unit[table.trajectory]
-    moved = run.contact_times(touch, table)
+    moved = run.contact_times(early, table)
     mine = np.flatnonzero(table.guard < len(system.guards))
     names = np.array([guard.name for guard in system.guards] or [""], dtype=np.str_)
     end = run.flow.ends(outcome, group, length)
@@ -139,7 +152,7 @@ def sensitivity_dataset(run: SensitivityRun, outcome: Outcome) -> xr.Dataset:
             "contact_kind": table.kind_name[mine],
             "contact_velocity": speed[mine],
             "contact_trajectory": table.trajectory[mine],
-            **(_extremes(run, outcome, touch, moved, at, end) if turning.known else {}),
+            **(_extremes(run, outcome, touch, early, moved, at, end) if turning.known else {}),
             "end_derivative": run.chosen(run.slopes(end), end.trajectory),
             **(_of_orbits(run.closed, end) if run.closed is not None else {}),
             **dataset_parts.endings(outcome, COUNTED),
@@ -167,6 +180,7 @@ def _extremes(
     run: SensitivityRun,
     outcome: Outcome,
     touch: Places,
+    early: Places,
     moved: np.ndarray,
     samples: Places,
     end: Places,
@@ -179,10 +193,7 @@ def _extremes(
     first = _rows(samples, np.searchsorted(samples.trajectory, np.arange(n)))
     turns = np.isin(guard, list(run.turning.of))
     still = np.where(turns[:, None], 0.0, moved)
-    early = touch  # what an impact changes has one more value, just before it
-    if np.isin(outcome.contacts.kind_name, JUMPS).any():
-        kinds = (*HELD, *JUMPS)
-        early = run.flow.contacts(outcome, run.group, run.length, run.again, kinds)
+    # what an impact changes has one more value, just before it
     parts = [(touch, still, None), (early, still, ahead), (first, None, None)]
     if run.closed is None:  # an orbit ends where it begins, whose own slope is known
         parts.append((end, None, None))
