@@ -41,7 +41,7 @@ def gaps_function(system: System, clocks: Clocks) -> str:
     known to stand (twice the side), are taken from out. Behind the gaps come, for a guard whose
     contact can be held, the rate at which its constraint is left without its own force, what that
     force changes of it (of an impact, over what it changes without friction), and the constraint
-    itself.
+    itself; then of every guard the size of its gap, and of such constraints their sizes.
     """
     laws = any(guard.law for guard in system.guards)
     code = ScalarCode(
@@ -62,7 +62,9 @@ def gaps_function(system: System, clocks: Clocks) -> str:
     for i, guard in enumerate(system.guards):
         if guard.law and guard.law.kind == "hold":
             held.append(f"out[{i}] = {code.value(guard.gap)}")
-        elif guard.law:
+        if guard.law is None or guard.law.constraint is None:
+            held.append(f"out[{4 * count + i}] = {code.value(size_of_terms(guard.gap))}")
+        if guard.law and guard.law.kind != "hold":
             pivot = guard.law.pivot
             if guard.law.kind == "impact":
                 rough = guard.law.remaining is not None

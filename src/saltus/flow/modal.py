@@ -25,6 +25,7 @@ from saltus.kernels.batch import Batch
 from saltus.kernels.isolation import DEEPEST, MOST_TOUCHES
 from saltus.kernels.modal import layout
 from saltus.system import System
+from saltus.system.linear import LinearPiece
 from saltus.system.linearity import linear_pieces
 from saltus.system.quantity import remembered
 from saltus.system.tangent import tangent_states
@@ -36,7 +37,7 @@ FIRST_STEP = 1.0 / 64
 #: milliseconds: at its end a thread may wait five for another one that runs Python.
 MOST_AT_ONCE = 600
 #: Terms of a gap's series by which the way from a boundary is told.
-WAYS = 6
+WAYS = 12
 
 
 def bernstein_table(lanes: int) -> np.ndarray:
@@ -177,14 +178,7 @@ class ModalFlow:
                 *(course.at(time)[0] for course in given.courses),
             ]
         )
-        parts = [
-            state @ given.gaps.matrix.T,
-            np.broadcast_to(given.gaps.constant, (len(who), len(given.gaps.constant))),
-            drives @ given.gaps.driven.T,
-        ]
-        gap = parts[0] + parts[1] + parts[2]
-        size = np.abs(state) @ np.abs(given.gaps.matrix.T)
-        zero = np.abs(gap) <= layout.ROUNDED * (size + np.abs(parts[1]) + np.abs(parts[2]))
+        gap, zero = self._values(given.gaps, given, state, drives)
         bits, allowed, plain = 1 << np.arange(gap.shape[1]), self.tables.allowed, self.tables.plain
         beyond = ((gap * self.tables.limits > 0) & ~zero).any(axis=1)
         batch.status[who[beyond]] = st.INVALID
@@ -219,16 +213,25 @@ class ModalFlow:
         carry[:, layout.RIDES] = zero @ bits if gap.shape[1] else 0.0
         batch.carry[who, : layout.AMPLITUDES] = carry
 
+    @staticmethod
+    def _values(
+        of: LinearPiece, given: ValueSet, states: np.ndarray, drives: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Linear functions of states and drives, and which of them are rounding: that of a cosine
+        is absolute.
+        """
+        values = states @ of.matrix.T + of.constant + drives @ of.driven.T
+        most = np.abs(drives)
+        most[:, : len(given.rates)] = 1.0
+        size = np.abs(states) @ np.abs(of.matrix.T) + np.abs(of.constant)
+        size += most @ np.abs(of.driven.T)
+        return values, np.abs(values) <= layout.ROUNDED * size
+
     def _at_rest(
         self, given: ValueSet, states: np.ndarray, drives: np.ndarray, fresh: np.ndarray
     ) -> np.ndarray:
         """Bits of the stops among those in `fresh` that neither close nor open."""
-        closing = given.impacts.closing
-        parts = states @ closing.matrix.T, drives @ closing.driven.T
-        size = np.abs(states) @ np.abs(closing.matrix.T) + np.abs(parts[1])
-        slow = np.abs(parts[0] + parts[1] + closing.constant) <= layout.ROUNDED * (
-            size + np.abs(closing.constant)
-        )
+        _, slow = self._values(given.impacts.closing, given, states, drives)
         bits = 1 << np.arange(slow.shape[1])
         stops = (self.tables.allowed != 0) & ((fresh[:, None] & bits) != 0)
         found: np.ndarray = (slow & stops) @ bits if slow.shape[1] else fresh

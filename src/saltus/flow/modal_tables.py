@@ -244,7 +244,8 @@ class Tables:
         known = self._equations_of(given, mode, free)
         modes = self._state_modes(known, given, shown, free)
         number, guards = len(self.made), len(self.linear.system.guards)
-        links = [self._modes_of(known, modes, shown), self._steady_of(modes, given, shown), 0, -1]
+        seen = free.levelled(shown) if len(free.kept) < len(free.spread) else shown
+        links = [self._modes_of(known, modes, seen), self._steady_of(modes, given, seen), 0, -1]
         for g in range(guards):
             behind = self._states.get((which, mode ^ 1 << g), -1)
             links.append(behind)
@@ -385,7 +386,7 @@ class Tables:
         padded = np.zeros((len(answers), LANES * self.state_groups), complex)
         padded[:, : answers.shape[1]] = answers
         gaps = shown.matrix[first] @ answers.T
-        gaps[:, 0] += np.where(self.holds, shown.constant, 0.0)[first]
+        gaps[:, 0] += (shown.constant - given.gaps.constant)[first]
         gaps[:, 1:harmonic] += shown.driven[first, : harmonic - 1]
         gaps[:, harmonic :: self.linear.terms] += shown.driven[first, harmonic - 1 :]
         # only the harmonic ones have an imaginary part

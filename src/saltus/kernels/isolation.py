@@ -154,18 +154,22 @@ def is_rounding(q, degree, noise):
 
 
 @kernel
-def side_of_leaving(q, degree, shifted, noise):
-    """Sign of a gap, q(x) or ``x * q(x)`` if it is shifted, where it can first be told from zero on
-    [0, 1] (0: nowhere). Leading terms of the other sign are rounding, and made zero.
+def side_of_leaving(q, degree, known, noise):
+    """Sign of a gap, ``x**known * q(x)``, where it can first be told from zero on [0, 1] (0:
+    nowhere). Leading terms of the other sign are rounding, and made zero; of a gap that begins at
+    zero so are those that are no more than noise.
     """
     side, x = 0, 2.0**-DEEPEST
     while side == 0 and x <= 1.0:
-        value = polynomial(q, degree, x) * (x if shifted else 1.0)
+        value = polynomial(q, degree, x)
+        for _ in range(known):
+            value *= x
         if abs(value) > noise:
             side = 1 if value > 0.0 else -1
         x *= 2.0
+    least = noise if known > 0 else 0.0
     for k in range(degree + 1):
-        if side == 0 or q[k] * side > 0.0:
+        if side == 0 or q[k] * side > least:
             break
         q[k] = 0.0
     return side

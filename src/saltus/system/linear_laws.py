@@ -75,6 +75,20 @@ class Constrained:
         loads = rows_of(gaps)[:, len(self.spread) :] + gaps.matrix @ self.base
         return LinearPiece(gaps.matrix @ self.spread, loads[:, 0], loads[:, 1:])
 
+    def levelled(self, gaps: LinearPiece) -> LinearPiece:
+        """Gaps as functions of all states, but for those that held contacts keep at a level: these
+        are the level alone, without the rounding of terms that cancel.
+        """
+        n, at = len(self.spread), len(self.kept)
+        found = rows_of(self.seen(gaps))
+        sizes = np.abs(gaps.matrix) @ np.abs(np.column_stack([self.spread, self.base]))
+        sizes[:, at:] += np.abs(rows_of(gaps)[:, n:])
+        found[np.abs(found) <= SAME * sizes] = 0.0
+        level: np.ndarray = ~np.any(np.delete(found, at, axis=1), axis=1)
+        rows = np.where(level[:, None], 0.0, rows_of(gaps))
+        rows[level, n] = found[level, at]
+        return LinearPiece(rows[:, :n], rows[:, n], rows[:, n + 1 :])
+
 
 def impacts_of(linear: LinearSystem, values: Mapping[str, float]) -> Impacts:
     """The laws of a system by numbers."""

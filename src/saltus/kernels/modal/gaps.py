@@ -393,6 +393,17 @@ def judge(g, top, degree, fresh, error, whole, slope_error, noise, m):
     return OPEN
 
 
+@inner
+def way_of(i, g, degree, known, noise, batch, m):
+    """Side to which a gap leaves its boundary in a step (0: it doesn't). The velocity of a rebound
+    or a crossing tells it, however small; the first term of what begins at rest may be rounding.
+    """
+    rests = known > 1 or m.laws[g, KIND] == HOLD_LAW
+    if rests or (int(batch.carry[i, RIDES]) >> g) & 1 == 1:
+        return side_of_leaving(m.p, degree, known, noise)
+    return 0 if is_rounding(m.p, degree, noise) else leading_sign(m.p, degree)
+
+
 @kernel
 def decide(i, g, batch, m):
     """Outcome of a gap over the step: CLEAR over the part DECIDED, CROSSES, or OPEN: a shorter step
@@ -412,13 +423,11 @@ def decide(i, g, batch, m):
         error = slope_error
         if known > 1 and not exact:
             return OPEN
-        if exact and is_rounding(m.p, degree, noise):
-            if m.laws[g, KIND] == HOLD_LAW:  # the force that holds has gone
-                m.found[g, PLACE], m.found[g, FINAL] = 0.0, 1.0
-                return CROSSES
+        leaves = way_of(i, g, degree, known, noise, batch, m) if exact else 1
+        if leaves == 0 and m.laws[g, KIND] != HOLD_LAW:
             m.found[g, RIDDEN] = 1.0
             return CLEAR
-        if exact and leading_sign(m.p, degree) < 0:
+        if leaves <= 0:  # to the other side, or the force that holds has gone
             m.found[g, PLACE], m.found[g, FINAL] = 0.0, 1.0
             return CROSSES
         if not exact and m.p[0] <= error:
@@ -429,9 +438,12 @@ def decide(i, g, batch, m):
         if m.p[0] < -noise and m.laws[g, KIND] != HOLD_LAW:
             batch.status[i] = MODE_VIOLATION
             return CLEAR
+        if exact and m.laws[g, KIND] != HOLD_LAW and is_rounding(m.p, degree, noise):
+            m.found[g, RIDDEN] = 1.0  # held contacts keep it at zero
+            return CLEAR
         # what presses a contact at rest jumps where the state does
         least = 0 if m.laws[g, KIND] == HOLD_LAW and m.laws[g, SECOND] >= 0 else -1
-        if m.p[0] < -noise or side_of_leaving(m.p, degree, False, noise) <= least:
+        if m.p[0] < -noise or side_of_leaving(m.p, degree, 0, noise) <= least:
             m.found[g, PLACE], m.found[g, FINAL] = 0.0, 1.0
             return CROSSES
     bernstein_of(degree, m)

@@ -56,6 +56,18 @@ def know_zeros(i, g, count, batch):
 
 
 @inner
+def know_alike(i, g, count, batch, m):
+    """The same for a stop, and for boundaries without a law that are met with it: their gaps are
+    one.
+    """
+    know_zeros(i, g, count, batch)
+    for other in range(m.sizes[GUARDS]):
+        alike = m.row_of[other] == m.row_of[g] and m.laws[other, KIND] == NO_LAW
+        if alike and known_zeros(i, other, batch) > 0:
+            know_zeros(i, other, count, batch)
+
+
+@inner
 def know_nothing(i, batch):
     """Time has passed: no gap is known to be zero, and the start is over."""
     batch.fresh[i] = 0
@@ -104,7 +116,7 @@ def size_of(table, row, first, m):
     for j in range(states):
         total += abs(table[row, first + j] * m.state[j // LANES, j % LANES])
     for d in range(m.sizes[DRIVES]):
-        total += abs(table[row, first + states + 1 + d] * m.angle[d, 1])
+        total += abs(table[row, first + states + 1 + d])  # the rounding of a cosine is absolute
     for p in range(m.sizes[COURSES]):
         total += abs(table[row, first + states + 1 + m.sizes[DRIVES] + p] * m.record[p, VALUE])
     return total
@@ -126,8 +138,12 @@ def closing_of(i, g, batch, m):
 
 @inner
 def pressing_of(i, g, batch, m):
-    """Acceleration at which a contact would close without its force."""
-    return value_of(m.presses, int(batch.carry[i, AT]) * m.sizes[GUARDS] + g, 0, m)
+    """Acceleration at which a contact would close without its force; zero, if it is the rounding of
+    its terms.
+    """
+    row = int(batch.carry[i, AT]) * m.sizes[GUARDS] + g
+    pressing = value_of(m.presses, row, 0, m)
+    return pressing if abs(pressing) > ROUNDED * size_of(m.presses, row, 0, m) else 0.0
 
 
 @inner
@@ -169,14 +185,11 @@ def first_law(hits, m):
 @kernel
 def act(i, g, tau, d, hits, modes, steady, batch, m):
     """Let the law of a guard act a time d after tau. Returns the status."""
-    state_after(i, tau, d, modes, steady, batch, m)
-    if d > 0.0 and m.laws[g, SECOND] >= 0:
+    state_at(i, tau, d, modes, steady, batch, m)
+    if d > 0.0 and (m.laws[g, SECOND] >= 0 or m.laws[g, KIND] == HOLD_LAW):
         know_rides(i, batch, m)
     elif d > 0.0:
         know_nothing(i, batch)
-    elif has_just_landed(i, tau, batch):
-        for j in range(m.sizes[STATES]):
-            m.state[j // LANES, j % LANES] = batch.state[i, j]
     for other in range(m.sizes[GUARDS]):
         jumps = d == 0.0 and m.laws[other, KIND] == HOLD_LAW  # what presses it isn't zero
         if (hits >> other) & 1 and not jumps:
@@ -208,6 +221,17 @@ def act(i, g, tau, d, hits, modes, steady, batch, m):
 def has_just_landed(i, tau, batch):
     """True if the trajectory has landed, or begun, at this time: its state is known to the bit."""
     return time_of(i, tau, batch) == batch.carry[i, LANDED_AT]
+
+
+@kernel
+def state_at(i, tau, d, modes, steady, batch, m):
+    """The state a time d after tau, to `state`, to the bit if it is known; its amplitudes to
+    `moved`.
+    """
+    state_after(i, tau, d, modes, steady, batch, m)
+    if d == 0.0 and has_just_landed(i, tau, batch):
+        for j in range(m.sizes[STATES]):
+            m.state[j // LANES, j % LANES] = batch.state[i, j]
 
 
 @kernel
@@ -303,7 +327,8 @@ def strike(i, g, now, modes, steady, batch, m):
         note(i, g, now, IMPACT, int(-side), rate, mode, error, batch, m)
         turn_over(i, g, now, batch, m)
         loosen(i, g, now, closing, batch, m)
-    know_zeros(i, g, 1 if restitution * closing > 0.0 else 2, batch)
+    zeros = 3 if known_zeros(i, g, batch) > 1 else 2  # it closes, and only a force may close it
+    know_alike(i, g, 1 if restitution * closing > 0.0 else zeros, batch, m)
     batch.carry[i, ASKS] = g + 1.0
     return RUNNING
 
@@ -322,7 +347,8 @@ def rest_or_go(i, now, modes, steady, batch, m):
     drive(i, now, batch, m)
     restitution, pressing = restitution_of(i, g, batch, m), pressing_of(i, g, batch, m)
     rebound = -closing_of(i, g, batch, m) if known_zeros(i, g, batch) < 2 else 0.0
-    if pressing <= 0.0 or rebound < 0.0:
+    begins = known_zeros(i, g, batch) > 2 and pressing <= 0.0  # what presses it begins at zero
+    if (pressing <= 0.0 and not begins) or rebound < 0.0:
         return
     later = 0.0
     if rebound > 0.0:
@@ -334,7 +360,7 @@ def rest_or_go(i, now, modes, steady, batch, m):
     shortest = too_short(i, now, restitution, second, third, fourth, batch)
     hidden = rebound <= ROUNDED * first or is_hidden(i, g, rebound, pressing, batch, m)
     if later <= shortest or hidden:
-        hold(i, g, now, later, batch, m)
+        hold(i, g, now, later, 1 if begins else 0, batch, m)
         leave(i, before, batch, m)
         if m.sizes[TANGENTS] != 0:
             settle_held(i, now, batch, m)
@@ -441,15 +467,15 @@ def loosen(i, struck, now, closing, batch, m):
 
 # -- contacts at rest ------------------------------------------------------------------------------
 @kernel
-def hold(i, g, now, later, batch, m):
-    """Begin to hold a contact, at most `later` [s] after now: the state goes onto its
-    constraint.
+def hold(i, g, now, later, zeros, batch, m):
+    """Begin to hold a contact, at most `later` [s] after now: the state goes onto its constraint.
+    So many zeros of what presses it are known.
     """
     h = m.laws[g, PARTNER]
     row, first = law_row(i, g, batch, m), width_of(m)
     push(i, g, -value_of(m.acts, row, first, m), batch, m)
     know_zeros(i, g, 0, batch)
-    know_zeros(i, h, 0, batch)
+    know_zeros(i, h, zeros, batch)
     error = CHATTER * later + clock_error(i, now, batch)
     note(i, h, now + later, HOLD, 1, 0.0, batch.mode[i] | (1 << h), error, batch, m)
 
@@ -459,6 +485,6 @@ def release(i, h, now, zeros, batch, m):
     """Release a contact. If its force vanishes continuously, gap, rate and acceleration are known
     to be zero; if it jumps, gap and rate; if it was struck, the gap.
     """
-    know_zeros(i, m.laws[h, PARTNER], zeros, batch)
+    know_alike(i, m.laws[h, PARTNER], zeros, batch, m)
     after = batch.mode[i] & ~(1 << h)
     note(i, h, now, RELEASE, -1, 0.0, after, clock_error(i, now, batch), batch, m)

@@ -90,6 +90,8 @@ QUEUE = 8
 LEAST, MOST, KNOWN, FIRST, LAST, DROP, RISE, RISES, FALLS, BELOW, ABOVE = range(11)
 #: Shortest part of a step by which a gap is decided.
 SHORTEST_PIECE = 0.125
+#: A step as short as this [s] decides nothing because the gaps are no numbers.
+LEAST_STEP = 1.0e-290
 #: Landings at one instant before they count as sliding.
 MOST_LANDINGS = 100
 #: Landings at one instant after which impacts that cause each other are completed at once, least

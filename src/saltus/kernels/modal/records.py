@@ -106,17 +106,18 @@ def courses_at(tau, m):
 @kernel
 def add_course_series(r, first, at, h, m):
     """Add the courses' part of a row of gaps to its terms in q[r], each times the factorial of its
-    order; returns its size. Its numbers
-    stand in the rows from `first` on, from `at` on.
+    order; returns its size over a time h. Its numbers stand in the rows from `first` on, from `at`
+    on.
     """
     size = 0.0
     for p in range(m.sizes[COURSES]):
         for k in range(m.sizes[TERMS]):
-            factor, power = number(m.steady, first, at + m.sizes[TERMS] * p + k), 1.0
-            size += abs(factor * m.record[p, VALUE + k])
+            factor, power, share = number(m.steady, first, at + m.sizes[TERMS] * p + k), 1.0, 1.0
             for j in range(m.sizes[TERMS] - k):
-                m.q[r, j] += factor * m.record[p, VALUE + k + j] * power
-                power *= h
+                part = factor * m.record[p, VALUE + k + j] * power
+                m.q[r, j] += part
+                size += abs(part) * share
+                power, share = power * h, share / (j + 1)
     return size
 
 

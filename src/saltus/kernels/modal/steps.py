@@ -219,9 +219,12 @@ def land(i, tau, d, hits, modes, steady, batch, m):
     at = int(batch.carry[i, AT])
     if law >= 0:
         return act(i, law, tau, d, hits, modes, steady, batch, m)
-    state_after(i, tau, d, modes, steady, batch, m)
+    state_at(i, tau, d, modes, steady, batch, m)
+    counts = d > 0.0 or batch.carry[i, STARTS] < 0.5  # a side at the start is no event
+    for k in range(0 if counts else max(batch.cursor[i], 0)):
+        batch.sample_mode[i, k] = before ^ hits
     for g in range(m.sizes[GUARDS]):
-        if (hits >> g) & 1:
+        if counts and (hits >> g) & 1:
             _, rate = gap_of_moved(m.row_of[g], modes, steady, which, m)
             rate *= m.sign_of[g]
             size = m.errors[m.row_of[g], 2] + abs(m.offset[which, g])
@@ -235,8 +238,8 @@ def land(i, tau, d, hits, modes, steady, batch, m):
     if d > 0.0:
         know_rides(i, batch, m)
     for g in range(m.sizes[GUARDS]):
-        if (hits >> g) & 1:
-            know_zeros(i, g, 1, batch)
+        if (hits >> g) & 1:  # a force may jump there, a velocity doesn't
+            know_zeros(i, g, max(1, min(2, known_zeros(i, g, batch))), batch)
     batch.mode[i] = before ^ hits
     leave(i, before, batch, m)
     if m.sizes[TANGENTS] != 0:
@@ -332,6 +335,7 @@ def advance(i, budget, batch, m):
         elif answer == OPEN:
             batch.counters[i, REJECTED] += 1
             batch.carry[i, NEXT_STEP], stands = 0.5 * h, True
+            status = NONFINITE if is_lost(modes, m) or not h > LEAST_STEP else RUNNING
         else:
             stands = False
             batch.counters[i, STEPS] += 1

@@ -27,6 +27,7 @@ from saltus.kernels.status import (
     GRAZE_SHALLOW,
     GRAZES,
     HOLD_LAW,
+    IMPACT_LAW,
     MODE_VIOLATION,
     REC_DIRECTION,
     REC_GUARD,
@@ -42,6 +43,7 @@ from saltus.kernels.status import (
     RECORD_FLOATS,
     RUNNING,
     SLIDING,
+    SURFACE_LAW,
     VIOLATIONS,
 )
 
@@ -83,14 +85,17 @@ def gap_rate(lanes, lane, g, d):
 
 
 @kernel
-def first_place(lanes, lane, g, h, slow, count):
+def first_place(lanes, lane, batch, g, h, slow, count):
     """Time into the step at which gap g crosses first, beyond h if it doesn't; and the number of
     touches on the list.
     """
     if LAWS and lanes.side[WATCHED + g, lane] < 0.5:
         return 2.0 * h, count
-    noise = scaled_gap(lanes, lane, g, h, slow)
-    fresh = lanes.fresh[g, lane] > 0.5
+    noise, known = scaled_gap(lanes, lane, g, h, slow), int(lanes.fresh[g, lane])
+    fresh = known > 0
+    begins = begins_in_rounding(lanes, lane, g)
+    if begins:
+        noise = max(noise, ROUNDING * size_beyond(lanes, lane, batch, g, h, slow))
     stays_on = fresh and LAW[g] != HOLD_LAW
     if stays_on and abs(lanes.work[GAP_ROW + g, lane]) > allowed_beside(lanes, lane, g):
         lanes.memo[lane, FAULT] = MODE_VIOLATION
@@ -98,10 +103,10 @@ def first_place(lanes, lane, g, h, slow, count):
     sign = leading_sign(slow.q, ORDER)
     if fresh and is_rounding(slow.q, ORDER, noise):
         sign = 0
-    elif lanes.fresh[g, lane] == RIDDEN:  # rounding doesn't leave it
-        sign = side_of_leaving(slow.q, ORDER, True, noise)
+    elif begins or lanes.fresh[g, lane] == RIDDEN:  # rounding doesn't leave it
+        sign = side_of_leaving(slow.q, ORDER, known, noise)
     elif not fresh and sign < 0 and slow.q[0] > -noise:  # it may have reversed at the node
-        sign = 1 if side_of_leaving(slow.q, ORDER, False, noise) > 0 else -1
+        sign = 1 if side_of_leaving(slow.q, ORDER, 0, noise) > 0 else -1
     holds = LAW[g] == HOLD_LAW and not sets_aside(lanes, lane)
     if sign == 0 and holds and LAW[PARTNER[g]] == SURFACE_LAW:
         return 0.0, count  # its force has gone: it holds nothing
@@ -134,6 +139,28 @@ def first_place(lanes, lane, g, h, slow, count):
 
 
 @inner
+def begins_in_rounding(lanes, lane, g):
+    """True if a gap is at zero where terms of it that should cancel leave rounding: at the start of
+    a run, or on a boundary that was ridden. A state less a constant has no such terms, and the
+    velocity of a rebound none that cancel.
+    """
+    starts = lanes.run[STARTING, lane] > 0.5 or lanes.fresh[g, lane] == RIDDEN
+    rebounds = LAW[g] == IMPACT_LAW and (int(lanes.run[FLIPPED, lane]) >> g) & 1 == 1
+    at_zero = starts and lanes.fresh[g, lane] > 0.5 and not rebounds
+    return at_zero and SNAP_STATE[g] < 0 and LAW[g] != SURFACE_LAW
+
+
+@kernel
+def size_beyond(lanes, lane, batch, g, h, slow):
+    """Size of the terms of a gap at time h into the step: from rest they begin at zero."""
+    state_at(lanes, lane, h, slow.state)
+    for j in range(NGUARDS):
+        slow.gaps[j] = lanes.side[j, lane]
+    look_at_gaps(lanes, lane, batch, h, slow)
+    return slow.gaps[SIZES * NGUARDS + g]
+
+
+@inner
 def allowed_beside(lanes, lane, g):
     """Distance by which rounding may carry a lane off a boundary that it keeps to."""
     return KEPT * (lanes.work[SCALE_ROW + g, lane] + lanes.prior[PRIOR_ROWS * g + OLD, lane])
@@ -152,7 +179,7 @@ def decide(lanes, lane, batch, slow):
         lanes.memo[lane, BROKEN], lanes.found[DELTA, lane] = 1, 0.0
         return
     for g in range(NGUARDS):
-        at, count = first_place(lanes, lane, g, h, slow, count)
+        at, count = first_place(lanes, lane, batch, g, h, slow, count)
         if at <= h:
             if hits != 0 and abs(at - first) <= COINCIDENT * now:
                 hits |= 1 << g
@@ -165,7 +192,7 @@ def decide(lanes, lane, batch, slow):
     if first < h and lanes.run[LEAST, lane] < least:
         lanes.run[LEAST, lane] = least
         for g in range(NGUARDS if first > 0.0 else 0):
-            first_place(lanes, lane, g, first, slow, 0)
+            first_place(lanes, lane, batch, g, first, slow, 0)
 
 
 @kernel
@@ -317,6 +344,14 @@ def show_clocks(lanes, lane, slow):
 
 
 @inner
+def begins_at_zero(g, slow):
+    """True if a gap in slow.gaps is zero, or the rounding of terms that cancel."""
+    return abs(slow.gaps[g]) <= (
+        ROUNDING * slow.gaps[SIZES * NGUARDS + g] if SNAP_STATE[g] < 0 else 0.0
+    )
+
+
+@inner
 def stands_at(lanes, lane, g, slow):
     """True if a lane is known to be on a boundary whose gap is in slow.gaps: the gap's sign then
     says nothing of the side.
@@ -334,7 +369,7 @@ def gaps_here(lanes, lane, batch, slow):
         slow.state[i] = lanes.y[i, lane]
     for g in range(NGUARDS):
         slow.gaps[g] = lanes.side[g, lane]
-    look_at_gaps(lanes, lane, batch, slow)
+    look_at_gaps(lanes, lane, batch, 0.0, slow)
     rounded = False
     for g in range(NGUARDS if LAWS else 0):
         rounded = rounded or (slow.gaps[g] != 0.0 and stands_at(lanes, lane, g, slow))
@@ -342,18 +377,23 @@ def gaps_here(lanes, lane, batch, slow):
         for g in range(NGUARDS):
             known = stands_at(lanes, lane, g, slow)
             slow.gaps[g] = lanes.side[g, lane] * (KNOWN if known else 1.0)
-        look_at_gaps(lanes, lane, batch, slow)
+        look_at_gaps(lanes, lane, batch, 0.0, slow)
 
 
 @kernel
-def look_at_gaps(lanes, lane, batch, slow):
-    """Write the result of `gaps` for slow.state, with the sides in slow.gaps."""
+def look_at_gaps(lanes, lane, batch, later, slow):
+    """Write the result of `gaps` for slow.state, some time later than the node, with the sides in
+    slow.gaps.
+    """
     show_clocks(lanes, lane, slow)
     parameters = batch.param[lanes.memo[lane, WHO] * batch.stride]
-    gaps(
+    now = (
         time_of_law(lanes, lane, batch)
         if LAWS
-        else lanes.clock[TAU, lane] + lanes.clock[BASE, lane],
+        else lanes.clock[TAU, lane] + lanes.clock[BASE, lane]
+    )
+    gaps(
+        now + later,
         slow.state,
         parameters,
         slow.held,
@@ -496,7 +536,7 @@ def is_shallow(lanes, lane, g, rate):
         abs(lanes.bounds[j + QUADRATIC, lane]) + 3.0 * abs(lanes.bounds[j + CUBIC, lane])
     )
     size = lanes.prior[PRIOR_ROWS * g + NEW, lane] + lanes.prior[PRIOR_ROWS * g + OLD, lane]
-    return rate * rate * h * h <= 2.0 * ROUNDING * size * curvature
+    return abs(rate) * h <= math.sqrt(2.0 * ROUNDING * size) * math.sqrt(curvature)
 
 
 @inner

@@ -159,6 +159,8 @@ def classify(lanes, g, h):
     once = inside & (end < -noise) & (falls | concave | convex)
     closes = asked & inside & (~clear)
     undecided = ~inside
+    if SNAP_STATE[g] < 0:  # where it begins, its first terms may be rounding: the slow path tells
+        undecided = undecided | (on_boundary & (load(lanes.run, STARTING, LANES) > 0.5))
     if LAWS:
         beside = on_boundary & (magnitude(a0) > KEPT * (size + inherited))
         undecided = (undecided | beside) & asked

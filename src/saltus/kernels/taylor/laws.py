@@ -134,6 +134,10 @@ def strike(lanes, lane, batch, g, rate, slow):
     who, mode, known = lanes.memo[lane, WHO], mode_of(lanes, lane), lanes.fresh[g, lane]
     if LAW[g] == IMPACT_LAW or not carried_over(lanes, lane, g):
         snap(lanes, lane, g)
+    least = 0.0
+    if lanes.run[STARTING, lane] > 0.5:
+        gaps_here(lanes, lane, batch, slow)
+        least = ROUNDING * slow.gaps[5 * NGUARDS + g]
     for i in range(NSTATES):
         slow.state[i] = lanes.y[i, lane]
     show_clocks(lanes, lane, slow)
@@ -141,6 +145,8 @@ def strike(lanes, lane, batch, g, rate, slow):
     now, parameters = time_of_law(lanes, lane, batch), batch.param[who * batch.stride]
     reset(now, slow.state, parameters, slow.held, mode, mode, g, slow.out)
     restitution, closing = slow.out[0], slow.out[1]
+    if closing <= least:
+        closing = 0.0
     if not is_possible(g, slow.out):
         lanes.memo[lane, FAULT] = INVALID_RESTITUTION
         return
@@ -160,6 +166,8 @@ def strike(lanes, lane, batch, g, rate, slow):
         for i in range(NSTATES):
             slow.state[i] = lanes.y[i, lane]
         velocity = rate * lanes.side[g, lane]
+        if LAW[g] == IMPACT_LAW and restitution > 0.0:
+            lanes.run[FLIPPED, lane] = int(lanes.run[FLIPPED, lane]) | (1 << g)
         lanes.run[SLOWEST, lane] = min(lanes.run[SLOWEST, lane], abs(rate))
         note(lanes, lane, batch, g, IMPACT, int(-lanes.side[g, lane]), velocity, mode, 0.0, slow)
         turn_over(lanes, lane, batch, behind, slow)
@@ -452,7 +460,10 @@ def strays(lanes, lane, batch, slow):
     away = False
     for g in range(NGUARDS):
         held = PARTNER[g] >= 0 and LAW[g] != HOLD_LAW and lanes.side[PARTNER[g], lane] > 0.0
-        near = KEPT * (lanes.prior[PRIOR_ROWS * g + NEW, lane] + slow.gaps[4 * NGUARDS + g])
+        near = KEPT * (lanes.prior[PRIOR_ROWS * g + NEW, lane] + slow.gaps[SIZES * NGUARDS + g])
+        if held:  # where nothing can move the rounding of its acceleration does
+            size = lanes.prior[PRIOR_ROWS * PARTNER[g] + NEW, lane]
+            near += ROUNDING * size * lanes.run[END, lane] * lanes.run[END, lane]
         away = away or (held and not abs(slow.gaps[g]) <= near)
     return away
 
@@ -631,6 +642,9 @@ def release(lanes, lane, batch, h, slow):
             free = LAW[m] == SURFACE_LAW and lanes.side[WATCHED + m, lane] > 0.5
             if free and slow.gaps[m] == 0.0:
                 lanes.fresh[m, lane] = 2.0 if fades else 1.0
+            same = SNAP_STATE[m] == SNAP_STATE[g] and SNAP_STATE[g] >= 0
+            if same and fades and LAW[m] == NO_LAW and lanes.fresh[m, lane] > 0.5:
+                lanes.fresh[m, lane] = 3.0
     watch(lanes, lane)
     if lanes.run[CAUSE, lane] < 0.0:
         lanes.run[CAUSE, lane] = float(h)

@@ -138,6 +138,8 @@ KEPT = 2.0**-30
 RIDDEN = 1.25
 #: Said of the margin of a surface that begins to be held where it was at rest: nothing jumps.
 AT_REST = -1.0
+#: Block of `gaps` that holds the sizes of the gaps, if none of their terms cancelled.
+SIZES = 4
 #: Side of a guard on whose boundary the state is known to be, as `gaps` gets it.
 KNOWN = 2.0
 #: Rounds of flips at one instant before the contact is given up as sliding (EVENTS.md, rule 6).

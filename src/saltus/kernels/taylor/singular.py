@@ -207,9 +207,10 @@ def left_out(lanes, h, j):
     for i in range(NMOVED):
         rate, slope = load(lanes.probe_rate, i, LANES), load(lanes.probe_rate, NSTATES + i, LANES)
         defect = magnitude(rate - slope) - ROUNDING * load(lanes.probe_rate, 2 * NSTATES + i, LANES)
-        size = magnitude(load(lanes.work, i * (ORDER + 1), LANES)) + h * magnitude(
-            load(lanes.work, i * (ORDER + 1) + 1, LANES)
-        )
+        # where a stop lets go the rate of a velocity is the rounding of its terms
+        size = magnitude(load(lanes.work, i * (ORDER + 1) + 2, LANES))
+        for k in range(1, -1, -1):
+            size = fma(size, h, magnitude(load(lanes.work, i * (ORDER + 1) + k, LANES)))
         share = select(
             defect > 0.0,
             defect * h / (NEGLIGIBLE * size),

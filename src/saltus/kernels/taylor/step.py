@@ -12,6 +12,7 @@ from saltus.kernels.lanes import (
     larger,
     load,
     magnitude,
+    root,
     select,
     smaller,
     splat,
@@ -240,7 +241,7 @@ def land_simply(lanes, simple, tau):
         magnitude(load(found, RATE, LANES)),
         load(run, STEP, LANES),
     )
-    depth = rate * rate * h * h
+    depth = rate * h
     shallow, flipped = load(run, SHALLOW, LANES), load(run, FLIPPED, LANES)
     for g in range(NGUARDS):
         here = simple & (magnitude(which - g) < 0.5)
@@ -251,7 +252,7 @@ def land_simply(lanes, simple, tau):
         )
         size = load(prior, PRIOR_ROWS * g + NEW, LANES) + load(prior, PRIOR_ROWS * g + OLD, LANES)
         shallow = shallow + select(
-            here & (depth <= 2.0 * ROUNDING * size * curvature), splat(1.0, LANES), 0.0
+            here & (depth <= root(2.0 * ROUNDING * size) * root(curvature)), splat(1.0, LANES), 0.0
         )
         flipped = select(here, float(1 << g), flipped)
         side = load(lanes.side, g, LANES)

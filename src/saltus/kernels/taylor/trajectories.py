@@ -5,6 +5,7 @@ samples and ends of periods, emptied.
 import math
 
 from saltus.kernels.batch import Batch
+from saltus.kernels.isolation import ROUNDING
 from saltus.kernels.status import (
     BUDGET_EVENTS,
     BUDGET_STEPS,
@@ -243,12 +244,13 @@ def start_sides(lanes, lane, batch, slow):
         lanes.side[g, lane], lanes.fresh[g, lane] = -1.0, 0.0
     gaps_here(lanes, lane, batch, slow)
     for g in range(NGUARDS):
-        lanes.side[g, lane] = -1.0 if slow.gaps[g] < 0.0 else 1.0
-        lanes.fresh[g, lane] = 1.0 if slow.gaps[g] == 0.0 else 0.0
-        lanes.memo[lane, ALWAYS] |= (1 if slow.gaps[g] == 0.0 else 0) << g
+        zero = begins_at_zero(g, slow)
+        lanes.side[g, lane] = -1.0 if slow.gaps[g] < 0.0 and not zero else 1.0
+        lanes.fresh[g, lane] = 1.0 if zero else 0.0
+        lanes.memo[lane, ALWAYS] |= (1 if zero else 0) << g
         if LAW[g] == HOLD_LAW:
             lanes.side[g, lane], lanes.fresh[g, lane] = -1.0, 0.0
-        if LAW[g] == IMPACT_LAW and slow.gaps[g] == 0.0:
+        if LAW[g] == IMPACT_LAW and zero:
             lanes.side[g, lane] = LAW_SIDE[g]
     if LAWS:
         watch(lanes, lane)
@@ -259,7 +261,8 @@ def start_sides(lanes, lane, batch, slow):
         if LEVELS and pushes_on(lanes, lane, batch, time_of_law(lanes, lane, batch), slow):
             lanes.memo[lane, FAULT] = INVALID_FRICTION
         for g in range(NGUARDS):
-            if LAW[g] == IMPACT_LAW and slow.gaps[g] == 0.0 and slow.gaps[3 * NGUARDS + g] == 0.0:
+            slow_here = abs(slow.gaps[3 * NGUARDS + g]) <= ROUNDING * slow.gaps[5 * NGUARDS + g]
+            if LAW[g] == IMPACT_LAW and begins_at_zero(g, slow) and slow_here:
                 ask_for_paradox(lanes, lane, g, slow)
     lanes.run[STARTING, lane] = 1.0
     lanes.run[LANDED, lane] = lanes.clock[TAU, lane] + lanes.clock[BASE, lane]
