@@ -202,8 +202,13 @@ class ModalFlow:
                 rows[:] = begin.projection(int(mode[i]), held) @ rows
         twice, thrice = self._at_rest(given, state, drives, fresh), np.zeros(len(who), np.int64)
         for i in np.flatnonzero(zero.any(axis=1)).tolist():
-            up, slow, slower = self._ways(which, int(mode[i]), zero[i], state[i], time[i])
+            up, slow, slower, moves = self._ways(which, int(mode[i]), zero[i], state[i], time[i])
+            # with a rate a gap in rounding isn't zero either, if it is that of a motion
+            moves &= int((gap[i] != 0.0) @ bits) if state[i].any() else 0
+            up = (up & ~moves) | (moves & int((gap[i] > 0.0) @ bits))
             mode[i], twice[i], thrice[i] = mode[i] | up, twice[i] | slow, slower
+            fresh[i] &= ~moves
+            zero[i] &= (moves & bits) == 0
         batch.mode[who], batch.fresh[who] = mode, fresh
         carry = np.zeros((len(who), layout.AMPLITUDES))
         carry[:, layout.AT], carry[:, layout.ENTERS], carry[:, layout.STARTS] = -1.0, 1.0, 1.0
@@ -239,15 +244,16 @@ class ModalFlow:
 
     def _ways(
         self, which: int, mode: int, zero: np.ndarray, state: np.ndarray, time: float
-    ) -> tuple[int, int, int]:
+    ) -> tuple[int, int, int, int]:
         """Bits of the guards at zero whose gaps open upwards, by the first derivative that isn't
-        rounding; of those whose rate is zero, and of those whose second derivative is too.
+        rounding; of those whose rate is zero, of those whose second derivative is too, and of those
+        whose rate isn't.
         """
         given = self.tables.sets[which]
         piece = self.tables.piece_of(given, mode)
         values, sizes = self._drives_at(which, time)
         rate, size, steady = state, np.abs(state), piece.constant
-        open_, bits = set(np.flatnonzero(zero).tolist()), [0, 0, 0]
+        open_, bits = set(np.flatnonzero(zero).tolist()), [0] * 4
         for order in range(1, WAYS + 1):
             rate = piece.matrix @ rate + piece.driven @ values[order - 1] + steady
             size = (
@@ -263,9 +269,9 @@ class ModalFlow:
                 )
                 if abs(value) > order * least:
                     open_.discard(g)
-                    for k, holds in enumerate((value > 0, order > 1, order > 2)):
+                    for k, holds in enumerate((value > 0, order > 1, order > 2, order < 2)):
                         bits[k] |= int(holds) << g
-        return bits[0], bits[1], bits[2]
+        return bits[0], bits[1], bits[2], bits[3]
 
     def _drives_at(self, which: int, time: float) -> tuple[np.ndarray, np.ndarray]:
         """The drives and their derivatives at a time, and what their sizes are at most:

@@ -91,13 +91,17 @@ def first_place(lanes, lane, batch, g, h, slow, count):
     """
     if LAWS and lanes.side[WATCHED + g, lane] < 0.5:
         return 2.0 * h, count
-    noise, known = scaled_gap(lanes, lane, g, h, slow), int(lanes.fresh[g, lane])
-    fresh = known > 0
-    begins = begins_in_rounding(lanes, lane, g)
+    noise, begins = scaled_gap(lanes, lane, g, h, slow), begins_in_rounding(lanes, lane, g)
     if begins:
         noise = max(noise, ROUNDING * size_beyond(lanes, lane, batch, g, h, slow))
+    if lanes.fresh[g, lane] == DOUBTFUL:
+        begins = abs(slow.q[0]) <= noise
+        lanes.fresh[g, lane] = 1.0 if begins else 0.0
+        noise = noise if begins else scaled_gap(lanes, lane, g, h, slow)
+    known = int(lanes.fresh[g, lane])
+    fresh, beside = known > 0, max(noise, allowed_beside(lanes, lane, g))
     stays_on = fresh and LAW[g] != HOLD_LAW
-    if stays_on and abs(lanes.work[GAP_ROW + g, lane]) > allowed_beside(lanes, lane, g):
+    if stays_on and abs(lanes.work[GAP_ROW + g, lane]) > beside:
         lanes.memo[lane, FAULT] = MODE_VIOLATION
         return 2.0 * h, count
     sign = leading_sign(slow.q, ORDER)
@@ -345,10 +349,11 @@ def show_clocks(lanes, lane, slow):
 
 @inner
 def begins_at_zero(g, slow):
-    """True if a gap in slow.gaps is zero, or the rounding of terms that cancel."""
-    return abs(slow.gaps[g]) <= (
-        ROUNDING * slow.gaps[SIZES * NGUARDS + g] if SNAP_STATE[g] < 0 else 0.0
-    )
+    """True if a gap in slow.gaps is zero, or the rounding of terms that cancel. The velocities of
+    surfaces tell their sides.
+    """
+    told = SNAP_STATE[g] >= 0 or LAW[g] == SURFACE_LAW
+    return abs(slow.gaps[g]) <= (0.0 if told else ROUNDING * slow.gaps[SIZES * NGUARDS + g])
 
 
 @inner
@@ -522,6 +527,8 @@ def land(lanes, lane, batch, g, rate, slow):
     stood = lanes.found[DELTA, lane] == 0.0 and lanes.fresh[g, lane] > 0.5
     if stood and (lanes.run[CAUSE, lane] >= 0.0 or lanes.fresh[g, lane] == RIDDEN):
         crossed = int(lanes.run[CAUSE, lane])
+    if lanes.fresh[g, lane] < 0.5:  # it comes from one side, no time after the start or later
+        lanes.run[STARTING, lane] = 0.0
     snap(lanes, lane, g)
     change_side(lanes, lane, batch, g, rate, before, crossed, slow)
 

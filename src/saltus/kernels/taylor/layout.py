@@ -136,6 +136,9 @@ KEPT = 2.0**-30
 #: Value of `fresh` for a ridden boundary, if contacts have laws: one zero is known, and a motion
 #: that leaves it does so at once.
 RIDDEN = 1.25
+#: Value of `fresh` where a motion begins with a gap in rounding: a rate that isn't rounding tells
+#: that the gap isn't zero either, and its sign is the side.
+DOUBTFUL = 1.125
 #: Said of the margin of a surface that begins to be held where it was at rest: nothing jumps.
 AT_REST = -1.0
 #: Block of `gaps` that holds the sizes of the gaps, if none of their terms cancelled.

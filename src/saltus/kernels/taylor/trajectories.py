@@ -243,10 +243,14 @@ def start_sides(lanes, lane, batch, slow):
     for g in range(NGUARDS):
         lanes.side[g, lane], lanes.fresh[g, lane] = -1.0, 0.0
     gaps_here(lanes, lane, batch, slow)
+    moves = False
+    for i in range(NSTATES):
+        moves = moves or lanes.y[i, lane] != 0.0
     for g in range(NGUARDS):
         zero = begins_at_zero(g, slow)
-        lanes.side[g, lane] = -1.0 if slow.gaps[g] < 0.0 and not zero else 1.0
-        lanes.fresh[g, lane] = 1.0 if zero else 0.0
+        doubtful = moves and slow.gaps[g] != 0.0 and LAW[g] == NO_LAW
+        lanes.side[g, lane] = -1.0 if slow.gaps[g] < 0.0 else 1.0
+        lanes.fresh[g, lane] = (DOUBTFUL if doubtful else 1.0) if zero else 0.0
         lanes.memo[lane, ALWAYS] |= (1 if zero else 0) << g
         if LAW[g] == HOLD_LAW:
             lanes.side[g, lane], lanes.fresh[g, lane] = -1.0, 0.0
