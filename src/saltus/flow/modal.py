@@ -36,6 +36,8 @@ FIRST_STEP = 1.0 / 64
 #: grow with the states, not with their square. A slice of eighty states takes some forty
 #: milliseconds: at its end a thread may wait five for another one that runs Python.
 MOST_AT_ONCE = 600
+#: Statuses of a run that came to its end.
+ENDED = st.OK, st.RESTING, st.GRAZE_UNRESOLVED
 #: Terms of a gap's series by which the way from a boundary is told.
 WAYS = 12
 
@@ -97,8 +99,33 @@ class ModalFlow:
             self._begin(batch)
             self._look_up(batch)
             tables = self._sizes, *self.tables.arrays(self._names)
+        running = batch.status == st.RUNNING
         answer: int = self._kernel.propagate(*batch, budget, *tables, *self._work())
+        ended = np.flatnonzero(running & np.isin(batch.status, ENDED))
+        sets = batch.carry[ended, layout.SET].astype(int)
+        for which in np.unique(sets).tolist():
+            self._keep_sides(batch, ended[sets == which], which)
         return answer
+
+    def _keep_sides(self, batch: Batch, who: np.ndarray, which: int) -> None:
+        """Move ends that rounding put on the other side of a boundary, by rounding, to their side:
+        a run that begins there meets what this one hasn't met, and not again what it has.
+        """
+        tables, state = self.tables, batch.state[who, : self._states]
+        given = tables.sets[which]
+        drives = self._drives(given, _times(batch, who))
+        gap, noise = self._values(given.gaps, given, state, drives)
+        mode, fresh, carry = batch.mode[who, None], batch.fresh[who, None], batch.carry[who]
+        guards = np.arange(gap.shape[1])
+        stays = carry[:, [layout.RIDES]].astype(int) | carry[:, [layout.TWICE]].astype(int)
+        held = (mode >> np.maximum(tables.partners, 0)) & (tables.partners >= 0)
+        free = (tables.plain | (tables.allowed != 0)) & (((stays >> guards) | held) & 1 == 0)
+        side, met = np.where((mode >> guards) & 1, 1.0, -1.0), (fresh >> guards) & (gap == 0.0) != 0
+        near = free & ~met & (np.abs(gap) <= noise) & (side * gap < noise / 4)
+        for i, g in np.argwhere(near).tolist():
+            row = given.gaps.matrix[g]
+            j = int(np.argmax(np.abs(row)))
+            batch.state[who[i], j] += (side[i, g] * noise[i, g] / 4 - gap[i, g]) / row[j]
 
     def _look_up(self, batch: Batch) -> None:
         """Find the contact states that trajectories have come to: as many as the tables have room
@@ -164,7 +191,7 @@ class ModalFlow:
     def _begin_set(self, batch: Any, who: np.ndarray, which: int) -> None:
         """The same for trajectories with one set of parameter values."""
         given, state = self.tables.sets[which], batch.state[who, : self._states]
-        time = batch.origin[who] + batch.count[who] * batch.period[who] + batch.phase[who]
+        time = _times(batch, who)
         earliest = max((course.earliest for course in given.courses), default=-np.inf)
         if (time < earliest).any():
             raise ParameterError(
@@ -172,13 +199,9 @@ class ModalFlow:
                 f"{self.tables.linear.system.name} from {earliest:g} s on: ask for "
                 f"method=sl.Taylor(), or begin later."
             )
-        drives = np.column_stack(
-            [
-                np.cos(given.rates * time[:, None] + given.lags),
-                *(course.at(time)[0] for course in given.courses),
-            ]
-        )
-        gap, zero = self._values(given.gaps, given, state, drives)
+        drives = self._drives(given, time)
+        gap, noise = self._values(given.gaps, given, state, drives)
+        zero = np.abs(gap) <= noise
         bits, allowed, plain = 1 << np.arange(gap.shape[1]), self.tables.allowed, self.tables.plain
         beyond = ((gap * self.tables.limits > 0) & ~zero).any(axis=1)
         batch.status[who[beyond]] = st.INVALID
@@ -201,6 +224,8 @@ class ModalFlow:
                 rows = batch.state[who[i], self._states :].reshape(self._states, -1)
                 rows[:] = begin.projection(int(mode[i]), held) @ rows
         twice, thrice = self._at_rest(given, state, drives, fresh), np.zeros(len(who), np.int64)
+        within = ((gap * allowed > 0) & state.any(axis=1)[:, None]) @ bits if len(bits) else fresh
+        fresh &= ~(within & ~twice)
         for i in np.flatnonzero(zero.any(axis=1)).tolist():
             up, slow, slower, moves = self._ways(which, int(mode[i]), zero[i], state[i], time[i])
             # with a rate a gap in rounding isn't zero either, if it is that of a motion
@@ -219,24 +244,31 @@ class ModalFlow:
         batch.carry[who, : layout.AMPLITUDES] = carry
 
     @staticmethod
+    def _drives(given: ValueSet, time: np.ndarray) -> np.ndarray:
+        """The drives at some times, float64[times, drives]."""
+        waves = np.cos(given.rates * time[:, None] + given.lags)
+        return np.column_stack([waves, *(course.at(time)[0] for course in given.courses)])
+
+    @staticmethod
     def _values(
         of: LinearPiece, given: ValueSet, states: np.ndarray, drives: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Linear functions of states and drives, and which of them are rounding: that of a cosine
-        is absolute.
+        """Linear functions of states and drives, and their rounding: that of a cosine is
+        absolute.
         """
         values = states @ of.matrix.T + of.constant + drives @ of.driven.T
         most = np.abs(drives)
         most[:, : len(given.rates)] = 1.0
         size = np.abs(states) @ np.abs(of.matrix.T) + np.abs(of.constant)
         size += most @ np.abs(of.driven.T)
-        return values, np.abs(values) <= layout.ROUNDED * size
+        return values, layout.ROUNDED * size
 
     def _at_rest(
         self, given: ValueSet, states: np.ndarray, drives: np.ndarray, fresh: np.ndarray
     ) -> np.ndarray:
         """Bits of the stops among those in `fresh` that neither close nor open."""
-        _, slow = self._values(given.impacts.closing, given, states, drives)
+        closing, noise = self._values(given.impacts.closing, given, states, drives)
+        slow = np.abs(closing) <= noise
         bits = 1 << np.arange(slow.shape[1])
         stops = (self.tables.allowed != 0) & ((fresh[:, None] & bits) != 0)
         found: np.ndarray = (slow & stops) @ bits if slow.shape[1] else fresh
@@ -285,6 +317,12 @@ class ModalFlow:
             known = course.at(np.array(time))[: WAYS + 1]
             courses[: len(known), p] = known
         return np.hstack([waves.real, courses]), np.hstack([np.abs(waves), np.abs(courses)])
+
+
+def _times(batch: Batch, who: np.ndarray) -> np.ndarray:
+    """Absolute times of some trajectories [s]."""
+    times: np.ndarray = batch.origin[who] + batch.count[who] * batch.period[who] + batch.phase[who]
+    return times
 
 
 @functools.lru_cache(maxsize=64)

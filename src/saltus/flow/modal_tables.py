@@ -71,6 +71,7 @@ class Tables:
         self.holds, self.plain = kinds == HOLD_LAW, kinds == NO_LAW
         self.rubs, self.allowed = kinds == SURFACE_LAW, sides
         self.limits = self._laws[:, layout.LIMITS]
+        self.partners = self._laws[:, layout.PARTNER].astype(int)
         self._remembers = np.array(remembered(linear.system), np.int64)
         self._impacts = impacts_of(linear, linear.system.values)
         self.generation = 0

@@ -76,6 +76,13 @@ def know_nothing(i, batch):
 
 
 @inner
+def end_start(i, d, hits, batch):
+    """The start is over where time has passed, or a boundary is met that wasn't stood on."""
+    if d > 0.0 or hits & ~batch.fresh[i] != 0:
+        batch.carry[i, STARTS] = 0.0
+
+
+@inner
 def know_rides(i, batch, m):
     """Time has passed, and the state hasn't jumped: boundaries that were ridden go on to be."""
     fresh, twice, thrice = 0, int(batch.carry[i, TWICE]), int(batch.carry[i, THRICE])
@@ -190,6 +197,8 @@ def act(i, g, tau, d, hits, modes, steady, batch, m):
         know_rides(i, batch, m)
     elif d > 0.0:
         know_nothing(i, batch)
+    elif m.laws[g, KIND] == IMPACT_LAW:
+        end_start(i, d, 1 << g, batch)
     for other in range(m.sizes[GUARDS]):
         jumps = d == 0.0 and m.laws[other, KIND] == HOLD_LAW  # what presses it isn't zero
         if (hits >> other) & 1 and not jumps:

@@ -220,12 +220,12 @@ def land(i, tau, d, hits, modes, steady, batch, m):
     if law >= 0:
         return act(i, law, tau, d, hits, modes, steady, batch, m)
     state_at(i, tau, d, modes, steady, batch, m)
-    # a side at the start is no event
-    sides = hits & batch.fresh[i] if d == 0.0 and batch.carry[i, STARTS] > 0.5 else 0
-    for k in range(max(batch.cursor[i], 0) if sides != 0 else 0):
-        batch.sample_mode[i, k] = before ^ sides
+    end_start(i, d, hits, batch)
+    starts = batch.carry[i, STARTS] > 0.5  # a side at the start is no event
+    for k in range(max(batch.cursor[i], 0) if starts else 0):
+        batch.sample_mode[i, k] = before ^ hits
     for g in range(m.sizes[GUARDS]):
-        if ((hits & ~sides) >> g) & 1:
+        if not starts and (hits >> g) & 1:
             _, rate = gap_of_moved(m.row_of[g], modes, steady, which, m)
             rate *= m.sign_of[g]
             size = m.errors[m.row_of[g], 2] + abs(m.offset[which, g])

@@ -132,6 +132,8 @@ def strike(lanes, lane, batch, g, rate, slow):
     followed end at rest.
     """
     who, mode, known = lanes.memo[lane, WHO], mode_of(lanes, lane), lanes.fresh[g, lane]
+    if known < 0.5:  # it comes from within, no time after the start or later
+        lanes.run[STARTING, lane] = 0.0
     if LAW[g] == IMPACT_LAW or not carried_over(lanes, lane, g):
         snap(lanes, lane, g)
     least = 0.0

@@ -118,6 +118,36 @@ def final_contacts(lanes, lane, batch, slow):
                 land(lanes, lane, batch, g, rate, slow)
 
 
+@kernel
+def keep_sides(lanes, lane, batch, slow):
+    """Move an end on a boundary that rounding put on the side it came from, by rounding, to the
+    side on which the motion goes on: a run that begins there doesn't meet the contact again.
+    """
+    for g in range(NGUARDS):
+        met = lanes.fresh[g, lane] > 0.5 and lanes.fresh[g, lane] < RIDDEN and SNAP_STATE[g] < 0
+        if not met or LAW[g] != NO_LAW:
+            continue
+        most, inside = -1, side_here(lanes, lane, batch, g, slow)
+        wanted = 2.0e-16 * slow.gaps[SIZES * NGUARDS + g] - inside
+        change = 0.0
+        for i in range(NSTATES if inside < 0.0 else 0):
+            kept = lanes.y[i, lane]
+            lanes.y[i, lane] = kept * (1.0 + PROBED)
+            effect = side_here(lanes, lane, batch, g, slow) - inside
+            lanes.y[i, lane] = kept
+            if abs(effect) > abs(change):
+                most, change = i, effect
+        if abs(wanted) < KEPT * abs(change):
+            lanes.y[most, lane] *= 1.0 + PROBED * wanted / change
+
+
+@kernel
+def side_here(lanes, lane, batch, g, slow):
+    """Gap of a guard at the node, positive on its side; its size is in slow.gaps."""
+    gaps_here(lanes, lane, batch, slow)
+    return slow.gaps[g] * lanes.side[g, lane]
+
+
 @inner
 def end_stretch(lanes, lane, batch, slow):
     """The end of a period, or of the run. Returns the status."""
@@ -137,6 +167,7 @@ def end_stretch(lanes, lane, batch, slow):
     ):
         return RUNNING
     final_contacts(lanes, lane, batch, slow)
+    keep_sides(lanes, lane, batch, slow)
     if LAWS and lanes.memo[lane, FAULT] != 0:
         return lanes.memo[lane, FAULT]
     for g in range(NGUARDS):
@@ -248,7 +279,8 @@ def start_sides(lanes, lane, batch, slow):
         moves = moves or lanes.y[i, lane] != 0.0
     for g in range(NGUARDS):
         zero = begins_at_zero(g, slow)
-        doubtful = moves and slow.gaps[g] != 0.0 and LAW[g] == NO_LAW
+        past = LAW[g] == IMPACT_LAW and slow.gaps[g] * LAW_SIDE[g] < 0.0
+        doubtful = moves and slow.gaps[g] != 0.0 and not past
         lanes.side[g, lane] = -1.0 if slow.gaps[g] < 0.0 else 1.0
         lanes.fresh[g, lane] = (DOUBTFUL if doubtful else 1.0) if zero else 0.0
         lanes.memo[lane, ALWAYS] |= (1 if zero else 0) << g
