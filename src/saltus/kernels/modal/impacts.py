@@ -98,6 +98,7 @@ def end_impacts(i, stops, now, batch, m):
             snap(i, g, batch, m)
             stands = abs(closing_of(i, g, batch, m)) <= FELT * fastest
             know_zeros(i, g, 2 if stands else 1, batch)
+    turn_over(i, -1, now, batch, m)
     return True
 
 
