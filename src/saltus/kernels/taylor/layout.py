@@ -144,7 +144,7 @@ AT_REST = -1.0
 #: Block of `gaps` that holds the sizes of the gaps, if none of their terms cancelled.
 SIZES = 4
 #: Share of a state by which it is changed to see what that does to a gap.
-PROBED = 2.0**-12
+ALTERED = 2.0**-12
 #: Side of a guard on whose boundary the state is known to be, as `gaps` gets it.
 KNOWN = 2.0
 #: Rounds of flips at one instant before the contact is given up as sliding (EVENTS.md, rule 6).

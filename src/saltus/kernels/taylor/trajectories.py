@@ -132,13 +132,13 @@ def keep_sides(lanes, lane, batch, slow):
         change = 0.0
         for i in range(NSTATES if inside < 0.0 else 0):
             kept = lanes.y[i, lane]
-            lanes.y[i, lane] = kept * (1.0 + PROBED)
+            lanes.y[i, lane] = kept * (1.0 + ALTERED)
             effect = side_here(lanes, lane, batch, g, slow) - inside
             lanes.y[i, lane] = kept
             if abs(effect) > abs(change):
                 most, change = i, effect
         if abs(wanted) < KEPT * abs(change):
-            lanes.y[most, lane] *= 1.0 + PROBED * wanted / change
+            lanes.y[most, lane] *= 1.0 + ALTERED * wanted / change
 
 
 @kernel
