@@ -199,3 +199,43 @@ def test_derivatives_are_those_of_the_motion(system, seed):
     known = (ends[:, : len(start)] - ends[:, len(start) :]) / 2e-6
     apart = np.abs(found[0] - known)[:, :size].max()
     assert apart <= 1e-5 * np.abs(known).max()
+
+
+@sl.system(states="x y z u v w")
+def wedge(t, x, y, z, u, v, w, *, a=0.1, b=0.9, c=0.1, e=0.9, push=0.2, weight=1.0, slip=0.05):
+    """A body that slides on a floor into an overhanging wall, and rubs along z."""
+    return (
+        u, v, w, push, -weight, -sl.friction(w, slip=slip),
+        sl.impact(y > 0, -v, restitution=e),
+        sl.impact(a * x + b * y + c * z < 0, a * u + b * v + c * w, restitution=e,
+                  inertia={"u": 1.0, "v": 1.0, "w": 1.0}),
+    )  # fmt: skip
+
+
+def thrown_along(a, b, c, e, pairs):
+    """Speed -w after blows of the wall and the floor in turn, of a closing velocity of 1."""
+    velocity = np.array([1 / a, 0.0, 0.0])
+    for _ in range(pairs):
+        velocity -= (1 + e) * np.dot((a, b, c), velocity) * np.array([a, b, c])
+        velocity[1] = abs(velocity[1]) * e
+    return -velocity[2]
+
+
+def test_impacts_without_end_that_turn_a_friction_are_completed_on_its_other_side():
+    """Floor and wall throw the body to and fro at one instant, t = 1. After the 50 blows that are
+    taken one by one it slides along z as before; those that are completed at once turn it.
+    """
+    b, e, push, slip = 0.9995, 0.9, 0.2, 0.05
+    a = c = math.sqrt((1 - b * b) / 2)
+    some, every = (thrown_along(a, b, c, e, pairs) for pairs in (25, 5000))
+    share = (some + every) / 2
+    speed = share * a / (1 - share * c)
+    one = wedge.with_values(a=a, b=b, c=c, e=e, push=push, slip=slip)
+    start = (-1 + push / 2, 0.0, -speed - slip / 2, 1 - push, 0.0, speed + slip)
+    for run in runs(one, start, t_end=1.2):
+        assert str(run.status.values) == "ok"
+        left = speed - every * (a + c * speed)
+        assert left < 0
+        # on the wall and the floor it is moved along (c, 0, -a)
+        assert float(run.end_w) == pytest.approx(left - 0.2 * (push - slip) / 2, abs=1e-9)
+        assert float(run.end_u) == pytest.approx(-float(run.end_w), abs=1e-12)
