@@ -95,7 +95,7 @@ def first_place(lanes, lane, batch, g, h, slow, count):
     if begins:
         noise = max(noise, ROUNDING * size_beyond(lanes, lane, batch, g, h, slow))
     if lanes.fresh[g, lane] == DOUBTFUL:
-        begins = abs(slow.q[0]) <= noise
+        begins = slow.q[0] >= -noise  # what leaves to its side meets nothing
         lanes.fresh[g, lane] = 1.0 if begins else 0.0
         noise = noise if begins else scaled_gap(lanes, lane, g, h, slow)
     known = int(lanes.fresh[g, lane])

@@ -150,6 +150,9 @@ KNOWN = 2.0
 #: Rounds of flips at one instant before the contact is given up as sliding (EVENTS.md, rule 6).
 MOST_BOUNCES = 100
 HUGE = 1.0e300
+#: Largest number whose square is a number: larger ones are taken for it where contacts are asked
+#: whether they are shallow.
+LARGE = 1.0e150
 #: Highest term of a series that is summed by Horner's rule (even, and at most ORDER - 3).
 HORNER = min(8, ORDER - 4 - ORDER % 2)
 #: A probed step is at most this share of a period, or of an unforced span (MATLAB's default too).

@@ -12,7 +12,6 @@ from saltus.kernels.lanes import (
     larger,
     load,
     magnitude,
-    root,
     select,
     smaller,
     splat,
@@ -241,7 +240,8 @@ def land_simply(lanes, simple, tau):
         magnitude(load(found, RATE, LANES)),
         load(run, STEP, LANES),
     )
-    depth = rate * h
+    depth = smaller(rate * h, LARGE)
+    depth = depth * depth
     shallow, flipped = load(run, SHALLOW, LANES), load(run, FLIPPED, LANES)
     for g in range(NGUARDS):
         here = simple & (magnitude(which - g) < 0.5)
@@ -251,9 +251,8 @@ def land_simply(lanes, simple, tau):
             + 3.0 * magnitude(load(lanes.bounds, j + CUBIC, LANES))
         )
         size = load(prior, PRIOR_ROWS * g + NEW, LANES) + load(prior, PRIOR_ROWS * g + OLD, LANES)
-        shallow = shallow + select(
-            here & (depth <= root(2.0 * ROUNDING * size) * root(curvature)), splat(1.0, LANES), 0.0
-        )
+        below = 2.0 * ROUNDING * smaller(size, LARGE) * smaller(curvature, LARGE)
+        shallow = shallow + select(here & (depth <= below), splat(1.0, LANES), 0.0)
         flipped = select(here, float(1 << g), flipped)
         side = load(lanes.side, g, LANES)
         store(lanes.side, g, select(here, -side, side))
