@@ -21,6 +21,7 @@ import shutil
 import subprocess
 import sys
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -28,6 +29,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from websockets.extensions.permessage_deflate import PerMessageDeflate
+from websockets.frames import Frame, Opcode
 from websockets.sync.client import ClientConnection, connect
 
 import saltus as sl
@@ -53,6 +56,25 @@ DRAWING = (
 )  # fmt: skip
 
 
+#: Bytes of frames on the line, compressed or not, until they are read.
+WEIGHED: deque[int] = deque()
+
+
+def weighed(
+    self: PerMessageDeflate,
+    frame: Frame,
+    decode: Callable[..., Frame] = PerMessageDeflate.decode,
+    **named: Any,
+) -> Frame:
+    """A frame as it was before it was compressed, once it is weighed."""
+    if frame.opcode is Opcode.BINARY:
+        WEIGHED.append(len(frame.data))
+    return decode(self, frame, **named)
+
+
+PerMessageDeflate.decode = weighed  # type: ignore[method-assign]
+
+
 class Page:
     """A page without a picture.
 
@@ -74,14 +96,15 @@ class Page:
         return self._next
 
     def answers(self, number: int) -> Iterator[tuple[dict[str, Any], int]]:
-        """Heads of the answers to a question, with the bytes of each."""
+        """Heads of the answers to a question, with the bytes of each on the line."""
         while True:
             frame = self.line.recv()
             head, _ = unpacked(frame)  # type: ignore[arg-type]
+            size = WEIGHED.popleft()
             if head["kind"] == "map-piece":
                 self.line.send(json.dumps({"ask": "seen", "id": head["id"]}))
             if head["id"] == number:
-                yield head, len(frame)
+                yield head, size
             if head["id"] == number and head["kind"] in FAILED:
                 raise RuntimeError(head["why"])
             if head["id"] == number and head["kind"] in LAST and head.get("done", True):

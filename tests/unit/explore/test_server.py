@@ -8,6 +8,8 @@ import threading
 
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.extensions.permessage_deflate import PerMessageDeflate
+from websockets.frames import Opcode
 from websockets.sync.client import connect
 
 import saltus as sl
@@ -291,3 +293,29 @@ def test_work_that_outlasts_the_server_leaves_no_traceback(capfd):
             threading.Event().wait(0.01)
         one.stop()
     assert capfd.readouterr().err == ""
+
+
+# -- bytes -----------------------------------------------------------------------------------------
+def test_maps_are_compressed_and_motions_are_not(known, monkeypatch):
+    decode, weights = PerMessageDeflate.decode, []
+
+    def weighed(self, frame, **named):
+        if frame.opcode is Opcode.BINARY:
+            weights.append((len(frame.data), frame.rsv1))
+        return decode(self, frame, **named)
+
+    monkeypatch.setattr(PerMessageDeflate, "decode", weighed)
+    known.send(json.dumps({"ask": "motion", "id": 1, "start": [1e-3, 0.0]}))
+    motion = known.recv(timeout=60)
+    assert weights == [(len(motion), False)]
+    axes = {"x": [-5e-3, 5e-3], "v": [-1.0, 1.0]}
+    known.send(json.dumps({"ask": "map", "id": 2, "axes": axes, "size": [40, 40], "coarse": True}))
+    weights.clear()
+    sizes, head = [], {"kind": ""}
+    while head["kind"] != "map-end":
+        sizes.append(len(frame := known.recv(timeout=60)))
+        head, _ = unpacked(frame)
+        if head["kind"] == "map-piece":
+            known.send(json.dumps({"ask": "seen", "id": 2}))
+    assert all(compressed for _, compressed in weights)
+    assert sum(size for size, _ in weights) < 0.5 * sum(sizes)
