@@ -4,9 +4,11 @@ import type { Explorer } from "./explorer";
 import type { Question } from "./link";
 import { Agreement, Sheet } from "./sheets";
 
-/** Milliseconds of rest before a start is settled; between two coarse maps of a drag. */
+/** Milliseconds of rest before a start is settled; between two coarse maps of a drag, and at most if the first has no
+ *  cell yet: were it stopped again and again, none would come. */
 export const SETTLE = 300;
-const COARSE = 250;
+const COARSE = 250,
+  SLOW = 1000;
 
 export class Asks {
   constructor(private of: Explorer) {}
@@ -117,7 +119,8 @@ export class Asks {
   }
   askCoarse(): void {
     this.pickSheet();
-    const wait = this.of.coarse + COARSE - performance.now();
+    const sheet = this.of.map.sheet,
+      wait = this.of.coarse + (sheet && !sheet.known && !sheet.open ? SLOW : COARSE) - performance.now();
     if (wait <= 0) {
       this.of.coarse = performance.now();
       this.askMap(true);
