@@ -40,7 +40,7 @@ class MapsDeflated(Extension):
 
 
 class MapsDeflatedFactory(ServerPerMessageDeflateFactory):
-    """What agrees with a page on compression."""
+    """The server's side of the agreement on compression with a page."""
 
     def process_request_params(
         self, params: Sequence[ExtensionParameter], accepted_extensions: Sequence[Extension]
