@@ -11,8 +11,11 @@ def import_statements(
     for node in ast.iter_child_nodes(tree):
         if isinstance(node, ast.Import | ast.ImportFrom):
             yield node
-        elif isinstance(node, ast.stmt | ast.ExceptHandler | ast.match_case) and (
-            for_types
-            or not (isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING")
-        ):
+        elif isinstance(node, ast.If) and not for_types and _is_for_types(node):
+            continue
+        elif isinstance(node, ast.stmt | ast.ExceptHandler | ast.match_case):
             yield from import_statements(node, for_types)
+
+
+def _is_for_types(node: ast.If) -> bool:
+    return isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
