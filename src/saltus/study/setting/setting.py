@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from saltus import flow
 from saltus.errors import ParameterError, SaltusError, StudyError, nearest
+from saltus.flow.methods import default_method
 from saltus.study.setting import quantities
 from saltus.study.setting.curves import curve_of
 from saltus.study.setting.structures import structure_of
@@ -73,8 +74,13 @@ class Setting:
         return outputs or None
 
     def method(self, own: StudyTable | None, place: str) -> Any:
-        """Method of one question: its own, which the table ``place`` holds, or the study's."""
-        return method_of(self.study.method) if own is None else method_of(own, place)
+        """Method of one question: its own, which the table ``place`` holds, or the study's, or the
+        one that serves the system.
+        """
+        if own is not None:
+            return method_of(own, place)
+        given = self.study.method
+        return default_method(self.base) if given is None else method_of(given)
 
 
 def setting_of(study: Study, own: System | None, inputs: Inputs) -> Setting:
