@@ -78,9 +78,8 @@ class Setting:
         one that serves the system.
         """
         if own is not None:
-            return method_of(own, place)
-        given = self.study.method
-        return default_method(self.base) if given is None else method_of(given)
+            return method_of(own, self.base, place)
+        return method_of(self.study.method, self.base)
 
 
 def setting_of(study: Study, own: System | None, inputs: Inputs) -> Setting:
@@ -216,10 +215,12 @@ def _written(table: SystemTable, formulas: Formulas, header: Header | None) -> S
         raise fault("system", error) from None
 
 
-def method_of(table: StudyTable, place: str = "method") -> Any:
-    """The method that a table describes. Raises StudyError if it doesn't take one of
-    the options.
+def method_of(table: StudyTable | None, system: System, place: str = "method") -> Any:
+    """The method that a table describes; without one that which serves the system. Raises
+    StudyError if it doesn't take one of the options.
     """
+    if table is None:
+        return default_method(system)
     options = table.model_dump(exclude_unset=True)
     try:
         return getattr(flow, options.pop("name"))(**options)
