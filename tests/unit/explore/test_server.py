@@ -6,6 +6,7 @@ import random
 import socket
 import threading
 
+import numpy as np
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.extensions.permessage_deflate import PerMessageDeflate
@@ -296,7 +297,16 @@ def test_work_that_outlasts_the_server_leaves_no_traceback(capfd):
 
 
 # -- bytes -----------------------------------------------------------------------------------------
-def test_maps_are_compressed_and_motions_are_not(known, monkeypatch):
+class Even:
+    """A desk that answers a motion by one frame, a map by three pieces and an end."""
+
+    def answer(self, question, emit):
+        kinds = ["map-piece"] * 3 + ["map-end"] if question.ask == "map" else ["motion"]
+        for kind in kinds:
+            emit({"kind": kind}, {"step": np.ones(1000, "u1")})
+
+
+def test_maps_are_compressed_and_motions_are_not(monkeypatch):
     decode, weights = PerMessageDeflate.decode, []
 
     def weighed(self, frame, **named):
@@ -305,17 +315,19 @@ def test_maps_are_compressed_and_motions_are_not(known, monkeypatch):
         return decode(self, frame, **named)
 
     monkeypatch.setattr(PerMessageDeflate, "decode", weighed)
-    known.send(json.dumps({"ask": "motion", "id": 1, "start": [1e-3, 0.0]}))
-    motion = known.recv(timeout=60)
-    assert weights == [(len(motion), False)]
-    axes = {"x": [-5e-3, 5e-3], "v": [-1.0, 1.0]}
-    known.send(json.dumps({"ask": "map", "id": 2, "axes": axes, "size": [40, 40], "coarse": True}))
-    weights.clear()
-    sizes, head = [], {"kind": ""}
-    while head["kind"] != "map-end":
-        sizes.append(len(frame := known.recv(timeout=60)))
-        head, _ = unpacked(frame)
-        if head["kind"] == "map-piece":
-            known.send(json.dumps({"ask": "seen", "id": 2}))
-    assert all(compressed for _, compressed in weights)
-    assert sum(size for size, _ in weights) < 0.5 * sum(sizes)
+    server = Server(Even())
+    server.start()
+    try:
+        with page(server) as line:
+            line.send(hello(server))
+            assert heard(line)["kind"] == "hello"
+            line.send(json.dumps({"ask": "motion", "id": 1, "start": [1e-3, 0.0]}))
+            motion = line.recv(timeout=60)
+            assert weights[1:] == [(len(motion), False)]
+            axes = {"x": [-5e-3, 5e-3], "v": [-1.0, 1.0]}
+            line.send(json.dumps({"ask": "map", "id": 2, "axes": axes, "size": [40, 40]}))
+            sizes = [len(line.recv(timeout=60)) for _ in range(4)]
+    finally:
+        server.stop()
+    assert all(compressed for _, compressed in weights[2:])
+    assert sum(size for size, _ in weights[2:]) < 0.2 * sum(sizes)
