@@ -11,7 +11,6 @@ import saltus as sl
 from explorer_systems import van_der_pol
 from mad_page import mad_message
 from saltus.errors import SaltusError
-from saltus.explore import map as maps
 from saltus.explore import motion as motions
 from saltus.explore import orbits, responses
 from saltus.explore.attractors import Legend
@@ -22,6 +21,7 @@ from saltus.explore.opening import Opening, opening_of
 from saltus.explore.orbits import settled
 from saltus.explore.questions import QuestionError, question_of, read
 from saltus.explore.shown import shown
+from saltus.explore.studies import opening_of_study
 from saltus.interrupt import Interrupted, Stop, check_stop
 
 RIG = sl.models.delangre("b", force="4 N", frequency="15 Hz")
@@ -264,11 +264,15 @@ def test_a_hue_belongs_to_one_side_of_a_fold(desk, found):
 def test_responses_are_branches_and_their_points_are_orbits(desk, monkeypatch):
     monkeypatch.setattr(responses, "STARTS", 1)
     monkeypatch.setattr(responses, "VALUES", 1)
-    monkeypatch.setattr(maps, "LOOKED", 1)
+    monkeypatch.setattr(responses, "LOOKED", 1)
     one(desk, "settle", start={"x": "1 mm", "v": 0})
-    answers = asked(desk, "responses", parameter="frequency", range=[15.0, 15.1])
-    head, arrays = [one for one in answers if one[0]["kind"] == "responses"][-1]
+    question = {"ask": "responses", "parameter": "frequency", "range": [14.5, 15.1]}
+    head, arrays = asked(desk, **question)[-1]
     assert head["done"]
+    told, fresh = asked(desk_of(), **question)[-1]  # nothing was asked before
+    assert told["events"] == head["events"]
+    for name in fresh.keys() - {"point_hue"}:
+        np.testing.assert_array_equal(arrays[name], fresh[name])
     unstable = np.flatnonzero(arrays["point_stable"] == 0)
     for point in (int(unstable[0]), 0):
         orbit, samples = one(desk, "orbit", responses=head["key"], point=point)
@@ -281,15 +285,19 @@ def test_responses_are_branches_and_their_points_are_orbits(desk, monkeypatch):
         assert any(outside) != orbit["stable"]
     event, _ = one(desk, "orbit", responses=head["key"], event=0)
     assert event["event"] == head["events"][0]
-    again = asked(desk, "responses", parameter="frequency", range=[15.0, 15.1])
+    again = asked(desk, **question)
     assert [one[0]["key"] for one in again] == [head["key"]]  # kept
-    hue = one(desk, "settle", start={"x": "1 mm", "v": 0})[0]["attractor"]["hue"]
-    assert hue in arrays["point_hue"][arrays["point_period"] == 3]
-    view = {"responses": {"parameter": "frequency", "range": [15.0, 15.1], "quantity": "x"}}
+    view = {name: question[name] for name in ("parameter", "range")}
+    view = {"responses": {**view, "quantity": "x"}}
     starts = np.stack([*shown(desk, view)[0].starts.values()], axis=1)
     ds = desk.responses.get(head["key"])[1]
-    on = [one.points[0] for _, one in crossings(ds, RIG.with_values(frequency=15.05))]
-    assert on  # a study that is saved begins on each of them
+    both = [RIG.with_values(frequency=value) for value in (14.8, 15.0)]
+    on = [one.points[0] for here in both for _, one in crossings(ds, here)]
+    assert len(on) >= 2  # a study that is saved begins on each of them, once
+    assert len(np.unique(starts, axis=0)) == len(starts)
+    five = one(desk, "settle", start=on[-1].tolist())[0]["attractor"]
+    assert five["period"] == 5
+    assert set(arrays["point_hue"][arrays["point_stable"] == 1].tolist()) == {five["hue"]}
     assert all(np.abs(starts - point).max(axis=1).min() < 1e-12 for point in on)
 
 
@@ -426,3 +434,48 @@ def test_every_kind_of_model_opens_with_a_box_that_holds_its_motion(name):
     about, _ = one(Desk(opening, 1), "about")
     for row in about["parameters"]:
         assert row["low"] <= row["value"] <= row["high"] or row["value"] == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "axis", "side", "place"),
+    [("impact_oscillator", "x", 1, 1.0), ("rocking_block", "tilt", 0, 0.0)],
+)
+def test_a_map_ends_at_a_rigid_stop(name, axis, side, place):
+    ends = opening_of(sl.models.find(name)()).axes[axis]
+    assert ends[side] == place
+    assert ends[1 - side] == pytest.approx(-20.0 if side else 5.0)
+
+
+def test_a_study_with_a_record_opens_with_all_of_its_motion(tmp_path):
+    chain = 900.0 * (2 * np.eye(4) - np.eye(4, k=1) - np.eye(4, k=-1))
+    np.savez(tmp_path / "chain.npz", M=np.eye(4), K=chain, names=["w1", "w2", "w3", "w4"])
+    times = np.linspace(0, 3, 61)
+    np.savetxt(tmp_path / "quake.csv", np.column_stack([times, np.sin(9 * times)]), delimiter=",",
+        header="time [s],acceleration [m/s^2]", comments="")  # fmt: skip
+    (tmp_path / "study.toml").write_text(STUDY)
+    opening = opening_of_study(tmp_path / "study.toml")
+    slowest = 2 * np.pi / (2 * 30.0 * np.sin(np.pi / 10))
+    assert opening.turn == pytest.approx(slowest, rel=0.03)  # of two digits
+    assert opening.view["motion"]["periods"] == np.ceil(4 / opening.turn)
+    assert opening.method == sl.Modal()
+    largest = np.abs(sl.simulate(opening.system, t_end=4.0)["tip"].values).max()
+    assert largest < opening.box["tip"][1] < 30 * largest
+
+
+STUDY = """
+[study]
+name = "a record"
+
+[system.structure]
+mass = "chain.npz"
+modes = 4
+damping_ratio = "1 %"
+base = { direction = "w", amplitude = "quake(t)" }
+sensors = { tip = "w4" }
+
+[system.tables]
+quake = { file = "quake.csv", kind = "spline" }
+
+[simulate]
+t_end = "4 s"
+"""
