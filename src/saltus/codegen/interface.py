@@ -208,7 +208,7 @@ _MODAL_TABLES = (
     *(_I1, _I1, _F1, _F2, _F2, _F2, _F2, _F2, _I2, _F2, _F2),
     *(_I2, _F2, _F2, _I1, _F2, _F2),
 )
-_MODAL_WORK = (_F2,) * 6 + (_F1, _F2, _F2, _F1, _F1) + (_F2,) * 15 + (_F1, _F2, _I1)
+_MODAL_WORK = (_F2,) * 6 + (_F1, _F2, _F2, _F1, _F1) + (_F2,) * 15 + (_F1, _F2, _I1, _F2)
 
 #: The modal flow: what it needs of an equation are tables, which it is given.
 MODAL = Interface(

@@ -146,11 +146,13 @@ def put_off(i, k, tau, d, modes, steady, batch, m):
     drive(i, tau + d, batch, m)
     answer_now(steady, m)
     width = 2 * m.sizes[MODE_GROUPS]
-    row = m.queued[0] * (width + m.sizes[STATE_GROUPS])
+    row = m.queued[0] * (2 * width + m.sizes[STATE_GROUPS])
     for g in range(width):
         store(m.queue, row + g, load(m.moved, g, LANES))
+    if coordinates_of(modes, m) > 0:
+        rates_of_waves(modes, m.moved, m.queue, row + width, m)
     for s in range(m.sizes[STATE_GROUPS]):
-        store(m.queue, row + width + s, load(m.answer, s, LANES))
+        store(m.queue, row + 2 * width + s, load(m.answer, s, LANES))
     m.queued[0] += 1
 
 
@@ -162,14 +164,28 @@ def write_queue(i, k, modes, batch, m):
     width, states, count = 2 * m.sizes[MODE_GROUPS], m.sizes[STATES], m.queued[0]
     if count == 0:
         return
+    m.queued[0] = 0
+    coordinates = coordinates_of(modes, m)
+    for b in range((coordinates + LANES - 1) // LANES):
+        for p in range(count):
+            row = p * (2 * width + m.sizes[STATE_GROUPS])
+            block_of_coordinates(b, modes, m.queue, row, m.queue, row + width, m)
+            for j in range(min(LANES, coordinates - LANES * b)):
+                at = LANES * b + j
+                answer = number(m.queue, row + 2 * width, at)
+                batch.samples[i, k - count + p, at] = answer + total_of(m.sums, j)
+                at += coordinates
+                answer = number(m.queue, row + 2 * width, at)
+                batch.samples[i, k - count + p, at] = answer + total_of(m.sums, LANES + j)
+    if coordinates > 0:
+        return
     for s in range(m.sizes[STATE_GROUPS]):
         for p in range(count):
-            row = p * (width + m.sizes[STATE_GROUPS])
-            answer = load(m.queue, row + width + s, LANES)
+            row = p * (2 * width + m.sizes[STATE_GROUPS])
+            answer = load(m.queue, row + 2 * width + s, LANES)
             store(m.sums, 0, group_of_states(s, modes, m.queue, row, answer, m))
             for j in range(min(LANES, states - LANES * s)):
                 batch.samples[i, k - count + p, LANES * s + j] = m.sums[0, j]
-    m.queued[0] = 0
 
 
 # -- one trajectory --------------------------------------------------------------------------------
@@ -389,7 +405,7 @@ def propagate(
     lag, modes, steady, links, course, pieces, laws, acts, presses, remembers, varied, shifts, y,
     moved, size, sums, q, errors, p, bern, bounds, slopes, out, touches, place, answer, angle,
     found, chain, follows, factor, column, columns, struck, bernstein, stood, waves, spans, near,
-    queue, queued,
+    queue, queued, rates,
 ):  # fmt: skip
     """Move every trajectory whose status is RUNNING and whose contact state has been made, `budget`
     steps at most. See kernels/batch.py for the arrays.
@@ -403,7 +419,7 @@ def propagate(
         sizes, row_of, sign_of, offset, rate, lag, modes, steady, links, course, pieces, laws, acts,
         presses, remembers, varied, shifts, y, moved, size, sums, q, errors, p, bern, bounds,
         slopes, out, touches, place, answer, angle, found, chain, follows, factor, column, columns,
-        struck, bernstein, stood, waves, spans, near, queue, queued,
+        struck, bernstein, stood, waves, spans, near, queue, queued, rates,
     )  # fmt: skip
     waits = False
     for i in range(status.shape[0]):
