@@ -34,7 +34,7 @@ MOST_BYTES = 2**30
 #: Memory of a set of parameter values besides its arrays [bytes].
 SET_BYTES = 4096
 #: Modes from which on L and V share the shapes: fewer lie near anyway.
-SHARED = 8
+SHARED = 32
 #: Rounding of a coefficient of the equations, relative to it.
 ROUNDED = 16 * np.finfo(float).eps
 
@@ -407,16 +407,18 @@ class Tables:
         return self.steady.add(np.concatenate([*states, flat]))
 
 
-def _shapes(
-    shared: tuple[np.ndarray, np.ndarray], to_states: np.ndarray, size: int
-) -> np.ndarray:
+def _shapes(shared: tuple[np.ndarray, np.ndarray], to_states: np.ndarray, size: int) -> np.ndarray:
     """What stands in place of L where the modes are those of coordinates and their rates: see
     kernels/modal/series.py. float64[size].
     """
     scale, damping = shared
     slots, width = len(scale), to_states.shape[1]
     count = -(-slots // LANES) * LANES
-    shapes, factors, rates = np.zeros((count, width), complex), np.zeros(width, complex), np.zeros(count)
+    shapes, factors, rates = (
+        np.zeros((count, width), complex),
+        np.zeros(width, complex),
+        np.zeros(count),
+    )
     shapes[:slots], factors[:slots], rates[:slots] = to_states[:slots], scale / 2, damping
     shapes = shapes.reshape(-1, LANES, width // LANES, LANES).transpose(0, 2, 1, 3)
     parts = np.stack([shapes.real, shapes.imag], axis=3)

@@ -124,8 +124,9 @@ def less_answer(m):
 def amplitudes_of(modes, y, m):
     """Amplitudes of what is in `state`, to y: L z."""
     groups, count = m.sizes[MODE_GROUPS], LANES * m.sizes[STATE_GROUPS]
-    if coordinates_of(modes, m) > 0:
-        amplitudes_of_shapes(modes, y, m)
+    coordinates = coordinates_of(modes, m)
+    if coordinates > 0:
+        amplitudes_of_shapes(modes, coordinates, y, m)
         return
     for g in range(2 * groups):
         runs = runs_of(modes, m) + g % groups
@@ -179,9 +180,9 @@ def state_of(modes, y, m):
     """The state that some amplitudes are, to `state`: z_p + Re(V y). Needs `answer`."""
     count = coordinates_of(modes, m)
     if count > 0:
-        rates_of_waves(modes, y, m.rates, 0, m)
+        rates_of_waves(modes, y, m)
         for b in range((count + LANES - 1) // LANES):
-            block_of_coordinates(b, modes, y, 0, m.rates, 0, m)
+            coordinates_and_rates(b, modes, y, 0, m.rates, 0, m)
             for j in range(min(LANES, count - LANES * b)):
                 q, v = LANES * b + j, count + LANES * b + j
                 m.state[q // LANES, q % LANES] = number(m.answer, 0, q) + total_of(m.sums, j)
@@ -196,109 +197,105 @@ def state_of(modes, y, m):
 # -- structures: coordinates and their rates -------------------------------------------------------
 @inner
 def coordinates_of(modes, m):
-    """Number of coordinates, if the states are these and their rates, and damping couples none: V
-    is (U, U lambda) then, and L is s (lambda U' + U' C, U'). In place of L stands U: for each
-    LANES coordinates and group of modes a row of real parts and one of imaginary parts for each
-    coordinate; then s, and C. In place of V stands nothing. Else 0.
+    """Number of coordinates q, if the states are q and q', damping couples none, and they are many:
+    V is (U, U lambda) then, L is s (lambda U' + U' C, U'). In place of L stands U: of each block of
+    LANES coordinates and group of modes, for each coordinate a row of real parts and one of
+    imaginary ones; then the factors s, and C. In place of V stands nothing. Else 0.
     """
     return int(m.modes[block_of(modes, m), 3])
 
 
 @inner
-def shapes_of(modes, b, m):
-    """First row of U for a group of coordinates."""
-    groups = m.sizes[MODE_GROUPS]
-    return modes + 3 * groups + 2 * LANES * groups * b
+def shapes_of(modes, block, m):
+    """First row of U for a block of LANES coordinates."""
+    return modes + (3 + 2 * LANES * block) * m.sizes[MODE_GROUPS]
+
+
+@inner
+def onto(row, v, q, a, b, c, d, m):
+    """What a coordinate and its rate add to U' (v + C q), a + i b, and to U' q, c + i d."""
+    real, imaginary = load(m.modes, row, LANES), load(m.modes, row + 1, LANES)
+    return fma(real, v, a), fma(imaginary, v, b), fma(real, q, c), fma(imaginary, q, d)
 
 
 @kernel
-def amplitudes_of_shapes(modes, y, m):
+def amplitudes_of_shapes(modes, count, y, m):
     """Amplitudes of coordinates q and rates v in `state`, to y: s (U' (v + C q) + lambda U' q)."""
-    groups, count = m.sizes[MODE_GROUPS], coordinates_of(modes, m)
-    blocks = (count + LANES - 1) // LANES
+    groups, blocks, last = m.sizes[MODE_GROUPS], (count + LANES - 1) // LANES, 2 * count - 1
     scale = shapes_of(modes, blocks, m)
     for g in range(4 * groups):
         store(m.rates, g, splat(0.0, LANES))
-    for b in range(blocks):
-        runs, last = runs_of(modes, m) + groups + b, 2 * count - 1
-        damping, q, v = scale + 2 * groups + b, LANES * b, count + LANES * b
-        q0, q1 = number(m.state, 0, q), number(m.state, 0, min(q + 1, last))
-        q2, q3 = number(m.state, 0, min(q + 2, last)), number(m.state, 0, min(q + 3, last))
-        v0, v1 = number(m.state, 0, v), number(m.state, 0, min(v + 1, last))
-        v2, v3 = number(m.state, 0, min(v + 2, last)), number(m.state, 0, min(v + 3, last))
-        v0, v1 = v0 + m.modes[damping, 0] * q0, v1 + m.modes[damping, 1] * q1
-        v2, v3 = v2 + m.modes[damping, 2] * q2, v3 + m.modes[damping, 3] * q3
+    for block in range(blocks):
+        runs, first = runs_of(modes, m) + groups + block, shapes_of(modes, block, m)
+        damping, q, v = scale + 2 * groups + block, LANES * block, count + LANES * block
+        q0, q1 = number(m.state, 0, q), number(m.state, 0, q + 1)
+        q2, q3 = number(m.state, 0, q + 2), number(m.state, 0, q + 3)
+        v0 = number(m.state, 0, v) + m.modes[damping, 0] * q0
+        v1 = number(m.state, 0, min(v + 1, last)) + m.modes[damping, 1] * q1
+        v2 = number(m.state, 0, min(v + 2, last)) + m.modes[damping, 2] * q2
+        v3 = number(m.state, 0, min(v + 3, last)) + m.modes[damping, 3] * q3
         for run in range(0, LANES, 2):
             for g in range(int(m.modes[runs, run]), int(m.modes[runs, run + 1])):
-                row = shapes_of(modes, b, m) + 2 * LANES * g
-                c, d = load(m.rates, 4 * g, LANES), load(m.rates, 4 * g + 1, LANES)
-                e, f = load(m.rates, 4 * g + 2, LANES), load(m.rates, 4 * g + 3, LANES)
-                real, imaginary = load(m.modes, row, LANES), load(m.modes, row + 1, LANES)
-                c, d = fma(real, v0, c), fma(imaginary, v0, d)
-                e, f = fma(real, q0, e), fma(imaginary, q0, f)
-                real, imaginary = load(m.modes, row + 2, LANES), load(m.modes, row + 3, LANES)
-                c, d = fma(real, v1, c), fma(imaginary, v1, d)
-                e, f = fma(real, q1, e), fma(imaginary, q1, f)
-                real, imaginary = load(m.modes, row + 4, LANES), load(m.modes, row + 5, LANES)
-                c, d = fma(real, v2, c), fma(imaginary, v2, d)
-                e, f = fma(real, q2, e), fma(imaginary, q2, f)
-                real, imaginary = load(m.modes, row + 6, LANES), load(m.modes, row + 7, LANES)
-                c, d = fma(real, v3, c), fma(imaginary, v3, d)
-                e, f = fma(real, q3, e), fma(imaginary, q3, f)
-                store(m.rates, 4 * g, c)
-                store(m.rates, 4 * g + 1, d)
-                store(m.rates, 4 * g + 2, e)
-                store(m.rates, 4 * g + 3, f)
+                row, to = first + 2 * LANES * g, 4 * g
+                a, b = load(m.rates, to, LANES), load(m.rates, to + 1, LANES)
+                c, d = load(m.rates, to + 2, LANES), load(m.rates, to + 3, LANES)
+                a, b, c, d = onto(row, v0, q0, a, b, c, d, m)
+                a, b, c, d = onto(row + 2, v1, q1, a, b, c, d, m)
+                a, b, c, d = onto(row + 4, v2, q2, a, b, c, d, m)
+                a, b, c, d = onto(row + 6, v3, q3, a, b, c, d, m)
+                store(m.rates, to, a)
+                store(m.rates, to + 1, b)
+                store(m.rates, to + 2, c)
+                store(m.rates, to + 3, d)
     for g in range(groups):
         a, b = load(m.modes, modes + g, LANES), load(m.modes, modes + groups + g, LANES)
-        c, d = load(m.rates, 4 * g, LANES), load(m.rates, 4 * g + 1, LANES)
-        e, f = load(m.rates, 4 * g + 2, LANES), load(m.rates, 4 * g + 3, LANES)
-        real, imaginary = fma(-b, f, fma(a, e, c)), fma(b, e, fma(a, f, d))
-        a, b = load(m.modes, scale + g, LANES), load(m.modes, scale + groups + g, LANES)
-        store(y, g, fma(-b, imaginary, a * real))
-        store(y, groups + g, fma(b, real, a * imaginary))
+        c, d = load(m.rates, 4 * g + 2, LANES), load(m.rates, 4 * g + 3, LANES)
+        store(y, g, fma(-b, d, fma(a, c, load(m.rates, 4 * g, LANES))))
+        store(y, groups + g, fma(b, c, fma(a, d, load(m.rates, 4 * g + 1, LANES))))
+        turn(y, g, load(m.modes, scale + g, LANES), load(m.modes, scale + groups + g, LANES), y, m)
 
 
 @inner
-def rates_of_waves(modes, y, to, at, m):
-    """The rates of amplitudes, lambda y, to the rows of `to` from `at` on."""
+def rates_of_waves(modes, y, m):
+    """The rates of amplitudes, lambda y, to `rates`."""
     groups = m.sizes[MODE_GROUPS]
     for g in range(groups):
         a, b = load(m.modes, modes + g, LANES), load(m.modes, modes + groups + g, LANES)
-        real, imaginary = load(y, g, LANES), load(y, groups + g, LANES)
-        store(to, at + g, fma(-imaginary, b, real * a))
-        store(to, at + groups + g, fma(imaginary, a, real * b))
+        turn(y, g, a, b, m.rates, m)
 
 
 @inner
-def block_of_coordinates(b, modes, y, at, rates, row, m):
+def along(row, a, b, c, d, q, v, m):
+    """What amplitudes a + i b and their rates c + i d add to a coordinate and its rate."""
+    real, imaginary = load(m.modes, row, LANES), load(m.modes, row + 1, LANES)
+    return fma(-imaginary, b, fma(real, a, q)), fma(-imaginary, d, fma(real, c, v))
+
+
+@inner
+def coordinates_and_rates(block, modes, y, at, rates, row, m):
     """LANES coordinates without the answer, Re(U y) of the amplitudes in the rows of y from `at`
-    on, and their rates by those of the amplitudes: lanes that add up to them, to `sums`.
+    on, and their rates by those of the amplitudes: lanes that add up to each, to `sums`.
     """
-    groups, runs = m.sizes[MODE_GROUPS], runs_of(modes, m) + m.sizes[MODE_GROUPS] + b
-    q0, q1, q2, q3 = splat(0.0, LANES), splat(0.0, LANES), splat(0.0, LANES), splat(0.0, LANES)
-    v0, v1, v2, v3 = splat(0.0, LANES), splat(0.0, LANES), splat(0.0, LANES), splat(0.0, LANES)
+    groups, runs = m.sizes[MODE_GROUPS], runs_of(modes, m) + m.sizes[MODE_GROUPS] + block
+    first, zero = shapes_of(modes, block, m), splat(0.0, LANES)
+    q0, q1, q2, q3, v0, v1, v2, v3 = zero, zero, zero, zero, zero, zero, zero, zero
     for run in range(0, LANES, 2):
         for g in range(int(m.modes[runs, run]), int(m.modes[runs, run + 1])):
-            k = shapes_of(modes, b, m) + 2 * LANES * g
-            c, d = load(y, at + g, LANES), load(y, at + groups + g, LANES)
-            e, f = load(rates, row + g, LANES), load(rates, row + groups + g, LANES)
-            real, imaginary = load(m.modes, k, LANES), load(m.modes, k + 1, LANES)
-            q0, v0 = fma(-imaginary, d, fma(real, c, q0)), fma(-imaginary, f, fma(real, e, v0))
-            real, imaginary = load(m.modes, k + 2, LANES), load(m.modes, k + 3, LANES)
-            q1, v1 = fma(-imaginary, d, fma(real, c, q1)), fma(-imaginary, f, fma(real, e, v1))
-            real, imaginary = load(m.modes, k + 4, LANES), load(m.modes, k + 5, LANES)
-            q2, v2 = fma(-imaginary, d, fma(real, c, q2)), fma(-imaginary, f, fma(real, e, v2))
-            real, imaginary = load(m.modes, k + 6, LANES), load(m.modes, k + 7, LANES)
-            q3, v3 = fma(-imaginary, d, fma(real, c, q3)), fma(-imaginary, f, fma(real, e, v3))
+            k = first + 2 * LANES * g
+            a, b = load(y, at + g, LANES), load(y, at + groups + g, LANES)
+            c, d = load(rates, row + g, LANES), load(rates, row + groups + g, LANES)
+            q0, v0 = along(k, a, b, c, d, q0, v0, m)
+            q1, v1 = along(k + 2, a, b, c, d, q1, v1, m)
+            q2, v2 = along(k + 4, a, b, c, d, q2, v2, m)
+            q3, v3 = along(k + 6, a, b, c, d, q3, v3, m)
     store(m.sums, 0, q0)
     store(m.sums, 1, q1)
     store(m.sums, 2, q2)
     store(m.sums, 3, q3)
-    store(m.sums, LANES, v0)
-    store(m.sums, LANES + 1, v1)
-    store(m.sums, LANES + 2, v2)
-    store(m.sums, LANES + 3, v3)
+    store(m.sums, 4, v0)
+    store(m.sums, 5, v1)
+    store(m.sums, 6, v2)
+    store(m.sums, 7, v3)
 
 
 @inner

@@ -147,10 +147,10 @@ def put_off(i, k, tau, d, modes, steady, batch, m):
     answer_now(steady, m)
     width = 2 * m.sizes[MODE_GROUPS]
     row = m.queued[0] * (2 * width + m.sizes[STATE_GROUPS])
+    rates_of_waves(modes, m.moved, m)
     for g in range(width):
         store(m.queue, row + g, load(m.moved, g, LANES))
-    if coordinates_of(modes, m) > 0:
-        rates_of_waves(modes, m.moved, m.queue, row + width, m)
+        store(m.queue, row + width + g, load(m.rates, g, LANES))
     for s in range(m.sizes[STATE_GROUPS]):
         store(m.queue, row + 2 * width + s, load(m.answer, s, LANES))
     m.queued[0] += 1
@@ -169,7 +169,7 @@ def write_queue(i, k, modes, batch, m):
     for b in range((coordinates + LANES - 1) // LANES):
         for p in range(count):
             row = p * (2 * width + m.sizes[STATE_GROUPS])
-            block_of_coordinates(b, modes, m.queue, row, m.queue, row + width, m)
+            coordinates_and_rates(b, modes, m.queue, row, m.queue, row + width, m)
             for j in range(min(LANES, coordinates - LANES * b)):
                 at = LANES * b + j
                 answer = number(m.queue, row + 2 * width, at)
