@@ -80,7 +80,8 @@ def check_legs(system, run, parts):
 
 
 @pytest.mark.parametrize(("seed", "degrees", "contacts"), [(1, 9, 1), (2, 14, 3), (3, 33, 2)])
-def test_legs_of_many_modes_are_those_of_matrix_exponentials(seed, degrees, contacts):
+def test_legs_of_many_modes_are_those_of_matrix_exponentials(seed, degrees, contacts, monkeypatch):
+    monkeypatch.setattr(modal_tables, "SHARED", 33)
     system = spread(20261126 + seed, degrees, contacts)
     run = sl.simulate(system, periods=20, progress=False, method=sl.Modal(), time_errors="local")
     assert str(run.status.values) == "ok"

@@ -16,7 +16,7 @@ from saltus.flow.modal_eigen import Eigen, half_of, shared_of, slots_of
 from saltus.flow.modal_laws import laws_of
 from saltus.flow.modal_modes import Known, StateModes, modes_of, spread_over
 from saltus.flow.modal_parameters import ParameterTables
-from saltus.flow.modal_rows import Links, Rows, runs_of
+from saltus.flow.modal_rows import Links, Rows, runs_of, shapes_table
 from saltus.flow.modal_values import ValueSet
 from saltus.kernels.modal import layout
 from saltus.kernels.status import HOLD_LAW, NO_LAW, SURFACE_LAW
@@ -33,8 +33,9 @@ from saltus.system.quantity import remembered
 MOST_BYTES = 2**30
 #: Memory of a set of parameter values besides its arrays [bytes].
 SET_BYTES = 4096
-#: Modes from which on L and V share the shapes: fewer lie near anyway.
-SHARED = 32
+#: Modes from which on L and V share the shapes: with 60, all contact states of a beam against eight
+#: stops lie in a cache.
+SHARED = 64
 #: Rounding of a coefficient of the equations, relative to it.
 ROUNDED = 16 * np.finfo(float).eps
 
@@ -365,7 +366,8 @@ class Tables:
         eigen = values, modes.vectors, modes.inverse
         shared = shared_of(matrix, eigen) if slots >= SHARED and modes.block is None else None
         if shared is not None:
-            left, right = _shapes(shared, to_states, left.size), np.zeros(right.shape)
+            left = shapes_table(*shared, to_states, LANES, left.size)
+            right = np.zeros(right.shape)
         gaps = gaps[self.first_guard]
         rows = gaps @ to_states[:states]
         waves = np.stack([rows.real, rows.imag, np.abs(rows)], axis=1)
@@ -405,25 +407,6 @@ class Tables:
         flat = np.array(numbers).T.ravel()
         flat = np.concatenate([flat, np.zeros(-len(flat) % LANES)])
         return self.steady.add(np.concatenate([*states, flat]))
-
-
-def _shapes(shared: tuple[np.ndarray, np.ndarray], to_states: np.ndarray, size: int) -> np.ndarray:
-    """What stands in place of L where the modes are those of coordinates and their rates: see
-    kernels/modal/series.py. float64[size].
-    """
-    scale, damping = shared
-    slots, width = len(scale), to_states.shape[1]
-    count = -(-slots // LANES) * LANES
-    shapes, factors, rates = (
-        np.zeros((count, width), complex),
-        np.zeros(width, complex),
-        np.zeros(count),
-    )
-    shapes[:slots], factors[:slots], rates[:slots] = to_states[:slots], scale / 2, damping
-    shapes = shapes.reshape(-1, LANES, width // LANES, LANES).transpose(0, 2, 1, 3)
-    parts = np.stack([shapes.real, shapes.imag], axis=3)
-    flat = np.concatenate([one.ravel() for one in (parts, factors.real, factors.imag, rates)])
-    return np.concatenate([flat, np.zeros(size - len(flat))])
 
 
 def _numbers(matrix: np.ndarray) -> np.ndarray:

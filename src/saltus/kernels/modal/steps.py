@@ -147,10 +147,12 @@ def put_off(i, k, tau, d, modes, steady, batch, m):
     answer_now(steady, m)
     width = 2 * m.sizes[MODE_GROUPS]
     row = m.queued[0] * (2 * width + m.sizes[STATE_GROUPS])
-    rates_of_waves(modes, m.moved, m)
     for g in range(width):
         store(m.queue, row + g, load(m.moved, g, LANES))
-        store(m.queue, row + width + g, load(m.rates, g, LANES))
+    if coordinates_of(modes, m) > 0:
+        rates_of_waves(modes, m.moved, m)
+        for g in range(width):
+            store(m.queue, row + width + g, load(m.rates, g, LANES))
     for s in range(m.sizes[STATE_GROUPS]):
         store(m.queue, row + 2 * width + s, load(m.answer, s, LANES))
     m.queued[0] += 1
