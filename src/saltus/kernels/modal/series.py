@@ -178,16 +178,9 @@ def group_of_states(s, modes, y, at, answer, m):
 @kernel
 def state_of(modes, y, m):
     """The state that some amplitudes are, to `state`: z_p + Re(V y). Needs `answer`."""
-    count = coordinates_of(modes, m)
-    if count > 0:
-        rates_of_waves(modes, y, m)
-        for b in range((count + LANES - 1) // LANES):
-            coordinates_and_rates(b, modes, y, 0, m.rates, 0, m)
-            for j in range(min(LANES, count - LANES * b)):
-                q, v = LANES * b + j, count + LANES * b + j
-                m.state[q // LANES, q % LANES] = number(m.answer, 0, q) + total_of(m.sums, j)
-                speed = number(m.answer, 0, v) + total_of(m.sums, LANES + j)
-                m.state[v // LANES, v % LANES] = speed
+    coordinates = coordinates_of(modes, m)
+    if coordinates > 0:
+        state_of_shapes(modes, coordinates, y, m)
         return
     for s in range(m.sizes[STATE_GROUPS]):
         store(m.state, s, group_of_states(s, modes, y, 0, load(m.answer, s, LANES), m))
@@ -253,6 +246,19 @@ def amplitudes_of_shapes(modes, count, y, m):
         store(y, g, fma(-b, d, fma(a, c, load(m.rates, 4 * g, LANES))))
         store(y, groups + g, fma(b, c, fma(a, d, load(m.rates, 4 * g + 1, LANES))))
         turn(y, g, load(m.modes, scale + g, LANES), load(m.modes, scale + groups + g, LANES), y, m)
+
+
+@kernel
+def state_of_shapes(modes, count, y, m):
+    """The coordinates and rates that some amplitudes are, to `state`."""
+    rates_of_waves(modes, y, m)
+    for b in range((count + LANES - 1) // LANES):
+        coordinates_and_rates(b, modes, y, 0, m.rates, 0, m)
+        for j in range(min(LANES, count - LANES * b)):
+            q, v = LANES * b + j, count + LANES * b + j
+            m.state[q // LANES, q % LANES] = number(m.answer, 0, q) + total_of(m.sums, j)
+            speed = number(m.answer, 0, v) + total_of(m.sums, LANES + j)
+            m.state[v // LANES, v % LANES] = speed
 
 
 @inner

@@ -104,17 +104,30 @@ def state_after(i, tau, d, modes, steady, batch, m):
     state_of(modes, m.moved, m)
 
 
-@kernel
+@inner
+def due_at(i, k, batch):
+    """Time of the period at which a sample is due [s]: infinite if that isn't in this one."""
+    if not 0 <= k < batch.sample_count.shape[0] or batch.sample_count[k] > batch.count[i]:
+        return math.inf
+    due = (batch.sample_count[k] - batch.count[i]) * batch.period[i]
+    return due + batch.sample_fraction[k] * batch.period[i]
+
+
+@inner
 def take_samples(i, tau, until, modes, steady, batch, m):
+    """Take the samples due up to a time of the period, if there are any: a call takes long."""
+    if due_at(i, batch.cursor[i], batch) <= until:
+        take_due(i, tau, until, modes, steady, batch, m)
+
+
+@kernel
+def take_due(i, tau, until, modes, steady, batch, m):
     """Take the samples due up to a time of the period from the amplitudes at tau: their states are
     written together, when the queue is full or the contact state ends.
     """
     k = batch.cursor[i]
-    while 0 <= k < batch.sample_count.shape[0] and batch.sample_count[k] <= batch.count[i]:
-        due = (batch.sample_count[k] - batch.count[i]) * batch.period[i]
-        due += batch.sample_fraction[k] * batch.period[i]
-        if due > until:
-            break
+    while due_at(i, k, batch) <= until:
+        due = due_at(i, k, batch)
         states = m.sizes[STATES]
         if due == tau and has_just_landed(i, tau, batch):
             for j in range(states):
@@ -168,18 +181,8 @@ def write_queue(i, k, modes, batch, m):
         return
     m.queued[0] = 0
     coordinates = coordinates_of(modes, m)
-    for b in range((coordinates + LANES - 1) // LANES):
-        for p in range(count):
-            row = p * (2 * width + m.sizes[STATE_GROUPS])
-            coordinates_and_rates(b, modes, m.queue, row, m.queue, row + width, m)
-            for j in range(min(LANES, coordinates - LANES * b)):
-                at = LANES * b + j
-                answer = number(m.queue, row + 2 * width, at)
-                batch.samples[i, k - count + p, at] = answer + total_of(m.sums, j)
-                at += coordinates
-                answer = number(m.queue, row + 2 * width, at)
-                batch.samples[i, k - count + p, at] = answer + total_of(m.sums, LANES + j)
     if coordinates > 0:
+        write_shapes(i, k - count, count, modes, coordinates, batch, m)
         return
     for s in range(m.sizes[STATE_GROUPS]):
         for p in range(count):
@@ -188,6 +191,23 @@ def write_queue(i, k, modes, batch, m):
             store(m.sums, 0, group_of_states(s, modes, m.queue, row, answer, m))
             for j in range(min(LANES, states - LANES * s)):
                 batch.samples[i, k - count + p, LANES * s + j] = m.sums[0, j]
+
+
+@kernel
+def write_shapes(i, first, count, modes, coordinates, batch, m):
+    """The same for samples of coordinates and rates, from the first one on."""
+    width = 2 * m.sizes[MODE_GROUPS]
+    for b in range((coordinates + LANES - 1) // LANES):
+        for p in range(count):
+            row = p * (2 * width + m.sizes[STATE_GROUPS])
+            coordinates_and_rates(b, modes, m.queue, row, m.queue, row + width, m)
+            for j in range(min(LANES, coordinates - LANES * b)):
+                at = LANES * b + j
+                answer = number(m.queue, row + 2 * width, at)
+                batch.samples[i, first + p, at] = answer + total_of(m.sums, j)
+                at += coordinates
+                answer = number(m.queue, row + 2 * width, at)
+                batch.samples[i, first + p, at] = answer + total_of(m.sums, LANES + j)
 
 
 # -- one trajectory --------------------------------------------------------------------------------
