@@ -84,7 +84,7 @@ def runs_of(filled: np.ndarray) -> np.ndarray:
 def shapes_table(
     scale: np.ndarray, damping: np.ndarray, to_states: np.ndarray, lanes: int, size: int
 ) -> np.ndarray:
-    """What stands in place of L where the states are coordinates and their rates, float64[size]:
+    """The table in place of L where the states are coordinates and their rates, float64[size]:
     see kernels/modal/series.py. Factors of the left vectors complex128[M], damping float64[M], V.
     """
     modes, width = len(scale), to_states.shape[1]

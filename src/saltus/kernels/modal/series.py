@@ -206,7 +206,7 @@ def shapes_of(modes, block, m):
 
 @inner
 def onto(row, v, q, a, b, c, d, m):
-    """What a coordinate and its rate add to U' (v + C q), a + i b, and to U' q, c + i d."""
+    """Add a coordinate and its rate to U' (v + C q), a + i b, and to U' q, c + i d."""
     real, imaginary = load(m.modes, row, LANES), load(m.modes, row + 1, LANES)
     return fma(real, v, a), fma(imaginary, v, b), fma(real, q, c), fma(imaginary, q, d)
 
@@ -272,7 +272,7 @@ def rates_of_waves(modes, y, m):
 
 @inner
 def along(row, a, b, c, d, q, v, m):
-    """What amplitudes a + i b and their rates c + i d add to a coordinate and its rate."""
+    """Add amplitudes a + i b and their rates c + i d to a coordinate and its rate."""
     real, imaginary = load(m.modes, row, LANES), load(m.modes, row + 1, LANES)
     return fma(-imaginary, b, fma(real, a, q)), fma(-imaginary, d, fma(real, c, v))
 
