@@ -95,8 +95,7 @@ class ClosedHarmonics(HarmonicOrbits):
         multipliers = np.full((len(z), points.shape[2]), np.nan + 0j)
         good = np.flatnonzero(point.found)
         if len(good):
-            derivative = orbits.evaluate(point.z[good], good)[1]
-            multipliers[good] = orbits.multipliers(point.z[good], derivative, good)
+            multipliers[good] = orbits.multipliers(point.z[good], point.derivative[good], good)
         ends = orbits.points(point.z)
         for i, one in enumerate(z):
             self._known[one.tobytes()] = bool(point.found[i]), ends[i], multipliers[i]

@@ -22,7 +22,7 @@ from saltus.analysis.harmonics.sums import Linear
 from saltus.system import System
 from saltus.system.parametric import parametric
 
-#: Motions whose forces and boundaries are remembered.
+#: Motions whose states and boundaries are remembered.
 REMEMBERED = 4096
 
 
@@ -68,7 +68,7 @@ class HarmonicOrbits:
             states[i]: DerivedState(signal, times)
             for signal, chain in enumerate(self.source.chains) for times, i in enumerate(chain)
         }  # fmt: skip
-        self._remembered: dict[bytes, tuple[np.ndarray | None, Intervals]] = {}
+        self._remembered: dict[bytes, tuple[np.ndarray, Intervals]] = {}
         self.turn = periods * (1.0 if self._timed else float(system.period()))
         own = self.source.own(harmonics)
         self._own = np.concatenate([own, own[1:]]).T.ravel()
@@ -120,19 +120,19 @@ class HarmonicOrbits:
     def _along(self, z: np.ndarray) -> tuple[np.ndarray, Intervals]:
         """The states and intervals of a motion, remembered."""
         key = z.tobytes()
-        constants, _, rate, rate_by = self._constants(z)
-        signals = self.signals(z)
         if key not in self._remembered:
-            if isinstance(self.source, States):
-                forces = None
-            else:
+            constants, _, rate, rate_by = self._constants(z)
+            signals, forces = self.signals(z), None
+            if not isinstance(self.source, States):
                 found = self.forces.coefficients(signals, constants, rate, rate_by)
                 forces = found.values / self._pace(constants)
             if len(self._remembered) >= REMEMBERED:
                 self._remembered.clear()
-            self._remembered[key] = forces, self.forces.intervals(signals, constants, rate)
-        forces, intervals = self._remembered[key]
-        return self.source.states(signals, forces, rate), intervals
+            self._remembered[key] = (
+                self.source.states(signals, forces, rate),
+                self.forces.intervals(signals, constants, rate),
+            )
+        return self._remembered[key]
 
     def _pace(self, constants: np.ndarray) -> float:
         """Factor of the rates of the equations."""
