@@ -55,7 +55,7 @@ def told(found, outputs):
 
 def test_a_structure_in_quadrature_by_scipy():
     amplitudes, angular, force = told(
-        sl.backbone(chain(None), (0.25, PEAK), state="b", phase="quadrature", progress=False,
+        sl.backbone(chain(None), (0.1, PEAK), state="b", phase="quadrature", progress=False,
                     by=sl.HarmonicBalance(HARMONICS)), ["a", "b", "c"],
     )  # fmt: skip
     size = 3 * (HARMONICS + 1)
