@@ -78,7 +78,7 @@ def test_a_structure_in_quadrature_by_scipy():
 def test_a_reduced_structure_in_quadrature():
     """All modes are kept, so the sensors fulfil the equations in the matrices."""
     found = sl.backbone(
-        chain(3), (0.25, PEAK), state="q2", mode=2, phase="quadrature", progress=False,
+        chain(3), (0.1, PEAK), state="q2", mode=2, phase="quadrature", progress=False,
         by=sl.HarmonicBalance(HARMONICS),
     )  # fmt: skip
     off, motion = balance(*told(found, ["at a", "at b", "at c"]))
@@ -93,4 +93,4 @@ def test_a_mode_that_damping_keeps_from_quadrature():
     such frequency is that of the third.
     """
     with pytest.raises(ParameterError, match="near mode 2 of chain brings a into quadrature"):
-        sl.backbone(chain(None), (0.25, PEAK), mode=2, phase="quadrature", progress=False)
+        sl.backbone(chain(None), (0.1, PEAK), mode=2, phase="quadrature", progress=False)
