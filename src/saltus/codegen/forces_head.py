@@ -34,12 +34,10 @@ def _body(roots: Sequence[Expr], states: Sequence[str], parameters: Sequence[str
     places = {ex.state(name): f"y[{i}]" for i, name in enumerate(states)}
     places |= {ex.parameter(name): f"p[{i}]" for i, name in enumerate(parameters)}
     places[ex.TIME] = "t"
+    # what time alone decides isn't balanced: analysis/harmonics/balance.py
     switches: dict[ex.Relation, str] = {}
     code = ScalarCode(
         places.get, lambda guard: f"((mode >> {guard}) & 1) == 1", switch=switches.__getitem__
     )
-    asked = [node.payload for node in ex.walk(*roots) if node.op == "select"]
-    for relation in (one for condition in asked for one in ex.relations_in(condition)):
-        switches[relation] = f"{code.value(relation.gap)} > 0.0"  # it depends on parameters alone
     code.lines += [f"out[{i}] = {value}" for i, value in enumerate(code.values(roots))]
     return indented(code.lines)
