@@ -101,8 +101,8 @@ def zeros_of(series: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """All angles in [0, 2 pi) at which series float64[g, 2H + 1] change their sign, float64[r];
     which series does, int64[r], ascending; and its slope there, float64[r].
 
-    Bounds of the slope prove how many zeros a piece of the circle holds (kernels/harmonics/series.py).
-    Zeros nearer to each other than rounding tells apart are none.
+    Bounds of the slope prove how many zeros a piece of the circle holds
+    (kernels/harmonics/series.py). Zeros nearer to each other than rounding tells apart are none.
     """
     room = ROOM * len(series) * (series.shape[1] + 1)
     which, (angle, slope) = np.empty(room, np.int64), np.empty((2, room))
