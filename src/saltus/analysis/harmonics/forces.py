@@ -236,8 +236,11 @@ class Forces:
         """The forces where a guard's side is taken as either, float64[2, m, TRIED]."""
         bits: list[Any] = []
         for guard in self.system.guards:
+            if is_hold(guard):  # its gap may ask for the sides of guards behind it
+                bits.append(np.zeros(TRIED, bool))
+                continue
             (gap,) = evaluate([guard.gap], **about, bits=bits)
-            bits.append(np.broadcast_to(gap > 0, TRIED) & (not is_hold(guard)))
+            bits.append(np.broadcast_to(gap > 0, TRIED))
         both = []
         for bits[i] in (np.zeros(TRIED, bool), np.ones(TRIED, bool)):
             forces = evaluate(self._entries[: self.count], **about, bits=bits)
