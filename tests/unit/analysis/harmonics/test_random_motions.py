@@ -18,18 +18,18 @@ SAMPLES = 2**15
 @sl.system(states="x y v w", forced_at="f", units={"f": "rad/s"})
 def met(t, x, y, v, w, *, K=5.0, gap=0.3, r=0.6, slip=0.3, d=0.2, push=0.3, cubic=0.2, f=1.0):
     """A damped stop, a round hole, dry friction, a bent spring behind a gap, a push by two sides,
-    a root of a depth.
+    a brake, a root of a depth.
     """
-    rub = sl.friction(v, slip=slip)  # whether it holds asks for the sides of all others
     bent = sl.piecewise((2 * x, x > 0), otherwise=0.5 * x)
     stop = sl.piecewise((K * (y - gap) + d * w, y > gap), otherwise=0)
     hole = sl.piecewise((K * (x**2 + y**2 - r**2), x**2 + y**2 > r**2), otherwise=0)
     late = sl.piecewise((K * (bent + gap), bent < -gap), otherwise=0)
+    slow = sl.piecewise((d * x * v, x * v > -gap), otherwise=0)
     both = sl.piecewise((push, (x > gap) & (w > 0)), otherwise=0)
     root = sl.hertz(x - 0.5 * gap, stiffness=K, exponent=1.5)
-    first = sl.cos(f * t) - 0.1 * v - x - (x - y) - hole * x - late - rub
+    first = sl.cos(f * t) - 0.1 * v - x - (x - y) - hole * x - late - sl.friction(v, slip=slip)
     second = 0.4 * sl.sin(2 * f * t) - 0.1 * w - y - (y - x) - stop - hole * y
-    return v, w, first - cubic * x**3 - root, second - both
+    return v, w, first - cubic * x**3 - root - slow, second - both
 
 
 def rates(t, x, y, v, w, K, gap, r, slip, d, push, cubic, f):
@@ -38,6 +38,7 @@ def rates(t, x, y, v, w, K, gap, r, slip, d, push, cubic, f):
     hole = K * np.maximum(x**2 + y**2 - r**2, 0)
     first = np.cos(f * t) - 0.1 * v - x - (x - y) - hole * x - slip * np.sign(v) - cubic * x**3
     first = first - K * np.minimum(bent + gap, 0) - K * np.maximum(x - 0.5 * gap, 0) ** 1.5
+    first = first - np.where(x * v > -gap, d * x * v, 0)
     second = 0.4 * np.sin(2 * f * t) - 0.1 * w - y - (y - x) - hole * y
     second = second - np.where(y > gap, K * (y - gap) + d * w, 0)
     return first, second - np.where((x > gap) & (w > 0), push, 0)
