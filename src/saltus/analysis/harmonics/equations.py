@@ -18,7 +18,7 @@ from saltus.analysis.harmonics import series as fourier
 from saltus.analysis.harmonics.forces import DerivedState, Forces
 from saltus.analysis.harmonics.pieces import Intervals
 from saltus.analysis.harmonics.signals import States, signals_of
-from saltus.analysis.harmonics.sums import Linear
+from saltus.analysis.harmonics.sums import LinearSide
 from saltus.system import System
 from saltus.system.parametric import parametric
 
@@ -189,7 +189,7 @@ class HarmonicOrbits:
         constants, slopes, rate, rate_by = self._constants(z)
         pace = self._pace(constants)
         response, by_rate = self.source.response(self.harmonics, rate)
-        linear = Linear(self._own, _parts(response), _parts(by_rate), slopes, pace, self._timed)
+        linear = LinearSide(self._own, _parts(response), _parts(by_rate), slopes, pace, self._timed)
         return self.forces.equations(self.signals(z), constants, rate, rate_by, linear)
 
     def accepted(self, z: np.ndarray, rows: np.ndarray) -> None:

@@ -19,7 +19,7 @@ import numpy as np
 from saltus.analysis.harmonics import series as fourier
 from saltus.analysis.harmonics.pieces import Intervals, intervals_of
 from saltus.analysis.harmonics.powers import bends, degree
-from saltus.analysis.harmonics.sums import Linear, Sums
+from saltus.analysis.harmonics.sums import LinearSide, Sums
 from saltus.codegen.forces_head import forces_text
 from saltus.codegen.module import balance_module
 from saltus.contact.guards import bits_in, is_hold
@@ -279,7 +279,7 @@ class Forces:
 
     def equations(
         self, signals: np.ndarray, constants: np.ndarray, rate: float, rate_by: np.ndarray,
-        linear: Linear,
+        linear: LinearSide,
     ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
         """Residual ``own X - L W`` along a motion, float64[c (2H + 1)], and its derivative by the
         signals and u more unknowns, float64[c (2H + 1), c (2H + 1) + u].
@@ -289,7 +289,7 @@ class Forces:
 
     def _along(
         self, signals: np.ndarray, constants: np.ndarray, rate: float, rate_by: np.ndarray,
-        linear: Linear | None,
+        linear: LinearSide | None,
     ) -> Sums:  # fmt: skip
         """The sums along a motion."""
         unknowns = 0 if linear is None else linear.turning.shape[1]

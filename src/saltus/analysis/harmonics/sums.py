@@ -18,7 +18,7 @@ MOST_NODES, RULE_STEP = 64, 4
 
 
 @dataclass(frozen=True)
-class Linear:
+class LinearSide:
     """The linear side of the equations ``own X - L W = 0``, at a rate of the angle.
 
     Attributes
@@ -110,7 +110,7 @@ class Sums:
 
     def take(
         self, signals: np.ndarray, constants: np.ndarray, rate: float, rate_by: np.ndarray,
-        pace: float, linear: Linear | None, gaps: tuple[np.ndarray, np.ndarray] | None,
+        pace: float, linear: LinearSide | None, gaps: tuple[np.ndarray, np.ndarray] | None,
         intervals: Intervals | None,
     ) -> None:  # fmt: skip
         """Compute :attr:`whole`, and :attr:`residual` and :attr:`derivative`, along a motion: by
