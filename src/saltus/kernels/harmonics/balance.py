@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 #: Places of ``sizes``: degree of products of the forces and a harmonic, bends of the angle, known
-#: instants (-1: they are to be found) and intervals, states that move.
+#: instants (-1: they are to be found) and intervals.
 DEGREE, BENT, INSTANTS, INTERVALS = 0, 1, 2, 3
 #: Places of ``numbers``: rate of the angle [rad/s], time of the equations in a radian, factor of
 #: the rates of the equations, whether that is the first state that doesn't move.
