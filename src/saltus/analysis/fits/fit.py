@@ -19,6 +19,7 @@ from saltus.analysis.fits.search import MisfitSearch
 from saltus.analysis.fits.steady import Size, SteadyResponses
 from saltus.analysis.fits.unknowns import INSIDE, Unknowns
 from saltus.analysis.fits.verdict import UNKNOWN, follow, noise_of, valleys, verdict
+from saltus.analysis.fits.windows import can_shoot, shoot
 from saltus.analysis.inputs.given import Range, Starts, Value
 from saltus.analysis.inputs.starts import at_values, check_system
 from saltus.analysis.inputs.verb import verb
@@ -189,8 +190,13 @@ def fit(
             )
             if not search.spent and not sure and data.along == "time":
                 more = _places(system, model, MORE * starts, seed)
-                grow(search, more, described, stage(show, 0.3, 0.9))
-            if spread.each and len(data.outputs) > 1:
+                here = grow(search, more, described, stage(show, 0.3, 0.7))
+                if here is not None and can_shoot(search) and not described(search):
+                    if spread.each or spread.common:
+                        off = np.nanstd(here.fitted - data.values[: len(here.fitted)], axis=0)
+                        search.reweigh(np.tile(off, (len(data.at), 1)))
+                    shoot(search, here, stage(show, 0.7, 1.0))
+            if spread.each and len(data.outputs) > 1 and search.windows == 1:
                 _settle(search, spread, data)
         except KeyboardInterrupt:
             raise Interrupted(answer if search.best is not None else None) from None

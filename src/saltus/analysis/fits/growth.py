@@ -23,6 +23,8 @@ WAYS = 6
 #: A longer beginning follows where its data are predicted to within this share of their standard
 #: deviations; else a shorter step does.
 PREDICTED = 0.25
+#: A beginning is described as well as another if what is left is so many times as large at most.
+AS_WELL = 1.5
 #: Factors between beginnings: the first one, and the shortest.
 LONGER, SHORTEST = 2.0, 1.05
 #: Share of the work that finds the minima on the first beginning.
@@ -34,9 +36,10 @@ def grow(
     starts: np.ndarray,
     described: Callable[[MisfitSearch], bool],
     show: Callable[[float], None] | None,
-) -> None:
+) -> Point | None:
     """Descend along such ways, from the minima on the first beginning, until one describes the
-    data.
+    data. The minimum of the best way on the longest beginning that is described as well as the
+    first one; None if no way begins.
     """
     whole = len(search.data)
     count = min(max(round(FIRST * whole), LEAST * (len(search.unknowns) + 1)), whole)
@@ -44,14 +47,17 @@ def grow(
     part.run(starts, stage(show, 0.0, BEGIN), descend=1.0)
     search.take(part)
     search.minima.clear()
+    longest = None
     for i, (one, count) in enumerate(valleys(part.minima)[:WAYS]):
         begin, end = (BEGIN + (1.0 - BEGIN) * j / WAYS for j in (i, i + 1))
         search.ended = None
-        _follow(search, one, i, stage(show, begin, end))
+        here = _follow(search, one, i, stage(show, begin, end))
+        longest = longest or here
         if search.ended is not None:  # as many descents as led to where it began
             search.minima += [search.ended] * (count - 1)
         if search.spent or described(search):
-            return
+            break
+    return longest
 
 
 def _off(search: MisfitSearch, here: Point) -> float:
@@ -63,9 +69,11 @@ def _off(search: MisfitSearch, here: Point) -> float:
 
 def _follow(
     search: MisfitSearch, here: Point, i: int, show: Callable[[float], None] | None
-) -> None:
-    """Follow the minimum number i on a beginning to the whole history."""
-    whole, factor = len(search.data), LONGER
+) -> Point:
+    """Follow the minimum number i on a beginning to the whole history. The minimum on the longest
+    beginning that is described as well as the first one.
+    """
+    whole, factor, longest, first = len(search.data), LONGER, here, _off(search, here)
     while (count := len(here.fitted)) < whole and not search.spent:
         longer = min(max(round(count * factor), count + 1), whole)
         part = search if longer == whole else search.beginning(longer)
@@ -75,9 +83,12 @@ def _follow(
         else:
             part.descend(here.shares, stage(show, count / whole, longer / whole))
             if part is search or not part.minima:
-                return
+                return longest
             here = part.minima[0]
+            if _off(search, here) <= AS_WELL * first:
+                longest = here
             if i and _off(search, here) > PREDICTED:  # others are better
-                return
+                return longest
         if part is not search:
             search.take(part)
+    return longest

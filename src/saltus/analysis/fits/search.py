@@ -110,6 +110,8 @@ class MisfitSearch:
         Whether the budget ended the search.
     steps : int
         Most steps of a descent.
+    windows : int
+        Parts of the history, each with a start of its own, through which the best place was found.
     """
 
     model: Model
@@ -123,6 +125,7 @@ class MisfitSearch:
     ended: Point | None = None
     spent: bool = False
     steps: int = STEPS
+    windows: int = 1
 
     def run(
         self, starts: np.ndarray, show: Callable[[float], None] | None, descend: float = DESCEND

@@ -1,0 +1,289 @@
+"""Multiple shooting: a history that is too sensitive to be followed from its start is fitted through
+windows, each of which has a start of its own near the end of the one before.
+
+Bock, in Modelling of Chemical Reaction Systems (1981) 102-125. The first guess of the starts is that
+of an iterated extended Kalman filter: Jazwinski, Stochastic Processes and Filtering Theory (1970),
+section 8.3.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from saltus.analysis.fits.motion import Motions
+from saltus.analysis.fits.search import MisfitSearch, Point
+from saltus.analysis.fits.unknowns import INSIDE, Unknowns
+from saltus.flow.progress import stage
+from saltus.interrupt import check_stop
+
+#: Factor by which changes of the start may grow in a window, relative to the sizes of the states.
+GROWTH = 10.0
+#: Distance at which a window's start may lie from the end of the one before, in the states' sizes.
+JOINED = 1e-6
+#: Most windows, and passes through them; steps of the filter in a window.
+MOST, PASSES, FILTER = 400, 30, 4
+#: Halvings of a step that doesn't lessen the misfit.
+HALVINGS = 8
+#: A pass that gains less of the misfit than this is the last.
+SETTLED = 1e-6
+#: Share of the work of the filter, which comes first.
+FIRST = 0.3
+
+
+@dataclass(frozen=True)
+class Flown:
+    """A window that was flown: n measured numbers, D states, p unknowns.
+
+    Attributes
+    ----------
+    fitted : float64[M, K]
+    residual : float64[n]
+        In standard deviations of the noise.
+    slopes : float64[n, p + D]
+        Its derivatives by the shares of the unknowns and the start.
+    states : float64[M, D]
+    moved : float64[M, D, p + D]
+        Their derivatives.
+    """
+
+    fitted: np.ndarray
+    residual: np.ndarray
+    slopes: np.ndarray
+    states: np.ndarray
+    moved: np.ndarray
+
+
+class Windows:
+    """The windows of a history.
+
+    Parameters
+    ----------
+    search : MisfitSearch
+        Of a model that is :class:`Motions`; its deviations are those of the noise.
+    """
+
+    def __init__(self, search: MisfitSearch) -> None:
+        model = search.model
+        assert isinstance(model, Motions)
+        self.search, self.unknowns, self._given = search, search.unknowns, model
+        system, names = model.system, search.unknowns.names
+        starts = [f"{name}(0)" for name in system.states]
+        self.size, self.wide = len(starts), len(names)
+        self._free = [(starts.index(name), i) for i, name in enumerate(names) if name in starts]
+        self._places = [i for i, name in enumerate(names) if name in system.values]
+        own, zeros = (*(names[i] for i in self._places), *starts), np.zeros(0)
+        self._model = replace(
+            model,
+            unknowns=Unknowns(own, ("",) * len(own), zeros, zeros, zeros),
+            measured=replace(
+                model.measured,
+                columns=np.concatenate([np.arange(self.size), model.measured.columns]),
+            ),
+        )
+        self.begins: list[int] = []
+        self.scale = np.ones(self.size)
+
+    def first(self, shares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Start of the motion float64[D], and its derivatives by the shares float64[D, p]."""
+        values = self.unknowns.values(shares)
+        widths = self.unknowns.widths(values)
+        start, by = self._given.start.copy(), np.zeros((self.size, self.wide))
+        for place, i in self._free:
+            start[place], by[place, i] = values[i], widths[i]
+        return start, by
+
+    def fly(self, shares: np.ndarray, start: np.ndarray, begin: int, end: int) -> Flown:
+        """The motion through the samples ``begin`` to ``end``, from the time of the sample before
+        the first one.
+        """
+        check_stop()
+        search, whole, model = self.search, self._model.measured, copy.copy(self._model)
+        model.measured = replace(whole, at=whole.at[begin:end], values=whole.values[begin:end])
+        if begin:
+            model.t_start = float(whole.at[begin - 1])
+        values = self.unknowns.values(shares)
+        seen, by = model.with_derivatives(np.concatenate([values[self._places], start]))
+        places, size = self._places, self.size
+        full = np.zeros((*seen.shape, self.wide + size))
+        full[..., places] = by[..., : len(places)] * self.unknowns.widths(values)[places]
+        full[..., self.wide :] = by[..., len(places) :]
+        data, noise = search.data[begin:end], search.deviation[begin:end]
+        there, off = np.isfinite(data), (seen[:, size:] - data) / noise
+        slopes = full[:, size:] / noise[..., None]
+        return Flown(seen[:, size:], off[there], slopes[there], seen[:, :size], full[:, :size])
+
+    def march(self, here: Point, show: Callable[[float], None] | None) -> np.ndarray:
+        """Divide the history, and guess the starts of the windows, float64[w, D]: those of the
+        motion up to the end of a beginning that is known, then those of the filter.
+        """
+        shares, known, whole = here.shares, len(here.fitted), len(self.search.data)
+        start, by = self.first(shares)
+        trip = self.fly(shares, start, 0, known)
+        self.scale = np.abs(trip.states).max(axis=0) + np.finfo(float).tiny
+        spread = np.linalg.pinv(here.slopes.T @ here.slopes) * here.variance
+        turn = np.concatenate([np.eye(self.wide), by])
+        spread, begin, look, starts = turn @ spread @ turn.T, 0, known, []
+        while begin < whole:
+            if len(starts) == MOST:
+                raise _TooManyError
+            trip = self.fly(shares, start, begin, min(begin + look, whole))
+            length = self._length(trip)
+            if begin < known:
+                length = min(length, known - begin)
+                off = np.zeros(self.wide + self.size)
+            else:
+                base = np.concatenate([shares, start])
+                off, spread, trip = self._filtered(base, spread, begin, begin + length)
+            shares = np.clip(shares + off[: self.wide], INSIDE, 1.0 - INSIDE)
+            starts.append(start + off[self.wide :])
+            self.begins.append(begin)
+            moved = trip.moved[length - 1]
+            start = trip.states[length - 1]
+            turn = np.concatenate([np.eye(self.wide, self.wide + self.size), moved])
+            spread = turn @ spread @ turn.T
+            spread[self.wide :, self.wide :] += np.diag((JOINED * self.scale) ** 2)
+            begin, look = begin + length, 2 * length
+            if show is not None:
+                show(begin / whole)
+        self.shares = shares
+        return np.array(starts)
+
+    def _length(self, trip: Flown) -> int:
+        """Samples through which changes of the start don't grow too much."""
+        by = trip.moved[..., self.wide :] * self.scale / self.scale[:, None]
+        grown = ~(np.linalg.norm(by, 2, axis=(1, 2)) <= GROWTH)
+        return max(int(np.argmax(grown)), 1) if grown.any() else len(grown)
+
+    def _filtered(
+        self, base: np.ndarray, spread: np.ndarray, begin: int, end: int
+    ) -> tuple[np.ndarray, np.ndarray, Flown]:
+        """Change of unknowns and start that a window's data tell beside what is known before, its
+        covariance, and the window flown with it.
+        """
+        off, after = np.zeros(len(base)), spread
+        for last in (*[False] * FILTER, True):
+            shares = np.clip((base + off)[: self.wide], INSIDE, 1.0 - INSIDE)
+            trip = self.fly(shares, (base + off)[self.wide :], begin, end)
+            if last:
+                break
+            turned, slopes = np.linalg.qr(trip.slopes)
+            said = turned.T @ trip.residual
+            gain = np.linalg.solve(
+                slopes @ spread @ slopes.T + np.eye(len(slopes)), slopes @ spread
+            ).T
+            off, after = gain @ (slopes @ off - said), spread - gain @ slopes @ spread
+        return off, after, trip
+
+    def passed(self, shares: np.ndarray, starts: np.ndarray) -> list[Flown]:
+        """All windows."""
+        self._given.flows += 1
+        ends = [*self.begins[1:], len(self.search.data)]
+        return [
+            self.fly(shares, start, begin, end)
+            for start, begin, end in zip(starts, self.begins, ends, strict=True)
+        ]
+
+    def equations(
+        self, shares: np.ndarray, starts: np.ndarray, flown: list[Flown]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Linear terms of data and joints, float64[r, p + (w - 1) D] and float64[r]: what a window's
+        data say is turned into as many rows as it has unknowns, and one.
+        """
+        wide, size, count = self.wide, self.size, len(flown)
+        by, rows, right = self.first(shares)[1], [], []
+        for k, one in enumerate(flown):
+            joint = JOINED * self.scale
+            own = np.linalg.qr(np.column_stack([one.slopes, one.residual]), mode="r")
+            ends = one.moved[-1] / joint[:, None]
+            parts = [(own[:, :-1], own[:, -1])]
+            if k + 1 < count:
+                parts.append((ends, (one.states[-1] - starts[k + 1]) / joint))
+            for i, (matrix, value) in enumerate(parts):
+                row = np.zeros((len(matrix), wide + (count - 1) * size))
+                row[:, :wide] = matrix[:, :wide]
+                if k:
+                    place = wide + (k - 1) * size
+                    row[:, place : place + size] = matrix[:, wide:] * self.scale
+                else:
+                    row[:, :wide] += matrix[:, wide:] @ by
+                if i:
+                    place = wide + k * size
+                    row[:, place : place + size] = np.diag(-self.scale / joint)
+                rows.append(row)
+                right.append(value)
+        return np.concatenate(rows), np.concatenate(right)
+
+    def solve(
+        self, starts: np.ndarray, show: Callable[[float], None] | None
+    ) -> tuple[np.ndarray, np.ndarray, list[Flown]]:
+        """Gauss-Newton steps of unknowns and starts, halved where they don't gain."""
+        shares = self.shares
+        flown = self.passed(shares, starts)
+        matrix, right = self.equations(shares, starts, flown)
+        for count in range(PASSES):
+            step, before = np.linalg.lstsq(matrix, -right)[0], right @ right
+            for _ in range(HALVINGS):
+                there = np.clip(shares + step[: self.wide], INSIDE, 1.0 - INSIDE)
+                moved = starts.copy()
+                moved[1:] += step[self.wide :].reshape(-1, self.size) * self.scale
+                trial = self.passed(there, moved)
+                matrix, right = self.equations(there, moved, trial)
+                if right @ right < before:
+                    break
+                step = 0.5 * step
+            else:
+                break
+            shares, starts, flown = there, moved, trial
+            if show is not None:
+                show((count + 1) / PASSES)
+            if before - right @ right <= SETTLED * before:
+                break
+        return shares, starts, flown
+
+    def point(self, shares: np.ndarray, starts: np.ndarray, flown: list[Flown]) -> Point:
+        """The place, with derivatives of the residuals along which the starts of the windows
+        follow the unknowns.
+        """
+        matrix, _ = self.equations(shares, starts, flown)
+        along = np.linalg.lstsq(matrix[:, self.wide :], -matrix[:, : self.wide])[0]
+        along = along.reshape(-1, self.size, self.wide) * self.scale[:, None]
+        each = [self.first(shares)[1], *along]
+        slopes = [
+            one.slopes[:, : self.wide] + one.slopes[:, self.wide :] @ by
+            for one, by in zip(flown, each, strict=True)
+        ]
+        return Point(
+            shares, *(np.concatenate(one) for one in (
+                [one.fitted for one in flown], [one.residual for one in flown], slopes,
+            )),
+        )  # fmt: skip
+
+
+def can_shoot(search: MisfitSearch) -> bool:
+    """Whether windows may begin anywhere: the time of the start isn't free."""
+    return not search.spent and "t_start" not in search.unknowns.names
+
+
+def shoot(search: MisfitSearch, here: Point, show: Callable[[float], None] | None) -> None:
+    """Fit the whole history through windows, from the minimum ``here`` on a beginning, and keep the
+    result if it describes the data better than the best place so far.
+    """
+    windows = Windows(search)
+    try:
+        starts = windows.march(here, stage(show, 0.0, FIRST))
+        found = windows.solve(starts, stage(show, FIRST, 1.0))
+    except (_TooManyError, np.linalg.LinAlgError):
+        return
+    best = windows.point(*found)
+    assert search.best is not None
+    if best.misfit < search.best.misfit:
+        search.best, search.windows = best, len(starts)
+        search.minima = [best]
+
+
+class _TooManyError(Exception):
+    """There are more windows than are computed."""
