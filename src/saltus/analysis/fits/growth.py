@@ -13,7 +13,8 @@ from collections.abc import Callable
 import numpy as np
 
 from saltus.analysis.fits.search import MisfitSearch, Point
-from saltus.analysis.fits.verdict import valleys
+from saltus.analysis.fits.verdict import FEW, FOLLOW, follow, valleys
+from saltus.analysis.fits.windows import shoot
 from saltus.flow.progress import stage
 
 #: The first beginning, in shares of the history, and its samples for each unknown at least.
@@ -23,8 +24,6 @@ WAYS = 6
 #: A longer beginning follows where its data are predicted to within this share of their standard
 #: deviations; else a shorter step does.
 PREDICTED = 0.25
-#: A beginning is described as well as another if what is left is so many times as large at most.
-AS_WELL = 1.5
 #: Factors between beginnings: the first one, and the shortest.
 LONGER, SHORTEST = 2.0, 1.05
 #: Share of the work that finds the minima on the first beginning.
@@ -36,28 +35,36 @@ def grow(
     starts: np.ndarray,
     described: Callable[[MisfitSearch], bool],
     show: Callable[[float], None] | None,
-) -> Point | None:
+) -> None:
     """Descend along such ways, from the minima on the first beginning, until one describes the
-    data. The minimum of the best way on the longest beginning that is described as well as the
-    first one; None if no way begins.
+    data; where a way's motion can't be followed from its start, through windows.
     """
     whole = len(search.data)
-    count = min(max(round(FIRST * whole), LEAST * (len(search.unknowns) + 1)), whole)
-    part = search.beginning(count)
-    part.run(starts, stage(show, 0.0, BEGIN), descend=1.0)
-    search.take(part)
+    least = min(max(LEAST * (len(search.unknowns) + 1), FEW + 1), whole)
+    count = max(round(FIRST * whole), least)
+    while True:
+        part = search.beginning(count)
+        part.run(starts, stage(show, 0.0, BEGIN), descend=1.0)
+        search.take(part)
+        if search.spent or count == least or (part.minima and _noise(search, part.minima[0])):
+            break
+        count = max(count // 2, least)
     search.minima.clear()
-    longest = None
     for i, (one, count) in enumerate(valleys(part.minima)[:WAYS]):
         begin, end = (BEGIN + (1.0 - BEGIN) * j / WAYS for j in (i, i + 1))
         search.ended = None
         here = _follow(search, one, i, stage(show, begin, end))
-        longest = longest or here
         if search.ended is not None:  # as many descents as led to where it began
             search.minima += [search.ended] * (count - 1)
-        if search.spent or described(search):
-            break
-    return longest
+        if search.spent or (described(search) and _noise(search, search.minima[0])):
+            return
+        if here is not None and shoot(search, here, count) and described(search):
+            return
+
+
+def _noise(search: MisfitSearch, here: Point) -> bool:
+    """Whether noise is left of a beginning: neighbouring residuals don't follow each other."""
+    return bool((follow(search.data[: len(here.fitted)] - here.fitted) <= FOLLOW).all())
 
 
 def _off(search: MisfitSearch, here: Point) -> float:
@@ -69,11 +76,11 @@ def _off(search: MisfitSearch, here: Point) -> float:
 
 def _follow(
     search: MisfitSearch, here: Point, i: int, show: Callable[[float], None] | None
-) -> Point:
+) -> Point | None:
     """Follow the minimum number i on a beginning to the whole history. The minimum on the longest
-    beginning that is described as well as the first one.
+    beginning of which noise is left; None if there is none.
     """
-    whole, factor, longest, first = len(search.data), LONGER, here, _off(search, here)
+    whole, factor, longest = len(search.data), LONGER, here if _noise(search, here) else None
     while (count := len(here.fitted)) < whole and not search.spent:
         longer = min(max(round(count * factor), count + 1), whole)
         part = search if longer == whole else search.beginning(longer)
@@ -85,7 +92,7 @@ def _follow(
             if part is search or not part.minima:
                 return longest
             here = part.minima[0]
-            if _off(search, here) <= AS_WELL * first:
+            if _noise(search, here):
                 longest = here
             if i and _off(search, here) > PREDICTED:  # others are better
                 return longest

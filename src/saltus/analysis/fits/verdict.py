@@ -11,6 +11,8 @@ from saltus.analysis.fits.search import Point, same_place
 
 #: Standard deviation of an unknown of which the bounds are all that is known, in their width.
 UNKNOWN = 1.0 / np.sqrt(12.0)
+#: Correlation of neighbouring residuals beyond which they aren't noise.
+FOLLOW = 0.5
 #: Fewer neighbouring residuals than these tell nothing.
 FEW = 20
 

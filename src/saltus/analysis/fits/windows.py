@@ -1,15 +1,14 @@
-"""Multiple shooting: a history that is too sensitive to be followed from its start is fitted through
-windows, each of which has a start of its own near the end of the one before.
+"""Multiple shooting: a history that is too sensitive to be followed from its start is fitted
+through windows, each of which has a start of its own near the end of the one before.
 
-Bock, in Modelling of Chemical Reaction Systems (1981) 102-125. The first guess of the starts is that
-of an iterated extended Kalman filter: Jazwinski, Stochastic Processes and Filtering Theory (1970),
-section 8.3.
+Bock, in Modelling of Chemical Reaction Systems (1981) 102-125. The first guess of the starts is
+that of an iterated extended Kalman filter: Jazwinski, Stochastic Processes and Filtering Theory
+(1970), section 8.3.
 """
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +16,6 @@ import numpy as np
 from saltus.analysis.fits.motion import Motions
 from saltus.analysis.fits.search import MisfitSearch, Point
 from saltus.analysis.fits.unknowns import INSIDE, Unknowns
-from saltus.flow.progress import stage
 from saltus.interrupt import check_stop
 
 #: Factor by which changes of the start may grow in a window, relative to the sizes of the states.
@@ -30,8 +28,6 @@ MOST, PASSES, FILTER = 400, 30, 4
 HALVINGS = 8
 #: A pass that gains less of the misfit than this is the last.
 SETTLED = 1e-6
-#: Share of the work of the filter, which comes first.
-FIRST = 0.3
 
 
 @dataclass(frozen=True)
@@ -116,7 +112,7 @@ class Windows:
         slopes = full[:, size:] / noise[..., None]
         return Flown(seen[:, size:], off[there], slopes[there], seen[:, :size], full[:, :size])
 
-    def march(self, here: Point, show: Callable[[float], None] | None) -> np.ndarray:
+    def march(self, here: Point) -> np.ndarray:
         """Divide the history, and guess the starts of the windows, float64[w, D]: those of the
         motion up to the end of a beginning that is known, then those of the filter.
         """
@@ -126,7 +122,8 @@ class Windows:
         self.scale = np.abs(trip.states).max(axis=0) + np.finfo(float).tiny
         spread = np.linalg.pinv(here.slopes.T @ here.slopes) * here.variance
         turn = np.concatenate([np.eye(self.wide), by])
-        spread, begin, look, starts = turn @ spread @ turn.T, 0, known, []
+        spread, begin, look = turn @ spread @ turn.T, 0, known
+        starts: list[np.ndarray] = []
         while begin < whole:
             if len(starts) == MOST:
                 raise _TooManyError
@@ -147,10 +144,8 @@ class Windows:
             spread = turn @ spread @ turn.T
             spread[self.wide :, self.wide :] += np.diag((JOINED * self.scale) ** 2)
             begin, look = begin + length, 2 * length
-            if show is not None:
-                show(begin / whole)
         self.shares = shares
-        return np.array(starts)
+        return np.stack([self.first(shares)[0], *starts[1:]])
 
     def _length(self, trip: Flown) -> int:
         """Samples through which changes of the start don't grow too much."""
@@ -175,7 +170,8 @@ class Windows:
             gain = np.linalg.solve(
                 slopes @ spread @ slopes.T + np.eye(len(slopes)), slopes @ spread
             ).T
-            off, after = gain @ (slopes @ off - said), spread - gain @ slopes @ spread
+            off, kept = gain @ (slopes @ off - said), np.eye(len(off)) - gain @ slopes
+            after = kept @ spread @ kept.T + gain @ gain.T  # Joseph's form: no variance below zero
         return off, after, trip
 
     def passed(self, shares: np.ndarray, starts: np.ndarray) -> list[Flown]:
@@ -190,46 +186,42 @@ class Windows:
     def equations(
         self, shares: np.ndarray, starts: np.ndarray, flown: list[Flown]
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Linear terms of data and joints, float64[r, p + (w - 1) D] and float64[r]: what a window's
-        data say is turned into as many rows as it has unknowns, and one.
+        """Linear terms of data and joints, float64[r, p + (w - 1) D] and float64[r]. What a
+        window's data say is turned into one row more than it has unknowns.
         """
         wide, size, count = self.wide, self.size, len(flown)
-        by, rows, right = self.first(shares)[1], [], []
+        by, joint = self.first(shares)[1], JOINED * self.scale
+        rows, right = [], []
         for k, one in enumerate(flown):
-            joint = JOINED * self.scale
             own = np.linalg.qr(np.column_stack([one.slopes, one.residual]), mode="r")
-            ends = one.moved[-1] / joint[:, None]
             parts = [(own[:, :-1], own[:, -1])]
             if k + 1 < count:
-                parts.append((ends, (one.states[-1] - starts[k + 1]) / joint))
-            for i, (matrix, value) in enumerate(parts):
-                row = np.zeros((len(matrix), wide + (count - 1) * size))
+                gap = (one.states[-1] - starts[k + 1]) / joint
+                parts.append((one.moved[-1] / joint[:, None], gap))
+            for matrix, value in parts:
+                row = np.zeros((len(matrix), wide + count * size))
                 row[:, :wide] = matrix[:, :wide]
-                if k:
-                    place = wide + (k - 1) * size
-                    row[:, place : place + size] = matrix[:, wide:] * self.scale
-                else:
-                    row[:, :wide] += matrix[:, wide:] @ by
-                if i:
-                    place = wide + k * size
-                    row[:, place : place + size] = np.diag(-self.scale / joint)
+                row[:, wide + k * size : wide + (k + 1) * size] = matrix[:, wide:] * self.scale
                 rows.append(row)
                 right.append(value)
-        return np.concatenate(rows), np.concatenate(right)
+            if k + 1 < count:
+                row[:, wide + (k + 1) * size : wide + (k + 2) * size] = -np.eye(size) / JOINED
+        whole = np.concatenate(rows)
+        first = whole[:, wide : wide + size] @ (by / self.scale[:, None])
+        whole[:, :wide] += first
+        return np.delete(whole, np.s_[wide : wide + size], axis=1), np.concatenate(right)
 
-    def solve(
-        self, starts: np.ndarray, show: Callable[[float], None] | None
-    ) -> tuple[np.ndarray, np.ndarray, list[Flown]]:
+    def solve(self, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[Flown]]:
         """Gauss-Newton steps of unknowns and starts, halved where they don't gain."""
         shares = self.shares
         flown = self.passed(shares, starts)
         matrix, right = self.equations(shares, starts, flown)
-        for count in range(PASSES):
+        for _ in range(PASSES):
             step, before = np.linalg.lstsq(matrix, -right)[0], right @ right
             for _ in range(HALVINGS):
                 there = np.clip(shares + step[: self.wide], INSIDE, 1.0 - INSIDE)
-                moved = starts.copy()
-                moved[1:] += step[self.wide :].reshape(-1, self.size) * self.scale
+                steps = step[self.wide :].reshape(-1, self.size) * self.scale
+                moved = np.stack([self.first(there)[0], *(starts[1:] + steps)])
                 trial = self.passed(there, moved)
                 matrix, right = self.equations(there, moved, trial)
                 if right @ right < before:
@@ -238,8 +230,6 @@ class Windows:
             else:
                 break
             shares, starts, flown = there, moved, trial
-            if show is not None:
-                show((count + 1) / PASSES)
             if before - right @ right <= SETTLED * before:
                 break
         return shares, starts, flown
@@ -251,38 +241,36 @@ class Windows:
         matrix, _ = self.equations(shares, starts, flown)
         along = np.linalg.lstsq(matrix[:, self.wide :], -matrix[:, : self.wide])[0]
         along = along.reshape(-1, self.size, self.wide) * self.scale[:, None]
-        each = [self.first(shares)[1], *along]
+        each = (self.first(shares)[1], *along)
         slopes = [
             one.slopes[:, : self.wide] + one.slopes[:, self.wide :] @ by
             for one, by in zip(flown, each, strict=True)
         ]
-        return Point(
-            shares, *(np.concatenate(one) for one in (
-                [one.fitted for one in flown], [one.residual for one in flown], slopes,
-            )),
-        )  # fmt: skip
+        fitted = np.concatenate([one.fitted for one in flown])
+        residual = np.concatenate([one.residual for one in flown])
+        return Point(shares, fitted, residual, np.concatenate(slopes))
 
 
-def can_shoot(search: MisfitSearch) -> bool:
-    """Whether windows may begin anywhere: the time of the start isn't free."""
-    return not search.spent and "t_start" not in search.unknowns.names
-
-
-def shoot(search: MisfitSearch, here: Point, show: Callable[[float], None] | None) -> None:
-    """Fit the whole history through windows, from the minimum ``here`` on a beginning, and keep the
-    result if it describes the data better than the best place so far.
+def shoot(search: MisfitSearch, here: Point, count: int) -> bool:
+    """Fit the whole history through windows, from the minimum ``here`` on a beginning, to which
+    ``count`` descents led; True if it describes the data better than the best place so far, which
+    it is then.
     """
+    if "t_start" in search.unknowns.names or search.best is None:  # times aren't known
+        return False
+    left = here.fitted - search.data[: len(here.fitted)]
+    search.reweigh(np.tile(np.nanstd(left, axis=0), (len(search.data), 1)))
     windows = Windows(search)
     try:
-        starts = windows.march(here, stage(show, 0.0, FIRST))
-        found = windows.solve(starts, stage(show, FIRST, 1.0))
+        found = windows.solve(windows.march(here))
     except (_TooManyError, np.linalg.LinAlgError):
-        return
+        return False
     best = windows.point(*found)
-    assert search.best is not None
-    if best.misfit < search.best.misfit:
-        search.best, search.windows = best, len(starts)
-        search.minima = [best]
+    if best.misfit >= search.best.misfit:
+        return False
+    search.best, search.windows = best, len(windows.begins)
+    search.minima = [best] * count
+    return True
 
 
 class _TooManyError(Exception):
