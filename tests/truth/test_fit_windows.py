@@ -60,11 +60,14 @@ def test_windows_give_what_one_motion_gives_where_it_can_be_followed(monkeypatch
 
 
 def test_a_chaotic_history_of_240_periods_gives_the_values_that_made_it():
-    at, x, noise = made_up(CHAOTIC, 240, 4)
+    at, x, noise = made_up(CHAOTIC, 240, 5)
     search = searched(at, x, FREE, noise)
-    part = search.beginning(400)
     truth = search.unknowns.shares(np.array([*CHAOTIC.values()]))
-    part.descend(truth + 0.002, None)
+    here = truth + 0.0005
+    for count in (100, 250, 400):
+        part = search.beginning(count)
+        part.descend(here, None)
+        here = part.minima[0].shares
     search.at(part.minima[0].shares)
     assert search.best.misfit > 100 * len(at)  # from the start it is followed nowhere
     assert windows.shoot(search, part.minima[0], 3)

@@ -24,8 +24,6 @@ GROWTH = 10.0
 JOINED = 1e-6
 #: Most windows, and passes through them; steps of the filter in a window.
 MOST, PASSES, FILTER = 400, 30, 4
-#: Halvings of a step that doesn't lessen the misfit.
-HALVINGS = 8
 #: A pass that gains less of the misfit than this is the last.
 SETTLED = 1e-6
 
@@ -191,9 +189,11 @@ class Windows:
         """
         wide, size, count = self.wide, self.size, len(flown)
         by, joint = self.first(shares)[1], JOINED * self.scale
-        rows, right = [], []
+        rows: list[np.ndarray] = []
+        right: list[np.ndarray] = []
         for k, one in enumerate(flown):
-            own = np.linalg.qr(np.column_stack([one.slopes, one.residual]), mode="r")
+            both = np.column_stack([one.slopes, one.residual])
+            own = np.asarray(np.linalg.qr(both, mode="r"))
             parts = [(own[:, :-1], own[:, -1])]
             if k + 1 < count:
                 gap = (one.states[-1] - starts[k + 1]) / joint
@@ -213,25 +213,23 @@ class Windows:
 
     def solve(self, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[Flown]]:
         """Gauss-Newton steps of unknowns and starts, halved where they don't gain."""
-        shares = self.shares
-        flown = self.passed(shares, starts)
+        shares, flown = self.shares, self.passed(self.shares, starts)
         matrix, right = self.equations(shares, starts, flown)
+        step = np.linalg.lstsq(matrix, -right)[0]
         for _ in range(PASSES):
-            step, before = np.linalg.lstsq(matrix, -right)[0], right @ right
-            for _ in range(HALVINGS):
-                there = np.clip(shares + step[: self.wide], INSIDE, 1.0 - INSIDE)
-                steps = step[self.wide :].reshape(-1, self.size) * self.scale
-                moved = np.stack([self.first(there)[0], *(starts[1:] + steps)])
-                trial = self.passed(there, moved)
-                matrix, right = self.equations(there, moved, trial)
-                if right @ right < before:
-                    break
+            there = np.clip(shares + step[: self.wide], INSIDE, 1.0 - INSIDE)
+            steps = step[self.wide :].reshape(-1, self.size) * self.scale
+            moved = np.stack([self.first(there)[0], *(starts[1:] + steps)])
+            trial = self.passed(there, moved)
+            matrix, after = self.equations(there, moved, trial)
+            gain = right @ right - after @ after
+            if not gain > 0:
                 step = 0.5 * step
-            else:
+                continue
+            shares, starts, flown, right = there, moved, trial, after
+            if gain <= SETTLED * (right @ right):
                 break
-            shares, starts, flown = there, moved, trial
-            if before - right @ right <= SETTLED * before:
-                break
+            step = np.linalg.lstsq(matrix, -right)[0]
         return shares, starts, flown
 
     def point(self, shares: np.ndarray, starts: np.ndarray, flown: list[Flown]) -> Point:
