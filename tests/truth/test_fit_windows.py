@@ -69,7 +69,7 @@ def test_a_chaotic_history_of_240_periods_gives_the_values_that_made_it():
         part.descend(here, None)
         here = part.minima[0].shares
     search.at(part.minima[0].shares)
-    assert search.best.misfit > 100 * len(at)  # from the start it is followed nowhere
+    assert search.best.misfit > 25 * len(at)  # from the start it can't be followed
     assert windows.shoot(search, part.minima[0], 3)
     assert search.windows > 20
     assert len(search.minima) == 3
