@@ -28,6 +28,8 @@ __all__ = sorted(_HOMES)
 def __getattr__(name: str) -> Any:
     from saltus.interrupt import ctrl_c_waits
 
+    if name.startswith("_"):  # inspect, doctest and pytest ask for many of these
+        raise AttributeError(name, name=name, obj=sys.modules[__name__])
     if name not in _HOMES:
         from saltus.system.elsewhere import instead
 

@@ -29,6 +29,7 @@ def test_the_bundle_is_small_and_fetches_nothing():
         assert "innerHTML" not in text  # texts enter as text
 
 
+@pytest.mark.slow
 def test_the_sources_make_the_same_bytes(web):
     built = web / "built"
     subprocess.run(["node", "build.mjs", str(built)], cwd=web, check=True, timeout=120)
@@ -37,6 +38,7 @@ def test_the_sources_make_the_same_bytes(web):
         assert (built / name).read_bytes() == committed(name), f"{name}: npm run build in web/"
 
 
+@pytest.mark.slow
 def test_the_sources_are_strictly_typed(web):
     run = subprocess.run(
         ["node", "node_modules/typescript/bin/tsc", "-p", "."],

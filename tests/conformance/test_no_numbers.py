@@ -26,7 +26,6 @@ def stop(t, x, v, *, w=1.0, p=-1.0):
     return v, sl.cos(w * t) / sl.sqrt(p) - x, sl.impact(x < 0.2, v, restitution=0.5)
 
 
-@pytest.mark.nojit
 @pytest.mark.filterwarnings("ignore:.*nonfinite")
 @pytest.mark.parametrize("system", [gap, stiffness, force, stop], ids=lambda one: one.name)
 def test_a_formula_without_a_number_ends_its_motion_alone(system):

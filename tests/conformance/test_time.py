@@ -24,6 +24,7 @@ def _steady(frequency):
     return 4 * (1 - 18 / w**2) / 3 / complex(wn**2 - w**2, 2 * 0.03 * wn * w)
 
 
+@pytest.mark.slow
 def test_phase_after_a_million_periods():
     """1e6 periods at 17 Hz: phase error below 1e-9 rad (it is below 1e-14), and at 3 other
     frequencies in the same batch.

@@ -73,15 +73,13 @@ def test_hertz_contacts_last_as_long_as_the_closed_form_says():
     system = power_stop.with_values(stiffness=1e6)
     run = sl.simulate(
         system,
-        [(-1e-3, 0.1), (0.0, 0.2), (0.0, -0.2)],
-        t_end=0.04,
+        [(0.0, 0.2), (0.0, -0.2)],
+        t_end=0.02,
         method=sl.Taylor(order=12, lanes=2),
     )
-    assert list(run.status.values) == ["ok"] * 3
+    assert list(run.status.values) == ["ok"] * 2
     first = run.contact_time.values[run.contact_trajectory.values == 0]
-    assert np.abs(np.diff(first) - duration_of(0.1, 1e6, 1.5)) < 1e-15
-    second = run.contact_time.values[run.contact_trajectory.values == 1]
-    assert np.abs(second - duration_of(0.2, 1e6, 1.5)) < 1e-15
+    assert np.abs(first - duration_of(0.2, 1e6, 1.5)) < 1e-15
 
 
 # -- Taylor ----------------------------------------------------------------------------------------

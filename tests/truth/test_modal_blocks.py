@@ -329,6 +329,7 @@ def test_stops_of_all_places_are_met_where_matrix_exponentials_say(stops):
     assert check_contacts(system, start, run, 12, 1e-12 / 2.3) > 7
 
 
+@pytest.mark.slow
 def test_the_phase_is_kept_over_a_million_periods_without_a_contact():
     """An undamped oscillator and its drive: x = a cos W t + b cos w t, w/W = sqrt(2)."""
     system = struck.with_values(spring=2.0, gap=1e3, force=0.1)

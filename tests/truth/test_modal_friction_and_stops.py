@@ -23,7 +23,6 @@ def thrown(t, x, y, u, v, *, level=0.5, e=0.5):
     return u, v, 0.0, -sl.friction(v, slip=level), law
 
 
-@pytest.mark.nojit
 def test_a_blow_throws_a_body_that_sticks():
     """Of its speed c the striker keeps (1 - e) c / 2. The struck body gets (1 + e) c / 2, slides
     (1 + e)^2 c^2 / (8 level), and sticks until it is overtaken.

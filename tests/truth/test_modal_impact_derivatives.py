@@ -56,7 +56,6 @@ def test_start_beyond_a_stop_has_no_derivative():
     np.testing.assert_allclose(found, exact, rtol=0, atol=1e-12)
 
 
-@pytest.mark.nojit
 def test_contact_that_comes_to_rest_by_chatter_leaves_the_others_free():
     """Two masses, the first of which comes to rest and is released again. The remainder of the
     chatter is completed at 1e-8.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import pickle
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -36,8 +37,8 @@ def caught(tree: ast.AST) -> set[str]:
         if isinstance(node, ast.ExceptHandler) and node.name:
             names.add(node.name)
         elif isinstance(node, ast.arg) and node.annotation is not None:
-            kind = ast.unparse(node.annotation)
-            if "Error" in kind or "Exception" in kind:
+            kinds = [one.id for one in ast.walk(node.annotation) if isinstance(one, ast.Name)]
+            if any("Error" in kind or "Exception" in kind for kind in kinds):
                 names.add(node.arg)
     return names
 
@@ -82,10 +83,18 @@ def reads(tree: ast.AST) -> Iterator[ast.AST]:
                     yield node
 
 
+#: What holds an exception: an ``except``, or an argument said to be one.
+HOLDS = re.compile(r"except [^\n]* as |: [^\n]*(Error|Exception)")
+
+
 def found(text: str) -> list[str]:
     """Names of the innermost functions that read an error."""
+    if not HOLDS.search(text):
+        return []
     functions = [one for one in ast.walk(ast.parse(text)) if isinstance(one, ast.FunctionDef)]
     places = {id(node) for one in functions for node in reads(one)}
+    if not places:
+        return []
     inner = {id(node): one.name for one in functions for node in ast.walk(one)}
     return sorted({inner[place] for place in places})
 

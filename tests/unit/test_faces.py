@@ -5,6 +5,7 @@ from collections import Counter
 from pathlib import Path
 
 import saltus
+from import_statements import import_statements
 
 ROOT = Path(saltus.__file__).parent
 #: Most names that a room hands to others.
@@ -43,7 +44,7 @@ def handed_out(sources: dict[str, str]) -> Counter[str]:
     handed = set()
     for name, source in sources.items():
         user = room_of(name)
-        for node in ast.walk(ast.parse(source)):
+        for node in import_statements(ast.parse(source), for_types=True):
             if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("saltus"):
                 below = node.module.removeprefix("saltus").removeprefix(".")
                 for alias in node.names:

@@ -7,6 +7,7 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import saltus
+from import_statements import import_statements
 
 SOURCE = Path(saltus.__file__).parents[1]
 MODULES = {
@@ -28,22 +29,11 @@ def imported(node):
         yield from (alias.name for alias in node.names if alias.name in MODULES)
 
 
-def statements(tree):
-    """Import statements, those inside functions too; those for type checkers don't count."""
-    for node in ast.iter_child_nodes(tree):
-        if isinstance(node, ast.Import | ast.ImportFrom):
-            yield node
-        elif isinstance(node, ast.stmt | ast.ExceptHandler) and not (
-            isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
-        ):
-            yield from statements(node)
-
-
 def test_no_circle_of_imports():
     graph = {
         name: {
             one
-            for node in statements(ast.parse(file.read_text(encoding="utf-8")))
+            for node in import_statements(ast.parse(file.read_text(encoding="utf-8")))
             for one in imported(node)
             if one != name
         }

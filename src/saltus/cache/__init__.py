@@ -25,8 +25,8 @@ from saltus.whole_files import ABANDONED, is_older
 #: Suffixes of the names of entries, by content.
 KERNEL, HASH = ".kernel", ".hash"
 _CALLED = {KERNEL: "compiled kernel", HASH: "hash of the code"}
-#: Age from which a hash of code counts as old [s].
-_OLD = 30 * ABANDONED
+#: Ages from which a hash of code and a kernel count as old [s]: the folder doesn't grow for ever.
+_OLD = {HASH: 30 * ABANDONED, KERNEL: 90 * ABANDONED}
 
 
 @dataclass(frozen=True)
@@ -134,9 +134,10 @@ def _usable() -> bool:
 
 
 def _sweep(directory: Path) -> None:
-    """Delete unfinished entries of processes that were killed long ago, and hashes of old code."""
-    for pattern, age in ((f"{entry.DRAFT}*", ABANDONED), (f"*{HASH}", _OLD)):
-        _sweep_older(directory, pattern, age)
+    """Delete unfinished entries of processes that were killed long ago, and old entries."""
+    _sweep_older(directory, f"{entry.DRAFT}*", ABANDONED)
+    for kind, age in _OLD.items():
+        _sweep_older(directory, f"*{kind}", age)
 
 
 def _sweep_older(directory: Path, pattern: str, age: float) -> None:

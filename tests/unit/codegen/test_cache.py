@@ -591,3 +591,12 @@ def test_a_process_that_compiles_ends_with_the_one_that_asked(tmp_path):
         asker.wait()
     with lock.open() as file:
         fcntl.flock(file, fcntl.LOCK_EX)  # waits until its holder has ended
+
+
+def test_a_kernel_of_long_ago_is_deleted_when_another_is_kept(folder):
+    for name, days in (("old", 91), ("young", 89)):
+        cache.keep(name, "an equation", b"code")
+        when = time.time() - days * 86_400
+        os.utime(reopened(folder / f"{name}.kernel"), (when, when))
+    cache.keep("new", "another", b"code")
+    assert [one.name for one in cache.kernels()] == ["new", "young"]

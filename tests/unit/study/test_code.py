@@ -72,6 +72,7 @@ def test_versions_of_python_agree():
     )
 
 
+@pytest.mark.slow
 def test_a_comment_in_saltus_throws_nothing_away_and_a_statement_does(tmp_path, monkeypatch):
     monkeypatch.setenv("SALTUS_CACHE", str(tmp_path / "cache"))
     before = code.code_hash.__wrapped__()

@@ -42,7 +42,7 @@ class Page:
             self.label[one.cells] = one.part.label
 
 
-@pytest.mark.parametrize("scouts", [1024, 3])
+@pytest.mark.parametrize("scouts", [pytest.param(1024, marks=pytest.mark.slow), 3])
 def test_a_map_from_nothing_is_that_of_basins(monkeypatch, scouts):
     """With few scouts the cells themselves reveal attractors, in both."""
     monkeypatch.setattr(growing, "FEW_SCOUTS", 2)

@@ -108,6 +108,7 @@ def chaotic():
     return replace(basin_plan(duffing, axes, None, sl.Taylor(), 500, None), scouts=24)
 
 
+@pytest.mark.slow
 def test_a_pool_labels_as_one_call_does_attractors_that_never_repeat_too():
     plan = chaotic()
     map_, start = plan.map(1), plan.starts(np.arange(plan.cells))

@@ -149,11 +149,11 @@ def test_threads_change_nothing_and_the_order_of_starts_only_the_last_digits(few
     box = {"x": ("-5 mm", "5 mm"), "v": ("-1 m/s", "1 m/s")}
     one = sl.frequency_response(RIG, ("14.5 Hz", "16 Hz", 4), start="random 40", box=box, threads=1)
     assert one.attrs["result_hash"] == few.attrs["result_hash"]
-    starts = {"x": few.start_x.values[::-1], "v": few.start_v.values[::-1]}
+    starts = {"x": few.start_x.values[11::-1], "v": few.start_v.values[11::-1]}
     alone = sl.frequency_response(RIG, np.array([15.0]), start=starts)
     # Newton's method from another start
-    np.testing.assert_allclose(alone.rms.values[0, ::-1], few.rms.values[1], rtol=1e-12)
-    np.testing.assert_array_equal(alone.period.values[0, ::-1], few.period.values[1])
+    np.testing.assert_allclose(alone.rms.values[0, ::-1], few.rms.values[1, :12], rtol=1e-12)
+    np.testing.assert_array_equal(alone.period.values[0, ::-1], few.period.values[1, :12])
 
 
 def test_shares_of_random_starts_add_up_and_lie_in_their_intervals(few):
