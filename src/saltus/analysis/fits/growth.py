@@ -63,7 +63,7 @@ def grow(
 
 
 def _noise(search: MisfitSearch, here: Point) -> bool:
-    """Whether noise is left of a beginning: neighbouring residuals don't follow each other."""
+    """True if noise is left of a beginning: neighbouring residuals don't follow each other."""
     return bool((follow(search.data[: len(here.fitted)] - here.fitted) <= FOLLOW).all())
 
 

@@ -78,7 +78,7 @@ class Point:
 
 
 def same_place(shares: np.ndarray, minimum: Point, variance: float) -> bool:
-    """Whether shares lie where a minimum lies, as far as data with noise of that variance tell."""
+    """True if shares lie where a minimum lies, as far as data with noise of that variance tell."""
     apart = shares - minimum.shares
     return bool(
         np.abs(apart).max() <= SAME_SHARE

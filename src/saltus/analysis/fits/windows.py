@@ -124,7 +124,7 @@ class Windows:
         starts: list[np.ndarray] = []
         while begin < whole:
             if len(starts) == MOST:
-                raise _TooManyError
+                raise _TooManyWindowsError
             trip = self.fly(shares, start, begin, min(begin + look, whole))
             length = self._length(trip)
             if begin < known:
@@ -261,7 +261,7 @@ def shoot(search: MisfitSearch, here: Point, count: int) -> bool:
     windows = Windows(search)
     try:
         found = windows.solve(windows.march(here))
-    except (_TooManyError, np.linalg.LinAlgError):
+    except (_TooManyWindowsError, np.linalg.LinAlgError):
         return False
     best = windows.point(*found)
     if best.misfit >= search.best.misfit:
@@ -271,5 +271,5 @@ def shoot(search: MisfitSearch, here: Point, count: int) -> bool:
     return True
 
 
-class _TooManyError(Exception):
+class _TooManyWindowsError(Exception):
     """There are more windows than are computed."""
