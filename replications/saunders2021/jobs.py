@@ -199,7 +199,7 @@ class _Plan:
         made = []
         for kind, verb in RESPONSES.items():
             for table, asked in zip(getattr(study, kind), text.get(kind, []), strict=True):
-                method = method_of(table.method or study.method)
+                method = method_of(table.method or study.method, system)
                 arguments = {
                     key: asked[key] for key in ("start", "periods", "sample") if key in asked
                 }
@@ -276,7 +276,7 @@ class _Plan:
                 f"{name}/{one.name}",
                 basin_map,
                 system.with_values(**one.values),
-                method_of(one.method or study.method),
+                method_of(one.method or study.method, system),
                 arguments,
             )
             for one in basins.map

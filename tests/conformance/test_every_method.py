@@ -345,7 +345,7 @@ def test_a_study_file_asks_for_the_same_method(method):
     assert set(TABLES) == set(METHODS)
     written = {key: value for key, value in method.options().items() if value is not None}
     table = TABLES[method.name].model_validate({"name": method.name, **written})
-    assert method_of(table) == method
+    assert method_of(table, RIG) == method
 
 
 # -- in every question -----------------------------------------------------------------------------

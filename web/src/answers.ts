@@ -99,9 +99,11 @@ export class Answers {
     if (head.ask === "responses") {
       if (field.startsWith("range")) return this.of.range.refuse(why);
       $("responses-under").textContent = "";
+      this.of.responses.without = "no branches";
+      this.of.responses.draw();
       return notes($("responses-words"), [why]);
     }
-    if (head.ask === "track" && !this.of.view.orbit) return clearOrbit(why);
+    if ((head.ask === "track" || head.ask === "settle") && !this.of.view.orbit) return clearOrbit(why);
     if ((head.ask === "orbit" || head.ask === "track") && this.of.view.orbit)
       this.of.go({ orbit: null }, { past: true });
     this.of.says.say(why);

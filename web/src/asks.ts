@@ -2,6 +2,7 @@
 import { isOutput, states } from "./about";
 import type { Explorer } from "./explorer";
 import type { Question } from "./link";
+import { FOLLOWED } from "./responses";
 import { Agreement, Sheet } from "./sheets";
 
 /** Milliseconds of rest before a start is settled; between two coarse maps of a drag. */
@@ -102,6 +103,7 @@ export class Asks {
       key = JSON.stringify({ ...fields, values: others });
     if (key === this.askedValues) return;
     this.askedValues = key;
+    this.of.responses.without = FOLLOWED;
     this.of.link.ask("responses", fields);
   }
   mapKey(fields: Question): string {

@@ -33,11 +33,14 @@ export function scaleOf(unit: string, largest: number): Scale {
 export const scaleFor = (unit: string, [low, high]: Range): Scale =>
   scaleOf(unit, Math.max(Math.abs(low), Math.abs(high)));
 
+const raised = (n: string): string => [...n].map(c => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(c)]).join("");
+const power = (size: number): string => `10${raised(String(size))}`;
+
 /** A unit as it stands on an axis: m/s² in place of m/s^2. */
 export const pretty = (unit: string): string =>
   unit
     .replaceAll("kg^0.5", "√kg")
-    .replace(/\^(-?\d+)(?!\.)/g, (_, n: string) => [...n].map(c => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(c)]).join(""))
+    .replace(/\^(-?\d+)(?!\.)/g, (_, n: string) => raised(n))
     .replaceAll("*", "·");
 
 /** Text of an axis: `x [mm]`. */
@@ -54,7 +57,7 @@ export function digits(value: number, count = 4): string {
     out = text.includes("e") ? String(+text) : text.includes(".") ? text.replace(/\.?0+$/, "") : text;
   else {
     const [mantissa, exponent] = value.toExponential(count - 1).split("e");
-    out = `${mantissa.replace(/\.?0+$/, "")}·10${[...String(+exponent)].map(c => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(c)]).join("")}`;
+    out = `${mantissa.replace(/\.?0+$/, "")}·${power(+exponent)}`;
   }
   return out.replace(/^-/, "−");
 }
@@ -95,13 +98,16 @@ export function tickTexts(at: number[]): { texts: string[]; offset: string } {
   if (largest / step > 1e5) {
     const base = at[0],
       size = Math.floor(Math.log10(step) + 1e-9);
-    const sup = [...String(size)].map(c => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(c)]).join("");
     return {
       texts: at.map(v => digits(Math.round((v - base) / 10 ** size), 6)),
-      offset: `${base.toPrecision(14).replace(/0+$/, "").replace(/^-/, "−")} + n·10${sup}`,
+      offset: `${base.toPrecision(14).replace(/0+$/, "").replace(/^-/, "−")} + n·${power(size)}`,
     };
   }
-  if (decimals > 5 || largest >= 1e6) return { texts: at.map(v => digits(v, 6)), offset: "" };
+  if (decimals > 3 || largest >= 1e5) {
+    const size = Math.floor(Math.log10(largest) + 1e-9);
+    const { texts } = tickTexts(at.map(v => v / 10 ** size));
+    return { texts, offset: `n·${power(size)}` };
+  }
   return { texts: at.map(v => (Math.abs(v) < step / 1e3 ? 0 : v).toFixed(decimals).replace(/^-/, "−")), offset: "" };
 }
 
@@ -193,7 +199,7 @@ export function place(
   canvas: HTMLCanvasElement,
   rx: Range,
   ry: Range,
-  margin = { left: 58, right: 18, top: 10, bottom: 40 },
+  margin = { left: 62, right: 18, top: 10, bottom: 40 },
 ): Plot {
   const left = margin.left,
     top = margin.top,
@@ -255,7 +261,7 @@ export function frame(
   c.textAlign = "center";
   c.fillText(xt.offset ? `${names[0]}  ${xt.offset}` : names[0], p.left + p.width / 2, bottom + 30);
   c.save();
-  c.translate(11, p.top + p.height / 2);
+  c.translate(9, p.top + p.height / 2);
   c.rotate(-Math.PI / 2);
   c.fillText(yt.offset ? `${names[1]}  ${yt.offset}` : names[1], 0, 0);
   c.restore();

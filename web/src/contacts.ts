@@ -1,10 +1,13 @@
 /** The table of contacts: rows are made as they are scrolled to. */
 import { type About, plain } from "./about";
-import { axisText, digits, scaleOf } from "./axes";
+import { axisText, digits, scaleOf, spoken } from "./axes";
 import type { Motion } from "./motion";
 import { $, cells } from "./words";
 
 const BATCH = 60;
+
+/** The unit of the speed of a boundary's gap. */
+const rate = ({ unit }: { unit: string }): string => (unit ? `${unit}/s` : "");
 
 export class Contacts {
   private motion: Motion | null = null;
@@ -46,12 +49,13 @@ export class Contacts {
     columns[4].textContent = axisText("speed", this.scale().unit);
     this.more();
   }
-  private scale(): { factor: number; unit: string } {
+  /** The scale of all speeds; none where boundaries differ in unit: then each row has its own. */
+  private scale(): { factor: number; unit: string; own?: boolean } {
     const speeds = this.motion!.arrays.contact_velocity,
-      units = new Set(this.about.guards.map(g => (g.unit ? `${g.unit}/s` : "")));
+      units = new Set(this.about.guards.map(rate));
     let most = 0;
     for (let i = 0; i < (speeds?.length ?? 0); i++) most = Math.max(most, Math.abs(speeds[i]));
-    return units.size === 1 ? scaleOf([...units][0], most) : { factor: 1, unit: "" };
+    return units.size === 1 ? scaleOf([...units][0], most) : { factor: 1, unit: "", own: true };
   }
   private more(): void {
     const motion = this.motion!,
@@ -64,16 +68,17 @@ export class Contacts {
       n = time?.length ?? 0,
       to = Math.min(this.made + BATCH, n);
     const from = (motion.head.contacts_from ?? 0) + 1,
-      { factor } = this.scale(),
+      { factor, own } = this.scale(),
       rows: HTMLElement[] = [];
     for (let i = this.made; i < to; i++) {
-      const guard = this.about.guards[motion.arrays.contact_guard[i]]?.name ?? "";
+      const met = this.about.guards[motion.arrays.contact_guard[i]],
+        guard = met?.name ?? "";
       const texts = [
         String(i + from),
         time[i].toFixed(7),
         error ? digits(error[i], 2) : "",
         `${plain(guard)}${direction ? (direction[i] > 0 ? " ↑" : " ↓") : ""}`,
-        speed ? (speed[i] * factor).toPrecision(4).replace("-", "−") : "",
+        !speed ? "" : own && met ? spoken(speed[i], rate(met)) : (speed[i] * factor).toPrecision(4).replace("-", "−"),
       ];
       if (motion.period) texts.push((time[i] / motion.period).toFixed(3));
       rows.push(cells("td", texts));

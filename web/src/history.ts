@@ -128,7 +128,7 @@ export class History {
       small = "11px system-ui, sans-serif";
     c.font = small;
     const margin = {
-        left: 58,
+        left: 62,
         right: 18 + Math.max(0, ...names.map(name => c.measureText(name).width)),
         top: 10,
         bottom: 40,

@@ -35,7 +35,7 @@ const FIRST_WAIT = 500,
   LONGEST_WAIT = 8000;
 /** What a page can't mend by trying again. */
 const FINAL: Record<number, string> = {
-  4403: "not let in: open the address that saltus explore printed in the terminal",
+  4403: "not let in: open the address that saltus explore printed in the terminal, or one that save copied from the page",
   4409: "this page is of another version of saltus: reload it",
   4429: "eight pages are open already: close one and reload",
 };

@@ -23,6 +23,7 @@ export interface ResponseEvents {
   orbit(choice: { point?: number; event?: number }): void;
   hover(text: string): void;
 }
+export const FOLLOWED = "the branches are being followed";
 const REACH = 22,
   EVENT_REACH = 12;
 /** The hue of a stretch on which nothing attracts. */
@@ -86,10 +87,12 @@ export class Responses {
     this.draw();
   }
 
+  /** What stands where there are no branches. */
+  without = FOLLOWED;
   draw(): void {
     const c = fitted(this.canvas),
       head = this.head;
-    if (!head) return wordsIn(c, place(this.canvas, [0, 1], [0, 1]), "the branches are being followed");
+    if (!head) return wordsIn(c, place(this.canvas, [0, 1], [0, 1]), this.without);
     const { ink, quiet, accent, panel } = colours(),
       { point_stable: stable, point_branch: branch, point_hue: hue } = this.a,
       x = this.x,
@@ -175,7 +178,7 @@ export class Responses {
       c.stroke();
     }
     if (!n)
-      wordsIn(c, p, head.done === false ? "the branches are being followed" : "no branch was found in this range");
+      wordsIn(c, p, head.done === false ? FOLLOWED : "no branch was found in this range");
     c.restore();
     const branches = new Set(Array.from(branch ?? [])).size;
     this.canvas.setAttribute(

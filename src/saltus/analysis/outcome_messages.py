@@ -60,7 +60,8 @@ _BELOW_A_ROOT = (
 #: A step of one trajectory alone, for systems of two states on one core of a server [s]. Good to a
 #: factor of three.
 SECONDS_PER_STEP = 1e-6
-
+#: Most states that a message gives.
+MOST_STATES = 6
 
 #: Gap, as a part of the largest state, below which a motion stands on a boundary.
 ON_IT = 1e-9
@@ -125,7 +126,9 @@ def _where(run: xr.Dataset, index: int) -> str:
     parts = [f"trajectory {index}"]
     if "end_time" in place:
         parts.append(f"t = {place['end_time'].item():.9g} s")
-        parts += [_value(place, name) for name in str(run.attrs["states"]).split()]
+        states = str(run.attrs["states"]).split()
+        parts += [_value(place, name) for name in states[:MOST_STATES]]
+        parts += ["..."] * (len(states) > MOST_STATES)
     return ", ".join(parts)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.analysis.closed.field_zeros import jacobian_of
+from saltus.analysis.closed.field_zeros import autonomous, jacobian_of
 from saltus.analysis.dataset_parts import guards_over
 from saltus.analysis.inputs.starts import ensemble
 from saltus.analysis.motion.motion_arrays import motion_arrays
@@ -28,6 +28,8 @@ LOOKED, SAMPLES = 60, 32
 WIDER = 5.0
 #: Times the widest gap beyond which a motion has left the picture.
 FARTHEST = 1e3
+#: Rates of a structure below this share of the fastest are those of rigid bodies.
+RIGID = 1e-6
 #: Starts along each axis of the first map.
 SIZE = (160, 160)
 #: Steps of a slider between its ends.
@@ -157,8 +159,8 @@ def _plane(system: System) -> tuple[str, str]:
 
 
 def _box(system: System, method: Method) -> tuple[dict[str, tuple[float, float]], float]:
-    """A range of each state about zero that holds the motion from rest and the gaps; and the time
-    of a turn [s].
+    """A range of each state about zero that holds the motion from rest and the gaps, and ends at
+    rigid stops; and the time of a turn [s].
     """
     names = (*system.states, *system.outputs.names)
     reach = np.zeros(len(names))
@@ -171,7 +173,8 @@ def _box(system: System, method: Method) -> tuple[dict[str, tuple[float, float]]
     if forced:
         turn = float(np.ravel(system.period(system.values))[0])
     else:
-        start = np.where(reach > 0, reach, 0.5)[: len(start)]
+        if autonomous(system):  # else the drive moves it from rest
+            start = np.where(reach > 0, reach, 0.5)[: len(start)]
         turn = _turn(system, start)
     length = {"periods": LOOKED} if forced else {"t_end": LOOKED * turn}
     count = SAMPLES if forced else LOOKED * SAMPLES
@@ -189,17 +192,26 @@ def _box(system: System, method: Method) -> tuple[dict[str, tuple[float, float]]
         reach = np.maximum(reach, moved)  # else gaps alone say how wide
     reach = np.where(reach > 0, reach, reach.max() or 1.0)
     ends = [_round_up(WIDER * one) for one in reach]
-    return {name: (-end, end) for name, end in zip(names, ends, strict=True)}, turn
+    box = {name: (-end, end) for name, end in zip(names, ends, strict=True)}
+    for guard, place in zip(system.guards, np.ravel(about.boundaries).tolist(), strict=True):
+        if guard.law and guard.law.kind == "impact" and guard.state:
+            low, high = box[guard.state]
+            if low < place < high:  # beyond a rigid stop there is no start
+                box[guard.state] = (low, place) if guard.law.side < 0 else (place, high)
+    return box, turn
 
 
 def _turn(system: System, start: np.ndarray) -> float:
-    """Time in which the linear part of the equations at a state turns or decays once [s]; 1 s where
-    it does neither.
+    """Time in which the linear part of the equations at a state turns or decays once [s], of a
+    structure that of its lowest mode; 1 s where it does neither.
     """
     (matrix,) = jacobian_of(
         system, start[None], {name: np.array([value]) for name, value in system.values.items()}
     )
-    rate = float(np.abs(np.linalg.eigvals(matrix)).max()) if np.isfinite(matrix).all() else 0.0
+    rates = np.abs(np.linalg.eigvals(matrix)) if np.isfinite(matrix).all() else np.zeros(1)
+    rate = float(rates.max())
+    if by_modes(system):
+        rate = float(rates[rates >= RIGID * rate].min())
     return float(f"{2.0 * np.pi / rate:.1e}") if rate > 0 else 1.0
 
 

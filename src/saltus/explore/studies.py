@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +22,7 @@ from saltus.errors import SaltusError
 from saltus.explore.desk import Desk
 from saltus.explore.map import KeptMap
 from saltus.explore.opening import Opening, first_quantity, opening_of
+from saltus.explore.questions import MOST_PERIODS
 from saltus.kernels import status as st
 from saltus.results import load
 from saltus.results.dataset import schema
@@ -95,7 +98,11 @@ def _opening(
         known["start"] = _start(system, motion.start)
         if isinstance(motion.periods, int):
             view["motion"] = {"periods": motion.periods}
-    return opening_of(system, setting.method(None, "method"), view=view, **known)
+    found = opening_of(system, setting.method(None, "method"), view=view, **known)
+    if motion is None or motion.t_end is None or isinstance(motion.t_end, list):
+        return found
+    turns = math.ceil(to_si(motion.t_end, "s", "t_end") / found.turn * (1 - 1e-9))
+    return replace(found, view={**view, "motion": {"periods": min(max(turns, 1), MOST_PERIODS)}})
 
 
 def _ends(system: System, name: str, axis: Any) -> tuple[float, float, int]:

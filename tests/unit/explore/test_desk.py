@@ -22,6 +22,7 @@ from saltus.explore.opening import Opening, opening_of
 from saltus.explore.orbits import settled
 from saltus.explore.questions import QuestionError, question_of, read
 from saltus.explore.shown import shown
+from saltus.explore.studies import opening_of_study
 from saltus.interrupt import Interrupted, Stop, check_stop
 
 RIG = sl.models.delangre("b", force="4 N", frequency="15 Hz")
@@ -426,3 +427,48 @@ def test_every_kind_of_model_opens_with_a_box_that_holds_its_motion(name):
     about, _ = one(Desk(opening, 1), "about")
     for row in about["parameters"]:
         assert row["low"] <= row["value"] <= row["high"] or row["value"] == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "axis", "side", "place"),
+    [("impact_oscillator", "x", 1, 1.0), ("rocking_block", "tilt", 0, 0.0)],
+)
+def test_a_map_ends_at_a_rigid_stop(name, axis, side, place):
+    ends = opening_of(sl.models.find(name)()).axes[axis]
+    assert ends[side] == place
+    assert ends[1 - side] == pytest.approx(-20.0 if side else 5.0)
+
+
+def test_a_study_with_a_record_opens_with_all_of_its_motion(tmp_path):
+    chain = 900.0 * (2 * np.eye(4) - np.eye(4, k=1) - np.eye(4, k=-1))
+    np.savez(tmp_path / "chain.npz", M=np.eye(4), K=chain, names=["w1", "w2", "w3", "w4"])
+    times = np.linspace(0, 3, 61)
+    np.savetxt(tmp_path / "quake.csv", np.column_stack([times, np.sin(9 * times)]), delimiter=",",
+        header="time [s],acceleration [m/s^2]", comments="")  # fmt: skip
+    (tmp_path / "study.toml").write_text(STUDY)
+    opening = opening_of_study(tmp_path / "study.toml")
+    slowest = 2 * np.pi / (2 * 30.0 * np.sin(np.pi / 10))
+    assert opening.turn == pytest.approx(slowest, rel=0.03)  # of two digits
+    assert opening.view["motion"]["periods"] == np.ceil(4 / opening.turn)
+    assert opening.method == sl.Modal()
+    largest = np.abs(sl.simulate(opening.system, t_end=4.0)["tip"].values).max()
+    assert largest < opening.box["tip"][1] < 30 * largest
+
+
+STUDY = """
+[study]
+name = "a record"
+
+[system.structure]
+mass = "chain.npz"
+modes = 4
+damping_ratio = "1 %"
+base = { direction = "w", amplitude = "quake(t)" }
+sensors = { tip = "w4" }
+
+[system.tables]
+quake = { file = "quake.csv", kind = "spline" }
+
+[simulate]
+t_end = "4 s"
+"""

@@ -8,6 +8,7 @@ import scipy.io
 
 import saltus as sl
 from saltus.errors import StudyError
+from saltus.flow.methods import default_method
 from saltus.study.read import parse
 from saltus.study.setting.inputs import Inputs
 from saltus.study.setting.setting import setting_of
@@ -89,6 +90,26 @@ sliding = "u_1"
     assert dict(written.units) == dict(made.units)
     assert [one.name for one in written.guards] == [one.name for one in made.guards]
     assert written.description == made.description
+
+
+def test_the_method_that_serves_it_moves_it(folder):
+    size = 4
+    chain = 900.0 * (2 * np.eye(size) - np.eye(size, k=1) - np.eye(size, k=-1))
+    np.savez(folder / "chain.npz", M=np.eye(size), K=chain, names=["w_1", "w_2", "w_3", "w_4"])
+    modes = """
+[system.structure]
+mass = "chain.npz"
+modes = 4
+damping_ratio = "1 %"
+base = { direction = "w", amplitude = "2*quake(t)" }
+
+[system.tables]
+quake = { file = "quake.csv", kind = "spline" }
+"""
+    setting = setting_of(parse(HEAD + modes), None, Inputs(folder))
+    assert setting.method(None, "method") == default_method(setting.base) == sl.Modal()
+    named = parse(HEAD + modes + '[method]\nname = "ODE45"\n')
+    assert setting_of(named, None, Inputs(folder)).method(None, "method") == sl.ODE45()
 
 
 def test_one_file_a_matrix(folder):

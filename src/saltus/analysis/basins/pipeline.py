@@ -44,6 +44,7 @@ from saltus.results.dataset.attractors import basin_meanings
 from saltus.results.dataset.kinds import Kind
 from saltus.results.provenance import to_json
 from saltus.system import System
+from saltus.system.structures.told import by_modes
 from saltus.units import to_si
 
 #: Cells of one task: seconds of work at most, and enough cells to keep lanes full to the end.
@@ -296,9 +297,12 @@ def basin_plan(
             f'{name}=("-1 {system.units[name]}", "1 {system.units[name]}", 400)'
             for name in system.states[:2]
         )
+        if by_modes(system):
+            example = 'tip=("-1 mm", "1 mm", 400), **{"tip speed": ("-1 m/s", "1 m/s", 400)}'
         raise ParameterError(
-            f"a basin map has two axes, not {len(axes)}. Give two states with "
-            f"range and number of starts: {example}."
+            f"a basin map has two axes, not {len(axes)}. Give two "
+            f"{'sensors' if by_modes(system) else 'states'} with range and number of starts: "
+            f"{example}."
         )
     periods = whole(periods, "periods")
     first, second = (count_along(given) for given in axes.values())

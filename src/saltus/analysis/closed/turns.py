@@ -17,7 +17,9 @@ from saltus.analysis.closed.field_zeros import autonomous, jacobian_of
 from saltus.errors import ParameterError, must_be
 from saltus.flow.maps import Stroboscope, forced
 from saltus.flow.taylor import Taylor
+from saltus.sentences import Dialect
 from saltus.system import System
+from saltus.system.structures.told import by_modes
 from saltus.units import to_si
 
 #: Motions that are asked.
@@ -66,9 +68,9 @@ def looks_every(
             raise ParameterError(
                 lambda say: (
                     f"{system.name} depends on time, but no parameter is named as the frequency "
-                    f"of its forcing: name it by {say.key('forced_at')} in {say.system()}. If the "
-                    f"forcing repeats otherwise, give {say.key('every')}, its period, such as "
-                    f"{say.key(every='0.1 s')}."
+                    f"of its forcing: {_naming(system, say)}. If the forcing repeats otherwise, "
+                    f"give {say.key('every')}, its period, such as {say.key(every='0.1 s')}; if it "
+                    f"doesn't, {say.verb('simulate')} follows its motions, which settle to nothing."
                 )
             )
         return _turn(system, start, parameters)
@@ -76,6 +78,13 @@ def looks_every(
     if not 0 < seconds < math.inf:
         raise must_be("every", "a positive time", every)
     return seconds
+
+
+def _naming(system: System, say: Dialect) -> str:
+    """How the frequency of a forcing is named."""
+    if by_modes(system):
+        return f"give {say.key('frequency')} of the structure"
+    return f"name it by {say.key('forced_at')} in {say.system()}"
 
 
 def _turn(system: System, start: np.ndarray, parameters: np.ndarray | None) -> float:

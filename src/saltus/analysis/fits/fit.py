@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.dataset_parts import provenance, subject
+from saltus.analysis.fits.doubts import doubt_sizes, doubt_times
 from saltus.analysis.fits.growth import grow
 from saltus.analysis.fits.measurement import Measurement, measurement, per_output
 from saltus.analysis.fits.motion import Motions
@@ -173,6 +174,7 @@ def fit(
     )  # fmt: skip
     model: Motions | SteadyResponses
     if data.along == "time":
+        doubt_times(system, data)
         model = Motions.of(system, method, data, unknowns, start, t_start, threads)
     else:
         one_of(get_args(Size), quantity=quantity)
@@ -186,9 +188,10 @@ def fit(
     with reporting(progress) as show:
         try:
             search.run(places, stage(show, 0.0, 0.3))
+            doubt_sizes(data, search)
             described = functools.partial(_described, spread, data)
             sure = described(search) and (
-                len(search.minima) == 1 or valleys(search.minima)[0][1] > 1
+                len(search.minima) < 2 or valleys(search.minima)[0][1] > 1
             )
             if not search.spent and not sure and data.along == "time":
                 more = _places(system, model, MORE * starts, seed)

@@ -88,10 +88,12 @@ def measurement(system: System, given: Any, missing: bool) -> Measurement:
     word = next((name for name in places if name in columns), "")
     names = tuple(name for name in outputs.names if name in columns)
     if not word or not names:
+        file = isinstance(given, str | os.PathLike | bytes)
         raise ParameterError(
             f"the measurement has no {'times' if not word else 'state or output'}. It needs t [s]"
             + (f", or {system.forced_at} of responses," if system.forced_at else "")
             + f" and some of {listed(outputs.names)}, under these names."
+            + file * " The first line of a file is t [s], x [mm]: commas between columns."
         )
     values = _together(columns, word, names)
     _check_places(columns[word], word, ascending=word in TIMES)

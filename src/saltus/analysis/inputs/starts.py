@@ -330,10 +330,7 @@ def range_of(system: System, name: Any, ends: Any) -> tuple[float, float]:
     if not among(name, system.values):
         raise unknown(f"{system.name} has no parameter", name, system.values)
     if not isinstance(ends, list | tuple | np.ndarray) or len(ends) != 2:
-        raise ParameterError(
-            f"the range of {name} must be (low, high), not {shown(ends)}: the steps between are "
-            f"chosen as the curve needs them."
-        )
+        raise ParameterError(f"the range of {name} must be (low, high), not {shown(ends)}.")
     low, high = (single(system, name, end) for end in ends)
     if not low < high:
         first, last = map(str, ends)
@@ -360,7 +357,8 @@ def _columns(system: System, start: Any) -> dict[str, np.ndarray]:
             )
         if strange:
             raise unknown(f"{system.name} has no state", strange[0], system.states)
-        start = {**dict.fromkeys(_made(system), 0.0), **start}
+        rest = system.states if by_modes(system) and not start else _made(system)
+        start = {**dict.fromkeys(rest, 0.0), **start}
         missing = [name for name in system.states if name not in start]
         if missing:
             example: dict[Any, Any] = dict.fromkeys(system.states[:MOST_IN_A_ROW], 0.0)

@@ -262,7 +262,7 @@ def _branches(title: str, ds: xr.Dataset) -> TextTable:
         quantity(f"largest |{first}|", [peak.values[i].max() for i in mine], unit_of(peak)),
         words("bifurcations", [int((ds["event_branch"].values == i).sum()) for i in numbers]),
     ]
-    notes = [f"{len(branch_of)} orbits on {len(numbers)} branches."]
+    notes = [f"{counted(len(branch_of), 'orbit')} on {counted(len(numbers), 'branch')}."]
     notes += [f"{one}." for one in _unexplained(ds)]
     shown = np.sort(np.argsort([-len(i) for i in mine], kind="stable")[:ROWS]).tolist()
     return table(title, columns, tuple(notes), shown)

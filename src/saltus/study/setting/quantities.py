@@ -85,8 +85,8 @@ def levels(system: System, table: Mapping[str, Quantity], place: str) -> dict[st
 def start(
     system: System, table: Mapping[str, Start], place: str = "simulate"
 ) -> dict[str, float | list[float]]:
-    """Start in SI: a number for each state, or for some sensors of a structure by its modes; or a
-    list for a batch.
+    """Start in SI: a number for each state, or for some sensors of a structure by its modes, whose
+    rest is an empty table; or a list for a batch.
 
     Raises
     ------
@@ -97,6 +97,8 @@ def start(
     if table and by_modes(system) and not any(name in known for name in table):
         known = system.outputs.names
         units = dict(zip(known, system.outputs.units, strict=True))
+    elif by_modes(system) and not table:
+        return {}
     elif missing := [state for state in known if state not in table]:
         raise StudyError(
             f"[{place}] start lacks {listed(missing)}. {system.name} has the states "

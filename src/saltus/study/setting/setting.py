@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from saltus import flow
 from saltus.errors import ParameterError, SaltusError, StudyError, nearest
+from saltus.flow.methods import default_method
 from saltus.study.setting import quantities
 from saltus.study.setting.curves import curve_of
 from saltus.study.setting.structures import structure_of
@@ -73,8 +74,12 @@ class Setting:
         return outputs or None
 
     def method(self, own: StudyTable | None, place: str) -> Any:
-        """Method of one question: its own, which the table ``place`` holds, or the study's."""
-        return method_of(self.study.method) if own is None else method_of(own, place)
+        """Method of one question: its own, which the table ``place`` holds, or the study's, or the
+        one that serves the system.
+        """
+        if own is not None:
+            return method_of(own, self.base, place)
+        return method_of(self.study.method, self.base)
 
 
 def setting_of(study: Study, own: System | None, inputs: Inputs) -> Setting:
@@ -210,10 +215,12 @@ def _written(table: SystemTable, formulas: Formulas, header: Header | None) -> S
         raise fault("system", error) from None
 
 
-def method_of(table: StudyTable, place: str = "method") -> Any:
-    """The method that a table describes. Raises StudyError if it doesn't take one of
-    the options.
+def method_of(table: StudyTable | None, system: System, place: str = "method") -> Any:
+    """The method that a table describes; without one that which serves the system. Raises
+    StudyError if it doesn't take one of the options.
     """
+    if table is None:
+        return default_method(system)
     options = table.model_dump(exclude_unset=True)
     try:
         return getattr(flow, options.pop("name"))(**options)

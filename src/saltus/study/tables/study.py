@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from pydantic import Field
 
-from saltus.study.tables.methods import METHODS, Method
+from saltus.study.tables.methods import Method
 from saltus.study.tables.parts import Header, StudyTable
 from saltus.study.tables.system import SystemTable
 
@@ -36,7 +36,12 @@ class Study(StudyTable):
 
     study: Header
     system: SystemTable = SystemTable()
-    method: Method = METHODS["Taylor"](name="Taylor")
+    method: Method | None = Field(
+        None,
+        description="How to integrate. Default: Taylor, or Modal from eight states on where it "
+        "serves.",
+        examples=[{"name": "Taylor"}],
+    )
     compare: Compare | None = None
 
     def questions(self) -> Iterator[tuple[str, StudyTable]]:

@@ -50,21 +50,39 @@ def checked(matrix: Any, name: str, size: int | None = None, symmetric: bool = F
             f"{name} is {square.shape[0]} x {square.shape[0]}, but mass is {size} x {size}."
         )
     if not np.isfinite(entries).all():
-        raise ParameterError(f"{name} holds a number that isn't finite.")
+        _refuse_strange(square, name)
     square = square.astype(np.float64)
     if symmetric:
         _check_symmetric(square, name)
     return square
 
 
+def _refuse_strange(matrix: Any, name: str) -> None:
+    """Raise a ParameterError that says where the first number is that isn't finite."""
+    from scipy.sparse import find
+
+    rows, columns, entries = find(matrix)
+    strange = np.flatnonzero(~np.isfinite(entries))
+    i, j = min((int(rows[k]), int(columns[k])) for k in strange)
+    raise ParameterError(
+        f"{name}[{i}, {j}] = {matrix[i, j]:g} isn't finite"
+        + (f", and {len(strange) - 1} more aren't." if len(strange) > 1 else ".")
+    )
+
+
 def _check_symmetric(matrix: Any, name: str) -> None:
+    from scipy.sparse import tril
+
     apart = abs(matrix - matrix.T)
     if apart.max() > ASYMMETRY * abs(matrix).max():
         place = apart.argmax()
         i, j = (int(k) for k in np.unravel_index(int(place), matrix.shape))
+        half = any(abs(tril(one, -1)).max() == 0 for one in (matrix, matrix.T))
         raise ParameterError(
             f"{name} must be symmetric, but {name}[{i}, {j}] = {matrix[i, j]:g} and "
             f"{name}[{j}, {i}] = {matrix[j, i]:g}."
+            + half
+            * f" It holds one triangle: give {name} + {name}.T - diag({name})."
         )
 
 

@@ -5,7 +5,7 @@ import pytest
 
 import saltus as sl
 from saltus.analysis.fits.measurement import measurement
-from saltus.errors import ParameterError, SaltusError, UnitError
+from saltus.errors import ParameterError, SaltusError, SaltusWarning, UnitError
 
 RIG = sl.models.delangre("a", force="4 N", frequency="8 Hz")
 GAP = {"upper_gap": ("0.1 mm", "2 mm")}
@@ -131,3 +131,15 @@ def test_units_must_fit():
         sl.fit(RIG, {"t": (TIME, "mm"), "x": X}, GAP)
     with pytest.raises(ParameterError, match="start of x isn't finite"):
         sl.fit(RIG, {"t": TIME, "x": X}, GAP, start=(np.nan, 0))
+
+
+@pytest.mark.parametrize(
+    ("measured", "message"),
+    [
+        ({"t": 1e3 * TIME[:9], "x": X[:9]}, "162 forcing periods apart.*milliseconds"),
+        ({"t": TIME[:9], "x": 1e3 * X[:9]}, r"measured x is \S+ times as large.*are in m:"),
+    ],
+)
+def test_a_unit_that_was_forgotten_is_doubted(measured, message):
+    with pytest.warns(SaltusWarning, match=message):
+        sl.fit(RIG, measured, GAP, starts=1, flows=2)

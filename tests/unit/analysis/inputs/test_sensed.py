@@ -51,6 +51,12 @@ def test_a_deflection_is_static_and_a_velocity_that_of_blows():
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-14)
 
 
+def test_nothing_given_is_rest():
+    system, _, _ = structure(modes=4)
+    np.testing.assert_array_equal(begun(system, {}), 0.0)
+    assert quantities.start(system, {}, "simulate") == {}
+
+
 def test_a_free_body_is_moved_as_a_whole():
     system, _, _ = structure(free=True)
     np.testing.assert_allclose(begun(system, {"x2": 1e-3})[:SIZE], 1e-3, rtol=1e-9)
