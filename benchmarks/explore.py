@@ -21,6 +21,7 @@ import shutil
 import subprocess
 import sys
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -28,6 +29,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from websockets.extensions.permessage_deflate import PerMessageDeflate
+from websockets.frames import Frame, Opcode
 from websockets.sync.client import ClientConnection, connect
 
 import saltus as sl
@@ -38,8 +41,20 @@ from saltus.flow import engine
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
+from benchmarks.structures import structure  # noqa: E402
+
 RIG = sl.models.delangre("b", force="4 N", frequency="15 Hz")
 BOX = {"x": [-5e-3, 5e-3], "v": [-1.0, 1.0]}
+#: A beam of ten modes with two stops, seen by sensors.
+BEAM = structure(
+    10,
+    2,
+    sensors={
+        "tip": "w30",
+        "tip speed": sl.velocity("w30"),
+        "stop force": sl.contact_force("stop_30"),
+    },
+)
 CLICKS = 40
 #: Time between two questions [s]: the server refuses more than 200 a second.
 PACE = 0.006
@@ -51,6 +66,25 @@ DRAWING = (
     "--disable-gpu-compositing", "--disable-gpu-rasterization", "--disable-accelerated-2d-canvas",
     "--no-sandbox",
 )  # fmt: skip
+
+
+#: Bytes of frames on the line, compressed or not, until they are read.
+WEIGHED: deque[int] = deque()
+
+
+def weighed(
+    self: PerMessageDeflate,
+    frame: Frame,
+    decode: Callable[..., Frame] = PerMessageDeflate.decode,
+    **named: Any,
+) -> Frame:
+    """A frame as it was before it was compressed, once it is weighed."""
+    if frame.opcode is Opcode.BINARY:
+        WEIGHED.append(len(frame.data))
+    return decode(self, frame, **named)
+
+
+PerMessageDeflate.decode = weighed  # type: ignore[method-assign]
 
 
 class Page:
@@ -74,14 +108,15 @@ class Page:
         return self._next
 
     def answers(self, number: int) -> Iterator[tuple[dict[str, Any], int]]:
-        """Heads of the answers to a question, with the bytes of each."""
+        """Heads of the answers to a question, with the bytes of each on the line."""
         while True:
             frame = self.line.recv()
             head, _ = unpacked(frame)  # type: ignore[arg-type]
+            size = WEIGHED.popleft()
             if head["kind"] == "map-piece":
                 self.line.send(json.dumps({"ask": "seen", "id": head["id"]}))
             if head["id"] == number:
-                yield head, len(frame)
+                yield head, size
             if head["id"] == number and head["kind"] in FAILED:
                 raise RuntimeError(head["why"])
             if head["id"] == number and head["kind"] in LAST and head.get("done", True):
@@ -333,6 +368,28 @@ def mixed(page: Page, seconds: float = 30.0) -> None:
     )  # fmt: skip
 
 
+def a_structure() -> None:
+    """Clicks, and how soon maps begin, of the beam."""
+    random = np.random.default_rng(1)
+    with served(f"{__file__}:BEAM") as (page, _):
+        box = {"tip": [-2e-3, 2e-3], "tip speed": [-0.5, 0.5]}
+        tips = random.uniform(-1, 1, (CLICKS, 2)) * (2e-3, 0.5)
+        starts = [dict(zip(box, tip, strict=True)) for tip in tips.tolist()]
+        begun = page.cpu()
+        times = [timed(partial(page.one, "motion", start=s), time.perf_counter) for s in starts]
+        each = (page.cpu() - begun) / CLICKS
+        begun, first = time.perf_counter(), 0.0
+        for head, _ in page.answers(page.ask("map", axes=box, size=[100, 100])):
+            if head["kind"] == "map-piece" and not first:
+                first = time.perf_counter() - begun
+                page.ask("stop", of="map")
+    row(
+        "beam, 10 modes, 2 stops, 3 sensors: click -> heard, median, p95",
+        f"{spread(times)}; {1e3 * each:.0f} ms CPU", "-", "30, 50 ms",
+    )  # fmt: skip
+    row("the same: first cells, nothing known", f"{first:.2f} s", "-", "0.5 s")
+
+
 def opening() -> None:
     """From the command to the printed address; the size of the page."""
     waited = []
@@ -363,27 +420,40 @@ def in_browser() -> None:
     if chromium is None:
         print("no Chromium, or no Playwright: the rows of the page are left out")
         return
-    from explorer_page import Seen, opened
+    from explorer_page import opened
 
-    with opened(RIG) as explorer, sync_playwright() as playwright:
+    with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=list(DRAWING))
-        seen = Seen(browser.new_page(viewport={"width": 1400, "height": 900}))
-        seen.page.goto(explorer.url)
-        seen.until("!!window.explorer && !!explorer.motion && !!explorer.map.sheet")
-        seen.get(WATCH)
-        row(
-            "click -> drawn while a map is computed, median, p95",
-            clicks(seen),
-            "42, 81 ms",
-            "40, 80 ms",
-        )
-        seen.patience = 300.0
-        seen.rest()
-        row("click -> drawn, idle, median, p95", clicks(seen), "31, 43 ms", "30, 50 ms")
-        row("slider: motions a second", drags(seen), "32 to 39", "30 to 40")
-        heap = seen.get("performance.memory ? performance.memory.usedJSHeapSize / 1e6 : NaN")
-        row("heap of the page", f"{heap:.1f} MB", "7.8 MB", "30 MB")
+        with opened(RIG) as explorer:
+            seen = shown(browser, explorer)
+            row(
+                "click -> drawn while a map is computed, median, p95",
+                clicks(seen),
+                "42, 81 ms",
+                "40, 80 ms",
+            )
+            seen.patience = 300.0
+            seen.rest()
+            row("click -> drawn, idle, median, p95", clicks(seen), "31, 43 ms", "30, 50 ms")
+            row("slider: motions a second", drags(seen), "32 to 39", "30 to 40")
+            heap = seen.get("performance.memory ? performance.memory.usedJSHeapSize / 1e6 : NaN")
+            row("heap of the page", f"{heap:.1f} MB", "7.8 MB", "30 MB")
+        with opened(BEAM) as explorer:
+            seen = shown(browser, explorer)
+            row("beam: click -> drawn while a map is computed", clicks(seen), "-", "40, 80 ms")
+            row("beam: slider, motions a second", drags(seen), "-", "30 to 40")
         browser.close()
+
+
+def shown(browser: Any, explorer: sl.explore.Explorer) -> Any:
+    """The page of an explorer with its first motion, watched."""
+    from explorer_page import Seen
+
+    seen = Seen(browser.new_page(viewport={"width": 1400, "height": 900}))
+    seen.page.goto(explorer.url)
+    seen.until("!!window.explorer && !!explorer.motion && !!explorer.map.sheet")
+    seen.get(WATCH)
+    return seen
 
 
 #: In the page: the motions that were drawn, and the times from clicks until theirs were.
@@ -458,6 +528,7 @@ def main() -> None:
         mixed(page)
     maps(given.large)
     models()
+    a_structure()
     opening()
     if not given.desk:
         in_browser()

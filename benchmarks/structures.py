@@ -25,6 +25,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -80,8 +81,8 @@ def beam(elements: int) -> tuple[np.ndarray, np.ndarray]:
     return mass[2:, 2:], stiffness[2:, 2:]
 
 
-def structure(modes: int, stops: int) -> sl.System:
-    """The beam with stops."""
+def structure(modes: int, stops: int, **more: Any) -> sl.System:
+    """The beam with stops, and what else :func:`saltus.structure` takes."""
     mass, stiffness = beam(elements_for(modes))
     fine = len(mass) // 60
     names = [f"{kind}{(i // 2 + 1) / fine:g}" for i, kind in enumerate("wr" * (len(mass) // 2))]
@@ -92,7 +93,7 @@ def structure(modes: int, stops: int) -> sl.System:
     ]
     return sl.structure(
         mass, stiffness, names=names, modes=modes, damping_ratio=RATIO, contacts=contacts,
-        forces=[sl.Force("w30", FORCE)], frequency=1.1 * first,
+        forces=[sl.Force("w30", FORCE)], frequency=1.1 * first, **more,
     )  # fmt: skip
 
 

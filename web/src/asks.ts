@@ -5,9 +5,13 @@ import type { Question } from "./link";
 import { FOLLOWED } from "./responses";
 import { Agreement, Sheet } from "./sheets";
 
-/** Milliseconds of rest before a start is settled; between two coarse maps of a drag. */
+/** Milliseconds of rest before a start is settled; between two coarse maps of a drag, and at most if the first has no
+ *  cell yet: were it stopped again and again, none would come. */
 export const SETTLE = 300;
-const COARSE = 250;
+const COARSE = 250,
+  SLOW = 1000;
+/** Milliseconds of the desk's work from which a motion is shown before its errors are measured, once the start rests. */
+const DEAR = 10;
 
 export class Asks {
   constructor(private of: Explorer) {}
@@ -65,11 +69,18 @@ export class Asks {
     this.of.later("settle", SETTLE, () => this.settleNow());
   }
   askMotion(): void {
-    const orbit = this.of.view.orbit;
-    if (!orbit)
-      this.of.link.newest("motion", { ...this.motionFields(), errors: this.of.dragging ? "local" : "measured" });
-    else if (orbit.track) this.of.link.newest("track", { ...(orbit.track as Question), values: this.of.view.values });
+    const orbit = this.of.view.orbit,
+      dear = (this.of.motion?.head.ms ?? 0) > DEAR;
+    this.of.later("errors", SETTLE, () => this.withErrors(), orbit !== null || this.of.dragging || !dear);
+    if (!orbit) {
+      if (dear || this.of.dragging) this.of.link.newest("motion", { ...this.motionFields(), errors: "local" });
+      else this.withErrors();
+    } else if (orbit.track) this.of.link.newest("track", { ...(orbit.track as Question), values: this.of.view.values });
     else this.of.link.newest("orbit", { ...orbit, values: this.of.view.values });
+  }
+  /** The motion, with the errors of its contacts measured: the desk runs it twice. */
+  withErrors(): void {
+    this.of.link.newest("motion", { ...this.motionFields(), errors: "measured" });
   }
   settleNow(): void {
     if (!this.of.view.orbit)
@@ -119,7 +130,8 @@ export class Asks {
   }
   askCoarse(): void {
     this.pickSheet();
-    const wait = this.of.coarse + COARSE - performance.now();
+    const sheet = this.of.map.sheet,
+      wait = this.of.coarse + (sheet && !sheet.known && !sheet.open ? SLOW : COARSE) - performance.now();
     if (wait <= 0) {
       this.of.coarse = performance.now();
       this.askMap(true);

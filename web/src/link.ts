@@ -58,7 +58,7 @@ export class Link {
   private welcome = false;
   private asked = new Map<number, Question>();
   private since = new Map<number, [string, number]>();
-  private flying = new Map<string, number>();
+  private flying = new Map<number, string>();
   private waiting = new Map<string, Question>();
   bytes = 0;
 
@@ -123,8 +123,7 @@ export class Link {
     if (head.kind === "map-piece") this.send({ ask: "seen", id: head.id });
     if (last) this.asked.delete(head.id);
     if (last) this.since.delete(head.id);
-    if (last && this.flying.get(kind) === head.id) {
-      this.flying.delete(kind);
+    if (last && this.flying.delete(head.id)) {
       const next = this.waiting.get(kind);
       if (next) {
         this.waiting.delete(kind);
@@ -162,14 +161,15 @@ export class Link {
     return id;
   }
 
-  /** Ask, but have one question of a kind under way: of those that come meanwhile only the newest is asked. */
+  /** Ask, but have one question of a kind under way, two of motions, so that the desk has the next one while this
+   *  is drawn: of those that come meanwhile only the newest is asked. */
   newest(kind: string, fields: Question): void {
-    if (this.flying.has(kind)) {
+    if ([...this.flying.values()].filter(one => one === kind).length >= (kind === "motion" ? 2 : 1)) {
       this.waiting.set(kind, fields);
       return;
     }
     const id = this.ask(kind, fields);
-    if (id >= 0) this.flying.set(kind, id);
+    if (id >= 0) this.flying.set(id, kind);
   }
 
   /** Tell the desk something that has no answer. */

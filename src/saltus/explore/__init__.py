@@ -123,10 +123,11 @@ def explore(
     from saltus.explore.desk import Desk
     from saltus.explore.opening import opening_of
     from saltus.flow.methods import check_method
+    from saltus.flow.progress import in_notebook
 
     check_system(system)
     desk = Desk(opening_of(system, check_method(method, system)), threads)
-    return opened(desk, browser=not _in_notebook() if browser is None else browser)
+    return opened(desk, browser=not in_notebook() if browser is None else browser)
 
 
 def opened(
@@ -160,11 +161,6 @@ def opened(
 def _warm(desk: Desk) -> None:
     with suppress(SaltusError):  # whoever asks for a map is told
         desk.warm()
-
-
-def _in_notebook() -> bool:
-    ipython = sys.modules.get("IPython")
-    return ipython is not None and hasattr(ipython.get_ipython(), "kernel")
 
 
 class _CallableRoom(ModuleType):

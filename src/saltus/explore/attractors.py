@@ -152,13 +152,6 @@ class Legend:
         still = np.where(np.abs(one.points) > _AT_ZERO * self.scale, one.points, 0.0)
         return replace(one, points=still)
 
-    def dataset(self) -> xr.Dataset:
-        """All of them, as :func:`saltus.attractors` returns them."""
-        system = self.map.system
-        about = provenance(system, self.map.method, system.values)
-        with self.lock:
-            return attractors_dataset(subject(system, about), portraits(self.map, self.found))
-
     def table(self) -> list[dict[str, Any]]:
         """All of them in words and numbers, by their keys."""
         with self.lock:
@@ -231,6 +224,12 @@ class Legend:
         kept = taken | reserved | {hue for _, hue in before}
         free = iter(sorted(set(range(len(kept) + len(fresh))) - kept))
         return [found[i] if i in found else next(free) for i in range(len(fresh))]
+
+
+def dataset_of(map_: Stroboscope, found: AttractorSet) -> xr.Dataset:
+    """Attractors as :func:`saltus.attractors` returns them."""
+    about = provenance(map_.system, map_.method, map_.system.values)
+    return attractors_dataset(subject(map_.system, about), portraits(map_, found))
 
 
 def pairs(numbers: Sequence[complex] | np.ndarray) -> list[list[float]]:

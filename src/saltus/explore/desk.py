@@ -21,7 +21,7 @@ from saltus.explore.about import about_answer, models_answer
 from saltus.explore.attractors import Legend
 from saltus.explore.frames import Answer, Emit
 from saltus.explore.kept_responses import KeptResponses
-from saltus.explore.map import KeptMap, KeptMaps, grow_map, look, plan_of_map
+from saltus.explore.map import KeptMap, KeptMaps, grow_map, plan_of_map
 from saltus.explore.motion import AskedRun, motion
 from saltus.explore.opening import Opening, first_quantity
 from saltus.explore.orbits import (
@@ -257,7 +257,6 @@ class Desk:
         if all(reasons := [nothing_attracts(one) for one in (system, *along)]):
             raise QuestionError(f"{reasons[0]} Responses are followed from attractors.")
         known = self.legend_at(plan := self.plan_of(system, method))
-        look(plan, known, self.threads)
         respond(
             known, method, question.parameter, limits, quantity, plan,
             self.responses, emit, self.threads, lambda: self._beside(known, question.parameter),

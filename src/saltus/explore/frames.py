@@ -18,6 +18,7 @@ Emit: TypeAlias = Callable[[Mapping[str, Any], Mapping[str, np.ndarray]], None]
 TYPES = ("f4", "f8", "u1", "i1", "u2", "u4", "i4")
 #: Heads and arrays begin at multiples of this [bytes].
 _STEP = 8
+_MAP = b'{"kind": "map-'
 
 
 def packed(head: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> bytes:
@@ -47,6 +48,11 @@ def packed(head: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> bytes:
     text = json.dumps(plain({**head, "arrays": places}), allow_nan=False).encode()
     text += b" " * (-(len(text) + 4) % _STEP)
     return b"".join([struct.pack("<I", len(text)), text, *parts])
+
+
+def of_map(frame: bytes | bytearray | memoryview) -> bool:
+    """True for a frame of a map: its head begins with its kind."""
+    return bytes(frame[4 : 4 + len(_MAP)]) == _MAP
 
 
 def unpacked(frame: bytes) -> tuple[dict[str, Any], dict[str, np.ndarray]]:

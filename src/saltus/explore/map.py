@@ -22,7 +22,7 @@ from saltus.analysis.basins.growing import (
     grow,
     grow_all,
 )
-from saltus.analysis.basins.labels import OPEN, Settling
+from saltus.analysis.basins.labels import OPEN, Settling, has_label
 from saltus.analysis.basins.levels import stride_of
 from saltus.analysis.basins.pipeline import BasinPlan, basin_plan
 from saltus.errors import counted
@@ -197,7 +197,7 @@ class _Growing:
         for other in others:
             if other is not mine:
                 here, there = _shared(mine.plan, other.plan)
-                has = _has_label(other.result.label[there]) & ~_has_label(label[here])
+                has = has_label(other.result.label[there]) & ~has_label(label[here])
                 here, there = here[has], there[has]
                 part = other.result.of(there)
                 part.label[:] = self._renumbered(part.label, other.found, wider)
@@ -253,7 +253,7 @@ class _Growing:
         self._begun = True
         label = self._kept.result.label
         cells = np.flatnonzero(label != Kind.NOT_COMPUTED)
-        known, strides = int(_has_label(label).sum()), stride_of(cells, plan.shape)
+        known, strides = int(has_label(label).sum()), stride_of(cells, plan.shape)
         for level in plan.levels():
             here = cells[strides == level.stride]
             if len(here):
@@ -376,8 +376,3 @@ def _same_starts(mine: np.ndarray, theirs: np.ndarray) -> tuple[np.ndarray, np.n
     """
     _, here, there = np.intersect1d(mine, theirs, return_indices=True)
     return here, there
-
-
-def _has_label(label: np.ndarray) -> np.ndarray:
-    known: np.ndarray = (label != Kind.NOT_COMPUTED) & (label != OPEN)
-    return known

@@ -14,7 +14,7 @@ from saltus.analysis.branches.branches import follow_all, seeds_between
 from saltus.analysis.branches.plans import LONGEST_DOUBLED, POINTS, SWITCHES, plan_of
 from saltus.analysis.inputs.outputs import outputs_of
 from saltus.errors import unknown
-from saltus.explore.attractors import Legend, pairs
+from saltus.explore.attractors import Legend, dataset_of, pairs
 from saltus.explore.frames import Answer, Emit
 from saltus.explore.kept_responses import NO_HUE, KeptResponses, crossings, stretches
 from saltus.explore.motion import AskedRun
@@ -24,10 +24,10 @@ from saltus.flow.methods import Method, exact_method
 from saltus.results.dataset import schema
 from saltus.system import System
 
-#: Starts that are drawn from the box of the map, and values of the parameter at which they and the
-#: known attractors are run.
-STARTS, VALUES = 8, 5
-#: Share of the work that the branches of the known attractors are.
+#: Starts that are looked through for attractors to begin with; fewer of them, and the attractors,
+#: are run at some more values of the parameter.
+LOOKED, STARTS, VALUES = 64, 8, 5
+#: Share of the work that the branches of the first attractors are.
 FIRST = 0.4
 #: Share of progress after which it is told anew.
 _STEP = 0.02
@@ -47,8 +47,10 @@ def respond(
     threads: int | None,
     beside: Callable[[], Sequence[Legend]],
 ) -> None:
-    """Emit the branches of a system over a parameter: those of the known attractors first, then all
-    that starts in a box lead to. Each answer replaces the one before.
+    """Emit the branches of a system over a parameter: those of the attractors that some starts lead
+    to at its values first, then all that fewer starts lead to at other values. Each answer replaces
+    the one before. Branches don't depend on what was asked before; only their hues do, which are
+    those of the attractors that are shown.
 
     Raises
     ------
@@ -73,8 +75,14 @@ def respond(
         system, parameter, limits, method, threads, POINTS, LONGEST_DOUBLED, frozenset(SWITCHES)
     )
     wanted = outputs_of(system)
-    if len(known):
-        seeds = seeds_between(system, parameter, limits, known.dataset(), method=method)
+    known.follow()
+    found = plan.glanced(LOOKED, threads)
+    starts = np.concatenate([plan.drawn(STARTS), *(one.points[:1] for one in found.every)])
+    if found:
+        ds = dataset_of(known.map, found)
+        known.grow(found)
+        known.scouts = max(known.scouts, LOOKED)
+        seeds = seeds_between(system, parameter, limits, ds, method=method)
         told.begin("following branches")
         follow_all(rules, system, parameter, *seeds, done, told.between(0.0, FIRST))
         first = table_of(system, parameter, limits, done, wanted, method)
@@ -85,7 +93,7 @@ def respond(
         system,
         parameter,
         limits,
-        starts_from(known, plan),
+        starts,
         at=VALUES,
         method=method,
         threads=threads,
@@ -171,11 +179,6 @@ class _Told:
                 self._say()
 
         return told
-
-
-def starts_from(known: Legend, plan: BasinPlan) -> np.ndarray:
-    """Starts in the box of a map, and a point of each known attractor, float64[k, D]."""
-    return np.concatenate([plan.drawn(STARTS), *(one.points[:1] for one in known.found.every)])
 
 
 def _answer(

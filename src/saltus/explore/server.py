@@ -22,8 +22,10 @@ from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
+from uvicorn.protocols.websockets.auto import AutoWebSocketsProtocol
 
 from saltus.errors import ParameterError
+from saltus.explore.compression import MapsDeflatedFactory
 from saltus.explore.frames import packed
 from saltus.explore.questions import LONGEST, Hello, QuestionError, read
 from saltus.explore.session import AnswersQuestions, Outbox, Session
@@ -100,6 +102,15 @@ class OnlyOurs:
             await PlainTextResponse("Not here.", 403 if ours else 421)(scope, receive, answer)
 
 
+class _PageSocket(AutoWebSocketsProtocol):  # type: ignore[misc, valid-type]
+    """The protocol of a page's socket: maps are compressed."""
+
+    def __init__(self, *given: Any, **named: Any) -> None:
+        super().__init__(*given, **named)
+        holder: Any = getattr(self, "conn", self)  # in older uvicorn the protocol itself
+        holder.available_extensions = [MapsDeflatedFactory()]
+
+
 class Server:
     """The explorer's server, on a thread.
 
@@ -143,7 +154,7 @@ class Server:
             server_header=False,
             date_header=False,
             ws_max_size=LONGEST,
-            ws_per_message_deflate=False,
+            ws=_PageSocket,
             timeout_graceful_shutdown=2,
         )
         self._uvicorn = uvicorn.Server(config)

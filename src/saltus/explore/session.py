@@ -4,6 +4,7 @@ and neither sockets nor files.
 
 from __future__ import annotations
 
+import ctypes
 import os
 import secrets
 import sys
@@ -268,6 +269,8 @@ class Session:
             self._outbox.put(packed(_failed(question), {}), stop)
         finally:
             self._windows.pop(question.id, None)
+            if question.ask in BEHIND:
+                _give_back()
 
     def _desk_for(self, question: PageQuestion) -> AnswersQuestions:
         """The desk; that of another model from where the page opens one."""
@@ -290,6 +293,14 @@ def _give_way() -> None:
     """
     if sys.platform == "linux":
         os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICE)
+
+
+def _give_back() -> None:
+    """Return freed memory to the system, where the C library keeps it for each thread (glibc): 306
+    MB after 20 s of maps and clicks became 263. It takes half a millisecond.
+    """
+    if sys.platform == "linux" and (trim := getattr(ctypes.CDLL(None), "malloc_trim", None)):
+        trim(0)
 
 
 def _stopped(question: PageQuestion) -> dict[str, Any]:

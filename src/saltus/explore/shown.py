@@ -17,7 +17,7 @@ from saltus.explore.kept_responses import crossings
 from saltus.explore.map import KeptMap, plan_of_map
 from saltus.explore.opening import first_quantity
 from saltus.explore.questions import MotionQuestion, QuestionError, ResponsesQuestion, question_of
-from saltus.explore.responses import VALUES, starts_from
+from saltus.explore.responses import STARTS, VALUES
 from saltus.explore.save import PARTS, View, starts_of
 from saltus.flow.methods import Method
 from saltus.system import System
@@ -75,12 +75,8 @@ def shown(desk: Any, fields: Mapping[str, Any]) -> tuple[View, dict[str, Callabl
         limits = range_of(system, responses.parameter, responses.range)
         given["vary"] = responses.parameter, *limits
         plan = desk.plan_of(system, method)
-        starts = np.concatenate(
-            [
-                starts_from(desk.legend_at(plan), plan),
-                *_on_branches(desk, system, method, responses, limits),
-            ]
-        )
+        on = _on_branches(desk, system, method, responses, limits)
+        starts = np.unique(np.concatenate([plan.drawn(STARTS), *on]), axis=0)
         given |= {"starts": starts_of(system.states, starts), "values_tried": VALUES}
         found["responses"] = partial(_answered, desk, system, method, responses, limits)
     return View(desk.opening, system, method, **given), found
@@ -125,13 +121,13 @@ def _answered(*view: Any) -> xr.Dataset:
 def _on_branches(
     desk: Any, system: System, method: Method, question: ResponsesQuestion, limits: Any
 ) -> list[np.ndarray]:
-    """A point of each branch that attracts at a value from which a saved study begins, float64[1,
-    D]: it comes to the branches that are shown, whatever the box leads to.
+    """A point of each branch that attracts at the values of the view, or at one from which a saved
+    study begins, float64[1, D]: it comes to the branches that are shown, whatever the box leads to.
     """
     ds = _known(desk, system, method, question, limits)
     if ds is None:
         return []
     low, high = limits
     values = np.linspace(low, high, VALUES + 2)[1:-1].tolist()
-    here = [system.with_values(**{question.parameter: one}) for one in values]
+    here = [system, *(system.with_values(**{question.parameter: one}) for one in values)]
     return [one.points[:1] for each in here for _, one in crossings(ds, each)]

@@ -42,11 +42,11 @@ def reporting(
             yield show
     elif progress is not None and not progress:
         yield None
-    elif progress is None and not os.isatty(2) and not _in_notebook():
+    elif progress is None and not os.isatty(2) and not in_notebook():
         with _alive(LogLines(_to_stderr).show) as show:
             yield show
     else:
-        bar = _NotebookBar() if _in_notebook() else _Bar()
+        bar = _NotebookBar() if in_notebook() else _Bar()
         try:
             with _alive(bar.show) as show:
                 yield show
@@ -125,7 +125,7 @@ class LogLines:
         )
 
 
-def _in_notebook() -> bool:
+def in_notebook() -> bool:
     """True in a notebook, which shows outputs below cells."""
     ipython = sys.modules.get("IPython")
     return ipython is not None and hasattr(ipython.get_ipython(), "kernel")

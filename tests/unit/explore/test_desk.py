@@ -11,7 +11,6 @@ import saltus as sl
 from explorer_systems import van_der_pol
 from mad_page import mad_message
 from saltus.errors import SaltusError
-from saltus.explore import map as maps
 from saltus.explore import motion as motions
 from saltus.explore import orbits, responses
 from saltus.explore.attractors import Legend
@@ -265,11 +264,15 @@ def test_a_hue_belongs_to_one_side_of_a_fold(desk, found):
 def test_responses_are_branches_and_their_points_are_orbits(desk, monkeypatch):
     monkeypatch.setattr(responses, "STARTS", 1)
     monkeypatch.setattr(responses, "VALUES", 1)
-    monkeypatch.setattr(maps, "LOOKED", 1)
+    monkeypatch.setattr(responses, "LOOKED", 1)
     one(desk, "settle", start={"x": "1 mm", "v": 0})
-    answers = asked(desk, "responses", parameter="frequency", range=[15.0, 15.1])
-    head, arrays = [one for one in answers if one[0]["kind"] == "responses"][-1]
+    question = {"ask": "responses", "parameter": "frequency", "range": [14.5, 15.1]}
+    head, arrays = asked(desk, **question)[-1]
     assert head["done"]
+    told, fresh = asked(desk_of(), **question)[-1]  # nothing was asked before
+    assert told["events"] == head["events"]
+    for name in fresh.keys() - {"point_hue"}:
+        np.testing.assert_array_equal(arrays[name], fresh[name])
     unstable = np.flatnonzero(arrays["point_stable"] == 0)
     for point in (int(unstable[0]), 0):
         orbit, samples = one(desk, "orbit", responses=head["key"], point=point)
@@ -282,15 +285,19 @@ def test_responses_are_branches_and_their_points_are_orbits(desk, monkeypatch):
         assert any(outside) != orbit["stable"]
     event, _ = one(desk, "orbit", responses=head["key"], event=0)
     assert event["event"] == head["events"][0]
-    again = asked(desk, "responses", parameter="frequency", range=[15.0, 15.1])
+    again = asked(desk, **question)
     assert [one[0]["key"] for one in again] == [head["key"]]  # kept
-    hue = one(desk, "settle", start={"x": "1 mm", "v": 0})[0]["attractor"]["hue"]
-    assert hue in arrays["point_hue"][arrays["point_period"] == 3]
-    view = {"responses": {"parameter": "frequency", "range": [15.0, 15.1], "quantity": "x"}}
+    view = {name: question[name] for name in ("parameter", "range")}
+    view = {"responses": {**view, "quantity": "x"}}
     starts = np.stack([*shown(desk, view)[0].starts.values()], axis=1)
     ds = desk.responses.get(head["key"])[1]
-    on = [one.points[0] for _, one in crossings(ds, RIG.with_values(frequency=15.05))]
-    assert on  # a study that is saved begins on each of them
+    both = [RIG.with_values(frequency=value) for value in (14.8, 15.0)]
+    on = [one.points[0] for here in both for _, one in crossings(ds, here)]
+    assert len(on) >= 2  # a study that is saved begins on each of them, once
+    assert len(np.unique(starts, axis=0)) == len(starts)
+    five = one(desk, "settle", start=on[-1].tolist())[0]["attractor"]
+    assert five["period"] == 5
+    assert set(arrays["point_hue"][arrays["point_stable"] == 1].tolist()) == {five["hue"]}
     assert all(np.abs(starts - point).max(axis=1).min() < 1e-12 for point in on)
 
 

@@ -6,8 +6,11 @@ import random
 import socket
 import threading
 
+import numpy as np
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.extensions.permessage_deflate import PerMessageDeflate
+from websockets.frames import Opcode
 from websockets.sync.client import connect
 
 import saltus as sl
@@ -291,3 +294,40 @@ def test_work_that_outlasts_the_server_leaves_no_traceback(capfd):
             threading.Event().wait(0.01)
         one.stop()
     assert capfd.readouterr().err == ""
+
+
+# -- bytes -----------------------------------------------------------------------------------------
+class Even:
+    """A desk that answers a motion by one frame, a map by three pieces and an end."""
+
+    def answer(self, question, emit):
+        kinds = ["map-piece"] * 3 + ["map-end"] if question.ask == "map" else ["motion"]
+        for kind in kinds:
+            emit({"kind": kind}, {"step": np.ones(1000, "u1")})
+
+
+def test_maps_are_compressed_and_motions_are_not(monkeypatch):
+    decode, weights = PerMessageDeflate.decode, []
+
+    def weighed(self, frame, **named):
+        if frame.opcode is Opcode.BINARY:
+            weights.append((len(frame.data), frame.rsv1))
+        return decode(self, frame, **named)
+
+    monkeypatch.setattr(PerMessageDeflate, "decode", weighed)
+    server = Server(Even())
+    server.start()
+    try:
+        with page(server) as line:
+            line.send(hello(server))
+            assert heard(line)["kind"] == "hello"
+            line.send(json.dumps({"ask": "motion", "id": 1, "start": [1e-3, 0.0]}))
+            motion = line.recv(timeout=60)
+            assert weights[1:] == [(len(motion), False)]
+            axes = {"x": [-5e-3, 5e-3], "v": [-1.0, 1.0]}
+            line.send(json.dumps({"ask": "map", "id": 2, "axes": axes, "size": [40, 40]}))
+            sizes = [len(line.recv(timeout=60)) for _ in range(4)]
+    finally:
+        server.stop()
+    assert all(compressed for _, compressed in weights[2:])
+    assert sum(size for size, _ in weights[2:]) < 0.2 * sum(sizes)

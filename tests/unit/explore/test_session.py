@@ -1,6 +1,8 @@
 """A page's session: the newest question counts, work waits for the page, and ends with it."""
 
 import json
+import os
+import platform
 import threading
 
 import numpy as np
@@ -223,3 +225,26 @@ def test_what_is_dropped_is_said():
     assert [outbox.take(), outbox.take()] == [b"x" * 8] * 2
     assert unpacked(outbox.take())[0] == {"kind": "dropped", "count": 2}
     assert outbox.take() is None
+
+
+# -- memory ----------------------------------------------------------------------------------------
+@pytest.mark.skipif(
+    "glibc" not in platform.libc_ver(), reason="other C libraries free by themselves"
+)
+def test_memory_of_a_map_is_given_back():
+    def resident():
+        with open("/proc/self/statm") as statm:
+            return int(statm.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+    class Taker:
+        def answer(self, question, emit):
+            arrays = [np.ones(10_000) for _ in range(1000)]
+            self.held, self.kept = resident(), arrays[9::10]  # memory in between is free
+            emit({"kind": "map-end"}, {})
+
+    page = Page(Taker())
+    page.map()
+    page.wait(len)
+    page.session.close()
+    assert len(page.desk.kept) == 100
+    assert resident() < page.desk.held - 50

@@ -17,7 +17,15 @@ import numpy as np
 
 from saltus.analysis.attractors.attractor_set import AttractorSet
 from saltus.analysis.basins.basins import compiled
-from saltus.analysis.basins.labels import OPEN, Settling, Wanderers, complete, fewer, renumber
+from saltus.analysis.basins.labels import (
+    OPEN,
+    Settling,
+    Wanderers,
+    complete,
+    fewer,
+    has_label,
+    renumber,
+)
 from saltus.analysis.basins.levels import stride_of
 from saltus.analysis.basins.pipeline import BasinPlan
 from saltus.analysis.basins.scouting import dear
@@ -25,7 +33,6 @@ from saltus.analysis.closed.capture import Neighbourhoods
 from saltus.flow.maps import Stroboscope
 from saltus.flow.threads import on_threads, usable_processors
 from saltus.interrupt import check_stop
-from saltus.results.dataset.kinds import Kind
 
 #: Starts of up to seven states that one thread follows at a time: fewer leave lanes empty, more
 #: delay the first cells.
@@ -266,7 +273,7 @@ class _Work:
     def _in_order(self) -> Iterator[np.ndarray]:
         for level in self.levels:
             for tile in level.tiles():
-                yield tile[~_has_label(self.result.label[tile])]
+                yield tile[~has_label(self.result.label[tile])]
 
     def take(self, count: int) -> np.ndarray:
         """The next cells, int64[count at most]; behind all levels those that wait."""
@@ -323,7 +330,7 @@ class _Handed:
 
     def __init__(self, work: _Work, take: Callable[[Grown], None]) -> None:
         self._work, self._take = work, take
-        self._known = _has_label(work.result.label)
+        self._known = has_label(work.result.label)
         self._seen = self._known.copy()
         strides = stride_of(np.flatnonzero(self._seen), work.plan.shape)
         self._left = {
@@ -352,10 +359,5 @@ class _Handed:
             here = cells[strides == stride]
             part = self._work.result.of(here)
             self._left[stride] -= int((~self._seen[here]).sum())
-            self._seen[here], self._known[here] = True, _has_label(part.label)
+            self._seen[here], self._known[here] = True, has_label(part.label)
             self._take(Grown(stride, here, part, int(self._known.sum()), self._left[stride] == 0))
-
-
-def _has_label(label: np.ndarray) -> np.ndarray:
-    known: np.ndarray = (label != Kind.NOT_COMPUTED) & (label != OPEN)
-    return known

@@ -79,6 +79,12 @@ class Settling:
         return Settling(*(getattr(self, field.name)[where] for field in fields(self)))
 
 
+def has_label(label: np.ndarray) -> np.ndarray:
+    """True where a start has an outcome: it is computed, and not open."""
+    known: np.ndarray = (label != Kind.NOT_COMPUTED) & (label != OPEN)
+    return known
+
+
 class Wanderers:
     """Trajectories of any ages on their way to attractors, on one thread.
 
