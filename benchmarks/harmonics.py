@@ -4,14 +4,15 @@ alternating frequency-time method (AFT) of our own in the same run, and exact br
     OPENBLAS_NUM_THREADS=1 python benchmarks/harmonics.py
 
 CPU time of one thread. The AFT samples the motion at 1024 places of a period, adds up the force
-there, and takes its Fourier coefficients and their derivatives by FFT, as NLvib and others do; it
-has the same linear response, the same continuation and the same unknowns, so what differs is how
-the force is integrated. Its error is that of its own solution, put into the equations with exact
-contact instants.
+there, and takes its Fourier coefficients and their derivatives by products of matrices, as NLvib
+does; it is written in NumPy, and has the same linear response and the same unknowns, so what
+differs is how the force is integrated. Its error is the distance of its own solution from that of
+the equations with exact contact instants.
 """
 
 from __future__ import annotations
 
+import functools
 import sys
 import time
 from pathlib import Path
@@ -24,8 +25,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "src"))
 import saltus as sl
 from saltus.analysis.harmonics import series as fourier
 from saltus.analysis.harmonics.equations import HarmonicOrbits
-from saltus.analysis.harmonics.forces import Forces
-from saltus.analysis.harmonics.pieces import Intervals, uncut
+from saltus.language.evaluate import evaluate
 
 SAMPLES = 1024
 
@@ -64,32 +64,63 @@ def beam(elements=1000, modes=8):
     )  # fmt: skip
 
 
-class Sampled(Forces):
-    """Forces as the AFT of the literature has them: at equidistant samples."""
+class Sampled(HarmonicOrbits):
+    """The equations as the AFT of the literature has them: forces at equidistant samples."""
 
-    def intervals(self, signals, constants, rate):
-        """Every sample with the sides on which it lies."""
-        angle, harmonics = samples(), fourier.harmonics_of(signals.shape[1])
-        numbers, gaps = self._gaps(self.states(signals, rate), constants)
-        bits = np.zeros((SAMPLES, len(self.system.guards)), bool)
-        bits[:, numbers] = fourier.basis(angle, harmonics) @ gaps.T > 0
-        return Intervals(angle, np.full(SAMPLES, 2 * np.pi / SAMPLES), bits, uncut(0).instants)
+    def _of(self, z):
+        forces, harmonics, signals = self.forces, self.harmonics, self.signals(z)
+        constants, slopes, rate, rate_by = self._constants(z)
+        angle, here = samples(harmonics)
+        states = forces.states(signals, rate)
+        seen = here @ states.T
+        numbers, gaps = forces._gaps(states, constants)
+        bits = np.zeros((SAMPLES, len(forces.system.guards)), bool)
+        bits[:, numbers] = here @ gaps.T > 0
+        found = evaluate(
+            forces._entries, **forces.motion(angle, seen, constants), bits=list(bits.T)
+        )
+        found = np.array([np.broadcast_to(one, SAMPLES) for one in found])
+        back = here.T * (2.0 / SAMPLES)
+        back[0] *= 0.5
+        width, size = 2 * harmonics + 1, self.size
+        whole = np.zeros((forces.count, width, 1 + size + len(constants)))
+        whole[:, :, 0] = found[: forces.count] @ back.T
+        for (i, j), slope in zip(forces._known, found[forces.count :], strict=True):
+            if j >= len(forces.moving):
+                whole[i, :, 1 + size + j - len(forces.moving)] += back @ slope
+                continue
+            first, times = 1 + forces._signal[j] * width, forces._times[j]
+            derived = fourier.derivative(np.eye(width), times).T * rate**times
+            whole[i, :, first : first + width] += (back * slope) @ (here @ derived)
+            shift = back @ (slope * seen[:, j]) * times
+            whole[i, :, 1 + size :] += np.outer(shift, rate_by)
+        response, by_rate = self.source.response(harmonics, rate)
+        moved = responses(response, whole).reshape(size, -1) / constants[0]
+        turned = responses(by_rate, whole[:, :, :1]).ravel() / constants[0]
+        derivative = np.empty((size, self.width))
+        derivative[:, :size] = np.diag(self._own) - moved[:, 1 : 1 + size]
+        by = -moved[:, 1 + size :] - np.outer(turned, rate_by)
+        by[:, 0] += moved[:, 0] / constants[0]
+        derivative[:, size:] = by @ slopes
+        return self._own * z[:size] - moved[:, 0], derivative
 
-    def nodes(self, intervals, harmonics):  # noqa: ARG002
-        """The samples."""
-        return samples(), np.full(SAMPLES, 2 * np.pi / SAMPLES), np.arange(SAMPLES)
+
+def responses(blocks, series):
+    """Series float64[m, 2H + 1, n] whose amplitudes are multiplied by complex128[H + 1, c, m]."""
+    amplitudes = fourier.to_complex(series.swapaxes(1, 2))  # m, n, H + 1
+    found = np.einsum("kcm,mnk->cnk", blocks, amplitudes)
+    return fourier.of_complex(found).swapaxes(1, 2)
 
 
-def samples():
-    return 2 * np.pi * np.arange(SAMPLES) / SAMPLES
+@functools.lru_cache(maxsize=8)
+def samples(harmonics):
+    angle = 2 * np.pi * np.arange(SAMPLES) / SAMPLES
+    return angle, fourier.basis(angle, harmonics)
 
 
-def equations(system, harmonics, scale, by_samples=False):
+def equations(system, harmonics, scale, kind=HarmonicOrbits):
     """Those of one motion over the frequency."""
-    found = HarmonicOrbits(system, ("frequency",), harmonics, 1, scale[None])
-    if by_samples:
-        found.forces.__class__ = Sampled
-    return found
+    return kind(system, ("frequency",), harmonics, 1, scale[None])
 
 
 def closed(orbits, z):
@@ -145,7 +176,7 @@ def compare(system, harmonics, states, frequency):
     one = equations(system, harmonics, np.ones(1))
     z = one.of_states(states[: len(system.states)], frequency)
     unit = np.append(np.full(one.size, np.abs(z[:-1]).max()), 1.0)
-    exact, aft = (equations(system, harmonics, unit, how) for how in (False, True))
+    exact, aft = (equations(system, harmonics, unit, kind) for kind in (HarmonicOrbits, Sampled))
     (z, _), (sampled, more) = closed(exact, z), closed(aft, z)
     off = np.abs(z - sampled)[:-1].max() / unit[0]
     print(

@@ -79,6 +79,7 @@ def derivatives():
     print(f"| orbits, amplitude without contact | k, d, force | closed form | {amplitude():.0e} |")
     for name, system in (("soft contacts", bumper), ("impacts", hammer), ("stick-slip", slider)):
         print(f"| orbits, {name} | a random way | differences | {orbits(system, random):.0e} |")
+    print(f"| responses, soft contacts | a random way | differences | {responses(random):.0e} |")
     slopes, said = graze()
     print(f"| places of grazes | gap, force, k, d | closed form | {slopes:.0e} |")
     print(f"\nAt a graze of a rigid stop: {said}\n")
@@ -143,23 +144,39 @@ def amplitude():
 
 def orbits(system, random):
     """Largest state of periodic orbits that are found again at values nearby."""
-    worst, to = 0.0, [*system.values]
+    worst = 0.0
     for _ in range(SYSTEMS // 2):
         own = varied(system, random)
-        values = np.array([*own.values.values()])
-        along = random.normal(size=len(to)) * values
         orbit = sl.attractors(own, (0.0, 0.1)).isel(attractor=0)
-        if str(orbit.attractor_type.item()) != "periodic":
-            continue
-        found, each = sl.sensitivity(own, orbit, to=to), []
-        start = [orbit[f"attractor_{name}"].values[0] for name in own.states]
-        for shift in SHIFTS * 1e-5:
-            moved = own.with_values(**dict(zip(to, values + shift * along, strict=True)))
-            there = sl.attractors(moved, start).isel(attractor=0)
-            each.append(sl.sensitivity(moved, there, to=to).maximum.values)
-        by = WEIGHTS @ np.array(each) / 1e-5
-        worst = max(worst, off(found.maximum_derivative.values @ along, by))
+        if str(orbit.attractor_type.item()) == "periodic":
+            found = sl.sensitivity(own, orbit, to=[*own.values])
+            worst = max(worst, beside(own, found.maximum_derivative.values, orbit, random))
     return worst
+
+
+def responses(random):
+    """Largest state of the responses over the frequency, all in one call."""
+    seen, worst = sl.frequency_response(bumper, ("1.6 Hz", "2.4 Hz", SYSTEMS), (0.0, 0.1)), 0.0
+    seen = seen.sel(response=(seen.response_period == 1) & (seen.response_type == "periodic"))
+    found = sl.sensitivity(bumper, seen, to=[*bumper.values])
+    for i, frequency in enumerate(seen.response_f.values):
+        own = bumper.with_values(f=float(frequency))
+        orbit = sl.attractors(own, (0.0, 0.1)).isel(attractor=0)
+        worst = max(worst, beside(own, found.maximum_derivative.values[i], orbit, random))
+    return worst
+
+
+def beside(own, slopes, orbit, random):
+    """Error of the slopes of an orbit's largest state, along a random way, beside differences."""
+    to, each = [*own.values], []
+    values = np.array([*own.values.values()])
+    along = random.normal(size=len(to)) * values
+    start = [orbit[f"attractor_{name}"].values[0] for name in own.states]
+    for shift in SHIFTS * 1e-5:
+        moved = own.with_values(**dict(zip(to, values + shift * along, strict=True)))
+        there = sl.attractors(moved, start).isel(attractor=0)
+        each.append(sl.sensitivity(moved, there, to=to).maximum.values)
+    return off(slopes @ along, WEIGHTS @ np.array(each) / 1e-5)
 
 
 def graze():

@@ -10,6 +10,8 @@ from scipy.interpolate import BPoly
 from scipy.linalg import expm
 
 import saltus as sl
+from saltus.flow import modal_tables
+from saltus.flow.modal_eigen import shared_of
 from saltus.kernels.modal.layout import QUEUE
 from saltus.system.linearity import linear_pieces
 
@@ -77,8 +79,9 @@ def check_legs(system, run, parts):
         assert (np.abs(z[:states] - at[k + 1]) < 1e-10 * size).all()
 
 
-@pytest.mark.parametrize(("seed", "degrees", "contacts"), [(1, 9, 1), (2, 14, 3), (3, 20, 2)])
-def test_legs_of_many_modes_are_those_of_matrix_exponentials(seed, degrees, contacts):
+@pytest.mark.parametrize(("seed", "degrees", "contacts"), [(1, 9, 1), (2, 14, 3), (3, 33, 2)])
+def test_legs_of_many_modes_are_those_of_matrix_exponentials(seed, degrees, contacts, monkeypatch):
+    monkeypatch.setattr(modal_tables, "SHARED", 33)
     system = spread(20261126 + seed, degrees, contacts)
     run = sl.simulate(system, periods=20, progress=False, method=sl.Modal(), time_errors="local")
     assert str(run.status.values) == "ok"
@@ -95,11 +98,18 @@ def test_legs_need_no_compiler():
 
 
 @pytest.mark.nojit
-def test_samples_are_those_of_matrix_exponentials_however_many_there_are():
+@pytest.mark.parametrize("shared", [False, True])
+def test_samples_are_those_of_matrix_exponentials_however_many_there_are(shared, monkeypatch):
     """States are written some samples at a time, of one contact state each: more samples between
-    two contacts than are written together, and a fourth of them, which are the same to the bit.
+    two contacts than are written together, and a fourth of them, which are the same to the bit. By
+    eigenvectors and their inverse, and by shapes alone; five coordinates fill no lanes.
     """
-    system = spread(6, 5, 1)
+    found = []
+    monkeypatch.setattr(modal_tables, "SHARED", 1 if shared else 6)
+    monkeypatch.setattr(
+        modal_tables, "shared_of", lambda *of: found.append(shared_of(*of)) or found[-1]
+    )
+    system = spread(6 + shared, 5, 1)
     few, many = (
         sl.simulate(system, periods=1, samples=samples, progress=False, method=sl.Modal(),
             time_errors="local") for samples in (60, 240)
@@ -109,6 +119,8 @@ def test_samples_are_those_of_matrix_exponentials_however_many_there_are():
     at = np.array([many[f"contact_{name}"].values for name in system.states]).T
     before = np.searchsorted(many.contact_time.values, many.time.values, side="right") - 1
     assert np.bincount(before[before >= 0]).max() > 2 * QUEUE
+    assert bool(found) == shared
+    assert None not in found
     for k in np.flatnonzero(before >= 0)[::3]:
         begin = float(many.contact_time[before[k]])
         every, rate = augmented(system, int(many.contact_mode_after[before[k]]))

@@ -220,7 +220,7 @@ def test_the_largest_exponents_alone_are_those_of_all():
     every, some = (sl.lyapunov(beam, exponents=most, **kw) for most in (None, 3))
     assert every.kind.item() == some.kind.item() == "chaotic"
     apart = np.abs(some.lyapunov_exponent.values - every.lyapunov_exponent.values[:, :3])
-    assert (apart < 1e-3 * some.lyapunov_error.values).all()
+    assert (apart < 1e-2 * some.lyapunov_error.values).all()
     np.testing.assert_array_equal(some.mean_divergence, every.mean_divergence)
     assert some.sizes["flow_exponent"] == 3
     assert "exponent_sum" not in some

@@ -52,6 +52,7 @@ class Interface:
 
 
 _F1, _F2, _F3 = "float64[::1]", "float64[:, ::1]", "float64[:, :, ::1]"
+_F4 = "float64[:, :, :, ::1]"
 _I1, _I2 = "int64[::1]", "int64[:, ::1]"
 #: Types of the first arguments of every `propagate`, in order: a batch (kernels/batch.py), and the
 #: budget.
@@ -196,7 +197,7 @@ HARMONICS = Interface(
     entry="zeros",
     arguments=(_F2, _I1, _F1, _F1),
     layout="",
-    templates=("harmonics",),
+    templates=("harmonics/series", "harmonics/zeros"),
     sizes=(),
     flags=(),
     tables=MappingProxyType({}),
@@ -204,11 +205,37 @@ HARMONICS = Interface(
     truths=(),
 )
 
+#: The equations of harmonic balance: an equation brings its forces with their slopes, and the
+#: slopes of its gaps.
+BALANCE = Interface(
+    entry="balance",
+    arguments=(
+        _I1, _F1, _F2, _F1, _F1, _F1, _F2, _F1, _F4, _F4, _I1, _I1, _I1, _I1, _I1, _I1, _F1, _F2,
+        _F1, _F1, _I1, _F1, _F1, _I2, _F1, _F1, _I1, _F1, _F2, _F3, _F2, _F2, _F2, _F2, _F1, _F1,
+        _F1, _F2, _F1, _F1, _F2, _F1,
+    ),
+    layout="",
+    templates=(
+        "harmonics/series",
+        "harmonics/cut",
+        "harmonics/sums",
+        "harmonics/derivatives",
+        "harmonics/balance",
+    ),
+    sizes=(),
+    flags=(),
+    tables=MappingProxyType({}),
+    functions=MappingProxyType(
+        dict.fromkeys(("forces", "gap_slopes"), (REAL, ARRAY, ARRAY, WHOLE, ARRAY))
+    ),
+    truths=(),
+)  # fmt: skip
+
 _MODAL_TABLES = (
     *(_I1, _I1, _F1, _F2, _F2, _F2, _F2, _F2, _I2, _F2, _F2),
     *(_I2, _F2, _F2, _I1, _F2, _F2),
 )
-_MODAL_WORK = (_F2,) * 6 + (_F1, _F2, _F2, _F1, _F1) + (_F2,) * 15 + (_F1, _F2, _I1)
+_MODAL_WORK = (_F2,) * 6 + (_F1, _F2, _F2, _F1, _F1) + (_F2,) * 15 + (_F1, _F2, _I1, _F2)
 
 #: The modal flow: what it needs of an equation are tables, which it is given.
 MODAL = Interface(

@@ -16,6 +16,7 @@ from saltus.codegen import machine, tableaux, templates
 from saltus.codegen.head import Constant, Head
 from saltus.codegen.interface import (
     ADAMS,
+    BALANCE,
     CAPTURE,
     FIXED_STEP,
     HARMONICS,
@@ -138,6 +139,18 @@ def capture_module() -> Any:
 def harmonics_module() -> Any:
     """The compiled search for the zeros of Fourier series, the same for all systems."""
     return _flow(HARMONICS, "harmonics", Head({}, ""), "harmonics", "the zeros of Fourier series")
+
+
+@lru_cache(maxsize=256)
+def balance_module(functions: str, name: str) -> Any:
+    """The compiled equations of harmonic balance, of the forces that
+    :func:`saltus.codegen.forces_head.forces_text` prints of a system of some name.
+    """
+    with working(lambda: f"compiling {name} for harmonic balance"):
+        head = Head({}, functions)
+        return _flow(
+            BALANCE, "balance", head, f"{name}, harmonic balance", f"{name} for harmonic balance"
+        )
 
 
 @lru_cache(maxsize=1)

@@ -16,6 +16,7 @@ from typing import Any
 
 from saltus.codegen.interface import (
     ADAMS,
+    BALANCE,
     CAPTURE,
     FIXED_STEP,
     HARMONICS,
@@ -33,7 +34,7 @@ WIDTHS = (2, 4, 8, 16)
 BITCODE: dict[str, tuple[Interface, int]] = {
     **{f"taylor_{lanes}": (TAYLOR, lanes) for lanes in WIDTHS}, "pair": (PAIR, 1),
     "fixed_step": (FIXED_STEP, 1), "adams": (ADAMS, 1), "ndf": (NDF, 1), "capture": (CAPTURE, 1),
-    "harmonics": (HARMONICS, 1), "modal": (MODAL, 4),
+    "harmonics": (HARMONICS, 1), "balance": (BALANCE, 1), "modal": (MODAL, 4),
 }  # fmt: skip
 #: Kernels that the templates import.
 _SHARED = ("lanes", "trigonometry", "isolation", "status", "batch", "parts", "clocks_layout")

@@ -171,7 +171,8 @@ class ModalFlow:
                 empty((max(rows, 1), layout.FIFTH + 1)),
                 empty((layout.WAVES * (groups + 1) * max(rows, 1), lanes)),
                 empty((max(rows, 1), 11)), empty(5),
-                empty((layout.QUEUE * (2 * groups + states), lanes)), np.zeros(1, np.int64),
+                empty((layout.QUEUE * (4 * groups + states), lanes)), np.zeros(1, np.int64),
+                empty((4 * groups, lanes)),
             )  # fmt: skip
         arrays: tuple[np.ndarray, ...] = self._memory.arrays
         return arrays

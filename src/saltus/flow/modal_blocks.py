@@ -184,11 +184,11 @@ def _limit(matrix: np.ndarray) -> float:
 
 
 def table_of(
-    block: Block | None, gaps: np.ndarray, lanes: int, state_groups: int
+    block: Block | None, coordinates: int, gaps: np.ndarray, lanes: int, state_groups: int
 ) -> Iterator[np.ndarray]:
     """The table of a block, as kernels/modal/blocks.py reads it; rows of gaps float64[R, N]."""
     if block is None:
-        yield np.zeros(lanes)
+        yield np.array([0.0, 0.0, 0.0, coordinates])
         return
     size, states = len(block.matrix), len(block.right)
     groups, count = -(-size // lanes), lanes * state_groups

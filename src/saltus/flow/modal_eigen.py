@@ -13,6 +13,9 @@ Eigen = tuple[np.ndarray, np.ndarray, np.ndarray]
 MOST_ROUNDS = 24
 #: Least frequency of a mode over the largest, and over its own rate, for these rounds.
 SLOWEST, UNDAMPED = 1e-6, 1e-2
+#: Least ((C_ii l + K_ii + l^2) over the larger of its terms by which an entry of an eigenvector is
+#: made anew.
+CLEAR = 1e-2
 #: Most that the product of eigenvectors and their inverse differs from 1 before it is corrected.
 MOST_ERROR = 1e-9
 
@@ -117,7 +120,7 @@ def _of_structure(matrix: np.ndarray) -> Eigen | None:
     if found is None:
         return None
     values, within = found
-    shapes = basis @ within
+    shapes = _refined(stiffness, damping, values, basis @ within)
     vectors = np.concatenate([shapes, shapes * values])
     inverse = np.concatenate([shapes * values + damping @ shapes, shapes])
     inverse = (inverse / (inverse * vectors).sum(axis=0)).T
@@ -131,6 +134,39 @@ def _of_structure(matrix: np.ndarray) -> Eigen | None:
     inverse = (back[:size] - 1j * back[size:]) / 2
     order = np.argsort(np.abs(values), kind="stable")
     return values[order], vectors[:, order], inverse[order]
+
+
+def _refined(
+    stiffness: np.ndarray, damping: np.ndarray, values: np.ndarray, shapes: np.ndarray
+) -> np.ndarray:
+    """Eigenvectors whose small entries are as exact as large ones: each entry is what its row of
+    the equations makes of the others, where that isn't nearly 0/0.
+    """
+    own, rate = np.diag(stiffness)[:, None], np.diag(damping)[:, None]
+    beside = np.concatenate([stiffness, damping]) - np.concatenate(
+        [np.diag(own[:, 0]), np.diag(rate[:, 0])]
+    )
+    held, lost = (beside @ shapes.view(float)).view(complex).reshape(2, *shapes.shape)
+    divisor = own + values * (values + rate)
+    clear = np.abs(divisor) > CLEAR * np.maximum(own, np.abs(values) ** 2)
+    return np.where(clear, -(held + values * lost) / np.where(clear, divisor, 1.0), shapes)
+
+
+def shared_of(matrix: np.ndarray, modes: Eigen) -> tuple[np.ndarray, np.ndarray] | None:
+    """Factors s of the left vectors s (l u + C u, u) of modes (u, l u), complex128[M], and the
+    damping, float64[M], if it couples no coordinates and all modes are of this form; else None.
+    """
+    values, vectors, inverse = modes
+    size = len(values)
+    if len(vectors) != 2 * size or not np.array_equal(vectors[:size] * values, vectors[size:]):
+        return None
+    damping = -matrix[size:, size:]
+    rate = np.diag(damping).copy()
+    left = np.concatenate([vectors[size:] + rate[:, None] * vectors[:size], vectors[:size]]).T
+    scale = 1.0 / (left * vectors.T).sum(axis=1)
+    wrong = np.abs(left * scale[:, None] - inverse).max(axis=1)
+    alike = wrong <= MOST_ERROR * np.abs(inverse).max(axis=1)
+    return (scale, rate) if alike.all() and (damping == np.diag(rate)).all() else None
 
 
 def _is_symmetric(matrix: np.ndarray) -> bool:

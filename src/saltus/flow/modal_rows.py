@@ -81,6 +81,26 @@ def runs_of(filled: np.ndarray) -> np.ndarray:
     return runs
 
 
+def shapes_table(
+    scale: np.ndarray, damping: np.ndarray, to_states: np.ndarray, lanes: int, size: int
+) -> np.ndarray:
+    """The table in place of L where the states are coordinates and their rates, float64[size]:
+    see kernels/modal/series.py. Factors of the left vectors complex128[M], damping float64[M], V.
+    """
+    modes, width = len(scale), to_states.shape[1]
+    count = -(-modes // lanes) * lanes
+    shapes, factors, rates = (
+        np.zeros((count, width), complex),
+        np.zeros(width, complex),
+        np.zeros(count),
+    )
+    shapes[:modes], factors[:modes], rates[:modes] = to_states[:modes], scale / 2, damping
+    blocks = shapes.reshape(-1, lanes, width // lanes, lanes).transpose(0, 2, 1, 3)
+    parts = np.stack([blocks.real, blocks.imag], axis=3)
+    flat = np.concatenate([one.ravel() for one in (parts, factors.real, factors.imag, rates)])
+    return np.concatenate([flat, np.zeros(size - len(flat))])
+
+
 def _zeros(shape: tuple[int, int], kind: Any) -> np.ndarray:
     """Zeros that begin where a line of the processor's cache does: else half of the lanes lie in
     two lines each.

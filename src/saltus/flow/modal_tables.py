@@ -12,11 +12,11 @@ import numpy as np
 
 from saltus.codegen.module import MODAL_LANES as LANES
 from saltus.flow.modal_blocks import table_of
-from saltus.flow.modal_eigen import Eigen, half_of, slots_of
+from saltus.flow.modal_eigen import Eigen, half_of, shared_of, slots_of
 from saltus.flow.modal_laws import laws_of
 from saltus.flow.modal_modes import Known, StateModes, modes_of, spread_over
 from saltus.flow.modal_parameters import ParameterTables
-from saltus.flow.modal_rows import Links, Rows, runs_of
+from saltus.flow.modal_rows import Links, Rows, runs_of, shapes_table
 from saltus.flow.modal_values import ValueSet
 from saltus.kernels.modal import layout
 from saltus.kernels.status import HOLD_LAW, NO_LAW, SURFACE_LAW
@@ -33,6 +33,9 @@ from saltus.system.quantity import remembered
 MOST_BYTES = 2**30
 #: Memory of a set of parameter values besides its arrays [bytes].
 SET_BYTES = 4096
+#: Modes from which on L and V share the shapes: with 60, all contact states of a beam against eight
+#: stops lie in a cache.
+SHARED = 64
 #: Rounding of a coefficient of the equations, relative to it.
 ROUNDED = 16 * np.finfo(float).eps
 
@@ -338,12 +341,12 @@ class Tables:
         """
         key = id(known), shown.matrix.tobytes()
         if modes.block is not None:
-            return self.modes.add(self._table(modes, shown.matrix))
+            return self.modes.add(self._table(known.piece.matrix, modes, shown.matrix))
         if key not in self._known:
-            self._known[key] = self.modes.add(self._table(modes, shown.matrix))
+            self._known[key] = self.modes.add(self._table(known.piece.matrix, modes, shown.matrix))
         return self._known[key]
 
-    def _table(self, modes: StateModes, gaps: np.ndarray) -> np.ndarray:
+    def _table(self, matrix: np.ndarray, modes: StateModes, gaps: np.ndarray) -> np.ndarray:
         """The table of some modes: lambda, its size, L, V, amplitudes of the gaps; where L and V
         aren't zero; the block.
         """
@@ -362,10 +365,15 @@ class Tables:
         # V: by groups of states, for each mode the real part and minus the imaginary one
         right = to_states.reshape(self.state_groups, LANES, width).transpose(0, 2, 1)
         right = np.stack([right.real, -right.imag], axis=2)
+        eigen = values, modes.vectors, modes.inverse
+        shared = shared_of(matrix, eigen) if slots >= SHARED and modes.block is None else None
+        if shared is not None:
+            left = shapes_table(*shared, to_states, LANES, left.size)
+            right = np.zeros(right.shape)
         gaps = gaps[self.first_guard]
         rows = gaps @ to_states[:states]
         waves = np.stack([rows.real, rows.imag, np.abs(rows)], axis=1)
-        block = table_of(modes.block, gaps, LANES, self.state_groups)
+        block = table_of(modes.block, slots if shared else 0, gaps, LANES, self.state_groups)
         sides = (
             (to_modes, self.groups, self.state_groups),
             (to_states, self.state_groups, self.groups),

@@ -116,7 +116,7 @@ class Dots:
 def check_quantity(quantity: Any, known: Sequence[str]) -> None:
     """Raise a ParameterError unless a quantity is known."""
     if not among(quantity, known):
-        raise ParameterError(f"quantity={shown(quantity)}. Known: {', '.join(known)}.")
+        raise ParameterError(f"quantity={shown(quantity)} isn't known. {nearest(quantity, known)}")
 
 
 def height(ds: xr.Dataset, quantity: str, output: str | None, prefix: str = "") -> Height:

@@ -67,6 +67,7 @@ def test_what_fits_no_map_of_sizes_is_refused():
         (lambda: amplitude_map(ds, start=3), "there is no start 3"),
         (lambda: amplitude_map(ds, output="w"), "has no output 'w'"),
         (lambda: amplitude_map(ds, quantity="loud"), "quantity='loud'"),
+        (lambda: amplitude_map(ds, quantity="amplitud"), "Did you mean 'amplitude'?"),
         (lambda: amplitude_map(ds, bifurcations=[]), "has no curves"),
         (lambda: amplitude_map(ds, bifurcations=ds), r"\(bifurcations=\) takes"),
         (lambda: amplitude_map(resonance(20)), "two parameters"),
@@ -148,5 +149,5 @@ def test_shares_need_random_starts_over_one_parameter():
     with pytest.raises(ParameterError, match="responses over one parameter"):
         shares(kinds_map())
     ds, _ = mixed()
-    with pytest.raises(ParameterError, match="Known: rms, peak"):
+    with pytest.raises(ParameterError, match="quantity='mean' isn't known"):
         shares(ds, quantity="mean")

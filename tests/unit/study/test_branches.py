@@ -180,7 +180,8 @@ vary.frequency = { first = "17 Hz", last = "18.5 Hz", count = 2 }
 
 
 def test_a_fold_of_the_branches_is_followed_over_two_parameters(tmp_path):
-    outcome = run(STUDY + CURVE + MAP, tmp_path / "out")
+    slopes = '[event_sensitivity]\nevent = "fold"\nnear = "17.8 Hz"\nto = ["force"]\n'
+    outcome = run(STUDY + CURVE + MAP + slopes, tmp_path / "out")
     (path,) = (one for one in outcome.files if one.name == "bifurcation-curve.csv")
     with path.open() as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
@@ -188,6 +189,12 @@ def test_a_fold_of_the_branches_is_followed_over_two_parameters(tmp_path):
     assert min(abs(f - 17.81941952) for f, n in zip(at, force, strict=True) if n == 4.0) < 1e-7
     assert min(at) >= 17
     assert max(at) <= 18.5
+    (path,) = (one for one in outcome.files if one.name == "event-sensitivity.csv")
+    with path.open() as file:
+        (row,) = csv.DictReader(line for line in file if not line.startswith("#"))
+    near = sorted(zip(force, at, strict=True), key=lambda one: abs(one[0] - 4.0))[:5]
+    slope = np.polyfit(*np.transpose(near), 2)
+    assert float(row["derivative [SI]"]) == pytest.approx(2 * slope[0] * 4.0 + slope[1], rel=1e-3)
     names = {file.name for file in outcome.files}
     assert names >= {"bifurcation-curve.png", "bifurcation-curve-map.png", "map-sizes.png"}
 

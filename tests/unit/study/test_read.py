@@ -129,7 +129,7 @@ def test_schema_tells_editors_the_keys():
         "study", "system", "method", "simulate", "sensitivity", "fit", "scatter", "compare",
         "poincare", "spectrum", "impacts", "energy", "lyapunov",
         "frequency_response", "bifurcation_diagram", "equilibria", "periodic_orbits", "branches",
-        "bifurcation_curve", "backbone", "basins",
+        "bifurcation_curve", "event_sensitivity", "backbone", "basins",
     }  # fmt: skip
     assert schema["$defs"]["Simulate"]["additionalProperties"] is False
     assert schema["$defs"]["SystemTable"]["additionalProperties"] != {}, (

@@ -27,9 +27,12 @@ from saltus.system.modes import mode_number, sides
 #: Farthest that Newton's method goes from a truncated motion to the exact orbit, in ranges of the
 #: states.
 NEAR = 0.5
-#: Samples of a forcing period by which an exact orbit is read off as a series, and by which it is
-#: held against a truncated one.
+#: Samples of a forcing period by which an exact orbit is read off as a series, and the least by
+#: which it is held against a truncated one.
 SAMPLES = 256
+#: Samples in a period of the first harmonic that is left out, by which it is: the largest distance
+#: is missed by half a percent there.
+BEHIND_LAST = 32
 #: Numbers that are held at a time, of motions beside exact orbits: some 16 MB.
 TOGETHER = 2**21
 
@@ -95,8 +98,7 @@ class ClosedHarmonics(HarmonicOrbits):
         multipliers = np.full((len(z), points.shape[2]), np.nan + 0j)
         good = np.flatnonzero(point.found)
         if len(good):
-            derivative = orbits.evaluate(point.z[good], good)[1]
-            multipliers[good] = orbits.multipliers(point.z[good], derivative, good)
+            multipliers[good] = orbits.multipliers(point.z[good], point.derivative[good], good)
         ends = orbits.points(point.z)
         for i, one in enumerate(z):
             self._known[one.tobytes()] = bool(point.found[i]), ends[i], multipliers[i]
@@ -127,11 +129,12 @@ class ClosedHarmonics(HarmonicOrbits):
         good = np.flatnonzero(exact.found)
         if not len(good):
             return apart, ranges
-        each = SAMPLES * self.periods
+        per_period = max(SAMPLES, -(-BEHIND_LAST * (self.harmonics + 1) // self.periods))
+        each = per_period * self.periods
         for some in np.array_split(good, 1 + len(good) * each * len(outputs) // TOGETHER):
             seen = samples(
                 self.system, self.names[0], exact.points[some, 0], self.values(z[some])[:, 0],
-                self.periods, self._exact.map.method,
+                self.periods, self._exact.map.method, per_period,
             )  # fmt: skip
             share = np.arange(each) / each
             here = fourier.basis(2 * np.pi * share, self.harmonics)
@@ -161,12 +164,13 @@ def copy_with(orbits: PeriodicOrbits, scale: np.ndarray) -> PeriodicOrbits:
 
 
 def samples(
-    system: System, name: str, starts: np.ndarray, values: np.ndarray, periods: int, method: Method
-) -> np.ndarray:
+    system: System, name: str, starts: np.ndarray, values: np.ndarray, periods: int, method: Method,
+    per_period: int = SAMPLES,
+) -> np.ndarray:  # fmt: skip
     """Exact motions from states float64[r, D] at values of a parameter, in equal steps over some
-    forcing periods, float64[r, periods*SAMPLES, D].
+    forcing periods, float64[r, periods*per_period, D].
     """
     rows = np.tile(np.array(list(system.values.values())), (len(starts), 1))
     rows[:, list(system.values).index(name)] = values
-    run = Stroboscope(system, method, rows).run(starts, periods, Schedule.even(periods, SAMPLES))
+    run = Stroboscope(system, method, rows).run(starts, periods, Schedule.even(periods, per_period))
     return np.asarray(run.samples[:, :, : starts.shape[1]])

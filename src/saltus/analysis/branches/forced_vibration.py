@@ -227,12 +227,15 @@ def small_vibration(
     looked = about * np.linspace(1 - FAR, 1 + FAR, LOOKS)
     signs = np.sign([in_phase(one) for one in looked])
     changes = np.flatnonzero(signs[1:] != signs[:-1])
-    if not len(changes):
+    first = changes[np.abs(looked[changes] - about).argmin()] if len(changes) else 0
+    apart = np.abs(natural / turns - looked[first])
+    # damping may keep a displacement from quadrature in a mode: the next change is another mode's
+    if not len(changes) or apart[mode - 1] > apart.min() + about / LOOKS:
         raise ParameterError(
             f"no forcing frequency near mode {mode} of {system.name} brings "
-            f"{system.states[force.displacement]} into quadrature with {force.name}."
+            f"{system.states[force.displacement]} into quadrature with {force.name}. ",
+            lambda say: f"Choose another {say.key('state')} or {say.key('mode')}.",
         )
-    first = changes[np.abs(looked[changes] - about).argmin()]
     frequency = float(brentq(in_phase, looked[first], looked[first + 1], xtol=1e-14 * about))
     shape, drive = response(frequency)
     size = amplitude / np.abs(shape[state])

@@ -81,7 +81,7 @@ def looks_every(
 
 
 def _naming(system: System, say: Dialect) -> str:
-    """How the frequency of a forcing is named."""
+    """The name of the frequency of a forcing."""
     if by_modes(system):
         return f"give {say.key('frequency')} of the structure"
     return f"name it by {say.key('forced_at')} in {say.system()}"

@@ -19,7 +19,7 @@ from saltus.analysis.fits.motion import Motions
 from saltus.analysis.fits.search import MisfitSearch
 from saltus.analysis.fits.steady import Size, SteadyResponses
 from saltus.analysis.fits.unknowns import INSIDE, Unknowns
-from saltus.analysis.fits.verdict import UNKNOWN, follow, noise_of, valleys, verdict
+from saltus.analysis.fits.verdict import FOLLOW, UNKNOWN, follow, noise_of, valleys, verdict
 from saltus.analysis.inputs.given import Range, Starts, Value
 from saltus.analysis.inputs.starts import at_values, check_system
 from saltus.analysis.inputs.verb import verb
@@ -44,8 +44,6 @@ ROUNDS, SETTLED = 20, 1e-3
 MORE = 4
 #: Misfit beyond which residuals are more than the noise that was given.
 TOO_LARGE = 1.5
-#: Correlation of neighbouring residuals beyond which they aren't noise.
-FOLLOW = 0.5
 #: Residuals of this share of what was measured are small: they needn't be noise.
 SMALL = 0.05
 
@@ -80,7 +78,11 @@ def fit(
        and from the system's own values. Where contacts come and go, misfits have many valleys.
     2. From the quarter of them with the least misfit, least squares descend (trust region
        reflective), by derivatives that the flow carries along exactly through every contact.
-    3. The best valley gives the values. Its derivatives give their standard errors, and by
+    3. If no two agree, or what is left isn't noise, minima on short beginnings of a history are
+       followed to longer ones; and where a motion is too sensitive to be followed from its start,
+       as chaotic ones are, through up to 400 windows (multiple shooting), each of which starts
+       where the one before ends, to a millionth of the states.
+    4. The best valley gives the values. Its derivatives give their standard errors, and by
        singular vectors the combinations of unknowns that the data don't fix.
 
     Parameters
@@ -116,8 +118,8 @@ def fit(
     starts : int
         Places from which the search begins.
     flows : int
-        Most motions that are computed, with derivatives or without, of any length; of responses
-        two for each frequency and step.
+        Most motions that are computed, with derivatives or without, of any length; all windows
+        count as one. Of responses two for each frequency and step.
     seed : int
         Of the places.
     values : mapping, optional
@@ -139,7 +141,7 @@ def fit(
         whether the data tell more of a combination than the bounds do; ``valley_value``,
         ``valley_misfit``, ``valley_descents``; ``measured``, ``fitted``, ``residual`` and ``noise``
         of each output; ``misfit``, the root mean square of the residuals in standard deviations of
-        the noise; ``flows``.
+        the noise; ``windows``; ``flows``.
 
     Raises
     ------
@@ -152,7 +154,8 @@ def fit(
     ----------
     Bates & Watts, Nonlinear Regression Analysis and Its Applications (1988), chapters 2 and 3;
     Branch, Coleman & Li, SIAM J. Sci. Comput. 21 (1999) 1-23; Sobol, USSR Comput. Math. Math.
-    Phys. 7 (1967) 86-112.
+    Phys. 7 (1967) 86-112; Bock, in Modelling of Chemical Reaction Systems (1981) 102-125 (multiple
+    shooting).
 
     Examples
     --------
@@ -192,8 +195,8 @@ def fit(
             )
             if not search.spent and not sure and data.along == "time":
                 more = _places(system, model, MORE * starts, seed)
-                grow(search, more, described, stage(show, 0.3, 0.9))
-            if spread.each and len(data.outputs) > 1:
+                grow(search, more, described, stage(show, 0.3, 1.0))
+            if spread.each and len(data.outputs) > 1 and search.windows == 1:
                 _settle(search, spread, data)
         except KeyboardInterrupt:
             raise Interrupted(answer if search.best is not None else None) from None
@@ -366,6 +369,7 @@ def _dataset(
             "noise": noise,
             "residual_correlation": alike,
             "misfit": np.sqrt(best.misfit / count),
+            "windows": search.windows,
             "flows": search.model.flows,
         },
         words={"<at>": at_unit, "<along>": data.along, "<unknown>": ""},

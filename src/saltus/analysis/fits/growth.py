@@ -13,7 +13,8 @@ from collections.abc import Callable
 import numpy as np
 
 from saltus.analysis.fits.search import MisfitSearch, Point
-from saltus.analysis.fits.verdict import valleys
+from saltus.analysis.fits.verdict import FEW, FOLLOW, follow, valleys
+from saltus.analysis.fits.windows import shoot
 from saltus.flow.progress import stage
 
 #: The first beginning, in shares of the history, and its samples for each unknown at least.
@@ -36,22 +37,34 @@ def grow(
     show: Callable[[float], None] | None,
 ) -> None:
     """Descend along such ways, from the minima on the first beginning, until one describes the
-    data.
+    data; where a way's motion can't be followed from its start, through windows.
     """
     whole = len(search.data)
-    count = min(max(round(FIRST * whole), LEAST * (len(search.unknowns) + 1)), whole)
-    part = search.beginning(count)
-    part.run(starts, stage(show, 0.0, BEGIN), descend=1.0)
-    search.take(part)
+    least = min(max(LEAST * (len(search.unknowns) + 1), FEW + 1), whole)
+    count = max(round(FIRST * whole), least)
+    while True:
+        part = search.beginning(count)
+        part.run(starts, stage(show, 0.0, BEGIN), descend=1.0)
+        search.take(part)
+        if search.spent or count == least or (part.minima and _noise(search, part.minima[0])):
+            break
+        count = max(count // 2, least)
     search.minima.clear()
     for i, (one, count) in enumerate(valleys(part.minima)[:WAYS]):
         begin, end = (BEGIN + (1.0 - BEGIN) * j / WAYS for j in (i, i + 1))
         search.ended = None
-        _follow(search, one, i, stage(show, begin, end))
+        here = _follow(search, one, i, stage(show, begin, end))
         if search.ended is not None:  # as many descents as led to where it began
             search.minima += [search.ended] * (count - 1)
-        if search.spent or described(search):
+        if search.spent or (described(search) and _noise(search, search.minima[0])):
             return
+        if here is not None and shoot(search, here, count) and described(search):
+            return
+
+
+def _noise(search: MisfitSearch, here: Point) -> bool:
+    """True if noise is left of a beginning: neighbouring residuals don't follow each other."""
+    return bool((follow(search.data[: len(here.fitted)] - here.fitted) <= FOLLOW).all())
 
 
 def _off(search: MisfitSearch, here: Point) -> float:
@@ -63,9 +76,11 @@ def _off(search: MisfitSearch, here: Point) -> float:
 
 def _follow(
     search: MisfitSearch, here: Point, i: int, show: Callable[[float], None] | None
-) -> None:
-    """Follow the minimum number i on a beginning to the whole history."""
-    whole, factor = len(search.data), LONGER
+) -> Point | None:
+    """Follow the minimum number i on a beginning to the whole history. The minimum on the longest
+    beginning of which noise is left; None if there is none.
+    """
+    whole, factor, longest = len(search.data), LONGER, here if _noise(search, here) else None
     while (count := len(here.fitted)) < whole and not search.spent:
         longer = min(max(round(count * factor), count + 1), whole)
         part = search if longer == whole else search.beginning(longer)
@@ -75,9 +90,12 @@ def _follow(
         else:
             part.descend(here.shares, stage(show, count / whole, longer / whole))
             if part is search or not part.minima:
-                return
+                return longest
             here = part.minima[0]
+            if _noise(search, here):
+                longest = here
             if i and _off(search, here) > PREDICTED:  # others are better
-                return
+                return longest
         if part is not search:
             search.take(part)
+    return longest

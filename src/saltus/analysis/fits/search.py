@@ -20,6 +20,11 @@ SCREENING = 0.1
 STEPS, SHORT = 60, 20
 #: Share of a descent that is left to show after each of its steps: their number isn't known.
 SLOWING = 0.9
+#: Minima are in one valley if they differ by this share of the ranges at most, or by this many
+#: standard errors.
+SAME_SHARE, SAME_ERRORS = 1e-4, 1.0
+#: A step ends a descent if it lessens the misfit by so many variances of the noise at most.
+NO_GAIN = 1e-4
 #: A value that can't be computed counts as so many standard deviations of what was measured.
 NOWHERE = 3.0
 
@@ -66,6 +71,20 @@ class Point:
         """Sum of squares of the residual."""
         return float(self.residual @ self.residual)
 
+    @property
+    def variance(self) -> float:
+        """Variance of the noise that the residual tells, in units of the deviations squared."""
+        return self.misfit / max(len(self.residual) - len(self.shares), 1)
+
+
+def same_place(shares: np.ndarray, minimum: Point, variance: float) -> bool:
+    """True if shares lie where a minimum lies, as far as data with noise of that variance tell."""
+    apart = shares - minimum.shares
+    return bool(
+        np.abs(apart).max() <= SAME_SHARE
+        or np.sum((minimum.slopes @ apart) ** 2) <= SAME_ERRORS**2 * variance
+    )
+
 
 @dataclass
 class MisfitSearch:
@@ -91,6 +110,8 @@ class MisfitSearch:
         Whether the budget ended the search.
     steps : int
         Most steps of a descent.
+    windows : int
+        Parts of the history, each with a start of its own, through which the best place was found.
     """
 
     model: Model
@@ -104,6 +125,7 @@ class MisfitSearch:
     ended: Point | None = None
     spent: bool = False
     steps: int = STEPS
+    windows: int = 1
 
     def run(
         self, starts: np.ndarray, show: Callable[[float], None] | None, descend: float = DESCEND
@@ -141,16 +163,24 @@ class MisfitSearch:
                 show(1.0 - SLOWING**count)
             return self.at(shares).residual
 
+        def slopes(shares: np.ndarray) -> np.ndarray:
+            here = self.at(shares)
+            self._check_end(here)
+            return here.slopes
+
         start = np.clip(start, INSIDE, 1.0 - INSIDE)
         try:
             end = least_squares(
-                residual, start, lambda shares: self.at(shares).slopes, bounds=(0.0, 1.0),
-                max_nfev=self.steps, xtol=self.model.least_step,
+                residual, start, slopes, bounds=(0.0, 1.0), max_nfev=self.steps,
+                xtol=self.model.least_step,
             )  # fmt: skip
             self.ended = self.at(end.x)
-            self.minima.append(self.ended)
+        except _EndedError as end:
+            self.ended = end.point
         except _SpentError:
             self.spent = True
+            return
+        self.minima.append(self.ended)
         self.minima.sort(key=lambda one: one.misfit)
 
     def at(self, shares: np.ndarray) -> Point:
@@ -182,6 +212,19 @@ class MisfitSearch:
         self.best, self.minima = moved[0], moved[1:]
 
     # -- parts -------------------------------------------------------------------------------------
+    def _check_end(self, here: Point) -> None:
+        """End a descent whose next step, by the linear terms, leads to a minimum that is known, or
+        gains nothing that the data could tell.
+        """
+        step = np.linalg.lstsq(here.slopes, -here.residual)[0]
+        there = here.shares + step
+        for one in self.minima:
+            if same_place(there, one, one.variance):
+                raise _EndedError(one)
+        gain = here.misfit - np.sum((here.residual + here.slopes @ step) ** 2)
+        if gain <= NO_GAIN * here.variance and (there >= 0.0).all() and (there <= 1.0).all():
+            raise _EndedError(min(here, self.at(there), key=lambda one: one.misfit))
+
     def _point(self, shares: np.ndarray, fitted: np.ndarray, slopes: np.ndarray) -> Point:
         there = np.isfinite(self.data)
         residual, known = self._residual(fitted), np.isfinite(slopes).all(axis=-1)
@@ -199,6 +242,14 @@ class MisfitSearch:
         off = self._residual(self.model.plain(self.unknowns.values(starts)))
         misfit = np.nansum(off**2, axis=(1, 2))
         return np.asarray(starts[np.argsort(misfit, kind="stable")])
+
+
+class _EndedError(Exception):
+    """The descent has ended at a place."""
+
+    def __init__(self, point: Point) -> None:
+        super().__init__()
+        self.point = point
 
 
 class _SpentError(Exception):

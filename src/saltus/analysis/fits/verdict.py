@@ -7,13 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from saltus.analysis.fits.search import Point
+from saltus.analysis.fits.search import Point, same_place
 
 #: Standard deviation of an unknown of which the bounds are all that is known, in their width.
 UNKNOWN = 1.0 / np.sqrt(12.0)
-#: Minima are in one valley if they differ by this share of the ranges at most, or by this many
-#: standard errors.
-SAME_SHARE, SAME_ERRORS = 1e-4, 1.0
+#: Correlation of neighbouring residuals beyond which they aren't noise.
+FOLLOW = 0.5
 #: Fewer neighbouring residuals than these tell nothing.
 FEW = 20
 
@@ -97,11 +96,7 @@ def valleys(minima: Sequence[Point]) -> list[tuple[Point, int]]:
     found: list[tuple[Point, int]] = []
     for one in minima:
         for i, (other, count) in enumerate(found):
-            apart = one.shares - other.shares
-            if (
-                np.abs(apart).max() <= SAME_SHARE
-                or np.linalg.norm(other.slopes @ apart) <= SAME_ERRORS
-            ):
+            if same_place(one.shares, other, 1.0):
                 found[i] = other, count + 1
                 break
         else:

@@ -18,10 +18,11 @@ from saltus.analysis.harmonics import series as fourier
 from saltus.analysis.harmonics.forces import DerivedState, Forces
 from saltus.analysis.harmonics.pieces import Intervals
 from saltus.analysis.harmonics.signals import States, signals_of
+from saltus.analysis.harmonics.sums import LinearSide
 from saltus.system import System
 from saltus.system.parametric import parametric
 
-#: Motions whose forces and boundaries are remembered.
+#: Motions whose states and boundaries are remembered.
 REMEMBERED = 4096
 
 
@@ -61,18 +62,18 @@ class HarmonicOrbits:
         self.source = signals_of(system)
         known = parametric(self.source.system, names)
         self._timed, inner = known.timed, known.system
-        self.count, own = len(self.source.chains), self.source.system.states
+        self.count, states = len(self.source.chains), self.source.system.states
         self.size = self.count * self.series  # unknowns of a motion
         moving = {
-            own[i]: DerivedState(signal, times)
+            states[i]: DerivedState(signal, times)
             for signal, chain in enumerate(self.source.chains) for times, i in enumerate(chain)
         }  # fmt: skip
-        self._remembered: dict[bytes, tuple[np.ndarray | None, Intervals]] = {}
+        self._remembered: dict[bytes, tuple[np.ndarray, Intervals]] = {}
         self.turn = periods * (1.0 if self._timed else float(system.period()))
-        own_factors = self.source.own(harmonics)
-        self._own = np.concatenate([own_factors, own_factors[1:]]).T.ravel()
+        own = self.source.own(harmonics)
+        self._own = np.concatenate([own, own[1:]]).T.ravel()
         forces = [inner.field[i] for i in self.source.forces]
-        self.forces = Forces(inner, forces, moving, inner.states[len(own) :], self.turn, periods)
+        self.forces = Forces(inner, forces, moving, inner.states[len(states) :], self.turn, periods)
 
     @property
     def width(self) -> int:
@@ -119,22 +120,19 @@ class HarmonicOrbits:
     def _along(self, z: np.ndarray) -> tuple[np.ndarray, Intervals]:
         """The states and intervals of a motion, remembered."""
         key = z.tobytes()
-        constants, _, rate, rate_by = self._constants(z)
-        signals = self.signals(z)
         if key not in self._remembered:
-            if isinstance(self.source, States):
-                self._remember(z, None, self.forces.intervals(signals, constants, rate))
-            else:
+            constants, _, rate, rate_by = self._constants(z)
+            signals, forces = self.signals(z), None
+            if not isinstance(self.source, States):
                 found = self.forces.coefficients(signals, constants, rate, rate_by)
-                self._remember(z, found.values / self._pace(constants), found.intervals)
-        forces, intervals = self._remembered[key]
-        return self.source.states(signals, forces, rate), intervals
-
-    def _remember(self, z: np.ndarray, forces: np.ndarray | None, intervals: Intervals) -> None:
-        """Keep the series of the forces along a motion, and where it meets boundaries."""
-        if len(self._remembered) >= REMEMBERED:
-            self._remembered.clear()
-        self._remembered[z.tobytes()] = forces, intervals
+                forces = found.values / self._pace(constants)
+            if len(self._remembered) >= REMEMBERED:
+                self._remembered.clear()
+            self._remembered[key] = (
+                self.source.states(signals, forces, rate),
+                self.forces.intervals(signals, constants, rate),
+            )
+        return self._remembered[key]
 
     def _pace(self, constants: np.ndarray) -> float:
         """Factor of the rates of the equations."""
@@ -188,23 +186,11 @@ class HarmonicOrbits:
 
     def _of(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The residual and its derivative, in units of the motion."""
-        signals = self.signals(z)
         constants, slopes, rate, rate_by = self._constants(z)
-        found = self.forces.coefficients(signals, constants, rate, rate_by)
-        period = self._pace(constants)
-        self._remember(z, found.values / period, found.intervals)
+        pace = self._pace(constants)
         response, by_rate = self.source.response(self.harmonics, rate)
-        moved = fourier.responses(response / period, found.whole).reshape(self.size, -1)
-        turned = fourier.responses(by_rate / period, found.values).ravel()
-        own = self._own
-        derivative = np.empty((self.size, self.width))
-        derivative[:, : self.size] = -moved[:, 1 : 1 + self.size]
-        derivative[np.arange(self.size), np.arange(self.size)] += own
-        by_constants = -moved[:, 1 + self.size :] - np.outer(turned, rate_by)
-        if self._timed:
-            by_constants[:, 0] += moved[:, 0] / period
-        derivative[:, self.size :] = by_constants @ slopes
-        return own * z[: self.size] - moved[:, 0], derivative
+        linear = LinearSide(self._own, _parts(response), _parts(by_rate), slopes, pace, self._timed)
+        return self.forces.equations(self.signals(z), constants, rate, rate_by, linear)
 
     def accepted(self, z: np.ndarray, rows: np.ndarray) -> None:
         """Nothing depends on it."""
@@ -227,3 +213,8 @@ class HarmonicOrbits:
     def _shifted(self, z: np.ndarray, angle: float, factor: float = 1.0) -> np.ndarray:
         moved = factor * fourier.shifted(self.signals(z), angle)
         return np.concatenate([moved.reshape(len(z), -1), z[:, self.size :]], axis=1)
+
+
+def _parts(amplitudes: np.ndarray) -> np.ndarray:
+    """Real and imaginary parts, one behind the other."""
+    return np.array([amplitudes.real, amplitudes.imag])

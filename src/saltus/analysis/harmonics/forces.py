@@ -19,6 +19,9 @@ import numpy as np
 from saltus.analysis.harmonics import series as fourier
 from saltus.analysis.harmonics.pieces import Intervals, intervals_of
 from saltus.analysis.harmonics.powers import bends, degree
+from saltus.analysis.harmonics.sums import LinearSide, Sums
+from saltus.codegen.forces_head import forces_text
+from saltus.codegen.module import balance_module
 from saltus.contact.guards import bits_in, is_hold
 from saltus.language import expression as ex
 from saltus.language.derivatives import gradients
@@ -32,8 +35,6 @@ UNEVEN = 6
 MULTIPLES = 12
 #: A jump below this share of a force is rounding.
 ROUNDING = 1e-12
-#: Distance from an instant within which depths are rounding [rad].
-BESIDE = 1e-12
 #: Random states at which forces are compared on both sides of a boundary.
 TRIED = 16
 
@@ -64,13 +65,10 @@ class Coefficients:
         Behind one another :attr:`values`, :attr:`by_signals` and :attr:`by_constants`.
     signals : int
         Number of the signals.
-    intervals : Intervals
-        The motion between the boundaries that it meets.
     """
 
     whole: np.ndarray
     signals: int
-    intervals: Intervals
 
     @property
     def values(self) -> np.ndarray:
@@ -125,7 +123,6 @@ class Forces:
             (i, j) for mine in (True, False) for i, row in enumerate(self._slopes)
             for j, one in enumerate(row) if not _is_zero(one) and mine == (j < len(self.moving))
         ]  # fmt: skip
-        self._by_moving = sum(j < len(self.moving) for _, j in self._known)
         self._entries = (*forces, *(self._slopes[i][j] for i, j in self._known))
         self._degree = degree(forces, self.moving)
         self._bent = bends(forces, system.values) if math.isinf(self._degree) else 0
@@ -142,6 +139,7 @@ class Forces:
             i: sorted(bits_in([guard.gap]))
             for i, guard in enumerate(system.guards) if not is_hold(guard)
         }  # fmt: skip
+        self._known_sums: dict[tuple[int, int, int], Sums] = {}
         self._rest = dict.fromkeys(states, 0.0)
         self._signal = np.array([one.signal for one in self.moving.values()])
         self._times = np.array([one.times for one in self.moving.values()])
@@ -238,8 +236,11 @@ class Forces:
         """The forces where a guard's side is taken as either, float64[2, m, TRIED]."""
         bits: list[Any] = []
         for guard in self.system.guards:
+            if is_hold(guard):  # its gap may ask for the sides of guards behind it
+                bits.append(np.zeros(TRIED, bool))
+                continue
             (gap,) = evaluate([guard.gap], **about, bits=bits)
-            bits.append(np.broadcast_to(gap > 0, TRIED) & (not is_hold(guard)))
+            bits.append(np.broadcast_to(gap > 0, TRIED))
         both = []
         for bits[i] in (np.zeros(TRIED, bool), np.ones(TRIED, bool)):
             forces = evaluate(self._entries[: self.count], **about, bits=bits)
@@ -250,8 +251,12 @@ class Forces:
         self, intervals: Intervals, harmonics: int
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """See :meth:`Intervals.nodes`: for products of the forces and a harmonic."""
+        return intervals.nodes(self._products(harmonics), self._bent)
+
+    def _products(self, harmonics: int) -> int:
+        """Degree of products of the forces and a harmonic."""
         most = UNEVEN if self._bent else max(int(self._degree), 1)
-        return intervals.nodes((most + 1) * harmonics + MULTIPLES * self.periods, self._bent)
+        return (most + 1) * harmonics + MULTIPLES * self.periods
 
     def coefficients(
         self, signals: np.ndarray, constants: np.ndarray, rate: float, rate_by: np.ndarray
@@ -269,82 +274,52 @@ class Forces:
         rate_by : float64[e]
             Its derivatives with respect to the constants, over itself.
         """
-        intervals = self.intervals(signals, constants, rate)
-        harmonics, c = fourier.harmonics_of(signals.shape[1]), len(signals)
-        width, states = 2 * harmonics + 1, self.states(signals, rate)
-        angle, weight, which = self.nodes(intervals, harmonics)
-        here, kept = fourier.basis(angle, 2 * harmonics), _kept(harmonics)
-        seen = here[:, kept] @ states.T
-        values = evaluate(
-            self._entries, **self.motion(angle, seen, constants), bits=list(intervals.bits[which].T)
-        )
-        found = np.empty((len(values), len(angle)))
-        for row, value in zip(found, values, strict=True):
-            row[:] = value
-        if self._bent:  # a power of a depth isn't defined where rounding makes that negative
-            begin = intervals.begin[which]
-            aside = np.minimum(angle - begin, begin + intervals.length[which] - angle) < BESIDE
-            found[:, aside] = np.nan_to_num(found[:, aside], posinf=0.0, neginf=0.0)
-        integrals = (found * (weight / np.pi)) @ here
-        series = integrals[:, kept]
-        series[:, 0] *= 0.5
-        whole = Coefficients(
-            np.zeros((self.count, width, 1 + c * width + len(constants))), c, intervals
-        )
-        whole.values[:], by_constants = series[: self.count], whole.by_constants
-        moving = len(self.moving)
-        blocks = fourier.products(integrals[self.count :][: self._by_moving], harmonics)
-        for (i, j), slope in zip(self._known, series[self.count :], strict=True):
-            if j >= moving:
-                by_constants[i, :, j - moving] += slope
-        for (i, j), block in zip(self._known, blocks, strict=False):
-            times, first = self._times[j], 1 + self._signal[j] * width
-            mine = fourier.before_derivative(block, times) * rate**times
-            whole.whole[i, :, first : first + width] += mine
-            if times:
-                by_constants[i] += np.outer(block @ states[j], times * rate_by)
-        if len(intervals.instants.angle):
-            self._add_jumps(whole, states, constants, rate, rate_by)
-        return whole
+        sums = self._along(signals, constants, rate, rate_by, None)
+        return Coefficients(sums.whole.copy(), len(signals))
 
-    def _add_jumps(
-        self, whole: Coefficients, states: np.ndarray, constants: np.ndarray, rate: float,
-        rate_by: np.ndarray,
-    ) -> None:  # fmt: skip
-        """Add to the derivatives what the shifts of instants do at which forces jump."""
-        instants, harmonics = whole.intervals.instants, fourier.harmonics_of(states.shape[1])
-        if not self._jumping[instants.guard].any():
-            return
-        here = fourier.basis(instants.angle, harmonics)
-        about = self.motion(instants.angle, here @ states.T, constants)
-        sides = [
-            np.array([
-                np.broadcast_to(one, len(instants.angle))
-                for one in evaluate(self._entries[: self.count], **about, bits=list(bits.T))
-            ])
-            for bits in (instants.before, instants.behind)
-        ]  # fmt: skip
-        jumps = sides[0] - sides[1]
-        # a power of a depth isn't defined where rounding makes that negative, and doesn't jump
-        jumps[~(np.abs(jumps) > ROUNDING * np.abs(sides).max(axis=0))] = 0.0
-        jumps[:, ~self._jumping[instants.guard]] = 0.0
-        moving, width = len(self.moving), here.shape[1]
-        for k in np.flatnonzero(jumps.any(axis=0)).tolist():
-            one = _at(about, k)
-            slopes = np.array(
-                evaluate(
-                    self._gap_slopes[instants.guard[k]], **one, bits=instants.before[k].tolist()
-                ), float,
+    def equations(
+        self, signals: np.ndarray, constants: np.ndarray, rate: float, rate_by: np.ndarray,
+        linear: LinearSide,
+    ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+        """Residual ``own X - L W`` along a motion, float64[c (2H + 1)], and its derivative by the
+        signals and u more unknowns, float64[c (2H + 1), c (2H + 1) + u].
+        """
+        sums = self._along(signals, constants, rate, rate_by, linear)
+        return sums.residual.copy(), sums.derivative.copy()
+
+    def _along(
+        self, signals: np.ndarray, constants: np.ndarray, rate: float, rate_by: np.ndarray,
+        linear: LinearSide | None,
+    ) -> Sums:  # fmt: skip
+        """The sums along a motion."""
+        unknowns = 0 if linear is None else linear.turning.shape[1]
+        sums = self._sums(len(signals), fourier.harmonics_of(signals.shape[1]), unknowns)
+        gaps = intervals = None
+        if all(i in self._linear for i in self._asked):
+            gaps = self._gap_rows or self._rows(constants)
+        else:
+            intervals = self.intervals(signals, constants, rate)
+        pace = self.turn / (2 * np.pi)
+        sums.take(signals, constants, rate, rate_by, pace, linear, gaps, intervals)
+        return sums
+
+    def _sums(self, signals: int, harmonics: int, unknowns: int) -> Sums:
+        key = signals, harmonics, unknowns
+        if key not in self._known_sums:
+            self._known_sums[key] = Sums(
+                self._kernel, (signals, harmonics, len(self.constants), unknowns),
+                [(one.signal, one.times) for one in self.moving.values()], self._known, self.count,
+                self._jumping, self._numbers, np.array(list(self.system.values.values()), float),
+                self._products(harmonics), self._bent,
             )  # fmt: skip
-            row = np.zeros(whole.whole.shape[2])
-            row[1 + whole.signals * width :] = slopes[moving:]
-            for j, slope in enumerate(slopes[:moving]):
-                times, first = self._times[j], 1 + self._signal[j] * width
-                mine = fourier.before_derivative(here[k], times) * rate**times
-                row[first : first + width] += slope * mine
-                row[1 + whole.signals * width :] += slope * times * (here[k] @ states[j]) * rate_by
-            shift = np.outer(jumps[:, k], _norm(harmonics) * here[k]) / -instants.slope[k]
-            whole.whole[:] += shift[:, :, None] * row
+        return self._known_sums[key]
+
+    @functools.cached_property
+    def _kernel(self) -> Any:
+        names, system = (*self.moving, *self.constants), self.system
+        slopes = [one for row in self._gap_slopes for one in row]
+        text = forces_text(self._entries, slopes, names, list(system.values))
+        return balance_module(text, system.name)
 
 
 def _is_zero(entry: Expr) -> bool:
@@ -360,23 +335,3 @@ def _is_linear(gap: Expr, slopes: Sequence[Expr], moving: Sequence[str]) -> bool
     return not any(
         node.op == "state" and node.payload in moving for node in ex.walk(*slopes)
     )  # fmt: skip
-
-
-def _at(about: Mapping[str, Any], k: int) -> dict[str, Any]:
-    """Inputs of expressions at one of several angles."""
-    states = {name: one[k] if np.ndim(one) else one for name, one in about["states"].items()}
-    return {"t": about["t"][k], "states": states, "values": about["values"]}
-
-
-@functools.lru_cache(maxsize=64)
-def _kept(harmonics: int) -> np.ndarray:
-    """Places of the coefficients of a series in one of twice the harmonics."""
-    return np.asarray(np.r_[: harmonics + 1, 2 * harmonics + 1 : 3 * harmonics + 1])
-
-
-@functools.lru_cache(maxsize=64)
-def _norm(harmonics: int) -> np.ndarray:
-    """Factors that make coefficients of integrals over the circle."""
-    norm = np.full(2 * harmonics + 1, 1.0 / np.pi)
-    norm[0] *= 0.5
-    return norm

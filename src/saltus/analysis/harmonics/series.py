@@ -6,8 +6,6 @@ turns once in the fundamental period.
 
 from __future__ import annotations
 
-import functools
-
 import numpy as np
 
 from saltus.codegen.module import harmonics_module
@@ -93,77 +91,6 @@ def doubled(series: np.ndarray) -> np.ndarray:
     return of_complex(found)
 
 
-def responses(blocks: np.ndarray, series: np.ndarray) -> np.ndarray:
-    """The series of responses to series float64[m, 2H + 1, ...], whose amplitudes are multiplied by
-    complex128[H + 1, c, m]; float64[c, 2H + 1, ...].
-    """
-    split, behind = len(blocks) - 1, series.shape[2:]
-    amplitudes = series[:, : split + 1].reshape(len(series), split + 1, -1).astype(complex)
-    amplitudes[:, 1:] -= 1j * series[:, split + 1 :].reshape(len(series), split, -1)
-    found = (blocks @ amplitudes.swapaxes(0, 1)).swapaxes(0, 1)
-    whole = np.concatenate([found.real, -found.imag[:, 1:]], axis=1)
-    return whole.reshape(*whole.shape[:2], *behind)
-
-
-@functools.lru_cache(maxsize=64)
-def _places(harmonics: int) -> tuple[np.ndarray, ...]:
-    """Of the entries of a product, see :func:`products`: the two coefficients that each is a sum
-    of, and their factors.
-    """
-    order = np.concatenate([np.arange(harmonics + 1), np.arange(1, harmonics + 1)])
-    sine = np.arange(2 * harmonics + 1) > harmonics
-    (p, p_sine), (q, q_sine) = (order[:, None], sine[:, None]), (order, sine)
-    apart, sums, mixed = np.abs(p - q), p + q, p_sine != q_sine
-    # cos p cos q, sin p sin q by cosines; sin p cos q, cos p sin q by sines
-    ahead = np.where(p_sine, p - q, q - p)
-    first = np.where(mixed & (ahead < 0), -0.5, 0.5) * ~(mixed & (apart == 0))
-    second = np.where(p_sine & q_sine, -0.5, 0.5) * ~(mixed & (sums == 0))
-    first[0], second[0] = 0.5 * first[0], 0.5 * second[0]
-    shift = 2 * harmonics * mixed
-    return (
-        np.where(first == 0, 0, apart + shift), first, np.where(second == 0, 0, sums + shift),
-        second,
-    )  # fmt: skip
-
-
-def products(coefficients: np.ndarray, harmonics: int) -> np.ndarray:
-    """The matrices float64[..., 2H + 1, 2H + 1] that multiply a series by functions and give the
-    series of the products, cut off behind H harmonics.
-
-    Parameters
-    ----------
-    coefficients : float64[..., 4H + 1]
-        Of the functions: the integrals of them times 1, the cosines and the sines up to 2H, over
-        pi.
-    harmonics : int
-        H.
-    """
-    apart, first, sums, second = _places(harmonics)
-    found = coefficients.take(apart, axis=-1)
-    found *= first
-    more = coefficients.take(sums, axis=-1)
-    more *= second
-    found += more
-    return found
-
-
-@functools.lru_cache(maxsize=64)
-def _adjoint(harmonics: int, times: int) -> tuple[np.ndarray, np.ndarray]:
-    derived = derivative(np.eye(2 * harmonics + 1), times)
-    place = np.abs(derived).argmax(axis=1)
-    return place, derived[np.arange(len(place)), place]
-
-
-def before_derivative(matrix: np.ndarray, times: int) -> np.ndarray:
-    """A matrix float64[..., 2H + 1] that multiplies a series, for one that multiplies it in place
-    of the series' derivative.
-    """
-    if not times:
-        return matrix
-    place, factor = _adjoint(harmonics_of(matrix.shape[-1]), times)
-    return np.asarray(matrix[..., place] * factor)
-
-
 # -- zeros -----------------------------------------------------------------------------------------
 def zeros(series: np.ndarray) -> np.ndarray:
     """All angles in [0, 2 pi) at which a series float64[2H + 1] changes its sign."""
@@ -174,8 +101,8 @@ def zeros_of(series: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """All angles in [0, 2 pi) at which series float64[g, 2H + 1] change their sign, float64[r];
     which series does, int64[r], ascending; and its slope there, float64[r].
 
-    Bounds of the slope prove how many zeros a piece of the circle holds (kernels/harmonics.py).
-    Zeros nearer to each other than rounding tells apart are none.
+    Bounds of the slope prove how many zeros a piece of the circle holds
+    (kernels/harmonics/series.py). Zeros nearer to each other than rounding tells apart are none.
     """
     room = ROOM * len(series) * (series.shape[1] + 1)
     which, (angle, slope) = np.empty(room, np.int64), np.empty((2, room))

@@ -20,8 +20,12 @@ COLD = {
     "record", "saltate", "overflowed", "end_stretch", "is_slow", "periods_behind", "write_samples",
     "take_impacts", "order_matters", "end_impacts", "begins_uniquely",
 }  # fmt: skip
-#: Functions of lanes that few equations need: never inlined, to keep them out of the others.
-NOINLINE = {"probed", "look_ahead", "negligible_step", "add_what_was_left_out"}
+#: Functions of lanes that few equations or structures need: never inlined, to keep them out of the
+#: others.
+NOINLINE = {
+    "probed", "look_ahead", "negligible_step", "add_what_was_left_out", "amplitudes_of_shapes",
+    "state_of_shapes", "write_shapes",
+}  # fmt: skip
 #: Functions that run once a contact: inlined only by LLVM's cost model. Inlining them always would
 #: take time to compile, and gain none.
 _BY_COST_MODEL = {"attend", "change_side", "land_all"}

@@ -1,8 +1,9 @@
 """Template of the modal flow: modes that don't go their own ways go together, in a block.
 
 The block of a contact state is v' = T v: amplitudes of an invariant subspace, and of the drives
-that it resonates with. Its table: a row (groups, alpha, drives); T, column by column; L and V; for
-each row of gaps w and w T; for each of its drives a row (number, first amplitude, scale, rate).
+that it resonates with. Its table: a row (groups, alpha, drives; coordinates_of, which isn't of the
+block); T, column by column; L and V; for each row of gaps w and w T; for each of its drives a row
+(number, first amplitude, scale, rate).
 alpha is such that ||T^k|| <= alpha^k for all k > 11 (Al-Mohy & Higham, SIAM J. Matrix Anal. Appl.
 31 (2009), theorem 4.2): exp(T h) v is its Taylor series in parts of alpha h <= 1. A block is always
 followed.

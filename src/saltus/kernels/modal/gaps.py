@@ -460,7 +460,7 @@ def decide(i, g, batch, m):
     return CROSSES if crosses else CLEAR
 
 
-@kernel
+@inner
 def look(i, tau, h, modes, steady, batch, m):
     """Decide all gaps over a step: (OPEN, 0, 0) if a shorter one must tell, (CLEAR, d, 0) if no gap
     crosses in a time d, or CROSSES with the time after tau and the guards (bits).

@@ -81,7 +81,7 @@ HERE, SLOPE, SIZE, FIFTH = range(4)
 # more, 0. The last two are lanes whose numbers add up to them.
 REAL, IMAGINARY, GOING, BOUND, BEYOND, FASTER, WAVES = range(7)
 #: Samples that wait for one product with the modes of their contact state. Rows of `queue`, for
-#: each: its amplitudes, the steady answer.
+#: each: its amplitudes, the rates of these, the steady answer.
 QUEUE = 8
 # Columns of `spans`, for each row of gaps over a step: bounds of the gap without what its series
 # leaves out; whether the series is known; its first and its last Bernstein coefficient, the least
@@ -116,5 +116,5 @@ Modal = namedtuple(
     "sizes row_of sign_of offset rate lag modes steady links course pieces laws acts presses "
     "remembers varied shifts y moved size sums q errors p bern bounds slopes out touches state "
     "answer angle found chain record factor column columns struck bernstein stood waves spans near "
-    "queue queued",
+    "queue queued rates",
 )

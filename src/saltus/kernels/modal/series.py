@@ -124,6 +124,10 @@ def less_answer(m):
 def amplitudes_of(modes, y, m):
     """Amplitudes of what is in `state`, to y: L z."""
     groups, count = m.sizes[MODE_GROUPS], LANES * m.sizes[STATE_GROUPS]
+    coordinates = coordinates_of(modes, m)
+    if coordinates > 0:
+        amplitudes_of_shapes(modes, coordinates, y, m)
+        return
     for g in range(2 * groups):
         runs = runs_of(modes, m) + g % groups
         first = modes + 3 * groups + g * count
@@ -174,9 +178,130 @@ def group_of_states(s, modes, y, at, answer, m):
 @kernel
 def state_of(modes, y, m):
     """The state that some amplitudes are, to `state`: z_p + Re(V y). Needs `answer`."""
+    coordinates = coordinates_of(modes, m)
+    if coordinates > 0:
+        state_of_shapes(modes, coordinates, y, m)
+        return
     for s in range(m.sizes[STATE_GROUPS]):
         store(m.state, s, group_of_states(s, modes, y, 0, load(m.answer, s, LANES), m))
     add_block_state(modes, y, m)
+
+
+# -- structures: coordinates and their rates -------------------------------------------------------
+@inner
+def coordinates_of(modes, m):
+    """Number of coordinates q, if the states are q and q', damping couples none, and they are many:
+    V is (U, U lambda) then, L is s (lambda U' + U' C, U'). In place of L stands U: of each block of
+    LANES coordinates and group of modes, for each coordinate a row of real parts and one of
+    imaginary ones; then the factors s, and C. In place of V stands nothing. Else 0.
+    """
+    return int(m.modes[block_of(modes, m), 3])
+
+
+@inner
+def shapes_of(modes, block, m):
+    """First row of U for a block of LANES coordinates."""
+    return modes + (3 + 2 * LANES * block) * m.sizes[MODE_GROUPS]
+
+
+@inner
+def onto(row, v, q, a, b, c, d, m):
+    """Add a coordinate and its rate to U' (v + C q), a + i b, and to U' q, c + i d."""
+    real, imaginary = load(m.modes, row, LANES), load(m.modes, row + 1, LANES)
+    return fma(real, v, a), fma(imaginary, v, b), fma(real, q, c), fma(imaginary, q, d)
+
+
+@kernel
+def amplitudes_of_shapes(modes, count, y, m):
+    """Amplitudes of coordinates q and rates v in `state`, to y: s (U' (v + C q) + lambda U' q)."""
+    groups, blocks, last = m.sizes[MODE_GROUPS], (count + LANES - 1) // LANES, 2 * count - 1
+    scale = shapes_of(modes, blocks, m)
+    for g in range(4 * groups):
+        store(m.rates, g, splat(0.0, LANES))
+    for block in range(blocks):
+        runs, first = runs_of(modes, m) + groups + block, shapes_of(modes, block, m)
+        damping, q, v = scale + 2 * groups + block, LANES * block, count + LANES * block
+        q0, q1 = number(m.state, 0, q), number(m.state, 0, q + 1)
+        q2, q3 = number(m.state, 0, q + 2), number(m.state, 0, q + 3)
+        v0 = number(m.state, 0, v) + m.modes[damping, 0] * q0
+        v1 = number(m.state, 0, min(v + 1, last)) + m.modes[damping, 1] * q1
+        v2 = number(m.state, 0, min(v + 2, last)) + m.modes[damping, 2] * q2
+        v3 = number(m.state, 0, min(v + 3, last)) + m.modes[damping, 3] * q3
+        for run in range(0, LANES, 2):
+            for g in range(int(m.modes[runs, run]), int(m.modes[runs, run + 1])):
+                row, to = first + 2 * LANES * g, 4 * g
+                a, b = load(m.rates, to, LANES), load(m.rates, to + 1, LANES)
+                c, d = load(m.rates, to + 2, LANES), load(m.rates, to + 3, LANES)
+                a, b, c, d = onto(row, v0, q0, a, b, c, d, m)
+                a, b, c, d = onto(row + 2, v1, q1, a, b, c, d, m)
+                a, b, c, d = onto(row + 4, v2, q2, a, b, c, d, m)
+                a, b, c, d = onto(row + 6, v3, q3, a, b, c, d, m)
+                store(m.rates, to, a)
+                store(m.rates, to + 1, b)
+                store(m.rates, to + 2, c)
+                store(m.rates, to + 3, d)
+    for g in range(groups):
+        a, b = load(m.modes, modes + g, LANES), load(m.modes, modes + groups + g, LANES)
+        c, d = load(m.rates, 4 * g + 2, LANES), load(m.rates, 4 * g + 3, LANES)
+        store(y, g, fma(-b, d, fma(a, c, load(m.rates, 4 * g, LANES))))
+        store(y, groups + g, fma(b, c, fma(a, d, load(m.rates, 4 * g + 1, LANES))))
+        turn(y, g, load(m.modes, scale + g, LANES), load(m.modes, scale + groups + g, LANES), y, m)
+
+
+@kernel
+def state_of_shapes(modes, count, y, m):
+    """The coordinates and rates that some amplitudes are, to `state`."""
+    rates_of_waves(modes, y, m)
+    for b in range((count + LANES - 1) // LANES):
+        coordinates_and_rates(b, modes, y, 0, m.rates, 0, m)
+        for j in range(min(LANES, count - LANES * b)):
+            q, v = LANES * b + j, count + LANES * b + j
+            m.state[q // LANES, q % LANES] = number(m.answer, 0, q) + total_of(m.sums, j)
+            speed = number(m.answer, 0, v) + total_of(m.sums, LANES + j)
+            m.state[v // LANES, v % LANES] = speed
+
+
+@inner
+def rates_of_waves(modes, y, m):
+    """The rates of amplitudes, lambda y, to `rates`."""
+    groups = m.sizes[MODE_GROUPS]
+    for g in range(groups):
+        a, b = load(m.modes, modes + g, LANES), load(m.modes, modes + groups + g, LANES)
+        turn(y, g, a, b, m.rates, m)
+
+
+@inner
+def along(row, a, b, c, d, q, v, m):
+    """Add amplitudes a + i b and their rates c + i d to a coordinate and its rate."""
+    real, imaginary = load(m.modes, row, LANES), load(m.modes, row + 1, LANES)
+    return fma(-imaginary, b, fma(real, a, q)), fma(-imaginary, d, fma(real, c, v))
+
+
+@inner
+def coordinates_and_rates(block, modes, y, at, rates, row, m):
+    """LANES coordinates without the answer, Re(U y) of the amplitudes in the rows of y from `at`
+    on, and their rates by those of the amplitudes: lanes that add up to each, to `sums`.
+    """
+    groups, runs = m.sizes[MODE_GROUPS], runs_of(modes, m) + m.sizes[MODE_GROUPS] + block
+    first, zero = shapes_of(modes, block, m), splat(0.0, LANES)
+    q0, q1, q2, q3, v0, v1, v2, v3 = zero, zero, zero, zero, zero, zero, zero, zero
+    for run in range(0, LANES, 2):
+        for g in range(int(m.modes[runs, run]), int(m.modes[runs, run + 1])):
+            k = first + 2 * LANES * g
+            a, b = load(y, at + g, LANES), load(y, at + groups + g, LANES)
+            c, d = load(rates, row + g, LANES), load(rates, row + groups + g, LANES)
+            q0, v0 = along(k, a, b, c, d, q0, v0, m)
+            q1, v1 = along(k + 2, a, b, c, d, q1, v1, m)
+            q2, v2 = along(k + 4, a, b, c, d, q2, v2, m)
+            q3, v3 = along(k + 6, a, b, c, d, q3, v3, m)
+    store(m.sums, 0, q0)
+    store(m.sums, 1, q1)
+    store(m.sums, 2, q2)
+    store(m.sums, 3, q3)
+    store(m.sums, 4, v0)
+    store(m.sums, 5, v1)
+    store(m.sums, 6, v2)
+    store(m.sums, 7, v3)
 
 
 @inner

@@ -104,17 +104,30 @@ def state_after(i, tau, d, modes, steady, batch, m):
     state_of(modes, m.moved, m)
 
 
-@kernel
+@inner
+def due_at(i, k, batch):
+    """Time of the period at which a sample is due [s]: infinite if that isn't in this one."""
+    if not 0 <= k < batch.sample_count.shape[0] or batch.sample_count[k] > batch.count[i]:
+        return math.inf
+    due = (batch.sample_count[k] - batch.count[i]) * batch.period[i]
+    return due + batch.sample_fraction[k] * batch.period[i]
+
+
+@inner
 def take_samples(i, tau, until, modes, steady, batch, m):
+    """Take the samples due up to a time of the period, if there are any: a call takes long."""
+    if due_at(i, batch.cursor[i], batch) <= until:
+        take_due(i, tau, until, modes, steady, batch, m)
+
+
+@kernel
+def take_due(i, tau, until, modes, steady, batch, m):
     """Take the samples due up to a time of the period from the amplitudes at tau: their states are
     written together, when the queue is full or the contact state ends.
     """
     k = batch.cursor[i]
-    while 0 <= k < batch.sample_count.shape[0] and batch.sample_count[k] <= batch.count[i]:
-        due = (batch.sample_count[k] - batch.count[i]) * batch.period[i]
-        due += batch.sample_fraction[k] * batch.period[i]
-        if due > until:
-            break
+    while due_at(i, k, batch) <= until:
+        due = due_at(i, k, batch)
         states = m.sizes[STATES]
         if due == tau and has_just_landed(i, tau, batch):
             for j in range(states):
@@ -146,11 +159,15 @@ def put_off(i, k, tau, d, modes, steady, batch, m):
     drive(i, tau + d, batch, m)
     answer_now(steady, m)
     width = 2 * m.sizes[MODE_GROUPS]
-    row = m.queued[0] * (width + m.sizes[STATE_GROUPS])
+    row = m.queued[0] * (2 * width + m.sizes[STATE_GROUPS])
     for g in range(width):
         store(m.queue, row + g, load(m.moved, g, LANES))
+    if coordinates_of(modes, m) > 0:
+        rates_of_waves(modes, m.moved, m)
+        for g in range(width):
+            store(m.queue, row + width + g, load(m.rates, g, LANES))
     for s in range(m.sizes[STATE_GROUPS]):
-        store(m.queue, row + width + s, load(m.answer, s, LANES))
+        store(m.queue, row + 2 * width + s, load(m.answer, s, LANES))
     m.queued[0] += 1
 
 
@@ -162,14 +179,35 @@ def write_queue(i, k, modes, batch, m):
     width, states, count = 2 * m.sizes[MODE_GROUPS], m.sizes[STATES], m.queued[0]
     if count == 0:
         return
+    m.queued[0] = 0
+    coordinates = coordinates_of(modes, m)
+    if coordinates > 0:
+        write_shapes(i, k - count, count, modes, coordinates, batch, m)
+        return
     for s in range(m.sizes[STATE_GROUPS]):
         for p in range(count):
-            row = p * (width + m.sizes[STATE_GROUPS])
-            answer = load(m.queue, row + width + s, LANES)
+            row = p * (2 * width + m.sizes[STATE_GROUPS])
+            answer = load(m.queue, row + 2 * width + s, LANES)
             store(m.sums, 0, group_of_states(s, modes, m.queue, row, answer, m))
             for j in range(min(LANES, states - LANES * s)):
                 batch.samples[i, k - count + p, LANES * s + j] = m.sums[0, j]
-    m.queued[0] = 0
+
+
+@kernel
+def write_shapes(i, first, count, modes, coordinates, batch, m):
+    """The same for samples of coordinates and rates, from the first one on."""
+    width = 2 * m.sizes[MODE_GROUPS]
+    for b in range((coordinates + LANES - 1) // LANES):
+        for p in range(count):
+            row = p * (2 * width + m.sizes[STATE_GROUPS])
+            coordinates_and_rates(b, modes, m.queue, row, m.queue, row + width, m)
+            for j in range(min(LANES, coordinates - LANES * b)):
+                at = LANES * b + j
+                answer = number(m.queue, row + 2 * width, at)
+                batch.samples[i, first + p, at] = answer + total_of(m.sums, j)
+                at += coordinates
+                answer = number(m.queue, row + 2 * width, at)
+                batch.samples[i, first + p, at] = answer + total_of(m.sums, LANES + j)
 
 
 # -- one trajectory --------------------------------------------------------------------------------
@@ -394,7 +432,7 @@ def propagate(
     lag, modes, steady, links, course, pieces, laws, acts, presses, remembers, varied, shifts, y,
     moved, size, sums, q, errors, p, bern, bounds, slopes, out, touches, place, answer, angle,
     found, chain, follows, factor, column, columns, struck, bernstein, stood, waves, spans, near,
-    queue, queued,
+    queue, queued, rates,
 ):  # fmt: skip
     """Move every trajectory whose status is RUNNING and whose contact state has been made, `budget`
     steps at most. See kernels/batch.py for the arrays.
@@ -408,7 +446,7 @@ def propagate(
         sizes, row_of, sign_of, offset, rate, lag, modes, steady, links, course, pieces, laws, acts,
         presses, remembers, varied, shifts, y, moved, size, sums, q, errors, p, bern, bounds,
         slopes, out, touches, place, answer, angle, found, chain, follows, factor, column, columns,
-        struck, bernstein, stood, waves, spans, near, queue, queued,
+        struck, bernstein, stood, waves, spans, near, queue, queued, rates,
     )  # fmt: skip
     waits = False
     for i in range(status.shape[0]):

@@ -51,6 +51,7 @@ VARIABLES = {
     "misfit": Variable(
         (), "1", "root mean square of the residuals, in standard deviations of the noise"
     ),
+    "windows": Variable((), "1", "parts of the history, each with a start of its own", "i8"),
     "flows": Variable((), "1", "motions computed", "i8"),
 }
 
@@ -144,7 +145,13 @@ def _identified(ds: xr.Dataset) -> list[str]:
 def _valleys(ds: xr.Dataset) -> list[str]:
     """Sentences on the descents and where they ended."""
     ended, misfit = ds["valley_descents"].values, ds["valley_misfit"].values
-    lines = []
+    lines, windows = [], int(ds["windows"])
+    if windows > 1:
+        lines.append(
+            f"The motion is too sensitive to be followed from its start: it was fitted through "
+            f"{windows} windows, each of which starts where the one before ends, to a millionth of "
+            "the states."
+        )
     if ended.sum():
         near = int(ended[1:][misfit[1:] <= NEAR * misfit[0]].sum())
         lines.append(

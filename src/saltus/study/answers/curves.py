@@ -1,4 +1,6 @@
-"""[bifurcation_curve]: a bifurcation of the study's branches over two parameters."""
+"""[bifurcation_curve]: a bifurcation of the study's branches over two parameters;
+[event_sensitivity]: the derivatives of its place.
+"""
 
 from __future__ import annotations
 
@@ -40,28 +42,20 @@ _OVER = Field(
     None, description="Name of a [bifurcation_diagram] over the same two parameters: a map of "
     "amplitudes is drawn, with all curves on it so far.", examples=["map"],
 )  # fmt: skip
+_TO = Field(
+    min_length=1,
+    description="Parameters that the derivatives are with respect to.",
+    examples=[["force", "gap"]],
+)
 _NEAR = Field(None, description="Value of the branches' parameter near it.", examples=["17.8 Hz"])
 
 
-@asked(
-    120,
-    asking(
-        "bifurcation_curve",
-        ["bifurcation_curve"],
-        KEYS,
-        called="Bifurcation curve",
-        branches=(str | None, _BRANCHES),
-        near=(Quantity | None, _NEAR),
-        over=(str | None, _OVER),
-    ),
-)
-class CurveQuestion(OneVerb):
-    """A curve of bifurcations."""
+class AtEvent(OneVerb):
+    """Question that begins at a bifurcation of the study's branches."""
 
     def check(self, table: Any, setting: Setting) -> None:  # noqa: ARG002
-        """Read the event, the branches that it is on, and the map to draw it on."""
+        """Read the event, and the branches that it is on."""
         self.kind, self.near, self.branches_named = table.event, table.near, table.branches
-        self.over = table.over
 
     def join(self, asked: Sequence[Question]) -> None:
         """Find the branches among the questions of the study."""
@@ -82,27 +76,12 @@ class CurveQuestion(OneVerb):
                 f"{nearest(self.branches_named, known)}"
             )
         branches = known[self.branches_named or next(iter(known))]
-        self.needs = (branches.stem, *self._map(asked))
+        self.needs = (branches.stem,)
         self.parent = to_json(branches.identity())
         (name,) = branches.arguments["vary"]
         if self.near is not None:
             place = f"{self.place}.near"
             self.near = quantities.parameters(self.system, {name: self.near}, place)[name]
-
-    def _map(self, asked: Sequence[Question]) -> tuple[str, ...]:
-        """Stem of the map that the curve is drawn on, if there is one."""
-        if self.over is None:
-            return ()
-        pair = set(self.arguments["vary"])
-        maps = {one.title: one for one in asked if isinstance(one, Diagram)}
-        fitting = [name for name, one in maps.items() if set(one.varied()) == pair]
-        if self.over not in fitting:
-            raise StudyError(
-                f"[{self.place}] over: no [bifurcation_diagram] over "
-                f"{' and '.join(sorted(pair))} is called {shown(self.over)}. "
-                f"{nearest(self.over, fitting)}"
-            )
-        return (maps[self.over].stem,)
 
     def identity(self) -> dict[str, str]:
         """Identity of the question, with that of the branches at which the curve begins."""
@@ -130,6 +109,47 @@ class CurveQuestion(OneVerb):
         nearest_one = 0 if self.near is None else int(np.argmin(np.abs(at - self.near)))
         return ds.isel(event=int(events[nearest_one]))
 
+
+@asked(
+    120,
+    asking(
+        "bifurcation_curve",
+        ["bifurcation_curve"],
+        KEYS,
+        called="Bifurcation curve",
+        branches=(str | None, _BRANCHES),
+        near=(Quantity | None, _NEAR),
+        over=(str | None, _OVER),
+    ),
+)
+class CurveQuestion(AtEvent):
+    """A curve of bifurcations."""
+
+    def check(self, table: Any, setting: Setting) -> None:
+        """Read the map to draw it on, too."""
+        super().check(table, setting)
+        self.over = table.over
+
+    def join(self, asked: Sequence[Question]) -> None:
+        """Find the branches and the map among the questions of the study."""
+        super().join(asked)
+        self.needs = (*self.needs, *self._map(asked))
+
+    def _map(self, asked: Sequence[Question]) -> tuple[str, ...]:
+        """Stem of the map that the curve is drawn on, if there is one."""
+        if self.over is None:
+            return ()
+        pair = set(self.arguments["vary"])
+        maps = {one.title: one for one in asked if isinstance(one, Diagram)}
+        fitting = [name for name, one in maps.items() if set(one.varied()) == pair]
+        if self.over not in fitting:
+            raise StudyError(
+                f"[{self.place}] over: no [bifurcation_diagram] over "
+                f"{' and '.join(sorted(pair))} is called {shown(self.over)}. "
+                f"{nearest(self.over, fitting)}"
+            )
+        return (maps[self.over].stem,)
+
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
         """The curve in the plane of both parameters."""
         from saltus import plot
@@ -149,6 +169,31 @@ class CurveQuestion(OneVerb):
         axes = plot.amplitude_map(found[self.needs[-1]], bifurcations=curves)
         axes.set_title(f"{self.over}: {axes.get_title('left')}", loc="left")
         return {"-map": first_figure(axes)}
+
+
+@asked(
+    125,
+    asking(
+        "event_sensitivity",
+        ["event_sensitivity"],
+        KEYS,
+        called="Event sensitivity",
+        without=("to",),
+        to=(list[str], _TO),
+        branches=(str | None, _BRANCHES),
+        near=(Quantity | None, _NEAR),
+    ),
+)
+class EventDerivatives(AtEvent):
+    """Derivatives of the place of a bifurcation."""
+
+    def check(self, table: Any, setting: Setting) -> None:
+        """Check what the derivatives are with respect to."""
+        from saltus.analysis.derivatives.columns import Columns
+
+        super().check(table, setting)
+        self.arguments["to"] = table.to
+        Columns.of(self.system, table.to)
 
 
 def _pair(ds: xr.Dataset) -> set[str]:

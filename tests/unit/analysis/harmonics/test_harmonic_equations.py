@@ -14,7 +14,6 @@ import saltus as sl
 from saltus.analysis.harmonics import series as fourier
 from saltus.analysis.harmonics.equations import HarmonicOrbits
 
-pytestmark = pytest.mark.nojit
 STOP = sl.models.soft_stop()
 with open(Path(__file__).parents[3] / "reference/backbones_hbm.csv") as table:
     KNOWN = {row["id"]: float(row["value"]) for row in csv.DictReader(table)}
@@ -97,6 +96,7 @@ def test_derivatives_are_those_of_differences(system):
         assert np.abs(derivative - slopes).max() < 1e-7 * max(1.0, np.abs(derivative).max()), name
 
 
+@pytest.mark.nojit
 def test_linear_systems_are_exact_for_any_number_of_harmonics():
     far = STOP.with_values(gap=100.0)
     for count in (1, 6):
@@ -130,6 +130,7 @@ def test_one_harmonic_is_the_describing_function(by_harmonics):
     assert np.hypot(stiffness, 0.1 * z[-1]) * a == pytest.approx(1.0, rel=1e-14)
 
 
+@pytest.mark.nojit
 @pytest.mark.parametrize("power", [0.25, 1.5, 2.0])
 def test_powers_of_a_depth_are_integrated_to_rounding(power):
     """Against mpmath's quadrature of the first harmonic of a Hertz contact, and of a root whose

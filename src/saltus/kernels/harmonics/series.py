@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import math
 
-from saltus.kernels.marks import entry, kernel
-
 #: Halvings of the circle before the first look, and the most: what is left is rounding.
 FIRST, DEEPEST = 3, 48
 #: Steps of Newton's method, or halvings, by which a zero is located.
@@ -31,6 +29,23 @@ def along(series, row, angle):
         slope += k * (b * c - a * s)
         c, s = c * cosine - s * sine, s * cosine + c * sine
     return value, slope
+
+
+@kernel
+def write_basis(angle, most, here):
+    """One, the cosines and the sines up to a harmonic at an angle, f8[2 most + 1]."""
+    here[0] = 1.0
+    if most == 0:
+        return
+    here[1], here[most + 1] = math.cos(angle), math.sin(angle)
+    known = 1
+    while known < most:  # twice as many each time
+        cosine, sine = here[known], here[most + known]
+        for k in range(1, min(known, most - known) + 1):
+            c, s = here[k], here[most + k]
+            here[known + k] = c * cosine - s * sine
+            here[most + known + k] = s * cosine + c * sine
+        known *= 2
 
 
 @kernel
@@ -57,8 +72,8 @@ def located(series, row, low, high, rising):
     return place, slope
 
 
-@entry
-def zeros(series, which, angle, slope):
+@kernel
+def all_zeros(series, which, angle, slope):
     """Find the changes of sign of series on the circle.
 
     series f8[g, 2H + 1]; out, as many as fit: which i8[r], the series, ascending; angle f8[r] in
