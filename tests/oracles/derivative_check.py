@@ -14,6 +14,7 @@ import sys
 import time
 import warnings
 from dataclasses import dataclass
+from functools import partial
 from random import Random
 
 import numpy as np
@@ -34,7 +35,7 @@ ALLOWED, OF_LARGEST, UNDECIDABLE = 1e-6, 1e-7, 1e-3
 READ = {
     "derivative": "value", "contact_time_derivative": "contact_time",
     "maximum_derivative": "maximum", "minimum_derivative": "minimum",
-    "end_derivative": None,
+    "end_derivative": "end",
 }  # fmt: skip
 METHODS = {"Taylor": sl.Taylor(), "Modal": sl.Modal()}
 REACHED = ("ok", "graze_unresolved")
@@ -82,72 +83,74 @@ def case(seed: str) -> Case:
     return random_case(Random(seed))
 
 
-def columns(that: Case, method: sl.Method, system: sl.System | None = None) -> list[Column] | str:
+def columns(that: Case, method: sl.Method, extremes: bool = True) -> list[Column] | str:
     """All derivatives of a case by a method, or the status with which it ends otherwise."""
-    system, to = system or that.system(), list(that.to)
-    found = _sensitivity(system, that.start, that.t_end, to, method)
-    if str(found.status.item()) not in REACHED:
-        return str(found.status.item())
+    system, to = that.system(), list(that.to)
+    fly = partial(_sensitivity, that=that, method=method, extremes=extremes)
+    (found,) = fly(system, [that.start])
+    if found["status"] not in REACHED:
+        return found["status"]
+    kinds = [kind for kind in READ if kind in found]
+    shifts = np.concatenate([SHIFTS * step for step in STEPS])
     answer = []
     for number, name in enumerate(to):
-        differences = [_differences(that, method, system, name, found, step) for step in STEPS]
-        if any(one is None for one in differences):
+        state = name.endswith("(0)")
+        place = [*system.states].index(name[:-3]) if state else None
+        base = that.start[place] if state else system.values[name]
+        unit = max(abs(base), 0.1)
+        if state:
+            starts = [np.add(that.start, s * unit * np.eye(len(that.start))[place]) for s in shifts]
+            runs = fly(system, starts)
+        elif name == system.forced_at:  # periods of their own have no times in common
+            values = [base + s * unit for s in shifts]
+            runs = [fly(system.with_values(**{name: v}), [that.start])[0] for v in values]
+        else:
+            runs = fly(system, [that.start] * len(shifts), {name: base + shifts * unit})
+        if any(run["contacts"] != found["contacts"] for run in runs):
             answer.append(Column("other contacts", name, *np.empty((3, 0))))
             continue
-        (first, _), (second, kink) = differences
-        for kind in READ:
-            own = found[kind].values[..., number]
-            error = np.maximum(np.abs(second[kind] - first[kind]), kink[kind])
-            left_out = _ends_of_chatter(found) if kind.startswith("contact") else False
-            answer.append(Column(kind, name, own, second[kind], error, left_out))
+        for kind in kinds:
+            rows = np.array([run[READ[kind]] for run in runs]).reshape(2, len(SHIFTS), -1)
+            first, second = (
+                np.tensordot(MIDDLE, part, 1) / (step * unit)
+                for part, step in zip(rows, STEPS, strict=True)
+            )
+            left, right = np.tensordot(SIDES, rows[1], 1) / (STEPS[1] * unit)
+            error = np.maximum(np.abs(second - first), np.abs(right - left))
+            left_out = found["ends of chatter"] if kind.startswith("contact") else False
+            own = found[kind][..., number].ravel()
+            answer.append(Column(kind, name, own, second, error, left_out))
     return answer
 
 
-def _ends_of_chatter(found):
-    """Where a contact comes to rest by ever smaller impacts: no gap tells this instant."""
-    kinds, times = found.contact_kind.values, found.contact_time.values
-    behind = np.append(False, (kinds[:-1] == "impact") & (np.diff(times) > 0))
-    return (kinds == "hold") & behind
-
-
-def _sensitivity(system, start, t_end, to, method):
+def _sensitivity(system, starts, values=None, *, that, method, extremes):
+    """Values and derivatives of motions, each by name."""
+    at, names = np.linspace(0.21, 0.97, 4) * that.t_end, (*system.states, *system.outputs.names)
+    columns = dict(zip(system.states, np.transpose(starts), strict=True))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        at = np.linspace(0.21, 0.97, 4) * t_end
-        return sl.sensitivity(system, start, t_end=t_end, to=to, at=at, method=method)
-
-
-def _differences(that, method, system, name, found, step):
-    """Differences of everything that was read, and by how much those of both sides differ; None
-    where the contacts are other ones.
-    """
-    values, start = dict(system.values), np.array(that.start, float)
-    place = system.states.index(name[:-3]) if name.endswith("(0)") else None
-    base = values[name] if place is None else start[place]
-    unit = step * max(abs(base), 0.1)
-    runs = []
-    for shift in SHIFTS * unit:
-        moved, other = start.copy(), system
-        if place is None:
-            other = system.with_values(**{name: base + shift})
-        else:
-            moved[place] += shift
-        run = _sensitivity(other, moved, that.t_end, list(that.to), method)
-        same = np.array_equal(run.contact_guard.values, found.contact_guard.values)
-        if not same or not np.array_equal(run.contact_kind.values, found.contact_kind.values):
-            return None
-        runs.append(run)
-    slopes, kinks = {}, {}
-    for kind, read in READ.items():
-        if read is None:
-            names = (*system.states, *system.outputs.names)
-            rows = np.array([[run[f"end_{one}"].item() for one in names] for run in runs])
-        else:
-            rows = np.array([run[read].values for run in runs])
-        slopes[kind] = np.tensordot(MIDDLE, rows, 1) / unit
-        sides = np.tensordot(SIDES, rows, 1) / unit
-        kinks[kind] = np.abs(sides[1] - sides[0])
-    return slopes, kinks
+        found = sl.sensitivity(
+            system, columns, t_end=that.t_end, to=list(that.to), at=at, method=method,
+            values=values, extremes=extremes,
+        )  # fmt: skip
+    answer = []
+    for i in range(len(starts)):
+        one, mine = found.isel(trajectory=i), found.contact_trajectory.values == i
+        kinds, times = found.contact_kind.values[mine], found.contact_time.values[mine]
+        read = {name: one[name].values for pair in READ.items() for name in pair if name in one}
+        read |= {name: found[name].values[mine] for name in read if name.startswith("contact")}
+        behind = np.append(False, (kinds[:-1] == "impact") & (np.diff(times) > 0))[: len(kinds)]
+        answer.append(
+            read
+            | {
+                "status": str(one.status.item()),
+                "end": np.array([one[f"end_{name}"].item() for name in names]),
+                "contacts": [*found.contact_guard.values[mine], *kinds],
+                # no gap tells when ever smaller impacts end
+                "ends of chatter": (kinds == "hold") & behind,
+            }
+        )
+    return answer
 
 
 def judged(seed: str, which: str) -> tuple[Case, str, list[str]]:

@@ -66,10 +66,10 @@ class SensitivityRun(Readings):
         """Derivatives of the times of contacts, float64[m, C], from the places just before them.
 
         The gap of each stays zero. One whose gap isn't zero there, or stays zero, comes with what
-        else happens at its instant: the first jump of the state, or all that tell the same; else it
-        is NaN.
+        else happens at its instant: the first jump of the state, or all that tell the same. Where
+        nothing else does and the gap isn't zero, a drive jumps, whose phase stays.
         """
-        moved = self._gap_times(at, table)
+        moved, jumped = self._gap_times(at, table)
         known, first = np.isfinite(moved).all(axis=1), np.isin(table.kind_name, JUMPS)
         began = np.ones(len(moved), bool)
         began[1:] = (np.diff(at.time) != 0) | (np.diff(at.trajectory) != 0)
@@ -81,12 +81,25 @@ class SensitivityRun(Readings):
         split = np.bincount(instant, known & ~same, len(moved))[instant] > 0
         caused = ~known & (first[leader] | ~split)
         moved[caused] = moved[leader[caused]]
+        driven = jumped & ~known[leader] & ~first[leader]
+        moved[driven] = self._phase_times(at)[driven]
         return moved
 
-    def _gap_times(self, at: Places, table: ContactTable) -> np.ndarray:
+    def _phase_times(self, at: Places) -> np.ndarray:
+        """Derivatives of times whose phase of the forcing stays, float64[m, C]."""
+        moved, where = np.zeros((len(at.time), at.slopes.shape[2])), self.system.forced_at
+        if where in self.flow.names:
+            frequency = self.flow.parameters(self.group, at.trajectory)[where]
+            column = len(self.system.states) + self.flow.names.index(where)
+            moved[:, column] = -at.time / frequency
+        return moved
+
+    def _gap_times(self, at: Places, table: ContactTable) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of the times at which the gaps of contacts are zero, float64[m, C], from
-        places just before; NaN where a gap isn't zero there, or stays zero.
+        places just before; NaN where a gap isn't zero there, or stays zero. And whether it isn't
+        zero, bool[m].
         """
+        jumped = np.zeros(len(at.time), bool)
         moved = np.full((len(at.time), at.slopes.shape[2]), np.nan)
         rates, system = self.flow.rates(at, self.group), self.turning.system
         size, near = len(system.states), NEAR * np.abs(at.time).max(initial=0.0)
@@ -112,9 +125,10 @@ class SensitivityRun(Readings):
             change[:, size:] += by_name.T.reshape(len(here), -1)
             rate = np.einsum("im,mi->m", by_state, rates[here]) + slopes[-1]
             met_it = np.abs(rate) > LEAVES * np.abs(rate).max()
-            met_it &= np.abs(value) <= near * np.abs(rate)
+            jumped[here] = np.abs(value) > near * np.abs(rate)
+            met_it &= ~jumped[here]
             moved[here[met_it]] = -change[met_it] / rate[met_it, None]
-        return moved
+        return moved, jumped
 
 
 def sensitivity_dataset(run: SensitivityRun, outcome: Outcome) -> xr.Dataset:
@@ -205,7 +219,7 @@ def _extremes(
     guard = outcome.contacts.guard
     first = _rows(samples, np.searchsorted(samples.trajectory, np.arange(n)))
     turns = np.isin(guard, list(run.turning.of))
-    still = np.where(turns[:, None], 0.0, moved)
+    still = np.where(turns[:, None] & np.isnan(moved), 0.0, moved)
     # what an impact changes has one more value, just before it
     parts = [(touch, still, None), (early, still, ahead), (first, None, None)]
     if run.closed is None:  # an orbit ends where it begins, whose own slope is known
