@@ -85,73 +85,92 @@ class _Equation:
         return self.rng.randrange(self.bodies)
 
     def add(self, kind):
-        """Add a contact."""
-        rng, i = self.rng, self.body()
-        x, v, gap = f"x{i}", f"v{i}", None
-        if kind in ("soft", "damped", "pressed", "both", "impact", "clay", "wall"):
-            gap = self.new("gap", 0.0 if rng.random() < 0.2 else 0.02, 0.3)
-        side = rng.choice((1, -1))
-        toward, closing = (x, v) if side > 0 else (f"(-{x})", f"-{v}")
-        sign = "-" if side > 0 else "+"
-        if kind in ("soft", "damped", "pressed"):
-            force = f"{self.new('stop', 60, 900)}*({toward} - {gap})"
-            if kind == "damped":
-                force += f" + {self.new('oil', 0.5, 8)}*({closing})"
-            if kind == "pressed":
-                force += f" + {self.new('press', 0.2, 2)}"
-            force = f"sl.where({toward} > {gap}, {force}, 0)"
-            self.outputs.append(force)
-            self.forces[i].append(f"{sign} {force}")
-        elif kind == "both":
-            self.forces[i].append(
-                f"- sl.freeplay({x}, stiffness={self.new('stop', 60, 900)}, gap={gap})"
-            )
-        elif kind in ("impact", "clay"):
-            e = 0.0 if kind == "clay" else self.new("e", 0.3, 1.0)
-            self.laws.append(f"sl.impact({toward} < {gap}, {closing}, restitution={e})")
-            self.gaps.append((i, side, self.values[gap]))
-        elif kind == "wall":  # it moves
-            size, e = self.new("shake", 0.005, 0.02), rng.choice((0.0, 0.5, 0.8))
-            self.laws.append(
-                f"sl.impact({toward} < {gap} + {size}*sl.cos(2*sl.pi*f*t), {closing} "
-                f"+ 2*sl.pi*f*{size}*sl.sin(2*sl.pi*f*t), restitution={e})"
-            )
-            self.gaps.append((i, side, self.values[gap] - self.values[size]))
-        elif kind in ("pair", "clay pair") and self.bodies > 1:
-            i = min(i, self.bodies - 2)
-            gap = self.new("gap", 0.02, 0.3)
-            e = 0.0 if kind == "clay pair" else self.new("e", 0.3, 1.0)
-            self.laws.append(
-                f"sl.impact(x{i} < x{i + 1} + {gap}, v{i} - v{i + 1}, restitution={e}, "
-                f"inertia={{'v{i}': {self.masses[i]}, 'v{i + 1}': {self.masses[i + 1]}}})"
-            )
-            self.gaps.append((i, 2, self.values[gap]))
-        elif kind in ("friction", "static", "belt"):
-            slip = self.new("slip", 0.3, 2)
-            more = f", stick={slip}*{_number(rng, 1.05, 1.6)}" if kind == "static" else ""
-            past = f" - {self.new('belt', 0.1, 0.5)}" if kind == "belt" else ""
-            self.forces[i].append(f"- sl.friction({v}{past}, slip={slip}{more})")
-        elif kind == "slider":
-            stiffness, limit = self.new("spring", 20, 200), self.new("limit", 0.5, 2)
-            self.forces[i].append(f"- sl.slider({x}, stiffness={stiffness}, limit={limit})")
-        elif kind == "play":
-            stiffness, gap = self.new("spring", 20, 200), self.new("gap", 0.01, 0.1)
-            self.forces[i].append(f"- {stiffness}*sl.play({x}, gap={gap})")
-        elif kind == "rough" and self.bodies > 1:
-            i = min(i, self.bodies - 2)
-            gap, mu = self.new("gap", 0.02, 0.3), self.new("mu", 0.1, 0.6)
-            self.laws.append(
-                f"sl.impact(x{i} < {gap}, v{i}, restitution=0, friction={mu}, "
-                f"slip_velocity=v{i + 1}, "
-                f"inertia={{'v{i}': {self.masses[i]}, 'v{i + 1}': {self.masses[i + 1]}}})"
-            )
-            self.gaps.append((i, 1, self.values[gap]))
-        elif kind == "kick":
+        """Add a contact; returns its name, or nothing if it takes more bodies."""
+        if kind in ("pair", "clay pair", "rough") and self.bodies == 1:
+            return ""
+        i = self.rng.randrange(
+            self.bodies - 1 if kind in ("pair", "clay pair", "rough") else self.bodies
+        )
+        make = {
+            "soft": self._soft, "damped": self._soft, "pressed": self._soft, "impact": self._rigid,
+            "clay": self._rigid, "wall": self._wall, "pair": self._pair, "clay pair": self._pair,
+            "friction": self._friction, "static": self._friction, "belt": self._friction,
+            "rough": self._rough,
+        }.get(kind, self._more)  # fmt: skip
+        make(kind, i, f"x{i}", f"v{i}")
+        return kind
+
+    def _side(self, x, v):
+        """A gap on either side: its parameter, +1 or -1, the way towards it and the velocity."""
+        gap = self.new("gap", 0.0 if self.rng.random() < 0.2 else 0.02, 0.3)
+        return (gap, 1, x, v) if self.rng.random() < 0.5 else (gap, -1, f"(-{x})", f"-{v}")
+
+    def _soft(self, kind, i, x, v):
+        gap, side, toward, closing = self._side(x, v)
+        force = f"{self.new('stop', 60, 900)}*({toward} - {gap})"
+        if kind == "damped":
+            force += f" + {self.new('oil', 0.5, 8)}*({closing})"
+        if kind == "pressed":
+            force += f" + {self.new('press', 0.2, 2)}"
+        force = f"sl.where({toward} > {gap}, {force}, 0)"
+        self.outputs.append(force)
+        self.forces[i].append(f"{'-' if side > 0 else '+'} {force}")
+
+    def _rigid(self, kind, i, x, v):
+        gap, side, toward, closing = self._side(x, v)
+        e = 0.0 if kind == "clay" else self.new("e", 0.3, 1.0)
+        self.laws.append(f"sl.impact({toward} < {gap}, {closing}, restitution={e})")
+        self.gaps.append((i, side, self.values[gap]))
+
+    def _wall(self, kind, i, x, v):
+        """A wall that moves."""
+        gap, side, toward, closing = self._side(x, v)
+        size, e = self.new("shake", 0.005, 0.02), self.rng.choice((0.0, 0.5, 0.8))
+        self.laws.append(
+            f"sl.impact({toward} < {gap} + {size}*sl.cos(2*sl.pi*f*t), {closing} "
+            f"+ 2*sl.pi*f*{size}*sl.sin(2*sl.pi*f*t), restitution={e})"
+        )
+        self.gaps.append((i, side, self.values[gap] - self.values[size]))
+
+    def _shared(self, i):
+        return f"inertia={{'v{i}': {self.masses[i]}, 'v{i + 1}': {self.masses[i + 1]}}}"
+
+    def _pair(self, kind, i, x, v):
+        gap = self.new("gap", 0.02, 0.3)
+        e = 0.0 if kind == "clay pair" else self.new("e", 0.3, 1.0)
+        self.laws.append(
+            f"sl.impact({x} < x{i + 1} + {gap}, {v} - v{i + 1}, restitution={e}, {self._shared(i)})"
+        )
+        self.gaps.append((i, 2, self.values[gap]))
+
+    def _rough(self, kind, i, x, v):
+        gap, mu = self.new("gap", 0.02, 0.3), self.new("mu", 0.1, 0.6)
+        self.laws.append(
+            f"sl.impact({x} < {gap}, {v}, restitution=0, friction={mu}, slip_velocity=v{i + 1}, "
+            f"{self._shared(i)})"
+        )
+        self.gaps.append((i, 1, self.values[gap]))
+
+    def _friction(self, kind, i, x, v):
+        slip = self.new("slip", 0.3, 2)
+        more = f", stick={slip}*{_number(self.rng, 1.05, 1.6)}" if kind == "static" else ""
+        past = f" - {self.new('belt', 0.1, 0.5)}" if kind == "belt" else ""
+        self.forces[i].append(f"- sl.friction({v}{past}, slip={slip}{more})")
+
+    def _more(self, kind, i, x, v):
+        if kind == "kick":
             level, part = self.new("level", 0.05, 0.4), self.new("kick", 0.2, 1.0)
             self.laws.append(f"sl.jump({x} > {level}, {v}={v} - {part})")
+            return
+        stiffness = self.new("spring", 20, 400)
+        if kind == "slider":
+            force = f"sl.slider({x}, stiffness={stiffness}, limit={self.new('limit', 0.5, 2)})"
         else:
-            return ""
-        return kind
+            gap = self.new("gap", 0.01, 0.1)
+            play = f"{stiffness}*sl.play({x}, gap={gap})"
+            free = f"sl.freeplay({x}, stiffness={stiffness}, gap={gap})"
+            force = play if kind == "play" else free
+        self.forces[i].append(f"- {force}")
 
 
 def _drive(rng, made):
