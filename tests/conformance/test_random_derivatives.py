@@ -26,6 +26,16 @@ def test_derivatives_are_those_of_differences(seed, which):
     assert judged > 100
 
 
+def test_a_largest_velocity_where_a_drive_jumps_moves_with_the_drive():
+    source = (
+        "def equation(t, x, v, *, f=1.3, pull=5.0, k=9.0):\n"
+        "    return v, pull*sl.square(2*sl.pi*f*t) - k*x\n"
+        "system = sl.system(states='x v', forced_at='f')(equation)\n"
+    )
+    that = derivative_check.Case("a drive that jumps", source, (0.1, 0.0), 1.1, ("f", "pull"))
+    assert derivative_check.judged(that, "Taylor")[:2] == ("same", [])
+
+
 @pytest.mark.nightly
 @pytest.mark.parametrize("which", ["Taylor", "Modal"])
 def test_a_hundred_systems(which):
