@@ -59,7 +59,7 @@ class Column:
 
     @property
     def largest(self) -> float:
-        return float(np.nanmax(np.abs(self.expected), initial=1e-12))
+        return float(np.nanmax(np.abs(self.expected), initial=1e-3))
 
     @property
     def decided(self) -> np.ndarray:

@@ -15,6 +15,7 @@ KINDS = (
     "soft", "damped", "pressed", "both", "impact", "impact", "clay", "wall", "pair", "clay pair",
     "friction", "static", "belt", "slider", "play", "rough", "kick",
 )  # fmt: skip
+RUBBING = ("friction", "static", "belt", "slider", "play")
 DRIVES = ("cos", "cos", "cos", "two", "record", "square")
 
 
@@ -200,7 +201,10 @@ def _equation(rng):
     bodies = rng.choice((1, 1, 1, 2, 2, 3))
     made = _Equation(rng, bodies)
     made.values["f"] = _number(rng, 0.7, 2.5)
-    names = [made.add(kind) for kind in rng.sample(KINDS, rng.choice((1, 1, 2, 2, 3)))]
+    kinds = rng.sample(KINDS, rng.choice((1, 1, 2, 2, 3)))
+    if "rough" in kinds:  # nothing else may switch where it slides
+        kinds = [kind for kind in kinds if kind not in RUBBING]
+    names = [made.add(kind) for kind in kinds]
     drive, before = _drive(rng, made)
     if rng.random() < 0.3:
         made.forces[made.body()].append(f"+ {made.new('load', -3, 3)}")
