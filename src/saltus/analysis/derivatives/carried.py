@@ -156,8 +156,8 @@ class CarriedDerivatives:
     ) -> tuple[Places, Places]:
         """Places just before the contacts, and behind them; before those that begin to be held too.
 
-        What the flow doesn't record comes from a second ``run`` of each trajectory, with samples:
-        before contacts that have a law, and at all of a flow without derivatives in its records.
+        Trajectories that meet contacts with a law come from a second ``run`` each, with samples
+        beside their contacts; so do all of a flow without derivatives in its records.
         """
         table, whole = outcome.contacts, self.request(group, length, NO_SAMPLES)
         unit = length.period[table.trajectory] if self.timed else 1.0
@@ -165,15 +165,14 @@ class CarriedDerivatives:
         modes = np.stack([table.mode_after, table.mode_after])
         missing = not self._method.serving(self.flown.origin).records_tangents
         lawful = np.array([guard.law is not None for guard in self.system.guards] or [False])
-        before = 4.0 * np.spacing(np.maximum(np.abs(table.time), abs(whole.origin)))
-        since = np.maximum(table.time - whole.origin - np.stack([before, 0.0 * before]), 0.0)
+        beside = 4.0 * np.spacing(np.maximum(np.abs(table.time), abs(whole.origin)))
+        since = table.time + np.stack([-beside, beside]) - whole.origin
+        since = np.clip(since, 0.0, outcome.time[table.trajectory] - whole.origin)
         for i in np.unique(table.trajectory[missing | lawful[table.guard]]):
-            here = np.flatnonzero(table.trajectory == i)
-            wanted = since[: 1 + missing, here]
-            times, place = np.unique(wanted, return_inverse=True)
-            found, place = run(_alone(whole, i, times)), place.reshape(wanted.shape)
-            rows[: 1 + missing, here] = found.samples[0, place]
-            modes[: 1 + missing, here] = found.sample_mode[0, place]
+            here = table.trajectory == i
+            times, place = np.unique(since[:, here], return_inverse=True)
+            found, place = run(_alone(whole, i, times)), place.reshape(2, -1)
+            rows[:, here], modes[:, here] = found.samples[0, place], found.sample_mode[0, place]
         held = np.isin(table.kind_name, HELD)
         rows[1, held], modes[1, held] = rows[0, held], modes[0, held]
         who = table.trajectory
