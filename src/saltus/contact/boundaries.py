@@ -62,11 +62,19 @@ def surface_guard(gap: Expr, name: str) -> Guard:
         If the expression doesn't depend on a state.
     """
     canonical, gap = Canonical(), without_root(gap)
-    _check_moves(gap, canonical.kinds(canonical.polynomial(gap)))
+    _check_moves(gap, kinds_of(gap))
     level, positive = _guard(gap, canonical)
     return replace(
         level if positive and canonical.level_of(gap)[1] == 1.0 else Guard("", gap), name=name
     )
+
+
+def kinds_of(gap: Expr) -> frozenset[str]:
+    """What the gap of a surface depends on, once terms have cancelled: of ``state``, ``time``,
+    ``param`` and ``select``.
+    """
+    canonical = Canonical()
+    return canonical.kinds(canonical.polynomial(gap))
 
 
 def number_of(condition: Relation, guards: Sequence[Guard]) -> int | None:

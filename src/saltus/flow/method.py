@@ -154,6 +154,11 @@ class Method:
         return True
 
     @property
+    def records_tangents(self) -> bool:
+        """True if the records of contacts hold the derivatives that the flow carries."""
+        return True
+
+    @property
     def noise(self) -> float:
         """Mismatch of a periodic orbit, relative to the range of the states, that the errors of
         this method explain.

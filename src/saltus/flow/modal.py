@@ -401,6 +401,11 @@ class Modal(Method):
         return np.array([step_budget(self.max_steps, periods), float(self.max_events)])
 
     @property
+    def records_tangents(self) -> bool:
+        """No: columns of the derivative wait until the motion leaves a contact state."""
+        return False
+
+    @property
     def noise(self) -> float:
         """Rounding over some periods."""
         return 1e-12

@@ -26,6 +26,9 @@ from saltus.kernels.modal import layout
 from saltus.language import expression as ex
 from saltus.system.linear import LinearPiece, LinearSystem
 
+#: Contact states whose differentiated equations are kept: those of some periods.
+KEPT = 64
+
 
 @functools.lru_cache(maxsize=256)
 def varies_by(linear: LinearSystem, name: str) -> bool:
@@ -97,6 +100,7 @@ class ParameterTables:
         self.rows, self.shifts = Rows(), Rows(max(len(names) * self._width, 1))
         #: Derivatives of the equations, by the parameters and the values that they depend on.
         self._pieces: dict[tuple[float, ...], Callable[[int], LinearPiece]] = {}
+        self._piece = functools.lru_cache(maxsize=KEPT)(self._piece_of)
         self._every, self.links = links, Links(links.table.shape[1])
 
     def need(self, at: int, which: int, mode: int) -> None:
@@ -151,7 +155,7 @@ class ParameterTables:
         key = parameter, *(given.values[name] for name in linear.parameters)
         if key not in self._pieces:
             self._pieces[key] = linear.every_piece(given.values)
-        piece = self._pieces[key](mode)
+        piece = self._piece(key, mode)
         answers = slopes_of(piece, given.rates, slow, modes)
         padded = np.zeros((len(answers.T), LANES * self._state_groups), complex)
         padded[:, : len(answers)] = answers.T
@@ -160,6 +164,10 @@ class ParameterTables:
         if modes.block is not None or not piece.matrix.any():
             return rows, np.zeros((0, LANES))
         return rows, mixing_of(piece.matrix, modes, self._groups)
+
+    def _piece_of(self, key: tuple[float, ...], mode: int) -> LinearPiece:
+        """Derivatives of the equations of a contact state."""
+        return self._pieces[key](mode)
 
 
 def slopes_of(

@@ -46,8 +46,10 @@ class Parametric:
 
 
 @functools.lru_cache(maxsize=256)
-def parametric(system: System, names: tuple[str, ...]) -> Parametric:
-    """The system with these parameters as states: the same one each time.
+def parametric(system: System, names: tuple[str, ...], unforced_timed: bool = True) -> Parametric:
+    """The system with these parameters as states: the same one each time. The time is counted in
+    periods where the forcing frequency is one of them and, unless ``unforced_timed`` is False, in a
+    system without forcing.
 
     Raises
     ------
@@ -55,10 +57,10 @@ def parametric(system: System, names: tuple[str, ...]) -> Parametric:
         If the instants of a switch, a remainder or a table of time would depend on a parameter.
     """
     if system.origin is not system:
-        known = parametric(system.origin, names)
+        known = parametric(system.origin, names, unforced_timed)
         kept = {name: system.values[name] for name in known.system.values}
         return replace(known, system=known.system.with_values(**kept))
-    timed = system.forced_at is None or system.forced_at in names
+    timed = unforced_timed if system.forced_at is None else system.forced_at in names
     new = tuple(name for name in names if name != system.forced_at)
     rewriting = _Rewriting(system, new, timed)
     states = (*system.states, *((_free(PERIOD, system),) if timed else ()), *new)

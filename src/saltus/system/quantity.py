@@ -11,13 +11,14 @@ import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from saltus.contact.boundaries import surface_guard
-from saltus.contact.guards import Guard, Law, bits_in, expressions_of
+from saltus.contact.boundaries import kinds_of, number_of, surface_guard
+from saltus.contact.guards import Guard, Law, bits_in, expressions_of, is_hold
 from saltus.errors import ParameterError, among, shown, unknown
 from saltus.language.derivatives import gradient, time_derivative
 from saltus.language.expression import (
     Bit,
     Expr,
+    Relation,
     add,
     constant,
     depends_on,
@@ -146,7 +147,7 @@ def turning_surfaces(
     formula, guards = formula_of(system, name)
     bits, title = sorted(bits_in([formula])), f"{name} turns"
     rates = _rates_by_sides(system, formula, bits) if len(bits) <= MOST_SIDES else {}
-    moving = [rate for rate in rates if depends_on(rate, ("state",))]
+    moving = [rate for rate in rates if "state" in kinds_of(rate)]
     if not moving or any(depends_on(rate, ("time",)) for rate in rates.keys() - set(moving)):
         found = _with_guard(system, rate_of(system, formula), guards, title)
         return found, {len(guards): ((0, 0),)}
@@ -197,21 +198,27 @@ def with_turning_surfaces(
     dict of int to str
         The state or output of each new guard by its number. The gap of a guard is the rate.
     list of str
-        The names that turn on these surfaces only, or never. The others turn at times of their own,
-        on surfaces that were left out, or are switched by more than :data:`MOST_SIDES` contacts or
-        by boundaries of their own.
+        The names that turn on these surfaces and at contacts only, or never. The others turn at
+        times of their own, on surfaces that were left out, or are switched by more than
+        :data:`MOST_SIDES` contacts or by boundaries of their own.
     """
     found, of, complete = system, {}, []
+    holds = {number for number, guard in enumerate(system.guards) if is_hold(guard)}
     for name in names:
         formula, guards = formula_of(system, name)
         bits = sorted(bits_in([formula]))
         if len(guards) > len(system.guards) or len(bits) > MOST_SIDES:
             continue
         left_out = False
+        more_bits = sorted({*bits, *(bits_in([rate_of(system, formula)]) & holds)})
+        if len(more_bits) <= MOST_SIDES:  # a rate of what is held would be ridden
+            bits = more_bits
         for gap in _rates_by_sides(system, formula, bits):
-            if not depends_on(gap, ("state",)):
+            if "state" not in kinds_of(gap):
                 left_out |= depends_on(gap, ("time",))
                 continue
+            if not bits_in([gap]) and number_of(Relation(gap), system.guards) is not None:
+                continue  # it turns at contacts: a second guard there would be ridden as they hold
             more = _with_guard(found, gap, found.guards, f"{name} turns")
             if len(found.guards) >= MOST_GUARDS or not admits(more):
                 left_out = True

@@ -6,7 +6,7 @@ Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems (2
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,7 +17,6 @@ from saltus.analysis.inputs.starts import Ensemble
 from saltus.analysis.motion.sample_times import NO_SAMPLES, SampleTimes
 from saltus.errors import ParameterError
 from saltus.flow.methods import Method
-from saltus.flow.modal import Modal
 from saltus.flow.request import Outcome, Request
 from saltus.system import System
 from saltus.system.modes import field
@@ -75,12 +74,12 @@ class CarriedDerivatives:
         self.system, self.names, size = system, names, len(system.states)
         own = method.tangents(system, names)
         self._own = own is not None
-        self._unrecorded = self._own or isinstance(method, Modal)  # no derivatives in its contacts
+        self._method = method
         if own is not None:
             self.flown: System = own
             self.timed, self._order = False, [*range(size + len(names))]
             return
-        with_parameters = parametric(system, names)
+        with_parameters = parametric(system, names, unforced_timed=False)
         flown = method.tangents(with_parameters.system)
         if flown is None:
             raise ParameterError(
@@ -150,40 +149,44 @@ class CarriedDerivatives:
         who = np.repeat(np.arange(n), count)
         rows = outcome.samples[:, kept].reshape(n * count, -1)
         mode = outcome.sample_mode[:, kept].ravel()
-        return self._places(rows, time.ravel(), mode, who, group, length)
+        return self._places(rows, mode, time.ravel(), who, group, length)
 
     def contacts(
-        self,
-        outcome: Outcome,
-        group: Ensemble,
-        length: Span,
-        run: Callable[[Request], Outcome],
-        early: Sequence[str] = HELD,
-    ) -> Places:
-        """The contacts: behind them, before them if they are of the kinds ``early``. What the flow
-        doesn't record comes from a second ``run`` with samples at their times.
+        self, outcome: Outcome, group: Ensemble, length: Span, run: Callable[[Request], Outcome]
+    ) -> tuple[Places, Places]:
+        """Places just before the contacts, and behind them; before those that begin to be held too.
+
+        Trajectories that meet contacts with a law come from a second ``run`` each, with samples
+        beside their contacts; so do all of a flow without derivatives in its records.
         """
-        table = outcome.contacts
+        table, whole = outcome.contacts, self.request(group, length, NO_SAMPLES)
         unit = length.period[table.trajectory] if self.timed else 1.0
-        rows, mode = table.state.copy(), table.mode_after.copy()
-        held = np.isin(table.kind_name, early)
-        again = np.full(len(held), True) if self._unrecorded else held
-        if again.any():
-            whole = self.request(group, length, NO_SAMPLES)
-            before = 4.0 * np.spacing(np.maximum(np.abs(table.time), abs(whole.origin)))
-            since = np.maximum(table.time - whole.origin - np.where(held, before, 0.0), 0.0)
-            for i in np.unique(table.trajectory[again]):
-                here = again & (table.trajectory == i)
-                times, place = np.unique(since[here], return_inverse=True)
-                found = run(_alone(whole, i, times))
-                rows[here], mode[here] = found.samples[0, place], found.sample_mode[0, place]
-        return self._places(rows, table.time * unit, mode, table.trajectory, group, length)
+        rows = np.stack([table.state, table.state])
+        modes = np.stack([table.mode_after, table.mode_after])
+        missing = not self._method.serving(self.flown.origin).records_tangents
+        lawful = np.array([guard.law is not None for guard in self.system.guards] or [False])
+        beside = 4.0 * np.spacing(np.maximum(np.abs(table.time), abs(whole.origin)))
+        since = table.time + np.stack([-beside, beside]) - whole.origin
+        since = np.clip(since, 0.0, outcome.time[table.trajectory] - whole.origin)
+        for i in np.unique(table.trajectory[missing | lawful[table.guard]]):
+            here = table.trajectory == i
+            times, place = np.unique(since[:, here], return_inverse=True)
+            found, place = run(_alone(whole, i, times)), place.reshape(2, -1)
+            rows[:, here], modes[:, here] = found.samples[0, place], found.sample_mode[0, place]
+        held = np.isin(table.kind_name, HELD)
+        rows[1, held], modes[1, held] = rows[0, held], modes[0, held]
+        who = table.trajectory
+        early, touch = (
+            self._places(*one, table.time * unit, who, group, length)
+            for one in zip(rows, modes, strict=True)
+        )
+        return early, touch
 
     def ends(self, outcome: Outcome, group: Ensemble, length: Span) -> Places:
         """The ends of all trajectories."""
         unit = length.period if self.timed else 1.0
         who = np.arange(group.size)
-        return self._places(outcome.state, outcome.time * unit, outcome.mode, who, group, length)
+        return self._places(outcome.state, outcome.mode, outcome.time * unit, who, group, length)
 
     def parameters(self, group: Ensemble, who: np.ndarray) -> dict[str, np.ndarray]:
         """Values of all parameters of trajectories int64[m], float64[m] each."""
@@ -199,8 +202,8 @@ class CarriedDerivatives:
     def _places(
         self,
         rows: np.ndarray,
-        time: np.ndarray,
         mode: np.ndarray,
+        time: np.ndarray,
         who: np.ndarray,
         group: Ensemble,
         length: Span,

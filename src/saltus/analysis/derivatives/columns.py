@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -86,10 +87,15 @@ class Turning:
     known: list[int]
 
 
+@functools.lru_cache(maxsize=64)
 def turning_surfaces(system: System, method: Method) -> Turning:
     """The system with surfaces on which its outputs turn; of a structure by its modes not the
-    modes. A surface for which another flow would have to stand in is left out.
+    modes. A surface for which another flow would have to stand in is left out. Cached: those of
+    copies with other values are copies of one another, and nothing is compiled again.
     """
+    if system.origin is not system:
+        turning = turning_surfaces(system.origin, method)
+        return replace(turning, system=turning.system.with_values(**system.values))
     served = method.serving(system.origin)
     names = (*system.states, *system.outputs.names)
     wanted = names[len(system.states) :] if system.outputs.first else names

@@ -105,15 +105,16 @@ def sensitivity(
     Dataset
         Dims ``time``, ``output``, ``to``, ``contact``, and ``trajectory`` for many starts or
         values. ``value`` and ``derivative`` (at fixed times) of states and outputs;
-        ``contact_time`` and ``contact_time_derivative``, NaN where the time isn't that of a gap's
-        zero (the end of a chatter), the motion stays on the boundary, or an impact at the same
-        instant may have caused the contact; ``maximum``,
+        ``contact_time`` and ``contact_time_derivative``: what an impact, a jump or another contact
+        causes at its own instant moves with it, what a jump of a drive causes keeps its phase. NaN
+        at the end of a chatter, and where the motion stays on the boundary; ``maximum``,
         ``maximum_time``, ``maximum_derivative``, ``minimum`` likewise, of what is kept;
-        ``end_derivative``; ``status``. Units in ``output_units``, ``to_units``. Of periodic orbits
-        also ``period``, ``period_derivative``, and over the dim ``multiplier``
-        ``multiplier_real``, ``multiplier_imag``, ``multiplier_real_derivative`` and
-        ``multiplier_imag_derivative`` (of a limit cycle without the trivial one). The times of a
-        limit cycle count from its first point, which moves across the flow.
+        ``end_derivative``, at the time of the end as it is; ``status``. Units in ``output_units``,
+        ``to_units``. Of periodic orbits also ``period``, ``period_derivative``,
+        and over the dim ``multiplier`` ``multiplier_real``, ``multiplier_imag``,
+        ``multiplier_real_derivative`` and ``multiplier_imag_derivative`` (of a limit cycle without
+        the trivial one). The times of a limit cycle count from its first point, which moves across
+        the flow.
 
     Raises
     ------

@@ -33,6 +33,9 @@ JUMPS = ("impact",)
 #: Rate of a gap at a contact, in the largest at its contacts, below which the contact's time isn't
 #: that of a zero of the gap: the motion rests there, or goes along the boundary.
 LEAVES = 1e-9
+#: Distance of a gap from its zero just before a contact, in the time of the run at its rate, that
+#: is rounding: beyond it something else has carried the motion over the boundary.
+NEAR = 1e-7
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,46 +63,72 @@ class SensitivityRun(Readings):
         return engine.run(self.flow.flown, self.method.suited_to(1), request, 1)
 
     def contact_times(self, at: Places, table: ContactTable) -> np.ndarray:
-        """Derivatives of the times of contacts, float64[m, C]: the gap of each stays zero. NaN
-        where it is zero beside the contact too, and behind an impact at the same instant, if its
-        own gap tells of another one: the impact may have caused it.
+        """Derivatives of the times of contacts, float64[m, C], from the places just before them.
+
+        The gap of each stays zero. One whose gap isn't zero there, or stays zero, comes with what
+        else happens at its instant: the first jump of the state, or all that tell the same. Where
+        nothing else does and the gap isn't zero, a drive jumps, whose phase stays.
         """
+        moved, jumped = self._gap_times(at, table)
+        known, first = np.isfinite(moved).all(axis=1), np.isin(table.kind_name, JUMPS)
+        began = np.ones(len(moved), bool)
+        began[1:] = (np.diff(at.time) != 0) | (np.diff(at.trajectory) != 0)
+        instant = np.cumsum(began) - 1
+        # the first row of each instant that tells something, jumps before all others
+        order = np.lexsort((np.arange(len(moved)), ~first, ~known, instant))
+        leader = order[np.flatnonzero(began)][instant]
+        same = np.isclose(moved, moved[leader], rtol=ALIKE, atol=0.0).all(axis=1)
+        split = np.bincount(instant, known & ~same, len(moved))[instant] > 0
+        caused = ~known & (first[leader] | ~split)
+        moved[caused] = moved[leader[caused]]
+        driven = jumped & ~known[leader] & ~first[leader]
+        moved[driven] = self._phase_times(at)[driven]
+        return moved
+
+    def _phase_times(self, at: Places) -> np.ndarray:
+        """Derivatives of times whose phase of the forcing stays, float64[m, C]."""
+        moved, where = np.zeros((len(at.time), at.slopes.shape[2])), self.system.forced_at
+        if where in self.flow.names:
+            frequency = self.flow.parameters(self.group, at.trajectory)[where]
+            column = len(self.system.states) + self.flow.names.index(where)
+            moved[:, column] = -at.time / frequency
+        return moved
+
+    def _gap_times(self, at: Places, table: ContactTable) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of the times at which the gaps of contacts are zero, float64[m, C], from
+        places just before; NaN where a gap isn't zero there, or stays zero. And whether it isn't
+        zero, bool[m].
+        """
+        jumped = np.zeros(len(at.time), bool)
         moved = np.full((len(at.time), at.slopes.shape[2]), np.nan)
         rates, system = self.flow.rates(at, self.group), self.turning.system
-        begins = np.isin(table.kind_name, HELD)
+        size, near = len(system.states), NEAR * np.abs(at.time).max(initial=0.0)
         met = np.arange(len(system.guards))  # where a contact begins to be held
         for number, one in enumerate(system.guards):
             if one.law is not None and one.law.kind == "hold":
                 met[number] = one.law.partner
-        guard = np.where(begins, met[table.guard], table.guard)
+        guard = np.where(np.isin(table.kind_name, HELD), met[table.guard], table.guard)
+        leaves = [*map(state, system.states), *map(parameter, self.flow.names), TIME]
         for number in np.unique(guard):
-            here = guard == number
-            gap = system.guards[number].gap
-            leaves = [*map(state, system.states), *map(parameter, self.flow.names), TIME]
+            here, gap = guard == number, system.guards[number].gap
             found = evaluate(
-                [slope_of(gap, leaf) for leaf in leaves],
+                [gap, *(slope_of(gap, leaf) for leaf in leaves)],
                 t=at.time[here],
                 states=dict(zip(system.states, at.states[here].T, strict=True)),
                 values=self.flow.parameters(self.group, at.trajectory[here]),
                 bits=[(at.mode[here] >> i) & 1 == 1 for i in range(len(system.guards))],
             )
-            slopes = np.stack([np.broadcast_to(one, here.sum()) for one in found], axis=1)
-            size = len(system.states)
-            change = np.einsum("mi,mic->mc", slopes[:, :size], at.slopes[here])
-            change[:, size:] += slopes[:, size:-1]
-            rate = np.einsum("mi,mi->m", slopes[:, :size], rates[here]) + slopes[:, -1]
-            leaves_it = np.abs(rate) > LEAVES * np.abs(rate).max()
-            with np.errstate(divide="ignore", invalid="ignore"):
-                moved[here] = np.where(leaves_it[:, None], -change / rate[:, None], np.nan)
-        began = np.ones(len(moved), bool)
-        began[1:] = (np.diff(at.time) != 0) | (np.diff(at.trajectory) != 0)
-        for rows in np.split(np.arange(len(moved)), np.flatnonzero(began)[1:]):
-            (struck,) = np.nonzero(np.isin(table.kind_name[rows], JUMPS))
-            if len(struck):
-                behind, first = rows[struck[0] :], moved[rows[struck[0]]]
-                same = np.isclose(moved[behind], first, rtol=ALIKE, atol=0.0).all(axis=1)
-                moved[behind[~same]] = np.nan
-        return moved
+            here = np.flatnonzero(here)
+            value, *slopes = (np.broadcast_to(one, here.shape) for one in found)
+            by_state, by_name = np.array(slopes[:size]), np.array(slopes[size:-1])
+            change = np.einsum("im,mic->mc", by_state, at.slopes[here])
+            change[:, size:] += by_name.T.reshape(len(here), -1)
+            rate = np.einsum("im,mi->m", by_state, rates[here]) + slopes[-1]
+            met_it = np.abs(rate) > LEAVES * np.abs(rate).max()
+            jumped[here] = np.abs(value) > near * np.abs(rate)
+            met_it &= ~jumped[here]
+            moved[here[met_it]] = -change[met_it] / rate[met_it, None]
+        return moved, jumped
 
 
 def sensitivity_dataset(run: SensitivityRun, outcome: Outcome) -> xr.Dataset:
@@ -117,9 +146,7 @@ def sensitivity_dataset(run: SensitivityRun, outcome: Outcome) -> xr.Dataset:
     value = run.values(at).reshape(n, count, -1)
     slope = run.chosen(run.slopes(at), at.trajectory).reshape(n, count, len(outputs), -1)
     table = outcome.contacts
-    touch = early = run.flow.contacts(outcome, group, length, run.again)
-    if np.isin(table.kind_name, JUMPS).any():  # a stop without rebound rests behind its impact
-        early = run.flow.contacts(outcome, group, length, run.again, (*HELD, *JUMPS))
+    early, touch = run.flow.contacts(outcome, group, length, run.again)
     speed = table.velocity / unit[table.trajectory]
     moved = run.contact_times(early, table)
     mine = np.flatnonzero(table.guard < len(system.guards))
@@ -192,7 +219,7 @@ def _extremes(
     guard = outcome.contacts.guard
     first = _rows(samples, np.searchsorted(samples.trajectory, np.arange(n)))
     turns = np.isin(guard, list(run.turning.of))
-    still = np.where(turns[:, None], 0.0, moved)
+    still = np.where(turns[:, None] & np.isnan(moved), 0.0, moved)
     # what an impact changes has one more value, just before it
     parts = [(touch, still, None), (early, still, ahead), (first, None, None)]
     if run.closed is None:  # an orbit ends where it begins, whose own slope is known

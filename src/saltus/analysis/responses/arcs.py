@@ -36,6 +36,7 @@ from saltus.analysis.inputs.outputs import Outputs
 from saltus.errors import ParameterError
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method, exact_method
+from saltus.flow.progress import stage
 from saltus.results.dataset.kinds import CLOSED, Kind
 from saltus.system.parametric import parametric
 
@@ -188,8 +189,10 @@ def _follow_orbits(
             values[found.place[some]],
         )
         beginnings = scaled(grid.system, name, list(seeds), method)
+        done = number - len(some) - len(left)
+        part = stage(progress, done / number, (done + len(some)) / number)
         try:
-            trace(plan, beginnings, arcs.branches, None if plan.stable else progress)
+            trace(plan, beginnings, arcs.branches, part if plan.stable else progress)
         finally:  # also with the results so far, when interrupted
             _number(found, orbits, grid, plan, np.append(some, left), arcs, known)
         left, known = left[arcs.branch_of[left] < 0], len(arcs.branches)
