@@ -85,15 +85,15 @@ def gap_rate(lanes, lane, g, d):
 
 
 @kernel
-def first_place(lanes, lane, batch, g, h, slow, count):
+def first_place(lanes, lane, g, h, beyond, slow, count):
     """Time into the step at which gap g crosses first, beyond h if it doesn't; and the number of
-    touches on the list.
+    touches on the list. The size of the gap's terms at h counts where it begins in rounding.
     """
     if LAWS and lanes.side[WATCHED + g, lane] < 0.5:
         return 2.0 * h, count
     noise, begins = scaled_gap(lanes, lane, g, h, slow), begins_in_rounding(lanes, lane, g)
     if begins:
-        noise = max(noise, ROUNDING * size_beyond(lanes, lane, batch, g, h, slow))
+        noise = max(noise, ROUNDING * beyond)
     if lanes.fresh[g, lane] == DOUBTFUL:
         begins = slow.q[0] >= -noise  # what leaves to its side meets nothing
         lanes.fresh[g, lane] = 1.0 if begins else 0.0
@@ -183,7 +183,10 @@ def decide(lanes, lane, batch, slow):
         lanes.memo[lane, BROKEN], lanes.found[DELTA, lane] = 1, 0.0
         return
     for g in range(NGUARDS):
-        at, count = first_place(lanes, lane, batch, g, h, slow, count)
+        beyond = 0.0
+        if begins_in_rounding(lanes, lane, g):
+            beyond = size_beyond(lanes, lane, batch, g, h, slow)
+        at, count = first_place(lanes, lane, g, h, beyond, slow, count)
         if at <= h:
             if hits != 0 and abs(at - first) <= COINCIDENT * now:
                 hits |= 1 << g
@@ -196,7 +199,10 @@ def decide(lanes, lane, batch, slow):
     if first < h and lanes.run[LEAST, lane] < least:
         lanes.run[LEAST, lane] = least
         for g in range(NGUARDS if first > 0.0 else 0):
-            first_place(lanes, lane, batch, g, first, slow, 0)
+            beyond = 0.0
+            if begins_in_rounding(lanes, lane, g):
+                beyond = size_beyond(lanes, lane, batch, g, first, slow)
+            first_place(lanes, lane, g, first, beyond, slow, 0)
 
 
 @kernel
