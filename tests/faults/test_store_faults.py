@@ -117,6 +117,7 @@ def committed(path):
     return len(list((path / "chunks").glob("*.chunk")))
 
 
+@pytest.mark.slow
 @posix
 def test_killed_at_every_touch_of_the_disk(processes, memory):
     """A new map of three chunks each time, its writer killed at its n-th touch; the resumed map is

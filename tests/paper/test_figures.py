@@ -160,6 +160,7 @@ def test_the_second_attractor_of_fig_11_is_the_large_one():
     assert float(ds.attractor_fraction[large]) < 0.05
 
 
+@pytest.mark.slow
 def test_fig_8_has_a_third_attractor_after_the_grazing():
     """At 23.2 kN/m, with a handful of starts of the grid as it stands; at 25.5 kN/m there are two.
 

@@ -99,6 +99,7 @@ def test_multipliers_multiply_to_what_the_divergence_says(which, request):
     assert np.prod(multipliers(found), axis=1) == pytest.approx(shrunk, rel=1e-10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("which", ["chaotic", "subcritical"])
 def test_lorenz_cycles_close_under_heyoka_with_the_same_multipliers(which, request):
     """By its own variational equations."""

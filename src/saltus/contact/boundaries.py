@@ -70,8 +70,8 @@ def surface_guard(gap: Expr, name: str) -> Guard:
 
 
 def kinds_of(gap: Expr) -> frozenset[str]:
-    """What the gap of a surface depends on, once terms have cancelled: of ``state``, ``time``,
-    ``param`` and ``select``.
+    """The kinds of leaves that the gap of a surface depends on, once terms have cancelled: of
+    ``state``, ``time``, ``param`` and ``select``.
     """
     canonical = Canonical()
     return canonical.kinds(canonical.polynomial(gap))

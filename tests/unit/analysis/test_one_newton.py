@@ -19,6 +19,8 @@ WHY = {
     "branches/criticality.py": "the Lyapunov coefficient of a Hopf point",
     "branches/codimension_two.py": "the quadratic part at a fold",
     "harmonics/signals.py": "dynamic stiffness",
+    "fits/search.py": "the gain that the next linear step would bring",
+    "fits/windows.py": "a Kalman filter, and least squares with joints between windows",
     "branches/forced_vibration.py": "the answer of a rigid body to a static force",
 }
 

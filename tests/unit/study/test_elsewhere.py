@@ -65,6 +65,7 @@ def test_threads_processes_and_cluster_share_one_loop(run, monkeypatch):
     assert handed == [[3, 4]]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")
 def test_processes_that_die_again_and_again_are_reported(monkeypatch):
     monkeypatch.setattr(processes, "MAX_TRIES", 2)

@@ -23,6 +23,7 @@ from saltus.language.evaluate import evaluate
 from saltus.language.expression import TIME, parameter, state
 from saltus.results import build
 from saltus.results.dataset import schema
+from saltus.system.periodic import timing_of
 
 #: Counters that are kept.
 COUNTED = ("steps", "rejected_steps", "mode_violations", "grazes_unresolved")
@@ -67,7 +68,7 @@ class SensitivityRun(Readings):
 
         The gap of each stays zero. One whose gap isn't zero there, or stays zero, comes with what
         else happens at its instant: the first jump of the state, or all that tell the same. Where
-        nothing else does and the gap isn't zero, a drive jumps, whose phase stays.
+        nothing else does and the gap isn't zero, a drive in it jumps, whose phase stays.
         """
         moved, jumped = self._gap_times(at, table)
         known, first = np.isfinite(moved).all(axis=1), np.isin(table.kind_name, JUMPS)
@@ -81,7 +82,8 @@ class SensitivityRun(Readings):
         split = np.bincount(instant, known & ~same, len(moved))[instant] > 0
         caused = ~known & (first[leader] | ~split)
         moved[caused] = moved[leader[caused]]
-        driven = jumped & ~known[leader] & ~first[leader]
+        steps = np.array([bool(timing_of(one.gap).clocks) for one in self.turning.system.guards])
+        driven = jumped & ~known[leader] & ~first[leader] & steps[table.guard]
         moved[driven] = self._phase_times(at)[driven]
         return moved
 

@@ -330,7 +330,10 @@ def range_of(system: System, name: Any, ends: Any) -> tuple[float, float]:
     if not among(name, system.values):
         raise unknown(f"{system.name} has no parameter", name, system.values)
     if not isinstance(ends, list | tuple | np.ndarray) or len(ends) != 2:
-        raise ParameterError(f"the range of {name} must be (low, high), not {shown(ends)}.")
+        raise ParameterError(
+            f"the range of {name} must be (low, high), not {shown(ends)}: the steps between are "
+            f"saltus's choice."
+        )
     low, high = (single(system, name, end) for end in ends)
     if not low < high:
         first, last = map(str, ends)
