@@ -85,6 +85,11 @@ def timing_of(entry: Expr) -> Timing:
     return Timing(tuple(clocks.values()), tuple(phases.values()), complete)
 
 
+def jumps_by_time(entry: Expr) -> bool:
+    """True if time enters an expression by remainders, tables or comparisons, at which it jumps."""
+    return bool(timing_of(entry).clocks)
+
+
 def rate_of(angle: Expr) -> Expr | None:
     """The rate of ``rate*t + (anything without time)``, if it depends on parameters only; None for
     any other angle.

@@ -23,7 +23,7 @@ from saltus.language.evaluate import evaluate
 from saltus.language.expression import TIME, parameter, state
 from saltus.results import build
 from saltus.results.dataset import schema
-from saltus.system.periodic import timing_of
+from saltus.system import jumps_by_time
 
 #: Counters that are kept.
 COUNTED = ("steps", "rejected_steps", "mode_violations", "grazes_unresolved")
@@ -82,7 +82,7 @@ class SensitivityRun(Readings):
         split = np.bincount(instant, known & ~same, len(moved))[instant] > 0
         caused = ~known & (first[leader] | ~split)
         moved[caused] = moved[leader[caused]]
-        steps = np.array([bool(timing_of(one.gap).clocks) for one in self.turning.system.guards])
+        steps = np.array([jumps_by_time(one.gap) for one in self.turning.system.guards])
         driven = jumped & ~known[leader] & ~first[leader] & steps[table.guard]
         moved[driven] = self._phase_times(at)[driven]
         return moved
