@@ -114,7 +114,8 @@ def amplitude_map(
             sizes.set_ticks(LogLocator(subs=(1, 2, 5)), minor=False)
             sizes.formatter = FormatStrFormatter("%g")
             sizes.minorticks_off()
-        sizes.set_label(up.label(curves.LABELS[quantity].format(of.quantity)))
+        label = up.label(curves.LABELS[quantity].format(of.quantity))
+        sizes.ax.set_title(label, loc="left", size="medium")  # beside it stands the legend
         if bifurcations is not None:
             draw_over(panel, over, map_.sides)
         if legend:

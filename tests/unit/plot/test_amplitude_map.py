@@ -37,7 +37,7 @@ def test_each_cell_has_the_colour_of_its_size_and_the_hatching_of_its_kind():
     ds = sized()
     ax = amplitude_map(ds)
     bar = ax.figure.axes[1]
-    assert bar.get_ylabel() == "peak |x| [mm]"
+    assert bar.get_title(loc="left") == "peak |x| [mm]"
     (mesh,) = (one for one in ax.collections if isinstance(one, QuadMesh))
     painted = mesh.get_array().reshape(30, 40, 3)
     scale = next(one for one in bar.collections if isinstance(one, QuadMesh))
