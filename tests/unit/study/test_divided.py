@@ -20,6 +20,8 @@ from saltus.study.run.running import Resources
 from saltus.study.run.status import status_tables
 from saltus.study.run.study import run_study
 
+pytestmark = pytest.mark.slow
+
 HEAD = """
 [study]
 name = "divided"
