@@ -251,6 +251,7 @@ MODAL = Interface(
         "modal/impacts",
         "modal/friction",
         "modal/tangents",
+        "modal/ends",
         "modal/steps",
     ),
     sizes=(),

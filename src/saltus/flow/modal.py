@@ -109,17 +109,26 @@ class ModalFlow:
 
     def _keep_sides(self, batch: Batch, who: np.ndarray, which: int) -> None:
         """Move ends that rounding put on the other side of a boundary, by rounding, to their side:
-        a run that begins there meets what this one hasn't met, and not again what it has.
+        a run that begins there meets what this one hasn't met, and not again what it has. Contacts
+        at rest are put onto their constraints.
         """
         tables, state = self.tables, batch.state[who, : self._states]
         given = tables.sets[which]
         drives = self._drives(given, _times(batch, who))
-        gap, noise = self._values(given.gaps, given, state, drives)
         mode, fresh, carry = batch.mode[who, None], batch.fresh[who, None], batch.carry[who]
-        guards = np.arange(gap.shape[1])
-        stays = carry[:, [layout.RIDES]].astype(int) | carry[:, [layout.TWICE]].astype(int)
-        held = (mode >> np.maximum(tables.partners, 0)) & (tables.partners >= 0)
-        free = (tables.plain | (tables.allowed != 0)) & (((stays >> guards) | held) & 1 == 0)
+        guards = np.arange(len(tables.partners))
+        rest = carry[:, [layout.TWICE]].astype(int)
+        stays = (carry[:, [layout.RIDES]].astype(int) | rest) >> guards & 1 == 1
+        held = (mode >> np.maximum(tables.partners, 0)) & (tables.partners >= 0) & ~tables.holds == 1
+        rests = held | (stays & (tables.allowed != 0) & ((rest >> guards) & 1 == 1))
+        if rests.any():
+            bits = rests[:, tables.partners >= 0] @ (1 << tables.partners[tables.partners >= 0])
+            for holds in np.unique(bits[bits != 0]).tolist():
+                rows = bits == holds
+                state[rows] = tables.rests(which, holds).put(state[rows], drives[rows])
+            batch.state[who, : self._states] = state
+        gap, noise = self._values(given.gaps, given, state, drives)
+        free = (tables.plain | (tables.allowed != 0)) & ~(stays | held)
         side, met = np.where((mode >> guards) & 1, 1.0, -1.0), (fresh >> guards) & (gap == 0.0) != 0
         near = free & ~met & (np.abs(gap) <= noise) & (side * gap < noise / 4)
         for i, g in np.argwhere(near).tolist():

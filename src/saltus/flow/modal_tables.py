@@ -110,6 +110,7 @@ class Tables:
         self._smooth: dict[tuple[object, ...], bool] = {}
         self._known: dict[tuple[int, bytes], int] = {}
         self._states: dict[tuple[int, int], int] = {}
+        self._rests: dict[tuple[int, int], Constrained] = {}
         #: Equations and modes of each contact state.
         self.made: list[tuple[_Equations, StateModes]] = []
         self._by: dict[tuple[str, ...], ParameterTables] = {}
@@ -268,6 +269,14 @@ class Tables:
             self._presses.add(np.where((partner >= 0)[:, None], rows[partner], 0.0))
         self.made.append((known, modes))
         self._states[which, mode] = number
+
+    def rests(self, which: int, holds: int) -> Constrained:
+        """The states that the contacts with some hold guards (bits) allow while they are held."""
+        if (which, holds) not in self._rests:
+            given = self.sets[which]
+            free = constrained(self.linear.system, holds, given.gaps, given.impacts)
+            self._rests[which, holds] = free
+        return self._rests[which, holds]
 
     # -- one contact state -------------------------------------------------------------------------
     def shown(self, given: ValueSet, mode: int) -> LinearPiece:

@@ -21,7 +21,7 @@ from saltus.kernels.isolation import (
     to_bernstein,
 )
 from saltus.kernels.lanes import bits, fma, larger, load, lowest_bit, root, smaller, splat, store
-from saltus.kernels.status import GAP_MARGIN, HOLD_LAW, MODE_VIOLATION
+from saltus.kernels.status import GAP_MARGIN, HOLD_LAW, IMPACT_LAW, MODE_VIOLATION
 
 
 # -- where the amplitudes stand --------------------------------------------------------------------
@@ -399,6 +399,8 @@ def way_of(i, g, degree, known, noise, batch, m):
     or a crossing tells it, however small; the first term of what begins at rest may be rounding.
     """
     rests = known > 1 or m.laws[g, KIND] == HOLD_LAW
+    if known == 2 and m.laws[g, KIND] == IMPACT_LAW and begins_pressed(i, g, batch, m):
+        return -1
     if rests or (int(batch.carry[i, RIDES]) >> g) & 1 == 1:
         return side_of_leaving(m.p, degree, known, noise)
     return 0 if is_rounding(m.p, degree, noise) else leading_sign(m.p, degree)
