@@ -114,7 +114,8 @@ class ModalFlow:
         """
         tables, state = self.tables, batch.state[who, : self._states]
         given = tables.sets[which]
-        drives = self._drives(given, _times(batch, who))
+        time = _times(batch, who)
+        drives = self._drives(given, time)
         mode, fresh, carry = batch.mode[who, None], batch.fresh[who, None], batch.carry[who]
         guards = np.arange(len(tables.partners))
         rest = carry[:, [layout.TWICE]].astype(int)
@@ -122,10 +123,8 @@ class ModalFlow:
         held = (mode >> np.maximum(tables.partners, 0)) & (tables.partners >= 0) & ~tables.holds == 1
         rests = held | (stays & (tables.allowed != 0) & ((rest >> guards) & 1 == 1))
         if rests.any():
-            bits = rests[:, tables.partners >= 0] @ (1 << tables.partners[tables.partners >= 0])
-            for holds in np.unique(bits[bits != 0]).tolist():
-                rows = bits == holds
-                state[rows] = tables.rests(which, holds).put(state[rows], drives[rows])
+            for i in np.flatnonzero(rests.any(axis=1)).tolist():
+                state[i] = self._rested(which, int(mode[i, 0]), rests[i], held[i], state[i], time[i])
             batch.state[who, : self._states] = state
         gap, noise = self._values(given.gaps, given, state, drives)
         free = (tables.plain | (tables.allowed != 0)) & ~(stays | held)
@@ -135,6 +134,31 @@ class ModalFlow:
             row = given.gaps.matrix[g]
             j = int(np.argmax(np.abs(row)))
             batch.state[who[i], j] += (side[i, g] * noise[i, g] / 4 - gap[i, g]) / row[j]
+
+    def _rested(
+        self, which: int, mode: int, rests: np.ndarray, held: np.ndarray, state: np.ndarray,
+        time: float,
+    ) -> np.ndarray:
+        """A state with contacts at rest on their constraints. What presses a stop that is held is
+        more than rounding, of one that isn't it is nothing, as a start reads it.
+        """  # fmt: skip
+        given, partners = self.tables.sets[which], self.tables.partners
+        free, presses = self.tables.rests(which, mode, sum(1 << int(h) for h in partners[rests]))
+        drives = self._drives(given, np.array([time]))
+        rates = self._drives_at(which, time)[1][1]
+        late = layout.CLOCK * abs(time) * np.abs(presses.driven) @ rates
+        state = free.put(state, drives[0])
+        for g in np.flatnonzero(rests & (self.tables.allowed != 0)).tolist():
+            h, ways = int(partners[g]), presses.matrix[partners[g]] @ free.spread
+            value, noise = (of[0, h] for of in self._values(presses, given, state[None], drives))
+            noise += late[h]
+            wanted = max(value, 2 * noise) if held[g] else min(value, 0.0)
+            if abs(value) <= 2 * noise and ways.any():
+                j = int(np.argmax(np.abs(ways * state[free.kept])))
+                if ways[j] != 0.0:
+                    state[free.kept[j]] += (wanted - value) / ways[j]
+                    state = free.put(state, drives[0])
+        return state
 
     def _look_up(self, batch: Batch) -> None:
         """Find the contact states that trajectories have come to: as many as the tables have room

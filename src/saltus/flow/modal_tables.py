@@ -110,7 +110,7 @@ class Tables:
         self._smooth: dict[tuple[object, ...], bool] = {}
         self._known: dict[tuple[int, bytes], int] = {}
         self._states: dict[tuple[int, int], int] = {}
-        self._rests: dict[tuple[int, int], Constrained] = {}
+        self._rests: dict[tuple[int, int, int], tuple[Constrained, LinearPiece]] = {}
         #: Equations and modes of each contact state.
         self.made: list[tuple[_Equations, StateModes]] = []
         self._by: dict[tuple[str, ...], ParameterTables] = {}
@@ -270,13 +270,15 @@ class Tables:
         self.made.append((known, modes))
         self._states[which, mode] = number
 
-    def rests(self, which: int, holds: int) -> Constrained:
-        """The states that the contacts with some hold guards (bits) allow while they are held."""
-        if (which, holds) not in self._rests:
-            given = self.sets[which]
+    def rests(self, which: int, mode: int, holds: int) -> tuple[Constrained, LinearPiece]:
+        """The states that the contacts with some hold guards (bits) allow while they are held, and
+        the gaps of a contact state.
+        """
+        key, given = (which, mode, holds), self.sets[which]
+        if key not in self._rests:
             free = constrained(self.linear.system, holds, given.gaps, given.impacts)
-            self._rests[which, holds] = free
-        return self._rests[which, holds]
+            self._rests[key] = free, self.shown(given, mode)
+        return self._rests[key]
 
     # -- one contact state -------------------------------------------------------------------------
     def shown(self, given: ValueSet, mode: int) -> LinearPiece:

@@ -9,13 +9,20 @@ from saltus.kernels.status import HOLD_LAW, IMPACT_LAW
 
 
 @kernel
-def is_pressed(i, g, batch, m):
-    """True if the state at a start or an end presses a contact, by more than rounding. Needs
-    `angle`.
+def is_pressed(i, g, tau, batch, m):
+    """True if the state at a start or an end presses a contact, by more than rounding, of the time
+    too. Needs `angle`.
     """
     for j in range(m.sizes[STATES]):
         m.state[j // LANES, j % LANES] = batch.state[i, j]
-    return pressing_of(i, g, batch, m) > 0.0
+    row, which = int(batch.carry[i, AT]) * m.sizes[GUARDS] + g, int(batch.carry[i, SET])
+    speed, first = 0.0, m.sizes[STATES] + 1
+    for d in range(m.sizes[DRIVES]):
+        speed += abs(m.presses[row, first + d] * m.rate[which, d])
+    for p in range(m.sizes[COURSES]):
+        speed += abs(m.presses[row, first + m.sizes[DRIVES] + p] * m.record[p, VALUE + 1])
+    noise = ROUNDED * size_of(m.presses, row, 0, m) + CLOCK * abs(time_of(i, tau, batch)) * speed
+    return value_of(m.presses, row, 0, m) > noise
 
 
 @kernel
@@ -23,10 +30,10 @@ def begins_pressed(i, g, batch, m):
     """True if a stop that rests at the start of a run is pressed there. From exact rest what
     presses it may be the rounding of terms that cancel.
     """
-    moves = False
-    for j in range(m.sizes[STATES] if batch.carry[i, STARTS] > 0.5 else 0):
+    moves, asked = False, batch.carry[i, STARTS] > 0.5 and m.laws[g, KIND] == IMPACT_LAW
+    for j in range(m.sizes[STATES] if asked else 0):
         moves = moves or batch.state[i, j] != 0.0
-    return moves and is_pressed(i, g, batch, m)
+    return moves and is_pressed(i, g, batch.phase[i], batch, m)
 
 
 @kernel
@@ -52,7 +59,7 @@ def ending_holds(i, tau, modes, steady, batch, m):
         value, _ = here(i, g, batch, m)
         noise = ROUNDED * (m.stood[row, SIZE] + abs(m.offset[which, g]))
         if (holds >> g) & 1 and h > 0.0:
-            if value <= noise if rubs else not is_pressed(i, m.laws[g, PARTNER], batch, m):
+            if value <= noise if rubs else not is_pressed(i, m.laws[g, PARTNER], tau, batch, m):
                 series_of(row, modes, steady, which, h, m.sizes[MODE_GROUPS], m)
                 noise = terms_of(i, g, side_of(g, batch.mode[i]), batch, m)
                 if side_of_leaving(m.p, ORDER, 0, noise) < 0:

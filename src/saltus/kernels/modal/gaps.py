@@ -445,7 +445,10 @@ def decide(i, g, batch, m):
             return CLEAR
         # what presses a contact at rest jumps where the state does
         least = 0 if m.laws[g, KIND] == HOLD_LAW and m.laws[g, SECOND] >= 0 else -1
-        if m.p[0] < -noise or side_of_leaving(m.p, degree, 0, noise) <= least:
+        ends = m.p[0] < -noise or side_of_leaving(m.p, degree, 0, noise) <= least
+        if ends and least < 0 and begins_pressed(i, m.laws[g, PARTNER], batch, m):
+            m.p[0] = max(m.p[0], 0.25 * noise)
+        elif ends:
             m.found[g, PLACE], m.found[g, FINAL] = 0.0, 1.0
             return CROSSES
     bernstein_of(degree, m)
