@@ -466,6 +466,19 @@ def decide(i, g, batch, m):
 
 
 @inner
+def begun(i, hits, batch, m):
+    """Of the guards that a step from the start crosses (bits) those that its state is on: how they
+    begin is settled before others are met.
+    """
+    early = 0
+    for g in range(m.sizes[GUARDS] if hits != 0 and batch.carry[i, STARTS] > 0.5 else 0):
+        stood = known_zeros(i, g, batch) > 0 or m.laws[g, KIND] == HOLD_LAW
+        if (hits >> g) & 1 and stood and m.found[g, PLACE] == 0.0:
+            early |= 1 << g
+    return early
+
+
+@inner
 def look(i, tau, h, modes, steady, batch, m):
     """Decide all gaps over a step: (OPEN, 0, 0) if a shorter one must tell, (CLEAR, d, 0) if no gap
     crosses in a time d, or CROSSES with the time after tau and the guards (bits).
@@ -508,6 +521,9 @@ def look(i, tau, h, modes, steady, batch, m):
                 hits, first = 1 << g, d
     if first > until * h:
         return CLEAR, until * h, 0
+    early = begun(i, hits, batch, m)
+    if early != 0:
+        first, hits = 0.0, early
     return (CROSSES if hits != 0 else CLEAR), first, hits
 
 
