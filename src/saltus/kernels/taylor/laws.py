@@ -198,7 +198,9 @@ def strike(lanes, lane, batch, g, rate, slow):
 
 @kernel
 def mode_behind(lanes, lane, batch, struck, slow):
-    """The mode after a jump, which may have carried the state over other boundaries."""
+    """The mode after a jump, which may have carried the state over other boundaries, or off those
+    that it was on.
+    """
     mode, others = mode_of(lanes, lane), False
     for g in range(NGUARDS):
         others = others or (g != struck and (LAW[g] == NO_LAW or LAW[g] == SURFACE_LAW))
@@ -210,6 +212,8 @@ def mode_behind(lanes, lane, batch, struck, slow):
         watched = lanes.side[WATCHED + g, lane] > 0.5
         if g != struck and plain and watched and slow.gaps[g] * lanes.side[g, lane] < 0.0:
             mode ^= 1 << g
+        elif g != struck and LAW[g] == NO_LAW and not stands_at(lanes, lane, g, slow):
+            lanes.fresh[g, lane] = 0.0
     return mode
 
 
