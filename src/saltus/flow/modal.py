@@ -26,6 +26,7 @@ from saltus.kernels.isolation import DEEPEST, MOST_TOUCHES
 from saltus.kernels.modal import layout
 from saltus.system import System
 from saltus.system.linear import LinearPiece
+from saltus.system.linear_laws import Constrained
 from saltus.system.linearity import linear_pieces
 from saltus.system.quantity import remembered
 from saltus.system.tangent import tangent_states
@@ -118,47 +119,59 @@ class ModalFlow:
         drives = self._drives(given, time)
         mode, fresh, carry = batch.mode[who, None], batch.fresh[who, None], batch.carry[who]
         guards = np.arange(len(tables.partners))
-        rest = carry[:, [layout.TWICE]].astype(int)
-        stays = (carry[:, [layout.RIDES]].astype(int) | rest) >> guards & 1 == 1
-        held = (mode >> np.maximum(tables.partners, 0)) & (tables.partners >= 0) & ~tables.holds == 1
-        rests = held | (stays & (tables.allowed != 0) & ((rest >> guards) & 1 == 1))
-        if rests.any():
-            for i in np.flatnonzero(rests.any(axis=1)).tolist():
-                state[i] = self._rested(which, int(mode[i, 0]), rests[i], held[i], state[i], time[i])
-            batch.state[who, : self._states] = state
+        twice = carry[:, [layout.TWICE]].astype(int) >> guards & 1 == 1
+        stays = (carry[:, [layout.RIDES]].astype(int) >> guards & 1 == 1) | twice
+        held = (mode >> np.maximum(tables.partners, 0)) & 1 == 1
+        held &= (tables.partners >= 0) & ~tables.holds
+        rests = held | (twice & (tables.allowed != 0))
+        holds = rests[:, tables.partners >= 0] @ (1 << tables.partners[tables.partners >= 0])
+        for some, bits in {(int(a), int(b)) for a, b in zip(mode[:, 0], holds, strict=True) if b}:
+            rows = np.flatnonzero((mode[:, 0] == some) & (holds == bits))
+            with tables.lock:
+                free, shown = tables.rests(which, some, bits)
+            for g in [-1, *np.flatnonzero(rests[rows[0]] & (tables.allowed != 0)).tolist()]:
+                self._rest(given, free, shown, g, held[rows, g], state, rows, time[rows])
+        batch.state[who, : self._states] = state
         gap, noise = self._values(given.gaps, given, state, drives)
         free = (tables.plain | (tables.allowed != 0)) & ~(stays | held)
         side, met = np.where((mode >> guards) & 1, 1.0, -1.0), (fresh >> guards) & (gap == 0.0) != 0
-        near = free & ~met & (np.abs(gap) <= noise) & (side * gap < noise / 4)
+        least = np.where(tables.rubs, 2 * noise, noise / 4)  # what slides isn't taken to stick
+        near = ((free & ~met) | (tables.rubs & ~held)) & (np.abs(gap) <= 2 * noise)
+        near &= (side * gap < least) & (tables.rubs | (np.abs(gap) <= noise))
         for i, g in np.argwhere(near).tolist():
             row = given.gaps.matrix[g]
             j = int(np.argmax(np.abs(row)))
-            batch.state[who[i], j] += (side[i, g] * noise[i, g] / 4 - gap[i, g]) / row[j]
+            batch.state[who[i], j] += (side[i, g] * least[i, g] - gap[i, g]) / row[j]
 
-    def _rested(
-        self, which: int, mode: int, rests: np.ndarray, held: np.ndarray, state: np.ndarray,
-        time: float,
-    ) -> np.ndarray:
-        """A state with contacts at rest on their constraints. What presses a stop that is held is
-        more than rounding, of one that isn't it is nothing, as a start reads it.
+    def _rest(
+        self,
+        given: ValueSet,
+        free: Constrained,
+        shown: LinearPiece,
+        g: int,
+        held: np.ndarray,
+        states: np.ndarray,
+        rows: np.ndarray,
+        time: np.ndarray,
+    ) -> None:
+        """Put the states in some rows onto the constraints of contacts at rest. What presses a stop
+        g that is held becomes more than rounding, what presses one that isn't nothing: that is how
+        a start reads them.
         """  # fmt: skip
-        given, partners = self.tables.sets[which], self.tables.partners
-        free, presses = self.tables.rests(which, mode, sum(1 << int(h) for h in partners[rests]))
-        drives = self._drives(given, np.array([time]))
-        rates = self._drives_at(which, time)[1][1]
-        late = layout.CLOCK * abs(time) * np.abs(presses.driven) @ rates
-        state = free.put(state, drives[0])
-        for g in np.flatnonzero(rests & (self.tables.allowed != 0)).tolist():
-            h, ways = int(partners[g]), presses.matrix[partners[g]] @ free.spread
-            value, noise = (of[0, h] for of in self._values(presses, given, state[None], drives))
-            noise += late[h]
-            wanted = max(value, 2 * noise) if held[g] else min(value, 0.0)
-            if abs(value) <= 2 * noise and ways.any():
-                j = int(np.argmax(np.abs(ways * state[free.kept])))
-                if ways[j] != 0.0:
-                    state[free.kept[j]] += (wanted - value) / ways[j]
-                    state = free.put(state, drives[0])
-        return state
+        drives = self._drives(given, time)
+        states[rows] = free.put(states[rows], drives)
+        h = self.tables.partners[g] if g >= 0 else 0
+        ways = shown.matrix[h] @ free.spread
+        if g < 0 or not ways.any():
+            return
+        value, noise = (of[:, h] for of in self._values(shown, given, states[rows], drives))
+        speeds = self._speeds(given, time) @ np.abs(shown.driven[h])
+        noise = noise + layout.CLOCK * np.abs(time) * speeds
+        wanted = np.where(held, np.maximum(value, 2 * noise), np.minimum(value, 0.0))
+        for i in np.flatnonzero((np.abs(value) <= 2 * noise) & (wanted != value)).tolist():
+            j = int(np.argmax(np.abs(ways * states[rows[i], free.kept])))
+            states[rows[i], free.kept[j]] += (wanted[i] - value[i]) / ways[j] if ways[j] else 0.0
+        states[rows] = free.put(states[rows], drives)
 
     def _look_up(self, batch: Batch) -> None:
         """Find the contact states that trajectories have come to: as many as the tables have room
@@ -282,6 +295,12 @@ class ModalFlow:
         """The drives at some times, float64[times, drives]."""
         waves = np.cos(given.rates * time[:, None] + given.lags)
         return np.column_stack([waves, *(course.at(time)[0] for course in given.courses)])
+
+    @staticmethod
+    def _speeds(given: ValueSet, time: np.ndarray) -> np.ndarray:
+        """What the rates of the drives are at most, float64[times, drives]."""
+        waves = np.broadcast_to(np.abs(given.rates), (len(time), len(given.rates)))
+        return np.column_stack([waves, *(np.abs(course.at(time)[1]) for course in given.courses)])
 
     @staticmethod
     def _values(

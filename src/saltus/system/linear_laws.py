@@ -75,11 +75,12 @@ class Constrained:
         loads = rows_of(gaps)[:, len(self.spread) :] + gaps.matrix @ self.base
         return LinearPiece(gaps.matrix @ self.spread, loads[:, 0], loads[:, 1:])
 
-    def put(self, state: np.ndarray, drives: np.ndarray) -> np.ndarray:
-        """The state float64[N] that these contacts hold, for the free ones of a state and the
-        drives float64[D] there.
+    def put(self, states: np.ndarray, drives: np.ndarray) -> np.ndarray:
+        """States float64[m, N] that these contacts hold, for the free ones of some states and the
+        drives float64[m, D] there.
         """
-        found: np.ndarray = self.spread @ state[self.kept] + self.base @ np.append(1.0, drives)
+        loads = np.column_stack([np.ones(len(states)), drives])
+        found: np.ndarray = states[:, self.kept] @ self.spread.T + loads @ self.base.T
         return found
 
     def levelled(self, gaps: LinearPiece) -> LinearPiece:
