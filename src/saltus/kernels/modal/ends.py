@@ -58,12 +58,13 @@ def ending_holds(i, tau, modes, steady, batch, m):
         rubs, row = m.laws[g, SECOND] >= 0, m.row_of[g]
         value, _ = here(i, g, batch, m)
         noise = ROUNDED * (m.stood[row, SIZE] + abs(m.offset[which, g]))
-        if (holds >> g) & 1 and h > 0.0:
-            if value <= noise if rubs else not is_pressed(i, m.laws[g, PARTNER], tau, batch, m):
-                series_of(row, modes, steady, which, h, m.sizes[MODE_GROUPS], m)
-                noise = terms_of(i, g, side_of(g, batch.mode[i]), batch, m)
-                if side_of_leaving(m.p, ORDER, 0, noise) < 0:
-                    ending |= 1 << g
+        asked = (holds >> g) & 1 == 1 and h > 0.0
+        if asked and not rubs:
+            asked = not is_pressed(i, m.laws[g, PARTNER], tau, batch, m)
+        if asked and (value <= noise or not rubs):
+            series_of(row, modes, steady, which, h, m.sizes[MODE_GROUPS], m)
+            noise = terms_of(i, g, side_of(g, batch.mode[i]), batch, m)
+            ending |= 1 << g if side_of_leaving(m.p, ORDER, 0, noise) < 0 else 0
     return ending
 
 
