@@ -665,9 +665,9 @@ def release(lanes, lane, batch, h, slow):
 
 # -- stops at rest at the start and at the end of a run --------------------------------------------
 @kernel
-def is_pressed(lanes, lane, batch, g, slow):
-    """True if what presses a stop at rest is more than rounding, of the time too: its series says
-    so then. Needs slow.gaps.
+def presses(lanes, lane, batch, g, slow):
+    """1 if a stop at rest is pressed, -1 if it is pulled, by more than rounding, of the time too:
+    its series says so then; else 0. Needs slow.gaps.
     """
     h = PARTNER[g]
     value, noise = slow.gaps[h], 4.0 * ROUNDING * slow.gaps[SIZES * NGUARDS + h]
@@ -675,26 +675,26 @@ def is_pressed(lanes, lane, batch, g, slow):
         slow.gaps[j] = lanes.side[j, lane]
     now = lanes.clock[TAU, lane] + abs(lanes.clock[BASE, lane])
     look_at_gaps(lanes, lane, batch, 2.0 * SHORTEST_FLIGHT * now, slow)
-    return min(value, slow.gaps[h]) > noise
+    if min(value, slow.gaps[h]) > noise:
+        return 1
+    return -1 if max(value, slow.gaps[h]) < -noise else 0
 
 
 @kernel
 def rest_at_once(lanes, lane, batch, moves, slow):
     """Hold the stops that rest at the start of a run, each beside those that are held already; of
-    those that nothing presses two zeros are known. From exact rest what presses them may be the
-    rounding of terms that cancel: the first step tells.
+    the others their gaps and rates are known to be zero, and accelerations that are rounding. From
+    exact rest what presses them may be the rounding of terms that cancel: the first step tells.
     """
     for look in range(NGUARDS * NGUARDS if moves else 0):
         g = look % NGUARDS
-        if (
-            LAW[g] == IMPACT_LAW
-            and lanes.fresh[g, lane] > 0.5
-            and lanes.side[PARTNER[g], lane] < 0.0
-        ):
+        free = LAW[g] == IMPACT_LAW and lanes.side[PARTNER[g], lane] < 0.0
+        if free and lanes.fresh[g, lane] > 0.5:
             gaps_here(lanes, lane, batch, slow)
             if abs(slow.gaps[3 * NGUARDS + g]) <= ROUNDING * slow.gaps[5 * NGUARDS + g]:
-                lanes.fresh[g, lane] = 2.0
-                if is_pressed(lanes, lane, batch, g, slow):
+                pressing = presses(lanes, lane, batch, g, slow)
+                lanes.fresh[g, lane] = 3.0 if pressing == 0 else 2.0
+                if pressing > 0:
                     snap(lanes, lane, g)
                     hold(lanes, lane, batch, g, 0.0, 0.0, slow)
 
@@ -704,20 +704,18 @@ def end_rests(lanes, lane, batch, slow):
     """Release the stops at rest that a run which began here would find free: what presses them is
     rounding, and falls. Put the others onto their constraints.
     """
+    d = lanes.found[DELTA, lane]
     for g in range(NGUARDS):
-        if LAW[g] == IMPACT_LAW and lanes.side[PARTNER[g], lane] > 0.0:
+        h = PARTNER[g]
+        if LAW[g] == IMPACT_LAW and lanes.side[h, lane] > 0.0:
             gaps_here(lanes, lane, batch, slow)
-            falls = gap_rate(lanes, lane, PARTNER[g], lanes.found[DELTA, lane]) < 0.0
-            if falls and not is_pressed(lanes, lane, batch, g, slow):
-                release(lanes, lane, batch, PARTNER[g], slow)
-            else:
-                for i in range(NSTATES):
-                    slow.state[i] = lanes.y[i, lane]
-                show_clocks(lanes, lane, slow)
-                now, p = (
-                    time_of_law(lanes, lane, batch),
-                    batch.param[lanes.memo[lane, WHO] * batch.stride],
-                )
-                settle(now, slow.state, p, slow.held, mode_of(lanes, lane) & ~(1 << PARTNER[g]), g)
-                for i in range(NMOVED):
-                    lanes.y[i, lane] = slow.state[i]
+            pressed = presses(lanes, lane, batch, g, slow) > 0
+            if not pressed and gap_rate(lanes, lane, h, d) < 0.0:
+                release(lanes, lane, batch, h, slow)
+                continue
+            begin_impacts(lanes, lane, slow)
+            now, who = time_of_law(lanes, lane, batch), lanes.memo[lane, WHO]
+            mode, p = mode_of(lanes, lane) & ~(1 << h), batch.param[who * batch.stride]
+            settle(now, slow.state, p, slow.held, mode, g)
+            for i in range(NMOVED):
+                lanes.y[i, lane] = slow.state[i]
