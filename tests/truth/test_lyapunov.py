@@ -427,7 +427,7 @@ def test_lorenz_at_rho_20_has_two_equilibria_and_nothing_else():
     # mirror images, and so are the places that they lead to
     starts = np.array([(1.0, 1.0, 20.0), (-1.0, -1.0, 20.0)])
     ds = sl.attractors(
-        butterfly.with_values(rho=20.0), starts, method=sl.Taylor(order=12, lanes=2), every=0.75
+        butterfly.with_values(rho=20.0), starts, method=sl.Taylor(lanes=2), every=0.75
     )
     assert ds["attractor_type"].values.tolist() == ["equilibrium"] * 2
     across = math.sqrt(8 / 3 * 19)
