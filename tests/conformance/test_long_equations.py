@@ -239,8 +239,14 @@ def depth_of(i, x, _v, z):
         pytest.param(of_a_sum(jump, sl.sin), marks=pytest.mark.slow),
         of_a_sum(lambda *a: depth_of(*a) ** 1.5),
         pytest.param(of_a_sum(depth_of, lambda total: total**1.5), marks=pytest.mark.slow),
-        of_a_sum(depth_of, lambda total: sl.sqrt(1 + total**2)),
-        of_a_product(lambda i, *y: sl.piecewise((1.1 + i, side(i, *y)), otherwise=0.1 * i)),
+        pytest.param(
+            of_a_sum(depth_of, lambda total: sl.sqrt(1 + total**2)),
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            of_a_product(lambda i, *y: sl.piecewise((1.1 + i, side(i, *y)), otherwise=0.1 * i)),
+            marks=pytest.mark.slow,
+        ),
         of_a_product(lambda i, *y: 1 / sl.piecewise((1.1 + i, side(i, *y)), otherwise=1 + i)),
         one_in_another,
     ],
