@@ -148,11 +148,7 @@ TWICE = (
 
 @pytest.mark.parametrize(
     ("piece", "boundaries"),
-    [
-        (TWICE, 19),
-        (random_piece(44, 4, 1), 44),
-        pytest.param(random_piece(44, 4, 2), 44, marks=pytest.mark.slow),
-    ],
+    [(TWICE, 19), *((random_piece(44, 4, seed), 44) for seed in (1, 2))],
     ids=["twice", "four deep", "four deep again"],
 )
 def test_nested_conditions_move_as_in_plain_python(piece, boundaries):
@@ -235,18 +231,12 @@ def depth_of(i, x, _v, z):
     "family",
     [
         of_a_sum(jump),
-        pytest.param(of_a_sum(joined), marks=pytest.mark.slow),
-        pytest.param(of_a_sum(jump, sl.sin), marks=pytest.mark.slow),
+        of_a_sum(joined),
+        of_a_sum(jump, sl.sin),
         of_a_sum(lambda *a: depth_of(*a) ** 1.5),
-        pytest.param(of_a_sum(depth_of, lambda total: total**1.5), marks=pytest.mark.slow),
-        pytest.param(
-            of_a_sum(depth_of, lambda total: sl.sqrt(1 + total**2)),
-            marks=pytest.mark.slow,
-        ),
-        pytest.param(
-            of_a_product(lambda i, *y: sl.piecewise((1.1 + i, side(i, *y)), otherwise=0.1 * i)),
-            marks=pytest.mark.slow,
-        ),
+        of_a_sum(depth_of, lambda total: total**1.5),
+        of_a_sum(depth_of, lambda total: sl.sqrt(1 + total**2)),
+        of_a_product(lambda i, *y: sl.piecewise((1.1 + i, side(i, *y)), otherwise=0.1 * i)),
         of_a_product(lambda i, *y: 1 / sl.piecewise((1.1 + i, side(i, *y)), otherwise=1 + i)),
         one_in_another,
     ],
