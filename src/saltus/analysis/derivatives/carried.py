@@ -137,7 +137,7 @@ class CarriedDerivatives:
             end_phase=base.end_phase / unit,
             origin=base.origin / float(unit[0]),
             times=None if base.times is None else base.times / float(unit[0]),
-            t_end=base.t_end / float(unit[0]),
+            t_end=base.t_end / float(unit[0]) if np.ptp(unit) == 0 else np.inf,
         )
 
     # -- what it holds -----------------------------------------------------------------------------
