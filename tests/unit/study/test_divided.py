@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from saltus.analysis.attractors import divided_grid
+from saltus.analysis.motion import divided
 from saltus.errors import SaltusWarning, StudyError
 from saltus.results import load
 from saltus.results.store.arrays import packed, unpacked
@@ -54,6 +55,18 @@ outputs.stop = { formula = "contact_stiffness*max(x - upper_gap, 0)", unit = "N"
 uncertain.upper_gap = { normal = ["0.4 mm", "0.3 mm"] }
 uncertain.frequency = { uniform = ["15 Hz", "18 Hz"] }
 """
+#: Motions and derivatives: the last two frequencies are equal.
+ROWS = """
+[simulate]
+t_end = "0.2 s"
+start = { x = "1 mm", v = "0 m/s" }
+values.frequency = ["15 Hz", "17 Hz", "20 Hz", "20 Hz"]
+[sensitivity]
+t_end = "0.2 s"
+to = ["frequency", "upper_gap"]
+start = { x = "1 mm", v = "0 m/s" }
+values.frequency = ["15 Hz", "17 Hz", "20 Hz", "20 Hz"]
+"""
 SWEEP = """
 [frequency_response]
 frequency = { first = "15 Hz", last = "17 Hz", count = 3 }
@@ -66,6 +79,7 @@ def small():
     """Two trajectories in a chunk, or those of one value."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(divided_grid, "TRAJECTORIES", 2)
+        patch.setattr(divided, "TOGETHER", 2)
         yield
 
 
@@ -152,6 +166,14 @@ def test_sets_of_values(tmp_path):
         with pytest.warns(SaltusWarning, match="refused") if not k else nullcontext():
             jobs = Run(tmp_path / "jobs", HEAD + SCATTER, shard=(k, 2))
     assert jobs.computed == (sets + 1) // 2
+    assert contents(jobs.folder)[1] == contents(plain.folder)[1]
+
+
+def test_motions_and_derivatives(tmp_path):
+    plain = Run(tmp_path / "plain", HEAD + ROWS)
+    for k in (1, 0):
+        jobs = Run(tmp_path / "jobs", HEAD + ROWS, shard=(k, 2))
+    assert jobs.computed == 2
     assert contents(jobs.folder)[1] == contents(plain.folder)[1]
 
 
