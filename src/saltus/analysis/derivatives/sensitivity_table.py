@@ -28,7 +28,7 @@ from saltus.system import jumps_by_time
 
 Show = Callable[[float], None]
 
-#: What a trajectory or a contact has, in the order of the result.
+#: Variables of trajectories and contacts, in the order of the result.
 _ROWS = [name for name in schema.KINDS[schema.SENSITIVITY].variables if name != "time"]
 #: Counters that are kept.
 COUNTED = ("steps", "rejected_steps", "mode_violations", "grazes_unresolved")
@@ -156,7 +156,7 @@ class SensitivityRun(Readings):
 
 
 def sensitivity_rows(run: SensitivityRun, outcome: Outcome) -> dict[str, np.ndarray]:
-    """What is computed of each trajectory and each contact: arrays with these first."""
+    """The numbers of each trajectory and each contact: arrays with these first."""
     system, group, length, turning = run.system, run.group, run.length, run.turning
     n, forced = group.size, system.forced_at is not None
     unit = length.period if run.flow.timed else np.ones(n)

@@ -37,7 +37,7 @@ class Span:
         return cls(0.0, time, np.ones(len(time), np.int64), np.zeros(len(time)))
 
     def rows(self, which: slice) -> Span:
-        """That of some of the trajectories."""
+        """The length of some of the trajectories."""
         each = {name: getattr(self, name)[which] for name in ("period", "count", "phase")}
         return replace(self, **each)
 

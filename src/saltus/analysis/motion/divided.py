@@ -72,7 +72,7 @@ class DividedRows(Division):
         return cls(system, method, arguments, count, TOGETHER)
 
     def __getstate__(self) -> dict[str, Any]:
-        """What goes to other processes: not what was read of the arguments."""
+        """The parts that go to other processes: all but what was read of the arguments."""
         return {name: value for name, value in vars(self).items() if name != "asked"}
 
     def rows(self, index: int) -> slice:

@@ -70,7 +70,7 @@ class Ending:
         )
 
     def rows(self, which: slice) -> Ending:
-        """That of some of the trajectories."""
+        """The condition of some of the trajectories."""
         return replace(self, until=self.until.of(which), first_mode=self.first_mode[which])
 
     def times(
