@@ -59,6 +59,7 @@ def test_windows_give_what_one_motion_gives_where_it_can_be_followed(monkeypatch
     assert search.best.fitted == pytest.approx(alone.fitted, abs=0.02 * noise)
 
 
+@pytest.mark.slow
 def test_a_chaotic_history_of_240_periods_gives_the_values_that_made_it(monkeypatch):
     """Stopped in its third pass, the fit has what the second one has found."""
     at, x, noise = made_up(CHAOTIC, 240, 5)
