@@ -124,8 +124,8 @@ class Forces:
             for j, one in enumerate(row) if not _is_zero(one) and mine == (j < len(self.moving))
         ]  # fmt: skip
         self._entries = (*forces, *(self._slopes[i][j] for i, j in self._known))
-        self._degree = degree(forces, self.moving)
-        self._bent = bends(forces, system.values) if math.isinf(self._degree) else 0
+        smooth = math.isfinite(degree(forces, self.moving, 1, 1))
+        self._bent = 0 if smooth else bends(forces, system.values)
         states, rows = list(self.moving), enumerate(self._gap_slopes)
         linear = [
             i for i, row in rows if _is_linear(system.guards[i].gap, row[: len(states)], states)
@@ -139,6 +139,7 @@ class Forces:
             i: sorted(bits_in([guard.gap]))
             for i, guard in enumerate(system.guards) if not is_hold(guard)
         }  # fmt: skip
+        self._all_linear = all(i in self._linear for i in self._asked)
         self._known_sums: dict[tuple[int, int, int], Sums] = {}
         self._rest = dict.fromkeys(states, 0.0)
         self._signal = np.array([one.signal for one in self.moving.values()])
@@ -255,8 +256,11 @@ class Forces:
 
     def _products(self, harmonics: int) -> int:
         """Degree of products of the forces and a harmonic."""
-        most = UNEVEN if self._bent else max(int(self._degree), 1)
-        return (most + 1) * harmonics + MULTIPLES * self.periods
+        drive = MULTIPLES * self.periods
+        if self._bent:
+            return (UNEVEN + 1) * harmonics + drive
+        forces = self._entries[: self.count]
+        return max(int(degree(forces, self.moving, harmonics, drive)), harmonics) + harmonics
 
     def coefficients(
         self, signals: np.ndarray, constants: np.ndarray, rate: float, rate_by: np.ndarray
@@ -295,7 +299,7 @@ class Forces:
         unknowns = 0 if linear is None else linear.turning.shape[1]
         sums = self._sums(len(signals), fourier.harmonics_of(signals.shape[1]), unknowns)
         gaps = intervals = None
-        if all(i in self._linear for i in self._asked):
+        if self._all_linear:
             gaps = self._gap_rows or self._rows(constants)
         else:
             intervals = self.intervals(signals, constants, rate)

@@ -22,8 +22,8 @@ from saltus.language.evaluate import evaluate
 ROUNDING = 1e-12
 #: Most samples by which a gap is read off as a series.
 MOST_SAMPLES = 2**14
-#: Nodes of Gauss's rule on an interval beyond half its turns.
-BEYOND = 10
+#: Nodes of Gauss's rule, as in kernels/harmonics/sums.py.
+BEYOND, FOR_BEND = 5, 15
 
 _gauss = functools.lru_cache(maxsize=512)(polynomials.gauss)
 #: Inputs of expressions at angles float64[n], but for the bits.
@@ -98,7 +98,7 @@ class Intervals:
             angle = 2.0 * np.pi * np.arange(count) / count
             return angle, np.full(count, 2.0 * np.pi / count), np.zeros(count, np.int64)
         turns = self.length * degree * 0.25 * (0.5 * np.pi) ** bent
-        counts = np.ceil(turns + 3.0 * np.cbrt(turns)).astype(np.int64) + BEYOND * (1 + bent)
+        counts = np.ceil(turns + 4.5 * np.cbrt(turns)).astype(np.int64) + BEYOND + FOR_BEND * bent
         rules = [_gauss(int(count)) for count in counts]
         place, weight = (np.concatenate(one) for one in zip(*rules, strict=True))
         for _ in range(bent):

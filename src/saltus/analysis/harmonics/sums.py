@@ -14,7 +14,7 @@ from saltus.analysis.harmonics.series import ROOM
 from saltus.flow import polynomials
 
 #: Most nodes of a rule, and the step from one rule to the next, as in kernels/harmonics/sums.py.
-MOST_NODES, RULE_STEP = 64, 4
+MOST_NODES, RULE_STEP = 96, 4
 
 
 @dataclass(frozen=True)
