@@ -94,7 +94,7 @@ class Sampled(HarmonicOrbits):
             whole[i, :, first : first + width] += (back * slope) @ (here @ derived)
             shift = back @ (slope * seen[:, j]) * times
             whole[i, :, 1 + size :] += np.outer(shift, rate_by)
-        response, by_rate = self.source.response(harmonics, rate)
+        response, by_rate = (one[0] + 1j * one[1] for one in self.source.response(harmonics, rate))
         moved = responses(response, whole).reshape(size, -1) / constants[0]
         turned = responses(by_rate, whole[:, :, :1]).ravel() / constants[0]
         derivative = np.empty((size, self.width))

@@ -3,8 +3,8 @@ change of stability.
 
 Each kind is the zero of a function of the orbit alone; a zero between two points of a branch is
 found by a bracketing method in arclength, at orbits that are closed by Newton's method, so it is
-the solution of the defining system and no interpolation. Chandrupatla, Adv. Eng. Softw. 28 (1997)
-145.
+the solution of the defining system and no interpolation; a fold by Newton's method on that system.
+Chandrupatla, Adv. Eng. Softw. 28 (1997) 145.
 Kuznetsov, Elements of Applied Bifurcation Theory (2004), chapter 10.
 """
 
@@ -19,6 +19,7 @@ from scipy.optimize import elementwise
 from saltus.analysis.branches.arclength import correct, tangents
 from saltus.analysis.branches.equations import OrbitEquations
 from saltus.analysis.branches.events import Event
+from saltus.analysis.solve.linear import solved
 from saltus.analysis.solve.newton import newton
 from saltus.flow.polynomials import between
 
@@ -35,6 +36,11 @@ ON_CIRCLE = 1e-9
 CONVERGED = 1e-11
 #: Distance of two derivatives whose difference is their slope, in units of the scale.
 ASIDE = 1e-5
+#: Steps of Newton's method towards a fold, at most.
+MOST_STEPS = 8
+#: A point nearer than this to the next place that is tried foretells the point there better than
+#: the cubic through the ends of the step, as a share of its length.
+BESIDE = 0.02
 #: Farthest that a branch point lies from where it was seen, in units of the scale.
 FARTHEST = 0.3
 
@@ -83,6 +89,7 @@ def locate(
     z: np.ndarray,
     tangent: np.ndarray,
     kind: np.ndarray,
+    values: np.ndarray,
 ) -> list[Event | None]:
     """The zeros of tests between points and the next ones.
 
@@ -96,6 +103,8 @@ def locate(
         The points before and behind.
     kind : int64[e]
         Which test.
+    values : float64[e, 2]
+        Its values there.
     """
     if not len(rows):
         return []
@@ -109,15 +118,29 @@ def locate(
     end = (length / np.einsum("ei,ei->e", beyond, tangent))[:, None] * beyond
     known: dict[int, Event] = {}
 
+    def ahead(share: np.ndarray, which: np.ndarray) -> np.ndarray:
+        zero, each = np.zeros_like(end[which]), share[:, None]
+        far = between(zero, step[which], along[which], end[which], each)
+        return np.asarray(z[which] + far * scale[which])
+
     def at(flat: np.ndarray, which: np.ndarray) -> np.ndarray:
+        guess = ahead(flat / length[which], which)
+        for i, one in enumerate(which.tolist()):
+            near = known.get(one)
+            if near is None:
+                continue
+            far = flat[i] - (near.z - z[one]) / scale[one] @ tangent[one]
+            if abs(far) < BESIDE * length[one]:
+                way = near.tangent / (near.tangent @ tangent[one])
+                guess[i] = near.z + far * way * scale[one]
+        return tested(guess, which)
+
+    def tested(guess: np.ndarray, which: np.ndarray) -> np.ndarray:
         mine = rows[which]
-        share = (flat / length[which])[:, None]
-        far = between(np.zeros_like(end[which]), step[which], along[which], end[which], share)
-        guess = z[which] + far * scale[which]
         point = correct(orbits, guess, tangent[which], mine)
         derivative = np.where(point.found[:, None, None], point.derivative, 0.0)
         direction = tangents(derivative, tangent[which])
-        values = np.full(len(flat), np.nan)
+        values = np.full(len(which), np.nan)
         asks = kind[which] >= BY_MULTIPLIERS
         for some in (np.flatnonzero(point.found & asks), np.flatnonzero(point.found & ~asks)):
             if len(some):
@@ -126,8 +149,8 @@ def locate(
                     if asks[some[0]]
                     else np.zeros((len(some), 0), complex)
                 )
-                tested = tests(direction[some], derivative[some], multipliers, column)
-                values[some] = tested[kind[which[some]], np.arange(len(some))]
+                each = tests(direction[some], derivative[some], multipliers, column)
+                values[some] = each[kind[which[some]], np.arange(len(some))]
         for i in np.flatnonzero(point.found).tolist():
             name = KINDS[kind[which[i]]]
             known[int(which[i])] = Event(
@@ -135,7 +158,17 @@ def locate(
             )
         return values
 
-    roots = zeros(at, length)
+    roots, folds = np.full(len(rows), np.nan), np.flatnonzero(kind == KINDS.index("fold"))
+    share = _turn(step[folds, column], along[folds, column], end[folds, column])
+    points, good = _folds(orbits, ahead(share, folds), tangent[folds], folds)
+    far = np.einsum("ei,ei->e", (points - z[folds]) / scale[folds], tangent[folds])
+    good &= (far >= 0) & (far <= length[folds])
+    tested(points[good], folds[good])
+    roots[folds[good]] = far[good]
+    others = np.flatnonzero(np.isnan(roots))
+    roots[others] = zeros(
+        lambda flat, which: at(flat, others[which]), length[others], values[others]
+    )
     result: list[Event | None] = [None] * len(rows)
     found = [i for i in sorted(known) if np.isfinite(roots[i])]
     if found:
@@ -152,17 +185,67 @@ def locate(
     return result
 
 
-def zeros(at: Callable[[np.ndarray, np.ndarray], np.ndarray], length: np.ndarray) -> np.ndarray:
+def _turn(rise: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """The share of a step at which a cubic turns back, from its rise and its slopes at the ends,
+    which have different signs.
+    """
+    bend, twist = 3.0 * rise - 2.0 * first - last, first + last - 2.0 * rise
+    return np.asarray(-first / (bend - np.sign(first) * np.sqrt(bend**2 - 3.0 * twist * first)))
+
+
+def _folds(
+    orbits: OrbitEquations, guess: np.ndarray, along: np.ndarray, rows: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The folds near points float64[r, m + 1] of curves int64[r], and where one was found, bool[r].
+
+    Newton's method on ``F = 0, g = 0``: g is the last entry of the null vector v of the derivative
+    J whose product with ``along`` is one. Its derivative is -w'(dJ/dv), where w solves the adjoint
+    equations, so that J a short way along v is all that is needed besides. Kuznetsov, section
+    10.2.1.
+    """
+    if not len(rows):
+        return guess, np.zeros(0, bool)
+
+    def equations(z: np.ndarray, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        mine = rows[which]
+        residual, derivative = orbits.evaluate(z, mine)
+        whole = np.concatenate([derivative, along[which, None]], axis=1)
+        last = np.zeros(z.shape)
+        last[:, -1] = 1.0
+        null, adjoint = solved(whole, last), solved(whole.swapaxes(1, 2), last)
+        beside = orbits.evaluate(z + ASIDE * null * orbits.scale[mine], mine)[1]
+        bend = np.einsum("rm,rmi->ri", adjoint[:, :-1], derivative - beside) / ASIDE
+        rows_of_all = np.concatenate([derivative, bend[:, None]], axis=1)
+        return np.append(residual, null[:, -1:], axis=1), rows_of_all
+
+    found = newton(
+        equations, guess, orbits.scale[rows], enough=CONVERGED, foresee=True, max_steps=MOST_STEPS
+    )
+    return found.z, found.found
+
+
+def zeros(
+    at: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    length: np.ndarray,
+    ends: np.ndarray | None = None,
+) -> np.ndarray:
     """Places at which functions of a distance vanish between 0 and float64[e], NaN where none is
     found: ``at`` gives their values at float64[r] for the functions int64[r], and is called at the
-    zeros last.
+    zeros last. ``ends``: their values at 0 and there float64[e, 2], if they are known.
     """
     if not len(length):
         return length
     which = np.arange(len(length))
 
     def values(step: np.ndarray, event: np.ndarray) -> np.ndarray:
-        return at(step.ravel(), event.astype(np.int64).ravel()).reshape(step.shape)
+        flat, some = step.ravel(), event.astype(np.int64).ravel()
+        if ends is None:
+            return at(flat, some).reshape(step.shape)
+        found = np.where(flat == 0, ends[some, 0], ends[some, 1])
+        inside = np.flatnonzero((flat != 0) & (flat != length[some]))
+        if len(inside):
+            found[inside] = at(flat[inside], some[inside])
+        return found.reshape(step.shape)
 
     root = elementwise.find_root(
         values,

@@ -266,7 +266,8 @@ def test_residual_deflections_keep_the_flexibility():
             forces=[sl.Force("x5", "1 N")],
         )  # fmt: skip
         rate = 2 * np.pi * 3.0
-        found = AtContacts(system).response(5, rate)[0][:, 0]
+        real, imaginary = AtContacts(system).response(5, rate)[0][:, :, 0]
+        found = real + 1j * imaginary
         loads = np.eye(size)[:, [at, 4]]
         for order, row in enumerate(found):
             w = order * rate
