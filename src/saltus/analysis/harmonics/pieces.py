@@ -139,7 +139,7 @@ def intervals_of(
     frozen = np.zeros(len(guards), bool)
     numbers, gaps = linear
     if more := [i for i, others in asked.items() if not others and i not in numbers]:
-        each = [*gaps, *(_series(name, guards[i], about, harmonics, frozen) for i in more)]
+        each = [*gaps, *(series_of(name, guards[i], about, harmonics, frozen) for i in more)]
         split = max(fourier.harmonics_of(len(one)) for one in each)
         numbers = np.append(numbers, more)
         gaps = np.array([fourier.resized(one, split) for one in each])
@@ -154,7 +154,7 @@ def intervals_of(
         for sides in np.unique(intervals.bits[:, mine], axis=0):
             bits = frozen.copy()
             bits[mine] = sides
-            gap = _series(name, guards[number], about, harmonics, bits)
+            gap = series_of(name, guards[number], about, harmonics, bits)
             _, angle, slope = fourier.zeros_of(gap[None])
             there = (intervals.bits[intervals.of(angle)][:, mine] == sides).all(axis=1)
             new = np.array([angle, np.full(len(angle), number), slope])
@@ -194,7 +194,7 @@ def _cut(intervals: Intervals, found: np.ndarray) -> Intervals:
     return Intervals(begin, length, bits, _NONE)
 
 
-def _series(name: str, guard: Guard, about: About, harmonics: int, bits: np.ndarray) -> np.ndarray:
+def series_of(name: str, guard: Guard, about: About, harmonics: int, bits: np.ndarray) -> np.ndarray:
     """The gap of a guard as a series, the bits that it asks for frozen."""
     count = 4 * harmonics + 16
     while count <= MOST_SAMPLES:

@@ -22,18 +22,6 @@ def nodes_for(turns, bent):
 
 
 @kernel
-def write_states(states, here, y):
-    """States at an angle of which the basis is given, up to twice their harmonics or more."""
-    split, most = (states.shape[1] - 1) // 2, (len(here) - 1) // 2
-    for j in range(len(states)):
-        even, odd = states[j, 0], 0.0
-        for k in range(1, split + 1):
-            even += states[j, k] * here[k]
-            odd += states[j, split + k] * here[most + k]
-        y[j] = even + odd
-
-
-@kernel
 def add_node(angle, weight, aside, mode, pace, states, p, here, y, out, integrals):
     """Add the forces at an angle, and their slopes, times a weight and the basis."""
     write_basis(angle, (len(here) - 1) // 2, here)
