@@ -1,4 +1,4 @@
-"""The generated head of harmonic balance: forces with their slopes, the slopes of gaps, and gaps."""
+"""The generated head of harmonic balance: forces with their slopes, gaps and their slopes."""
 
 from __future__ import annotations
 
@@ -26,11 +26,10 @@ def forces_text(
     states, parameters : sequence of str
         In their order.
     """
+    functions = {"forces": entries, "gap_slopes": gap_slopes, "gap_values": gaps}
     return "\n".join(
         f"@kernel\ndef {name}(t, y, p, mode, out):\n{_body(roots, states, parameters)}\n"
-        for name, roots in (
-            ("forces", entries), ("gap_slopes", gap_slopes), ("gap_values", gaps)
-        )  # fmt: skip
+        for name, roots in functions.items()
     )
 
 

@@ -80,7 +80,90 @@ def tests(
     )
 
 
-_ENDS = ("z", "derivative")
+class _Steps:
+    """Steps along curves, over each of which a test vanishes.
+
+    Parameters
+    ----------
+    orbits, rows, z, tangent, kind
+        See :func:`locate`.
+    """
+
+    def __init__(
+        self, orbits: OrbitEquations, rows: np.ndarray, z: np.ndarray, tangent: np.ndarray,
+        kind: np.ndarray,
+    ) -> None:  # fmt: skip
+        self.scale, self.kind, self.column = orbits.scale[rows], kind, z.shape[2] - 1
+        self.step, self.z = (z[:, 1] - z[:, 0]) / self.scale, z[:, 0]
+        self.orbits, self.rows = orbits.near(self.z, rows), np.arange(len(rows))
+        self.tangent, beyond = tangent.swapaxes(0, 1)
+        self.length = self.along(self.step)
+        # slopes by the share of the step along the first tangent
+        self.first = self.length[:, None] * self.tangent
+        self.last = (self.length / self.along(beyond))[:, None] * beyond
+        #: the latest point that was tested of each
+        self.known: dict[int, Event] = {}
+
+    def along(self, way: np.ndarray, which: np.ndarray | None = None) -> np.ndarray:
+        """The part of ways float64[r, m + 1] along the first tangents."""
+        tangent = self.tangent if which is None else self.tangent[which]
+        return np.asarray(np.einsum("ei,ei->e", way, tangent))
+
+    def ahead(self, share: np.ndarray, which: np.ndarray) -> np.ndarray:
+        """Points on the cubics through the ends of steps int64[r], at shares of them."""
+        step, first, last = self.step[which], self.first[which], self.last[which]
+        far = between(np.zeros_like(step), step, first, last, share[:, None])
+        return np.asarray(self.z[which] + far * self.scale[which])
+
+    def at(self, flat: np.ndarray, which: np.ndarray) -> np.ndarray:
+        """The tests of steps int64[r] at lengths float64[r] along the first tangents."""
+        guess = self.ahead(flat / self.length[which], which)
+        for i, one in enumerate(which.tolist()):
+            if (near := self.known.get(one)) is None:
+                continue
+            far = flat[i] - (near.z - self.z[one]) / self.scale[one] @ self.tangent[one]
+            if abs(far) < BESIDE * self.length[one]:
+                way = near.tangent / (near.tangent @ self.tangent[one])
+                guess[i] = near.z + far * way * self.scale[one]
+        return self.tested(guess, which)
+
+    def tested(self, guess: np.ndarray, which: np.ndarray) -> np.ndarray:
+        """The tests of steps int64[r] at the orbits across the first tangents from guesses, NaN
+        where there is none.
+        """
+        mine, orbits = self.rows[which], self.orbits
+        point = correct(orbits, guess, self.tangent[which], mine)
+        derivative = np.where(point.found[:, None, None], point.derivative, 0.0)
+        direction = tangents(derivative, self.tangent[which])
+        values = np.full(len(which), np.nan)
+        asks = self.kind[which] >= BY_MULTIPLIERS
+        for some in (np.flatnonzero(point.found & asks), np.flatnonzero(point.found & ~asks)):
+            if len(some):
+                multipliers = (
+                    orbits.multipliers(point.z[some], derivative[some], mine[some])
+                    if asks[some[0]]
+                    else np.zeros((len(some), 0), complex)
+                )
+                each = tests(direction[some], derivative[some], multipliers, self.column)
+                values[some] = each[self.kind[which[some]], np.arange(len(some))]
+        for i in np.flatnonzero(point.found).tolist():
+            name, none = KINDS[self.kind[which[i]]], np.zeros(0)
+            self.known[int(which[i])] = Event(
+                name, -1, point.z[i], none, direction[i], derivative[i]
+            )
+        return values
+
+    def folds(self) -> tuple[np.ndarray, np.ndarray]:
+        """The steps in which Newton's method finds a fold, which is tested, int64[r], and where."""
+        which = np.flatnonzero(self.kind == KINDS.index("fold"))
+        share = _turn(*(one[which, self.column] for one in (self.step, self.first, self.last)))
+        z, good = _folds(
+            self.orbits, self.ahead(share, which), self.tangent[which], self.rows[which]
+        )
+        far = self.along((z - self.z[which]) / self.scale[which], which)
+        good &= (far >= 0) & (far <= self.length[which])
+        self.tested(z[good], which[good])
+        return which[good], far[good]
 
 
 def locate(
@@ -108,80 +191,27 @@ def locate(
     """
     if not len(rows):
         return []
-    column, scale = z.shape[2] - 1, orbits.scale[rows]
-    step = (z[:, 1] - z[:, 0]) / scale
-    z, (tangent, beyond) = z[:, 0], tangent.swapaxes(0, 1)
-    orbits, rows = orbits.near(z, rows), np.arange(len(rows))
-    length = np.einsum("ei,ei->e", step, tangent)
-    # slopes by the share of the step along the first tangent
-    along = length[:, None] * tangent
-    end = (length / np.einsum("ei,ei->e", beyond, tangent))[:, None] * beyond
-    known: dict[int, Event] = {}
-
-    def ahead(share: np.ndarray, which: np.ndarray) -> np.ndarray:
-        zero, each = np.zeros_like(end[which]), share[:, None]
-        far = between(zero, step[which], along[which], end[which], each)
-        return np.asarray(z[which] + far * scale[which])
-
-    def at(flat: np.ndarray, which: np.ndarray) -> np.ndarray:
-        guess = ahead(flat / length[which], which)
-        for i, one in enumerate(which.tolist()):
-            near = known.get(one)
-            if near is None:
-                continue
-            far = flat[i] - (near.z - z[one]) / scale[one] @ tangent[one]
-            if abs(far) < BESIDE * length[one]:
-                way = near.tangent / (near.tangent @ tangent[one])
-                guess[i] = near.z + far * way * scale[one]
-        return tested(guess, which)
-
-    def tested(guess: np.ndarray, which: np.ndarray) -> np.ndarray:
-        mine = rows[which]
-        point = correct(orbits, guess, tangent[which], mine)
-        derivative = np.where(point.found[:, None, None], point.derivative, 0.0)
-        direction = tangents(derivative, tangent[which])
-        values = np.full(len(which), np.nan)
-        asks = kind[which] >= BY_MULTIPLIERS
-        for some in (np.flatnonzero(point.found & asks), np.flatnonzero(point.found & ~asks)):
-            if len(some):
-                multipliers = (
-                    orbits.multipliers(point.z[some], derivative[some], mine[some])
-                    if asks[some[0]]
-                    else np.zeros((len(some), 0), complex)
-                )
-                each = tests(direction[some], derivative[some], multipliers, column)
-                values[some] = each[kind[which[some]], np.arange(len(some))]
-        for i in np.flatnonzero(point.found).tolist():
-            name = KINDS[kind[which[i]]]
-            known[int(which[i])] = Event(
-                name, -1, point.z[i], np.zeros(0), direction[i], derivative[i]
-            )
-        return values
-
-    roots, folds = np.full(len(rows), np.nan), np.flatnonzero(kind == KINDS.index("fold"))
-    share = _turn(step[folds, column], along[folds, column], end[folds, column])
-    points, good = _folds(orbits, ahead(share, folds), tangent[folds], folds)
-    far = np.einsum("ei,ei->e", (points - z[folds]) / scale[folds], tangent[folds])
-    good &= (far >= 0) & (far <= length[folds])
-    tested(points[good], folds[good])
-    roots[folds[good]] = far[good]
+    steps, roots = _Steps(orbits, rows, z, tangent, kind), np.full(len(rows), np.nan)
+    which, places = steps.folds()
+    roots[which] = places
     others = np.flatnonzero(np.isnan(roots))
     roots[others] = zeros(
-        lambda flat, which: at(flat, others[which]), length[others], values[others]
+        lambda flat, some: steps.at(flat, others[some]), steps.length[others], values[others]
     )
     result: list[Event | None] = [None] * len(rows)
+    known, near = steps.known, steps.orbits
     found = [i for i in sorted(known) if np.isfinite(roots[i])]
     if found:
-        ends, matrices = (np.array([getattr(known[i], one) for i in found]) for one in _ENDS)
-        each = orbits.multipliers(ends, matrices, rows[found])
+        ends, matrices = (
+            np.array([getattr(known[i], one) for i in found]) for one in ("z", "derivative")
+        )
+        each = near.multipliers(ends, matrices, steps.rows[found])
         for place, multipliers in zip(found, each, strict=True):
             result[place] = replace(known[place], multipliers=multipliers)
-    for i in np.flatnonzero(kind == KINDS.index("branch_point")):
-        guess = z[i] + 0.5 * length[i] * tangent[i] * orbits.scale[rows[i]]
-        near = known.get(int(i))
-        result[i] = _branch_point(
-            orbits, int(rows[i]), guess if near is None else near.z, tangent[i]
-        )
+    for i in np.flatnonzero(kind == KINDS.index("branch_point")).tolist():
+        guess = z[i, 0] + 0.5 * steps.first[i] * steps.scale[i]
+        seen = known.get(i)
+        result[i] = _branch_point(near, i, guess if seen is None else seen.z, tangent[i, 0])
     return result
 
 

@@ -194,7 +194,9 @@ def _cut(intervals: Intervals, found: np.ndarray) -> Intervals:
     return Intervals(begin, length, bits, _NONE)
 
 
-def series_of(name: str, guard: Guard, about: About, harmonics: int, bits: np.ndarray) -> np.ndarray:
+def series_of(
+    name: str, guard: Guard, about: About, harmonics: int, bits: np.ndarray
+) -> np.ndarray:
     """The gap of a guard as a series, the bits that it asks for frozen."""
     count = 4 * harmonics + 16
     while count <= MOST_SAMPLES:

@@ -30,11 +30,11 @@ def degree(roots: Sequence[Expr], moving: Collection[str], state: int, drive: in
     timed: set[Expr] = set()
     for node in ex.walk(*roots, conditions=False):
         below = [known[one] for one in node.args]
-        if node.op == "time" or any(one in timed for one in node.args):
-            if not any(known[one] for one in node.args if one not in timed):
-                timed.add(node)
-                known[node] = drive
-                continue
+        moves = any(known[one] for one in node.args if one not in timed)
+        if ex.depends_on(node, ("time",)) and not moves:
+            timed.add(node)
+            known[node] = drive
+            continue
         match node.op:
             case "state":
                 known[node] = state if node.payload in moving else 0

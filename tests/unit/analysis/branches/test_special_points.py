@@ -48,7 +48,7 @@ def test_bifurcations_are_located_to_rounding_by_few_evaluations(kind, most):
     )[number].reshape(-1, 2)  # fmt: skip
     curves.evaluated = 0
     found = special_points.locate(curves, rows, z, tangent, np.full(30, number), values)
-    print(kind, curves.evaluated/30); assert curves.evaluated / 30 < most
+    assert curves.evaluated / 30 < most
     for event, (_, height) in zip(found, axes, strict=True):
         np.testing.assert_allclose(event.z, [0.0, height], rtol=0, atol=CLOSED)
         assert abs(event.tangent[1]) < 1e-14
