@@ -275,7 +275,7 @@ def zeros(
         inside = np.flatnonzero((flat != 0) & (flat != length[some]))
         if len(inside):
             found[inside] = at(flat[inside], some[inside])
-        return found.reshape(step.shape)
+        return np.asarray(found.reshape(step.shape))
 
     root = elementwise.find_root(
         values,
