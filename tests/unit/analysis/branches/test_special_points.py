@@ -9,7 +9,7 @@ from saltus.analysis.branches import special_points
 from saltus.analysis.branches.arclength import CLOSED
 
 
-class Ellipses:
+class EllipsesAsOrbits:
     """(x/a)**2 + (y/b)**2 = 1 over y, with folds at (0, b), as orbits with the multiplier x - 1:
     period doublings are there too.
     """
@@ -40,7 +40,7 @@ def test_bifurcations_are_located_to_rounding_by_few_evaluations(kind, most):
     z = axes[:, None] * np.concatenate([cosine, sine], axis=2)
     tangent = axes[:, None] * np.concatenate([-sine, cosine], axis=2)
     tangent /= np.linalg.norm(tangent, axis=2)[..., None]
-    curves = Ellipses(axes)
+    curves = EllipsesAsOrbits(axes)
     flat = z.reshape(-1, 2)
     values = special_points.tests(
         tangent.reshape(-1, 2), curves.evaluate(flat, np.repeat(rows, 2))[1],
