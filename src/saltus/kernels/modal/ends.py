@@ -26,14 +26,16 @@ def is_pressed(i, g, tau, batch, m):
 
 
 @kernel
-def begins_pressed(i, g, batch, m):
-    """True if a stop that rests at the start of a run is pressed there. From exact rest what
-    presses it may be the rounding of terms that cancel.
+def tell_pressed(i, tau, batch, m):
+    """Tell which stops are pressed at the start of a run, should they rest: to PRESSED. From exact
+    rest what presses them may be the rounding of terms that cancel.
     """
-    moves, asked = False, batch.carry[i, STARTS] > 0.5 and m.laws[g, KIND] == IMPACT_LAW
-    for j in range(m.sizes[STATES] if asked else 0):
+    moves = False
+    for j in range(m.sizes[STATES]):
         moves = moves or batch.state[i, j] != 0.0
-    return moves and is_pressed(i, g, batch.phase[i], batch, m)
+    for g in range(m.sizes[GUARDS]):
+        asked = moves and m.laws[g, KIND] == IMPACT_LAW
+        m.found[g, PRESSED] = 1.0 if asked and is_pressed(i, g, tau, batch, m) else 0.0
 
 
 @kernel

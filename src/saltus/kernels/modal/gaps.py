@@ -21,7 +21,7 @@ from saltus.kernels.isolation import (
     to_bernstein,
 )
 from saltus.kernels.lanes import bits, fma, larger, load, lowest_bit, root, smaller, splat, store
-from saltus.kernels.status import GAP_MARGIN, HOLD_LAW, IMPACT_LAW, MODE_VIOLATION
+from saltus.kernels.status import GAP_MARGIN, HOLD_LAW, MODE_VIOLATION
 
 
 # -- where the amplitudes stand --------------------------------------------------------------------
@@ -394,12 +394,18 @@ def judge(g, top, degree, fresh, error, whole, slope_error, noise, m):
 
 
 @inner
+def begins_pressed(i, g, batch, m):
+    """True if a contact is a stop that is pressed at the start of a run."""
+    return batch.carry[i, STARTS] > 0.5 and g >= 0 and m.found[g, PRESSED] > 0.5
+
+
+@inner
 def way_of(i, g, degree, known, noise, batch, m):
     """Side to which a gap leaves its boundary in a step (0: it doesn't). The velocity of a rebound
     or a crossing tells it, however small; the first term of what begins at rest may be rounding.
     """
     rests = known > 1 or m.laws[g, KIND] == HOLD_LAW
-    if known == 2 and m.laws[g, KIND] == IMPACT_LAW and begins_pressed(i, g, batch, m):
+    if known == 2 and begins_pressed(i, g, batch, m):
         return -1
     if rests or (int(batch.carry[i, RIDES]) >> g) & 1 == 1:
         return side_of_leaving(m.p, degree, known, noise)

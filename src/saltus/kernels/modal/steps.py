@@ -288,7 +288,7 @@ def land(i, tau, d, hits, modes, steady, batch, m):
     return count_landing(i, tau + d, batch)
 
 
-@kernel
+@inner
 def land_and_enter(i, tau, d, hits, modes, steady, batch, m):
     """Land, and begin in the contact state behind if it has been made. Returns the status."""
     write_queue(i, batch.cursor[i], modes, batch, m)
@@ -381,6 +381,8 @@ def advance(i, budget, batch, m):
             drive(i, tau, batch, m)
             set_block_drives(modes, m)
             stand(modes, steady, int(batch.carry[i, SET]), m)
+            if batch.carry[i, STARTS] > 0.5:
+                tell_pressed(i, tau, batch, m)
         h = reach(i, h, modes, batch, m)
         answer, d, hits = look(i, tau, h, modes, steady, batch, m)
         if batch.status[i] != RUNNING:
