@@ -17,6 +17,7 @@ from saltus.analysis.attractors.aperiodic import (
     survey,
 )
 from saltus.analysis.attractors.attractor_set import INSIDE, AttractorSet, is_about
+from saltus.analysis.attractors.families import on_families
 from saltus.analysis.attractors.growth import BUDGET, NEWTON, tangent_cost
 from saltus.analysis.attractors.limit_cycles import limit_cycles
 from saltus.analysis.attractors.noisy import Noisy, Stray, blurred, keep_to, stray_of
@@ -147,6 +148,12 @@ def _settle(
                     map_, found, points[here], going[here], travel, here, scale, owner, settled
                 )
             ]
+        if len(here):
+            here = here[
+                ~_on_families(
+                    map_, found, points[here], going[here], travel.age, owner, settled, scale
+                )
+            ]
         stay = np.zeros(len(going), bool)
         stay[here] = travel.going[here]
         travel.keep(stay)
@@ -189,6 +196,18 @@ def _keeping(
     for i in np.flatnonzero(on >= 0):
         owner[who[i]], settled[who[i]] = ones[on[i]], age
     return on >= 0
+
+
+def _on_families(
+    map_: Map, found: AttractorSet, points: np.ndarray, who: np.ndarray, age: int, owner: Owners,
+    settled: np.ndarray, scale: np.ndarray,
+) -> np.ndarray:  # fmt: skip
+    """Note which trajectories float64[k, m, D] are on families of orbits, bool[k]."""
+    homes = on_families(map_, points, scale, found)
+    for i, home in zip(who, homes, strict=True):
+        if home is not None:
+            owner[i], settled[i] = home, age
+    return np.array([home is not None for home in homes])
 
 
 def watched(states: int) -> tuple[int, int]:
