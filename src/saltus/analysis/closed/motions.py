@@ -144,8 +144,8 @@ class ClosedMotions:
         with np.errstate(invalid="ignore"):
             ones = np.abs(self.multipliers - 1.0) < MARGINAL
             kept = ones | (np.abs(self.multipliers) < 1.0 - MARGINAL)
-        maps: np.ndarray = (self.period > 0) & np.isnan(self.time)
-        return maps & kept.all(axis=1) & ones.any(axis=1)
+        of_map = (self.period > 0) & np.isnan(self.time)
+        return np.asarray(of_map & kept.all(axis=1) & ones.any(axis=1))
 
     def rows(self, which: np.ndarray) -> ClosedMotions:
         """Those of some rows, int64[m] or bool[k]."""
