@@ -342,8 +342,9 @@ def _survey(
     rests = np.array([mismatch(points[i, -ROUND:], scale) < ARRIVED for i in chosen])
     free = chosen[~keeps & ~rests]
     seen = [*noisy, *survey(map_, travel.state[free], points[free], scale)]
-    if seen:
-        moves = chosen[keeps | ~rests]
+    moves = chosen[keeps | ~rests]
+    if len(moves):  # a long transient, if nothing is seen
+        watching = watching if seen else SURVEY_ITERATES
         going_on = map_.launch(travel.state[moves], watching)
         ends = _leave(going_on, watching, found, noisy, scale, lambda age: tell(travel.age + age))
         leave = np.isfinite(ends).all(axis=(1, 2))
