@@ -8,7 +8,7 @@ from inspect import signature
 from typing import TYPE_CHECKING, Any
 
 from saltus import flow
-from saltus.errors import ParameterError, SaltusError, StudyError
+from saltus.errors import ParameterError, SaltusError, StudyError, nearest
 from saltus.flow.methods import default_method
 from saltus.study.setting import quantities
 from saltus.study.setting.curves import curve_of
