@@ -25,6 +25,7 @@ from saltus.analysis.closed import unforced
 from saltus.analysis.closed.field_zeros import autonomous
 from saltus.analysis.closed.motions import ClosedMotions
 from saltus.analysis.closed.orbits import neutral_orbits
+from saltus.analysis.closed.spread import beyond_rounding
 from saltus.analysis.closed.unforced import eigenvalues_of
 from saltus.analysis.solve.tolerances import BESIDE, NEAR, RESTS, ROUND, ROUNDING, SETTLED
 from saltus.flow.maps import Stroboscope
@@ -374,4 +375,5 @@ def motion_range(map_: Stroboscope, state: np.ndarray) -> np.ndarray:
     with np.errstate(all="ignore"):
         lengths, sizes = np.ptp(samples, axis=1), np.abs(samples).max(axis=1)
     scale = np.where(lengths > RESTS * sizes, lengths, sizes)
+    scale = beyond_rounding(scale, map_.system)
     return np.where(np.isfinite(scale) & (scale > 0), scale, 1.0)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from saltus.analysis.closed.search import used_up
+from saltus.analysis.solve.tolerances import RESTS
 from saltus.flow.maps import Stroboscope
 from saltus.flow.request import Schedule
+from saltus.system import System
 
 #: Iterates after which the range of the states is taken, where no box gives it.
 SPREAD = 32
@@ -28,5 +30,18 @@ def spread(map_: Stroboscope, start: np.ndarray) -> np.ndarray:
         [start, iterates.reshape(-1, start.shape[1]), between.reshape(-1, start.shape[1])]
     )
     points = points[np.isfinite(points).all(axis=1)]
-    wide = np.ptp(points, axis=0)
+    wide = beyond_rounding(np.ptp(points, axis=0), map_.system)
     return np.where(wide > 0, wide, 1.0)
+
+
+def beyond_rounding(ranges: np.ndarray, system: System) -> np.ndarray:
+    """Ranges of states, float64[..., D], at least :data:`RESTS` of the largest among those of one
+    unit: the velocity of a body that is held moves by the rounding of others.
+    """
+    units = np.array([system.units[name] for name in system.states])
+    result = np.array(ranges)
+    for unit in set(units):
+        alike = units == unit
+        largest = np.fmax.reduce(result[..., alike], axis=-1)[..., None]
+        result[..., alike] = np.maximum(result[..., alike], RESTS * largest)
+    return result
