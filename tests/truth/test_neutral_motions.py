@@ -99,3 +99,29 @@ def test_what_a_chaotic_transient_settles_to_at_last_is_found(monkeypatch):
     assert late.any()
     assert (found["basin"].values[late] >= 0).all()
     assert set(found["attractor_period"].values.tolist()) == {1, 2}
+
+
+def test_a_coordinate_that_rests_within_rounding_hides_no_response():
+    """A rough floor is pressed by one coordinate, which rests but for rounding: the slowest decay is
+    its own, damping / (2 mass) = 1.
+    """
+    stiffness = np.diag([8e3, 8e3, 8e3, 8e3, 4e3, 1e3])
+    for i in range(4):
+        stiffness[i, i + 1] = stiffness[i + 1, i] = -4e3
+    floor = {"gap": "-0.5 mm", "friction": 0.5, "sliding": "x5", "name": "floor"}
+    chain = sl.structure(
+        0.5 * np.eye(6),
+        stiffness,
+        1e-3 * stiffness,
+        frequency="5 Hz",
+        contacts=[
+            sl.Contact("x6", stiffness="50 kN/m", **floor),
+            sl.Contact("x1", stiffness="20 kN/m", gap="0.1 mm"),
+        ],
+        forces=[sl.Force("x1", "4 N")],
+    )
+    response = sl.frequency_response(chain, ["5 Hz", "9 Hz"], np.zeros(12))
+    assert response["response_of"].values.tolist() == [[0], [1]]
+    found = sl.lyapunov(chain.with_values(frequency="9 Hz"), np.zeros(12), periods=64)
+    assert found["kind"].item() == "periodic"
+    np.testing.assert_allclose(found["lyapunov_exponent"].values[0, :2], -1.0, rtol=1e-6)

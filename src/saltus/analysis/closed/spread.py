@@ -35,13 +35,13 @@ def spread(map_: Stroboscope, start: np.ndarray) -> np.ndarray:
 
 
 def beyond_rounding(ranges: np.ndarray, system: System) -> np.ndarray:
-    """Ranges of states, float64[..., D], at least :data:`RESTS` of the largest among those of one
-    unit: the velocity of a body that is held moves by the rounding of others.
+    """Ranges of states, float64[..., D], of which one that is rounding beside others of its unit is
+    the largest of these: the velocity of a body that is held moves by the rounding of others.
     """
     units = np.array([system.units[name] for name in system.states])
     result = np.array(ranges)
     for unit in set(units):
-        alike = units == unit
-        largest = np.fmax.reduce(result[..., alike], axis=-1)[..., None]
-        result[..., alike] = np.maximum(result[..., alike], RESTS * largest)
+        some = ranges[..., units == unit]
+        largest = np.fmax.reduce(some, axis=-1)[..., None]
+        result[..., units == unit] = np.where(some > RESTS * largest, some, largest)
     return result
