@@ -102,8 +102,8 @@ def test_what_a_chaotic_transient_settles_to_at_last_is_found(monkeypatch):
 
 
 def test_a_coordinate_that_rests_within_rounding_hides_no_response():
-    """A rough floor is pressed by one coordinate, which rests but for rounding: the slowest decay is
-    its own, damping / (2 mass) = 1.
+    """A coordinate that presses a rough floor rests but for rounding. The slowest decay is
+    its own, damping / (2 mass) = 1 s^-1.
     """
     stiffness = np.diag([8e3, 8e3, 8e3, 8e3, 4e3, 1e3])
     for i in range(4):
@@ -120,8 +120,7 @@ def test_a_coordinate_that_rests_within_rounding_hides_no_response():
         ],
         forces=[sl.Force("x1", "4 N")],
     )
-    response = sl.frequency_response(chain, ["5 Hz", "9 Hz"], np.zeros(12))
-    assert response["response_of"].values.tolist() == [[0], [1]]
-    found = sl.lyapunov(chain.with_values(frequency="9 Hz"), np.zeros(12), periods=64)
-    assert found["kind"].item() == "periodic"
-    np.testing.assert_allclose(found["lyapunov_exponent"].values[0, :2], -1.0, rtol=1e-6)
+    response = sl.frequency_response(chain, ["5 Hz"], np.zeros(12))
+    assert response["response_of"].values.tolist() == [[0]]
+    largest = np.hypot(response["response_multiplier_real"], response["response_multiplier_imag"])
+    np.testing.assert_allclose(largest.values[0, :2], np.exp(-1 / 5), rtol=1e-9)
