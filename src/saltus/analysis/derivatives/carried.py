@@ -18,6 +18,7 @@ from saltus.analysis.motion.sample_times import NO_SAMPLES, SampleTimes
 from saltus.errors import ParameterError
 from saltus.flow.methods import Method
 from saltus.flow.request import Outcome, Request
+from saltus.kernels import status as st
 from saltus.system import System
 from saltus.system.modes import field
 from saltus.system.parametric import parametric
@@ -25,6 +26,8 @@ from saltus.system.parametric import parametric
 #: Kinds of contacts at which a motion begins to be held: behind them its rates aren't those of the
 #: equations.
 HELD = ("hold",)
+#: Ends that a run may come to from outside.
+CUT_OFF = (st.INTERRUPTED, st.BUDGET_EVENTS)
 
 
 @dataclass(frozen=True)
@@ -137,7 +140,7 @@ class CarriedDerivatives:
             end_phase=base.end_phase / unit,
             origin=base.origin / float(unit[0]),
             times=None if base.times is None else base.times / float(unit[0]),
-            t_end=base.t_end / float(unit[0]),
+            t_end=base.t_end / float(unit[0]) if np.ptp(unit) == 0 else np.inf,
         )
 
     # -- what it holds -----------------------------------------------------------------------------
@@ -186,7 +189,10 @@ class CarriedDerivatives:
         """The ends of all trajectories."""
         unit = length.period if self.timed else 1.0
         who = np.arange(group.size)
-        return self._places(outcome.state, outcome.mode, outcome.time * unit, who, group, length)
+        at = self._places(outcome.state, outcome.mode, outcome.time * unit, who, group, length)
+        if self._own:  # those of a run that is cut off wait where they were moved last
+            at.slopes[np.isin(outcome.status, CUT_OFF)] = np.nan
+        return at
 
     def parameters(self, group: Ensemble, who: np.ndarray) -> dict[str, np.ndarray]:
         """Values of all parameters of trajectories int64[m], float64[m] each."""
