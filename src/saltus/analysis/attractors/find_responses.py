@@ -375,5 +375,5 @@ def motion_range(map_: Stroboscope, state: np.ndarray) -> np.ndarray:
     with np.errstate(all="ignore"):
         lengths, sizes = np.ptp(samples, axis=1), np.abs(samples).max(axis=1)
     scale = np.where(lengths > RESTS * sizes, lengths, sizes)
-    scale = beyond_rounding(scale, map_.system)
+    scale = beyond_rounding(scale, map_)
     return np.where(np.isfinite(scale) & (scale > 0), scale, 1.0)

@@ -6,9 +6,8 @@ import numpy as np
 
 from saltus.analysis.closed.search import used_up
 from saltus.analysis.solve.tolerances import RESTS
-from saltus.flow.maps import Stroboscope
+from saltus.flow.maps import Map, Stroboscope
 from saltus.flow.request import Schedule
-from saltus.system import System
 
 #: Iterates after which the range of the states is taken, where no box gives it.
 SPREAD = 32
@@ -30,15 +29,17 @@ def spread(map_: Stroboscope, start: np.ndarray) -> np.ndarray:
         [start, iterates.reshape(-1, start.shape[1]), between.reshape(-1, start.shape[1])]
     )
     points = points[np.isfinite(points).all(axis=1)]
-    wide = beyond_rounding(np.ptp(points, axis=0), map_.system)
+    wide = beyond_rounding(np.ptp(points, axis=0), map_)
     return np.where(wide > 0, wide, 1.0)
 
 
-def beyond_rounding(ranges: np.ndarray, system: System) -> np.ndarray:
-    """Ranges of states, float64[..., D], of which one that is rounding beside others of its unit is
-    the largest of these: the velocity of a body that is held moves by the rounding of others.
+def beyond_rounding(ranges: np.ndarray, map_: Map) -> np.ndarray:
+    """Ranges of the states of a flow, float64[..., D], of which one that is rounding beside others
+    of its unit is the largest of these: a body that is held moves by the rounding of others.
     """
-    units = np.array([system.units[name] for name in system.states])
+    if not isinstance(map_, Stroboscope):  # its states have no units
+        return ranges
+    units = np.array([map_.system.units[name] for name in map_.states])
     result = np.array(ranges)
     for unit in set(units):
         some = ranges[..., units == unit]

@@ -18,9 +18,9 @@ import numpy as np
 
 from saltus.analysis.closed.spread import beyond_rounding
 from saltus.analysis.lyapunov.segments import Segment, TangentFlow
+from saltus.flow.maps import Map
 from saltus.flow.progress import stage
 from saltus.kernels import status as st
-from saltus.system import System
 
 #: Blocks of a segment. A trajectory restarts after each, so this number is part of the result and
 #: never depends on the batch.
@@ -86,7 +86,7 @@ def grow(
     aligning = min(ALIGNING, transient)
     before = flow.advance(start, transient, transient - aligning)
     scale = _scale(
-        flow.map.system,
+        flow.map,
         start,
         np.concatenate([before.points, flow.sample(before.points[:, -1])], axis=1),
     )
@@ -115,7 +115,7 @@ def grow(
     return Growth(rates, volume, zeros, scale, _joined(segments))
 
 
-def _scale(system: System, start: np.ndarray, motion: np.ndarray) -> np.ndarray:
+def _scale(map_: Map, start: np.ndarray, motion: np.ndarray) -> np.ndarray:
     """Range of each state, float64[k, D], in the motion float64[k, m, D]: it makes lengths of
     different units comparable.
 
@@ -127,7 +127,7 @@ def _scale(system: System, start: np.ndarray, motion: np.ndarray) -> np.ndarray:
             np.ptp(motion, axis=1),
             np.ptp(np.concatenate([start[:, None], motion], axis=1), axis=1),
         )
-    wide = beyond_rounding(np.where(own > AT_REST * whole, own, whole), system)
+    wide = beyond_rounding(np.where(own > AT_REST * whole, own, whole), map_)
     return np.where((wide > 0) & np.isfinite(wide), wide, 1.0)
 
 
