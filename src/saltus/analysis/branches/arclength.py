@@ -132,6 +132,7 @@ def correct(
     rows: np.ndarray,
     astray: np.ndarray | float = np.inf,
     foresee: bool = False,
+    enough: float = CLOSED,
 ) -> Zeros:
     """Newton's method from guesses float64[k, m + 1] in the planes across float64[k, m + 1].
 
@@ -148,10 +149,12 @@ def correct(
     foresee : bool
         Leave out the evaluation that would only confirm a last step: the derivative is that before
         it then.
+    enough : float
+        Residual of a zero, in units of the scale.
     """
     return newton(
         lambda z, some: equations.evaluate(z, rows[some]), guess, equations.scale[rows],
-        planes=normal, enough=CLOSED, foresee=foresee, longest_step=np.inf, farthest=astray,
+        planes=normal, enough=enough, foresee=foresee, longest_step=np.inf, farthest=astray,
         max_steps=MOST_ITERATIONS,
     )  # fmt: skip
 

@@ -35,6 +35,9 @@ ASIDE = (1e-3, 2e-4, 4e-5)
 SHRUNK = 0.005
 #: Farthest that a seed lies from its orbit, in units of the scale.
 ASTRAY = 0.5
+#: Residual of points of a branch that aren't corrected again, in units of the scale: they were
+#: foreseen, and their derivatives alone are missing.
+FORESEEN = 1e-13
 #: Branches that are followed side by side, times the square of the unknowns of their orbits.
 ABREAST = 512
 
@@ -316,7 +319,7 @@ def _of(orbits: PeriodicOrbits, curve: Arc, ends: tuple[str, str], kind: type[Br
     z, tangent, derivative = (np.array(one) for one in (curve.z, curve.tangent, curve.derivative))
     length = np.array(curve.length) - curve.length[0]
     here, rows = orbits.near(z, np.zeros(len(z), np.int64)), np.arange(len(z))
-    point = correct(here, z, tangent, rows, ENDING)
+    point = correct(here, z, tangent, rows, ENDING, enough=FORESEEN)
     good = point.found
     z[good], derivative[good] = point.z[good], point.derivative[good]
     tangent[good] = tangents(derivative[good], tangent[good])
