@@ -84,7 +84,7 @@ class Arc:
         ``range``: the end of the range was reached; ``closed``; ``points``: as many as asked for;
         ``lost``: no step however short; ``stopped``: another curve of the group is closed;
         ``met``: another group goes on along the same curve; ``enough``: the caller needs no more;
-        or what the caller says.
+        ``interrupted``: by Ctrl-C; or what the caller says.
     """
 
     z: list[np.ndarray] = field(default_factory=list)
@@ -92,6 +92,13 @@ class Arc:
     derivative: list[np.ndarray] = field(default_factory=list)
     length: list[float] = field(default_factory=list)
     end: str = ""
+
+    def whole(self) -> Arc:
+        """The points of which all is known, when Ctrl-C has ended the curve."""
+        parts = self.z, self.tangent, self.derivative, self.length
+        count = min(map(len, parts))
+        z, tangent, derivative, length = (part[:count] for part in parts)
+        return Arc(z, tangent, derivative, length, self.end or "interrupted")
 
     def behind(self, back: Arc) -> Arc:
         """The curve through the start of both that comes along another one and goes on as this."""

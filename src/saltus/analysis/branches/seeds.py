@@ -25,8 +25,8 @@ from saltus.system import System
 RESTING_VALUES = 3
 #: Random starts at each of these values.
 RESTING_STARTS = 64
-#: Least range that counts of a state, as a part of the largest of those with its unit. High modes of
-#: a structure have tiny amplitudes, whose phases turn by many turns along a branch: they would set
+#: Least range that counts of a state, as a part of the largest of those with its unit. High modes
+#: of a structure have tiny amplitudes, whose phases turn many times along a branch: they would set
 #: the length of its steps.
 LEAST_SHARE = 0.1
 #: An equilibrium so near to zero is there, in units of the starts.
@@ -189,4 +189,5 @@ def _with_least(system: System, scale: np.ndarray) -> np.ndarray:
     """Ranges of the states, none smaller than LEAST_SHARE of the largest one with its unit."""
     units_of = np.array([system.state_unit(name) for name in system.states])
     alike = (units_of[:, None] == units_of) & (units_of != "")
-    return np.maximum(scale, LEAST_SHARE * np.where(alike, scale, 0.0).max(axis=1))
+    largest: np.ndarray = np.where(alike, scale, 0.0).max(axis=1)
+    return np.asarray(np.maximum(scale, LEAST_SHARE * largest))
