@@ -95,10 +95,9 @@ class Arc:
 
     def whole(self) -> Arc:
         """The points of which all is known, when Ctrl-C has ended the curve."""
-        parts = self.z, self.tangent, self.derivative, self.length
-        count = min(map(len, parts))
-        z, tangent, derivative, length = (part[:count] for part in parts)
-        return Arc(z, tangent, derivative, length, self.end or "interrupted")
+        k = min(len(self.z), len(self.tangent), len(self.derivative), len(self.length))
+        end = self.end or "interrupted"
+        return Arc(self.z[:k], self.tangent[:k], self.derivative[:k], self.length[:k], end)
 
     def behind(self, back: Arc) -> Arc:
         """The curve through the start of both that comes along another one and goes on as this."""
