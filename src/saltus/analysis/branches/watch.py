@@ -1,5 +1,5 @@
-"""What is known of branches while they are followed: how much work they have taken, how far it is,
-and what Ctrl-C leaves of them.
+"""The watch on branches while they are followed: a budget of work, progress, and the points so far,
+which Ctrl-C leaves.
 """
 
 from __future__ import annotations
