@@ -21,8 +21,8 @@ CHAIN = sl.structure(
         sl.Contact("c", stiffness=40.0, damping=60.0, gap=0.02, side="both", name="right"),
     ],
 )  # fmt: skip
-#: The third is in resonance with a mode, which then goes into a block.
-FREQUENCIES = (0.61, 0.611, 0.62, 0.64, 0.609)
+#: Near to one another, so that most contact states are the same.
+FREQUENCIES = (0.61, 0.611, 0.62, 0.609)
 
 
 def _tangents(frequencies):
@@ -31,7 +31,7 @@ def _tangents(frequencies):
     for frequency in frequencies:
         row = np.array([list(CHAIN.with_values(frequency=frequency).values.values())])
         map_ = Stroboscope(CHAIN, sl.Modal(), row)
-        found.append(map_.tangent_by(np.full((1, 6), 0.03), 6, ("frequency", "force")))
+        found.append(map_.tangent_by(np.full((1, 6), 0.03), 2, ("frequency", "force")))
     return found
 
 
