@@ -162,6 +162,7 @@ VARIABLES = {
 _STOPPED = {
     "points": "stopped by points=",
     "lost": "lost",
+    "interrupted": "interrupted",
     "held": "ends where the chatter before a held contact changes",
 }
 
