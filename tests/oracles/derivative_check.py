@@ -13,7 +13,6 @@ import signal
 import sys
 import time
 import warnings
-from dataclasses import dataclass
 from functools import partial
 from random import Random
 
@@ -22,16 +21,8 @@ import numpy as np
 import saltus as sl
 
 from .derivative_systems import Case, random_case
+from .differences import Column, shifts
 
-SHIFTS = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
-#: Differences of fourth order, and of second order on either side.
-MIDDLE = np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / 12.0
-SIDES = np.array([[1.0, -4.0, 3.0, 0.0, 0.0], [0.0, 0.0, -3.0, 4.0, -1.0]]) / 2.0
-#: Two steps, in the parameter.
-STEPS = (3e-5, 4e-6)
-#: Part of a derivative, and of the largest of its kind, that it may be off; differences whose own
-#: error is larger than the last, in the largest, decide nothing.
-ALLOWED, OF_LARGEST, UNDECIDABLE = 1e-6, 1e-7, 1e-3
 READ = {
     "derivative": "value", "contact_time_derivative": "contact_time",
     "maximum_derivative": "maximum", "minimum_derivative": "minimum",
@@ -44,38 +35,6 @@ SECONDS = 60  # of the processor
 
 class LateError(Exception):
     """The time of one system is used up."""
-
-
-@dataclass(frozen=True)
-class Column:
-    """The derivatives of one kind by one parameter: found, by differences, their errors."""
-
-    kind: str
-    to: str
-    found: np.ndarray
-    expected: np.ndarray
-    error: np.ndarray
-    left_out: np.ndarray | bool = False
-
-    @property
-    def largest(self) -> float:
-        return float(np.nanmax(np.abs(self.expected), initial=1e-3))
-
-    @property
-    def decided(self) -> np.ndarray:
-        """Where the differences say something."""
-        return np.isfinite(self.expected) & (self.error <= UNDECIDABLE * self.largest)
-
-    @property
-    def off(self) -> np.ndarray:
-        """How far each is off, in what it may be; NaN where nothing is said."""
-        may = 10 * self.error + ALLOWED * np.abs(self.expected) + OF_LARGEST * self.largest
-        return np.where(self.decided, np.abs(self.found - self.expected) / may, np.nan)
-
-    @property
-    def unknown(self) -> np.ndarray:
-        """Where a derivative exists and none is given."""
-        return self.decided & ~np.isfinite(self.found) & ~np.asarray(self.left_out)
 
 
 def case(seed: str) -> Case:
@@ -91,35 +50,28 @@ def columns(that: Case, method: sl.Method, extremes: bool = True) -> list[Column
     if found["status"] not in REACHED:
         return found["status"]
     kinds = [kind for kind in READ if kind in found]
-    shifts = np.concatenate([SHIFTS * step for step in STEPS])
     answer = []
     for number, name in enumerate(to):
         state = name.endswith("(0)")
         place = [*system.states].index(name[:-3]) if state else None
         base = that.start[place] if state else system.values[name]
-        unit = max(abs(base), 0.1)
+        moved, unit = shifts(base)
         if state:
-            starts = [np.add(that.start, s * unit * np.eye(len(that.start))[place]) for s in shifts]
+            starts = [np.add(that.start, s * np.eye(len(that.start))[place]) for s in moved]
             runs = fly(system, starts)
         elif name == system.forced_at:  # periods of their own have no times in common
-            values = [base + s * unit for s in shifts]
-            runs = [fly(system.with_values(**{name: v}), [that.start])[0] for v in values]
+            values = [system.with_values(**{name: base + s}) for s in moved]
+            runs = [fly(one, [that.start])[0] for one in values]
         else:
-            runs = fly(system, [that.start] * len(shifts), {name: base + shifts * unit})
+            runs = fly(system, [that.start] * len(moved), {name: base + moved})
         if any(run["contacts"] != found["contacts"] for run in runs):
             answer.append(Column("other contacts", name, *np.empty((3, 0))))
             continue
         for kind in kinds:
-            read = np.array([run[READ[kind]] for run in runs]).reshape(2, len(SHIFTS), -1)
-            first, second = (
-                np.tensordot(MIDDLE, part, 1) / (step * unit)
-                for part, step in zip(read, STEPS, strict=True)
-            )
-            left, right = np.tensordot(SIDES, read[1], 1) / (STEPS[1] * unit)
-            error = np.maximum(np.abs(second - first), np.abs(right - left))
+            read = [run[READ[kind]] for run in runs]
             left_out = found["ends of chatter"] if kind.startswith("contact") else False
-            own = found[kind][..., number].ravel()
-            answer.append(Column(kind, name, own, second, error, left_out))
+            own = found[kind][..., number]
+            answer.append(Column.of(kind, name, own, read, unit, left_out))
     return answer
 
 

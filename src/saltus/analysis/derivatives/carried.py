@@ -14,8 +14,9 @@ import numpy as np
 
 from saltus.analysis.inputs.spans import Span
 from saltus.analysis.inputs.starts import Ensemble
-from saltus.analysis.motion.sample_times import NO_SAMPLES, SampleTimes
+from saltus.analysis.motion.sample_times import NO_SAMPLES, SampleTimes, at_times
 from saltus.errors import ParameterError
+from saltus.flow import engine
 from saltus.flow.methods import Method
 from saltus.flow.request import Outcome, Request
 from saltus.system import System
@@ -25,6 +26,8 @@ from saltus.system.parametric import parametric
 #: Kinds of contacts at which a motion begins to be held: behind them its rates aren't those of the
 #: equations.
 HELD = ("hold",)
+#: Length of a run that only tells in which mode a motion begins [periods].
+SHORT = 1e-6
 
 
 @dataclass(frozen=True)
@@ -231,12 +234,15 @@ class CarriedDerivatives:
         return at
 
     def _begin(self, group: Ensemble, length: Span) -> np.ndarray:
-        """Rates at the starts, float64[n, D]."""
+        """Rates at the starts, float64[n, D], in the modes in which the motions begin."""
         if length.t_start == 0.0:
             return np.zeros(group.start.shape)
+        short = replace(length, count=np.zeros_like(length.count), phase=SHORT * length.period)
+        first = at_times(short, 0, np.array([length.t_start]))
+        found = engine.run(self.flown, self._method, self.request(group, short, first))
         every, time = np.arange(group.size), np.full(group.size, length.t_start)
-        values = self.parameters(group, every)
-        return field(self.system, time, group.start.T, values).T
+        nothing = np.zeros((group.size, 0, 0))
+        return self.rates(Places(time, group.start, nothing, found.sample_mode[:, 0], every), group)
 
 
 def _alone(whole: Request, i: int, times: np.ndarray) -> Request:
