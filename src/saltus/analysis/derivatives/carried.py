@@ -134,12 +134,16 @@ class CarriedDerivatives:
                     "call."
                 )
             )
+        times, end = base.times, base.end_phase / unit
+        if times is not None:
+            times = times / float(unit[0])  # the end rounds in its own way: no sample lies beyond
+            end = np.maximum(end, times.max(initial=0.0) - base.end_count)
         return replace(
             changed,
             period=np.ones(n),
-            end_phase=base.end_phase / unit,
+            end_phase=end,
             origin=base.origin / float(unit[0]),
-            times=None if base.times is None else base.times / float(unit[0]),
+            times=times,
             t_end=base.t_end / float(unit[0]),
         )
 
