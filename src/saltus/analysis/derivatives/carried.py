@@ -147,6 +147,13 @@ class CarriedDerivatives:
             t_end=base.t_end / float(unit[0]),
         )
 
+    def lost(self, at: Places) -> bool:
+        """True if derivatives are unknown where the motion isn't: modes that go together leave the
+        modal flow without those with respect to parameters.
+        """
+        known = np.isfinite(at.states).all(axis=1)
+        return self._own and bool(np.isnan(at.slopes[known]).any())
+
     # -- what it holds -----------------------------------------------------------------------------
     def samples(
         self, outcome: Outcome, group: Ensemble, length: Span, time: np.ndarray, kept: Any

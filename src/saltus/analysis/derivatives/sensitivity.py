@@ -37,6 +37,7 @@ from saltus.errors import ParameterError, SaltusWarning
 from saltus.flow import engine
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporting
+from saltus.flow.taylor import Taylor
 from saltus.system import System
 from saltus.system.outputs import with_more
 from saltus.system.read_off import Quantity
@@ -82,8 +83,12 @@ def sensitivity(
 
     Parameters
     ----------
-    system, periods, t_end, t_start, samples, at, keep, values, method, threads, progress
+    system, periods, t_end, t_start, samples, at, keep, values, threads, progress
         As for :func:`saltus.simulate`.
+    method : Method
+        As for :func:`saltus.simulate`. Where modes go together, as rigid bodies and resonances of
+        :class:`saltus.Modal`, its derivatives with respect to parameters are those of
+        :class:`saltus.Taylor`.
     start : Dataset, or starts
         Starts as for :func:`saltus.simulate`; or what :func:`saltus.periodic_orbits`,
         :func:`saltus.attractors`, :func:`saltus.frequency_response` or :func:`saltus.branches`
@@ -157,28 +162,32 @@ def sensitivity(
     if times is not None and periods is None and t_end is None:
         t_end = last_of(times, t_start)
     length = around if orbits else span(system, group, periods, t_end, t_start)
-    turning = turning_surfaces(system, method) if extremes else Turning(system, {}, [])
-    flow = CarriedDerivatives(turning.system, method, asked.parameters)
     with reporting(progress) as show:
-        fly = partial(engine.run, flow.flown, method.suited_to(group.size))
-        closed = None
-        if orbits:
-            closed = closed_orbits(flow, group, length, lambda one: fly(one, threads))
-            group, length = closed.group, closed.length
-        plan = (
-            planned(system, group, length, samples, keep, 2 * len(flow.flown.states))
-            if times is None
-            else at_times(length, first_kept(system, length, keep), times)
-        )
-        run = SensitivityRun(
-            system=system, flow=flow, group=group, method=method, length=length, plan=plan,
-            turning=turning, asked=asked, closed=closed,
-        )  # fmt: skip
-        answer = partial(sensitivity_dataset, run)
-        try:
-            result = answer(fly(flow.request(group, length, plan), threads, show))
-        except engine.RunInterrupted as stop:
-            raise stop.then(answer) from None
+        for by in (method, Taylor()):  # the second one where modes go together
+            turning = turning_surfaces(system, by) if extremes else Turning(system, {}, [])
+            flow = CarriedDerivatives(turning.system, by, asked.parameters)
+            fly = partial(engine.run, flow.flown, by.suited_to(group.size))
+            closed = None
+            if orbits:
+                closed = closed_orbits(flow, group, length, partial(fly, threads=threads))
+                group, length = closed.group, closed.length
+            plan = (
+                planned(system, group, length, samples, keep, 2 * len(flow.flown.states))
+                if times is None
+                else at_times(length, first_kept(system, length, keep), times)
+            )
+            run = SensitivityRun(
+                system=system, flow=flow, group=group, method=by, length=length, plan=plan,
+                turning=turning, asked=asked, closed=closed,
+            )  # fmt: skip
+            answer = partial(sensitivity_dataset, run)
+            try:
+                outcome = fly(flow.request(group, length, plan), threads, show)
+                if not flow.lost(flow.ends(outcome, group, length)):
+                    break
+            except engine.RunInterrupted as stop:
+                raise stop.then(answer) from None
+        result = answer(outcome)
     warn(result, length, system)
     if closed is None:
         _warn_of_chaos(result)

@@ -19,6 +19,7 @@ from saltus.analysis.motion.sample_times import SampleTimes, at_times
 from saltus.errors import ParameterError
 from saltus.flow import engine
 from saltus.flow.methods import Method
+from saltus.flow.taylor import Taylor
 from saltus.system import System
 from saltus.units import to_si
 
@@ -110,6 +111,10 @@ class Motions:
         outcome = engine.run(self._flow.flown, self.method.suited_to(1), request, 1)
         self.flows += 1
         at = self._flow.samples(outcome, group, length, time[None], slice(None))
+        if self._flow.lost(at):
+            self.method = Taylor()
+            self._flow = CarriedDerivatives(self.system, self.method, self._flow.names)
+            return self.with_derivatives(values)
         read = Readings(system=self.system, flow=self._flow, group=group)
         slopes = read.slopes(at)
         slopes = np.concatenate([slopes, self._by_t_start(read, at, slopes)[..., None]], axis=-1)

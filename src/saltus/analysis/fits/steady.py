@@ -29,6 +29,7 @@ from saltus.analysis.solve.linear import moves
 from saltus.errors import ParameterError
 from saltus.flow import engine
 from saltus.flow.methods import Method
+from saltus.flow.taylor import Taylor
 from saltus.interrupt import Interrupted
 from saltus.system import System
 
@@ -153,7 +154,12 @@ class SteadyResponses:
         )  # fmt: skip
         method, request = self.method.suited_to(group.size), flow.request(group, length, NO_SAMPLES)
         outcome = engine.run(flow.flown, method, request, self.threads)
-        end = flow.ends(outcome, group, length).slopes
+        there = flow.ends(outcome, group, length)
+        if flow.lost(there):
+            self.method = Taylor()
+            self._flow = CarriedDerivatives(self.system, self.method, flow.names)
+            return self._slopes(system, orbits, period)
+        end = there.slopes
         moved = moves(end[..., :size] - np.eye(size), end[..., size:])
         weights = np.concatenate([moved, np.tile(np.eye(end.shape[2] - size), (len(end), 1, 1))], 1)
         before, _ = flow.contacts(outcome, group, length, run.again)
