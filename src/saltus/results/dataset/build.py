@@ -106,6 +106,8 @@ class Subject:
         Kept where the table of the kind has them.
     gap_unit : str
         Unit of the gaps, where no guards are given.
+    margin_unit : str
+        Unit of margins to the next graze.
     varied : mapping of str to array, shape (trajectory,)
         Parameters that differ between trajectories [SI].
     forcing_period : float or array, shape (trajectory,), optional
@@ -119,6 +121,7 @@ class Subject:
     attrs: Mapping[str, Any] = field(default_factory=dict)
     guards: Guards | None = None
     gap_unit: str = ""
+    margin_unit: str = ""
     varied: Mapping[str, Any] = field(default_factory=dict)
     forcing_period: float | np.ndarray | None = None
     batch: bool = True
@@ -242,6 +245,7 @@ class _Building:
         first = subject.units.get(subject.states[0], "") if subject.states else ""
         self.words = {
             "<gap>": gap,
+            "<margin>": subject.margin_unit,
             "<gap rate>": schema.rate_unit(gap),
             "<root gap>": schema.root_unit(gap),
             "<first>": first,
