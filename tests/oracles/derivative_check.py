@@ -1,8 +1,9 @@
-"""Derivatives that `sl.sensitivity` hands out, beside differences of motions of random systems.
+"""Derivatives that are handed out, beside differences, of random systems: of motions, periodic
+orbits, fits and places of bifurcations.
 
 ``PYTHONPATH=src:tests python -m oracles.derivative_check COUNT SEED`` prints how many derivatives
 of how many systems ended how, and for each system that doesn't agree a program that repeats it;
-``... 1 SEED.NUMBER`` repeats one.
+``... 1 SEED.NUMBER`` repeats one, ``--of orbits`` asks for periodic orbits.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import numpy as np
 
 import saltus as sl
 
+from . import event_derivatives, orbit_derivatives, response_derivatives
 from .derivative_systems import Case, random_case
 from .differences import Column, shifts
 
@@ -31,6 +33,7 @@ READ = {
 METHODS = {"Taylor": sl.Taylor(), "Modal": sl.Modal()}
 REACHED = ("ok", "graze_unresolved")
 SECONDS = 60  # of the processor
+NOTHING_WRONG = ("same", "undecidable", "unforced", "no orbit", "no event")
 
 
 class LateError(Exception):
@@ -106,11 +109,17 @@ def _sensitivity(system, starts, values=None, *, that, method, extremes):
     return answer
 
 
-def judged(that: Case, which: str) -> tuple[str, list[str], int]:
+OF = {
+    "motions": columns, "orbits": orbit_derivatives.columns, "events": event_derivatives.columns,
+    "histories": response_derivatives.histories, "responses": response_derivatives.responses,
+}  # fmt: skip
+
+
+def judged(that: Case, which: str, of: str = "motions") -> tuple[str, list[str], int]:
     """How a case ends by a method, what is wrong with it, and how many derivatives were judged."""
     signal.setitimer(signal.ITIMER_PROF, SECONDS)
     try:
-        found = columns(that, METHODS[which])
+        found = OF[of](that, METHODS[which])
     except LateError:
         return "late", [], 0
     except Exception as error:
@@ -139,6 +148,7 @@ def main(arguments=None) -> int:
     parser.add_argument("count", type=int)
     parser.add_argument("seed", help="a number; or SEED.NUMBER, with a count of 1")
     parser.add_argument("methods", nargs="*", default=list(METHODS))
+    parser.add_argument("--of", choices=OF, default="motions")
     given = parser.parse_args(arguments)
     signal.signal(signal.SIGPROF, _late)
     seeds = [given.seed] if "." in given.seed else [f"{given.seed}.{i}" for i in range(given.count)]
@@ -146,15 +156,15 @@ def main(arguments=None) -> int:
     for seed in seeds:
         that = case(seed)
         for which in given.methods:
-            verdict, wrong, more = judged(that, which)
+            verdict, wrong, more = judged(that, which, given.of)
             count[f"{which}: {verdict}"] += 1
             decided += more
-            if verdict not in ("same", "undecidable"):
+            if verdict not in NOTHING_WRONG:
                 print(f"\n# {seed}, {which}, {that.name}: {verdict}", *wrong[:6], sep="\n#   ")
                 if wrong:
                     print(that.reproduction(which), flush=True)
     print(f"# {time.process_time() - began:.0f} s, {decided} derivatives: {dict(count)}")
-    return int(any(not name.endswith(("same", "undecidable")) for name in count))
+    return int(any(not name.endswith(NOTHING_WRONG) for name in count))
 
 
 if __name__ == "__main__":

@@ -24,6 +24,8 @@ def columns(that: Case, method: sl.Method) -> list[Column] | str:
     """Derivatives of the places of some events over the frequency, or why there are none."""
     system = that.system()
     varied = system.forced_at
+    if varied is None:
+        return "unforced"
     to = [name for name in that.to if not name.endswith("(0)") and name != varied]
     base = system.values[varied]
     limits = (base * (1.0 - RANGE), base * (1.0 + RANGE))

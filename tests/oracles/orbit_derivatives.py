@@ -33,24 +33,22 @@ def closed(that: Case, method: sl.Method, seed: int = 1):
     starts = start * rng.uniform(-1.0, 1.0, (12, size))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        if system.forced_at is None:
-            return sl.attractors(system, starts[:3], periods=300, method=method)
         return sl.periodic_orbits(system, starts, periods=2, method=method)
 
 
 def columns(that: Case, method: sl.Method, seed: int = 1) -> list[Column] | str:
     """All derivatives of some orbits of a case, or why there are none."""
-    system, found = that.system(), closed(that, method, seed)
+    system = that.system()
+    if system.forced_at is None:
+        return "unforced"
+    found = closed(that, method, seed)
     to = [name for name in that.to if not name.endswith("(0)")]
-    prefix = "orbit" if system.forced_at is not None else "attractor"
-    count = found[f"{prefix}_period" if prefix == "orbit" else "attractor_cycle"].values
-    repeats = np.flatnonzero(count > 0)[:ORBITS]
-    if not len(repeats):
+    if not found.sizes["orbit"]:
         return "no orbit"
     return [
         column
-        for one in repeats
-        for column in _of_orbit(system, found.isel({prefix: one}), to, method)
+        for one in range(min(ORBITS, found.sizes["orbit"]))
+        for column in _of_orbit(system, found.isel(orbit=one), to, method)
     ]
 
 
@@ -77,7 +75,7 @@ def _of_orbit(system, orbit, to, method):
             answer.append(Column("fold", name, *np.empty((3, 0))))
             continue
         for kind, read in READ.items():
-            late = kind == "end_derivative" and _moves_period(system, name)
+            late = kind == "end_derivative" and name == system.forced_at
             if kind not in one or late:
                 continue
             rows = [_nearest(run[read], one[read]) for run in runs]
@@ -92,10 +90,6 @@ def _of_orbit(system, orbit, to, method):
 
 
 PARTS = ((" real", np.real), (" imag", np.imag))
-
-
-def _moves_period(system, name):
-    return system.forced_at is None or name == system.forced_at
 
 
 def _nearest(values, own):

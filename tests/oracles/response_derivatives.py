@@ -45,6 +45,8 @@ def _compared(model, bases, names, word, contacts) -> list[Column]:
 def responses(that: Case, method: sl.Method) -> list[Column] | str:
     """Derivatives of sizes of the steady response of a case."""
     system = that.system()
+    if system.forced_at is None:
+        return "unforced"
     names = [n for n in that.to if not n.endswith("(0)") and n != system.forced_at]
     at = np.array([system.values[system.forced_at]] * 2)
 
