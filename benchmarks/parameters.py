@@ -1,29 +1,27 @@
 """Many parameter sets: derivatives beside closed forms and differences, fits of synthetic
 measurements, and the scatter of the rig.
 
-    OPENBLAS_NUM_THREADS=1 python benchmarks/parameters.py [derivatives] [fits] [scatter]
+    OPENBLAS_NUM_THREADS=1 python benchmarks/parameters.py [derivatives] [fits] [sets]
 
-`--fits 100 --sets 10000` are the numbers of measurements and sets. All random numbers have fixed
-seeds. Times are those of this machine; scatter runs as a study, by one worker and by two.
+`--whole` takes 100 measurements and 10 000 sets, in place of a few. All random numbers have fixed
+seeds. Times are those of this machine; sets run as a study, which needs `saltus[cluster]`.
 """
 
 from __future__ import annotations
 
 import argparse
-import subprocess
 import sys
-import tempfile
-import time
 import warnings
 from pathlib import Path
 
 import numpy as np
-from scipy.optimize import least_squares
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "src"))
 
+from parameter_fits import fits, jump, refused, undecided
+from parameter_sets import scatter
+
 import saltus as sl
-from saltus.analysis.fits.unknowns import INSIDE, Unknowns
 from saltus.errors import SaltusWarning
 
 #: Differences of fourth order, and their steps.
@@ -77,9 +75,13 @@ def derivatives():
             print(f"| {name}, {what} | every parameter | differences | {worst:.0e} |")
     print(f"| chatter, contact times | height, g, e | closed form | {chatter():.0e} |")
     print(f"| orbits, amplitude without contact | k, d, force | closed form | {amplitude():.0e} |")
-    for name, system in (("soft contacts", bumper), ("impacts", hammer), ("stick-slip", slider)):
+    pressed = hammer.with_values(f=0.5, gap=-0.05, e=0.3)  # it chatters to rest in each period
+    classes = (("soft contacts", bumper), ("impacts", hammer), ("stick-slip", slider))
+    for name, system in (*classes, ("chatter to rest", pressed)):
         print(f"| orbits, {name} | a random way | differences | {orbits(system, random):.0e} |")
-    print(f"| responses, soft contacts | a random way | differences | {responses(random):.0e} |")
+    for name, system in classes:
+        worst = responses(system, random)
+        print(f"| responses, {name} | a random way | differences | {worst:.0e} |")
     slopes, said = graze()
     print(f"| places of grazes | gap, force, k, d | closed form | {slopes:.0e} |")
     print(f"\nAt a graze of a rigid stop: {said}\n")
@@ -147,31 +149,30 @@ def orbits(system, random):
     worst = 0.0
     for _ in range(SYSTEMS // 2):
         own = varied(system, random)
-        orbit = sl.attractors(own, (0.0, 0.1)).isel(attractor=0)
+        start = min(0.0, 2 * own.values.get("gap", 0.0)), 0.1  # on the near side of the stop
+        orbit = sl.attractors(own, start).isel(attractor=0)
         if str(orbit.attractor_type.item()) == "periodic":
             found = sl.sensitivity(own, orbit, to=[*own.values])
-            worst = max(worst, beside(own, found.maximum_derivative.values, orbit, random))
+            worst = max(worst, beside(own, found.maximum_derivative.values, start, random))
     return worst
 
 
-def responses(random):
+def responses(system, random):
     """Largest state of the responses over the frequency, all in one call."""
-    seen, worst = sl.frequency_response(bumper, ("1.6 Hz", "2.4 Hz", SYSTEMS), (0.0, 0.1)), 0.0
+    seen, worst = sl.frequency_response(system, ("1.6 Hz", "2.4 Hz", SYSTEMS), (0.0, 0.1)), 0.0
     seen = seen.sel(response=(seen.response_period == 1) & (seen.response_type == "periodic"))
-    found = sl.sensitivity(bumper, seen, to=[*bumper.values])
+    found = sl.sensitivity(system, seen, to=[*system.values])
     for i, frequency in enumerate(seen.response_f.values):
-        own = bumper.with_values(f=float(frequency))
-        orbit = sl.attractors(own, (0.0, 0.1)).isel(attractor=0)
-        worst = max(worst, beside(own, found.maximum_derivative.values[i], orbit, random))
+        own = system.with_values(f=float(frequency))
+        worst = max(worst, beside(own, found.maximum_derivative.values[i], (0.0, 0.1), random))
     return worst
 
 
-def beside(own, slopes, orbit, random):
+def beside(own, slopes, start, random):
     """Error of the slopes of an orbit's largest state, along a random way, beside differences."""
     to, each = [*own.values], []
     values = np.array([*own.values.values()])
     along = random.normal(size=len(to)) * values
-    start = [orbit[f"attractor_{name}"].values[0] for name in own.states]
     for shift in SHIFTS * 1e-5:
         moved = own.with_values(**dict(zip(to, values + shift * along, strict=True)))
         there = sl.attractors(moved, start).isel(attractor=0)
@@ -193,136 +194,13 @@ def graze():
     return off(slopes.event_derivative.values, exact), said[0].strip()
 
 
-# -- fits ------------------------------------------------------------------------------------------
-#: Unknowns of the rig, and their bounds.
-FREE = {
-    "upper_gap": (1e-4, 2e-3),
-    "contact_stiffness": (1e3, 1e5),
-    "damping_ratio": (0.005, 0.1),
-}
-#: Measurements whose search is repeated by differences: it takes long.
-RIVALS = 10
-
-
-def fits(count):
-    """60 noisy periods (1 %) of rigs with random gaps, stiffnesses and dampings."""
-    random, names = np.random.default_rng(20261126), list(FREE)
-    low, high = np.array([*FREE.values()]).T
-    rig = sl.models.delangre("a", force="4 N", frequency="8 Hz")
-    at = np.arange(1, 60 * 24 + 1) / (24 * 8.0)
-    off, took, flows, grown, rivals = [], [], [], [], []
-    for number in range(count):
-        truth = np.exp(np.log(low) + (0.15 + 0.7 * random.random(3)) * np.log(high / low))
-        exact = sl.simulate(rig.with_values(**dict(zip(names, truth, strict=True))), at=at).x.values
-        noise = 0.01 * np.sqrt(np.mean(exact**2))
-        measured = exact + noise * random.standard_normal(len(at))
-        begin = time.process_time()
-        found = sl.fit(rig, {"t": at, "x": measured}, FREE, progress=False)
-        took.append(time.process_time() - begin)
-        off.append((found.value.values - truth) / found.standard_error.values)
-        flows.append(int(found.flows))
-        if number < RIVALS:
-            both = [differences(rig, at, measured, jac) for jac in ("2-point", "3-point")]
-            rivals.append(both)
-            grown.append(flows[-1])
-    inside = np.abs(off) < 2
-    print(f"{count} measurements of the rig, 60 periods, noise of 1 %, three unknowns")
-    for name, share in zip(names, inside.mean(axis=0), strict=True):
-        print(f"  {name:18} within two standard errors in {share:.0%}")
-    print(f"  wrong by more than five: {int((np.abs(off) > 5).any(axis=1).sum())} fits")
-    print(f"  CPU time {np.median(took):.2f} s (median), {np.max(took):.1f} s (longest)")
-    two, three = np.median(np.array(rivals), axis=0)
-    print(
-        f"  motions: {np.median(grown):.0f} (median of {len(grown)}), by forward differences "
-        f"{two:.0f}, by central ones {three:.0f}; of all fits {np.median(flows):.0f}\n"
-    )
-
-
-def differences(rig, at, measured, jac):
-    """Motions that SciPy's differences take for the four best of the same 17 places."""
-    unknowns = Unknowns.of(rig, FREE)
-    own = unknowns.shares(np.array([rig.values[name] for name in FREE]))
-    places = np.concatenate([np.clip(own, INSIDE, 1 - INSIDE)[None], unknowns.scattered(16, 1)])
-    count = [len(places)]
-
-    def residuals(shares):
-        values = dict(zip(FREE, unknowns.values(shares[None])[0].tolist(), strict=True))
-        return sl.simulate(rig, at=at, values=values).x.values - measured
-
-    def counted(shares):
-        count[0] += 1
-        return residuals(shares) / measured.std()
-
-    misfit = [np.sum(residuals(place) ** 2) for place in places]
-    for i in np.argsort(misfit, kind="stable")[:4]:
-        least_squares(counted, places[i], jac=jac, bounds=(0, 1), max_nfev=60)
-    return count[0]
-
-
-# -- scatter ---------------------------------------------------------------------------------------
-STUDY = """
-[study]
-name = "scatter"
-[system]
-model = "delangre"
-case = "a"
-force = "4 N"
-frequency = "15 Hz"
-[scatter]
-samples = {sets}
-start = {{ x = ["0 mm", "5 mm"], v = "0 m/s" }}
-uncertain.upper_gap = {{ normal = ["0.4 mm", "0.02 mm"], low = "0.3 mm" }}
-uncertain.contact_stiffness = {{ uniform = ["12 kN/m", "16 kN/m"] }}
-uncertain.damping_ratio = {{ lognormal = ["0.03", 1.1] }}
-"""
-
-
-def scatter(sets):
-    """Peaks and responses of the rig at 15 Hz, by one worker and by two."""
-    took, hashes = [], []
-    with tempfile.TemporaryDirectory() as folder:
-        (Path(folder) / "study.toml").write_text(STUDY.format(sets=sets))
-        for workers in ("1", "2"):
-            command = [sys.executable, "-m", "saltus.cli", "run", "study.toml", "--out", workers]
-            begin = time.perf_counter()
-            subprocess.run(
-                [*command, "--workers", workers, "--progress", "none"], cwd=folder, check=True,
-                capture_output=True,
-            )  # fmt: skip
-            took.append(time.perf_counter() - begin)
-            found = sl.load(Path(folder) / workers / "scatter.nc")
-            hashes.append(found.attrs["result_hash"])
-    print(f"{sets} sets of the rig at 15 Hz: gap, stiffness and damping uncertain")
-    one, two = took
-    print(f"  {one:.1f} s with one worker, {two:.1f} s with two ({one / two:.2f} times)")
-    print(f"  equal bits: {hashes[0] == hashes[1]}")
-    for q in (0.05, 0.5, 0.95):
-        each = [found.sel(outcome="x peak", start=start, quantile=q) for start in (0, 1)]
-        texts = [
-            f"{1e3 * float(at.quantile_of):.4f} mm ({1e3 * float(at.quantile_low):.4f} to "
-            f"{1e3 * float(at.quantile_high):.4f})"
-            for at in each
-        ]
-        print(f"  peak, {q:4.0%}: from rest {texts[0]}, from 5 mm {texts[1]}")
-    for k in range(found.sizes["response"]):
-        at = found.isel(response=k)
-        exists = share(at, "probability_exists")
-        reached = [share(at.isel(start=start), "probability_reached") for start in (0, 1)]
-        name = f"{at.response_type.item()} {int(at.response_period)}T"
-        print(f"  {name}: exists {exists}; reached from rest {reached[0]}, from 5 mm {reached[1]}")
-
-
-def share(at, name):
-    low, high = (100 * float(at[f"{name}_{end}"]) for end in ("low", "high"))
-    return f"{100 * float(at[name]):.2f} % ({low:.2f} to {high:.2f})"
-
-
 def main():
-    parts = {"derivatives", "fits", "scatter"}
+    parts = {"derivatives", "fits", "sets"}
     asked = argparse.ArgumentParser(description=__doc__)
-    asked.add_argument("parts", nargs="*", metavar="derivatives, fits, scatter")
-    asked.add_argument("--fits", type=int, default=100)
-    asked.add_argument("--sets", type=int, default=10_000)
+    asked.add_argument("parts", nargs="*", metavar="derivatives, fits, sets")
+    asked.add_argument("--whole", action="store_true", help="100 measurements, 10 000 sets")
+    asked.add_argument("--fits", type=int)
+    asked.add_argument("--sets", type=int)
     given = asked.parse_args()
     wanted = set(given.parts) or parts
     if wanted - parts:
@@ -332,9 +210,13 @@ def main():
         if "derivatives" in wanted:
             derivatives()
         if "fits" in wanted:
-            fits(given.fits)
-        if "scatter" in wanted:
-            scatter(given.sets)
+            fits(given.fits or (100 if given.whole else 5))
+            random = np.random.default_rng(20261126)
+            jump(random)
+            undecided(random)
+            refused()
+        if "sets" in wanted:
+            scatter(given.sets or (10_000 if given.whole else 300))
 
 
 if __name__ == "__main__":

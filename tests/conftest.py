@@ -17,61 +17,68 @@ import pytest
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 #: Files in which tests take longest, longest first: no process is to begin one of them when all
-#: others have ended.
+#: others have ended. Of the first four all tests are slow.
 LONGEST = (
     "truth/test_basins.py",
     "faults/test_study_faults.py",
-    "unit/analysis/branches/test_branches.py",
-    "paper/test_figures.py",
-    "truth/test_modal_blocks.py",
+    "test_examples.py",
+    "unit/study/test_divided.py",
     "conformance/test_tiers.py",
     "conformance/test_every_verb.py",
-    "truth/test_long_sums.py",
-    "conformance/test_every_method.py",
-    "unit/analysis/responses/test_arcs.py",
+    "unit/analysis/branches/test_branches.py",
     "truth/test_responses.py",
-    "test_examples.py",
-    "truth/test_lyapunov.py",
-    "truth/test_impact_branches.py",
-    "truth/test_attractors.py",
-    "truth/test_wolf.py",
-    "truth/test_modal_impact_derivatives.py",
-    "oracles/test_oracles.py",
-    "conformance/test_long_equations.py",
-    "unit/plot/test_responses.py",
-    "truth/test_modal_motions.py",
-    "truth/test_modal_laws.py",
-    "unit/test_startup.py",
-    "truth/test_random_diagrams.py",
-    "unit/analysis/branches/test_backbone.py",
-    "unit/analysis/branches/test_graze_curves.py",
-    "unit/analysis/attractors/test_aperiodic.py",
-    "unit/analysis/branches/test_equilibrium_branches.py",
-    "unit/cli/test_cli.py",
-    "unit/analysis/branches/test_bifurcation_curve.py",
-    "truth/test_unstable_cycles.py",
+    "paper/test_figures.py",
     "conformance/test_outputs.py",
-    "unit/study/test_maps_run.py",
+    "conformance/test_every_method.py",
+    "truth/test_unstable_cycles.py",
+    "unit/analysis/branches/test_graze_curves.py",
+    "unit/analysis/branches/test_backbone.py",
     "truth/test_unforced.py",
-    "truth/test_modal.py",
-    "truth/test_basin_measures.py",
     "unit/study/test_questions.py",
-    "unit/codegen/test_jets.py",
-    "truth/test_elements.py",
-    "unit/test_benchmarks.py",
-    "faults/test_result_files.py",
-    "truth/test_order.py",
-    "unit/results/files/test_files.py",
-    "unit/cli/test_cli_maps.py",
+    "unit/analysis/attractors/test_aperiodic.py",
+    "conformance/test_random_memory.py",
+    "test_docstrings.py",
     "unit/analysis/attractors/test_noisy.py",
+    "unit/cli/test_cli_maps.py",
+    "faults/test_result_files.py",
+    "truth/test_attractors.py",
+    "unit/analysis/branches/test_bifurcation_curve.py",
+    "conformance/test_laws.py",
     "truth/test_contact_peaks.py",
+    "truth/test_modal_motions.py",
+    "truth/test_modal_impact_derivatives.py",
+    "unit/test_startup.py",
+    "truth/test_lyapunov.py",
+    "truth/test_rotors.py",
+    "truth/test_periodic_orbits.py",
+    "truth/test_modal_blocks.py",
+    "unit/study/test_maps_run.py",
+    "unit/analysis/responses/test_arcs.py",
+    "unit/codegen/test_jets.py",
+    "unit/plot/test_responses.py",
+    "truth/test_impacts_by_method.py",
+    "conformance/test_long_equations.py",
+    "truth/test_steep_contacts.py",
+    "truth/test_modal_friction_and_stops.py",
+    "truth/test_orbit_sensitivity.py",
+    "truth/test_modal_friction.py",
+    "truth/test_elements.py",
+    "truth/test_orbit_measures.py",
+    "truth/test_impact_branches.py",
+    "truth/test_basin_measures.py",
+    "truth/test_modal_sweeps.py",
+    "unit/results/files/test_files.py",
+    "property/test_invariance.py",
+    "truth/test_order.py",
+    "unit/analysis/branches/test_equilibrium_branches.py",
     "unit/analysis/branches/test_ladders.py",
     "test_docs.py",
-    "truth/test_impacts_by_method.py",
-    "truth/test_modal_sweeps.py",
-    "truth/test_modal_laws_blocks.py",
-    "unit/codegen/test_cache.py",
+    "truth/test_wolf.py",
+    "truth/test_one_orbit.py",
     "faults/test_interrupted_runs.py",
+    "test_readme.py",
+    "conformance/test_breaks.py",
+    "unit/codegen/test_cache.py",
 )
 
 #: Where results are written as users write them, as netCDF-4.
@@ -101,13 +108,25 @@ def pytest_collection_finish():
     gc.enable()
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(collector):
+    """Every second process begins with the last file of a folder: in a new clone it then reads half
+    of the files as the other one has compiled them.
+    """
+    report = yield
+    odd = os.environ.get("PYTEST_XDIST_WORKER", "gw0")[-1] in "13579"
+    if odd and isinstance(collector, pytest.Directory):
+        report.result.reverse()
+    return report
+
+
 def pytest_collection_modifyitems(config, items):
-    """Whole files, in the order of LONGEST; all others stay as they are. --no-loadscope-reorder
+    """Whole files, in the order of LONGEST, all others by their names. --no-loadscope-reorder
     keeps the order (pyproject.toml).
     """
     here = Path(__file__).parent
     order = {here / name: place for place, name in enumerate(LONGEST)}
-    items.sort(key=lambda item: order.get(item.path, len(order)))
+    items.sort(key=lambda item: (order.get(item.path, len(order)), item.path))
 
 
 @pytest.fixture(autouse=True, scope="session")

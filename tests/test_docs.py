@@ -117,5 +117,5 @@ def test_every_public_name_is_documented():
 
 def test_ci_builds_the_documentation_without_warnings():
     script = (ROOT / ".ci" / "run").read_text()
-    assert 'pip install -q -e ".[docs,lint]"' in script
+    assert 'pip install -q -e ".[docs,lint,browser]"' in script
     assert "sphinx-build -W --keep-going" in script

@@ -156,7 +156,7 @@ CALLS = {
                 }[how]
             },
             "start": START[how],
-            "samples": 4,
+            "samples": 2,
             "indices": True,
         },
     ),

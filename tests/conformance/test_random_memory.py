@@ -29,7 +29,6 @@ def test_elements_with_a_memory_end_where_their_machines_end(seed):
     _agrees(seed)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("seed", [f"1.{i}" for i in range(3)])
 def test_joined_and_nested_conditions_end_where_rk4_ends(seed):
     _agrees(seed, conditions=True)

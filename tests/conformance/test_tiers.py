@@ -27,7 +27,6 @@ from saltus.kernels import status as st
 from saltus.system.tangent import tangent_system
 
 pytestmark = [
-    pytest.mark.slow,
     pytest.mark.skipif(jit_disabled(), reason="nothing is compiled with the JIT off"),
 ]
 TAYLOR = sl.Taylor(lanes=2)

@@ -135,7 +135,7 @@ def test_a_boundary_that_jumps_over_the_state_at_a_break_of_time(early, late, co
     again at 1), or short of x = 0.6.
     """
     jumping = sl.system(states="x")(_two_speeds).with_values(early=early, late=late)
-    run = sl.simulate(jumping, (0.0,), t_end=1.0, samples=10, method=sl.Taylor(order=12, lanes=2))
+    run = sl.simulate(jumping, (0.0,), t_end=1.0, samples=10, method=sl.Taylor(lanes=2))
     assert run.contact_time.values == pytest.approx(contacts, abs=1e-15)
     assert float(run.end_x) == pytest.approx(end, abs=1e-15)
     assert str(run.status.values) == "ok"

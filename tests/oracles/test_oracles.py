@@ -62,6 +62,7 @@ def floats(parameters):
 
 
 @pytest.mark.parametrize("row", rows("forced_linear"), ids=lambda row: row["id"])
+@pytest.mark.slow
 def test_closed_form_and_40_digits_give_the_forced_linear_runs(row):
     parameters = {**LINEAR, **run_row(row)}
     exact = high_precision.simulate(
@@ -80,6 +81,7 @@ def test_closed_form_and_40_digits_give_the_forced_linear_runs(row):
     assert abs(closed.end_v[0] - float(row["v_end_m_per_s"])) < 1e-15
 
 
+@pytest.mark.slow
 def test_closed_form_knows_its_own_rounding():
     parameters, x, v, end = piecewise_linear.random_cases(12, seed=3)
     closed = piecewise_linear.contacts(parameters, x, v, end)
@@ -206,6 +208,7 @@ def test_40_digits_give_all_contacts_of_figure_2b():
     ]
 
 
+@pytest.mark.slow
 def test_40_digits_hold_when_the_order_changes():
     exact = [
         high_precision.simulate(generate_reference.B4, 1e-3, 0.0, 3, order=order)
@@ -214,6 +217,7 @@ def test_40_digits_hold_when_the_order_changes():
     assert worst([exact[0].x, *exact[0].times], [exact[1].x, *exact[1].times]) < 1e-40
 
 
+@pytest.mark.slow
 def test_40_digits_give_the_run_of_the_full_rig():
     row = rows("runs")[0]
     exact = high_precision.simulate(
@@ -225,6 +229,7 @@ def test_40_digits_give_the_run_of_the_full_rig():
     assert abs(float(exact.times[0]) - float(row["first_event_time_s"])) < 1e-16
 
 
+@pytest.mark.slow
 def test_40_digits_close_the_doubling_of_case_b():
     """Row G07 of branches_rig.csv: R = 0 and det(M + I) = 0, M by central differences."""
     (row,) = (row for row in rows("branches_rig") if row["id"] == "G07")
@@ -250,6 +255,7 @@ def test_40_digits_close_the_doubling_of_case_b():
 
 
 @pytest.mark.parametrize("number", [5, 70, 128])
+@pytest.mark.slow
 def test_reference_file_is_what_the_generator_makes(number):
     row = rows("rig_b4_15hz_5periods")[number]
     _, x, v = generate_reference.starts()[number]
@@ -274,6 +280,7 @@ def on_boundary_at_rest(row):
     return float(row["v0_m_per_s"]) == 0.0 and float(row["x0_m"]) in (0.0, 0.4e-3)
 
 
+@pytest.mark.slow
 def test_heyoka_agrees_with_40_digits_on_case_b(systems):
     for row in rows("rig_b4_15hz_5periods"):
         if on_boundary_at_rest(row):
@@ -439,6 +446,7 @@ def test_section_inside_its_freeplay_is_a_matrix_exponential(systems):
         ("aeroelastic", SECTION, (0.01, 0.0, 0.0, 0.5), 5.0),
     ],
 )
+@pytest.mark.slow
 def test_heyoka_holds_when_its_tolerance_changes(systems, name, parameters, start, end):
     fine, coarse = (
         systems.simulate(name, parameters, start, end, tolerance=tolerance)

@@ -59,7 +59,9 @@ def test_windows_give_what_one_motion_gives_where_it_can_be_followed(monkeypatch
     assert search.best.fitted == pytest.approx(alone.fitted, abs=0.02 * noise)
 
 
-def test_a_chaotic_history_of_240_periods_gives_the_values_that_made_it():
+@pytest.mark.slow
+def test_a_chaotic_history_of_240_periods_gives_the_values_that_made_it(monkeypatch):
+    """Stopped in its third pass, the fit has what the second one has found."""
     at, x, noise = made_up(CHAOTIC, 240, 5)
     search = searched(at, x, FREE, noise)
     truth = search.unknowns.shares(np.array([*CHAOTIC.values()]))
@@ -70,6 +72,23 @@ def test_a_chaotic_history_of_240_periods_gives_the_values_that_made_it():
         here = part.minima[0].shares
     search.at(part.minima[0].shares)
     assert search.best.misfit > 25 * len(at)  # from the start it can't be followed
+    shares, passes, fly_all = [], [], windows.Windows.passed
+
+    def passed(self, *place):
+        passes.append(self.doing)
+        if len(passes) == 3:
+            raise KeyboardInterrupt
+        return fly_all(self, *place)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(windows.Windows, "passed", passed)
+        with pytest.raises(KeyboardInterrupt):
+            windows.shoot(search, part.minima[0], 3, shares.append)
+    assert (np.diff(shares) > 0).all()
+    assert len(shares) > 20
+    assert "pass 2 of" in passes[-1]
+    assert search.windows > 20
+    assert search.best.misfit < 25 * len(at)
     assert windows.shoot(search, part.minima[0], 3)
     assert search.windows > 20
     assert len(search.minima) == 3

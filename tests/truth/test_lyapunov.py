@@ -369,6 +369,7 @@ def test_lorenz_and_roessler_have_their_published_exponents():
         assert ds["flow_lyapunov_exponent"].values.tolist() == value.tolist()
 
 
+@pytest.mark.slow
 def test_other_motions_of_the_lorenz_system():
     """An equilibrium at rho = 10 has the eigenvalues of the Jacobian; at 160 there is a cycle."""
     ds = sl.lyapunov(
@@ -426,7 +427,7 @@ def test_lorenz_at_rho_20_has_two_equilibria_and_nothing_else():
     # mirror images, and so are the places that they lead to
     starts = np.array([(1.0, 1.0, 20.0), (-1.0, -1.0, 20.0)])
     ds = sl.attractors(
-        butterfly.with_values(rho=20.0), starts, method=sl.Taylor(order=12, lanes=2), every=0.75
+        butterfly.with_values(rho=20.0), starts, method=sl.Taylor(lanes=2), every=0.75
     )
     assert ds["attractor_type"].values.tolist() == ["equilibrium"] * 2
     across = math.sqrt(8 / 3 * 19)
@@ -531,6 +532,7 @@ def test_a_direction_that_is_lost_in_rounding_has_its_exponent():
 
 
 @pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.slow
 def test_random_directions_that_shrink_fast_have_their_exponents(seed):
     """From 1 to 1600 times a second, behind random oscillators: -c/2 twice, and -rate."""
 
@@ -551,6 +553,7 @@ def test_random_directions_that_shrink_fast_have_their_exponents(seed):
     assert np.isfinite(ds["lyapunov_error"].values[periodic]).all()
 
 
+@pytest.mark.slow
 def test_the_fast_chamber_of_a_relief_valve():
     """The third exponent of its limit cycle, lost in the rounding of a turn, beside that from
     blocks a tenth as long, in which it isn't: the second way knows it from the tangent.

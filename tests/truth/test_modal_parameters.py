@@ -10,6 +10,7 @@ from scipy.linalg import expm, expm_frechet
 
 import saltus as sl
 from saltus.analysis.branches.parametric_map import parametric_map
+from saltus.flow import engine, modal
 from saltus.flow.maps import Stroboscope
 from saltus.system.parametric import parametric
 
@@ -21,6 +22,19 @@ def by_differences(map_, start, name, step):
     none = np.zeros(4, int)
     ends, _ = map_.with_parameters(rows, none).ends(np.repeat(start, 4, axis=0), 1)
     return np.array([1.0, -8.0, 8.0, -1.0]) @ ends / (12 * step)
+
+
+def test_derivatives_do_not_depend_on_pauses(monkeypatch):
+    """A run is paused to hear Ctrl-C, and where a contact state has to be made first."""
+    chain, start, found = sl.models.chain(), ("2 mm", 0, 0, 0), []
+    for slow in (False, True):
+        if slow:
+            monkeypatch.setattr(engine, "SLICE", 1)
+            monkeypatch.setattr(modal, "MOST_AT_ONCE", 1)
+        asked = {"to": ["ground_gap", "frequency"], "periods": 4, "method": sl.Modal()}
+        found.append(sl.sensitivity(chain, start, **asked, extremes=False))
+    assert found[0].sizes["contact"] > 0
+    assert found[0].identical(found[1])
 
 
 @pytest.mark.nojit

@@ -10,7 +10,7 @@ import saltus as sl
 from saltus.errors import TraceError
 from saltus.flow.maps import Stroboscope
 
-METHOD = sl.Taylor(order=12, lanes=2)
+METHOD = sl.Taylor(lanes=2)
 F = 0.7
 POINTS = np.array([0.0, 0.2, 0.45, 0.8, 1.0])
 VALUES = np.array([1.0, 3.0, -1.0, 0.5, 1.0])

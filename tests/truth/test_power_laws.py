@@ -229,7 +229,7 @@ def test_the_tangent_flow_of_a_law_written_with_a_root(law):
 def assert_tangent_across_a_contact(stop, power, stiffness=1e4, x0=-1e-2, v0=0.5):
     system, duration = tangent_system(stop), duration_of(v0, stiffness, power)
     end = -x0 / v0 + 2 * duration
-    run = run_of(system, (x0, v0, 1, 0, 0, 1), end, method=sl.Taylor(order=12, lanes=2))
+    run = run_of(system, (x0, v0, 1, 0, 0, 1), end, method=sl.Taylor(lanes=2))
     tangent = [run[f"end_{name}"].item() for name in system.states[2:]]
     truth = [-1.0, -end + 2 * duration / (power + 1), 0.0, -1.0]
     assert np.abs(np.subtract(tangent, truth)).max() < 1e-12
@@ -250,7 +250,7 @@ def test_the_published_switches_of_a_lossy_hertz_stop():
     """Entry, turn and exit, six times; the first entry is printed to ten digits. Turns outside the
     stop switch nothing.
     """
-    run = run_of(lossy_stop, (0.0, 0.0), 3.0, method=sl.Taylor(order=12, lanes=2))
+    run = run_of(lossy_stop, (0.0, 0.0), 3.0, method=sl.Taylor(lanes=2))
     assert run.status.item() == "ok"
     at_stop = run.contact_guard.values == "stop"
     entries = run.contact_time.values[at_stop][::2]

@@ -113,7 +113,6 @@ def test_differences_are_the_tangents_where_there_are_some():
     np.testing.assert_allclose(differences / size, exact / size, atol=1e-9)
 
 
-@pytest.mark.slow
 def test_responses_and_branches_of_a_damped_hertz_stop_are_found():
     """They were `failed` after 30 s, and "no periodic orbit is known"."""
     settled = sl.stroboscope(HERTZ, (0.0, 0.0), 60, keep=1)

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 import saltus as sl
 from saltus.analysis.basins import pipeline
 
-METHOD = sl.Taylor(order=12, lanes=2)
+METHOD = sl.Taylor(lanes=2)
 CUTS, POINTS, VALUES = (
     [0.0, 0.2, 0.45, 0.5, 0.8, 1.0],
     [0.0, 0.2, 0.45, 0.8, 1.0],

@@ -12,7 +12,7 @@ from saltus.analysis.closed.cycles import find_cycles, returns
 from saltus.analysis.closed.field_zeros import captured, find_equilibria
 from saltus.flow.maps import Stroboscope
 
-FAST = sl.Taylor(order=12, lanes=2)
+FAST = sl.Taylor(lanes=2)
 
 
 @sl.system(states="x y")

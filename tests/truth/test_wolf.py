@@ -120,6 +120,7 @@ def test_lorenz_from_all_states(lorenz, settings):
 
 
 @pytest.mark.parametrize("delay", [5, "0.16 s"])
+@pytest.mark.slow
 def test_lorenz_in_four_delayed_coordinates(lorenz, delay):
     runs = [sl.wolf(series[:, 0], 0.02, dimension=4, delay=delay) for series in lorenz[:SOME]]
     assert_mean_is(runs, LORENZ, bias=0.1)
@@ -131,10 +132,12 @@ def from_x(roessler):
     return [sl.wolf(series[:, 0], 0.1) for series in roessler[:SOME]]
 
 
+@pytest.mark.slow
 def test_roessler_from_x(from_x):
     assert_mean_is(from_x, ROESSLER, bias=0.05)
 
 
+@pytest.mark.slow
 def test_roessler_from_y(roessler):
     assert_mean_is([sl.wolf(series[:, 1], 0.1) for series in roessler[:SOME]], ROESSLER, bias=0.05)
 
@@ -162,6 +165,7 @@ def test_units_and_sampling_scale_the_exponent_only(lorenz):
     )
 
 
+@pytest.mark.slow
 def test_short_series_scatter_more_and_say_so(roessler, from_x):
     """A quarter of the series doubles the intervals, and they are as wide as the scatter about the
     exponent.

@@ -61,8 +61,8 @@ def subject(
     """The subject of a Dataset of this system."""
     return with_outputs(
         Subject(
-            system.states, system.units, attrs, guards, gap_unit(system), margin_gaps(system)[1],
-            varied or {},
+            system.states, system.units, attrs, guards, gap_unit(system), varied or {},
+            margin_unit=margin_gaps(system)[1],
         ),
         system,
     )  # fmt: skip

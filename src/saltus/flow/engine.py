@@ -56,7 +56,7 @@ class _Chunk:
     first: int
     arrays: dict[str, np.ndarray]
     keeps_contacts: bool
-    due: float | None
+    due: np.ndarray | None
     until: Callable[[], bool] | None
     contacts: list[ContactTable] = field(default_factory=list)
 
@@ -93,9 +93,9 @@ def run(
     method = method.serving(system.origin)
     module = method.kernels(system.origin)
     outcome, arrays = allocate(request, system, module)
-    periods = float(np.max(request.end_count + request.end_phase / request.period, initial=0.0))
+    periods = request.end_count + request.end_phase / request.period
     data, due = tables_of(system.origin), method.due(periods)
-    arrays["options"] = options_of(method, periods, len(request.start), request.checks)
+    arrays["options"] = options_of(method, periods, len(periods), request.checks)
     most = float(arrays["options"][:, method.EVENT_BUDGET].max(initial=0.0))
     if request.until is not None:
         arrays["options"][:, method.EVENT_BUDGET] = 0.5
@@ -130,20 +130,36 @@ def run(
     return outcome
 
 
+def not_run(system: System, method: Method, request: Request) -> Outcome:
+    """The outcome of a request none of whose trajectories was moved."""
+    outcome, arrays = allocate(
+        request, system, method.serving(system.origin).kernels(system.origin)
+    )
+    outcome.complete = False
+    return _finish(outcome, arrays, [], request.t_end)
+
+
 def check_steps(system: System, method: Method, period: np.ndarray) -> None:
     """Raise ParameterError if the steps of a method are too long for the forcing periods [s]."""
     if system.forced_at is not None and len(period):
         method.check_forcing(float(np.min(period)))
 
 
-def options_of(method: Method, periods: float, count: int, checks: int = 0) -> np.ndarray:
-    """The numbers of a method as its kernels read them, for ``count`` trajectories. The last
-    ``checks`` of these measure errors.
+def options_of(
+    method: Method, periods: float | np.ndarray, count: int, checks: int = 0
+) -> np.ndarray:
+    """The numbers of a method as its kernels read them, for ``count`` trajectories of so many
+    periods each. The last ``checks`` of these measure errors.
     """
-    numbers = method.numbers(periods)
-    options = np.full((count, len(numbers)), numbers)
+    lengths, which = np.unique(np.broadcast_to(periods, count), return_inverse=True)
+
+    def numbers(one: Method) -> np.ndarray:
+        rows = [one.numbers(length) for length in lengths.tolist()]
+        return np.reshape(rows, (len(rows), len(one.numbers(1.0))))[which]
+
+    options = numbers(method)
     if checks:
-        options[-checks:] = method.companion().numbers(periods)
+        options[-checks:] = numbers(method.companion())[-checks:]
     return options
 
 
@@ -217,7 +233,7 @@ def _cut(
     all_arrays: dict[str, np.ndarray],
     rows: slice,
     data: np.ndarray,
-    due: float | None,
+    due: np.ndarray | None,
     budget: int,
     most: float,
 ) -> _Chunk:
@@ -235,7 +251,8 @@ def _cut(
         until = request.until.of(rows)
         until.begin(arrays)
         go_on = partial(until.go_on, arrays, budget, most)
-    return _Chunk(rows.start, arrays, request.record_from is not None, due, go_on)
+    keeps, mine = request.record_from is not None, None if due is None else due[rows]
+    return _Chunk(rows.start, arrays, keeps, mine, go_on)
 
 
 def shared_arrays(

@@ -110,9 +110,9 @@ class Method:
     def check_forcing(self, period: float) -> None:
         """Raise ParameterError if the steps are too long for a forcing of this period [s]."""
 
-    def due(self, periods: float) -> float | None:  # noqa: ARG002
-        """Least progress in :data:`saltus.flow.pace.LONG_CHECK_STEPS` steps, in periods; None if
-        there is a budget of steps.
+    def due(self, periods: Any) -> Any:  # noqa: ARG002
+        """Least progress in :data:`saltus.flow.pace.LONG_CHECK_STEPS` steps, in periods, for one or
+        float64[n] lengths of a run; None if there is a budget of steps.
         """
         return None
 

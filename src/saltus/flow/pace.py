@@ -37,17 +37,18 @@ def marks(count: int) -> dict[str, np.ndarray]:
     }
 
 
-def resume(arrays: dict[str, np.ndarray], due: float) -> bool:
+def resume(arrays: dict[str, np.ndarray], due: float | np.ndarray) -> bool:
     """Resume the stopped trajectories that are fast enough; True if there are any.
 
     Parameters
     ----------
     arrays : dict of str to ndarray
         The arrays of a kernel's batch, with its :func:`marks`.
-    due : float
+    due : float or float64[n]
         Periods that LONG_CHECK_STEPS steps must bring.
     """
-    stopped = np.flatnonzero(arrays["status"] == st.BUDGET_STEPS)
+    status = arrays["status"]
+    stopped = np.flatnonzero(status == st.BUDGET_STEPS)
     if not len(stopped):
         return False
     steps = arrays["counters"][stopped, st.STEPS]
@@ -56,9 +57,8 @@ def resume(arrays: dict[str, np.ndarray], due: float) -> bool:
         _since(arrays, stopped, "check") < MIN_PROGRESS * rest
     )
     long = steps - arrays["long_steps"][stopped]
-    slow = (long >= LONG_CHECK_STEPS) & ~(
-        _since(arrays, stopped, "long") >= due * long / LONG_CHECK_STEPS
-    )
+    least = np.broadcast_to(due, status.shape)[stopped] * long / LONG_CHECK_STEPS
+    slow = (long >= LONG_CHECK_STEPS) & ~(_since(arrays, stopped, "long") >= least)
     on = stopped[~(still | slow)]
     for which, who in (("check", on), ("long", on[(long >= LONG_CHECK_STEPS)[~(still | slow)]])):
         arrays[f"{which}_steps"][who] = arrays["counters"][who, st.STEPS]
@@ -66,7 +66,7 @@ def resume(arrays: dict[str, np.ndarray], due: float) -> bool:
             arrays["count"][who],
             arrays["phase"][who],
         )
-    arrays["status"][on] = st.RUNNING
+    status[on] = st.RUNNING
     return len(on) > 0
 
 

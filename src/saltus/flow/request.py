@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -160,6 +161,27 @@ class Outcome:
         return replace(
             self, **each, contacts=self.contacts.rows(slice(begins[0], begins[-1])).moved(-first)
         )
+
+    @classmethod
+    def joined(cls, parts: Sequence[Outcome]) -> Outcome:
+        """The outcomes of trajectories one behind the other, as one."""
+        each = {name: np.concatenate([getattr(one, name) for one in parts]) for name in _EACH}
+        begins = np.cumsum([0, *(len(one.status) for one in parts)]).tolist()
+        tables = [one.contacts.moved(begin) for one, begin in zip(parts, begins, strict=False)]
+        complete = all(one.complete for one in parts)
+        return cls(**each, contacts=ContactTable.joined(tables), complete=complete)
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Its arrays by name, as :meth:`of_arrays` takes them."""
+        integers, floats = self.contacts.arrays
+        each = {name: getattr(self, name) for name in _EACH}
+        return each | {"contact_integers": integers, "contact_floats": floats}
+
+    @classmethod
+    def of_arrays(cls, arrays: Mapping[str, np.ndarray]) -> Outcome:
+        """The outcome of a run that came to its end, from :meth:`arrays`' result."""
+        table = ContactTable(arrays["contact_integers"], arrays["contact_floats"])
+        return cls(**{name: arrays[name] for name in _EACH}, contacts=table, complete=True)
 
 
 #: Arrays of an outcome that have a row for each trajectory.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -98,10 +98,10 @@ class Taylor(Method):
         )
         return np.array([math.log2(self.tolerance), float(steps), float(self.max_events), least])
 
-    def due(self, periods: float) -> float | None:
+    def due(self, periods: Any) -> Any:
         """See :class:`Method`."""
         return (
-            min(SLOWEST_SHARE * periods, LONG_CHECK_STEPS / STEPS_PER_PERIOD)
+            np.minimum(SLOWEST_SHARE * periods, LONG_CHECK_STEPS / STEPS_PER_PERIOD)
             if self.max_steps is None
             else None
         )

@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -189,7 +190,7 @@ class Record:
 
 def recorded(
     times: Sequence[float] | np.ndarray,
-    values: Sequence[float] | np.ndarray,
+    values: Sequence[float] | np.ndarray | None = None,
     unit: str = "",
     *,
     time_unit: str = "s",
@@ -226,7 +227,7 @@ def recorded(
     Raises
     ------
     TraceError
-        As :func:`table`.
+        As :func:`table`; for a file in place of the numbers it says how to read it.
     UnitError
         If a unit can't be read, or that of the times is none of a time.
 
@@ -236,6 +237,13 @@ def recorded(
     >>> road.duration, round(road(0.015), 6)
     (0.03, 0.00225)
     """
+    if values is None or isinstance(times, str | PathLike):
+        file = str(times) if isinstance(times, str | PathLike) else "record.csv"
+        raise TraceError(
+            "sl.recorded takes times and values, as numbers, and reads no file. Read it first: "
+            f"times, values = numpy.loadtxt({file!r}, delimiter=',', skiprows=1, unpack=True); "
+            "then sl.recorded(times, values, 'm/s^2')."
+        )
     for what, word in (("unit", unit), ("time_unit", time_unit)):
         if not isinstance(word, str):
             raise TraceError(f"sl.recorded: {what}={shown(word)}. A unit is text, such as 'mm'.")

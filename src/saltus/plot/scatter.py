@@ -23,7 +23,7 @@ SPREAD, SIZES = 45.0, (1.25, 5.0)
 
 
 @picture()
-def scatter(ds: xr.Dataset, outcome: str | None = None, start: int = 0) -> np.ndarray:
+def scatter(ds: xr.Dataset, outcome: str | None = None, start: int = 0) -> Axes:
     """A number over each uncertain parameter, a point for each set, and how often it occurs.
 
     The colour tells the response that the start reaches; lines in the last panel are quantiles:
@@ -40,8 +40,9 @@ def scatter(ds: xr.Dataset, outcome: str | None = None, start: int = 0) -> np.nd
 
     Returns
     -------
-    ndarray of Axes
-        One for each parameter, and that of the histogram.
+    Axes
+        That of the first parameter. ``axes.figure.axes`` are all: one for each parameter, and that
+        of the histogram.
 
     Raises
     ------
@@ -80,11 +81,12 @@ def scatter(ds: xr.Dataset, outcome: str | None = None, start: int = 0) -> np.nd
         axes[-1].set_xlabel("sets")
         if any(label for *_, label in groups):
             axes[-1].legend(loc="upper left", bbox_to_anchor=(1.02, 1))
-    return np.asarray(axes)
+    first: Axes = axes[0]
+    return first
 
 
 @picture()
-def corner(ds: xr.Dataset, start: int = 0) -> np.ndarray:
+def corner(ds: xr.Dataset, start: int = 0) -> Axes:
     """Each uncertain parameter over each other one, coloured by the response that a start reaches.
 
     Parameters
@@ -96,8 +98,9 @@ def corner(ds: xr.Dataset, start: int = 0) -> np.ndarray:
 
     Returns
     -------
-    ndarray of Axes
-        Rows and columns of parameters; those above the diagonal are empty.
+    Axes
+        That of the first parameter alone. ``axes.figure.axes`` are all, row by row, a row and a
+        column for each parameter; those above the diagonal are empty.
 
     Raises
     ------
@@ -132,7 +135,8 @@ def corner(ds: xr.Dataset, start: int = 0) -> np.ndarray:
                 axes[row, row].set_xlabel(scale.label(_words(ds, row)))
         if any(label for *_, label in groups):
             figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="upper right")
-    return np.asarray(axes)
+    first: Axes = axes[0, 0]
+    return first
 
 
 def _bins(ds: xr.Dataset) -> int:

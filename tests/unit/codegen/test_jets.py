@@ -25,7 +25,7 @@ pytestmark = [
     # most of the equations below use none of a and b, or one
     pytest.mark.filterwarnings("ignore::saltus.errors.UnusedParameterWarning"),
 ]
-LANES, ORDER = 4, 12
+LANES, ORDER = 4, 10
 EPS = 2.0**-52
 TAU, BASE = 0, 1
 CLOCK_ROWS = 8

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy import signal
@@ -86,6 +88,9 @@ def test_a_record_in_an_equation_is_checked_and_kept():
         (lambda: sl.square(sl.system(states="x")(lambda t, x: x).field[0]), "a remainder is for"),
         (lambda: sl.recorded([0, 1], ["a", "b"]), "numbers"),
         (lambda: sl.recorded([0, 0], [1, 2]), "ascend"),
+        (lambda: sl.recorded("base.csv"), r"loadtxt\('base.csv'"),
+        (lambda: sl.recorded(Path("base.csv"), "mm"), r"loadtxt\('base.csv'"),
+        (lambda: sl.recorded([0, 1]), "times and values"),
     ],
 )
 def test_refusals(call, words):

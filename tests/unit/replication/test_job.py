@@ -107,7 +107,7 @@ def test_the_code_of_saltus_is_no_paper_s_own():
 # -- what a result depends on ----------------------------------------------------------------------
 #: Packages that take no part in numbers: messages, what kinds arguments may be of, the end of work,
 #: and pictures of what was computed.
-NO_NUMBERS = ("errors", "sentences", "announce", "arguments", "interrupt", "plot")
+NO_NUMBERS = ("errors", "sentences", "announce", "arguments", "blas_threads", "interrupt", "plot")
 #: What only says which system, method and arguments: these are in the identity themselves.
 SAYS_WHAT = ("replication.Job", "study.read", "study.spec", "study.tables", "study.setting")
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from saltus.analysis.attractors import divided_grid
+from saltus.analysis.motion import divided
 from saltus.errors import SaltusWarning, StudyError
 from saltus.results import load
 from saltus.results.store.arrays import packed, unpacked
@@ -18,7 +19,7 @@ from saltus.results.store.store import Store, StoreError
 from saltus.study.read import parse
 from saltus.study.run.running import Resources
 from saltus.study.run.status import status_tables
-from saltus.study.run.study import run_study
+from saltus.study.run.study import run_study, turns
 
 pytestmark = pytest.mark.slow
 
@@ -54,6 +55,23 @@ outputs.stop = { formula = "contact_stiffness*max(x - upper_gap, 0)", unit = "N"
 uncertain.upper_gap = { normal = ["0.4 mm", "0.3 mm"] }
 uncertain.frequency = { uniform = ["15 Hz", "18 Hz"] }
 """
+#: Motions and derivatives: the last two frequencies are equal.
+ROWS = """
+[simulate]
+t_end = "0.2 s"
+start = { x = "1 mm", v = "0 m/s" }
+values.frequency = ["15 Hz", "17 Hz", "20 Hz", "20 Hz"]
+[sensitivity]
+t_end = "0.2 s"
+to = ["frequency", "upper_gap"]
+start = { x = "1 mm", v = "0 m/s" }
+values.frequency = ["15 Hz", "17 Hz", "20 Hz", "20 Hz"]
+"""
+#: A question that doesn't divide.
+ONE = """
+[simulate]
+periods = 3
+"""
 SWEEP = """
 [frequency_response]
 frequency = { first = "15 Hz", last = "17 Hz", count = 3 }
@@ -66,6 +84,7 @@ def small():
     """Two trajectories in a chunk, or those of one value."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(divided_grid, "TRAJECTORIES", 2)
+        patch.setattr(divided, "TOGETHER", 2)
         yield
 
 
@@ -155,6 +174,14 @@ def test_sets_of_values(tmp_path):
     assert contents(jobs.folder)[1] == contents(plain.folder)[1]
 
 
+def test_motions_and_derivatives(tmp_path):
+    plain = Run(tmp_path / "plain", HEAD + ROWS)
+    for k in (1, 0):
+        jobs = Run(tmp_path / "jobs", HEAD + ROWS, shard=(k, 2))
+    assert jobs.computed == 2
+    assert contents(jobs.folder)[1] == contents(plain.folder)[1]
+
+
 @pytest.mark.parametrize("order", [(0, 1, 2), (2, 0, 1)])
 def test_shards(chunks, tmp_path, order):
     runs = [Run(tmp_path / "run", shard=(k, 3)) for k in order]
@@ -217,6 +244,24 @@ def test_another_question_has_another_store(tmp_path):
     assert (first.computed, second.computed) == (2, 2)
     assert len(list((tmp_path / "run" / "stores").iterdir())) == 2
     assert "values changed" in second.said[0]
+
+
+def test_jobs_take_in_turn_what_cannot_be_divided(tmp_path):
+    text = HEAD + ONE + SWEEP
+    for k, name in ((1, "frequency-response.nc"), (0, "run.nc")):
+        Run(tmp_path / f"job {k}", text, shard=(k, 2))
+        Run(tmp_path / "jobs", text, shard=(k, 2))
+        assert [*contents(tmp_path / f"job {k}")[1]] == [name]
+    assert contents(tmp_path / "jobs")[1] == contents(Run(tmp_path / "plain", text).folder)[1]
+
+
+def test_questions_that_need_each_other_go_to_one_job():
+    class Asked:
+        def __init__(self, stem, *needs):
+            self.stem, self.needs = stem, needs
+
+    asked = [Asked("a"), Asked("b"), Asked("c"), Asked("d", "map", "a"), Asked("e", "c", "d")]
+    assert turns(asked) == [{"b"}, {"a", "c", "d", "e"}]
 
 
 @pytest.mark.parametrize("resources", [{"workers": 2}, {"shard": (0, 2)}])

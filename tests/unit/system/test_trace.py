@@ -256,10 +256,10 @@ def math_call(t, x, v):
     return v, -math.cos(x)
 
 
-def sympy_call(t, x, v):
-    import sympy
+def mpmath_call(t, x, v):
+    import mpmath
 
-    return v, -sympy.cos(x)
+    return v, -mpmath.cos(x)
 
 
 def unknown_name(t, x, v):
@@ -308,7 +308,7 @@ def of_parameters(t, x, v, *, a=1.0, b=2.0):
         (branching, "if x > gap:", "sl.piecewise"),
         (numpy_call, "return v, -np.floor", "np.floor on a traced value.*sl.mod"),
         (math_call, "return v, -math.cos", "sl.cos"),
-        (sympy_call, "return v, -sympy.cos", "sl.cos"),
+        (mpmath_call, "return v, -mpmath.cos", "sl.cos"),
         (unknown_name, "return v, -stiffness", "'stiffness' is no state, no parameter"),
         (modulo, "return v, x % 1", "sl.mod of x"),
         (chained, "return v, piecewise", "a < x < b"),

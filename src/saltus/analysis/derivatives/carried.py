@@ -19,6 +19,7 @@ from saltus.errors import ParameterError
 from saltus.flow import engine
 from saltus.flow.methods import Method
 from saltus.flow.request import Outcome, Request
+from saltus.kernels import status as st
 from saltus.system import System
 from saltus.system.modes import field
 from saltus.system.parametric import parametric
@@ -28,6 +29,8 @@ from saltus.system.parametric import parametric
 HELD = ("hold",)
 #: Length of a run that only tells in which mode a motion begins [periods].
 SHORT = 1e-6
+#: Ends that a run may come to from outside.
+CUT_OFF = (st.INTERRUPTED, st.BUDGET_EVENTS)
 
 
 @dataclass(frozen=True)
@@ -144,7 +147,7 @@ class CarriedDerivatives:
             end_phase=end,
             origin=base.origin / float(unit[0]),
             times=times,
-            t_end=base.t_end / float(unit[0]),
+            t_end=base.t_end / float(unit[0]) if np.ptp(unit) == 0 else np.inf,
         )
 
     def lost(self, at: Places) -> bool:
@@ -200,7 +203,10 @@ class CarriedDerivatives:
         """The ends of all trajectories."""
         unit = length.period if self.timed else 1.0
         who = np.arange(group.size)
-        return self._places(outcome.state, outcome.mode, outcome.time * unit, who, group, length)
+        at = self._places(outcome.state, outcome.mode, outcome.time * unit, who, group, length)
+        if self._own:  # those of a run that is cut off wait where they were moved last
+            at.slopes[np.isin(outcome.status, CUT_OFF)] = np.nan
+        return at
 
     def parameters(self, group: Ensemble, who: np.ndarray) -> dict[str, np.ndarray]:
         """Values of all parameters of trajectories int64[m], float64[m] each."""

@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -19,7 +20,11 @@ from saltus.analysis.derivatives.closed_orbits import (
     warn_of_orbits,
 )
 from saltus.analysis.derivatives.columns import Columns, Turning, turning_surfaces
-from saltus.analysis.derivatives.sensitivity_table import SensitivityRun, sensitivity_dataset
+from saltus.analysis.derivatives.sensitivity_table import (
+    SensitivityRun,
+    sensitivity_dataset,
+    sensitivity_rows,
+)
 from saltus.analysis.inputs.given import Starts, Values
 from saltus.analysis.inputs.orbits import given_orbits
 from saltus.analysis.inputs.spans import span
@@ -37,6 +42,7 @@ from saltus.errors import ParameterError, SaltusWarning
 from saltus.flow import engine
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporting
+from saltus.flow.request import Outcome
 from saltus.flow.taylor import Taylor
 from saltus.system import System
 from saltus.system.outputs import with_more
@@ -143,6 +149,44 @@ def sensitivity(
     >>> dict(found.maximum_derivative.sizes)
     {'output': 2, 'to': 2}
     """
+    with reporting(progress) as show:
+        for by in (method, Taylor()):  # the second one where modes go together
+            run = sensitivity_run(
+                system, start, periods, t_end, to=to, outputs=outputs, extremes=extremes,
+                t_start=t_start, samples=samples, at=at, keep=keep, values=values, method=by,
+                threads=threads,
+            )  # fmt: skip
+
+            def answer(outcome: Outcome, run: SensitivityRun = run) -> xr.Dataset:
+                return sensitivity_dataset(run, sensitivity_rows(run, outcome))
+
+            try:
+                outcome = run.fly(run.request, threads, show)
+            except engine.RunInterrupted as stop:
+                raise stop.then(answer) from None
+            if not run.flow.lost(run.flow.ends(outcome, run.group, run.length)):
+                break
+        result = answer(outcome)
+    warn(result, run.length, system)
+    if run.closed is None:
+        warn_of_chaos(result)
+    else:
+        warn_of_orbits(system, result, run.closed)
+    return result
+
+
+def sensitivity_run(
+    system: System, start: Any, periods: Any, t_end: Any, *, to: Any, outputs: Any, extremes: bool,
+    t_start: Any, samples: Any, keep: Any, values: Any, method: Method | None, at: Any = None,
+    threads: int | None = None,
+) -> SensitivityRun:  # fmt: skip
+    """The run that the arguments of :func:`sensitivity` ask for. Orbits are closed first.
+
+    Raises
+    ------
+    ParameterError, UnitError, TraceError
+        If an argument can't be used.
+    """
     check_system(system)
     method = check_method(method, system)
     asked = Columns.of(system, to)
@@ -162,41 +206,25 @@ def sensitivity(
     if times is not None and periods is None and t_end is None:
         t_end = last_of(times, t_start)
     length = around if orbits else span(system, group, periods, t_end, t_start)
-    with reporting(progress) as show:
-        for by in (method, Taylor()):  # the second one where modes go together
-            turning = turning_surfaces(system, by) if extremes else Turning(system, {}, [])
-            flow = CarriedDerivatives(turning.system, by, asked.parameters)
-            fly = partial(engine.run, flow.flown, by.suited_to(group.size))
-            closed = None
-            if orbits:
-                closed = closed_orbits(flow, group, length, partial(fly, threads=threads))
-                group, length = closed.group, closed.length
-            plan = (
-                planned(system, group, length, samples, keep, 2 * len(flow.flown.states))
-                if times is None
-                else at_times(length, first_kept(system, length, keep), times)
-            )
-            run = SensitivityRun(
-                system=system, flow=flow, group=group, method=by, length=length, plan=plan,
-                turning=turning, asked=asked, closed=closed,
-            )  # fmt: skip
-            answer = partial(sensitivity_dataset, run)
-            try:
-                outcome = fly(flow.request(group, length, plan), threads, show)
-                if not flow.lost(flow.ends(outcome, group, length)):
-                    break
-            except engine.RunInterrupted as stop:
-                raise stop.then(answer) from None
-        result = answer(outcome)
-    warn(result, length, system)
-    if closed is None:
-        _warn_of_chaos(result)
-    else:
-        warn_of_orbits(system, result, closed)
-    return result
+    turning = turning_surfaces(system, method) if extremes else Turning(system, {}, [])
+    flow, closed = CarriedDerivatives(turning.system, method, asked.parameters), None
+    if orbits:
+        suited = method.suited_to(group.size)
+        fly = partial(engine.run, flow.flown, suited)
+        closed = closed_orbits(flow, group, length, lambda one: fly(one, threads))
+        group, length = closed.group, closed.length
+    plan = (
+        planned(system, group, length, samples, keep, 2 * len(flow.flown.states))
+        if times is None
+        else at_times(length, first_kept(system, length, keep), times)
+    )
+    return SensitivityRun(
+        system=system, flow=flow, group=group, method=method, length=length, plan=plan,
+        turning=turning, asked=asked, closed=closed,
+    )  # fmt: skip
 
 
-def _warn_of_chaos(result: xr.Dataset) -> None:
+def warn_of_chaos(result: xr.Dataset) -> None:
     """Say so where a motion is so sensitive that its derivatives hold for no change at all."""
     size = np.abs(result["to_value"].values)[..., None, None, :]
     change = SLIGHT * np.abs(result["derivative"].values) * size

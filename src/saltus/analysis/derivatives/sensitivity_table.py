@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
@@ -25,6 +26,10 @@ from saltus.results import build
 from saltus.results.dataset import schema
 from saltus.system import jumps_by_time
 
+Show = Callable[[float], None]
+
+#: Variables of trajectories and contacts, in the order of the result.
+_ROWS = [name for name in schema.KINDS[schema.SENSITIVITY].variables if name != "time"]
 #: Counters that are kept.
 COUNTED = ("steps", "rejected_steps", "mode_violations", "grazes_unresolved")
 #: Relative difference of the derivatives of an instant by two gaps that is rounding.
@@ -50,6 +55,20 @@ class SensitivityRun(Readings):
     asked: Columns
     closed: ClosedOrbits | None
 
+    def rows(self, which: slice) -> SensitivityRun:
+        """Some of the trajectories, which aren't orbits, with the samples of all."""
+        return replace(self, group=self.group.rows(which), length=self.length.rows(which))
+
+    @property
+    def request(self) -> Request:
+        """The request to the engine."""
+        return self.flow.request(self.group, self.length, self.plan)
+
+    def fly(self, request: Request, threads: int | None, show: Show | None = None) -> Outcome:
+        """The outcome of a request of the flow."""
+        method = self.method.suited_to(len(request.start))
+        return engine.run(self.flow.flown, method, request, threads, show)
+
     def chosen(self, slopes: np.ndarray, who: np.ndarray) -> np.ndarray:
         """The derivatives that were asked for, float64[m, ..., to], of all columns float64[m, ...,
         C] at places of trajectories int64[m].
@@ -58,10 +77,6 @@ class SensitivityRun(Readings):
             return slopes[..., self.asked.places]
         weights = self.closed.weights[who]
         return np.asarray(np.einsum("m...c,mct->m...t", slopes, weights))
-
-    def again(self, request: Request) -> Outcome:
-        """The outcome of another request of the flow."""
-        return engine.run(self.flow.flown, self.method.suited_to(1), request, 1)
 
     def contact_times(self, at: Places, table: ContactTable) -> np.ndarray:
         """Derivatives of the times of contacts, float64[m, C], from the places just before them.
@@ -104,7 +119,8 @@ class SensitivityRun(Readings):
         jumped = np.zeros(len(at.time), bool)
         moved = np.full((len(at.time), at.slopes.shape[2]), np.nan)
         rates, system = self.flow.rates(at, self.group), self.turning.system
-        size, near = len(system.states), NEAR * np.abs(at.time).max(initial=0.0)
+        size, whose = len(system.states), at.trajectory
+        near = NEAR * self._largest(at.time, whose)
         met = np.arange(len(system.guards))  # where a contact begins to be held
         for number, one in enumerate(system.guards):
             if one.law is not None and one.law.kind == "hold":
@@ -126,17 +142,22 @@ class SensitivityRun(Readings):
             change = np.einsum("im,mic->mc", by_state, at.slopes[here])
             change[:, size:] += by_name.T.reshape(len(here), -1)
             rate = np.einsum("im,mi->m", by_state, rates[here]) + slopes[-1]
-            met_it = np.abs(rate) > LEAVES * np.abs(rate).max()
-            jumped[here] = np.abs(value) > near * np.abs(rate)
+            met_it = np.abs(rate) > LEAVES * self._largest(rate, whose[here])
+            jumped[here] = np.abs(value) > near[here] * np.abs(rate)
             met_it &= ~jumped[here]
             moved[here[met_it]] = -change[met_it] / rate[met_it, None]
         return moved, jumped
 
+    def _largest(self, column: np.ndarray, whose: np.ndarray) -> np.ndarray:
+        """The largest magnitude in float64[m] of the same trajectory, float64[m]."""
+        largest = np.zeros(self.group.size)
+        np.maximum.at(largest, whose, np.abs(column))
+        return np.asarray(largest[whose])
 
-def sensitivity_dataset(run: SensitivityRun, outcome: Outcome) -> xr.Dataset:
-    """The Dataset of a run."""
+
+def sensitivity_rows(run: SensitivityRun, outcome: Outcome) -> dict[str, np.ndarray]:
+    """The numbers of each trajectory and each contact: arrays with these first."""
     system, group, length, turning = run.system, run.group, run.length, run.turning
-    asked = run.asked
     n, forced = group.size, system.forced_at is not None
     unit = length.period if run.flow.timed else np.ones(n)
     time, _ = run.plan.of_result(outcome, length, forced)
@@ -144,49 +165,57 @@ def sensitivity_dataset(run: SensitivityRun, outcome: Outcome) -> xr.Dataset:
     count = time.shape[-1]
     own = np.broadcast_to(time, (n, count))
     at = run.flow.samples(outcome, group, length, own, kept)
-    outputs = outputs_of(system)
     value = run.values(at).reshape(n, count, -1)
-    slope = run.chosen(run.slopes(at), at.trajectory).reshape(n, count, len(outputs), -1)
+    slope = run.chosen(run.slopes(at), at.trajectory).reshape(*value.shape, len(run.asked.names))
     table = outcome.contacts
-    early, touch = run.flow.contacts(outcome, group, length, run.again)
+    early, touch = run.flow.contacts(outcome, group, length, lambda one: run.fly(one, 1))
     speed = table.velocity / unit[table.trajectory]
     moved = run.contact_times(early, table)
     mine = np.flatnonzero(table.guard < len(system.guards))
     names = np.array([guard.name for guard in system.guards] or [""], dtype=np.str_)
     end = run.flow.ends(outcome, group, length)
+    return {
+        "time": own,
+        "value": value,
+        "derivative": slope,
+        "contact_time": touch.time[mine],
+        "contact_time_derivative": run.chosen(moved, touch.trajectory)[mine],
+        "contact_guard": names[table.guard[mine]],
+        "contact_kind": table.kind_name[mine],
+        "contact_velocity": speed[mine],
+        "contact_trajectory": table.trajectory[mine],
+        **(_extremes(run, outcome, touch, early, moved, at, end) if turning.known else {}),
+        "end_derivative": run.chosen(run.slopes(end), end.trajectory),
+        **(_of_orbits(run.closed, end) if run.closed is not None else {}),
+        **dataset_parts.endings(outcome, COUNTED),
+        "end_time": end.time,
+        "end_<state>": run.values(end),
+    }
+
+
+def sensitivity_dataset(run: SensitivityRun, rows: Mapping[str, np.ndarray]) -> xr.Dataset:
+    """The Dataset of what :func:`sensitivity_rows` gives for all trajectories."""
+    system, group, length, asked = run.system, run.group, run.length, run.asked
+    forced, outputs = system.forced_at is not None, outputs_of(system)
+    own = forced and bool(np.ptp(length.period) > 0)
     subject = dataset_parts.trajectories(
         system,
         run.method,
         group,
-        (length.period if np.ptp(length.period) > 0 else float(length.period[0]))
-        if forced
-        else None,
+        (length.period if own else float(length.period[0])) if forced else None,
     )
     return build(
         schema.SENSITIVITY,
         subject,
         {
-            "trajectory": np.arange(n),
-            "time": time,
+            "trajectory": np.arange(group.size),
+            "time": rows["time"] if own and run.plan.given is None else rows["time"][0],
             "to": list(asked.names),
             "to_units": asked.units(system),
             "to_value": asked.values(system, group),
             "output": list(outputs.names),
             "output_units": list(outputs.units),
-            "value": value,
-            "derivative": slope,
-            "contact_time": touch.time[mine],
-            "contact_time_derivative": run.chosen(moved, touch.trajectory)[mine],
-            "contact_guard": names[table.guard[mine]],
-            "contact_kind": table.kind_name[mine],
-            "contact_velocity": speed[mine],
-            "contact_trajectory": table.trajectory[mine],
-            **(_extremes(run, outcome, touch, early, moved, at, end) if turning.known else {}),
-            "end_derivative": run.chosen(run.slopes(end), end.trajectory),
-            **(_of_orbits(run.closed, end) if run.closed is not None else {}),
-            **dataset_parts.endings(outcome, COUNTED),
-            "end_time": end.time,
-            "end_<state>": run.values(end),
+            **{name: rows[name] for name in _ROWS if name in rows},
         },
         words={"<slope>": "", "<to>": ""},
     )

@@ -28,6 +28,8 @@ PREDICTED = 0.25
 LONGER, SHORTEST = 2.0, 1.05
 #: Share of the work that finds the minima on the first beginning.
 BEGIN = 0.2
+#: Share of the work on a way that comes before its windows.
+FOLLOWED = 0.5
 
 
 def grow(
@@ -51,14 +53,18 @@ def grow(
         count = max(count // 2, least)
     search.minima.clear()
     for i, (one, count) in enumerate(valleys(part.minima)[:WAYS]):
-        begin, end = (BEGIN + (1.0 - BEGIN) * j / WAYS for j in (i, i + 1))
+        begin, middle, end = (BEGIN + (1.0 - BEGIN) * j / WAYS for j in (i, i + FOLLOWED, i + 1))
         search.ended = None
-        here = _follow(search, one, i, stage(show, begin, end))
+        here = _follow(search, one, i, stage(show, begin, middle))
         if search.ended is not None:  # as many descents as led to where it began
             search.minima += [search.ended] * (count - 1)
         if search.spent or (described(search) and _noise(search, search.minima[0])):
             return
-        if here is not None and shoot(search, here, count) and described(search):
+        if (
+            here is not None
+            and shoot(search, here, count, stage(show, middle, end))
+            and described(search)
+        ):
             return
 
 

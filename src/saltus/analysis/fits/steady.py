@@ -9,6 +9,7 @@ Systems (1989), chapter 5.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -27,7 +28,6 @@ from saltus.analysis.inputs.starts import Ensemble
 from saltus.analysis.motion.sample_times import NO_SAMPLES, at_times
 from saltus.analysis.solve.linear import moves
 from saltus.errors import ParameterError
-from saltus.flow import engine
 from saltus.flow.methods import Method
 from saltus.flow.taylor import Taylor
 from saltus.interrupt import Interrupted
@@ -152,8 +152,8 @@ class SteadyResponses:
             plan=NO_SAMPLES, turning=Turning(system, {}, []), closed=None,
             asked=Columns.of(system, self.unknowns.names),
         )  # fmt: skip
-        method, request = self.method.suited_to(group.size), flow.request(group, length, NO_SAMPLES)
-        outcome = engine.run(flow.flown, method, request, self.threads)
+        again, request = partial(run.fly, threads=1), flow.request(group, length, NO_SAMPLES)
+        outcome = run.fly(request, self.threads)
         there = flow.ends(outcome, group, length)
         if flow.lost(there):
             self.method = Taylor()
@@ -162,7 +162,7 @@ class SteadyResponses:
         end = there.slopes
         moved = moves(end[..., :size] - np.eye(size), end[..., size:])
         weights = np.concatenate([moved, np.tile(np.eye(end.shape[2] - size), (len(end), 1, 1))], 1)
-        before, _ = flow.contacts(outcome, group, length, run.again)
+        before, _ = flow.contacts(outcome, group, length, again)
         late = run.contact_times(before, outcome.contacts)
         found = []
         for i, whose in enumerate(weights):
@@ -177,7 +177,7 @@ class SteadyResponses:
             one = Ensemble(start[[i]], columns[[i]], {}, True)
             around = span(system, one, period, None, 0.0)
             asked = flow.request(one, around, at_times(around, 0, times))
-            flown = run.again(replace(asked, record_from=None))
+            flown = again(replace(asked, record_from=None))
             at = flow.samples(flown, one, around, times[None], slice(None))
             read = Readings(system=self.system, flow=flow, group=one)
             mine = self.measured.columns

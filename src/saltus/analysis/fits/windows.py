@@ -9,13 +9,16 @@ that of an iterated extended Kalman filter: Jazwinski, Stochastic Processes and 
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from saltus.analysis.fits.motion import Motions
 from saltus.analysis.fits.search import MisfitSearch, Point
 from saltus.analysis.fits.unknowns import INSIDE, Unknowns
+from saltus.announce import working
 from saltus.interrupt import check_stop
 
 #: Factor by which changes of the start may grow in a window, relative to the sizes of the states.
@@ -26,6 +29,8 @@ JOINED = 1e-6
 MOST, PASSES, FILTER = 400, 30, 4
 #: A pass that gains less of the misfit than this is the last.
 SETTLED = 1e-6
+#: Share of the work that divides the history, and of what is left that a pass leaves to show.
+MARCH, SLOWING = 0.5, 0.7
 
 
 @dataclass(frozen=True)
@@ -58,9 +63,18 @@ class Windows:
     ----------
     search : MisfitSearch
         Of a model that is :class:`Motions`; its deviations are those of the noise.
+    show : callable, optional
+        Called with the share done.
+
+    Attributes
+    ----------
+    known : tuple, optional
+        Shares, starts and windows as flown, of the best pass so far.
+    doing : str
+        What is done now.
     """
 
-    def __init__(self, search: MisfitSearch) -> None:
+    def __init__(self, search: MisfitSearch, show: Callable[[float], None] | None = None) -> None:
         model = search.model
         assert isinstance(model, Motions)
         self.search, self.unknowns, self._given = search, search.unknowns, model
@@ -78,6 +92,8 @@ class Windows:
                 columns=np.concatenate([np.arange(self.size), model.measured.columns]),
             ),
         )
+        self.known: tuple[np.ndarray, np.ndarray, list[Flown]] | None = None
+        self.doing, self._show = "dividing the history into windows", show
         self.begins: list[int] = []
         self.scale = np.ones(self.size)
 
@@ -142,6 +158,7 @@ class Windows:
             spread = turn @ spread @ turn.T
             spread[self.wide :, self.wide :] += np.diag((JOINED * self.scale) ** 2)
             begin, look = begin + length, 2 * length
+            self._tell(MARCH * begin / whole)
         self.shares = shares
         return np.stack([self.first(shares)[0], *starts[1:]])
 
@@ -171,6 +188,19 @@ class Windows:
             off, kept = gain @ (slopes @ off - said), np.eye(len(off)) - gain @ slopes
             after = kept @ spread @ kept.T + gain @ gain.T  # Joseph's form: no variance below zero
         return off, after, trip
+
+    def _tell(self, share: float) -> None:
+        """Report the share done."""
+        if self._show is not None:
+            self._show(share)
+
+    def _keep(self, count: int, misfit: float, *found: Any) -> None:
+        """Keep the best pass so far, number ``count``."""
+        self.known, size = found, np.isfinite(self.search.data).sum()
+        self.doing = (
+            f"fitting through {len(self.begins)} windows: pass {count} of {PASSES} at most, "
+            f"residuals {np.sqrt(misfit / size):.3g} times the noise"
+        )
 
     def passed(self, shares: np.ndarray, starts: np.ndarray) -> list[Flown]:
         """All windows."""
@@ -216,7 +246,9 @@ class Windows:
         shares, flown = self.shares, self.passed(self.shares, starts)
         matrix, right = self.equations(shares, starts, flown)
         step = np.linalg.lstsq(matrix, -right)[0]
-        for _ in range(PASSES):
+        for count in range(1, PASSES + 1):
+            self._keep(count, right @ right, shares, starts, flown)
+            self._tell(1.0 - (1.0 - MARCH) * SLOWING**count)
             there = np.clip(shares + step[: self.wide], INSIDE, 1.0 - INSIDE)
             steps = step[self.wide :].reshape(-1, self.size) * self.scale
             moved = np.stack([self.first(there)[0], *(starts[1:] + steps)])
@@ -249,20 +281,36 @@ class Windows:
         return Point(shares, fitted, residual, np.concatenate(slopes))
 
 
-def shoot(search: MisfitSearch, here: Point, count: int) -> bool:
+def shoot(
+    search: MisfitSearch, here: Point, count: int, show: Callable[[float], None] | None = None
+) -> bool:
     """Fit the whole history through windows, from the minimum ``here`` on a beginning, to which
     ``count`` descents led; True if it describes the data better than the best place so far, which
-    it is then.
+    it is then. On Ctrl-C that of the best pass is.
     """
     if "t_start" in search.unknowns.names or search.best is None:  # times aren't known
         return False
     left = here.fitted - search.data[: len(here.fitted)]
     search.reweigh(np.tile(np.nanstd(left, axis=0), (len(search.data), 1)))
-    windows = Windows(search)
+    windows = Windows(search, show)
     try:
-        found = windows.solve(windows.march(here))
+        with working(lambda: windows.doing):
+            found = windows.solve(windows.march(here))
     except (_TooManyWindowsError, np.linalg.LinAlgError):
         return False
+    except KeyboardInterrupt:
+        if windows.known is not None:
+            _take(search, windows, windows.known, count)
+        raise
+    return _take(search, windows, found, count)
+
+
+def _take(
+    search: MisfitSearch, windows: Windows, found: tuple[np.ndarray, np.ndarray, list[Flown]],
+    count: int,
+) -> bool:  # fmt: skip
+    """Make a pass the best place so far, to which ``count`` descents led; False if it isn't."""
+    assert search.best is not None
     best = windows.point(*found)
     if best.misfit >= search.best.misfit:
         return False

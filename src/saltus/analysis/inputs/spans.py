@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -35,6 +35,11 @@ class Span:
     def of_cycles(cls, time: np.ndarray) -> Span:
         """A period of limit cycles, float64[n] [s]."""
         return cls(0.0, time, np.ones(len(time), np.int64), np.zeros(len(time)))
+
+    def rows(self, which: slice) -> Span:
+        """The length of some of the trajectories."""
+        each = {name: getattr(self, name)[which] for name in ("period", "count", "phase")}
+        return replace(self, **each)
 
     def request(
         self, start: np.ndarray, parameters: np.ndarray, schedule: Schedule, record_from: int | None

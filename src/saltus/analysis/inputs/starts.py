@@ -70,6 +70,16 @@ class Ensemble:
         varied = {name: column for name, column in columns.items() if np.ptp(column) > 0}
         return cls(start, np.stack([*columns.values()], axis=1), varied, batch)
 
+    def rows(self, which: slice) -> Ensemble:
+        """Some of the trajectories."""
+        shared = len(self.parameters) == 1
+        return Ensemble(
+            self.start[which],
+            self.parameters if shared else self.parameters[which],
+            {name: column[which] for name, column in self.varied.items()},
+            self.batch,
+        )
+
 
 def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> Ensemble:
     """Starts and values of all trajectories, broadcast against each other.

@@ -15,6 +15,7 @@ import numpy as np
 
 from saltus.announce import silent
 from saltus.arguments import Kinds
+from saltus.blas_threads import one_blas_thread
 from saltus.errors import MOST_IN_A_ROW, ParameterError, closest, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.engine import MOST_THREADS
@@ -111,7 +112,7 @@ def verb(function: Callable[P, R]) -> Callable[P, R]:
         )
         token = _INSIDE.set(True)
         try:
-            with quiet, no_ctrl_c_is_lost():
+            with quiet, one_blas_thread(), no_ctrl_c_is_lost():
                 return function(*args, **kwargs)
         except KeyboardInterrupt as stop:
             if isinstance(stop, Interrupted) and not isinstance(stop, PartInterrupted):

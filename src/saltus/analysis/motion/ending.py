@@ -69,17 +69,20 @@ class Ending:
             record_from=0,
         )
 
-    def plan(
+    def rows(self, which: slice) -> Ending:
+        """The condition of some of the trajectories."""
+        return replace(self, until=self.until.of(which), first_mode=self.first_mode[which])
+
+    def times(
         self,
-        system: System,
         method: Method,
         group: Ensemble,
         length: Span,
-        samples: Any,
         threads: int | None,
         show: Callable[[float], None] | None,
-    ) -> SampleTimes:
-        """Samples up to the last end, which a run finds that keeps none.
+    ) -> np.ndarray:
+        """The times at which the trajectories end, float64[n] [s], from a run that keeps nothing
+        else.
 
         Raises
         ------
@@ -95,13 +98,20 @@ class Ending:
             threads,
             show and (lambda done: show(FINDING * done)),
         )
-        elapsed = np.maximum(found.time - length.t_start, 0.0)
+        return found.time
+
+    @staticmethod
+    def plan(
+        system: System, group: Ensemble, length: Span, samples: Any, states: int, times: np.ndarray
+    ) -> SampleTimes:
+        """Samples up to the last of the times of :meth:`times`, of motions of some states."""
+        elapsed = np.maximum(times - length.t_start, 0.0)
         if system.forced_at is None:
             return evenly(system, group, length.t_start, float(elapsed.max()), samples)
         count = np.floor(elapsed / length.period).astype(np.int64)
         phase = np.maximum(elapsed - count * length.period, 0.0)
         reached = replace(length, count=count, phase=phase)
-        return planned(system, group, reached, samples, None, len(flown.states))
+        return planned(system, group, reached, samples, None, states)
 
     @staticmethod
     def afterwards(show: Callable[[float], None] | None) -> Callable[[float], None] | None:

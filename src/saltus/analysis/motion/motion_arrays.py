@@ -30,7 +30,7 @@ from saltus.errors import ParameterError, among, must_be
 from saltus.flow import engine
 from saltus.flow.contact_table import ContactTable
 from saltus.flow.methods import Method, check_method
-from saltus.flow.request import Outcome
+from saltus.flow.request import Outcome, Request
 from saltus.system import System
 from saltus.system.quantity import jumping_states, remembering
 
@@ -217,14 +217,28 @@ class AskedMotion:
         """
         if self.end is None or self.given:
             return self
-        args = self.system, self.method, self.group, self.length, self.samples
-        return replace(self, plan=self.end.plan(*args, threads, show))
+        return self.until(self.end.times(self.method, self.group, self.length, threads, show))
+
+    def until(self, times: np.ndarray) -> AskedMotion:
+        """The same with samples up to the last of the times at which trajectories end [s]."""
+        assert self.end is not None
+        args = self.system, self.group, self.length, self.samples, len(self.flown.states)
+        return replace(self, plan=self.end.plan(*args, times))
+
+    def rows(self, which: slice) -> AskedMotion:
+        """Some of the trajectories, with the samples of all."""
+        end = None if self.end is None else self.end.rows(which)
+        return replace(self, group=self.group.rows(which), length=self.length.rows(which), end=end)
+
+    @property
+    def request(self) -> Request:
+        """The request to the engine."""
+        request = self.plan.request(self.group, self.length, len(self.flown.states))
+        return request if self.end is None else self.end.asked(request)
 
     def run(self, threads: int | None, show: Show | None) -> tuple[Outcome, np.ndarray]:
         """The outcome, and the errors of its contact times [s]. Raises RunInterrupted on Ctrl-C."""
-        request = self.plan.request(self.group, self.length, len(self.flown.states))
-        if self.end is not None:
-            request = self.end.asked(request)
+        request = self.request
         if self.measured and self.flown.guards and self.method.records_contacts:
             return measure.measured(self.flown, self.method, request, threads, show)
         method = self.method.suited_to(self.group.size)

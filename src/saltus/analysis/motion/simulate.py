@@ -145,7 +145,7 @@ def simulate(
     )
 
     def so_far(outcome: Outcome) -> xr.Dataset:
-        return _dataset(asked, asked.arrays(outcome, measure.local(outcome)))
+        return simulation(asked, outcome, measure.local(outcome))
 
     outcome, end = None, asked.end
     with reporting(progress) as show:
@@ -153,7 +153,7 @@ def simulate(
             if end is not None and not asked.given:
                 asked, show = asked.with_end(threads, show), end.afterwards(show)
             outcome, errors = asked.run(threads, show)
-            result = _dataset(asked, asked.arrays(outcome, errors))
+            result = simulation(asked, outcome, errors)
         except KeyboardInterrupt as stop:
             if outcome is not None:
                 raise Interrupted(partial(so_far, outcome)) from None
@@ -164,8 +164,9 @@ def simulate(
     return result
 
 
-def _dataset(asked: AskedMotion, arrays: MotionArrays) -> xr.Dataset:
-    """The Dataset of a run."""
+def simulation(asked: AskedMotion, outcome: Outcome, errors: np.ndarray) -> xr.Dataset:
+    """The Dataset of a run, with the errors of its contact times float64[c] [s]."""
+    arrays = asked.arrays(outcome, errors)
     system, group, length, outcome = asked.system, asked.group, asked.length, arrays.outcome
     forced, own_periods = system.forced_at is not None, asked.own_periods
     attrs: dict[str, Any] = {"sample_times": "given"} if asked.given else {}

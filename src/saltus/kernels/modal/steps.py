@@ -412,15 +412,18 @@ def advance(i, budget, batch, m):
 
 @kernel
 def put_back(i, tau, status, batch, m):
-    """Store a trajectory that has ended or is paused."""
+    """Store a trajectory that has ended or is paused. The derivative of one that is paused waits
+    where it is: no bit depends on when that was.
+    """
     if batch.carry[i, ENTERS] < 0.5:
         at = int(batch.carry[i, AT])
         write_queue(i, batch.cursor[i], m.links[at, MODES], batch, m)
         for k in range(m.sizes[ROWS] * LANES):
             batch.carry[i, AMPLITUDES + k] = m.y[k // LANES, k % LANES]
         keep_state(i, tau, batch, m)
-        move_columns(i, at, tau, batch, m)
-        keep_amplitudes(i, batch, m)
+        if status != RUNNING:
+            move_columns(i, at, tau, batch, m)
+            keep_amplitudes(i, batch, m)
     batch.phase[i], batch.status[i] = tau, status
 
 

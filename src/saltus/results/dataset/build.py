@@ -121,12 +121,12 @@ class Subject:
     attrs: Mapping[str, Any] = field(default_factory=dict)
     guards: Guards | None = None
     gap_unit: str = ""
-    margin_unit: str = ""
     varied: Mapping[str, Any] = field(default_factory=dict)
     forcing_period: float | np.ndarray | None = None
     batch: bool = True
     outputs: Sequence[str] = ()
     outputs_first: bool = False
+    margin_unit: str = ""
 
 
 def subject_of(

@@ -67,10 +67,14 @@ OF_BACKBONES = OF_RESPONSES | {
 class Branches(OneVerb):
     """Branches of periodic orbits over a parameter."""
 
+    whole = "follows branches from point to point"
+
 
 @asked(130, asking("backbone", ["backbone"], OF_BACKBONES, called="Backbone"))
 class Backbone(OneVerb):
     """The backbone of resonances over their amplitude."""
+
+    whole = "follows a branch from point to point"
 
     def check(self, table: Any, setting: Setting) -> None:  # noqa: ARG002
         """Read the amplitude in the unit of its state."""

@@ -125,6 +125,8 @@ class AtEvent(OneVerb):
 class CurveQuestion(AtEvent):
     """A curve of bifurcations."""
 
+    whole = "follows a bifurcation from point to point"
+
     def check(self, table: Any, setting: Setting) -> None:
         """Read the map to draw it on, too."""
         super().check(table, setting)
@@ -186,6 +188,8 @@ class CurveQuestion(AtEvent):
 )
 class EventDerivatives(AtEvent):
     """Derivatives of the place of a bifurcation."""
+
+    whole = "takes less time than the branches that it begins at, which one job follows"
 
     def check(self, table: Any, setting: Setting) -> None:
         """Check what the derivatives are with respect to."""

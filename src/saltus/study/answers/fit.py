@@ -58,6 +58,8 @@ OF_FITS = OF_RESPONSES | {
 class Fit(OneVerb):
     """[fit]: unknowns of the system from a measurement."""
 
+    whole = "is one search, each of whose descents ends at the minima of those before it"
+
     def check(self, table: Any, setting: Setting) -> None:
         """Read the measurement, the bounds and the noise now: errors come before anything is
         computed.

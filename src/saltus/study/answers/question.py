@@ -103,11 +103,13 @@ class Question(ABC):
         Stems of the questions whose answers it takes.
     shared : bool
         Whether every job (shard) answers it that has the answers it needs; else, if it doesn't
-        divide into chunks, it is left to the first of them.
+        divide into chunks, one of them takes it.
     all_rows : str
         End of the name of a CSV file of every row of the Dataset; "" if the table holds them all.
     inputs : list of Input
         Files that take part in the answer.
+    whole : str
+        Reason why its work has no chunks, a sentence without its end.
     """
 
     title: str
@@ -118,6 +120,7 @@ class Question(ABC):
     shared: bool = False
     all_rows: str = ""
     inputs: Sequence[Input] = ()
+    whole: str = "is answered at once"
 
     @property
     def stems(self) -> tuple[str, ...]:
@@ -135,7 +138,7 @@ class Question(ABC):
         """Its work in independent chunks; the reason why it doesn't divide, a sentence without its
         end, if it doesn't.
         """
-        return "is answered at once"
+        return self.whole
 
     def join(self, asked: Sequence[Question]) -> None:  # noqa: ARG002
         """Find the questions whose answers this question needs. Raises StudyError if there are
@@ -177,6 +180,7 @@ class OneVerb(Question):
         If it doesn't fit the system, before anything is computed.
     """
 
+    whole = "is computed as a whole"
     #: Name of the function, and of its argument that says how to integrate.
     function: ClassVar[str] = ""
     how: ClassVar[str] = "method"

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+import functools
+from typing import TYPE_CHECKING, Any
 
 from pydantic import Field
 
@@ -10,6 +11,9 @@ from saltus.study.answers.question import OneVerb, asked
 from saltus.study.setting.setting import Setting
 from saltus.study.tables.kinds import KINDS
 from saltus.study.tables.signature import Asked, OfLength, table
+
+if TYPE_CHECKING:
+    from saltus.results.store.division import Division
 
 _TO = Field(
     min_length=1,
@@ -42,3 +46,10 @@ class Derivatives(OneVerb):
         Columns.of(self.system, table.to)
         names = ("start", "values", "periods", "t_end", "t_start")
         stretch(self.system, **{name: self.arguments[name] for name in names}, transient=0)
+
+    @functools.cached_property
+    def division(self) -> Division | str:
+        """Chunks of trajectories."""
+        from saltus.analysis.derivatives.divided import DividedSensitivity
+
+        return DividedSensitivity.of(self.system, self.method, self.arguments)

@@ -4,6 +4,7 @@ printed and exact times.
 
 from __future__ import annotations
 
+import functools
 from typing import TYPE_CHECKING, Any
 
 from saltus.analysis.motion.settled import settled
@@ -22,6 +23,7 @@ from saltus.system.condition import end_condition
 if TYPE_CHECKING:
     import xarray as xr
 
+    from saltus.results.store.division import Division
     from saltus.results.table import TextTable
     from saltus.study.setting.setting import Setting
     from saltus.study.tables.study import Study
@@ -102,6 +104,13 @@ class Motion(OneVerb):
         self.printed = printed_rows(files[0].data, files[0].path)
         self.exact = exact_times(files[1].data, files[1].path) if len(files) > 1 else {}
         self.inputs = files
+
+    @functools.cached_property
+    def division(self) -> Division | str:
+        """Chunks of trajectories."""
+        from saltus.analysis.motion.divided import DividedMotions
+
+        return DividedMotions.of(self.system, self.method, self.arguments)
 
     def rows(self, ds: xr.Dataset, found: Answers) -> list[TextTable]:
         """A row for each trajectory, or for each contact that was printed."""

@@ -25,7 +25,7 @@ class Resources:
         For these: address of a dask scheduler, or ``"local"`` for processes of this machine.
     shard : (k, n) or None
         Of these only the chunks i with i % n == k: one of n jobs that share the folder and nothing
-        else. All other questions are left to shard 0.
+        else. All other questions are taken in turn.
     """
 
     threads: int | None = None

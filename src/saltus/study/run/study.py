@@ -76,8 +76,9 @@ def run_study(
     inputs = inputs or Inputs(folder)
     asked = questions_of(study, own, inputs, only)
     divided = [question for question in asked if isinstance(question.division, Division)]
+    sets = turns([question for question in asked if question not in divided])
     if resources.divide:
-        _check_divided(asked, divided)
+        _check_divided(asked, divided or (resources.shard is not None and len(sets) > 1))
     if resources.scheduler not in (None, "local"):
         from saltus.study.run.cluster import check_scheduler, open_to_all
 
@@ -93,9 +94,9 @@ def run_study(
     at, outcome = Running(folder, text, resources, report, say, pictures), StudyOutcome()
     found: dict[str, xr.Dataset] = {}
     for question in asked:
-        first = resources.shard is None or resources.shard[0] == 0
         shared = question in divided or question.shared
-        if (first or shared) and found.keys() >= set(question.needs):
+        mine = shared or _is_mine(question, sets, resources.shard)
+        if mine and found.keys() >= set(question.needs):
             with naming_table(question.place):
                 ds = _answer(question, found, at, stores)
                 if ds is None:
@@ -106,9 +107,27 @@ def run_study(
     return outcome
 
 
-def _check_divided(asked: Sequence[Question], divided: Sequence[Question]) -> None:
-    """Raise StudyError if none of the questions divides into chunks."""
-    if not divided:
+def turns(whole: Sequence[Question]) -> list[set[str]]:
+    """The stems of questions that don't divide, in sets that need each other's answers."""
+    sets: list[set[str]] = []
+    for question in whole:
+        needed = [one for one in sets if one & set(question.needs)]
+        sets = [one for one in sets if one not in needed]
+        sets.append({question.stem}.union(*needed))
+    return sets
+
+
+def _is_mine(question: Question, sets: Sequence[set[str]], shard: tuple[int, int] | None) -> bool:
+    """True if a question that doesn't divide is left to this job: jobs take them in turn."""
+    if shard is None:
+        return True
+    place = next(i for i, one in enumerate(sets) if question.stem in one)
+    return place % shard[1] == shard[0]
+
+
+def _check_divided(asked: Sequence[Question], divides: object) -> None:
+    """Raise StudyError if there is nothing to divide among jobs or processes."""
+    if not divides:
         why = ". ".join(dict.fromkeys(f"[{one.place}] {one.division}" for one in asked))
         raise StudyError(
             "--workers, --scheduler and --shard divide questions into chunks, and none of this "

@@ -66,7 +66,6 @@ def test_a_neighbour_comes_nearer_as_damping_says(damping):
     assert rates.mean() == pytest.approx(-damping, abs=2.0 / (8 * len(rates)))
 
 
-@pytest.mark.slow
 def test_a_neighbour_tells_chaos_at_the_rate_that_the_tangent_flow_tells(monkeypatch):
     """Duffing's oscillator, beside two more that are at rest."""
 

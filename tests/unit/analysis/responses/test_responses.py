@@ -117,7 +117,7 @@ def test_a_huge_grid_is_refused_before_it_fills_memory():
         grid_of(
             RIG,
             {"frequency": ("1 Hz", "2 Hz", 100_000)},
-            {"x": np.zeros(100), "v": 0.0},
+            {"x": np.zeros(100_000), "v": 0.0},
             None,
             None,
             1,

@@ -1,0 +1,77 @@
+"""Derivatives of many motions in chunks, for a store."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from saltus.analysis.derivatives.sensitivity import sensitivity_run, warn_of_chaos
+from saltus.analysis.derivatives.sensitivity_table import (
+    SensitivityRun,
+    sensitivity_dataset,
+    sensitivity_rows,
+)
+from saltus.analysis.motion.divided import DividedRows
+from saltus.analysis.outcome_messages import warn
+from saltus.flow import engine
+from saltus.interrupt import Interrupted
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from saltus.results.store.store import Store
+
+
+@dataclass(frozen=True)
+class DividedSensitivity(DividedRows):
+    """The chunks of :func:`saltus.sensitivity` from starts."""
+
+    @functools.cached_property
+    def asked(self) -> SensitivityRun:
+        """The arguments, read and checked."""
+        return sensitivity_run(self.system, method=self.method, **self.arguments)
+
+    def prepare(self) -> None:
+        """Compile the flow that carries the derivatives."""
+        flown, method = self.asked.flow.flown, self.asked.method.suited_to(self.cells)
+        method.serving(flown.origin).kernels(flown.origin)
+
+    def chunk(self, index: int, shared: None) -> dict[str, np.ndarray]:  # noqa: ARG002
+        """The derivatives of the trajectories of one chunk."""
+        run = self.asked.rows(self.rows(index))
+        return sensitivity_rows(run, run.fly(run.request, 1))
+
+    def finish(
+        self,
+        store: Store,
+        shared: None,  # noqa: ARG002
+        threads: int | None = None,  # noqa: ARG002
+        progress: Callable[[float], None] | None = None,  # noqa: ARG002
+    ) -> xr.Dataset:
+        """The Dataset of all motions."""
+        stored = self.stored(store)
+        parts = [self._part(*one) for one in enumerate(stored)]
+        rows = {name: np.concatenate([one[name] for one in parts]) for name in parts[0]}
+        counts = [len(one["contact_trajectory"]) for one in parts]
+        rows["contact_trajectory"] += np.repeat(self.cells * np.arange(len(parts)), counts)
+        result = functools.partial(sensitivity_dataset, self.asked, rows)
+        if any(one is None for one in stored):
+            raise Interrupted(result)
+        ds = result()
+        warn(ds, self.asked.length, self.system)
+        warn_of_chaos(ds)
+        return ds
+
+    def _part(
+        self, index: int, values: Mapping[str, np.ndarray] | None
+    ) -> Mapping[str, np.ndarray]:
+        """The rows of a chunk; of one that is missing rows of NaN."""
+        if values is not None:
+            return values
+        run = self.asked.rows(self.rows(index))
+        none = engine.not_run(run.flow.flown, run.method, run.request)
+        return sensitivity_rows(run, replace(none, complete=True))

@@ -1,0 +1,53 @@
+"""One thread of linear algebra while a verb runs."""
+
+import threading
+
+import threadpoolctl
+
+from saltus.analysis.inputs.verb import verb
+
+
+def threads() -> set[int]:
+    """How many threads each library of linear algebra may take."""
+    return {
+        library["num_threads"]
+        for library in threadpoolctl.threadpool_info()
+        if library["user_api"] == "blas"
+    }
+
+
+def allow(number: int) -> None:
+    """Set the number on a thread that ends, since a thread that lives would own it."""
+    setting = threading.Thread(target=threadpoolctl.threadpool_limits, args=(number, "blas"))
+    setting.start()
+    setting.join()
+
+
+def test_a_verb_that_outlasts_another_one_leaves_the_threads_as_they_were():
+    """The second verb begins while one thread is allowed. That isn't what it leaves behind."""
+    second_runs, first_ended = threading.Event(), threading.Event()
+    within = []
+
+    @verb
+    def second() -> None:
+        second_runs.set()
+        assert first_ended.wait(60)
+
+    other = threading.Thread(target=second)
+
+    @verb
+    def first() -> None:
+        other.start()
+        assert second_runs.wait(60)
+        within.append(threads())
+
+    found = max(threads())
+    allow(2)
+    try:
+        first()
+        after_first = threads()
+        first_ended.set()
+        other.join(60)
+        assert (within, after_first, threads()) == ([{1}], {2}, {2})
+    finally:
+        allow(found)
