@@ -68,7 +68,3 @@ def test_places_move_as_differences_say(system, kind, to, vary, start):
     assert float(found.event_value) == pytest.approx(float(event[place]), rel=1e-12)
     expected = float(WEIGHTS @ places) / STEP
     assert found.event_derivative.values @ along == pytest.approx(expected, rel=1e-7)
-    by_modes = sl.event_sensitivity(system, event, to=to, method=sl.Modal())
-    assert by_modes.event_derivative.values == pytest.approx(
-        found.event_derivative.values, rel=1e-7
-    )
