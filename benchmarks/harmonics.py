@@ -23,6 +23,7 @@ import scipy.sparse as sp
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "src"))
 
 import saltus as sl
+from saltus.analysis.branches.arclength import correct, tangents
 from saltus.analysis.harmonics import series as fourier
 from saltus.analysis.harmonics.equations import HarmonicOrbits
 from saltus.language.evaluate import evaluate
@@ -94,7 +95,7 @@ class Sampled(HarmonicOrbits):
             whole[i, :, first : first + width] += (back * slope) @ (here @ derived)
             shift = back @ (slope * seen[:, j]) * times
             whole[i, :, 1 + size :] += np.outer(shift, rate_by)
-        response, by_rate = self.source.response(harmonics, rate)
+        response, by_rate = (one[0] + 1j * one[1] for one in self.source.response(harmonics, rate))
         moved = responses(response, whole).reshape(size, -1) / constants[0]
         turned = responses(by_rate, whole[:, :, :1]).ravel() / constants[0]
         derivative = np.empty((size, self.width))
@@ -187,12 +188,33 @@ def compare(system, harmonics, states, frequency):
     )
 
 
+def of_point(system, found):
+    """CPU time of an evaluation at the first motion of a result, and of a point that converges from
+    a step along the tangent there [ms], as text.
+    """
+    c = found.point_harmonic_real.values[0] + 1j * found.point_harmonic_imag.values[0]
+    one = equations(system, c.shape[1] - 1, np.ones(1))
+    one.scale = np.append(np.full(one.size, 1e-2), 1.0)[None]
+    z = one.of_states(fourier.of_complex(c), float(found.point_frequency[0]))[None]
+    row = np.zeros(1, int)
+    along = tangents(one.evaluate(z, row)[1], np.eye(one.width)[-1:])
+    guess = z + 0.05 * along * one.scale
+    times = (
+        cost(lambda: one.evaluate(z, row)),
+        cost(lambda: correct(one, guess, along, row, foresee=True)),
+    )
+    return "{:.3f} | {:.2f}".format(*times)
+
+
 def of_rig():
     rig = sl.models.delangre("b", force="4 N", frequency="15 Hz")
     start, limits = {"x": "5 mm", "v": 0}, {"frequency": ("14 Hz", "18 Hz")}
     print("The rig, case b, 4 N, 14 to 18 Hz")
-    print("| | points | CPU time a point [ms] | fold [Hz] | median error |")
-    print("|---|---|---|---|---|")
+    print(
+        "| | evaluation [ms] | converged point [ms] | points | CPU time a point of a branch [ms] | "
+        "fold [Hz] | median error |"
+    )
+    print("|---|---|---|---|---|---|---|")
     for count in (None, 3, 5, 9, 15, 31, 63):
         options = {} if count is None else {"by": sl.HarmonicBalance(count)}
         sl.branches(
@@ -204,7 +226,8 @@ def of_rig():
         folds = found.event_frequency.values[found.event_kind.values == "fold"]
         error = "" if count is None else f"{float(np.nanmedian(found.point_error)):.1e}"
         print(
-            f"| {'exact' if count is None else f'H = {count}'} | {found.sizes['point']} | "
+            f"| {'exact' if count is None else f'H = {count}'} | "
+            f"{' | ' if count is None else of_point(rig, found)} | {found.sizes['point']} | "
             f"{took:.1f} | "
             f"{', '.join(f'{f:.8f}' for f in folds)} | {error} |"
         )

@@ -16,7 +16,7 @@ LARGER = {
     "results": (105, "names of kinds and of variables, which pictures and verbs share"),
     "kernels": (55, "codes of what happened, columns of the tables that kernels fill"),
     "flow": (60, "maps, requests, series of a motion, threads, progress"),
-    "analysis.closed": (35, "closed motions, their measures, cycles and equilibria"),
+    "analysis.closed": (40, "closed motions, isolated or not, their measures and units, cycles"),
     "analysis.inputs": (40, "types of arguments, the readers of each, the orbits of a result"),
     "analysis.attractors": (30, "what starts settle to, the search for it, answers over a grid"),
     "language": (30, "expressions and what is made of them"),

@@ -1,4 +1,4 @@
-"""The generated head of harmonic balance: forces with their slopes, and the slopes of gaps."""
+"""The generated head of harmonic balance: forces with their slopes, gaps and their slopes."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from saltus.language.expression import Expr
 
 
 def forces_text(
-    entries: Sequence[Expr], gap_slopes: Sequence[Expr], states: Sequence[str],
-    parameters: Sequence[str],
+    entries: Sequence[Expr], gap_slopes: Sequence[Expr], gaps: Sequence[Expr],
+    states: Sequence[str], parameters: Sequence[str],
 ) -> str:  # fmt: skip
     """The functions that kernels/harmonics asks for, as text.
 
@@ -21,12 +21,15 @@ def forces_text(
         Forces and slopes.
     gap_slopes : sequence of Expr
         Of each gap by each state, one after the other.
+    gaps : sequence of Expr
+        That are polynomials of the states, but for linear ones.
     states, parameters : sequence of str
         In their order.
     """
+    functions = {"forces": entries, "gap_slopes": gap_slopes, "gap_values": gaps}
     return "\n".join(
         f"@kernel\ndef {name}(t, y, p, mode, out):\n{_body(roots, states, parameters)}\n"
-        for name, roots in (("forces", entries), ("gap_slopes", gap_slopes))
+        for name, roots in functions.items()
     )
 
 

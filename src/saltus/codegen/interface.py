@@ -205,14 +205,14 @@ HARMONICS = Interface(
     truths=(),
 )
 
-#: The equations of harmonic balance: an equation brings its forces with their slopes, and the
-#: slopes of its gaps.
+#: The equations of harmonic balance: an equation brings its forces with their slopes, the slopes of
+#: its gaps, and the gaps that aren't linear.
 BALANCE = Interface(
     entry="balance",
     arguments=(
         _I1, _F1, _F2, _F1, _F1, _F1, _F2, _F1, _F4, _F4, _I1, _I1, _I1, _I1, _I1, _I1, _F1, _F2,
-        _F1, _F1, _I1, _F1, _F1, _I2, _F1, _F1, _I1, _F1, _F2, _F3, _F2, _F2, _F2, _F2, _F1, _F1,
-        _F1, _F2, _F1, _F1, _F2, _F1,
+        _F1, _F1, _I1, _F1, _F1, _I2, _F1, _F1, _I1, _F1, _F2, _F3, _F2, _F2, _F1, _F1, _F2, _F2,
+        _F1, _F1, _F1, _F2, _F1, _F1, _F2, _F1,
     ),
     layout="",
     templates=(
@@ -226,7 +226,9 @@ BALANCE = Interface(
     flags=(),
     tables=MappingProxyType({}),
     functions=MappingProxyType(
-        dict.fromkeys(("forces", "gap_slopes"), (REAL, ARRAY, ARRAY, WHOLE, ARRAY))
+        dict.fromkeys(
+            ("forces", "gap_slopes", "gap_values"), (REAL, ARRAY, ARRAY, WHOLE, ARRAY)
+        )
     ),
     truths=(),
 )  # fmt: skip

@@ -254,7 +254,7 @@ t_end = "1 s"
         (RIG.replace('x = "v"', 'x = "mass*v"') + SIMULATE, "[system] written out"),
         (RIG.replace('"stop.csv"', '"../stop.csv"') + SIMULATE, "outside the study's folder"),
         (RIG.replace('"stop.csv"', '"words.csv"') + SIMULATE, "line 3: what stands in the column "
-            "'2' is no finite number"),
+            "'second' is no finite number. Correct the line"),
         (RIG.replace('"stop.csv"', '"down.csv"') + SIMULATE, "[system.tables.stop] down.csv: "
             "points must ascend"),
         (RIG.replace('"stop.csv"', '"bare.csv"') + SIMULATE, "begins with numbers. Its first line "

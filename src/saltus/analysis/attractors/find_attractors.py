@@ -17,6 +17,7 @@ from saltus.analysis.attractors.aperiodic import (
     survey,
 )
 from saltus.analysis.attractors.attractor_set import INSIDE, AttractorSet, is_about
+from saltus.analysis.attractors.families import on_families
 from saltus.analysis.attractors.growth import BUDGET, NEWTON, tangent_cost
 from saltus.analysis.attractors.limit_cycles import limit_cycles
 from saltus.analysis.attractors.noisy import Noisy, Stray, blurred, keep_to, stray_of
@@ -147,6 +148,12 @@ def _settle(
                     map_, found, points[here], going[here], travel, here, scale, owner, settled
                 )
             ]
+        if len(here):
+            here = here[
+                ~_on_families(
+                    map_, found, points[here], going[here], travel.age, owner, settled, scale
+                )
+            ]
         stay = np.zeros(len(going), bool)
         stay[here] = travel.going[here]
         travel.keep(stay)
@@ -189,6 +196,18 @@ def _keeping(
     for i in np.flatnonzero(on >= 0):
         owner[who[i]], settled[who[i]] = ones[on[i]], age
     return on >= 0
+
+
+def _on_families(
+    map_: Map, found: AttractorSet, points: np.ndarray, who: np.ndarray, age: int, owner: Owners,
+    settled: np.ndarray, scale: np.ndarray,
+) -> np.ndarray:  # fmt: skip
+    """Note which trajectories float64[k, m, D] are on families of orbits, bool[k]."""
+    homes = on_families(map_, points, scale, found)
+    for i, home in zip(who, homes, strict=True):
+        if home is not None:
+            owner[i], settled[i] = home, age
+    return np.array([home is not None for home in homes])
 
 
 def watched(states: int) -> tuple[int, int]:
@@ -323,11 +342,15 @@ def _survey(
     rests = np.array([mismatch(points[i, -ROUND:], scale) < ARRIVED for i in chosen])
     free = chosen[~keeps & ~rests]
     seen = [*noisy, *survey(map_, travel.state[free], points[free], scale)]
-    if seen:
-        moves = chosen[keeps | ~rests]
+    moves = chosen[keeps | ~rests]
+    if len(moves):  # a long transient, if nothing is seen
+        watching = watching if seen else SURVEY_ITERATES
         going_on = map_.launch(travel.state[moves], watching)
-        leave = _leave(going_on, watching, found, noisy, scale, lambda age: tell(travel.age + age))
+        ends = _leave(going_on, watching, found, noisy, scale, lambda age: tell(travel.age + age))
+        leave = np.isfinite(ends).all(axis=(1, 2))
         leavers.append(points[moves][leave, -ROUND:])
+        who, age = going[survivors[moves[leave]]], travel.age + going_on.age
+        _arrive(map_, ends[leave], who, age, scale, found, most, owner, settled)
     for one in seen:
         if not any((one.share(iterates) >= INSIDE).any() for iterates in leavers if len(iterates)):
             found.add_sampled(one)
@@ -337,7 +360,7 @@ def _survey(
         else np.full(len(survivors), -1)
     )
     for i, one in zip(going[survivors], label, strict=True):
-        if one >= 0:
+        if one >= 0 and owner[i] is None:
             owner[i] = found.sampled[one]
     found.astray = (
         [stray for stray, one in zip(strays, label[chosen], strict=True) if one < 0]
@@ -390,15 +413,28 @@ def _blurred(
     return [one for one in about if one is not None and (one.share(runs) >= INSIDE).any()], strays
 
 
+def _arrive(
+    map_: Map, ends: np.ndarray, who: np.ndarray, age: int, scale: np.ndarray, found: AttractorSet,
+    most: int, owner: Owners, settled: np.ndarray,
+) -> None:  # fmt: skip
+    """Note the orbits that trajectories float64[k, ROUND, D] have come to after very long."""
+    if not len(ends):
+        return
+    while _add_orbits(map_, ends, scale, found, most, np.full(1, np.inf)):
+        pass
+    left = ~_captured(found, ends, who, age, owner, settled)
+    _on_families(map_, found, ends[left], who[left], age, owner, settled, scale)
+
+
 def _leave(
     travel: Travel, most: int, found: AttractorSet, noisy: list[Noisy], scale: np.ndarray,
     tell: Callable[[int], None],
 ) -> np.ndarray:  # fmt: skip
-    """True where a trajectory, followed for very long, reaches an orbit after all, bool[k]. Those
-    near a noisy orbit don't count.
+    """Last iterates of trajectories, followed for very long, that reach an orbit after all,
+    float64[k, ROUND, D]; NaN of others. Those near a noisy orbit don't count.
     """
     going = np.arange(len(travel.state))
-    left = np.zeros(len(going), bool)
+    left = np.full((len(going), ROUND, len(scale)), np.nan)
     while len(going) and travel.age < most:
         points = travel.advance(ROUND)
         arrives = found.near.capture(points)[0] >= 0
@@ -406,7 +442,7 @@ def _leave(
             arrives |= [mismatch(iterates, scale) < ARRIVED for iterates in points] & (
                 keep_to(noisy, points, INSIDE) < 0
             )
-        left[going[arrives]] = True
+        left[going[arrives]] = points[arrives]
         stays = ~arrives & travel.going
         travel.keep(stays)
         going = going[stays]

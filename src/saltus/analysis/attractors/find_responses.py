@@ -24,7 +24,10 @@ from saltus.analysis.attractors.recurrence import recurrence, recurring_orbits
 from saltus.analysis.closed import unforced
 from saltus.analysis.closed.field_zeros import autonomous
 from saltus.analysis.closed.motions import ClosedMotions
-from saltus.analysis.solve.tolerances import BESIDE, NEAR, RESTS, ROUND, SETTLED
+from saltus.analysis.closed.orbits import neutral_orbits
+from saltus.analysis.closed.spread import beyond_rounding
+from saltus.analysis.closed.unforced import eigenvalues_of
+from saltus.analysis.solve.tolerances import BESIDE, NEAR, RESTS, ROUND, ROUNDING, SETTLED
 from saltus.flow.maps import Stroboscope
 from saltus.flow.modal import Modal
 from saltus.flow.request import Schedule
@@ -236,7 +239,7 @@ def _settled(
     orbits, apart, noise = recurring_orbits(map_.rows(who), points, result.scale[who], near, left)
     purse[who] = left
     beside = orbits.distance(points[:, -1], result.scale[who]) <= BESIDE * np.maximum(apart, noise)
-    done: np.ndarray = orbits.stable & beside
+    done: np.ndarray = (orbits.stable | orbits.neutral) & beside
     result.orbits.put(who[done], orbits.rows(done))
     result.kind[who[done]], result.exponent_error[who[done]] = Kind.PERIODIC, 0.0
     with np.errstate(divide="ignore"):
@@ -255,6 +258,15 @@ def _settled_unforced(
     state, window = points[:, -1], ROUND * float(map_.period[0])
     result.scale[who] = np.maximum(result.scale[who], np.ptp(points, axis=1))
     found, scale = unforced.attracted(map_, state, result.scale[who], window, near)
+    period, apart = recurrence(points, scale)
+    held = np.flatnonzero((found.period == 0) & (apart < ROUNDING))
+    if len(held):
+        rest = neutral_orbits(
+            map_.rows(held), state[held], period[held], scale[held], np.zeros(len(held))
+        )
+        rest.multipliers = eigenvalues_of(rest.multipliers, map_.period[held, None])
+        rest.time[rest.period > 0] = 0.0
+        found.put(held, rest)
     done = found.period > 0
     chosen = who[done]
     result.orbits.put(chosen, found.rows(done))
@@ -363,4 +375,5 @@ def motion_range(map_: Stroboscope, state: np.ndarray) -> np.ndarray:
     with np.errstate(all="ignore"):
         lengths, sizes = np.ptp(samples, axis=1), np.abs(samples).max(axis=1)
     scale = np.where(lengths > RESTS * sizes, lengths, sizes)
+    scale = beyond_rounding(scale, map_)
     return np.where(np.isfinite(scale) & (scale > 0), scale, 1.0)

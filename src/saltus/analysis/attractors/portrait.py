@@ -17,7 +17,7 @@ from saltus.analysis.closed.cycles import ASIDE
 from saltus.analysis.closed.field_zeros import autonomous, find_equilibria
 from saltus.analysis.closed.measures import Measures, measure, unknown
 from saltus.analysis.closed.motions import ClosedMotion
-from saltus.analysis.closed.unforced import measure_equilibria
+from saltus.analysis.closed.unforced import eigenvalues_of, measure_equilibria
 from saltus.analysis.inputs.outputs import outputs_of
 from saltus.flow.maps import Map, Stroboscope
 from saltus.results import AttractorTable
@@ -109,7 +109,12 @@ def _unforced(map_: Stroboscope, found: AttractorSet) -> AttractorTable:
     )
     for i in range(equilibria):
         points[i] = start[i : i + 1] = still.points[i, :1] if still.period[i] else start[i : i + 1]
-        eigenvalues[i], exponent[i] = still.multipliers[i], still.multipliers[i, 0].real
+        eigenvalues[i] = (
+            still.multipliers[i]
+            if still.period[i]  # the field of what a contact holds doesn't vanish
+            else eigenvalues_of(found.orbits[i].multipliers, float(map_.period[0]))
+        )
+        exponent[i] = eigenvalues[i, 0].real
     for i in np.flatnonzero(kind == Kind.LIMIT_CYCLE.word).tolist():
         one = cycle_of(map_, found.sampled[i - equilibria])
         cycle[i], multipliers[i], points[i], start[i] = (

@@ -8,7 +8,7 @@ import numpy as np
 
 from saltus.analysis.attractors.growth import NEWTON, tangent_cost
 from saltus.analysis.closed.motions import ClosedMotions
-from saltus.analysis.closed.orbits import find_orbits
+from saltus.analysis.closed.orbits import find_orbits, neutral_orbits
 from saltus.flow.maps import Map
 
 
@@ -67,8 +67,10 @@ def recurring_orbits(
     purse = np.full(len(points), np.inf) if purse is None else purse
     ready = np.flatnonzero((apart < np.maximum(near, noise)) & (price <= purse))
     purse[ready] -= price[ready]
-    result.put(
-        ready,
-        find_orbits(map_.rows(ready), points[ready, -1], period[ready], scale[ready], noise[ready]),
-    )
+    for find in (find_orbits, neutral_orbits):
+        result.put(
+            ready,
+            find(map_.rows(ready), points[ready, -1], period[ready], scale[ready], noise[ready]),
+        )
+        ready = ready[~result.stable[ready]]
     return result, apart, noise

@@ -5,14 +5,17 @@ part can be computed anywhere.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from saltus.analysis.attractors.aperiodic import SURVEY_ITERATES
 from saltus.analysis.attractors.attractor_set import AttractorSet
+from saltus.analysis.attractors.families import is_neutral, on_families
 from saltus.analysis.attractors.find_attractors import find_attractors, keeps_to_sampled
 from saltus.analysis.basins.scouting import affordable
+from saltus.analysis.closed.motions import ClosedMotion
+from saltus.analysis.solve.tolerances import ROUND
 from saltus.flow.maps import Map, Travel
 from saltus.flow.progress import stage
 from saltus.flow.threads import on_threads
@@ -257,7 +260,11 @@ def complete(
     half = stage(progress, 0.0, 0.5)
     wider, _, _ = find_attractors(map_, result.end[sample], scale, most, found, half)
     half = stage(progress, 0.5, 1.0)
-    more = settle_all(map_, result.end[opened], wider, most, threads, half)
+    wider, label = on_known_families(map_, result.end[opened], wider, scale)
+    alone = label < 0
+    more = result.of(opened)
+    more.label[:], more.periods[:], more.unresolved[:] = label, 0, 0
+    more.put(alone, settle_all(map_, more.end[alone], wider, most, threads, half))
     more.periods[more.periods >= 0] += most
     more.unresolved[:] += result.unresolved[opened]
     still = more.label == OPEN
@@ -265,6 +272,23 @@ def complete(
     renumber(result.label, wider.ids(found))  # at last: who stops this keeps the ids of before
     result.put(opened, more)
     return wider
+
+
+def on_known_families(
+    map_: Map, state: np.ndarray, found: AttractorSet, scale: np.ndarray
+) -> tuple[AttractorSet, np.ndarray]:
+    """The families of orbits that trajectories at float64[k, D] are on, int64[k], -1 where none:
+    ids among the attractors, to which further families are added. Looks at nothing where no family
+    is known.
+    """
+    owners: list[ClosedMotion | None] = [None] * len(state)
+    if any(is_neutral(one) for one in found.orbits):
+        found = replace(found, orbits=list(found.orbits))
+        for piece in pieces_of(*state.shape):
+            points = map_.launch(state[piece], ROUND).advance(ROUND)
+            owners[piece] = on_families(map_, points, scale, found)
+        found = found.ordered(scale)
+    return found, np.array([-1 if one is None else found.index(one) for one in owners], np.int64)
 
 
 def renumber(label: np.ndarray, ids: np.ndarray) -> None:

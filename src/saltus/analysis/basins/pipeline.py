@@ -21,7 +21,14 @@ from saltus.analysis.attractors.attractors import no_attractor
 from saltus.analysis.attractors.noisy import stray_attrs
 from saltus.analysis.attractors.portrait import portraits
 from saltus.analysis.basins import uncertainty
-from saltus.analysis.basins.labels import OPEN, Settling, complete, settle
+from saltus.analysis.basins.labels import (
+    OPEN,
+    Settling,
+    complete,
+    on_known_families,
+    renumber,
+    settle,
+)
 from saltus.analysis.basins.levels import GridLevel, levels_of
 from saltus.analysis.basins.scouting import SCOUTS, glanced, scouted
 from saltus.analysis.closed.spread import spread
@@ -262,7 +269,14 @@ class BasinPlan:
         again = settle(
             self.map(1).by(self.method.companion()), self.starts(chosen), found, 2 * self.periods
         )
-        flips = int(np.count_nonzero(again.label != result.label[chosen]))
+        left = np.flatnonzero(again.label == OPEN)
+        exact = self.map(1).by(self.method.companion())
+        wider, label = on_known_families(exact, again.end[left], found, self.scale)
+        before = result.label[chosen]
+        for one in (before, again.label):
+            renumber(one, wider.ids(found))
+        again.label[left] = label
+        flips = int(np.count_nonzero(again.label != before))
         low, high = wilson(flips, len(chosen))
         return {
             "flip_rate": flips / len(chosen),

@@ -221,7 +221,8 @@ def branches(
                         f"no periodic orbit of {system.name} is known between "
                         f"{limits[0]:g} and {limits[1]:g}: give other starts, more of them "
                         f"({say.key(start='random 20')} with {say.key('box')}), or longer runs "
-                        f"({say.key('periods')})."
+                        f"({say.key('periods')}). Orbits with a multiplier of 1, as where "
+                        "static friction holds a body all the time, lead on to no branch."
                     )
                 )
             plan = plan_of(system, name, limits, method, threads, points, longest, chosen)
@@ -341,5 +342,6 @@ def _found_in(
     ((name, values),) = grid.axes.items()
     orbits = found.motions.orbits.rows(found.row)
     place = values[found.place]
-    seeds = seeds_at(grid.system, orbits.points, orbits.period, orbits.time, place)
+    isolated = np.where(orbits.neutral, 0, orbits.period)
+    seeds = seeds_at(grid.system, orbits.points, isolated, orbits.time, place)
     return scaled(grid.system, name, list(seeds), method)

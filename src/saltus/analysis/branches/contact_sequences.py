@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from saltus.analysis.branches.shooting import PeriodicOrbits
+from saltus.contact.guards import is_hold
 from saltus.kernels import status as st
 
 #: A contact that two neighbouring periods both report at the time between them is one, in periods.
@@ -54,6 +55,8 @@ class ContactSequence:
         Rates of the gaps before them.
     mode : int
         Sides of all guards at the end.
+    held : bool
+        Whether a contact is held then.
     """
 
     contacts: tuple[SequenceContact, ...]
@@ -61,11 +64,13 @@ class ContactSequence:
     after: np.ndarray
     velocity: np.ndarray
     mode: int
+    held: bool = False
 
     @property
     def flies(self) -> bool:
         """True if no contact is held, so that the orbit is made of legs (legs.py)."""
-        return all(one.kind in (st.CROSSING, st.IMPACT) for one in self.contacts)
+        kinds = {one.kind for one in self.contacts}
+        return not self.held and kinds <= {st.CROSSING, st.IMPACT}
 
 
 def sequences(orbits: PeriodicOrbits, z: np.ndarray) -> list[ContactSequence | None]:
@@ -79,6 +84,7 @@ def sequences(orbits: PeriodicOrbits, z: np.ndarray) -> list[ContactSequence | N
     begins = table.begins(p * n)
     phase = table.trajectory % n + table.time / orbits.map.period[0]
     modes = outcome.mode.reshape(p, n)
+    holds = sum(1 << i for i, guard in enumerate(orbits.map.system.guards) if is_hold(guard))
     result: list[ContactSequence | None] = []
     for i in range(p):
         rows = np.arange(begins[i * n], begins[(i + 1) * n])
@@ -93,6 +99,7 @@ def sequences(orbits: PeriodicOrbits, z: np.ndarray) -> list[ContactSequence | N
                 table.state[rows][:, : orbits.size],
                 table.velocity[rows],
                 int(modes[i, -1]),
+                bool(modes[i, -1] & holds),
             )
             if whole[i]
             else None

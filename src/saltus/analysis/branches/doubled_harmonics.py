@@ -63,7 +63,7 @@ def doubled(branch: Branch, number: int, orbits: ClosedHarmonics) -> Iterator[Se
         found.update(zip(which.tolist(), point.z, strict=True))
         return np.where(point.found, test(point.z), np.nan)
 
-    places = zeros(at, length)
+    places = zeros(at, length, np.stack([values[after], values[after + 1]], axis=1))
     for i in np.flatnonzero(np.isfinite(places)).tolist():
         whole, derivative = over_two(found[i][None])
         way = np.zeros(orbits.width)

@@ -146,7 +146,8 @@ def _located(piece: Piece) -> list[Event]:
     values = _tests(piece)
     kinds, after = np.nonzero(values[:, 1:] * values[:, :-1] < 0)
     ends, rows = np.stack([after, after + 1], axis=1), np.full(len(after), piece.row)
-    found = locate(piece.orbits, rows, piece.z[ends], piece.tangent[ends], kinds)
+    each = values[kinds[:, None], ends]
+    found = locate(piece.orbits, rows, piece.z[ends], piece.tangent[ends], kinds, each)
     events = [
         replace(point, after=int(place))
         for place, point in zip(after, found, strict=True)

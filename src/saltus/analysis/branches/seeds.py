@@ -13,6 +13,7 @@ from saltus.analysis.branches.switching import Seed
 from saltus.analysis.closed.all_equilibria import all_equilibria
 from saltus.analysis.closed.cycles import ZERO, units
 from saltus.analysis.closed.measures import measure
+from saltus.analysis.closed.motions import ClosedMotions
 from saltus.analysis.inputs.orbits import NAMES, PREFIX, check_equations
 from saltus.errors import ParameterError, shown
 from saltus.flow.maps import Stroboscope
@@ -51,6 +52,10 @@ def seeds_of(system: System, name: str, found: xr.Dataset) -> list[Seed]:
     times = found.get(f"{prefix}_cycle")
     cycles = np.full(len(values), np.nan) if times is None else times.values
     periods = np.where(cycles > 0, 1, found[f"{prefix}_period"].values)
+    if f"{prefix}_multiplier_real" in found:
+        real, imaginary = (found[f"{prefix}_multiplier_{part}"].values for part in ("real", "imag"))
+        motions = ClosedMotions(periods, points, real + 1j * imaginary, cycles, cycles)
+        periods = np.where(motions.neutral, 0, periods)  # no single curve leads on from there
     return list(seeds_at(system, points, periods, cycles, values))
 
 

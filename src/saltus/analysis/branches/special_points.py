@@ -3,8 +3,8 @@ change of stability.
 
 Each kind is the zero of a function of the orbit alone; a zero between two points of a branch is
 found by a bracketing method in arclength, at orbits that are closed by Newton's method, so it is
-the solution of the defining system and no interpolation. Chandrupatla, Adv. Eng. Softw. 28 (1997)
-145.
+the solution of the defining system and no interpolation; a fold by Newton's method on that system.
+Chandrupatla, Adv. Eng. Softw. 28 (1997) 145.
 Kuznetsov, Elements of Applied Bifurcation Theory (2004), chapter 10.
 """
 
@@ -19,6 +19,7 @@ from scipy.optimize import elementwise
 from saltus.analysis.branches.arclength import correct, tangents
 from saltus.analysis.branches.equations import OrbitEquations
 from saltus.analysis.branches.events import Event
+from saltus.analysis.solve.linear import solved
 from saltus.analysis.solve.newton import newton
 from saltus.flow.polynomials import between
 
@@ -35,6 +36,11 @@ ON_CIRCLE = 1e-9
 CONVERGED = 1e-11
 #: Distance of two derivatives whose difference is their slope, in units of the scale.
 ASIDE = 1e-5
+#: Steps of Newton's method towards a fold, at most.
+MOST_STEPS = 8
+#: A point nearer than this to the next place that is tried foretells the point there better than
+#: the cubic through the ends of the step, as a share of its length.
+BESIDE = 0.02
 #: Farthest that a branch point lies from where it was seen, in units of the scale.
 FARTHEST = 0.3
 
@@ -74,7 +80,90 @@ def tests(
     )
 
 
-_ENDS = ("z", "derivative")
+class _Steps:
+    """Steps along curves, over each of which a test vanishes.
+
+    Parameters
+    ----------
+    orbits, rows, z, tangent, kind
+        See :func:`locate`.
+    """
+
+    def __init__(
+        self, orbits: OrbitEquations, rows: np.ndarray, z: np.ndarray, tangent: np.ndarray,
+        kind: np.ndarray,
+    ) -> None:  # fmt: skip
+        self.scale, self.kind, self.column = orbits.scale[rows], kind, z.shape[2] - 1
+        self.step, self.z = (z[:, 1] - z[:, 0]) / self.scale, z[:, 0]
+        self.orbits, self.rows = orbits.near(self.z, rows), np.arange(len(rows))
+        self.tangent, beyond = tangent.swapaxes(0, 1)
+        self.length = self.along(self.step)
+        # slopes by the share of the step along the first tangent
+        self.first = self.length[:, None] * self.tangent
+        self.last = (self.length / self.along(beyond))[:, None] * beyond
+        #: the latest point that was tested of each
+        self.known: dict[int, Event] = {}
+
+    def along(self, way: np.ndarray, which: np.ndarray | None = None) -> np.ndarray:
+        """The part of ways float64[r, m + 1] along the first tangents."""
+        tangent = self.tangent if which is None else self.tangent[which]
+        return np.asarray(np.einsum("ei,ei->e", way, tangent))
+
+    def ahead(self, share: np.ndarray, which: np.ndarray) -> np.ndarray:
+        """Points on the cubics through the ends of steps int64[r], at shares of them."""
+        step, first, last = self.step[which], self.first[which], self.last[which]
+        far = between(np.zeros_like(step), step, first, last, share[:, None])
+        return np.asarray(self.z[which] + far * self.scale[which])
+
+    def at(self, flat: np.ndarray, which: np.ndarray) -> np.ndarray:
+        """The tests of steps int64[r] at lengths float64[r] along the first tangents."""
+        guess = self.ahead(flat / self.length[which], which)
+        for i, one in enumerate(which.tolist()):
+            if (near := self.known.get(one)) is None:
+                continue
+            far = flat[i] - (near.z - self.z[one]) / self.scale[one] @ self.tangent[one]
+            if abs(far) < BESIDE * self.length[one]:
+                way = near.tangent / (near.tangent @ self.tangent[one])
+                guess[i] = near.z + far * way * self.scale[one]
+        return self.tested(guess, which)
+
+    def tested(self, guess: np.ndarray, which: np.ndarray) -> np.ndarray:
+        """The tests of steps int64[r] at the orbits across the first tangents from guesses, NaN
+        where there is none.
+        """
+        mine, orbits = self.rows[which], self.orbits
+        point = correct(orbits, guess, self.tangent[which], mine)
+        derivative = np.where(point.found[:, None, None], point.derivative, 0.0)
+        direction = tangents(derivative, self.tangent[which])
+        values = np.full(len(which), np.nan)
+        asks = self.kind[which] >= BY_MULTIPLIERS
+        for some in (np.flatnonzero(point.found & asks), np.flatnonzero(point.found & ~asks)):
+            if len(some):
+                multipliers = (
+                    orbits.multipliers(point.z[some], derivative[some], mine[some])
+                    if asks[some[0]]
+                    else np.zeros((len(some), 0), complex)
+                )
+                each = tests(direction[some], derivative[some], multipliers, self.column)
+                values[some] = each[self.kind[which[some]], np.arange(len(some))]
+        for i in np.flatnonzero(point.found).tolist():
+            name, none = KINDS[self.kind[which[i]]], np.zeros(0)
+            self.known[int(which[i])] = Event(
+                name, -1, point.z[i], none, direction[i], derivative[i]
+            )
+        return values
+
+    def folds(self) -> tuple[np.ndarray, np.ndarray]:
+        """The steps in which Newton's method finds a fold, which is tested, int64[r], and where."""
+        which = np.flatnonzero(self.kind == KINDS.index("fold"))
+        share = _turn(*(one[which, self.column] for one in (self.step, self.first, self.last)))
+        z, good = _folds(
+            self.orbits, self.ahead(share, which), self.tangent[which], self.rows[which]
+        )
+        far = self.along((z - self.z[which]) / self.scale[which], which)
+        good &= (far >= 0) & (far <= self.length[which])
+        self.tested(z[good], which[good])
+        return which[good], far[good]
 
 
 def locate(
@@ -83,6 +172,7 @@ def locate(
     z: np.ndarray,
     tangent: np.ndarray,
     kind: np.ndarray,
+    values: np.ndarray,
 ) -> list[Event | None]:
     """The zeros of tests between points and the next ones.
 
@@ -96,73 +186,96 @@ def locate(
         The points before and behind.
     kind : int64[e]
         Which test.
+    values : float64[e, 2]
+        Its values there.
     """
     if not len(rows):
         return []
-    column, scale = z.shape[2] - 1, orbits.scale[rows]
-    step = (z[:, 1] - z[:, 0]) / scale
-    z, (tangent, beyond) = z[:, 0], tangent.swapaxes(0, 1)
-    orbits, rows = orbits.near(z, rows), np.arange(len(rows))
-    length = np.einsum("ei,ei->e", step, tangent)
-    # slopes by the share of the step along the first tangent
-    along = length[:, None] * tangent
-    end = (length / np.einsum("ei,ei->e", beyond, tangent))[:, None] * beyond
-    known: dict[int, Event] = {}
-
-    def at(flat: np.ndarray, which: np.ndarray) -> np.ndarray:
-        mine = rows[which]
-        share = (flat / length[which])[:, None]
-        far = between(np.zeros_like(end[which]), step[which], along[which], end[which], share)
-        guess = z[which] + far * scale[which]
-        point = correct(orbits, guess, tangent[which], mine)
-        derivative = np.where(point.found[:, None, None], point.derivative, 0.0)
-        direction = tangents(derivative, tangent[which])
-        values = np.full(len(flat), np.nan)
-        asks = kind[which] >= BY_MULTIPLIERS
-        for some in (np.flatnonzero(point.found & asks), np.flatnonzero(point.found & ~asks)):
-            if len(some):
-                multipliers = (
-                    orbits.multipliers(point.z[some], derivative[some], mine[some])
-                    if asks[some[0]]
-                    else np.zeros((len(some), 0), complex)
-                )
-                tested = tests(direction[some], derivative[some], multipliers, column)
-                values[some] = tested[kind[which[some]], np.arange(len(some))]
-        for i in np.flatnonzero(point.found).tolist():
-            name = KINDS[kind[which[i]]]
-            known[int(which[i])] = Event(
-                name, -1, point.z[i], np.zeros(0), direction[i], derivative[i]
-            )
-        return values
-
-    roots = zeros(at, length)
+    steps, roots = _Steps(orbits, rows, z, tangent, kind), np.full(len(rows), np.nan)
+    which, places = steps.folds()
+    roots[which] = places
+    others = np.flatnonzero(np.isnan(roots))
+    roots[others] = zeros(
+        lambda flat, some: steps.at(flat, others[some]), steps.length[others], values[others]
+    )
     result: list[Event | None] = [None] * len(rows)
+    known, near = steps.known, steps.orbits
     found = [i for i in sorted(known) if np.isfinite(roots[i])]
     if found:
-        ends, matrices = (np.array([getattr(known[i], one) for i in found]) for one in _ENDS)
-        each = orbits.multipliers(ends, matrices, rows[found])
+        ends, matrices = (
+            np.array([getattr(known[i], one) for i in found]) for one in ("z", "derivative")
+        )
+        each = near.multipliers(ends, matrices, steps.rows[found])
         for place, multipliers in zip(found, each, strict=True):
             result[place] = replace(known[place], multipliers=multipliers)
-    for i in np.flatnonzero(kind == KINDS.index("branch_point")):
-        guess = z[i] + 0.5 * length[i] * tangent[i] * orbits.scale[rows[i]]
-        near = known.get(int(i))
-        result[i] = _branch_point(
-            orbits, int(rows[i]), guess if near is None else near.z, tangent[i]
-        )
+    for i in np.flatnonzero(kind == KINDS.index("branch_point")).tolist():
+        guess = z[i, 0] + 0.5 * steps.first[i] * steps.scale[i]
+        seen = known.get(i)
+        result[i] = _branch_point(near, i, guess if seen is None else seen.z, tangent[i, 0])
     return result
 
 
-def zeros(at: Callable[[np.ndarray, np.ndarray], np.ndarray], length: np.ndarray) -> np.ndarray:
+def _turn(rise: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """The share of a step at which a cubic turns back, from its rise and its slopes at the ends,
+    which have different signs.
+    """
+    bend, twist = 3.0 * rise - 2.0 * first - last, first + last - 2.0 * rise
+    return np.asarray(-first / (bend - np.sign(first) * np.sqrt(bend**2 - 3.0 * twist * first)))
+
+
+def _folds(
+    orbits: OrbitEquations, guess: np.ndarray, along: np.ndarray, rows: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The folds near points float64[r, m + 1] of curves int64[r], and where one was found, bool[r].
+
+    Newton's method on ``F = 0, g = 0``: g is the last entry of the null vector v of the derivative
+    J whose product with ``along`` is one. Its derivative is -w'(dJ/dv), where w solves the adjoint
+    equations, so that J a short way along v is all that is needed besides. Kuznetsov, section
+    10.2.1.
+    """
+    if not len(rows):
+        return guess, np.zeros(0, bool)
+
+    def equations(z: np.ndarray, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        mine = rows[which]
+        residual, derivative = orbits.evaluate(z, mine)
+        whole = np.concatenate([derivative, along[which, None]], axis=1)
+        last = np.zeros(z.shape)
+        last[:, -1] = 1.0
+        null, adjoint = solved(whole, last), solved(whole.swapaxes(1, 2), last)
+        beside = orbits.evaluate(z + ASIDE * null * orbits.scale[mine], mine)[1]
+        bend = np.einsum("rm,rmi->ri", adjoint[:, :-1], derivative - beside) / ASIDE
+        rows_of_all = np.concatenate([derivative, bend[:, None]], axis=1)
+        return np.append(residual, null[:, -1:], axis=1), rows_of_all
+
+    found = newton(
+        equations, guess, orbits.scale[rows], enough=CONVERGED, foresee=True, max_steps=MOST_STEPS
+    )
+    return found.z, found.found
+
+
+def zeros(
+    at: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    length: np.ndarray,
+    ends: np.ndarray | None = None,
+) -> np.ndarray:
     """Places at which functions of a distance vanish between 0 and float64[e], NaN where none is
     found: ``at`` gives their values at float64[r] for the functions int64[r], and is called at the
-    zeros last.
+    zeros last. ``ends``: their values at 0 and there float64[e, 2], if they are known.
     """
     if not len(length):
         return length
     which = np.arange(len(length))
 
     def values(step: np.ndarray, event: np.ndarray) -> np.ndarray:
-        return at(step.ravel(), event.astype(np.int64).ravel()).reshape(step.shape)
+        flat, some = step.ravel(), event.astype(np.int64).ravel()
+        if ends is None:
+            return at(flat, some).reshape(step.shape)
+        found = np.where(flat == 0, ends[some, 0], ends[some, 1])
+        inside = np.flatnonzero((flat != 0) & (flat != length[some]))
+        if len(inside):
+            found[inside] = at(flat[inside], some[inside])
+        return np.asarray(found.reshape(step.shape))
 
     root = elementwise.find_root(
         values,

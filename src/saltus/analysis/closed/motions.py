@@ -136,6 +136,17 @@ class ClosedMotions:
             inside = np.where(self.time == 0, leading.real < 0, np.abs(leading) < 1.0 - MARGINAL)
         return (self.period > 0) & inside
 
+    @property
+    def neutral(self) -> np.ndarray:
+        """True where some multipliers of an orbit of a map are 1 but for rounding and all others
+        lie inside the unit circle, bool[k]: it isn't isolated, others lie beside it.
+        """
+        with np.errstate(invalid="ignore"):
+            ones = np.abs(self.multipliers - 1.0) < MARGINAL
+            kept = ones | (np.abs(self.multipliers) < 1.0 - MARGINAL)
+        of_map = (self.period > 0) & np.isnan(self.time)
+        return np.asarray(of_map & kept.all(axis=1) & ones.any(axis=1))
+
     def rows(self, which: np.ndarray) -> ClosedMotions:
         """Those of some rows, int64[m] or bool[k]."""
         return ClosedMotions(*(getattr(self, field.name)[which] for field in fields(self)))

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from saltus.analysis.closed.field_zeros import autonomous
 from saltus.analysis.closed.motions import ClosedMotions, from_smallest, least_period
 from saltus.analysis.closed.shooting import Shooting
 from saltus.analysis.solve.newton import leading_first, newton
@@ -20,12 +21,17 @@ from saltus.analysis.solve.tolerances import (
     AVERAGED_RETURNS,
     JITTER,
     LONGEST,
+    MARGINAL,
     MAX_NEWTON_STEPS,
+    ROUNDING,
     SAME,
     SETTLING_ITERATES,
     SHOWING,
 )
-from saltus.flow.maps import Map
+from saltus.flow.maps import Map, Stroboscope
+
+#: Share of an interval between two looks that no turn of a motion fits into.
+ASIDE = 0.381966
 
 
 def find_orbits(
@@ -35,6 +41,7 @@ def find_orbits(
     scale: np.ndarray,
     noise: np.ndarray,
     max_slow: int = MAX_NEWTON_STEPS,
+    isolated: bool = True,
 ) -> ClosedMotions:
     """The periodic orbits near states that nearly recur.
 
@@ -53,12 +60,14 @@ def find_orbits(
     max_slow : int
         Newton's method gives up after this number of slow steps: the orbit isn't near. One may be
         due to a contact between.
+    isolated : bool
+        Whether they are. Of others the nearest is taken: each step is the shortest.
     """
     result = ClosedMotions.none(*start.shape)
     if not len(start):
         return result
     if map_.exact:
-        rows, points, mismatch = _closed(map_, start, n, scale, max_slow)
+        rows, points, mismatch = _closed(map_, start, n, scale, max_slow, isolated)
     else:
         rows, points, mismatch = _averaged(map_, start, n, scale, noise)
     points = [from_smallest(one) for one in points]
@@ -73,14 +82,49 @@ def find_orbits(
     return result
 
 
+def neutral_orbits(
+    map_: Map, start: np.ndarray, n: np.ndarray, scale: np.ndarray, noise: np.ndarray
+) -> ClosedMotions:
+    """The orbits near states that nearly recur, of those that aren't isolated: see
+    :attr:`ClosedMotions.neutral`. Arguments are those of :func:`find_orbits`. Without forcing those
+    that rest.
+
+    What static friction holds somewhere in an interval stays anywhere else in it too, and so does a
+    joint that nothing makes yield, or a body that no spring ties to a place.
+    """
+    result = ClosedMotions.none(*start.shape)
+    if not map_.exact or not len(start):
+        return result
+    near = leading_first(map_.tangent(start, n)[1])
+    with np.errstate(invalid="ignore"):
+        rows = np.flatnonzero((np.abs(near - 1.0) < MARGINAL).any(axis=1))
+    orbits = find_orbits(
+        map_.rows(rows), start[rows], n[rows], scale[rows], noise[rows], isolated=False
+    )
+    kept = orbits.neutral
+    if kept.any() and isinstance(map_, Stroboscope) and autonomous(map_.system):
+        first, own = orbits.points[kept, 0], map_.rows(rows[kept])
+        ends = own.with_period(ASIDE * own.period).ends(first, 1)[0]
+        kept[kept] = np.abs((ends - first) / scale[rows[kept]]).max(axis=1) < ROUNDING
+    result.put(rows[kept], orbits.rows(kept))
+    return result
+
+
 def _closed(
-    map_: Map, start: np.ndarray, n: np.ndarray, scale: np.ndarray, max_slow: int
+    map_: Map,
+    start: np.ndarray,
+    n: np.ndarray,
+    scale: np.ndarray,
+    max_slow: int,
+    isolated: bool,
 ) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
     """Rows that Newton's method closes, int64[m], the points of their orbits, float64[n, D] each,
     and their mismatch, float64[m].
     """
     guess = Shooting(map_, np.arange(len(start)), start[:, None], scale, iterates=n)
-    zeros = newton(guess, guess.unknowns, guess.units, max_slow=max_slow)
+    zeros = newton(
+        guess, guess.unknowns, guess.units, max_slow=max_slow, least_squares=not isolated
+    )
     x, rows = zeros.z, np.flatnonzero(zeros.found)
     if not len(rows):
         return rows, [], np.zeros(0)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from saltus.analysis.closed.search import used_up
-from saltus.flow.maps import Stroboscope
+from saltus.analysis.solve.tolerances import RESTS
+from saltus.flow.maps import Map, Stroboscope
 from saltus.flow.request import Schedule
 
 #: Iterates after which the range of the states is taken, where no box gives it.
@@ -28,5 +29,20 @@ def spread(map_: Stroboscope, start: np.ndarray) -> np.ndarray:
         [start, iterates.reshape(-1, start.shape[1]), between.reshape(-1, start.shape[1])]
     )
     points = points[np.isfinite(points).all(axis=1)]
-    wide = np.ptp(points, axis=0)
+    wide = beyond_rounding(np.ptp(points, axis=0), map_)
     return np.where(wide > 0, wide, 1.0)
+
+
+def beyond_rounding(ranges: np.ndarray, map_: Map) -> np.ndarray:
+    """Ranges of the states of a flow, float64[..., D], of which one that is rounding beside others
+    of its unit is the largest of these: a body that is held moves by the rounding of others.
+    """
+    if not isinstance(map_, Stroboscope):  # its states have no units
+        return ranges
+    units = np.array([map_.system.units[name] for name in map_.states])
+    result = np.array(ranges)
+    for unit in set(units):
+        some = ranges[..., units == unit]
+        largest = np.fmax.reduce(some, axis=-1)[..., None]
+        result[..., units == unit] = np.where(some > RESTS * largest, some, largest)
+    return result

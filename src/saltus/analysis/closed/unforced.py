@@ -124,6 +124,14 @@ def multipliers_and_eigenvalues(
     )
 
 
+def eigenvalues_of(multipliers: np.ndarray, time: np.ndarray | float) -> np.ndarray:
+    """Eigenvalues [1/s] of what rests, complex128[..., D], from the multipliers over a time [s];
+    -inf of directions that vanish.
+    """
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log(np.abs(multipliers)) / time + 1j * np.angle(multipliers) / time)
+
+
 def close_again(
     map_: Stroboscope, start: np.ndarray, time: np.ndarray, scale: np.ndarray
 ) -> ClosedMotions:

@@ -61,7 +61,7 @@ class HarmonicOrbits:
         self.series = 2 * harmonics + 1
         self.source = signals_of(system)
         known = parametric(self.source.system, names)
-        self._timed, inner = known.timed, known.system
+        self._timed, inner, self._unity = known.timed, known.system, np.eye(len(names))
         self.count, states = len(self.source.chains), self.source.system.states
         self.size = self.count * self.series  # unknowns of a motion
         moving = {
@@ -100,8 +100,8 @@ class HarmonicOrbits:
         float64[e, u], the rate of the angle [rad/s], and its derivatives by these states over
         itself.
         """
-        constants, by = z[self.size :].astype(float), np.zeros(len(self.names))
-        slopes = np.eye(len(constants))
+        constants, by = z[self.size :].copy(), np.zeros(len(self.names))
+        slopes = self._unity.copy()
         if not self._timed:
             return constants, slopes, 2 * np.pi / self.turn, by
         period = float(self.system.period({self.names[0]: constants[0]}))
@@ -174,14 +174,16 @@ class HarmonicOrbits:
     # -- equations ---------------------------------------------------------------------------------
     def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See :class:`saltus.analysis.branches.equations.CurveEquations`."""
-        residual = np.full((len(z), self.width - 1), np.nan)
-        derivative = np.full((len(z), self.width - 1, self.width), np.nan)
-        for i in np.flatnonzero(np.isfinite(z).all(axis=1)):
-            residual[i], derivative[i] = self._of(z[i])
-        unit = self.scale[rows]
-        each = unit[:, : self.width - 1]
-        residual /= each
-        derivative *= unit[:, None] / each[..., None]
+        residual, derivative = np.empty(z.shape)[:, 1:], np.empty((*z.shape, z.shape[1]))[:, 1:]
+        for i, (one, unit) in enumerate(zip(z, self.scale[rows], strict=True)):
+            if not np.isfinite(one).all():
+                residual[i], derivative[i] = np.nan, np.nan
+                continue
+            found, slopes = self._of(one)
+            each = unit[:-1]
+            np.divide(found, each, out=residual[i])
+            np.multiply(slopes, unit, out=derivative[i])
+            derivative[i] /= each[:, None]
         return residual, derivative
 
     def _of(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -189,7 +191,7 @@ class HarmonicOrbits:
         constants, slopes, rate, rate_by = self._constants(z)
         pace = self._pace(constants)
         response, by_rate = self.source.response(self.harmonics, rate)
-        linear = LinearSide(self._own, _parts(response), _parts(by_rate), slopes, pace, self._timed)
+        linear = LinearSide(self._own, response, by_rate, slopes, pace, self._timed)
         return self.forces.equations(self.signals(z), constants, rate, rate_by, linear)
 
     def accepted(self, z: np.ndarray, rows: np.ndarray) -> None:
@@ -213,8 +215,3 @@ class HarmonicOrbits:
     def _shifted(self, z: np.ndarray, angle: float, factor: float = 1.0) -> np.ndarray:
         moved = factor * fourier.shifted(self.signals(z), angle)
         return np.concatenate([moved.reshape(len(z), -1), z[:, self.size :]], axis=1)
-
-
-def _parts(amplitudes: np.ndarray) -> np.ndarray:
-    """Real and imaginary parts, one behind the other."""
-    return np.array([amplitudes.real, amplitudes.imag])

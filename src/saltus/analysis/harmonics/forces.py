@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from saltus.analysis.harmonics import series as fourier
-from saltus.analysis.harmonics.pieces import Intervals, intervals_of
+from saltus.analysis.harmonics.pieces import Intervals, intervals_of, series_of
 from saltus.analysis.harmonics.powers import bends, degree
 from saltus.analysis.harmonics.sums import LinearSide, Sums
 from saltus.codegen.forces_head import forces_text
@@ -124,8 +124,8 @@ class Forces:
             for j, one in enumerate(row) if not _is_zero(one) and mine == (j < len(self.moving))
         ]  # fmt: skip
         self._entries = (*forces, *(self._slopes[i][j] for i, j in self._known))
-        self._degree = degree(forces, self.moving)
-        self._bent = bends(forces, system.values) if math.isinf(self._degree) else 0
+        smooth = math.isfinite(degree(forces, self.moving, 1, 1))
+        self._bent = 0 if smooth else bends(forces, system.values)
         states, rows = list(self.moving), enumerate(self._gap_slopes)
         linear = [
             i for i, row in rows if _is_linear(system.guards[i].gap, row[: len(states)], states)
@@ -139,6 +139,14 @@ class Forces:
             i: sorted(bits_in([guard.gap]))
             for i, guard in enumerate(system.guards) if not is_hold(guard)
         }  # fmt: skip
+        gaps = [guard.gap for guard in system.guards]
+        self._polynomial = [
+            i for i, others in self._asked.items()
+            if i not in self._linear and not others
+            and math.isfinite(degree([gaps[i]], self.moving, 1, 1))
+        ]  # fmt: skip
+        #: whether the kernel finds the instants: no boundary asks for the sides of others
+        self.cut_in_kernel = len(self._linear) + len(self._polynomial) == len(self._asked)
         self._known_sums: dict[tuple[int, int, int], Sums] = {}
         self._rest = dict.fromkeys(states, 0.0)
         self._signal = np.array([one.signal for one in self.moving.values()])
@@ -255,8 +263,11 @@ class Forces:
 
     def _products(self, harmonics: int) -> int:
         """Degree of products of the forces and a harmonic."""
-        most = UNEVEN if self._bent else max(int(self._degree), 1)
-        return (most + 1) * harmonics + MULTIPLES * self.periods
+        drive = MULTIPLES * self.periods
+        if self._bent:
+            return (UNEVEN + 1) * harmonics + drive
+        forces = self._entries[: self.count]
+        return max(int(degree(forces, self.moving, harmonics, drive)), harmonics) + harmonics
 
     def coefficients(
         self, signals: np.ndarray, constants: np.ndarray, rate: float, rate_by: np.ndarray
@@ -295,7 +306,7 @@ class Forces:
         unknowns = 0 if linear is None else linear.turning.shape[1]
         sums = self._sums(len(signals), fourier.harmonics_of(signals.shape[1]), unknowns)
         gaps = intervals = None
-        if all(i in self._linear for i in self._asked):
+        if self.cut_in_kernel:
             gaps = self._gap_rows or self._rows(constants)
         else:
             intervals = self.intervals(signals, constants, rate)
@@ -306,19 +317,35 @@ class Forces:
     def _sums(self, signals: int, harmonics: int, unknowns: int) -> Sums:
         key = signals, harmonics, unknowns
         if key not in self._known_sums:
+            numbers = np.append(self._numbers, self._polynomial).astype(np.int64)
             self._known_sums[key] = Sums(
                 self._kernel, (signals, harmonics, len(self.constants), unknowns),
                 [(one.signal, one.times) for one in self.moving.values()], self._known, self.count,
-                self._jumping, self._numbers, np.array(list(self.system.values.values()), float),
+                self._jumping, numbers, len(self._numbers), self._highest(harmonics),
+                np.array(list(self.system.values.values()), float),
                 self._products(harmonics), self._bent,
             )  # fmt: skip
         return self._known_sums[key]
+
+    def _highest(self, harmonics: int) -> int:
+        """The highest harmonic of gaps that are polynomials, along motions of some harmonics."""
+        most, none = harmonics, np.zeros(len(self.system.guards), bool)
+        resting, constants = np.ones(len(self.moving)), np.ones(len(self.constants))
+        for guard in (self.system.guards[i] for i in self._polynomial):
+            drive = fourier.harmonics_of(len(series_of(
+                self.system.name, guard,
+                lambda angle: self.motion(angle, np.tile(resting, (len(angle), 1)), constants),
+                self.periods, none,
+            )))  # fmt: skip
+            most = max(most, int(degree([guard.gap], self.moving, harmonics, drive)))
+        return most
 
     @functools.cached_property
     def _kernel(self) -> Any:
         names, system = (*self.moving, *self.constants), self.system
         slopes = [one for row in self._gap_slopes for one in row]
-        text = forces_text(self._entries, slopes, names, list(system.values))
+        gaps = [system.guards[i].gap for i in self._polynomial]
+        text = forces_text(self._entries, slopes, gaps, names, list(system.values))
         return balance_module(text, system.name)
 
 

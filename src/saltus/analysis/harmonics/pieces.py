@@ -22,8 +22,8 @@ from saltus.language.evaluate import evaluate
 ROUNDING = 1e-12
 #: Most samples by which a gap is read off as a series.
 MOST_SAMPLES = 2**14
-#: Nodes of Gauss's rule on an interval beyond half its turns.
-BEYOND = 10
+#: Nodes of Gauss's rule, as in kernels/harmonics/sums.py.
+BEYOND, FOR_BEND = 5, 15
 
 _gauss = functools.lru_cache(maxsize=512)(polynomials.gauss)
 #: Inputs of expressions at angles float64[n], but for the bits.
@@ -98,7 +98,7 @@ class Intervals:
             angle = 2.0 * np.pi * np.arange(count) / count
             return angle, np.full(count, 2.0 * np.pi / count), np.zeros(count, np.int64)
         turns = self.length * degree * 0.25 * (0.5 * np.pi) ** bent
-        counts = np.ceil(turns + 3.0 * np.cbrt(turns)).astype(np.int64) + BEYOND * (1 + bent)
+        counts = np.ceil(turns + 4.5 * np.cbrt(turns)).astype(np.int64) + BEYOND + FOR_BEND * bent
         rules = [_gauss(int(count)) for count in counts]
         place, weight = (np.concatenate(one) for one in zip(*rules, strict=True))
         for _ in range(bent):
@@ -139,7 +139,7 @@ def intervals_of(
     frozen = np.zeros(len(guards), bool)
     numbers, gaps = linear
     if more := [i for i, others in asked.items() if not others and i not in numbers]:
-        each = [*gaps, *(_series(name, guards[i], about, harmonics, frozen) for i in more)]
+        each = [*gaps, *(series_of(name, guards[i], about, harmonics, frozen) for i in more)]
         split = max(fourier.harmonics_of(len(one)) for one in each)
         numbers = np.append(numbers, more)
         gaps = np.array([fourier.resized(one, split) for one in each])
@@ -154,7 +154,7 @@ def intervals_of(
         for sides in np.unique(intervals.bits[:, mine], axis=0):
             bits = frozen.copy()
             bits[mine] = sides
-            gap = _series(name, guards[number], about, harmonics, bits)
+            gap = series_of(name, guards[number], about, harmonics, bits)
             _, angle, slope = fourier.zeros_of(gap[None])
             there = (intervals.bits[intervals.of(angle)][:, mine] == sides).all(axis=1)
             new = np.array([angle, np.full(len(angle), number), slope])
@@ -194,7 +194,9 @@ def _cut(intervals: Intervals, found: np.ndarray) -> Intervals:
     return Intervals(begin, length, bits, _NONE)
 
 
-def _series(name: str, guard: Guard, about: About, harmonics: int, bits: np.ndarray) -> np.ndarray:
+def series_of(
+    name: str, guard: Guard, about: About, harmonics: int, bits: np.ndarray
+) -> np.ndarray:
     """The gap of a guard as a series, the bits that it asks for frozen."""
     count = 4 * harmonics + 16
     while count <= MOST_SAMPLES:

@@ -22,14 +22,22 @@ def bends(roots: Sequence[Expr], values: Mapping[str, float]) -> int:
     return 1 if halves else 2
 
 
-def degree(roots: Sequence[Expr], moving: Collection[str]) -> float:
-    """The highest power of moving states in expressions; inf if they are no polynomials."""
+def degree(roots: Sequence[Expr], moving: Collection[str], state: int, drive: int) -> float:
+    """The highest harmonic in expressions of moving states whose highest is ``state``, ``drive``
+    being that of what time alone makes; inf if they are no polynomials of the states.
+    """
     known: dict[Expr, float] = {}
+    timed: set[Expr] = set()
     for node in ex.walk(*roots, conditions=False):
         below = [known[one] for one in node.args]
+        moves = any(known[one] for one in node.args if one not in timed)
+        if ex.depends_on(node, ("time",)) and not moves:
+            timed.add(node)
+            known[node] = drive
+            continue
         match node.op:
             case "state":
-                known[node] = 1 if node.payload in moving else 0
+                known[node] = state if node.payload in moving else 0
             case "add" | "sub" | "neg" | "select":
                 known[node] = max(below)
             case "mul":

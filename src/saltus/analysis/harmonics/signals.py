@@ -39,8 +39,9 @@ class Signals(Protocol):
     forces: list[int]
 
     def response(self, harmonics: int, rate: float) -> tuple[np.ndarray, np.ndarray]:
-        """Responses of the signals to the forces at each harmonic of an angle's rate [rad/s],
-        complex128[H + 1, c, m], and their derivatives by the rate, times the rate.
+        """Responses of the signals to the forces at each harmonic of an angle's rate [rad/s], real
+        and imaginary parts float64[2, H + 1, c, m], and their derivatives by the rate, times the
+        rate.
         """
 
     def own(self, harmonics: int) -> np.ndarray:
@@ -71,13 +72,14 @@ class States:
     def __init__(self, system: System) -> None:
         self.system, self.chains = system, chains_of(system)
         self.forces = [chain[-1] for chain in self.chains]
-        self._orders = np.array([len(chain) for chain in self.chains])
+        self._each = tuple(len(chain) for chain in self.chains)
+        self._orders = np.array(self._each)
 
     def response(self, harmonics: int, rate: float) -> tuple[np.ndarray, np.ndarray]:
         """See :class:`Signals`. A mean isn't integrated: there the equation is that the mean of the
         force vanishes, over the rate for its unit.
         """
-        whole = _integrals(harmonics, tuple(self._orders)) * (1.0 / rate**self._orders)[:, None]
+        whole = _integrals(harmonics, self._each) * (1.0 / rate**self._orders)[:, None]
         return whole, -self._orders[:, None] * whole
 
     def own(self, harmonics: int) -> np.ndarray:
@@ -106,11 +108,16 @@ class States:
 
 @functools.lru_cache(maxsize=64)
 def _integrals(harmonics: int, orders: tuple[int, ...]) -> np.ndarray:
-    """Factors of integrals of some orders over the angle, complex128[H + 1, c, c]."""
+    """Factors of integrals of some orders over the angle, float64[2, H + 1, c, c]."""
     turns = np.arange(harmonics + 1) * 1j
     turns[0] = 1.0
     each = 1.0 / turns[:, None] ** np.array(orders)
-    return np.asarray(each[:, :, None] * np.eye(len(orders)))
+    return _parts(each[:, :, None] * np.eye(len(orders)))
+
+
+def _parts(amplitudes: np.ndarray) -> np.ndarray:
+    """Real and imaginary parts, one behind the other."""
+    return np.array([amplitudes.real, amplitudes.imag])
 
 
 class AtContacts:
@@ -146,7 +153,8 @@ class AtContacts:
         right = np.broadcast_to(self._forced.T + 0j, (harmonics + 1, *self._forced.T.shape))
         found, at = self._solved(angular, right), angular[:, None, None]
         slope = -2.0 * at**2 * (self._mass @ found) + 1j * at * (self._damping @ found)
-        return self._signals @ found, -self._signals @ self._solved(angular, slope)
+        turned = self._solved(angular, slope)
+        return _parts(self._signals @ found), _parts(-self._signals @ turned)
 
     def own(self, harmonics: int) -> np.ndarray:
         """See :class:`Signals`."""

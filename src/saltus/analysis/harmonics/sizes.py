@@ -60,20 +60,27 @@ class _Motion:
         own = dict(zip(orbits.names, orbits.values(z).tolist(), strict=True))
         self.parameters: dict[str, Any] = dict(orbits.system.values) | own
         angle, here = _even(orbits.harmonics)
-        self.even = self.values(angle)
-        others = fourier.of_samples(self.even[:, len(self.states) :].T, orbits.harmonics)
-        self.series = np.append(self.states, others, axis=0)
-        off = np.abs(self.even - here @ self.series.T).max(axis=0)
+        self.even, self.series = here @ self.states.T, self.states
         #: outputs that are no series of these harmonics, such as forces of contacts
-        self.others = np.flatnonzero(~(off <= ROUNDING * np.abs(self.even).max(axis=0)))
-        self.others = self.others[self.others >= len(self.states)]
+        self.others = np.zeros(0, np.int64)
+        if outputs.formulas:
+            self.even = self._read(angle, self.even, self.intervals.of(angle))
+            others = fourier.of_samples(self.even[:, len(self.states) :].T, orbits.harmonics)
+            self.series = np.append(self.states, others, axis=0)
+            off = np.abs(self.even - here @ self.series.T).max(axis=0)
+            self.others = np.flatnonzero(~(off <= ROUNDING * np.abs(self.even).max(axis=0)))
+            self.others = self.others[self.others >= len(self.states)]
 
     def values(self, angle: np.ndarray, which: np.ndarray | None = None) -> np.ndarray:
         """The outputs at angles float64[n] in some of the intervals, float64[n, K]."""
         here = fourier.basis(angle, self.orbits.harmonics)
-        bits = self.intervals.bits[self.intervals.of(angle) if which is None else which]
-        time = angle * (self.period / (2 * np.pi))
-        return self.outputs.values(time, here @ self.states.T, self.parameters, mode_number(bits.T))
+        which = self.intervals.of(angle) if which is None else which
+        return self._read(angle, here @ self.states.T, which)
+
+    def _read(self, angle: np.ndarray, states: np.ndarray, which: np.ndarray) -> np.ndarray:
+        """The outputs where the states are float64[n, D]."""
+        time, mode = angle * (self.period / (2 * np.pi)), mode_number(self.intervals.bits[which].T)
+        return self.outputs.values(time, states, self.parameters, mode)
 
     @functools.cached_property
     def _within(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

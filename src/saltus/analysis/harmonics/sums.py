@@ -14,7 +14,7 @@ from saltus.analysis.harmonics.series import ROOM
 from saltus.flow import polynomials
 
 #: Most nodes of a rule, and the step from one rule to the next, as in kernels/harmonics/sums.py.
-MOST_NODES, RULE_STEP = 64, 4
+MOST_NODES, RULE_STEP = 96, 4
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,9 @@ class Sums:
     jumping : bool[guards]
         Boundaries at which a force may jump.
     numbers : int64[g]
-        Boundaries that are cut at.
+        Boundaries that are cut at, those with linear gaps first.
+    linear, most : int
+        Number of these, and highest harmonic of all gaps.
     parameters : float64[p]
     degree, bent : int
         See :meth:`saltus.analysis.harmonics.pieces.Intervals.nodes`.
@@ -71,7 +73,7 @@ class Sums:
     def __init__(
         self, kernel: Any, shape: tuple[int, int, int, int], moving: Sequence[tuple[int, int]],
         known: Sequence[tuple[int, int]], count: int, jumping: np.ndarray, numbers: np.ndarray,
-        parameters: np.ndarray, degree: int, bent: int,
+        linear: int, most: int, parameters: np.ndarray, degree: int, bent: int,
     ) -> None:  # fmt: skip
         c, harmonics, constants, unknowns = shape
         width, states, gaps = 2 * harmonics + 1, len(moving), len(numbers)
@@ -84,19 +86,20 @@ class Sums:
             self._sizes, self._numbers, np.zeros((c, width)), np.zeros(constants), parameters,
             np.zeros(constants), np.zeros((constants, unknowns)), np.zeros(size), np.zeros(both),
             np.zeros(both), *_whole(moving), *_whole(known), jumping.astype(np.int64), numbers,
-            np.zeros(gaps), np.zeros((gaps, states)), place, weigh,
+            np.zeros(linear), np.zeros((linear, states)), place, weigh,
         ]  # fmt: skip
         self.residual, self.derivative = np.zeros(size), np.zeros((size, size + unknowns))
         #: Coefficients of the forces and their derivatives; see :class:`.forces.Coefficients`.
         self.whole = np.zeros((count, width, columns))
         self._found = [
             self.residual, self.derivative, self.whole, np.zeros((states, width)),
-            np.zeros((gaps, width)), np.zeros((entries, 2 * width - 1)), np.zeros((width, width)),
+            np.zeros((gaps, 2 * most + 1)), np.zeros(2 * most + 1), np.zeros(gaps - linear),
+            np.zeros((entries, 2 * width - 1)), np.zeros((width, width)),
             np.zeros(2 * width - 1), np.zeros(states + constants), np.zeros(entries),
             np.zeros((2, entries)), np.zeros(len(jumping) * (states + constants)),
             np.zeros(columns), np.zeros((2, columns)), np.zeros(2),
         ]  # fmt: skip
-        self._make_room(ROOM * gaps * (width + 1))
+        self._make_room(ROOM * gaps * (2 * most + 2))
 
     def _make_room(self, room: int) -> None:
         """Arrays for some instants, and the intervals between."""

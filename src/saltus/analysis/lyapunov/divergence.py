@@ -67,22 +67,28 @@ class Divergence:
         )
         np.add.at(total, outcome.contacts.trajectory, self._jumps(map_, outcome))
         good = np.isin(outcome.status, (st.OK, st.GRAZE_UNRESOLVED))
-        lost = np.maximum(self._lost(outcome, len(start)), np.isneginf(total))
+        lost = np.maximum(self._lost(outcome), np.isneginf(total))
+        total[lost > 0] = -np.inf  # what is held all the time keeps no volume either
         return np.where(good, total, np.nan), lost
 
-    def _lost(self, outcome: Outcome, size: int) -> np.ndarray:
+    def _lost(self, outcome: Outcome) -> np.ndarray:
         """The most constraints that are held at once, int64[k]: two for a contact at rest (place
         and velocity), one for a surface.
         """
-        contacts, most = outcome.contacts, np.zeros(size, np.int64)
-        held = np.zeros(len(contacts), np.int64)
-        for guard, bit in zip(self._system.guards, self._bits(contacts.mode_after), strict=True):
+        contacts, most = outcome.contacts, self._held(outcome.mode)
+        begins = contacts.kind == st.HOLD
+        np.maximum.at(most, contacts.trajectory[begins], self._held(contacts.mode_after)[begins])
+        lost: np.ndarray = np.minimum(most, len(self._system.states))
+        return lost
+
+    def _held(self, mode: np.ndarray) -> np.ndarray:
+        """Constraints of the contacts that are held in modes int64[n], int64[n]."""
+        held = np.zeros(len(mode), np.int64)
+        for guard, bit in zip(self._system.guards, self._bits(mode), strict=True):
             if guard.law is not None and guard.law.kind == "hold":
                 owner = self._system.guards[guard.law.partner].law
                 held += np.where(bit, 2 if owner is not None and owner.kind == "impact" else 1, 0)
-        begins = contacts.kind == st.HOLD
-        np.maximum.at(most, contacts.trajectory[begins], held[begins])
-        return np.minimum(most, len(self._system.states))
+        return held
 
     def _constant(self, map_: Stroboscope) -> np.ndarray:
         """A trace of parameters only."""

@@ -16,7 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from saltus.analysis.closed.spread import beyond_rounding
 from saltus.analysis.lyapunov.segments import Segment, TangentFlow
+from saltus.flow.maps import Map
 from saltus.flow.progress import stage
 from saltus.kernels import status as st
 
@@ -84,7 +86,9 @@ def grow(
     aligning = min(ALIGNING, transient)
     before = flow.advance(start, transient, transient - aligning)
     scale = _scale(
-        start, np.concatenate([before.points, flow.sample(before.points[:, -1])], axis=1)
+        flow.map,
+        start,
+        np.concatenate([before.points, flow.sample(before.points[:, -1])], axis=1),
     )
     frame = np.broadcast_to(_first_frame(size, axes), (k, size, axes))
     if aligning:
@@ -111,7 +115,7 @@ def grow(
     return Growth(rates, volume, zeros, scale, _joined(segments))
 
 
-def _scale(start: np.ndarray, motion: np.ndarray) -> np.ndarray:
+def _scale(map_: Map, start: np.ndarray, motion: np.ndarray) -> np.ndarray:
     """Range of each state, float64[k, D], in the motion float64[k, m, D]: it makes lengths of
     different units comparable.
 
@@ -123,7 +127,7 @@ def _scale(start: np.ndarray, motion: np.ndarray) -> np.ndarray:
             np.ptp(motion, axis=1),
             np.ptp(np.concatenate([start[:, None], motion], axis=1), axis=1),
         )
-    wide = np.where(own > AT_REST * whole, own, whole)
+    wide = beyond_rounding(np.where(own > AT_REST * whole, own, whole), map_)
     return np.where((wide > 0) & np.isfinite(wide), wide, 1.0)
 
 

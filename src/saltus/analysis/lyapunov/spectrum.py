@@ -147,7 +147,7 @@ def _orbits(flow: TangentFlow, growth: Growth) -> list[ClosedMotion | None]:
     """The stable periodic orbit to which each trajectory has come, None for the others."""
     points, scale = growth.segment.points, growth.scale
     orbits, _, noise = recurring_orbits(flow.map, points[:, -ROUND - 1 :], scale, NEAR)
-    good = orbits.stable & np.isin(growth.segment.status, GOOD)
+    good = (orbits.stable | orbits.neutral) & np.isin(growth.segment.status, GOOD)
     found: list[ClosedMotion | None] = [None] * len(points)
     for row in np.flatnonzero(good).tolist():
         if _arrives(points[row], orbits[row], scale[row], float(noise[row])):

@@ -169,7 +169,10 @@ def _follow_orbits(
     """Follow the branches of periodic orbits and limit cycles."""
     ((name, values),) = grid.axes.items()
     left = np.flatnonzero(
-        np.isin(found.kind, CLOSED) & (found.kind != Kind.EQUILIBRIUM) & (orbits.period > 0)
+        np.isin(found.kind, CLOSED)
+        & (found.kind != Kind.EQUILIBRIUM)
+        & (orbits.period > 0)
+        & ~orbits.neutral  # of a family no single curve leads on
     )
     # through unstable orbits few branches hold all seeds: they are followed side by side
     rank, most = found.place[left], len(left)

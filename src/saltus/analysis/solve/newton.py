@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -109,33 +110,39 @@ def newton(
         Zeros that must not be found again.
     """
     work = _Iteration(start, scale, least_squares, known, planes is not None)
-    enough, farthest = (np.broadcast_to(one, len(start)) for one in (enough, farthest))
-    slow, rows = np.zeros(len(start), np.int64), np.flatnonzero(np.isfinite(start).all(axis=1))
+    enough, farthest = (np.full(len(start), one) for one in (enough, farthest))
+    slow, rows = np.zeros(len(start), np.int64), np.isfinite(start).all(axis=1).nonzero()[0]
     for _ in range(max_steps or (MAX_DAMPED_STEPS if damped else MAX_NEWTON_STEPS)):
         if not len(rows):
             break
+        at = work.at(rows)
         residual, derivative = equations(work.trial[rows], rows)
-        work.evaluations[rows] += 1
+        work.count += 1
+        work.evaluations[at] = work.count
         retried = rows[:0]
         if damped:
             helps = work.helps(rows, residual)
             retried = rows[~helps & (work.share[rows] >= SHORTEST_SHARE)]
             rows, residual, derivative = rows[helps], residual[helps], derivative[helps]
         if planes is not None:
-            residual, derivative = _bordered(residual, derivative, planes[rows])
-            closed = np.abs(residual).max(axis=1) < enough[rows]
+            residual, derivative = _bordered(residual, derivative, planes[at])
+            closed = np.abs(residual).max(axis=1) < enough[at]
             if closed.any():  # a zero is one where the derivative is singular too
                 work.settle(rows[closed], derivative[closed])
                 rows, residual, derivative = rows[~closed], residual[~closed], derivative[~closed]
                 if not len(rows):
                     break
         rows = work.step(rows, residual, derivative)
-        done = work.done(rows, enough[rows], foresee)
-        goes = ~done & (damped | (work.length[rows] < longest_step))
-        if np.isfinite(max_slow):
-            slow[rows] += work.length[rows] > SLOW * work.before[rows]
-            goes &= slow[rows] <= max_slow
-        goes &= np.abs((work.trial[rows] - start[rows]) / scale[rows]).max(axis=1) <= farthest[rows]
+        at = work.at(rows)
+        done = work.done(rows, enough[at], foresee)
+        goes = ~done
+        if not damped:
+            goes &= work.length[at] < longest_step
+        if max_slow < np.inf:
+            slow[at] += work.length[at] > SLOW * work.before[at]
+            goes &= slow[at] <= max_slow
+        away = np.abs((work.trial[at] - start[at]) / work.scale[at])
+        goes &= away.max(axis=1) <= farthest[at]
         rows = rows[goes]
         rows = np.sort(np.append(rows, retried)) if damped else rows
         work.ahead(rows, damped)
@@ -173,7 +180,12 @@ class _Iteration:
         self.length, self.before = np.full((2, k), np.inf)
         self.share, self.cut = np.ones((2, k))
         self.found, self.evaluations = np.zeros(k, bool), np.zeros(k, np.int64)
+        self.count = 0  # of the evaluations of rows that aren't done
         self.contraction = np.zeros(k)
+
+    def at(self, rows: np.ndarray) -> Any:
+        """An index of some rows int64[r], ascending: all are a slice, which is quicker."""
+        return slice(None) if len(rows) == len(self.x) else rows
 
     def helps(self, rows: np.ndarray, residual: np.ndarray) -> np.ndarray:
         """True where the step to the trial shortens the next one, or is too short to tell, bool[r];
@@ -202,6 +214,9 @@ class _Iteration:
         self._keep(rows, derivative)
 
     def _keep(self, rows: np.ndarray, derivative: np.ndarray) -> None:
+        if len(rows) == len(self.x):
+            self.derivative = derivative.copy()
+            return
         if self.derivative.shape[1] != derivative.shape[1]:
             self.derivative = np.full((len(self.x), *derivative.shape[1:]), np.nan)
         self.derivative[rows] = derivative
@@ -215,15 +230,14 @@ class _Iteration:
         if not good.all():
             rows, residual, derivative = rows[good], residual[good], derivative[good]
         self._keep(rows, derivative)
+        at = self.at(rows)
         step = -self._solved(derivative, residual)
-        self.x[rows] = self.trial[rows]
-        self.newton_step[rows], self.before[rows] = step, self.length[rows]
-        self.length[rows] = np.abs(step).max(axis=1)
-        self.trial[rows] += step * self.scale[rows]
-        second = self.evaluations[rows] == 2
-        if second.any():
-            some = rows[second]
-            self.contraction[some] = self.length[some] / np.maximum(self.before[some], AMPLIFIED)
+        self.x[at] = self.trial[at]
+        self.newton_step[at], self.before[at] = step, self.length[at]
+        self.length[at] = np.abs(step).max(axis=1)
+        self.trial[at] += step * self.scale[at]
+        if self.count == 2:
+            self.contraction[at] = self.length[at] / np.maximum(self.before[at], AMPLIFIED)
         return rows
 
     def _solved(self, matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -235,16 +249,16 @@ class _Iteration:
         """True where the step is the last one, bool[r]: it is taken, but in planes, where the zeros
         stay where the derivatives are known.
         """
-        length, before = self.length[rows], self.before[rows]
-        done = (length < AMPLIFIED) & (length > 0.5 * before)
+        at = self.at(rows)
+        length, before, taken = self.length[at], self.before[at], np.zeros(len(rows), bool)
+        done = taken if self.count == 1 else (length < AMPLIFIED) & (length > 0.5 * before)
         if not self.in_planes:
-            step = np.abs(self.newton_step[rows] * self.scale[rows])
-            rounding = np.all(step <= ROUNDED * np.abs(self.trial[rows]), axis=1)
-            done |= (length < enough) | rounding
-        taken = done & (not self.in_planes)
-        if foresee:
-            sure = ~done & np.isfinite(before) & (length * (length / before) ** 2 < FORESEEN)
-            self.evaluations[rows[sure]] += 1
+            step = np.abs(self.newton_step[at] * self.scale[at])
+            rounding = np.all(step <= ROUNDED * np.abs(self.trial[at]), axis=1)
+            taken = done = done | (length < enough) | rounding
+        if foresee and self.count > 1:
+            sure = ~done & (length * (length / before) ** 2 < FORESEEN)
+            self.evaluations[at] += sure
             done, taken = done | sure, taken | sure
         if done.any():
             self.x[rows[taken]], self.found[rows[done]] = self.trial[rows[taken]], True
@@ -265,7 +279,8 @@ class _Iteration:
     def zeros(self) -> Zeros:
         """Return the zeros; known ones don't count as found."""
         found, derivative = self.found, self.derivative
-        found[found] = is_new(self.x[found], self.scale[found], self.known)
+        if self.known is not None:
+            found[found] = is_new(self.x[found], self.scale[found], self.known)
         derivative = derivative[:, :-1] if self.in_planes else derivative
         return Zeros(self.x, found, derivative, self.evaluations, self.contraction)
 

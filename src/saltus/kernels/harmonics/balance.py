@@ -63,8 +63,8 @@ def respond(
 def balance(
     sizes, numbers, signals, constants, p, rate_by, turning, own, response, by_rate, signal, times,
     forced, moved_by, jumping, gap_numbers, level, slope, place, weigh, which, angle, rates, sides,
-    begin, length, mode, residual, derivative, whole, states, gaps, integrals, matrix, here, y, out,
-    both, slopes, row, moved, shift,
+    begin, length, mode, residual, derivative, whole, states, gaps, around, value, integrals,
+    matrix, here, y, out, both, slopes, row, moved, shift,
 ):  # fmt: skip
     """Fourier coefficients of the forces along a motion, and the equations of harmonic balance.
 
@@ -78,7 +78,7 @@ def balance(
         y[moving + e] = constants[e]
     instants, intervals = sizes[INSTANTS], sizes[INTERVALS]
     if instants < 0:
-        write_gaps(states, level, slope, gaps)
+        write_gaps(states, level, slope, numbers[PACE], p, around, y, value, gaps)
         instants, intervals = cut(
             gaps, gap_numbers, which, angle, rates, sides, begin, length, mode
         )

@@ -20,15 +20,42 @@ def write_series(signals, signal, times, rate, states):
 
 
 @kernel
-def write_gaps(states, level, slope, gaps):
-    """The series of gaps that are linear in the states."""
+def write_states(states, here, y):
+    """States at an angle of which the basis is given, up to twice their harmonics or more."""
+    split, most = (states.shape[1] - 1) // 2, (len(here) - 1) // 2
+    for j in range(len(states)):
+        even, odd = states[j, 0], 0.0
+        for k in range(1, split + 1):
+            even += states[j, k] * here[k]
+            odd += states[j, split + k] * here[most + k]
+        y[j] = even + odd
+
+
+@kernel
+def write_gaps(states, level, slope, pace, p, around, y, value, gaps):
+    """The series of gaps: those that are linear in the states, and behind them others, read off at
+    as many places as they have coefficients.
+    """
+    split, most = (states.shape[1] - 1) // 2, (gaps.shape[1] - 1) // 2
+    gaps[:] = 0.0
     for i in range(len(level)):
-        gaps[i] = 0.0
         gaps[i, 0] = level[i]
         for j in range(len(states)):
             if slope[i, j] != 0.0:
-                for k in range(gaps.shape[1]):
+                gaps[i, 0] += slope[i, j] * states[j, 0]
+                for k in range(1, split + 1):
                     gaps[i, k] += slope[i, j] * states[j, k]
+                    gaps[i, most + k] += slope[i, j] * states[j, split + k]
+    for node in range(len(around) if len(value) > 0 else 0):
+        angle = 2.0 * math.pi * node / len(around)
+        write_basis(angle, most, around)
+        write_states(states, around, y)
+        gap_values(angle * pace, y, p, 0, value)
+        for i in range(len(value)):
+            row, share = len(level) + i, value[i] / len(around)
+            gaps[row, 0] += share
+            for k in range(1, len(around)):
+                gaps[row, k] += 2.0 * share * around[k]
 
 
 @kernel

@@ -6,10 +6,11 @@ from __future__ import annotations
 
 import math
 
-#: Nodes of Gauss's rule on an interval beyond half its turns.
-BEYOND = 10
+#: Nodes of Gauss's rule on an interval beyond half its turns and some of their cube root, and
+#: further ones for each bend of the angle.
+BEYOND, FOR_BEND = 5, 15
 #: Most nodes of a rule, and the step from one rule to the next; longer intervals are divided.
-MOST_NODES, RULE_STEP = 64, 4
+MOST_NODES, RULE_STEP = 96, 4
 #: Distance from an instant within which depths are rounding [rad].
 BESIDE = 1e-12
 
@@ -17,19 +18,7 @@ BESIDE = 1e-12
 @kernel
 def nodes_for(turns, bent):
     """Nodes that integrate a series over some turns to rounding."""
-    return math.ceil(turns + 3.0 * turns ** (1.0 / 3.0)) + BEYOND * (1 + bent)
-
-
-@kernel
-def write_states(states, here, y):
-    """States at an angle of which the basis is given, up to twice their harmonics or more."""
-    split, most = (states.shape[1] - 1) // 2, (len(here) - 1) // 2
-    for j in range(len(states)):
-        even, odd = states[j, 0], 0.0
-        for k in range(1, split + 1):
-            even += states[j, k] * here[k]
-            odd += states[j, split + k] * here[most + k]
-        y[j] = even + odd
+    return math.ceil(turns + 4.5 * turns ** (1.0 / 3.0)) + BEYOND + FOR_BEND * bent
 
 
 @kernel

@@ -167,7 +167,8 @@ def columns(data: bytes, path: Path) -> np.ndarray:
             f"their units: time [s], force [N]."
         )
     found = [
-        [_number(path, line, row, i, str(i + 1), "", "") for i in (0, 1)] for line, row in rows
+        [_number(path, line, row, i, ("first", "second")[i], "", "") for i in (0, 1)]
+        for line, row in rows
     ]
     values: np.ndarray = np.array(found, float).reshape(-1, 2).T * np.array(factors)[:, None]
     return values
@@ -229,7 +230,8 @@ def _number(
         value = math.nan
     if not math.isfinite(value):
         raise ResultFileError(
-            f"{path}, line {line}: what stands in the column {name!r} is no finite number."
+            f"{path}, line {line}: what stands in the column {name!r} is no finite number. "
+            "Correct the line, or take it out."
         )
     if not given:
         return value

@@ -42,6 +42,10 @@ VARIABLES = {
 }
 
 
+#: Distance from the unit circle that rounding can make.
+ROUNDING = 1e-7
+
+
 # -- account ---------------------------------------------------------------------------------------
 def account(ds: xr.Dataset) -> list[str]:
     """Lines on the attractors, and on the fate of the starts."""
@@ -64,7 +68,7 @@ def found(ds: xr.Dataset) -> list[str]:
     lines.append(settled(ds["basin"]))
     words = own_errors(ds) if (ds["basin"].values == Kind.UNCONVERGED).any() else ""
     lines += [f"noise    {words}"] if words else []
-    lines += untyped(ds["basin"], Kind.UNCONVERGED)
+    lines += [*families(ds, "attractor"), *untyped(ds["basin"], Kind.UNCONVERGED)]
     return lines + [f"missed   {one}" for one in missed(_computed(ds["basin"]))]
 
 
@@ -99,6 +103,29 @@ def missed(starts: int, where: str = "") -> list[str]:
 def untyped(labels: xr.DataArray, *codes: Kind) -> list[str]:
     """Line on motions without a type, if there are starts with one of these codes."""
     return [f"untyped  {LONGER}"] if np.isin(labels.values, codes).any() else []
+
+
+def families(ds: xr.Dataset, prefix: str) -> list[str]:
+    """Line on orbits and equilibria that aren't isolated, if there are any: those with a multiplier
+    of 1, or an eigenvalue of 0.
+    """
+    kinds = ds[f"{prefix}_type"].values
+    neutral = (kinds == Kind.PERIODIC.word) & _near(ds, f"{prefix}_multiplier", 1.0)
+    if f"{prefix}_eigenvalue_real" in ds:
+        neutral |= (kinds == Kind.EQUILIBRIUM.word) & _near(ds, f"{prefix}_eigenvalue", 0.0)
+    if not neutral.any():
+        return []
+    return [
+        f"family   {int(neutral.sum())} of these with a multiplier of 1, as where static friction "
+        "holds a body: others lie beside each, and the one that a start led to is listed"
+    ]
+
+
+def _near(ds: xr.Dataset, name: str, value: float) -> np.ndarray:
+    """True where the leading one of complex numbers is a value but for rounding, bool[m]."""
+    real, imaginary = (ds[f"{name}_{part}"].values[:, 0] for part in ("real", "imag"))
+    near: np.ndarray = np.hypot(real - value, imaginary) < ROUNDING
+    return near
 
 
 def own_errors(ds: xr.Dataset) -> str:

@@ -23,7 +23,7 @@ from saltus.results.dataset.schema import (
 )
 from saltus.results.dataset.variable import GUARDS, OUTPUT, Variable, of_outputs
 from saltus.results.kinds import branches
-from saltus.results.kinds.attractors import missed, settled, untyped
+from saltus.results.kinds.attractors import families, missed, settled, untyped
 from saltus.results.table import ROWS, Column, TextTable, interval, number, quantity, table, words
 from saltus.results.wording import LINES, header, kind_texts, plain, span, tally, unit_of
 from saltus.units import from_si, titled
@@ -83,7 +83,11 @@ def account(ds: xr.Dataset) -> list[str]:
     lines += _ends(ds)
     if left := _open(ds):
         lines.append(f"open     {counted(left, 'response')} {OPEN}")
-    lines += [settled(labels), *untyped(labels, Kind.UNCONVERGED, Kind.FAILED)]
+    lines += [
+        settled(labels),
+        *families(ds, "response"),
+        *untyped(labels, Kind.UNCONVERGED, Kind.FAILED),
+    ]
     return lines + [f"missed   {one}" for one in missed(starts, " at each")]
 
 

@@ -194,8 +194,11 @@ def _written(table: SystemTable, formulas: Formulas, header: Header | None) -> S
             {table.forced_at} if table.forced_at else set()
         )
         if unused := [name for name in table.values if name not in used]:
+            unknown = sorted(used - {*rates, *table.values, "t"})
+            advice = "Take it out, or write it into one."
             raise StudyError(
-                f"[system] {unused[0]!r} stands in no rate. {nearest(unused[0], sorted(used))}"
+                f"[system] {unused[0]!r} stands in no rate. "
+                f"{nearest(unused[0], unknown) if unknown else advice}"
             )
         equations = Equations(rates, table.values, header.description if header else "")
         title, source = (header.name, header.source) if header else ("system", "")

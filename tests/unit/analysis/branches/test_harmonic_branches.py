@@ -58,6 +58,21 @@ def test_distance_to_the_exact_orbit_falls_by_its_order(balanced):
     assert np.abs(order - [3, 2]).max() < 0.5
 
 
+@pytest.mark.parametrize(("model", "order"), [("chain", 2), ("gear_pair", 2), ("den_hartog", 1)])
+def test_models_come_to_their_exact_orbits(model, order):
+    """Velocities by H^-2 where forces have kinks, by H^-1 where they jump."""
+    system = getattr(sl.models, model)()
+    over = {system.forced_at: system.values[system.forced_at] * np.array([0.999, 1.001])}
+    few, many = (
+        sl.branches(
+            system, over, np.zeros(len(system.states)), at=1, points=2, switch=(), progress=False,
+            by=sl.HarmonicBalance(harmonics),
+        ).point_error.max()
+        for harmonics in (15, 45)
+    )  # fmt: skip
+    assert np.log(few / many) / np.log(3) > order - 0.3
+
+
 def test_distance_is_that_of_the_exact_orbit(balanced):
     ds = balanced[15]
     i = int(np.argmax(ds.point_peak.values * (ds.point_stable.values > 0)))
@@ -266,7 +281,8 @@ def test_residual_deflections_keep_the_flexibility():
             forces=[sl.Force("x5", "1 N")],
         )  # fmt: skip
         rate = 2 * np.pi * 3.0
-        found = AtContacts(system).response(5, rate)[0][:, 0]
+        real, imaginary = AtContacts(system).response(5, rate)[0][:, :, 0]
+        found = real + 1j * imaginary
         loads = np.eye(size)[:, [at, 4]]
         for order, row in enumerate(found):
             w = order * rate

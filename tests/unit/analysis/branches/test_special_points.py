@@ -1,0 +1,54 @@
+"""Bifurcations between two points of curves that are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from saltus.analysis.branches import special_points
+from saltus.analysis.branches.arclength import CLOSED
+
+
+class EllipsesAsOrbits:
+    """(x/a)**2 + (y/b)**2 = 1 over y, with folds at (0, b), as orbits with the multiplier x - 1:
+    period doublings are there too.
+    """
+
+    def __init__(self, axes):
+        self.axes, self.scale = axes, np.ones((len(axes), 2))
+        self.evaluated = 0
+
+    def near(self, z, rows):
+        self.axes, self.scale = self.axes[rows], self.scale[rows]
+        return self
+
+    def evaluate(self, z, rows):
+        self.evaluated += len(z)
+        shares = z / self.axes[rows]
+        return (shares**2).sum(axis=1)[:, None] - 1, (2 * shares / self.axes[rows])[:, None]
+
+    def multipliers(self, z, derivative, rows):
+        return z[:, :1] - 1 + 0j
+
+
+@pytest.mark.parametrize(("kind", "most"), [("fold", 7), ("period_doubling", 15)])
+def test_bifurcations_are_located_to_rounding_by_few_evaluations(kind, most):
+    random, number = np.random.default_rng(3111), special_points.KINDS.index(kind)
+    axes, rows = random.uniform(0.5, 2.0, (30, 2)), np.arange(30)
+    angle = 0.5 * np.pi + random.uniform(0.01, 0.08, (30, 2)) * [-1, 1]
+    cosine, sine = np.cos(angle)[..., None], np.sin(angle)[..., None]
+    z = axes[:, None] * np.concatenate([cosine, sine], axis=2)
+    tangent = axes[:, None] * np.concatenate([-sine, cosine], axis=2)
+    tangent /= np.linalg.norm(tangent, axis=2)[..., None]
+    curves = EllipsesAsOrbits(axes)
+    flat = z.reshape(-1, 2)
+    values = special_points.tests(
+        tangent.reshape(-1, 2), curves.evaluate(flat, np.repeat(rows, 2))[1],
+        curves.multipliers(flat, None, None), 1,
+    )[number].reshape(-1, 2)  # fmt: skip
+    curves.evaluated = 0
+    found = special_points.locate(curves, rows, z, tangent, np.full(30, number), values)
+    assert curves.evaluated / 30 < most
+    for event, (_, height) in zip(found, axes, strict=True):
+        np.testing.assert_allclose(event.z, [0.0, height], rtol=0, atol=CLOSED)
+        assert abs(event.tangent[1]) < 1e-14
