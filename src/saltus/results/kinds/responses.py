@@ -33,7 +33,7 @@ _GRID = ("...", "start")
 _RESPONSE = ("response",)
 
 #: Variables of the results of ``frequency_response`` and ``bifurcation_diagram``. ``<first>``: the
-#: unit of the first state; ``<gap>``: that of the gaps; ``<output>``: that of the output, in
+#: unit of the first state; ``<margin>``: that of its gaps; ``<output>``: that of the output, in
 #: ``output_units``.
 VARIABLES = {
     "<parameter>": Variable(("<parameter>",), "<parameter>", "<parameter>", coord=True),
