@@ -26,6 +26,23 @@ def test_derivatives_are_those_of_differences(seed, which):
     assert judged > 100
 
 
+@pytest.mark.parametrize(
+    ("of", "seed", "which"),
+    [
+        ("orbits", "1.0", "Modal"),
+        ("orbits", "1.42", "Taylor"),
+        ("histories", "1.7", "Taylor"),
+        pytest.param("events", "1.57", "Modal", marks=pytest.mark.slow),
+    ],
+    ids=["a moving wall and kicks", "friction and preload", "a start in sliding", "stops by modes"],
+)
+def test_derivatives_of_orbits_and_in_fits_are_those_of_differences(of, seed, which):
+    that = derivative_check.case(seed)
+    verdict, wrong, judged = derivative_check.judged(that, which, of)
+    assert verdict == "same", (verdict, wrong, that.reproduction(which))
+    assert judged > 5
+
+
 def test_a_largest_velocity_where_a_drive_jumps_moves_with_the_drive():
     source = (
         "def equation(t, x, v, *, f=1.3, pull=5.0, k=9.0):\n"

@@ -1,8 +1,9 @@
-"""Derivatives that `sl.sensitivity` hands out, beside differences of motions of random systems.
+"""Derivatives that are handed out, beside differences, of random systems: of motions, periodic
+orbits, fits and places of bifurcations.
 
 ``PYTHONPATH=src:tests python -m oracles.derivative_check COUNT SEED`` prints how many derivatives
 of how many systems ended how, and for each system that doesn't agree a program that repeats it;
-``... 1 SEED.NUMBER`` repeats one.
+``... 1 SEED.NUMBER`` repeats one, ``--of orbits`` asks for periodic orbits.
 """
 
 from __future__ import annotations
@@ -13,7 +14,6 @@ import signal
 import sys
 import time
 import warnings
-from dataclasses import dataclass
 from functools import partial
 from random import Random
 
@@ -21,17 +21,10 @@ import numpy as np
 
 import saltus as sl
 
+from . import event_derivatives, orbit_derivatives, response_derivatives
 from .derivative_systems import Case, random_case
+from .differences import Column, shifts
 
-SHIFTS = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
-#: Differences of fourth order, and of second order on either side.
-MIDDLE = np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / 12.0
-SIDES = np.array([[1.0, -4.0, 3.0, 0.0, 0.0], [0.0, 0.0, -3.0, 4.0, -1.0]]) / 2.0
-#: Two steps, in the parameter.
-STEPS = (3e-5, 4e-6)
-#: Part of a derivative, and of the largest of its kind, that it may be off; differences whose own
-#: error is larger than the last, in the largest, decide nothing.
-ALLOWED, OF_LARGEST, UNDECIDABLE = 1e-6, 1e-7, 1e-3
 READ = {
     "derivative": "value", "contact_time_derivative": "contact_time",
     "maximum_derivative": "maximum", "minimum_derivative": "minimum",
@@ -40,42 +33,11 @@ READ = {
 METHODS = {"Taylor": sl.Taylor(), "Modal": sl.Modal()}
 REACHED = ("ok", "graze_unresolved")
 SECONDS = 60  # of the processor
+NOTHING_WRONG = ("same", "undecidable", "unforced", "no orbit", "no event")
 
 
 class LateError(Exception):
     """The time of one system is used up."""
-
-
-@dataclass(frozen=True)
-class Column:
-    """The derivatives of one kind by one parameter: found, by differences, their errors."""
-
-    kind: str
-    to: str
-    found: np.ndarray
-    expected: np.ndarray
-    error: np.ndarray
-    left_out: np.ndarray | bool = False
-
-    @property
-    def largest(self) -> float:
-        return float(np.nanmax(np.abs(self.expected), initial=1e-3))
-
-    @property
-    def decided(self) -> np.ndarray:
-        """Where the differences say something."""
-        return np.isfinite(self.expected) & (self.error <= UNDECIDABLE * self.largest)
-
-    @property
-    def off(self) -> np.ndarray:
-        """How far each is off, in what it may be; NaN where nothing is said."""
-        may = 10 * self.error + ALLOWED * np.abs(self.expected) + OF_LARGEST * self.largest
-        return np.where(self.decided, np.abs(self.found - self.expected) / may, np.nan)
-
-    @property
-    def unknown(self) -> np.ndarray:
-        """Where a derivative exists and none is given."""
-        return self.decided & ~np.isfinite(self.found) & ~np.asarray(self.left_out)
 
 
 def case(seed: str) -> Case:
@@ -91,35 +53,28 @@ def columns(that: Case, method: sl.Method, extremes: bool = True) -> list[Column
     if found["status"] not in REACHED:
         return found["status"]
     kinds = [kind for kind in READ if kind in found]
-    shifts = np.concatenate([SHIFTS * step for step in STEPS])
     answer = []
     for number, name in enumerate(to):
         state = name.endswith("(0)")
         place = [*system.states].index(name[:-3]) if state else None
         base = that.start[place] if state else system.values[name]
-        unit = max(abs(base), 0.1)
+        moved, unit = shifts(base)
         if state:
-            starts = [np.add(that.start, s * unit * np.eye(len(that.start))[place]) for s in shifts]
+            starts = [np.add(that.start, s * np.eye(len(that.start))[place]) for s in moved]
             runs = fly(system, starts)
         elif name == system.forced_at:  # periods of their own have no times in common
-            values = [base + s * unit for s in shifts]
-            runs = [fly(system.with_values(**{name: v}), [that.start])[0] for v in values]
+            values = [system.with_values(**{name: base + s}) for s in moved]
+            runs = [fly(one, [that.start])[0] for one in values]
         else:
-            runs = fly(system, [that.start] * len(shifts), {name: base + shifts * unit})
+            runs = fly(system, [that.start] * len(moved), {name: base + moved})
         if any(run["contacts"] != found["contacts"] for run in runs):
             answer.append(Column("other contacts", name, *np.empty((3, 0))))
             continue
         for kind in kinds:
-            read = np.array([run[READ[kind]] for run in runs]).reshape(2, len(SHIFTS), -1)
-            first, second = (
-                np.tensordot(MIDDLE, part, 1) / (step * unit)
-                for part, step in zip(read, STEPS, strict=True)
-            )
-            left, right = np.tensordot(SIDES, read[1], 1) / (STEPS[1] * unit)
-            error = np.maximum(np.abs(second - first), np.abs(right - left))
+            read = [run[READ[kind]] for run in runs]
             left_out = found["ends of chatter"] if kind.startswith("contact") else False
-            own = found[kind][..., number].ravel()
-            answer.append(Column(kind, name, own, second, error, left_out))
+            own = found[kind][..., number]
+            answer.append(Column.of(kind, name, own, read, unit, left_out))
     return answer
 
 
@@ -154,11 +109,17 @@ def _sensitivity(system, starts, values=None, *, that, method, extremes):
     return answer
 
 
-def judged(that: Case, which: str) -> tuple[str, list[str], int]:
+OF = {
+    "motions": columns, "orbits": orbit_derivatives.columns, "events": event_derivatives.columns,
+    "histories": response_derivatives.histories, "responses": response_derivatives.responses,
+}  # fmt: skip
+
+
+def judged(that: Case, which: str, of: str = "motions") -> tuple[str, list[str], int]:
     """How a case ends by a method, what is wrong with it, and how many derivatives were judged."""
     signal.setitimer(signal.ITIMER_PROF, SECONDS)
     try:
-        found = columns(that, METHODS[which])
+        found = OF[of](that, METHODS[which])
     except LateError:
         return "late", [], 0
     except Exception as error:
@@ -187,6 +148,7 @@ def main(arguments=None) -> int:
     parser.add_argument("count", type=int)
     parser.add_argument("seed", help="a number; or SEED.NUMBER, with a count of 1")
     parser.add_argument("methods", nargs="*", default=list(METHODS))
+    parser.add_argument("--of", choices=OF, default="motions")
     given = parser.parse_args(arguments)
     signal.signal(signal.SIGPROF, _late)
     seeds = [given.seed] if "." in given.seed else [f"{given.seed}.{i}" for i in range(given.count)]
@@ -194,15 +156,15 @@ def main(arguments=None) -> int:
     for seed in seeds:
         that = case(seed)
         for which in given.methods:
-            verdict, wrong, more = judged(that, which)
+            verdict, wrong, more = judged(that, which, given.of)
             count[f"{which}: {verdict}"] += 1
             decided += more
-            if verdict not in ("same", "undecidable"):
+            if verdict not in NOTHING_WRONG:
                 print(f"\n# {seed}, {which}, {that.name}: {verdict}", *wrong[:6], sep="\n#   ")
                 if wrong:
                     print(that.reproduction(which), flush=True)
     print(f"# {time.process_time() - began:.0f} s, {decided} derivatives: {dict(count)}")
-    return int(any(not name.endswith(("same", "undecidable")) for name in count))
+    return int(any(not name.endswith(NOTHING_WRONG) for name in count))
 
 
 if __name__ == "__main__":

@@ -5,7 +5,8 @@ import pytest
 
 import saltus as sl
 from saltus.analysis.fits.measurement import measurement
-from saltus.analysis.fits.steady import SAMPLES, SteadyResponses, _size_of
+from saltus.analysis.fits.sizes import OrbitParts
+from saltus.analysis.fits.steady import SteadyResponses
 from saltus.analysis.fits.unknowns import Unknowns
 from saltus.flow.methods import check_method
 
@@ -41,20 +42,35 @@ def test_a_point_counts_to_its_branch_whose_derivatives_are_limits_of_difference
         assert np.abs(slopes[..., column] - expected).max() < 1e-5 * np.abs(expected).max()
 
 
+def sizes_of_a_saw(size, slope, jump, at):
+    """Sizes of slope t - 0.3 sin 2 pi t, which jumps at an instant, over the period 1."""
+
+    def value(t, behind):
+        return slope * t - 0.3 * np.sin(2 * np.pi * t) - jump * behind
+
+    t, weights = np.polynomial.legendre.leggauss(40)
+    legs = [(0.5 * at * (t + 1), 0.5 * at), (at + 0.5 * (1 - at) * (t + 1), 0.5 * (1 - at))]
+    parts = [(t, half * weights, value(t, k)) for k, (t, half) in enumerate(legs)]
+    if size == "peak":
+        return abs(value(at, 1))
+    if size == "rms":
+        return np.sqrt(sum(w @ y**2 for _, w, y in parts))
+    return abs(2 * sum(w @ (y * np.exp(-2j * np.pi * t)) for t, w, y in parts))
+
+
 @pytest.mark.parametrize("size", ["amplitude", "rms", "peak"])
-def test_derivatives_of_sizes_are_limits_of_differences(size):
-    phase = 2 * np.pi * np.arange(2 * SAMPLES) / SAMPLES
-
-    def sample(a):
-        return (a[0] * np.cos(phase) + a[1] * np.sin(phase / 2))[None, :, None]
-
-    by = np.stack([np.cos(phase), np.sin(phase / 2)], axis=-1)[None, :, None]
-    a, step = np.array([1.3, 0.4]), 1e-6
-    _, slopes = _size_of(size, sample(a), by)
-    for column in np.eye(2):
-        ahead, behind = (_size_of(size, sample(a + k * step * column), by)[0] for k in (1, -1))
-        assert (ahead - behind) / (2 * step) == pytest.approx(slopes @ column, abs=1e-8)
-    assert _size_of("amplitude", sample(a), by)[0] == pytest.approx(1.3)
+def test_derivatives_of_sizes_are_limits_of_differences_through_a_jump(size):
+    slope, jump, at = values = np.array([0.2, 1.3, 0.37])
+    parts = OrbitParts.of(np.array([at]), np.array([[0.0, 0.0, 1.0]]), 1.0, 0.04)
+    t, none = parts.times, np.zeros(len(parts.times))
+    y = slope * t - 0.3 * np.sin(2 * np.pi * t) - jump * (t > at)
+    by = np.stack([t, -1.0 * (t > at), none], axis=1)
+    slopes = parts.slopes(size, y[:, None], by[:, None], 2 * np.pi)[0]
+    step = 1e-3 * np.array([1.0, -8.0, 8.0, -1.0])
+    for i in range(3):
+        moved = values + np.outer([-2e-3, -1e-3, 1e-3, 2e-3], np.eye(3)[i])
+        each = [sizes_of_a_saw(size, *one) for one in moved]
+        assert slopes[i] == pytest.approx(step @ each / 12e-6, abs=1e-9)
 
 
 def test_a_response_with_a_jump_gives_the_gap_and_the_stiffness():

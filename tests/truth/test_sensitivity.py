@@ -228,3 +228,23 @@ def test_a_blow_moves_a_body_that_stands_where_its_velocity_turns():
     for column, name in enumerate(("gap", "push")):
         states, _ = by_differences(leaning, np.zeros(4), name, times)
         assert off(found.derivative.values[..., column], states) < 1e-6, name
+
+
+@sl.system(states="x v", forced_at="f")
+def adrift(t, x, v, *, f=1.3, pull=2.0):
+    return v, pull * sl.cos(2 * sl.pi * f * t)
+
+
+def test_a_body_that_drifts_has_derivatives_by_modes():
+    at = np.array([0.3, 1.1])
+    found = sl.sensitivity(adrift, (0, 0), at=at, to=["pull"], extremes=False, method=sl.Modal())
+    rate = 2 * np.pi * 1.3
+    expected = np.stack([(1 - np.cos(rate * at)) / rate**2, np.sin(rate * at) / rate], axis=1)
+    assert found.derivative.values[..., 0] == pytest.approx(expected, abs=1e-13)
+
+
+def test_no_sample_at_the_end_is_lost_where_the_frequency_moves():
+    for at in np.linspace(0.7, 2.9, 12):
+        found = sl.sensitivity(adrift, (0, 0), at=[0.1, at], to="f", t_start=0.03)
+        assert np.isfinite(found.derivative.values).all()
+        assert found.sizes["time"] == 2

@@ -19,7 +19,7 @@ from saltus.flow.until import STATUS
 from saltus.kernels import status as st
 from saltus.language.evaluate import evaluate
 from saltus.results import Guards, Subject, attributes
-from saltus.system import System, gap_units
+from saltus.system import System, gap_units, margin_gaps
 from saltus.system.quantity import jumping_states
 
 
@@ -60,8 +60,12 @@ def subject(
 ) -> Subject:
     """The subject of a Dataset of this system."""
     return with_outputs(
-        Subject(system.states, system.units, attrs, guards, gap_unit(system), varied or {}), system
-    )
+        Subject(
+            system.states, system.units, attrs, guards, gap_unit(system), varied or {},
+            margin_unit=margin_gaps(system)[1],
+        ),
+        system,
+    )  # fmt: skip
 
 
 def with_outputs(subject: Subject, system: System) -> Subject:

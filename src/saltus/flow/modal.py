@@ -192,7 +192,7 @@ class ModalFlow:
                 continue
             at = tables.state_of(which, int(batch.mode[i]))
             if self._names:
-                tables.by(self._names).need(at, which, int(batch.mode[i]))
+                tables.need(which, self._names)
             batch.carry[i, [layout.AT, layout.SET, layout.TABLES]] = at, which, tables.generation
 
     def _work(self) -> tuple[np.ndarray, ...]:

@@ -29,16 +29,15 @@ from saltus.flow.modal_eigen import (
     eigen_of,
     one_of_each_pair,
     slots_of,
-    vectors_of_each_pair,
 )
 from saltus.system.linear import LinearPiece
 from saltus.system.linear_laws import Constrained
 
 #: Rate of growth that is none, in units of the largest eigenvalue.
 NO_GROWTH = 1e-12
-#: By the fastest of rates and eigenvalues: all eigenvalues, the loads on their modes, and which of
-#: these don't go their own ways.
-Known = dict[float, tuple[np.ndarray, np.ndarray, np.ndarray]]
+#: By the fastest of rates and eigenvalues: the loads on the modes, and whether some of these don't
+#: go their own ways whatever the rates.
+Known = dict[float, tuple[np.ndarray, bool]]
 
 
 @dataclass(frozen=True)
@@ -109,14 +108,14 @@ def modes_of(
     if acts.scale not in known:
         whole = both_of_each_pair(eigen)
         parts = whole[2] @ acts.loads
-        known[acts.scale] = whole[0], parts, _always_together(*whole, parts, acts)
-    values, parts, always = known[acts.scale]
-    together = always | _driven_together(values, parts, acts)
-    if not together.any() and len(eigen[0]) <= most:
-        answers = _answers(values, vectors_of_each_pair(eigen), parts, acts)
-        return StateModes(*eigen, None, answers)
+        always = bool(_always_together(*whole, parts, acts).any())
+        known[acts.scale] = parts[: len(eigen[0])], always or len(eigen[0]) > most
+    parts, together = known[acts.scale]
+    if not (together or _driven_together(eigen[0], parts, acts).any()):
+        return StateModes(*eigen, None, _answers(*eigen[:2], parts, acts))
     spaces, whole = _parted(piece.matrix, acts, most)
-    eigen, answers = one_of_each_pair(whole), _answers(*whole[:2], whole[2] @ acts.loads, acts)
+    eigen = one_of_each_pair(whole)
+    answers = _answers(*eigen[:2], eigen[2] @ acts.loads, acts)
     if not spaces:  # states that the equations keep apart aren't mixed any more
         return StateModes(*eigen, None, answers)
     return StateModes(*eigen, *block_of(spaces, acts, answers))
@@ -155,12 +154,20 @@ def _together(
 
 def _driven_together(values: np.ndarray, parts: np.ndarray, acts: ModalLoads) -> np.ndarray:
     """True for modes that a drive comes too near to, bool[M]; loads on them, complex128[M, ..]."""
-    found, sizes = np.zeros(len(values), bool), np.abs(values)
-    for rate, part in zip(acts.rates[1:], parts.T[1:], strict=False):
-        far = np.minimum(np.abs(1j * rate - values), np.abs(1j * rate + values))
-        found |= (part != 0) & (MOST_LOSS * far <= np.maximum(abs(rate), sizes))
+    found, sizes = near_drives(values, parts, acts.rates), np.abs(values)
     for course, part in zip(acts.speeds, parts.T[len(acts.rates) :], strict=True):
         found |= (part != 0) & (loss_of(course, sizes, acts.scale) >= MOST_LOSS_OF_TWO)
+    return found
+
+
+def near_drives(values: np.ndarray, parts: np.ndarray, rates: np.ndarray) -> np.ndarray:
+    """True for modes that a harmonic drive comes too near to, bool[M]: rates of the constant and
+    the drives.
+    """
+    found, sizes = np.zeros(len(values), bool), np.abs(values)
+    for rate, part in zip(rates[1:], parts.T[1:], strict=False):
+        far = np.minimum(np.abs(1j * rate - values), np.abs(1j * rate + values))
+        found |= (part != 0) & (MOST_LOSS * far <= np.maximum(abs(rate), sizes))
     return found
 
 
@@ -193,22 +200,70 @@ def _always_together(
 def _answers(
     values: np.ndarray, vectors: np.ndarray, parts: np.ndarray, acts: ModalLoads
 ) -> np.ndarray:
-    """Steady answers of modes that go their own ways, by the loads on them complex128[M, ..]:
-    complex128[N, 1 + D + K * C].
+    """Steady answers of modes that go their own ways, one of each pair, by the loads on them
+    complex128[M, ..]: complex128[N, 1 + D + K * C].
     """
     harmonic = len(acts.rates)
-    far = 1j * acts.rates[:, None] - values[None]
+    weights = weights_of(values, np.tile(parts[:, :harmonic], 2), both_ways(acts.rates))
+    answers = answers_of(vectors, weights)
     with np.errstate(all="ignore"):
-        answers: np.ndarray = vectors @ np.where(
-            parts[:, :harmonic] == 0, 0, parts[:, :harmonic] / far.T
-        )
         # -A^-(k+1) B of the k-th derivative
         powers = -((1 / values[:, None]) ** np.arange(1, acts.speeds.shape[1] + 1))
+        powers[values.imag > 0] *= 2
         courses = [
-            vectors @ np.where(part[:, None] == 0, 0, part[:, None] * powers)
+            (vectors @ np.where(part[:, None] == 0, 0, part[:, None] * powers)).real
             for part in parts.T[harmonic:]
         ]
     return np.concatenate([answers, *courses], axis=1)
+
+
+def both_ways(rates: np.ndarray) -> np.ndarray:
+    """Rates of drives, then those of their conjugates, float64[2 D]."""
+    return np.concatenate([rates, -rates])
+
+
+def weights_of(values: np.ndarray, parts: np.ndarray, rates: np.ndarray) -> np.ndarray:
+    """Amplitudes of the modes in their steady answers, parts / (i rate - value): complex128[M, R].
+
+    The conjugates of modes answer a drive as the modes answer its conjugate, so that of each pair
+    one is enough. Each number is made by itself, in the same operations wherever it stands: contact
+    states may be made together or one by one.
+
+    Parameters
+    ----------
+    values : complex128[M]
+        Eigenvalues, one of each pair [1/s].
+    parts : complex128[M, R]
+        Loads on the modes.
+    rates : float64[R]
+        As of :func:`both_ways` [rad/s].
+    """
+    with np.errstate(all="ignore"):
+        result = np.where(parts == 0, 0, parts / (1j * rates - values[:, None]))
+    result[values.imag <= 0, len(rates) // 2 :] = 0
+    return np.asarray(result)
+
+
+def answers_of(vectors: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Answers of the states, complex128[N, R/2], by those of modes as of :func:`weights_of`."""
+    both = vectors @ weights
+    half = both.shape[1] // 2
+    return np.asarray(both[:, :half] + both[:, half:].conj())
+
+
+def answers_at(
+    eigen: list[Eigen], loads: list[np.ndarray], rates: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Steady answers of k contact states at some rates of the constant and the drives, as
+    :func:`modes_of` gives them to each by itself: complex128[k, N, 1 + D]. Before them, which of
+    the states keep their modes apart there, bool[k].
+    """
+    ends = np.cumsum([len(values) for values, *_ in eigen])[:-1]
+    values, parts = np.concatenate([values for values, *_ in eigen]), np.concatenate(loads)
+    near = np.split(near_drives(values, parts, rates), ends)
+    weights = np.split(weights_of(values, np.tile(parts, 2), both_ways(rates)), ends)
+    answers = [answers_of(one[1], own) for one, own in zip(eigen, weights, strict=True)]
+    return np.array([not one.any() for one in near]), np.array(answers)
 
 
 # -- parting -----------------------------------------------------------------------------------

@@ -18,8 +18,7 @@ import numpy as np
 from saltus.codegen.module import MODAL_LANES as LANES
 from saltus.contact.guards import is_hold
 from saltus.flow.modal_blocks import MOST_LOSS, MOST_SPREAD
-from saltus.flow.modal_eigen import both_of_each_pair
-from saltus.flow.modal_modes import StateModes
+from saltus.flow.modal_modes import StateModes, answers_of, both_ways, weights_of
 from saltus.flow.modal_rows import Links, Rows
 from saltus.flow.modal_values import ValueSet
 from saltus.kernels.modal import layout
@@ -103,34 +102,43 @@ class ParameterTables:
         self._piece = functools.lru_cache(maxsize=KEPT)(self._piece_of)
         self._every, self.links = links, Links(links.table.shape[1])
 
-    def need(self, at: int, which: int, mode: int) -> None:
-        """Make the derivatives of a contact state and of its set of values."""
+    def need(self, numbers: Sequence[int], which: int, modes: Sequence[int]) -> None:
+        """Make the derivatives of contact states of one set of values, and of this set."""
         while self.shifts.used <= which:
             self.shifts.add(self._shifts_of(self._sets[self.shifts.used]))
         while self.links.used < len(self._made):
             self.links.add(np.full(self.links.table.shape[1], -1))
-        if self.links.table[at, layout.SLOPES] < 0:
-            given, (_, modes) = self._sets[which], self._made[at]
-            parts = [self._slopes_of(j, given, modes, mode) for j in range(len(self._linear))]
-            answers, mixing = zip(*parts, strict=True)
-            behind = np.cumsum([sum(map(len, answers)), *map(len, mixing)])
-            for one, more, place in zip(answers, mixing, behind, strict=False):
-                one[0, 0] = place if len(more) else 0
-            self._link(at, self.rows.add(np.concatenate([*answers, *mixing])))
+        left = self.links.table[numbers, layout.SLOPES] < 0
+        if left.any():
+            some, sides = np.array(numbers)[left], np.array(modes)[left].tolist()
+            states = [self._made[at][1] for at in some.tolist()]
+            every = range(len(self._linear))
+            parts = [self._slopes_of(j, self._sets[which], states, sides) for j in every]
+            firsts = [self._put([one[k] for one in parts]) for k in range(len(states))]
+            self._link(some, np.array(firsts))
 
-    def _link(self, at: int, first: int) -> None:
-        """Link a contact state whose derivatives begin at a row to others that have some."""
-        links, behind, smooth = self.links, layout.BEHIND, layout.SMOOTH
-        row = self._every.table[at].copy()
-        row[layout.SLOPES] = first
-        for g in range(len(row) - behind):
-            other = int(row[behind + g])
-            if other < 0 or links.table[other, layout.SLOPES] < 0:
-                row[behind + g] = -1
-                continue
-            links.put(other, behind + g, at)
-            links.put(other, smooth, int(self._every.table[other, smooth]))
-        links.put(at, slice(None), row)
+    def _put(self, parts: list[tuple[np.ndarray, np.ndarray]]) -> int:
+        """Write the derivatives of a contact state; the first row."""
+        answers, mixing = zip(*parts, strict=True)
+        behind = np.cumsum([sum(map(len, answers)), *map(len, mixing)])
+        for one, more, place in zip(answers, mixing, behind, strict=False):
+            one[0, 0] = place if len(more) else 0
+        return self.rows.add(np.concatenate([*answers, *mixing]))
+
+    def _link(self, numbers: np.ndarray, firsts: np.ndarray) -> None:
+        """Link contact states whose derivatives begin at some rows to others that have some."""
+        links, every = self.links, self._every.table
+        rows = every[numbers]
+        rows[:, layout.SLOPES] = links.table[numbers, layout.SLOPES] = firsts
+        behind = rows[:, layout.BEHIND :]
+        known = (behind >= 0) & (links.table[behind, layout.SLOPES] >= 0)
+        behind[~known] = -1
+        links.put(numbers, rows)
+        mine, guards = np.nonzero(known)
+        others = behind[known]
+        links.table[others, layout.BEHIND + guards] = numbers[mine]
+        links.table[others, layout.SMOOTH] = every[others, layout.SMOOTH]
+        links.change(others)
 
     def _shifts_of(self, given: ValueSet) -> np.ndarray:
         """Of each parameter: what it does to the rate and the phase of each drive; of each guard
@@ -145,25 +153,32 @@ class ParameterTables:
         return np.concatenate(found)
 
     def _slopes_of(
-        self, parameter: int, given: ValueSet, modes: StateModes, mode: int
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """The derivative of the steady answer behind a row of its own, and what mixes the modes:
-        rows of the table.
+        self, parameter: int, given: ValueSet, modes: list[StateModes], sides: list[int]
+    ) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Of each of some contact states the derivative of the steady answer behind a row of its
+        own, and what mixes the modes: rows of the table.
         """
         linear = self._linear[parameter]
         slow, _ = linear.rates(given.values)
         key = parameter, *(given.values[name] for name in linear.parameters)
         if key not in self._pieces:
             self._pieces[key] = linear.every_piece(given.values)
-        piece = self._piece(key, mode)
-        answers = slopes_of(piece, given.rates, slow, modes)
-        padded = np.zeros((len(answers.T), LANES * self._state_groups), complex)
-        padded[:, : len(answers)] = answers.T
-        parts = [padded[0].real, *(part for one in padded[1:] for part in (one.real, one.imag))]
-        rows = np.concatenate([np.zeros(LANES), *parts]).reshape(-1, LANES)
-        if modes.block is not None or not piece.matrix.any():
-            return rows, np.zeros((0, LANES))
-        return rows, mixing_of(piece.matrix, modes, self._groups)
+        pieces = [self._piece(key, mode) for mode in sides]
+        answers = slopes_of(pieces, given.rates, slow, modes)
+        count, states, terms = answers.shape
+        rows = np.zeros((count, 2 * terms, LANES * self._state_groups))  # the first has a row alone
+        rows[:, 1, :states] = answers[:, :, 0].real
+        rows[:, 2::2, :states] = answers[:, :, 1:].real.transpose(0, 2, 1)
+        rows[:, 3::2, :states] = answers[:, :, 1:].imag.transpose(0, 2, 1)
+        behind = rows.reshape(count, -1, LANES)[:, self._state_groups - 1 :]
+        none = np.zeros((0, LANES))
+        mixing = [
+            none
+            if one.block is not None or not piece.matrix.any()
+            else mixing_of(piece.matrix, one, self._groups)
+            for piece, one in zip(pieces, modes, strict=True)
+        ]
+        return list(zip(behind, mixing, strict=True))
 
     def _piece_of(self, key: tuple[float, ...], mode: int) -> LinearPiece:
         """Derivatives of the equations of a contact state."""
@@ -171,38 +186,50 @@ class ParameterTables:
 
 
 def slopes_of(
-    piece: LinearPiece, rates: np.ndarray, slow: np.ndarray, modes: StateModes
+    pieces: list[LinearPiece], rates: np.ndarray, slow: np.ndarray, modes: list[StateModes]
 ) -> np.ndarray:
-    """Derivatives of the amplitudes of a steady answer: complex128[N, 1 + D].
+    """Derivatives of the amplitudes of steady answers: complex128[k, N, 1 + D].
 
     Parameters
     ----------
-    piece : LinearPiece
-        Derivatives of the equations of the contact state.
+    pieces : list of LinearPiece
+        Derivatives of the equations of k contact states.
     rates, slow : float64[D]
         Rates of the drives [rad/s], and the derivatives of these.
-    modes : StateModes
-        Its modes and its steady answer.
+    modes : list of StateModes
+        Their modes and their steady answers.
 
     Returns
     -------
-    complex128[N, 1 + D]
+    complex128[k, N, 1 + D]
         For the constant and for each drive. NaN where it has no closed form: modes go together in a
         block, or are so slow that a constant force moves them without end.
     """
     every, changes = np.append(0.0, rates), np.append(0.0, slow)
-    values, vectors, inverse = both_of_each_pair((modes.values, modes.vectors, modes.inverse))
-    loads = np.column_stack([piece.constant, piece.driven]) + piece.matrix @ modes.answers
-    loads = inverse @ (loads - 1j * changes * modes.answers)
+    answers = np.array([one.answers for one in modes])
+    loads = np.empty(answers.shape, complex)
+    loads.real = [np.column_stack([piece.constant, piece.driven]) for piece in pieces]
+    loads.real += changes * answers.imag
+    loads.imag = -changes * answers.real
+    for k, piece in enumerate(pieces):
+        if piece.matrix.any():
+            loads[k] += piece.matrix @ answers[k]
+    loads = np.concatenate([loads, loads.conj()], axis=2)
+    parts = np.concatenate([one.inverse @ load for one, load in zip(modes, loads, strict=True)])
+    counts = [len(one.values) for one in modes]
+    values, signed = np.concatenate([one.values for one in modes]), both_ways(every)
     sizes = np.abs(values)[:, None]
-    far = 1j * every - values[:, None]
-    scale = max(sizes.max(initial=0.0), np.abs(every).max())
-    lost = MOST_LOSS * np.abs(far) <= np.maximum(np.abs(every), sizes)
-    lost[:, 0] |= MOST_SPREAD * sizes[:, 0] <= scale
-    if modes.block is not None or (lost & (loads != 0)).any():
-        return np.full(modes.answers.shape, np.nan, complex)
-    with np.errstate(all="ignore"):
-        answers: np.ndarray = vectors @ np.where(loads == 0, 0, loads / far)
+    most = [max(np.abs(one.values).max(initial=0.0), np.abs(every).max()) for one in modes]
+    lost = MOST_LOSS * np.abs(1j * signed - values[:, None]) <= np.maximum(np.abs(signed), sizes)
+    lost[:, 0] |= MOST_SPREAD * sizes[:, 0] <= np.repeat(most, counts)
+    unknown = (lost & (parts != 0)).any(axis=1)
+    weights = weights_of(values, parts, signed)
+    for k, (one, end) in enumerate(zip(modes, np.cumsum(counts), strict=True)):
+        mine = slice(end - counts[k], end)
+        if one.block is not None or unknown[mine].any():
+            answers[k] = np.nan
+        else:
+            answers[k] = answers_of(one.vectors, weights[mine])
     return answers
 
 

@@ -43,15 +43,19 @@ class Links(Rows):
         self._mine = threading.local()
 
     def add(self, numbers: np.ndarray) -> int:
-        """Append a row; returns its number."""
+        """Append rows; returns the first."""
         first = super().add(numbers)
-        self._changed.append(first)
+        self._changed += range(first, self.used)
         return first
 
-    def put(self, row: int, column: int | slice, numbers: int | np.ndarray) -> None:
-        """Change some numbers of a row."""
-        self.table[row, column] = numbers
-        self._changed.append(row)
+    def put(self, rows: np.ndarray, numbers: np.ndarray) -> None:
+        """Change rows int64[k] to int64[k, width]."""
+        self.table[rows] = numbers
+        self.change(rows)
+
+    def change(self, rows: np.ndarray) -> None:
+        """Note that rows int64[k] have been changed."""
+        self._changed += rows.tolist()
 
     def copy(self) -> np.ndarray:
         """The copy of this thread, brought up to date."""
@@ -99,6 +103,29 @@ def shapes_table(
     parts = np.stack([blocks.real, blocks.imag], axis=3)
     flat = np.concatenate([one.ravel() for one in (parts, factors.real, factors.imag, rates)])
     return np.concatenate([flat, np.zeros(size - len(flat))])
+
+
+def steady_rows(answers: np.ndarray, gaps: np.ndarray, harmonic: int, width: int) -> np.ndarray:
+    """Rows of the table of steady answers, contact state by contact state, float64[k, ..].
+
+    Parameters
+    ----------
+    answers, gaps : complex128[k, N, ..], complex128[k, R, ..]
+        Of the states, and of the gaps; the first ``harmonic`` of them have an imaginary part, but
+        for that to the constant.
+    harmonic, width : int
+        How many; numbers that the states take with those that fill the lanes.
+    """
+    states, columns = answers.shape[1:]
+    terms = [(0, "real")]
+    terms += [(d, part) for d in range(1, harmonic) for part in ("real", "imag")]
+    terms += [(d, "real") for d in range(harmonic, columns)]
+    first, count = width * len(terms), len(terms) * gaps.shape[1]
+    rows = np.zeros((len(answers), first + count + -count % LANES))
+    for k, (d, part) in enumerate(terms):
+        rows[:, width * k : width * k + states] = getattr(answers[:, :, d], part)
+        rows[:, first + k : first + count : len(terms)] = getattr(gaps[:, :, d], part)
+    return rows
 
 
 def _zeros(shape: tuple[int, int], kind: Any) -> np.ndarray:

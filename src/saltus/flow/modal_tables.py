@@ -5,6 +5,7 @@ made when a motion first comes to them.
 from __future__ import annotations
 
 import threading
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -14,9 +15,15 @@ from saltus.codegen.module import MODAL_LANES as LANES
 from saltus.flow.modal_blocks import table_of
 from saltus.flow.modal_eigen import Eigen, half_of, shared_of, slots_of
 from saltus.flow.modal_laws import laws_of
-from saltus.flow.modal_modes import Known, StateModes, modes_of, spread_over
+from saltus.flow.modal_modes import (
+    Known,
+    StateModes,
+    answers_at,
+    modes_of,
+    spread_over,
+)
 from saltus.flow.modal_parameters import ParameterTables
-from saltus.flow.modal_rows import Links, Rows, runs_of, shapes_table
+from saltus.flow.modal_rows import Links, Rows, runs_of, shapes_table, steady_rows
 from saltus.flow.modal_values import ValueSet
 from saltus.kernels.modal import layout
 from saltus.kernels.status import HOLD_LAW, NO_LAW, SURFACE_LAW
@@ -38,16 +45,23 @@ SET_BYTES = 4096
 SHARED = 64
 #: Rounding of a coefficient of the equations, relative to it.
 ROUNDED = 16 * np.finfo(float).eps
+#: Sets of values among which the nearest to a new one is looked for.
+NEAR = 64
+#: Sets through which a contact state is handed on, each from the one before, without a motion that
+#: has asked for it: a motion that still comes to it asks again.
+HANDED = 32
 
 
 @dataclass(frozen=True)
 class _Equations:
     """The equations of a contact state, one of each pair of eigenvalues and -vectors of their
-    matrix, and the fastest eigenvalue of other states [1/s]: the same for all rates of the drives.
+    matrix, the largest eigenvalue, and the fastest of other states [1/s]: the same for all rates of
+    the drives.
     """
 
     piece: LinearPiece
     eigen: Eigen
+    largest: float
     fastest: float
 
 
@@ -111,6 +125,10 @@ class Tables:
         self._known: dict[tuple[int, bytes], int] = {}
         self._states: dict[tuple[int, int], int] = {}
         self._rests: dict[tuple[int, int, int], tuple[Constrained, LinearPiece]] = {}
+        #: Of each set its contact states, and how often each has been handed on to come to it.
+        self._handed: list[dict[int, int]] = []
+        #: The last sets of the same equations and gaps: they differ in the rates of drives.
+        self._alike: dict[tuple[object, ...], deque[int]] = {}
         #: Equations and modes of each contact state.
         self.made: list[tuple[_Equations, StateModes]] = []
         self._by: dict[tuple[str, ...], ParameterTables] = {}
@@ -206,6 +224,7 @@ class Tables:
                 )
             pushes = any(level < 0 for level in evaluate(self.linear.levels, values=values))
             self.sets.append(ValueSet(values, gaps, rates, lags, courses, impacts, pushes))
+            self._handed.append({})
             self._sets[key] = len(self.sets) - 1
             self._held += SET_BYTES + self.sets[-1].gaps.matrix.nbytes
         return self._sets[key]
@@ -236,10 +255,20 @@ class Tables:
         return self._finite[key] and given.is_finite
 
     def state_of(self, which: int, mode: int) -> int:
-        """Number of a contact state, made if it isn't known."""
+        """Number of a contact state, made if it isn't known; the first of a set with those that the
+        nearest set has.
+        """
+        if not self._handed[which]:
+            self._hand_on(which)
         if (which, mode) not in self._states:
             self._make(which, mode)
+            self._handed[which][mode] = 0
         return self._states[which, mode]
+
+    def need(self, which: int, names: tuple[str, ...]) -> None:
+        """Make the derivatives of all contact states of a set with respect to some parameters."""
+        modes = list(self._handed[which])
+        self.by(names).need([self._states[which, mode] for mode in modes], which, modes)
 
     def _make(self, which: int, mode: int) -> None:
         given = self.sets[which]
@@ -250,18 +279,16 @@ class Tables:
         modes = self._state_modes(known, given, shown, free)
         number, guards = len(self.made), len(self.linear.system.guards)
         seen = free.levelled(shown) if len(free.kept) < len(free.spread) else shown
-        links = [self._modes_of(known, modes, seen), self._steady_of(modes, given, seen), 0, -1]
+        row = np.full((1, layout.BEHIND + len(self._laws)), -1)
+        (steady,) = self._steady_of(modes.answers[None], given, seen)
+        row[0, : layout.BEHIND] = self._modes_of(known, modes, seen), steady, 0, -1
         for g in range(guards):
             behind = self._states.get((which, mode ^ 1 << g), -1)
-            links.append(behind)
-            if behind >= 0:
-                self._links.put(behind, layout.BEHIND + g, number)
-                if self.plain[g] and self._is_smooth(known, self.made[behind][0], given.gaps, g):
-                    links[layout.SMOOTH] |= 1 << g
-                    smooth = int(self._links.table[behind, layout.SMOOTH]) | 1 << g
-                    self._links.put(behind, layout.SMOOTH, smooth)
-        links += [-1] * (len(self._laws) - guards)
-        self._links.add(np.array(links))
+            if behind >= 0 and self.plain[g]:
+                smooth = self._is_smooth(known, self.made[behind][0], given.gaps, g)
+                row[0, layout.SMOOTH] |= int(smooth) << g
+            row[0, layout.BEHIND + g] = behind
+        self._link(row, number)
         if self.holds.any():
             # the closing accelerations of contacts that can be held: the gaps of their hold guards
             rows, partner = rows_of(shown), self._laws[:, layout.PARTNER].copy()
@@ -279,6 +306,66 @@ class Tables:
             free = constrained(self.linear.system, holds, given.gaps, given.impacts)
             self._rests[key] = free, self.shown(given, mode)
         return self._rests[key]
+
+    def _link(self, rows: np.ndarray, first: int) -> None:
+        """Link contact states that begin with number ``first`` and those behind their boundaries,
+        by their rows of links int64[k, ..].
+        """
+        self._links.add(rows)
+        mine, guards = np.nonzero(rows[:, layout.BEHIND :] >= 0)
+        others = rows[mine, layout.BEHIND + guards]
+        self._links.table[others, layout.BEHIND + guards] = first + mine
+        smooth = rows[mine, layout.SMOOTH] & 1 << guards
+        np.bitwise_or.at(self._links.table[:, layout.SMOOTH], others, smooth)
+        self._links.change(others)
+
+    def _hand_on(self, which: int) -> None:
+        """Make the contact states of the nearest set of the same equations and gaps for a set: all
+        that the rates of drives change is the steady answer. Those of which they change more, and
+        those with laws or records, are made when they are asked for.
+        """
+        given = self.sets[which]
+        if not self.plain.all() or given.courses:
+            return
+        key = id(given.gaps), *(given.values[name] for name in self.linear.parameters)
+        alike = self._alike.setdefault(key, deque(maxlen=NEAR))
+        if alike:
+            apart = np.abs([self.sets[one].rates - given.rates for one in alike]).sum(axis=1)
+            self._hand(alike[int(np.argmin(apart))], which)
+        alike.append(which)
+
+    def _hand(self, source: int, which: int) -> None:
+        """Make the contact states of one set for another one."""
+        given, rates = self.sets[which], np.append(0.0, self.sets[which].rates)
+        modes, numbers, loads = list[int](), list[int](), list[np.ndarray]()
+        for mode, times in self._handed[source].items():
+            number = self._states[source, mode]
+            known, made = self.made[number]
+            parts = self._parts[id(known), id(given.gaps)]
+            own, together = parts.get(max(known.largest, rates.max()), (rates, True))
+            if not together and made.block is None and times < HANDED:
+                modes.append(mode)
+                numbers.append(number)
+                loads.append(own)
+        if not modes:
+            return
+        apart, answers = answers_at([self.made[at][0].eigen for at in numbers], loads, rates)
+        answers, old = answers[apart], np.array(numbers)[apart]
+        if not len(old):
+            return
+        first, rows = len(self.made), self._links.table[old]
+        behind = rows[:, layout.BEHIND :]
+        place = np.minimum(np.searchsorted(old, behind), len(old) - 1)
+        kept = old[place] == behind
+        behind[:] = np.where(kept, first + place, -1)
+        rows[:, layout.SMOOTH] &= kept @ (1 << np.arange(kept.shape[1]))
+        rows[:, layout.STEADY] = self._steady_of(answers, given, given.gaps)
+        self._links.add(rows)
+        for k, mode in enumerate(np.array(modes)[apart].tolist()):
+            known, made = self.made[old[k]]
+            self.made.append((known, replace(made, answers=answers[k])))
+            self._states[which, mode] = first + k
+            self._handed[which][mode] = self._handed[source][mode] + 1
 
     # -- one contact state -------------------------------------------------------------------------
     def shown(self, given: ValueSet, mode: int) -> LinearPiece:
@@ -324,7 +411,8 @@ class Tables:
             piece = self.piece_of(given, mode)
             fastest = self._fastest(given, used) if piece.constant.any() else 0.0
             eigen = half_of(piece.matrix[free.kept] @ free.spread)
-            self._equations[key] = _Equations(piece, eigen, fastest)
+            largest = float(np.abs(eigen[0]).max(initial=0.0))
+            self._equations[key] = _Equations(piece, eigen, largest, fastest)
             self._held += piece.matrix.nbytes + 2 * sum(
                 one.nbytes for one in eigen
             )  # at most two copies
@@ -397,29 +485,20 @@ class Tables:
             [one.ravel() for one in (lam.real, lam.imag, size, left, right, waves, *runs, *block)]
         )
 
-    def _steady_of(self, modes: StateModes, given: ValueSet, shown: LinearPiece) -> int:
-        """First row of the table of the steady answer: to the constant, to cosine and sine of each
-        harmonic drive, to each derivative of each course.
+    def _steady_of(self, answers: np.ndarray, given: ValueSet, shown: LinearPiece) -> np.ndarray:
+        """First rows of the tables of the steady answers complex128[k, N, ..] of some contact
+        states: to the constant, to cosine and sine of each harmonic drive, to each derivative of
+        each course.
         """
         harmonic, first = 1 + len(given.rates), self.first_guard
-        answers = modes.answers.T  # [1 + drives + terms * courses, N]
-        padded = np.zeros((len(answers), LANES * self.state_groups), complex)
-        padded[:, : answers.shape[1]] = answers
-        gaps = shown.matrix[first] @ answers.T
-        gaps[:, 0] += (shown.constant - given.gaps.constant)[first]
-        gaps[:, 1:harmonic] += shown.driven[first, : harmonic - 1]
-        gaps[:, harmonic :: self.linear.terms] += shown.driven[first, harmonic - 1 :]
-        # only the harmonic ones have an imaginary part
-        states = [padded[0].real]
-        numbers = [gaps[:, 0].real]
-        for d in range(1, harmonic):
-            states += [padded[d].real, padded[d].imag]
-            numbers += [gaps[:, d].real, gaps[:, d].imag]
-        states += list(padded[harmonic:].real)
-        numbers += list(gaps[:, harmonic:].T.real)
-        flat = np.array(numbers).T.ravel()
-        flat = np.concatenate([flat, np.zeros(-len(flat) % LANES)])
-        return self.steady.add(np.concatenate([*states, flat]))
+        gaps = shown.matrix[first] @ answers
+        gaps[:, :, 0] += (shown.constant - given.gaps.constant)[first]
+        gaps[:, :, 1:harmonic] += shown.driven[first, : harmonic - 1]
+        gaps[:, :, harmonic :: self.linear.terms] += shown.driven[first, harmonic - 1 :]
+        rows = steady_rows(answers, gaps, harmonic, LANES * self.state_groups)
+        each = rows.shape[1] // LANES
+        firsts: np.ndarray = self.steady.add(rows) + each * np.arange(len(rows))
+        return firsts
 
 
 def _numbers(matrix: np.ndarray) -> np.ndarray:

@@ -6,6 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from saltus.contact.guards import is_hold
 from saltus.contact.reduction import free_field
 from saltus.language.dimensions import units_of
 from saltus.language.evaluate import evaluate
@@ -30,6 +31,23 @@ def _gap_units(system: System) -> tuple[str, ...]:
         else system.units[guard.state]
         for guard, unit in zip(system.guards, found, strict=True)
     )
+
+
+def margin_gaps(system: System) -> tuple[tuple[int, ...], str]:
+    """Numbers of the guards whose gaps a margin to the next graze is the smallest of, and their
+    unit: all lengths if there are any, else those in the unit of the first. What holds a contact is
+    a force or an acceleration and never counts. Without units all others do.
+    """
+    return _margin_gaps(system.origin)
+
+
+@lru_cache(maxsize=256)
+def _margin_gaps(system: System) -> tuple[tuple[int, ...], str]:
+    units = _gap_units(system)
+    free = [number for number, guard in enumerate(system.guards) if not is_hold(guard)]
+    own = [units[number] for number in free]
+    unit = "m" if "m" in own else own[0] if own else ""
+    return tuple(number for number in free if units[number] == unit), unit
 
 
 def _of_summand(system: System, gap: Expr) -> str:

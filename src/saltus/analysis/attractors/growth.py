@@ -26,6 +26,9 @@ MOST_STATES = 4
 #: Distance of a neighbour, in units of the scale. Rounding is 1e-8 of it; growth by 1e7 in a block
 #: still is that of a small deviation.
 APART = 1e-8
+#: Least range of a state, as a part of the largest. That of a mode which nothing excites goes on
+#: decaying: in its units rounding of the others, 1e-8 of APART, would be growth without bound.
+LEAST = 1e-7
 #: Iterates of the tangent flow that closing an orbit of period 1 takes, its multipliers included.
 NEWTON = 5
 #: Most iterates that telling the kind of a motion may take, in multiples of those that it was
@@ -67,6 +70,7 @@ def growth_rates(
     block by block, float64[blocks, k]: those after it has found its way. With ``past``
     float64[k, m, D], iterates that led to the starts, along the last of these: neighbours go alone.
     """
+    scale = np.maximum(scale, LEAST * scale.max(axis=-1, keepdims=True))
     stretched = _neighbours if by_neighbours(map_, start.shape[1]) else _tangents
     state, begin, growths = start, scale / math.sqrt(start.shape[1]), []
     direction, known = begin, None

@@ -31,7 +31,7 @@ def basins(
     *,
     at: Mapping[str, Value] | None = None,
     method: Method | None = None,
-    periods: int = 2000,
+    periods: int | None = None,
     every: float | str | None = None,
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
@@ -71,8 +71,12 @@ def basins(
     method : Method
         Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
         it serves.
-    periods : int
-        Forcing periods that a trajectory is followed at most.
+    periods : int, optional
+        Forcing periods that a trajectory is followed at most, and as many again in step 4. Default
+        2000. Of D states, from eight on, cells times periods times D^3 are at most 2^35 by default,
+        with 64 periods or more: 419 periods of 400 x 400 cells of four modes. Cells that haven't
+        settled by then, as at very low damping, are ``unconverged``;
+        :func:`saltus.describe` says how many.
     every : float or str, optional
         Time between two samples [s] of a system without forcing; default about a turn of its
         motions.

@@ -41,7 +41,7 @@ from saltus.analysis.inputs.starts import check_system
 from saltus.errors import ParameterError
 from saltus.flow.counts import whole
 from saltus.flow.maps import Stroboscope
-from saltus.flow.methods import Method
+from saltus.flow.methods import MANY_STATES, Method
 from saltus.flow.room import check_room
 from saltus.intervals import wilson
 from saltus.kernels import status as st
@@ -58,6 +58,10 @@ from saltus.units import to_si
 CHUNK = 4096
 #: Cells recomputed by a more exact method.
 CHECKED = 1000
+#: Forcing periods that each cell is followed at most; of many states as many as the work of all
+#: allows, cells times periods times the cube of the number of states, but so many at least. Where
+#: nothing settles, as at a damping of 1e-5, that is some hours of two cores.
+PERIODS, WORK, LEAST = 2000, 2**35, 64
 #: Cells whose motions say how large those of a map over sensors are.
 SPREAD_STARTS = 64
 
@@ -294,10 +298,10 @@ def basin_plan(
     axes: Mapping[str, Any],
     at: Mapping[str, Any] | None,
     method: Method,
-    periods: int,
+    periods: int | None,
     every: float | str | None,
 ) -> BasinPlan:
-    """A checked plan from a user's arguments.
+    """A checked plan from a user's arguments; without ``periods`` as many as :data:`WORK` allows.
 
     Raises
     ------
@@ -318,18 +322,29 @@ def basin_plan(
             f"{'sensors' if by_modes(system) else 'states'} with range and number of starts: "
             f"{example}."
         )
-    periods = whole(periods, "periods")
     first, second = (count_along(given) for given in axes.values())
     check_room(
         memory(first * second, len(system.states)),
         f"{first} x {second} cells",
         lambda say: f"Take a coarser grid, or {say.verb('basin_fractions')}.",
     )
+    periods = (
+        _allowed(first * second, len(system.states))
+        if periods is None
+        else whole(periods, "periods")
+    )
     units = units_of(system)
     values = {name: _axis(units[name], name, given) for name, given in axes.items()}
     plan = BasinPlan(system, method, values, fixed, periods)
     some = plan.starts(np.linspace(0, plan.cells - 1, ASKED).astype(int))
     return replace(plan, every=looks_every(system, every, some))
+
+
+def _allowed(cells: int, states: int) -> int:
+    """Forcing periods that each cell is followed at most where none are given."""
+    if states < MANY_STATES:
+        return PERIODS
+    return int(np.clip(WORK / (cells * states**3), LEAST, PERIODS))
 
 
 def _axis(unit: str, name: str, given: Any) -> np.ndarray:

@@ -84,7 +84,7 @@ class Arc:
         ``range``: the end of the range was reached; ``closed``; ``points``: as many as asked for;
         ``lost``: no step however short; ``stopped``: another curve of the group is closed;
         ``met``: another group goes on along the same curve; ``enough``: the caller needs no more;
-        or what the caller says.
+        ``interrupted``: by Ctrl-C; or what the caller says.
     """
 
     z: list[np.ndarray] = field(default_factory=list)
@@ -92,6 +92,12 @@ class Arc:
     derivative: list[np.ndarray] = field(default_factory=list)
     length: list[float] = field(default_factory=list)
     end: str = ""
+
+    def whole(self) -> Arc:
+        """The points of which all is known, when Ctrl-C has ended the curve."""
+        k = min(len(self.z), len(self.tangent), len(self.derivative), len(self.length))
+        end = self.end or "interrupted"
+        return Arc(self.z[:k], self.tangent[:k], self.derivative[:k], self.length[:k], end)
 
     def behind(self, back: Arc) -> Arc:
         """The curve through the start of both that comes along another one and goes on as this."""
@@ -132,6 +138,7 @@ def correct(
     rows: np.ndarray,
     astray: np.ndarray | float = np.inf,
     foresee: bool = False,
+    enough: float = CLOSED,
 ) -> Zeros:
     """Newton's method from guesses float64[k, m + 1] in the planes across float64[k, m + 1].
 
@@ -148,10 +155,12 @@ def correct(
     foresee : bool
         Leave out the evaluation that would only confirm a last step: the derivative is that before
         it then.
+    enough : float
+        Residual of a zero, in units of the scale.
     """
     return newton(
         lambda z, some: equations.evaluate(z, rows[some]), guess, equations.scale[rows],
-        planes=normal, enough=CLOSED, foresee=foresee, longest_step=np.inf, farthest=astray,
+        planes=normal, enough=enough, foresee=foresee, longest_step=np.inf, farthest=astray,
         max_steps=MOST_ITERATIONS,
     )  # fmt: skip
 

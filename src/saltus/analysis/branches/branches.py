@@ -167,7 +167,8 @@ def branches(
     ParameterError, UnitError
         If an argument can't be used, or no periodic orbit is found to begin with.
     Interrupted
-        On Ctrl-C; its ``partial`` is the Dataset of the branches that were finished.
+        On Ctrl-C; its ``partial`` is the Dataset of the branches that were finished, and of the
+        points so far of those that weren't, which end with ``interrupted``.
 
     References
     ----------

@@ -19,7 +19,7 @@ from saltus.contact.guards import is_hold
 from saltus.language.derivatives import gradient
 from saltus.language.evaluate import evaluate
 from saltus.language.expression import Expr
-from saltus.system import System
+from saltus.system import System, margin_gaps
 from saltus.system.parametric import parametric
 
 #: Largest real part whose exponential is taken, in units of the rates.
@@ -114,7 +114,7 @@ class EquilibriumCurves:
 
     def margin(self, z: np.ndarray) -> float:
         """Distance of float64[z] to the nearest boundary; inf without one."""
-        free = [one.gap for one in self._whole.guards if not is_hold(one)]
+        free = [self._whole.guards[number].gap for number in margin_gaps(self.system)[0]]
         gaps = self._at(free, z[None], self.sides(z[None]))[0] if free else np.zeros(0)
         return float(np.abs(gaps).min(initial=np.inf))
 

@@ -23,6 +23,7 @@ from saltus.analysis.solve.newton import newton
 from saltus.errors import ParameterError
 from saltus.flow.methods import Method, exact_method
 from saltus.flow.progress import reporting
+from saltus.flow.taylor import Taylor
 from saltus.results import build
 from saltus.results.dataset import schema
 from saltus.system import System
@@ -59,7 +60,8 @@ def event_sensitivity(
         each.
     method : Method
         Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
-        it serves; another one must be exact.
+        it serves; another one must be exact. By parameters whose derivatives the modal flow takes
+        by differences, such as the gap of a rigid stop: :class:`saltus.Taylor`.
     threads : int, optional
         Default all processors.
     progress : bool or callable
@@ -140,6 +142,8 @@ def _place(
     start: EventOrbit, varied: str, name: str, method: Method, threads: int | None
 ) -> tuple[float, float]:
     """Place of the bifurcation over ``varied`` [SI], and its slope over ``name``."""
+    if method.tangents(start.system, (varied, name)) is None:
+        method = Taylor()  # differences of another flow's differences have too few digits
     values = [start.system.values[one] for one in (varied, name)]
     limits = [(one - 0.1 * abs(one), one + 0.1 * abs(one) or 1.0) for one in values]
     orbits, z = orbits_over(start, (varied, name), limits, method, threads)

@@ -4,11 +4,13 @@ contact.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 from saltus.analysis.branches.leg_branches import leg_branches
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.tracing import Plan, both_ways
+from saltus.analysis.branches.watch import Watch
 from saltus.flow.methods import Method
 from saltus.system import System
 from saltus.system.leg import has_legs
@@ -34,9 +36,10 @@ def plan_of(
     *,
     stable: bool = False,
     twins: bool = False,
+    most: float = math.inf,
 ) -> Plan:
     """The plan of the branches of a system over a parameter ``name``; the rest is as in
-    :class:`Plan`. ``twins``: mirror images are followed too.
+    :class:`Plan`. ``twins``: mirror images are followed too; ``most``: see :class:`Watch`.
 
     Where states jump at contacts, branches are followed from contact to contact: the map over a
     period jumps when a contact crosses the whole period, and has a square root at a graze.
@@ -51,4 +54,5 @@ def plan_of(
         frozenset(switch),
         leg_branches if jumps and has_legs(system) else both_ways,
         stable=stable,
+        watch=Watch(most),
     )

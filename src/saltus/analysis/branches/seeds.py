@@ -25,6 +25,10 @@ from saltus.system import System
 RESTING_VALUES = 3
 #: Random starts at each of these values.
 RESTING_STARTS = 64
+#: Least range that counts of a state, as a part of the largest of those with its unit. High modes
+#: of a structure have tiny amplitudes, whose phases turn many times along a branch: they would set
+#: the length of its steps.
+LEAST_SHARE = 0.1
 #: An equilibrium so near to zero is there, in units of the starts.
 NOTHING = 1e-8
 
@@ -162,7 +166,9 @@ def _ranges(points: np.ndarray) -> np.ndarray:
 
 
 def scaled(system: System, name: str, seeds: list[Seed], method: Method) -> list[Seed]:
-    """The seeds with the ranges of their states over the whole motion, where they aren't known."""
+    """The seeds with the ranges of their states over the whole motion, where they aren't known; of
+    states with one unit the largest range counts for the others to LEAST_SHARE.
+    """
     unknown = [i for i, seed in enumerate(seeds) if not np.isfinite(seed.scale).all()]
     if not unknown:
         return seeds
@@ -174,5 +180,14 @@ def scaled(system: System, name: str, seeds: list[Seed], method: Method) -> list
     result = list(seeds)
     for place, i in enumerate(unknown):
         scale = units(numbers.maximum[place], numbers.minimum[place])
-        result[i] = replace(seeds[i], scale=np.where(np.isfinite(scale), scale, 1.0))
+        scale = np.where(np.isfinite(scale), scale, 1.0)
+        result[i] = replace(seeds[i], scale=_with_least(system, scale))
     return result
+
+
+def _with_least(system: System, scale: np.ndarray) -> np.ndarray:
+    """Ranges of the states, none smaller than LEAST_SHARE of the largest one with its unit."""
+    units_of = np.array([system.state_unit(name) for name in system.states])
+    alike = (units_of[:, None] == units_of) & (units_of != "")
+    largest: np.ndarray = np.where(alike, scale, 0.0).max(axis=1)
+    return np.asarray(np.maximum(scale, LEAST_SHARE * largest))

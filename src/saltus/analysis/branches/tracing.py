@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,8 @@ from saltus.analysis.branches.same_branch import SAME, branch_of
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.special_points import unstable
 from saltus.analysis.branches.switching import Seed, children, ends_there
+from saltus.analysis.branches.watch import Watch
+from saltus.flow.progress import stage
 
 #: Distances from the point where a branch leaves another, in units of the scale: it begins at the
 #: first of these at which Newton's method finds it.
@@ -35,6 +37,12 @@ ASIDE = (1e-3, 2e-4, 4e-5)
 SHRUNK = 0.005
 #: Farthest that a seed lies from its orbit, in units of the scale.
 ASTRAY = 0.5
+#: Residual of points of a branch that aren't corrected again, in units of the scale: they were
+#: foreseen, and their derivatives alone are missing.
+FORESEEN = 1e-13
+#: Points of a branch that are corrected at a time, times the square of the states: 16 of 80 states,
+#: so that a modal flow has the contact states of points before them.
+TOGETHER = 102_400
 #: Branches that are followed side by side, times the square of the unknowns of their orbits.
 ABREAST = 512
 
@@ -65,6 +73,8 @@ class Plan:
         from where they cross: what was followed is compared with the others once more.
     stable : bool
         Branches are followed up to where their orbits lose stability.
+    watch : Watch
+        Their budget and progress.
     """
 
     make: Callable[[int, np.ndarray], PeriodicOrbits]
@@ -76,6 +86,7 @@ class Plan:
     leave: Callable[[Any, int, frozenset[str], int], Iterator[Seed]] = children
     crossed: bool = False
     stable: bool = False
+    watch: Watch = field(default_factory=Watch)
 
 
 def trace(
@@ -87,28 +98,49 @@ def trace(
     """Add all branches that seeds lie on, and those that leave them at their events, to a list.
 
     Seeds that lie on a branch already followed, or on its mirror image, are not followed again.
+    After a KeyboardInterrupt the list also holds the branches that weren't finished, as far as
+    their points are known.
     """
-    waiting, begun = list(seeds), 0
-    while waiting:
-        beside = _abreast(waiting)
-        begun += len(beside)
-        found = [Start.of(plan, seed) for seed in beside]
-        starts = [one for one in found if one is not None and not _is_known(one, branches)]
-        beside = [start.seed for start in starts]
-        for start, branch in zip(starts, plan.follow(plan, starts), strict=True):
-            seed = beside.pop(0)
-            if start is not starts[0] and _is_known(start, branches):
-                continue
-            if branch is None and start is not starts[0]:
-                (branch,) = plan.follow(plan, [start])  # those beside it only seemed to be it
-            if branch is None or _was_followed(plan, branch, branches):
-                continue
-            branch.parent = seed.parent
-            branch.find_events()
-            number = _place(branch, branches, beside, waiting)
-            waiting += plan.leave(branch, number, plan.switch, plan.longest)
-        if progress is not None:
-            progress(begun / (begun + len(waiting)))
+    waiting, begun, share = list(seeds), 0, 0.0
+    try:
+        while waiting and not plan.watch.over:
+            beside = _abreast(waiting)
+            begun += len(beside)
+            before, share = share, max(share, begun / (begun + len(waiting)))
+            plan.watch.begin(stage(progress, before, share))
+            _trace_beside(plan, beside, waiting, branches)
+            if progress is not None:
+                progress(share)
+    except KeyboardInterrupt:
+        branches += plan.watch.cut.values()
+        raise
+
+
+def _trace_beside(
+    plan: Plan, beside: list[Seed], waiting: list[Seed], branches: list[Branch]
+) -> None:
+    """Add the branches that some seeds lie on to a list, and the seeds of those that leave them to
+    those that wait.
+    """
+    found = [Start.of(plan, seed) for seed in beside]
+    starts = [one for one in found if one is not None and not _is_known(one, branches)]
+    beside = [start.seed for start in starts]
+    for start, branch in zip(starts, plan.follow(plan, starts), strict=True):
+        seed, followed = beside.pop(0), id(branch)
+        if start is not starts[0] and _is_known(start, branches):
+            plan.watch.cut.pop(followed, None)
+            continue
+        if branch is None and start is not starts[0]:
+            (branch,) = plan.follow(plan, [start])  # those beside it only seemed to be it
+            followed = id(branch)
+        if branch is None or _was_followed(plan, branch, branches):
+            plan.watch.cut.pop(followed, None)
+            continue
+        branch.parent = seed.parent
+        branch.find_events()
+        number = _place(branch, branches, beside, waiting)
+        plan.watch.cut.pop(followed, None)
+        waiting += plan.leave(branch, number, plan.switch, plan.longest)
 
 
 def _abreast(waiting: list[Seed]) -> list[Seed]:
@@ -274,18 +306,34 @@ def both_ways(
     z = np.array([one.z for _, one, _ in sides])
     orbits = plan.make(starts[0].n, np.array([one.scale for _, one, _ in sides]))
     orbits.accepted(z, rows)
-    curves = follow(
-        orbits,
-        z,
-        np.array([side for _, _, side in sides]),
-        {orbits.width - 1: plan.limits},
-        plan.points,
-        np.array([one.first for _, one, _ in sides]),
-        ends=functools.partial(ends, orbits),
-        group=which,
-        foresee=True,
-        enough=functools.partial(unstable, orbits.multipliers) if plan.stable else None,
-    )
+    curves, work = list[Arc](), starts[0].n * orbits.size**2
+
+    def passed(curve: Arc) -> str:
+        if plan.watch.point(work):
+            curve.end = curve.end or "points"
+        return ends(orbits, curve)
+
+    try:
+        follow(
+            orbits,
+            z,
+            np.array([side for _, _, side in sides]),
+            {orbits.width - 1: plan.limits},
+            plan.points,
+            np.array([one.first for _, one, _ in sides]),
+            ends=passed,
+            group=which,
+            foresee=True,
+            enough=functools.partial(unstable, orbits.multipliers) if plan.stable else None,
+            curves=curves,
+        )
+    except KeyboardInterrupt:
+        for number in range(len(starts) if curves else 0):
+            known = [curves[row].whole() for row in np.flatnonzero(which == number)]
+            branch = _joined(orbits, [way for way in known if way.z], kind, final=False)
+            if branch is not None:
+                plan.watch.cut[id(branch)] = branch
+        raise
     for curve in curves:
         curve.end = "unstable" if curve.end == "enough" else curve.end
         shrunk = curve.end == "lost" and orbits.free and len(curve.z) > 1
@@ -299,26 +347,37 @@ def both_ways(
             result.append(None)
             continue
         equations = orbits.near(z[mine], mine) if len(starts) > 1 else orbits
-        result.append(_joined(equations, [way for way in ways if way.z], kind))
+        branch = _joined(equations, [way for way in ways if way.z], kind)
+        result.append(branch)
+        if branch is not None:
+            plan.watch.cut[id(branch)] = replace(branch)
     return result
 
 
-def _joined(orbits: PeriodicOrbits, curves: list[Arc], kind: type[Branch]) -> Branch | None:
+def _joined(
+    orbits: PeriodicOrbits, curves: list[Arc], kind: type[Branch], final: bool = True
+) -> Branch | None:
     """One branch from the curves to both sides."""
     if not curves:
         return None
     (curve, *back), ends = both_sides(curves)
-    return _of(orbits, curve.behind(back[0]) if back else curve, ends, kind)
+    return _of(orbits, curve.behind(back[0]) if back else curve, ends, kind, final)
 
 
-def _of(orbits: PeriodicOrbits, curve: Arc, ends: tuple[str, str], kind: type[Branch]) -> Branch:
-    """The branch of a curve, with the derivatives at its points themselves."""
+def _of(
+    orbits: PeriodicOrbits, curve: Arc, ends: tuple[str, str], kind: type[Branch], final: bool
+) -> Branch:
+    """The branch of a curve, with the derivatives at its points themselves if it is ``final``, else
+    with those beside them by which it was followed.
+    """
     z, tangent, derivative = (np.array(one) for one in (curve.z, curve.tangent, curve.derivative))
     length = np.array(curve.length) - curve.length[0]
     here, rows = orbits.near(z, np.zeros(len(z), np.int64)), np.arange(len(z))
-    point = correct(here, z, tangent, rows, ENDING)
-    good = point.found
-    z[good], derivative[good] = point.z[good], point.derivative[good]
-    tangent[good] = tangents(derivative[good], tangent[good])
+    most = max(TOGETHER // orbits.size**2, 1)
+    for some in np.split(rows, range(most, len(rows), most)) if final else ():
+        point = correct(here, z[some], tangent[some], some, ENDING, enough=FORESEEN)
+        good = some[point.found]
+        z[good], derivative[good] = point.z[point.found], point.derivative[point.found]
+        tangent[good] = tangents(derivative[good], tangent[good])
     multipliers = here.multipliers(z, derivative, rows)
     return kind(orbits, 0, z, tangent, derivative, length, multipliers, ends)

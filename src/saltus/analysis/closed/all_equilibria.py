@@ -23,7 +23,7 @@ from saltus.contact.guards import Guard, Law, is_hold
 from saltus.errors import ParameterError
 from saltus.language.derivatives import gradient
 from saltus.language.expression import Expr
-from saltus.system import System
+from saltus.system import System, margin_gaps
 
 #: Modes that are looked at; each boundary doubles them.
 MOST_MODES = 1024
@@ -149,13 +149,15 @@ def _equilibrium(piece: ModeEquations, state: np.ndarray) -> Equilibrium | None:
     """The equilibrium at a zero of the field; None where the mode doesn't hold."""
     state = piece.cleaned(state)
     touched, margin = [], np.inf
+    counted, _ = margin_gaps(piece.system)
     for number, guard in piece.free():
         gap, noise = _gap(piece, guard.gap, state)
         if abs(gap) <= noise:
             touched.append(number)
         elif (gap > 0) != piece.mode[number]:
             return None
-        margin = min(margin, abs(gap))
+        if number in counted:
+            margin = min(margin, abs(gap))
     releases, attracts = [], True
     for owner in piece.held:
         law = piece.law(owner)

@@ -10,7 +10,6 @@ import xarray as xr
 
 from saltus.analysis.closed.all_equilibria import Equilibrium, all_equilibria
 from saltus.analysis.closed.field_zeros import autonomous
-from saltus.analysis.dataset_parts import gap_unit
 from saltus.analysis.inputs.box import box_ranges, draw
 from saltus.analysis.inputs.given import Range, Starts, Value
 from saltus.analysis.inputs.halton import halton
@@ -20,7 +19,7 @@ from saltus.errors import ParameterError
 from saltus.flow.counts import whole
 from saltus.results import Subject, attributes, build
 from saltus.results.dataset.schema import EQUILIBRIA
-from saltus.system import System
+from saltus.system import System, margin_gaps
 from saltus.system.modes import mode_number
 
 #: Magnitudes that starts have where no box is given, as powers of ten [SI].
@@ -130,7 +129,7 @@ def equilibria(
         fingerprint=system.fingerprint(),
         source=system.source,
     )
-    about = Subject(system.states, system.units, attrs, gap_unit=gap_unit(system))
+    about = Subject(system.states, system.units, attrs, margin_unit=margin_gaps(system)[1])
     return build(EQUILIBRIA, about, _columns(system, found))
 
 

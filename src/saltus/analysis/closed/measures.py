@@ -27,6 +27,7 @@ from saltus.flow.threads import on_threads
 from saltus.flow.waves import WaveLegs, deviations, extremes, harmonics, least_turns, means, turns
 from saltus.interrupt import check_stop
 from saltus.kernels import status as st
+from saltus.system import margin_gaps
 
 #: Forcing periods of a motion that never repeats from which its numbers are taken, where there are
 #: many such motions.
@@ -60,10 +61,10 @@ class Measures:
         First harmonic: ``A exp(i phi)`` of ``A cos(2 pi t/T + phi)``, T the forcing period, t the
         time of the equations; NaN if unforced.
     margin : float64[m]
-        Smallest size of a gap where it turns [unit of the gap]; zero if it is within rounding, inf
-        without gaps.
+        Smallest size of a gap where it turns, of those of one unit
+        (:func:`saltus.system.margin_gaps`); zero if it is within rounding, inf without gaps.
     span : float64[m]
-        Largest range of a gap [its unit].
+        Largest range of these gaps [their unit].
     contacts : float64[m]
         Contacts per forcing period; NaN where the method doesn't locate them.
     itinerary : list of str
@@ -211,7 +212,7 @@ def _measured(
                 whole, first, turns[output], output
             )
         _means(map_, whole, first, wide, result)
-        gaps = range(wide, whole.terms.shape[1])
+        gaps = [wide + number for number in margin_gaps(map_.system)[0]]
         margins = [_margin(whole, first, turns[gap], gap) for gap in gaps]
         ranges = [np.subtract(*_extremes(whole, first, turns[gap], gap)) for gap in gaps]
         result.margin[known] = np.min(margins, axis=0, initial=np.inf) if margins else np.inf
@@ -242,7 +243,7 @@ def _measured_by_waves(
     size = outcome.state.shape[1]
     result = unknown(len(motions), size, outputs)
     _count_contacts(map_, outcome, span, closed, result)
-    own, gaps = slice(0, outputs), slice(outputs, None)
+    own, gaps = slice(0, outputs), outputs + np.array(margin_gaps(map_.system)[0], np.int64)
     for i, legs in enumerate(motions):
         check_stop()
         if legs is None:
@@ -256,7 +257,7 @@ def _measured_by_waves(
             rate = 2.0 * np.pi / float(map_.period[i])
             result.harmonic[i] = harmonics(wanted, rate)
         spans = (high - low)[gaps]
-        margins = least_turns(legs, outputs + np.arange(len(spans)), NEAR * spans)
+        margins = least_turns(legs, gaps, NEAR * spans)
         result.margin[i], result.span[i] = margins.min(initial=np.inf), spans.max(initial=0.0)
         result.turning[i] = _turning_states(legs, size, closed)
     return result

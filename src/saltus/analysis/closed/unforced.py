@@ -14,6 +14,7 @@ from saltus.analysis.inputs.outputs import Outputs
 from saltus.contact.guards import is_hold
 from saltus.flow.maps import Stroboscope
 from saltus.language.evaluate import evaluate
+from saltus.system import margin_gaps
 from saltus.system.modes import mode_number, sides
 
 #: Parts of a motion that must each be larger than the one before, to run away.
@@ -99,12 +100,14 @@ def measure_equilibria(
     states, values = dict(zip(map_.system.states, place.T, strict=False)), map_.values
     bits: list[np.ndarray] = []
     nearest = np.full(len(rows), np.inf)
-    for guard in map_.system.guards:
+    counted, _ = margin_gaps(map_.system)
+    for number, guard in enumerate(map_.system.guards):
         if is_hold(guard):
             continue
         (gap,) = evaluate([guard.gap], states=states, values=values, bits=bits)
         bits.append(np.broadcast_to(gap, len(rows)) > 0)
-        nearest = np.minimum(nearest, np.abs(gap))
+        if number in counted:
+            nearest = np.minimum(nearest, np.abs(gap))
     numbers.margin[rows] = nearest
     for row in rows:
         numbers.turning[row] = numbers.mean[row][None]

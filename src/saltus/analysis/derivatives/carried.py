@@ -14,8 +14,9 @@ import numpy as np
 
 from saltus.analysis.inputs.spans import Span
 from saltus.analysis.inputs.starts import Ensemble
-from saltus.analysis.motion.sample_times import NO_SAMPLES, SampleTimes
+from saltus.analysis.motion.sample_times import NO_SAMPLES, SampleTimes, at_times
 from saltus.errors import ParameterError
+from saltus.flow import engine
 from saltus.flow.methods import Method
 from saltus.flow.request import Outcome, Request
 from saltus.kernels import status as st
@@ -26,6 +27,8 @@ from saltus.system.parametric import parametric
 #: Kinds of contacts at which a motion begins to be held: behind them its rates aren't those of the
 #: equations.
 HELD = ("hold",)
+#: Length of a run that only tells in which mode a motion begins [periods].
+SHORT = 1e-6
 #: Ends that a run may come to from outside.
 CUT_OFF = (st.INTERRUPTED, st.BUDGET_EVENTS)
 
@@ -134,14 +137,25 @@ class CarriedDerivatives:
                     "call."
                 )
             )
+        times, end = base.times, base.end_phase / unit
+        if times is not None:
+            times = times / float(unit[0])  # the end rounds in its own way: no sample lies beyond
+            end = np.maximum(end, times.max(initial=0.0) - base.end_count)
         return replace(
             changed,
             period=np.ones(n),
-            end_phase=base.end_phase / unit,
+            end_phase=end,
             origin=base.origin / float(unit[0]),
-            times=None if base.times is None else base.times / float(unit[0]),
+            times=times,
             t_end=base.t_end / float(unit[0]) if np.ptp(unit) == 0 else np.inf,
         )
+
+    def lost(self, at: Places) -> bool:
+        """True if derivatives are unknown where the motion isn't: modes that go together leave the
+        modal flow without those with respect to parameters.
+        """
+        known = np.isfinite(at.states).all(axis=1)
+        return self._own and bool(np.isnan(at.slopes[known]).any())
 
     # -- what it holds -----------------------------------------------------------------------------
     def samples(
@@ -237,12 +251,15 @@ class CarriedDerivatives:
         return at
 
     def _begin(self, group: Ensemble, length: Span) -> np.ndarray:
-        """Rates at the starts, float64[n, D]."""
+        """Rates at the starts, float64[n, D], in the modes in which the motions begin."""
         if length.t_start == 0.0:
             return np.zeros(group.start.shape)
+        short = replace(length, count=np.zeros_like(length.count), phase=SHORT * length.period)
+        first = at_times(short, 0, np.array([length.t_start]))
+        found = engine.run(self.flown, self._method, self.request(group, short, first))
         every, time = np.arange(group.size), np.full(group.size, length.t_start)
-        values = self.parameters(group, every)
-        return field(self.system, time, group.start.T, values).T
+        nothing = np.zeros((group.size, 0, 0))
+        return self.rates(Places(time, group.start, nothing, found.sample_mode[:, 0], every), group)
 
 
 def _alone(whole: Request, i: int, times: np.ndarray) -> Request:

@@ -43,6 +43,7 @@ from saltus.flow import engine
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporting
 from saltus.flow.request import Outcome
+from saltus.flow.taylor import Taylor
 from saltus.system import System
 from saltus.system.outputs import with_more
 from saltus.system.read_off import Quantity
@@ -88,8 +89,12 @@ def sensitivity(
 
     Parameters
     ----------
-    system, periods, t_end, t_start, samples, at, keep, values, method, threads, progress
+    system, periods, t_end, t_start, samples, at, keep, values, threads, progress
         As for :func:`saltus.simulate`.
+    method : Method
+        As for :func:`saltus.simulate`. Where modes go together, as rigid bodies and resonances of
+        :class:`saltus.Modal`, its derivatives with respect to parameters are those of
+        :class:`saltus.Taylor`.
     start : Dataset, or starts
         Starts as for :func:`saltus.simulate`; or what :func:`saltus.periodic_orbits`,
         :func:`saltus.attractors`, :func:`saltus.frequency_response` or :func:`saltus.branches`
@@ -145,19 +150,23 @@ def sensitivity(
     {'output': 2, 'to': 2}
     """
     with reporting(progress) as show:
-        run = sensitivity_run(
-            system, start, periods, t_end, to=to, outputs=outputs, extremes=extremes,
-            t_start=t_start, samples=samples, at=at, keep=keep, values=values, method=method,
-            threads=threads,
-        )  # fmt: skip
+        for by in (method, Taylor()):  # the second one where modes go together
+            run = sensitivity_run(
+                system, start, periods, t_end, to=to, outputs=outputs, extremes=extremes,
+                t_start=t_start, samples=samples, at=at, keep=keep, values=values, method=by,
+                threads=threads,
+            )  # fmt: skip
 
-        def answer(outcome: Outcome) -> xr.Dataset:
-            return sensitivity_dataset(run, sensitivity_rows(run, outcome))
+            def answer(outcome: Outcome, run: SensitivityRun = run) -> xr.Dataset:
+                return sensitivity_dataset(run, sensitivity_rows(run, outcome))
 
-        try:
-            result = answer(run.fly(run.request, threads, show))
-        except engine.RunInterrupted as stop:
-            raise stop.then(answer) from None
+            try:
+                outcome = run.fly(run.request, threads, show)
+            except engine.RunInterrupted as stop:
+                raise stop.then(answer) from None
+            if not run.flow.lost(run.flow.ends(outcome, run.group, run.length)):
+                break
+        result = answer(outcome)
     warn(result, run.length, system)
     if run.closed is None:
         warn_of_chaos(result)

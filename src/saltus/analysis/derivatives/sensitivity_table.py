@@ -97,7 +97,7 @@ class SensitivityRun(Readings):
         split = np.bincount(instant, known & ~same, len(moved))[instant] > 0
         caused = ~known & (first[leader] | ~split)
         moved[caused] = moved[leader[caused]]
-        steps = np.array([jumps_by_time(one.gap) for one in self.turning.system.guards])
+        steps = np.array([jumps_by_time(one.gap) for one in self.turning.system.guards], bool)
         driven = jumped & ~known[leader] & ~first[leader] & steps[table.guard]
         moved[driven] = self._phase_times(at)[driven]
         return moved

@@ -17,7 +17,8 @@ from saltus.analysis.fits.growth import grow
 from saltus.analysis.fits.measurement import Measurement, measurement, per_output
 from saltus.analysis.fits.motion import Motions
 from saltus.analysis.fits.search import MisfitSearch
-from saltus.analysis.fits.steady import Size, SteadyResponses
+from saltus.analysis.fits.sizes import Size
+from saltus.analysis.fits.steady import SteadyResponses
 from saltus.analysis.fits.unknowns import INSIDE, Unknowns
 from saltus.analysis.fits.verdict import FOLLOW, UNKNOWN, follow, noise_of, valleys, verdict
 from saltus.analysis.inputs.given import Range, Starts, Value

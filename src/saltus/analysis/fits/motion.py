@@ -19,8 +19,8 @@ from saltus.analysis.motion.sample_times import SampleTimes, at_times
 from saltus.errors import ParameterError
 from saltus.flow import engine
 from saltus.flow.methods import Method
+from saltus.flow.taylor import Taylor
 from saltus.system import System
-from saltus.system.modes import field as field_of
 from saltus.units import to_si
 
 
@@ -104,17 +104,22 @@ class Motions:
         with respect to these, float64[M, K, p].
         """
         group, length, plan = self._asked(values[None])
-        request = replace(self._flow.request(group, length, plan), record_from=None)
+        assert plan.given is not None
+        time = np.append(length.t_start, plan.given)  # the start tells in which mode it begins
+        request = self._flow.request(group, length, at_times(length, 0, time))
+        request = replace(request, record_from=None)
         outcome = engine.run(self._flow.flown, self.method.suited_to(1), request, 1)
         self.flows += 1
-        time = plan.given
-        assert time is not None
         at = self._flow.samples(outcome, group, length, time[None], slice(None))
+        if self._flow.lost(at):
+            self.method = Taylor()
+            self._flow = CarriedDerivatives(self.system, self.method, self._flow.names)
+            return self.with_derivatives(values)
         read = Readings(system=self.system, flow=self._flow, group=group)
         slopes = read.slopes(at)
         slopes = np.concatenate([slopes, self._by_t_start(read, at, slopes)[..., None]], axis=-1)
         mine = self.measured.columns
-        return read.values(at)[:, mine], slopes[:, mine][..., self._places]
+        return read.values(at)[1:, mine], slopes[1:, mine][..., self._places]
 
     # -- parts -------------------------------------------------------------------------------------
     def _asked(self, values: np.ndarray) -> tuple[Ensemble, Span, SampleTimes]:
@@ -155,14 +160,11 @@ class Motions:
 
     def _by_t_start(self, read: Readings, at: Places, slopes: np.ndarray) -> np.ndarray:
         """Derivatives of what is read by the time at which the motion starts, at one time since
-        then: float64[m, K].
+        then: float64[m, K]; the first place is the start.
         """
         if "t_start" not in self.unknowns.names:
             return np.zeros(slopes.shape[:2])
         size = len(self.system.states)
         still = replace(at, slopes=np.zeros_like(at.slopes))
         along = read.slopes(still, np.ones((len(at.time), at.slopes.shape[2])))[..., 0]
-        begin = float(at.time[0] - self.measured.at[0])
-        values = dict(zip(self.system.values, read.group.parameters[0], strict=True))
-        rate = field_of(self.system, begin, read.group.start[0], values)
-        return np.asarray(along - slopes[..., :size] @ np.array(rate, float))
+        return np.asarray(along - slopes[..., :size] @ self._flow.rates(at, read.group)[0])

@@ -9,30 +9,30 @@ Systems (1989), chapter 5.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from functools import partial
 
 import numpy as np
 
 from saltus.analysis.attractors.grid import grid_of
 from saltus.analysis.attractors.grid_responses import find
 from saltus.analysis.derivatives.carried import CarriedDerivatives
+from saltus.analysis.derivatives.columns import Columns, Turning
 from saltus.analysis.derivatives.readings import Readings
+from saltus.analysis.derivatives.sensitivity_table import SensitivityRun
 from saltus.analysis.fits.measurement import Measurement
+from saltus.analysis.fits.sizes import LONGEST, OrbitParts, Size
 from saltus.analysis.fits.unknowns import Unknowns
 from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.inputs.spans import span
 from saltus.analysis.inputs.starts import Ensemble
-from saltus.analysis.motion.sample_times import planned
+from saltus.analysis.motion.sample_times import NO_SAMPLES, at_times
 from saltus.analysis.solve.linear import moves
 from saltus.errors import ParameterError
-from saltus.flow import engine
 from saltus.flow.methods import Method
+from saltus.flow.taylor import Taylor
 from saltus.interrupt import Interrupted
 from saltus.system import System
 
-Size = Literal["amplitude", "rms", "peak"]
-#: Samples of a forcing period from which sizes are taken: they err by its square, 1e-5.
-SAMPLES = 512
 #: Forcing periods after which a sweep goes on from a motion that hasn't settled.
 PERIODS = 500
 #: Longest step of a sweep, in its range: a longer one may jump off a branch.
@@ -96,10 +96,9 @@ class SteadyResponses:
         slopes = np.full((*fitted.shape, len(values)), np.nan)
         for period in sorted({len(one) for _, one in orbits}):
             mine = [i for i, (_, one) in enumerate(orbits) if len(one) == period]
-            sizes, by = self._sizes(system, [orbits[i] for i in mine], period)
+            by = self._slopes(system, [orbits[i] for i in mine], period)
             for place, i in enumerate(mine):
                 rows, columns = np.nonzero(chosen == i)
-                fitted[rows, columns] = sizes[place, columns]
                 slopes[rows, columns] = by[place, columns]
         return fitted, slopes
 
@@ -137,34 +136,54 @@ class SteadyResponses:
                 orbits.append((float(places[found.place[i]]), found.points(i)))
         return fitted, chosen, orbits
 
-    def _sizes(
+    def _slopes(
         self, system: System, orbits: list[tuple[float, np.ndarray]], period: int
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Sizes of k orbits of some forcing periods, float64[k, K], and their derivatives
-        float64[k, K, p].
-        """
+    ) -> np.ndarray:
+        """Derivatives of the sizes of k orbits of some forcing periods, float64[k, K, p]."""
         name, size = str(system.forced_at), len(system.states)
         frequency = np.array([one for one, _ in orbits])
         columns = np.tile(list(system.values.values()), (len(orbits), 1))
         columns[:, list(system.values).index(name)] = frequency
         start = np.array([points[0] for _, points in orbits])
         group = Ensemble(start, columns, {name: frequency}, True)
-        length = span(system, group, period, None, 0.0)
-        plan = planned(system, group, length, SAMPLES, None, 2 * len(self._flow.flown.states))
-        request = replace(self._flow.request(group, length, plan), record_from=None)
-        method = self.method.suited_to(group.size)
-        outcome = engine.run(self._flow.flown, method, request, self.threads)
-        time, _ = plan.of_result(outcome, length, True)
-        time = np.broadcast_to(time, (group.size, time.shape[-1]))
-        at = self._flow.samples(outcome, group, length, time, plan.reached(outcome))
-        read = Readings(system=self.system, flow=self._flow, group=group)
-        values = read.values(at).reshape(*time.shape, -1)
-        slopes = read.slopes(at).reshape(*values.shape, -1)
-        end = slopes[:, -1, :size]
+        length, flow = span(system, group, period, None, 0.0), self._flow
+        run = SensitivityRun(
+            system=self.system, flow=flow, group=group, method=self.method, length=length,
+            plan=NO_SAMPLES, turning=Turning(system, {}, []), closed=None,
+            asked=Columns.of(system, self.unknowns.names),
+        )  # fmt: skip
+        again, request = partial(run.fly, threads=1), flow.request(group, length, NO_SAMPLES)
+        outcome = run.fly(request, self.threads)
+        there = flow.ends(outcome, group, length)
+        if flow.lost(there):
+            self.method = Taylor()
+            self._flow = CarriedDerivatives(self.system, self.method, flow.names)
+            return self._slopes(system, orbits, period)
+        end = there.slopes
         moved = moves(end[..., :size] - np.eye(size), end[..., size:])
-        along = slopes[..., size:] + np.einsum("ktod,kdp->ktop", slopes[..., :size], moved)
-        mine = self.measured.columns
-        return _size_of(self.size, values[:, :-1, mine], along[:, :-1, mine])
+        weights = np.concatenate([moved, np.tile(np.eye(end.shape[2] - size), (len(end), 1, 1))], 1)
+        before, _ = flow.contacts(outcome, group, length, again)
+        late = run.contact_times(before, outcome.contacts)
+        found = []
+        for i, whose in enumerate(weights):
+            mine = before.trajectory == i
+            parts = OrbitParts.of(
+                before.time[mine],
+                late[mine] @ whose,
+                period * length.period[i],
+                LONGEST * length.period[i],
+            )
+            times, nodes = np.unique(parts.times, return_inverse=True)
+            one = Ensemble(start[[i]], columns[[i]], {}, True)
+            around = span(system, one, period, None, 0.0)
+            asked = flow.request(one, around, at_times(around, 0, times))
+            flown = again(replace(asked, record_from=None))
+            at = flow.samples(flown, one, around, times[None], slice(None))
+            read = Readings(system=self.system, flow=flow, group=one)
+            mine = self.measured.columns
+            y, by = read.values(at)[nodes][:, mine], (read.slopes(at) @ whose)[nodes][:, mine]
+            found.append(parts.slopes(self.size, y, by, 2.0 * np.pi / length.period[i]))
+        return np.stack(found)
 
 
 def _sweep(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -177,21 +196,3 @@ def _sweep(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     ]
     places = np.concatenate([*between, own[-1:]])
     return places, np.searchsorted(places, at)
-
-
-def _size_of(size: Size, y: np.ndarray, by: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Size of samples float64[k, t, K] over whole periods, and its derivatives, of those of the
-    samples float64[k, t, K, p].
-    """
-    if size == "amplitude":
-        turn = np.exp(-2j * np.pi * np.arange(y.shape[1]) / SAMPLES) * 2.0 / y.shape[1]
-        whole, moved = np.einsum("kto,t->ko", y, turn), np.einsum("ktop,t->kop", by, turn)
-        amplitude = np.abs(whole)
-        return amplitude, (np.conj(whole)[..., None] * moved).real / amplitude[..., None]
-    if size == "rms":
-        rms = np.sqrt((y**2).mean(axis=1))
-        return rms, (y[..., None] * by).mean(axis=1) / rms[..., None]
-    place = np.abs(y).argmax(axis=1)[:, None]
-    peak = np.take_along_axis(y, place, 1)[:, 0]
-    moved = np.take_along_axis(by, place[..., None], 1)[:, 0]
-    return np.abs(peak), np.sign(peak)[..., None] * moved

@@ -14,6 +14,7 @@ from saltus.analysis.harmonics import series as fourier
 from saltus.analysis.harmonics.equations import HarmonicOrbits
 from saltus.analysis.harmonics.pieces import Intervals
 from saltus.analysis.inputs.outputs import Outputs
+from saltus.system import margin_gaps
 from saltus.system.modes import mode_number
 
 #: Angles at which an extreme is looked for first, for each harmonic.
@@ -115,7 +116,8 @@ class _Motion:
             for number, slope in zip(instants.guard, instants.slope, strict=True)
         )
         which, _, gaps = _turns(intervals.gaps)
-        gaps = np.abs(gaps)
+        counted = np.isin(which, margin_gaps(self.orbits.system)[0])
+        which, gaps = which[counted], np.abs(gaps[counted])
         each = [gaps[which == number] for number in np.unique(which)]
         result.margin[row] = gaps.min(initial=np.inf)
         result.span[row] = max(map(np.ptp, each), default=0.0)

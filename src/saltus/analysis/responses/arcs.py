@@ -42,6 +42,12 @@ from saltus.system.parametric import parametric
 
 #: Seeds of each number of periods that are followed at a time.
 TAKEN = 8
+#: Most unknowns of an orbit that is followed: each point of its branch asks for their square in
+#: memory, and for their cube in work.
+MOST_UNKNOWNS = 400
+#: Most work on the branches of responses, see :class:`saltus.analysis.branches.watch.Watch`: 1250
+#: points of 80 states, which take a minute or two.
+MOST_WORK = 8e6
 #: Largest distance of a response of an inexact method from its exact orbit, in units of its range.
 INEXACT = 0.05
 
@@ -60,12 +66,16 @@ class Arcs:
         Whether unstable orbits are followed too, and branches that leave others.
     refused : str
         Why none can be followed of this system over this parameter; empty if they can.
+    left : int
+        Responses that repeat whose branches weren't followed: they repeat after too many periods,
+        or the work was done.
     """
 
     branches: list[Branch] = field(default_factory=list)
     branch_of: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
     unstable: bool = False
     refused: str = ""
+    left: int = 0
 
 
 def check_unstable(unstable: bool, grid: Grid, method: Method) -> None:
@@ -122,6 +132,7 @@ def follow_arcs(
         SWITCHES if arcs.unstable else (),
         stable=not arcs.unstable,
         twins=True,
+        most=MOST_WORK,
     )
     arcs.branch_of = np.full(len(found), -1, np.int64)
     try:
@@ -179,8 +190,11 @@ def _follow_orbits(
     if plan.stable:
         rank, most = _coarse_first(rank, grid.places), TAKEN
     left = left[np.lexsort((rank, orbits.period[left]))]
+    points = np.where(np.isfinite(orbits.time[left]), 1, orbits.period[left])
+    short = points * orbits.points.shape[2] <= MOST_UNKNOWNS
+    left, long = left[short], left[~short]
     number, known = len(left), 0
-    while len(left):
+    while len(left) and not plan.watch.over:
         first = np.flatnonzero(np.append(True, np.diff(orbits.period[left]) != 0))
         rank = np.arange(len(left)) - np.repeat(first, np.diff(np.append(first, len(left))))
         some, left = left[rank < most], left[rank >= most]
@@ -197,10 +211,13 @@ def _follow_orbits(
         try:
             trace(plan, beginnings, arcs.branches, part if plan.stable else progress)
         finally:  # also with the results so far, when interrupted
-            _number(found, orbits, grid, plan, np.append(some, left), arcs, known)
+            every = np.concatenate([some, left, long])
+            _number(found, orbits, grid, plan, every, arcs, known)
         left, known = left[arcs.branch_of[left] < 0], len(arcs.branches)
         if progress is not None:
             progress(1.0 - len(left) / number)
+    over = np.append(left, some) if plan.watch.over else left
+    arcs.left = int((arcs.branch_of[np.append(over, long)] < 0).sum())
 
 
 def _coarse_first(index: np.ndarray, places: int) -> np.ndarray:
@@ -306,11 +323,13 @@ def arc_values(
     arcs: Arcs, grid: Grid, method: Method, outputs: Outputs
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """The variables and attributes of the branches, empty if there are none."""
+    about: dict[str, Any] = {"branches_refused": arcs.refused} if arcs.refused else {}
+    about |= {"responses_not_followed": arcs.left} if arcs.left else {}
     if not arcs.branches or not method.exact:
-        return {}, {"branches_refused": arcs.refused} if arcs.refused else {}
+        return {}, about
     ((name, values),) = grid.axes.items()
     limits = float(values[0]), float(values[-1])
     return (
         values_of(grid.system, name, arcs.branches, outputs, method),
-        attributes_of(name, limits, arcs.branches) | {"unstable": int(arcs.unstable)},
+        attributes_of(name, limits, arcs.branches) | {"unstable": int(arcs.unstable)} | about,
     )

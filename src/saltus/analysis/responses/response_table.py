@@ -26,6 +26,9 @@ from saltus.results.dataset import schema
 from saltus.results.dataset.attractors import padded
 from saltus.results.dataset.responses import SAMPLES, grid_values, response_values
 
+#: States from which on most of the time goes into branches.
+MANY = 16
+
 
 @dataclass(frozen=True)
 class ResponsePlan:
@@ -57,7 +60,8 @@ class ResponsePlan:
     @property
     def settling(self) -> float:
         """Share of the progress at which all starts have settled."""
-        return 0.4 if self.unstable else 0.8
+        many = len(self.grid.system.states) >= MANY
+        return 0.3 if many else 0.4 if self.unstable else 0.8
 
 
 def response_plan(

@@ -35,7 +35,7 @@ ATTRACTOR_VARIABLES = {
     "attractor_peak": Variable(_EACH, "<first>", "largest magnitude of the first state"),
     "attractor_rms": Variable(_EACH, "<first>", "root mean square of the first state"),
     "attractor_margin": Variable(
-        _EACH, "<gap>", "smallest distance by which the orbit misses or overshoots a boundary"
+        _EACH, "<margin>", "smallest distance by which the orbit misses or overshoots a boundary"
     ),
     "attractor_multiplier_real": Variable(_MULTIPLIER, "1", "Floquet multiplier, real part"),
     "attractor_multiplier_imag": Variable(_MULTIPLIER, "1", "Floquet multiplier, imaginary part"),

@@ -106,6 +106,8 @@ class Subject:
         Kept where the table of the kind has them.
     gap_unit : str
         Unit of the gaps, where no guards are given.
+    margin_unit : str
+        Unit of margins to the next graze; default that of the gaps.
     varied : mapping of str to array, shape (trajectory,)
         Parameters that differ between trajectories [SI].
     forcing_period : float or array, shape (trajectory,), optional
@@ -124,6 +126,7 @@ class Subject:
     batch: bool = True
     outputs: Sequence[str] = ()
     outputs_first: bool = False
+    margin_unit: str = ""
 
 
 def subject_of(
@@ -242,6 +245,7 @@ class _Building:
         first = subject.units.get(subject.states[0], "") if subject.states else ""
         self.words = {
             "<gap>": gap,
+            "<margin>": subject.margin_unit or gap,
             "<gap rate>": schema.rate_unit(gap),
             "<root gap>": schema.root_unit(gap),
             "<first>": first,

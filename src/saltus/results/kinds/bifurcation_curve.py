@@ -14,7 +14,7 @@ _POINT = ("point",)
 _CODIM2 = ("codim2",)
 
 #: Variables of the result of ``bifurcation_curve``. ``<first>``: the unit of the first state;
-#: ``<gap>``: that of the gaps; ``<root gap>``: of their square roots.
+#: ``<margin>``: that of the gaps that count; ``<root gap>``: of their square roots.
 VARIABLES = {
     "point": Variable(_POINT, "1", "point of the curve", "i8", coord=True),
     "point_<parameter>": Variable(_POINT, "<parameter>", "<parameter>"),

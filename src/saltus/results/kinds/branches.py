@@ -29,7 +29,7 @@ _EVENT = ("event",)
 #: Digits of the parameter at a bifurcation.
 DIGITS = 10
 
-#: Variables of the result of ``branches``. ``<first>``: the unit of the first state; ``<gap>``:
+#: Variables of the result of ``branches``. ``<first>``: the unit of the first state; ``<margin>``:
 #: that of the gaps; ``<varied>``: that of the parameter; ``<output>``: that of the output, in
 #: ``output_units``.
 VARIABLES = {
@@ -54,7 +54,7 @@ VARIABLES = {
         _POINT, "", "guards met, with + where the gap becomes positive, in the order of time", "str"
     ),
     "point_margin": Variable(
-        _POINT, "<gap>", "smallest distance by which the orbit misses or overshoots a boundary"
+        _POINT, "<margin>", "smallest distance by which the orbit misses or overshoots a boundary"
     ),
     "point_multiplier_real": Variable(_MULTIPLIER, "1", "Floquet multiplier, real part"),
     "point_multiplier_imag": Variable(_MULTIPLIER, "1", "Floquet multiplier, imaginary part"),
@@ -162,6 +162,7 @@ VARIABLES = {
 _STOPPED = {
     "points": "stopped by points=",
     "lost": "lost",
+    "interrupted": "interrupted",
     "held": "ends where the chatter before a held contact changes",
 }
 

@@ -30,7 +30,7 @@ VARIABLES = {
         _EACH, "", "guards whose contacts are held, or whose gap is zero", "str"
     ),
     "equilibrium_mode": Variable(_EACH, "1", "mode, bit i is guard i", "i8"),
-    "equilibrium_margin": Variable(_EACH, "<gap>", "distance to the nearest other boundary"),
+    "equilibrium_margin": Variable(_EACH, "<margin>", "distance to the nearest other boundary"),
     "equilibrium_dimension": Variable(_EACH, "1", "dimension of a continuum, 0 if isolated", "i8"),
     "equilibrium_eigenvalue_real": Variable(
         _EIGENVALUE, "1/s", "eigenvalue of the Jacobian, real part"

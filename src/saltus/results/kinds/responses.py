@@ -33,7 +33,7 @@ _GRID = ("...", "start")
 _RESPONSE = ("response",)
 
 #: Variables of the results of ``frequency_response`` and ``bifurcation_diagram``. ``<first>``: the
-#: unit of the first state; ``<gap>``: that of the gaps; ``<output>``: that of the output, in
+#: unit of the first state; ``<margin>``: that of its gaps; ``<output>``: that of the output, in
 #: ``output_units``.
 VARIABLES = {
     "<parameter>": Variable(("<parameter>",), "<parameter>", "<parameter>", coord=True),
@@ -105,6 +105,11 @@ def _ends(ds: xr.Dataset) -> list[str]:
     lines = []
     if text := ds.attrs.get("branches_refused"):
         lines.append(f"unsure   branches are matched by where responses lie: {text}")
+    if left := ds.attrs.get("responses_not_followed"):
+        lines.append(
+            f"stopped  the branches of {counted(int(left), 'response')} weren't followed: they "
+            "repeat after many periods, or others took all the work; a narrower range follows more"
+        )
     if "branch_end" not in ds:
         return lines
     ends = tally(np.concatenate([ds["branch_begin"].values, ds["branch_end"].values]))
@@ -115,8 +120,8 @@ def _ends(ds: xr.Dataset) -> list[str]:
         )
     if "points" in ends:
         lines.append(
-            f"stopped  {counted(ends['points'], 'end')} of branches that go on, after 1000 points: "
-            "their orbits may grow without bound"
+            f"stopped  {counted(ends['points'], 'end')} of branches that go on, after 1000 points "
+            "or all the work: their orbits may grow without bound"
         )
     return lines
 

@@ -55,6 +55,15 @@ def spent(monkeypatch):
     return costs
 
 
+@pytest.mark.filterwarnings("error")
+def test_rounding_of_a_state_that_has_decayed_is_no_growth():
+    map_, scale = Stroboscope(oscillators(0.02), sl.Modal()), np.ones((1, 6))
+    scale[0, 2] = 1e-170
+    rates = [growth_rates(map_, start(), one, 32)[1].mean() for one in (scale, np.ones((1, 6)))]
+    assert rates[0] == pytest.approx(-0.02, abs=2e-3)
+    assert rates[1] == pytest.approx(-0.02, abs=2e-3)
+
+
 @pytest.mark.parametrize("damping", [0.0, 0.02])
 def test_a_neighbour_comes_nearer_as_damping_says(damping):
     """All deviations from a linear motion shrink by exp(-damping T)."""

@@ -72,6 +72,18 @@ def test_a_first_look_at_many_states_waits_for_nothing_that_never_repeats(states
     assert found or sum(asked) <= 8 * scouting.GLANCE
 
 
+def test_a_fine_map_of_a_structure_has_a_budget_and_a_given_number_of_periods_stands(chain):
+    def planned(count, periods):
+        axes = {"tip": (-0.05, 0.05, count), "tip speed": (-1.0, 1.0, count)}
+        return basin_plan(chain, axes, None, check_method(None, chain), periods, None).periods
+
+    states = len(chain.states)
+    assert states >= 8
+    assert planned(10, None) == 2000
+    assert 2**35 - 400**2 * states**3 < planned(400, None) * 400**2 * states**3 <= 2**35
+    assert planned(400, 1500) == 1500
+
+
 def test_a_map_over_sensors_begins_where_they_show_its_cells(chain):
     axes = {"tip": (-0.05, 0.05, 3), "tip speed": ("-1 m/s", "1 m/s", 2)}
     plan = basin_plan(chain, axes, {"root": "2 mm"}, check_method(None, chain), 200, None)

@@ -169,3 +169,53 @@ def test_where_no_branch_can_be_followed_responses_are_matched_and_the_reason_is
     assert "branches are matched by where responses lie: play switches" in sl.describe(found)
     with pytest.raises(ParameterError, match="switches at times that depend"):
         sl.bifurcation_diagram(play, vary, periods=300, unstable=True, progress=False)
+
+
+# -- budgets ---------------------------------------------------------------------------------------
+def test_ctrl_c_within_a_branch_hands_out_its_points():
+    shares = []
+
+    def press(share):
+        shares.append(share)
+        if len({one for one in shares if one > 0.8}) == 5:  # within the first branch
+            raise KeyboardInterrupt
+
+    with pytest.raises(sl.Interrupted) as stop:
+        sl.frequency_response(RIG, (*BAND, 2), "random 10", box=BOX, progress=press)
+    part = stop.value.partial
+    assert "interrupted" in {*part.branch_begin.values.tolist(), *part.branch_end.values.tolist()}
+    assert part.sizes["point"] > 4
+    every = {"frequency": part.point_frequency.values}
+    at = {name: part[f"point_{name}"].values[:, 0] for name in ("x", "v")}
+    periods = part.branch_periods.values[part.point_branch.values]
+    for n in np.unique(periods).tolist():
+        mine = periods == n
+        ends = [
+            sl.simulate(RIG.with_values(frequency=f), (x, v), periods=n, samples=1, progress=False)
+            for f, x, v in zip(every["frequency"][mine], at["x"][mine], at["v"][mine], strict=True)
+        ]
+        assert [float(one.end_x) for one in ends] == pytest.approx(at["x"][mine], abs=1e-11)
+
+
+def test_the_bar_moves_within_a_branch_and_never_back():
+    shares = []
+    sl.frequency_response(RIG, (*BAND, 2), "random 4", box=BOX, progress=shares.append)
+    following = [one for one in shares if 0.8 < one < 0.95]
+    assert len(following) > 50
+    assert (np.diff(following) >= 0).all()
+
+
+def test_what_a_budget_leaves_is_said(monkeypatch):
+    monkeypatch.setattr(arcs, "MOST_WORK", 100.0)
+    found = sl.frequency_response(RIG, (*BAND, 5), "random 10", box=BOX, progress=False)
+    ends = {*found.branch_begin.values.tolist(), *found.branch_end.values.tolist()}
+    assert "points" in ends
+    on = found.response_branch.values < found.sizes["branch"]
+    left = found.attrs["responses_not_followed"]
+    assert left == (~on & (found.response_type.values == "periodic")).sum() > 0
+    assert f"the branches of {left} responses weren't followed" in sl.describe(found)
+    monkeypatch.setattr(arcs, "MOST_WORK", np.inf)
+    monkeypatch.setattr(arcs, "MOST_UNKNOWNS", 2)
+    found = sl.frequency_response(RIG, (*BAND, 5), "random 10", box=BOX, progress=False)
+    longer = found.response_period.values > 1
+    assert found.attrs["responses_not_followed"] == longer.sum() > 0

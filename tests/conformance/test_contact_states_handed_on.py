@@ -1,0 +1,51 @@
+"""Contact states of the modal flow that a set of parameter values has from the nearest one: to the
+bit those that it makes by itself, so that no result depends on what was asked before.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import saltus as sl
+from saltus.flow.maps import Stroboscope
+from saltus.flow.modal import modal_flow
+
+MASS = np.diag([1.0, 2.0, 1.5])
+STIFFNESS = np.array([[30.0, -12, 0], [-12, 25, -7], [0, -7, 20]])
+#: A stop that is damped makes a mode that doesn't vibrate, where it touches.
+CHAIN = sl.structure(
+    MASS, STIFFNESS, damping_ratio=0.01, names="a b c", frequency=0.6, forces=[sl.Force("a", 3.0)],
+    contacts=[
+        sl.Contact("a", stiffness=90.0, gap=0.05, name="left"),
+        sl.Contact("c", stiffness=40.0, damping=60.0, gap=0.02, side="both", name="right"),
+    ],
+)  # fmt: skip
+#: Near to one another, so that most contact states are the same.
+FREQUENCIES = (0.61, 0.611, 0.62, 0.609)
+
+
+def _tangents(frequencies):
+    """Ends and derivatives by the frequency and by the force, one set of values after the other."""
+    found = []
+    for frequency in frequencies:
+        row = np.array([list(CHAIN.with_values(frequency=frequency).values.values())])
+        map_ = Stroboscope(CHAIN, sl.Modal(), row)
+        found.append(map_.tangent_by(np.full((1, 6), 0.03), 2, ("frequency", "force")))
+    return found
+
+
+@pytest.mark.nojit
+def test_they_are_those_that_a_set_makes_by_itself():
+    tables = modal_flow(CHAIN).tables
+    tables.clear()
+    together = _tangents(FREQUENCIES)
+    made = len(tables.made)
+    asked = sum(times == 0 for one in tables._handed for times in one.values())
+    assert asked < made / 2, "most were handed on"
+    for frequency, (end, matrix) in zip(FREQUENCIES, together, strict=True):
+        tables.clear()
+        ((own_end, own_matrix),) = _tangents([frequency])
+        assert np.isfinite(own_matrix).all()
+        assert np.array_equal(end, own_end)
+        assert np.array_equal(matrix, own_matrix)
