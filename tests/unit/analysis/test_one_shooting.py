@@ -20,6 +20,7 @@ WHY = {
     "closed/all_cycles.py": "multipliers of limit cycles of many points",
     "closed/capture.py": "norms in which a neighbourhood shrinks",
     "attractors/edge.py": "the direction that leaves an orbit on the boundary",
+    "attractors/families.py": "the direction in which nothing grows or dies out",
     "attractors/growth.py": "growth of deviations",
     "lyapunov/segments.py": "growth of deviations",
     "lyapunov/spectrum.py": "exponents on an orbit",
