@@ -298,7 +298,7 @@ class ModalFlow:
 
     @staticmethod
     def _speeds(given: ValueSet, time: np.ndarray) -> np.ndarray:
-        """What the rates of the drives are at most, float64[times, drives]."""
+        """Bounds of the rates of the drives, float64[times, drives]."""
         waves = np.broadcast_to(np.abs(given.rates), (len(time), len(given.rates)))
         return np.column_stack([waves, *(np.abs(course.at(time)[1]) for course in given.courses)])
 
