@@ -4,6 +4,8 @@ reported once, and never twice.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -118,10 +120,11 @@ def test_moving_boundary_at_the_end_far_from_the_origin_of_time():
 
 
 # -- a run cut in two ------------------------------------------------------------------------------
-def _halves(system, start, cut, t_end):
-    first = sl.simulate(system, start, t_end=cut, samples=4)
+def _halves(system, start, cut, t_end, method=None):
+    given = {"samples": 4, "method": method, "progress": False}
+    first = sl.simulate(system, start, t_end=cut, **given)
     state = [float(first[f"end_{name}"]) for name in system.states]
-    second = sl.simulate(system, state, t_start=cut, t_end=t_end, samples=4)
+    second = sl.simulate(system, state, t_start=cut, t_end=t_end, **given)
     return contacts(first), contacts(second), second
 
 
@@ -177,7 +180,13 @@ STOPS = {
               sl.Contact("x1", to="x2", stiffness=4e3, gap=1e-3)],
     "rigid pair": [sl.Contact("x1", to="x2", restitution=0.6, gap=1e-3),
                    sl.Contact("x3", stiffness=5e3, gap=2e-3, damping=3.0, side="lower")],
+    "clay": [sl.Contact("x3", restitution=0.0, gap=2e-3),
+             sl.Contact("x1", to="x2", stiffness=4e3, gap=1e-3)],
+    "clay pair": [sl.Contact("x1", to="x2", restitution=0.0, gap=1e-3),
+                  sl.Contact("x3", restitution=0.0, gap=1e-3, side="lower")],
 }  # fmt: skip
+CUT = [(kind, sl.Modal()) for kind in STOPS]
+CUT += [(kind, sl.Taylor()) for kind in STOPS if "clay" not in kind]
 
 
 def with_section(kind):
@@ -201,8 +210,7 @@ def drawn(system, rng):
     return system.with_values(**values), start
 
 
-@pytest.mark.parametrize("kind", STOPS)
-@pytest.mark.parametrize("method", [sl.Taylor(), sl.Modal()], ids=lambda one: one.name)
+@pytest.mark.parametrize(("kind", "method"), CUT)
 def test_structures_cut_anywhere(kind, method):
     """Cut at random times, at contacts, and some ulp beside them: every contact of the whole run is
     in one of the parts, and the end is the same.
@@ -230,6 +238,28 @@ def test_structures_cut_anywhere(kind, method):
         assert kinds[0] == kinds[1], cut
         assert [c.time for c in both] == pytest.approx([c.time for c in rows], abs=1e-10)
         assert end_of(after, system) == pytest.approx(end, rel=1e-8, abs=1e-10)
+
+
+@sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
+def caught(t, x, v, *, w=3.0, push=4.0, gap=0.1):
+    return v, push * sl.sin(w * t) - x, sl.impact(x < gap, v, restitution=0.0)
+
+
+@pytest.mark.nojit
+@pytest.mark.parametrize("method", [sl.Taylor(), sl.Modal()], ids=lambda one: one.name)
+@pytest.mark.parametrize("gap", [0.0735, 0.2503])
+def test_rest_on_a_stop_without_rebound_cut_where_it_ends(gap, method):
+    """What presses the body is push sin(w t) - gap until it leaves. The state says nothing of it:
+    it is the same all the time.
+    """
+    system = caught.with_values(gap=gap)
+    leaves = (math.pi - math.asin(gap / 4.0)) / 3.0
+    for shift in (-3, -1, 0, 1, 3):
+        cut = leaves + shift * np.spacing(leaves)
+        before, after, _ = _halves(system, (0.0, 0.0), cut, 1.2, method)
+        rows = before + after
+        assert [row.kind for row in rows] == ["impact", "hold", "release"], shift
+        assert rows[-1].time == pytest.approx(leaves, abs=1e-14)
 
 
 def end_of(run, system):

@@ -208,6 +208,28 @@ def test_times_of_impacts_without_rebound_and_of_releases_move_as_differences_sa
     )
 
 
+@sl.system(states="x y u v", forced_at="w", units={"w": "rad/s"})
+def leaning(t, x, y, u, v, *, w=3.0, push=4.0, gap=0.1, wall=0.3):
+    """A body is pushed onto one that stands still, without rebound, and both against a wall."""
+    return (
+        u, v, push * sl.sin(w * t) - x, -2 * y - 0.1 * v,
+        sl.impact(x < y + gap, u - v, restitution=0.0, inertia={"u": 1.0, "v": 1.0}),
+        sl.impact(y < wall, v, restitution=0.0),
+    )  # fmt: skip
+
+
+def test_a_blow_moves_a_body_that_stands_where_its_velocity_turns():
+    """Its velocity is zero until it is struck: it rides the surface on which it turns."""
+    times = np.linspace(0.2, 0.7, 5)  # before the wall
+    found = sl.sensitivity(
+        leaning, np.zeros(4), at=times, to=("gap", "push"), method=sl.Taylor(), progress=False
+    )
+    assert str(found.status.values) == "ok"
+    for column, name in enumerate(("gap", "push")):
+        states, _ = by_differences(leaning, np.zeros(4), name, times)
+        assert off(found.derivative.values[..., column], states) < 1e-6, name
+
+
 @sl.system(states="x v", forced_at="f")
 def adrift(t, x, v, *, f=1.3, pull=2.0):
     return v, pull * sl.cos(2 * sl.pi * f * t)

@@ -253,6 +253,7 @@ MODAL = Interface(
         "modal/impacts",
         "modal/friction",
         "modal/tangents",
+        "modal/ends",
         "modal/steps",
     ),
     sizes=(),

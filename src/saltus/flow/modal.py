@@ -26,6 +26,7 @@ from saltus.kernels.isolation import DEEPEST, MOST_TOUCHES
 from saltus.kernels.modal import layout
 from saltus.system import System
 from saltus.system.linear import LinearPiece
+from saltus.system.linear_laws import Constrained
 from saltus.system.linearity import linear_pieces
 from saltus.system.quantity import remembered
 from saltus.system.tangent import tangent_states
@@ -109,23 +110,68 @@ class ModalFlow:
 
     def _keep_sides(self, batch: Batch, who: np.ndarray, which: int) -> None:
         """Move ends that rounding put on the other side of a boundary, by rounding, to their side:
-        a run that begins there meets what this one hasn't met, and not again what it has.
+        a run that begins there meets what this one hasn't met, and not again what it has. Contacts
+        at rest are put onto their constraints.
         """
         tables, state = self.tables, batch.state[who, : self._states]
         given = tables.sets[which]
-        drives = self._drives(given, _times(batch, who))
-        gap, noise = self._values(given.gaps, given, state, drives)
+        time = _times(batch, who)
+        drives = self._drives(given, time)
         mode, fresh, carry = batch.mode[who, None], batch.fresh[who, None], batch.carry[who]
-        guards = np.arange(gap.shape[1])
-        stays = carry[:, [layout.RIDES]].astype(int) | carry[:, [layout.TWICE]].astype(int)
-        held = (mode >> np.maximum(tables.partners, 0)) & (tables.partners >= 0)
-        free = (tables.plain | (tables.allowed != 0)) & (((stays >> guards) | held) & 1 == 0)
+        guards = np.arange(len(tables.partners))
+        twice = carry[:, [layout.TWICE]].astype(int) >> guards & 1 == 1
+        stays = (carry[:, [layout.RIDES]].astype(int) >> guards & 1 == 1) | twice
+        held = (mode >> np.maximum(tables.partners, 0)) & 1 == 1
+        held &= (tables.partners >= 0) & ~tables.holds
+        rests = held | (twice & (tables.allowed != 0))
+        holds = rests[:, tables.partners >= 0] @ (1 << tables.partners[tables.partners >= 0])
+        for some, bits in {(int(a), int(b)) for a, b in zip(mode[:, 0], holds, strict=True) if b}:
+            rows = np.flatnonzero((mode[:, 0] == some) & (holds == bits))
+            with tables.lock:
+                free, shown = tables.rests(which, some, bits)
+            for g in [-1, *np.flatnonzero(rests[rows[0]] & (tables.allowed != 0)).tolist()]:
+                self._rest(given, free, shown, g, held[rows, g], state, rows, time[rows])
+        batch.state[who, : self._states] = state
+        gap, noise = self._values(given.gaps, given, state, drives)
+        free = (tables.plain | (tables.allowed != 0)) & ~(stays | held)
         side, met = np.where((mode >> guards) & 1, 1.0, -1.0), (fresh >> guards) & (gap == 0.0) != 0
-        near = free & ~met & (np.abs(gap) <= noise) & (side * gap < noise / 4)
+        least = np.where(tables.rubs, 2 * noise, noise / 4)  # what slides isn't taken to stick
+        near = ((free & ~met) | (tables.rubs & ~held)) & (np.abs(gap) <= 2 * noise)
+        near &= (side * gap < least) & (tables.rubs | (np.abs(gap) <= noise))
         for i, g in np.argwhere(near).tolist():
             row = given.gaps.matrix[g]
             j = int(np.argmax(np.abs(row)))
-            batch.state[who[i], j] += (side[i, g] * noise[i, g] / 4 - gap[i, g]) / row[j]
+            batch.state[who[i], j] += (side[i, g] * least[i, g] - gap[i, g]) / row[j]
+
+    def _rest(
+        self,
+        given: ValueSet,
+        free: Constrained,
+        shown: LinearPiece,
+        g: int,
+        held: np.ndarray,
+        states: np.ndarray,
+        rows: np.ndarray,
+        time: np.ndarray,
+    ) -> None:
+        """Put the states in some rows onto the constraints of contacts at rest. What presses a stop
+        g that is held becomes more than rounding, what presses one that isn't nothing: that is how
+        a start reads them.
+        """  # fmt: skip
+        drives = self._drives(given, time)
+        states[rows] = free.put(states[rows], drives)
+        h = self.tables.partners[g] if g >= 0 else 0
+        ways = shown.matrix[h] @ free.spread
+        if g < 0 or not ways.any():
+            return
+        value, noise = (of[:, h] for of in self._values(shown, given, states[rows], drives))
+        speeds = self._speeds(given, time) @ np.abs(shown.driven[h])
+        noise = noise + layout.CLOCK * np.abs(time) * speeds
+        wanted = np.where(held, np.maximum(value, 2 * noise), np.minimum(value, 0.0))
+        for i in np.flatnonzero((np.abs(value) <= 2 * noise) & (wanted != value)).tolist():
+            j = int(np.argmax(np.abs(ways * states[rows[i], free.kept])))
+            states[rows[i], free.kept[j]] += (wanted[i] - value[i]) / ways[j] if ways[j] else 0.0
+        states[rows] = free.put(states[rows], drives)
 
     def _look_up(self, batch: Batch) -> None:
         """Find the contact states that trajectories have come to: as many as the tables have room
@@ -163,7 +209,7 @@ class ModalFlow:
                 empty((max(rows, 1), terms)), empty((max(rows, 1), 3)), empty(terms),
                 empty((DEEPEST + 2, terms)), empty((DEEPEST + 2, 2)), empty(terms), empty(2),
                 empty((MOST_TOUCHES, 2)), empty((states, lanes)), empty((states, lanes)),
-                empty((max(drives, 1), 4)), empty((max(guards, 1), 6)),
+                empty((max(drives, 1), 4)), empty((max(guards, 1), 7)),
                 empty(((terms + 2) * self.tables.block_groups, lanes)),
                 empty((max(courses, 1), layout.VALUE + self.tables.linear.terms)),
                 empty((2 * groups, lanes)), empty((amplitudes, lanes)), empty((size, columns)),
@@ -249,6 +295,12 @@ class ModalFlow:
         """The drives at some times, float64[times, drives]."""
         waves = np.cos(given.rates * time[:, None] + given.lags)
         return np.column_stack([waves, *(course.at(time)[0] for course in given.courses)])
+
+    @staticmethod
+    def _speeds(given: ValueSet, time: np.ndarray) -> np.ndarray:
+        """Bounds of the rates of the drives, float64[times, drives]."""
+        waves = np.broadcast_to(np.abs(given.rates), (len(time), len(given.rates)))
+        return np.column_stack([waves, *(np.abs(course.at(time)[1]) for course in given.courses)])
 
     @staticmethod
     def _values(

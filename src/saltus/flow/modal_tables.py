@@ -124,6 +124,7 @@ class Tables:
         self._smooth: dict[tuple[object, ...], bool] = {}
         self._known: dict[tuple[int, bytes], int] = {}
         self._states: dict[tuple[int, int], int] = {}
+        self._rests: dict[tuple[int, int, int], tuple[Constrained, LinearPiece]] = {}
         #: Of each set its contact states, and how often each has been handed on to come to it.
         self._handed: list[dict[int, int]] = []
         #: The last sets of the same equations and gaps: they differ in the rates of drives.
@@ -295,6 +296,16 @@ class Tables:
             self._presses.add(np.where((partner >= 0)[:, None], rows[partner], 0.0))
         self.made.append((known, modes))
         self._states[which, mode] = number
+
+    def rests(self, which: int, mode: int, holds: int) -> tuple[Constrained, LinearPiece]:
+        """The states that the contacts with some hold guards (bits) allow while they are held, and
+        the gaps of a contact state.
+        """
+        key, given = (which, mode, holds), self.sets[which]
+        if key not in self._rests:
+            free = constrained(self.linear.system, holds, given.gaps, given.impacts)
+            self._rests[key] = free, self.shown(given, mode)
+        return self._rests[key]
 
     def _link(self, rows: np.ndarray, first: int) -> None:
         """Link contact states that begin with number ``first`` and those behind their boundaries,

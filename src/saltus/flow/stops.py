@@ -71,9 +71,10 @@ def on_allowed_sides(
         moved = len(system.field)  # a flow may carry derivatives without equations of theirs
         normal = columns(system.guard_gradients[g][:moved]) * side
         way = np.abs(columns(system.field)) * period[:, None]
-        size = (np.abs(normal) * (np.abs(start[:, :moved]) + way)).sum(axis=1)
+        place = (np.abs(normal) * np.abs(start[:, :moved])).sum(axis=1)
+        size = place + (np.abs(normal) * way).sum(axis=1)
         here = (inside < 0.0) & (inside >= -roundings * EPS * size)
-        back = (EPS * size - inside) / (normal**2).sum(axis=1)
+        back = (EPS * place - inside) / (normal**2).sum(axis=1)
         start[here, :moved] += (back[:, None] * normal)[here]
         beyond |= (inside < 0.0) & ~here
     return start, beyond

@@ -75,6 +75,14 @@ class Constrained:
         loads = rows_of(gaps)[:, len(self.spread) :] + gaps.matrix @ self.base
         return LinearPiece(gaps.matrix @ self.spread, loads[:, 0], loads[:, 1:])
 
+    def put(self, states: np.ndarray, drives: np.ndarray) -> np.ndarray:
+        """States float64[m, N] that these contacts hold, for the free ones of some states and the
+        drives float64[m, D] there.
+        """
+        loads = np.column_stack([np.ones(len(states)), drives])
+        found: np.ndarray = states[:, self.kept] @ self.spread.T + loads @ self.base.T
+        return found
+
     def levelled(self, gaps: LinearPiece) -> LinearPiece:
         """Gaps as functions of all states, but for those that held contacts keep at a level: these
         are the level alone, without the rounding of terms that cancel.

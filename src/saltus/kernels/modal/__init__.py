@@ -10,6 +10,7 @@ laws              impacts, contacts at rest, their release
 impacts           several impacts at one instant
 friction          friction that sticks and slides
 tangents          the derivative of the state with respect to the start and to parameters
+ends              what a run leaves to the next one
 steps             steps, and the life of a trajectory
 ================  ==================================================================================
 """

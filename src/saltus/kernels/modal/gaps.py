@@ -394,11 +394,19 @@ def judge(g, top, degree, fresh, error, whole, slope_error, noise, m):
 
 
 @inner
+def begins_pressed(i, g, batch, m):
+    """True if a contact is a stop that is pressed at the start of a run."""
+    return batch.carry[i, STARTS] > 0.5 and g >= 0 and m.found[g, PRESSED] > 0.5
+
+
+@inner
 def way_of(i, g, degree, known, noise, batch, m):
     """Side to which a gap leaves its boundary in a step (0: it doesn't). The velocity of a rebound
     or a crossing tells it, however small; the first term of what begins at rest may be rounding.
     """
     rests = known > 1 or m.laws[g, KIND] == HOLD_LAW
+    if known == 2 and begins_pressed(i, g, batch, m):
+        return -1
     if rests or (int(batch.carry[i, RIDES]) >> g) & 1 == 1:
         return side_of_leaving(m.p, degree, known, noise)
     return 0 if is_rounding(m.p, degree, noise) else leading_sign(m.p, degree)
@@ -443,7 +451,10 @@ def decide(i, g, batch, m):
             return CLEAR
         # what presses a contact at rest jumps where the state does
         least = 0 if m.laws[g, KIND] == HOLD_LAW and m.laws[g, SECOND] >= 0 else -1
-        if m.p[0] < -noise or side_of_leaving(m.p, degree, 0, noise) <= least:
+        ends = m.p[0] < -noise or side_of_leaving(m.p, degree, 0, noise) <= least
+        if ends and least < 0 and begins_pressed(i, m.laws[g, PARTNER], batch, m):
+            m.p[0] = max(m.p[0], 0.25 * noise)
+        elif ends:
             m.found[g, PLACE], m.found[g, FINAL] = 0.0, 1.0
             return CROSSES
     bernstein_of(degree, m)
@@ -458,6 +469,19 @@ def decide(i, g, batch, m):
     m.found[0, TOUCHED] = min(touched, MOST_TOUCHES - 1)
     m.found[g, PLACE], m.found[g, FINAL] = m.out[ROOT_AT], 1.0
     return CROSSES if crosses else CLEAR
+
+
+@inner
+def begun(i, hits, batch, m):
+    """Of the guards that a step from the start crosses (bits) those that its state is on: how they
+    begin is settled before others are met.
+    """
+    early = 0
+    for g in range(m.sizes[GUARDS] if hits != 0 and batch.carry[i, STARTS] > 0.5 else 0):
+        stood = known_zeros(i, g, batch) > 0 or m.laws[g, KIND] == HOLD_LAW
+        if (hits >> g) & 1 and stood and m.found[g, PLACE] == 0.0:
+            early |= 1 << g
+    return early
 
 
 @inner
@@ -503,6 +527,9 @@ def look(i, tau, h, modes, steady, batch, m):
                 hits, first = 1 << g, d
     if first > until * h:
         return CLEAR, until * h, 0
+    early = begun(i, hits, batch, m)
+    if early != 0:
+        first, hits = 0.0, early
     return (CROSSES if hits != 0 else CLEAR), first, hits
 
 

@@ -71,8 +71,8 @@ MOST_STEPS, MOST_CONTACTS = range(2)
 CLEAR, CROSSES, OPEN = range(3)
 # Columns of `found`, for each guard: the place of its crossing as a part of the step, whether that
 # is final, whether it is ridden, touches of the step (first row), the part of the step that is
-# decided, the end of the bracket of the crossing.
-PLACE, FINAL, RIDDEN, TOUCHED, DECIDED, BRACKET = range(6)
+# decided, the end of the bracket of the crossing, whether a stop is pressed at the start.
+PLACE, FINAL, RIDDEN, TOUCHED, DECIDED, BRACKET, PRESSED = range(7)
 # Columns of `stood`, for each row of gaps where the amplitudes stand: value and rate, the size of
 # its terms, what its fifth derivative is at most.
 HERE, SLOPE, SIZE, FIFTH = range(4)
@@ -109,6 +109,8 @@ CHATTER = 1.0e-8
 COINCIDENT = 10.0 * 2.220446049250313e-16
 #: Rounding of a gap, in units of the sizes of its terms.
 ROUNDED = 16.0 * 2.220446049250313e-16
+#: Rounding of the time at the end of a run, as a part of it.
+CLOCK = 2.0 * 2.220446049250313e-16
 HUGE = 1.0e300
 
 Modal = namedtuple(

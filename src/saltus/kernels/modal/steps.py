@@ -289,6 +289,17 @@ def land(i, tau, d, hits, modes, steady, batch, m):
 
 
 @inner
+def land_and_enter(i, tau, d, hits, modes, steady, batch, m):
+    """Land, and begin in the contact state behind if it has been made. Returns the status."""
+    write_queue(i, batch.cursor[i], modes, batch, m)
+    status = land(i, tau, d, hits, modes, steady, batch, m)
+    if batch.carry[i, AT] >= 0.0:
+        follow_courses(i, tau + d, batch, m)
+        enter(i, tau + d, batch, m)
+    return status
+
+
+@inner
 def keep_on(i, h, batch, m):
     """Take a step without a contact: boundaries that were ridden go on to be."""
     know_rides(i, batch, m)
@@ -358,7 +369,10 @@ def advance(i, budget, batch, m):
                 take_up(i, tau, batch, m)
                 take_samples(i, tau, tau, modes, steady, batch, m)
             if batch.count[i] >= batch.end_count[i] and tau >= batch.end_phase[i]:
+                hits = ending_holds(i, tau, modes, steady, batch, m)
                 status = at_the_end(i, batch)
+                if hits != 0:
+                    status = land_and_enter(i, tau, 0.0, hits, modes, steady, batch, m)
             continue
         budget -= 1
         following, wanted = next_break(m), batch.carry[i, NEXT_STEP]
@@ -367,6 +381,8 @@ def advance(i, budget, batch, m):
             drive(i, tau, batch, m)
             set_block_drives(modes, m)
             stand(modes, steady, int(batch.carry[i, SET]), m)
+            if batch.carry[i, STARTS] > 0.5:
+                tell_pressed(i, tau, batch, m)
         h = reach(i, h, modes, batch, m)
         answer, d, hits = look(i, tau, h, modes, steady, batch, m)
         if batch.status[i] != RUNNING:
@@ -396,12 +412,8 @@ def advance(i, budget, batch, m):
                     take_up(i, tau, batch, m)
                 status = NONFINITE if is_lost(modes, m) else RUNNING
             else:
-                write_queue(i, batch.cursor[i], modes, batch, m)
-                status = land(i, tau, d, hits, modes, steady, batch, m)
+                status = land_and_enter(i, tau, d, hits, modes, steady, batch, m)
                 tau += d
-                if batch.carry[i, AT] >= 0.0:
-                    follow_courses(i, tau, batch, m)
-                    enter(i, tau, batch, m)
         if status == RUNNING and batch.counters[i, EVENTS] >= batch.options[i, MOST_CONTACTS]:
             status = BUDGET_EVENTS
         if status == RUNNING and batch.counters[i, STEPS] >= batch.options[i, MOST_STEPS]:
@@ -424,6 +436,7 @@ def put_back(i, tau, status, batch, m):
         if status != RUNNING:
             move_columns(i, at, tau, batch, m)
             keep_amplitudes(i, batch, m)
+            know_rests(i, tau, batch, m)
     batch.phase[i], batch.status[i] = tau, status
 
 

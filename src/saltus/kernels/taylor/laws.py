@@ -198,7 +198,9 @@ def strike(lanes, lane, batch, g, rate, slow):
 
 @kernel
 def mode_behind(lanes, lane, batch, struck, slow):
-    """The mode after a jump, which may have carried the state over other boundaries."""
+    """The mode after a jump, which may have carried the state over other boundaries, or off those
+    that it was on.
+    """
     mode, others = mode_of(lanes, lane), False
     for g in range(NGUARDS):
         others = others or (g != struck and (LAW[g] == NO_LAW or LAW[g] == SURFACE_LAW))
@@ -210,6 +212,8 @@ def mode_behind(lanes, lane, batch, struck, slow):
         watched = lanes.side[WATCHED + g, lane] > 0.5
         if g != struck and plain and watched and slow.gaps[g] * lanes.side[g, lane] < 0.0:
             mode ^= 1 << g
+        elif g != struck and LAW[g] == NO_LAW and not stands_at(lanes, lane, g, slow):
+            lanes.fresh[g, lane] = 0.0
     return mode
 
 
@@ -657,3 +661,61 @@ def release(lanes, lane, batch, h, slow):
     note(lanes, lane, batch, h, RELEASE, -1, 0.0, before, 0.0, slow)
     if LAW[g] == IMPACT_LAW:
         stick_at_once(lanes, lane, batch, slow)
+
+
+# -- stops at rest at the start and at the end of a run --------------------------------------------
+@kernel
+def presses(lanes, lane, batch, g, slow):
+    """1 if a stop at rest is pressed, -1 if it is pulled, by more than rounding, of the time too:
+    its series says so then; else 0. Needs slow.gaps.
+    """
+    h = PARTNER[g]
+    value, noise = slow.gaps[h], 4.0 * ROUNDING * slow.gaps[SIZES * NGUARDS + h]
+    for j in range(NGUARDS):
+        slow.gaps[j] = lanes.side[j, lane]
+    now = lanes.clock[TAU, lane] + abs(lanes.clock[BASE, lane])
+    look_at_gaps(lanes, lane, batch, 2.0 * SHORTEST_FLIGHT * now, slow)
+    if min(value, slow.gaps[h]) > noise:
+        return 1
+    return -1 if max(value, slow.gaps[h]) < -noise else 0
+
+
+@kernel
+def rest_at_once(lanes, lane, batch, moves, slow):
+    """Hold the stops that rest at the start of a run, each beside those that are held already; of
+    the others their gaps and rates are known to be zero, and accelerations that are rounding. From
+    exact rest what presses them may be the rounding of terms that cancel: the first step tells.
+    """
+    for look in range(NGUARDS * NGUARDS if moves else 0):
+        g = look % NGUARDS
+        free = LAW[g] == IMPACT_LAW and lanes.side[PARTNER[g], lane] < 0.0
+        if free and lanes.fresh[g, lane] > 0.5:
+            gaps_here(lanes, lane, batch, slow)
+            if abs(slow.gaps[3 * NGUARDS + g]) <= ROUNDING * slow.gaps[5 * NGUARDS + g]:
+                pressing = presses(lanes, lane, batch, g, slow)
+                lanes.fresh[g, lane] = 3.0 if pressing == 0 else 2.0
+                if pressing > 0:
+                    snap(lanes, lane, g)
+                    hold(lanes, lane, batch, g, 0.0, 0.0, slow)
+
+
+@kernel
+def end_rests(lanes, lane, batch, slow):
+    """Release the stops at rest that a run which began here would find free: what presses them is
+    rounding, and falls. Put the others onto their constraints.
+    """
+    d = lanes.found[DELTA, lane]
+    for g in range(NGUARDS):
+        h = PARTNER[g]
+        if LAW[g] == IMPACT_LAW and lanes.side[h, lane] > 0.0:
+            gaps_here(lanes, lane, batch, slow)
+            pressed = presses(lanes, lane, batch, g, slow) > 0
+            if not pressed and gap_rate(lanes, lane, h, d) < 0.0:
+                release(lanes, lane, batch, h, slow)
+                continue
+            begin_impacts(lanes, lane, slow)
+            now, who = time_of_law(lanes, lane, batch), lanes.memo[lane, WHO]
+            mode, p = mode_of(lanes, lane) & ~(1 << h), batch.param[who * batch.stride]
+            settle(now, slow.state, p, slow.held, mode, g)
+            for i in range(NMOVED):
+                lanes.y[i, lane] = slow.state[i]

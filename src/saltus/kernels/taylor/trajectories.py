@@ -167,6 +167,8 @@ def end_stretch(lanes, lane, batch, slow):
     ):
         return RUNNING
     final_contacts(lanes, lane, batch, slow)
+    if LAWS:
+        end_rests(lanes, lane, batch, slow)
     keep_sides(lanes, lane, batch, slow)
     if LAWS and lanes.memo[lane, FAULT] != 0:
         return lanes.memo[lane, FAULT]
@@ -303,6 +305,7 @@ def start_sides(lanes, lane, batch, slow):
     lanes.run[STARTING, lane] = 1.0
     lanes.run[LANDED, lane] = lanes.clock[TAU, lane] + lanes.clock[BASE, lane]
     if LAWS:
+        rest_at_once(lanes, lane, batch, moves, slow)
         stick_at_once(lanes, lane, batch, slow)
 
 
