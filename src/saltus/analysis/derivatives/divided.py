@@ -17,8 +17,10 @@ from saltus.analysis.derivatives.sensitivity_table import (
 )
 from saltus.analysis.motion.divided import DividedRows
 from saltus.analysis.outcome_messages import warn
+from saltus.errors import ParameterError
 from saltus.flow import engine
 from saltus.interrupt import Interrupted
+from saltus.sentences import Word
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,9 +43,23 @@ class DividedSensitivity(DividedRows):
         method.serving(flown.origin).kernels(flown.origin)
 
     def chunk(self, index: int, shared: None) -> dict[str, np.ndarray]:  # noqa: ARG002
-        """The derivatives of the trajectories of one chunk."""
+        """The derivatives of the trajectories of one chunk.
+
+        Raises
+        ------
+        ParameterError
+            Where modes of one go together. :func:`saltus.sensitivity` then takes another method for
+            all trajectories: no chunk may do so for its own.
+        """
         run = self.asked.rows(self.rows(index))
-        return sensitivity_rows(run, run.fly(run.request, 1))
+        outcome = run.fly(run.request, 1)
+        if run.flow.lost(run.flow.ends(outcome, run.group, run.length)):
+            raise ParameterError(
+                f"modes of {self.system.name} go together (rigid bodies, or a resonance): Modal "
+                "then has no derivatives with respect to parameters. ",
+                lambda say: f"Give {say.key(method=Word(say.method('Taylor')))}.",
+            )
+        return sensitivity_rows(run, outcome)
 
     def finish(
         self,

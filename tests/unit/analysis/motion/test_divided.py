@@ -10,6 +10,7 @@ import pytest
 import saltus as sl
 from saltus.analysis.derivatives.divided import DividedSensitivity
 from saltus.analysis.motion.divided import DividedMotions
+from saltus.errors import ParameterError
 from saltus.flow.engine import options_of
 from saltus.interrupt import Interrupted
 from saltus.results.store.store import Store
@@ -77,6 +78,19 @@ def test_derivatives_at_the_slowest_contacts(tmp_path):
     asked |= {"to": ["restitution"], "values": {"restitution": np.full(COUNT, 0.5)}}
     found = in_chunks(DividedSensitivity(BALL, None, asked, COUNT, 3), tmp_path)
     assert found.identical(sl.sensitivity(BALL, **asked))
+
+
+@sl.system(states="x v", forced_at="f")
+def adrift(t, x, v, *, f=1.3, pull=2.0):
+    return v, pull * sl.cos(2 * sl.pi * f * t)
+
+
+def test_a_chunk_takes_no_other_method_than_the_rest(tmp_path):
+    """Derivatives of a body that nothing ties to a place are unknown to the modal flow."""
+    asked = DEFAULTS | MORE | {"start": {"x": np.zeros(COUNT), "v": 0.0}, "t_end": 0.1}
+    division = DividedSensitivity(adrift, sl.Modal(), asked | {"to": ["pull"]}, COUNT, 3)
+    with pytest.raises(ParameterError, match=r"adrift go together.*method=sl\.Taylor\(\)"):
+        in_chunks(division, tmp_path)
 
 
 @pytest.mark.parametrize("kind", [DividedMotions, DividedSensitivity])
