@@ -9,7 +9,8 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass
 
-from mpmath import cos, factorial, findroot, lu_solve, matrix, mp, mpf, pi
+from mpmath import cos, factorial, findroot, lu_solve, matrix, mpf, pi
+from numpy.polynomial.polynomial import polyval
 
 ORDER, STEP = 20, mpf(1) / 128
 #: Gap of a stop at which a body stands [m], and closing velocity that has ended [m/s].
@@ -103,4 +104,4 @@ def dot(a, b):
 
 
 def value(terms, d):
-    return mp.polyval(terms[::-1], d)
+    return polyval(d, terms)

@@ -9,6 +9,7 @@ from math import comb
 import numpy as np
 import pytest
 from mpmath import mp
+from numpy.polynomial.polynomial import polyval
 from scipy.optimize import brentq
 
 from saltus.kernels import isolation as iso
@@ -57,8 +58,8 @@ def truth(q):
         k = int(np.argmax(values < 0))
         low, high = places[k - 1], places[k]
         with mp.workdps(40):
-            exact = [mp.mpf(float(c)) for c in q[::-1]]
-            root = brentq(lambda x: float(mp.polyval(exact, mp.mpf(x))), low, high, xtol=1e-16)
+            exact = [mp.mpf(float(c)) for c in q]
+            root = brentq(lambda x: float(polyval(mp.mpf(x), exact)), low, high, xtol=1e-16)
     else:
         root = None
     return root, np.min(np.abs(values)) / size

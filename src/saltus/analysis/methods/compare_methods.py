@@ -13,6 +13,7 @@ import xarray as xr
 
 from saltus.analysis.basins.basins import basins
 from saltus.analysis.basins.compare import compare
+from saltus.analysis.basins.pipeline import PERIODS
 from saltus.analysis.dataset_parts import provenance
 from saltus.analysis.inputs.starts import check_system
 from saltus.analysis.inputs.verb import check_call, verb
@@ -154,9 +155,10 @@ def compare_methods(
         arguments = {"time_errors": "local", **arguments}
     else:
         usual = inspect.signature(_ANALYSES[name]).parameters["periods"].default
+        periods = arguments.get("periods", usual)
         for method in everything:
             if method.label not in known:
-                _check_work(system, method, arguments.get("periods", usual))
+                _check_work(system, method, PERIODS if periods is None else periods)
     try:
         for method in everything:
             done.append(
