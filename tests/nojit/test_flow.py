@@ -69,6 +69,7 @@ def closed_form(rig, x, v, end):
 # -- laws without a Taylor series on a boundary ----------------------------------------------------
 
 
+@pytest.mark.slow
 def test_hertz_contacts_last_as_long_as_the_closed_form_says():
     system = power_stop.with_values(stiffness=1e6)
     run = sl.simulate(

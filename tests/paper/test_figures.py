@@ -212,6 +212,7 @@ def test_the_maps_of_one_value_run(name, tmp_path, brief):
     assert len(outcome.tables) == len(jobs) + sum(job.compare is not None for job in jobs)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "periods"), [("fig4", [1, 1, 3]), ("fig5", [3, 5, 24])])
 def test_the_motions_run(name, periods, tmp_path):
     """As they stand. The paper reads 12T where 24T is; its fourth start lies where rounding

@@ -145,6 +145,7 @@ def test_balances_that_cant_be_drawn(arguments, words):
 
 
 # -- undamped, unforced ----------------------------------------------------------------------------
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("values", "frequency"),
     [

@@ -154,7 +154,9 @@ def drawn(system, rng):
     return system.with_values(**{name: float(one) for name, one in values.items()}), start
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize(
+    "seed", [*range(2), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 8))]
+)
 def test_random_bodies_rub_and_strike_as_by_taylor(system, seed):
     """Every row, of frictions, the memory, impacts, rests."""
     one, start = drawn(system, np.random.default_rng([SEED, seed]))

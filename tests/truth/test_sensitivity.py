@@ -146,6 +146,7 @@ def test_extremes_and_their_derivatives_are_exact():
             ), (word, name)
 
 
+@pytest.mark.slow
 def test_random_rough_oscillators_agree_with_differences():
     random, worst, contacts = np.random.default_rng(261126), 0.0, 0
     for _ in range(24):

@@ -113,6 +113,7 @@ def test_a_fold_of_equilibria_is_where_the_cubic_turns():
     np.testing.assert_allclose(state[order, 0], np.array([1, -1]) / np.sqrt(3), rtol=1e-13)
 
 
+@pytest.mark.slow
 def test_a_diagram_has_the_hopf_point_of_the_valve_to_rounding():
     start = {"x": 2.5, "v": 0.0, "pressure": 12.5}
     found = sl.bifurcation_diagram(sl.models.relief_valve(), {"flow": (8.2, 9.0, 5)}, start)

@@ -78,6 +78,7 @@ def test_every_picture_has_a_home():
     assert "blue" in plot.OKABE_ITO
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["basins", "style"])
 def test_a_picture_is_itself_whether_or_not_its_file_is_imported_first(name):
     imported(

@@ -44,8 +44,10 @@ def check_method(method: Any, system: Any) -> Method:
         return default_method(system) if isinstance(system, System) else Taylor()
     if not isinstance(method, Method):
         what = method.__name__ + " itself" if isinstance(method, type) else shown(method)
+        balance = " Harmonic balance is by=." if "HarmonicBalance" in what else ""
         raise ParameterError(
             f"method must be such as sl.Taylor() or sl.ODE45(rtol=1e-4, atol=1e-7), not {what}."
+            f"{balance}"
         )
     return method
 

@@ -131,6 +131,7 @@ def test_what_is_known_is_not_computed_again(desk, monkeypatch):
     assert again.heads[0]["cached"]
 
 
+@pytest.mark.slow
 def test_a_panned_map_computes_what_came_into_sight(desk, monkeypatch):
     step = 2.0**-11  # of which all starts are multiples, to the bit
     first, panned = (

@@ -144,6 +144,7 @@ def test_a_grown_map_is_that_of_basins(monkeypatch):
     assert taken[-1].whole
 
 
+@pytest.mark.slow
 def test_coarse_starts_wait_and_a_stopped_map_goes_on(monkeypatch):
     monkeypatch.setattr(growing, "POOL", 64)
     plan = plan_of((66, 40))
