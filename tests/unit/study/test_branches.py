@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+import saltus as sl
 from saltus.errors import SaltusError
 from saltus.study.read import parse
 from saltus.study.run.running import Resources
@@ -43,6 +44,21 @@ def test_branches_are_tabulated_and_drawn(tmp_path):
     assert [row["period"] for row in rows] == ["T"] * len(rows)
     assert sum(int(row["bifurcations"]) for row in rows) >= 1
     assert any(file.suffix == ".png" for file in outcome.files)
+
+
+def test_harmonic_balance_has_the_fold_of_the_exact_branch(tmp_path):
+    text = STUDY[: STUDY.index("[system]")] + (
+        '[system]\nmodel = "soft_stop"\n[branches]\n'
+        'vary.frequency = ["1 rad/s", "1.8 rad/s"]\nlongest = 1\n'
+    )
+    folds = []
+    for name, by in (("exact", ""), ("balanced", "by = { harmonics = 15 }\n")):
+        (file,) = (one for one in run(text + by, tmp_path / name).files if one.suffix == ".nc")
+        with sl.load(file) as found:
+            folds.append(found.event_frequency.values[found.event_kind.values == "fold"])
+            assert ("point_error" in found) == (name == "balanced")
+    assert [len(one) for one in folds] == [1, 1]
+    assert 0 < abs(folds[0] - folds[1]) < 4e-5
 
 
 @pytest.mark.parametrize(
