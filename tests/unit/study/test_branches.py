@@ -46,6 +46,7 @@ def test_branches_are_tabulated_and_drawn(tmp_path):
     assert any(file.suffix == ".png" for file in outcome.files)
 
 
+@pytest.mark.slow
 def test_harmonic_balance_has_the_fold_of_the_exact_branch(tmp_path):
     text = STUDY[: STUDY.index("[system]")] + (
         '[system]\nmodel = "soft_stop"\n[branches]\n'
