@@ -1,7 +1,10 @@
 """One thread of linear algebra while a verb runs."""
 
+import subprocess
+import sys
 import threading
 
+import pytest
 import threadpoolctl
 
 from saltus.analysis.inputs.verb import verb
@@ -51,3 +54,33 @@ def test_a_verb_that_outlasts_another_one_leaves_the_threads_as_they_were():
         assert (within, after_first, threads()) == ([{1}], {2}, {2})
     finally:
         allow(found)
+
+
+WHILE_A_THREAD_LOADS = """
+import _ctypes, importlib.util, threading
+from saltus import blas_threads
+
+library = importlib.util.find_spec("numpy._core._umath_tests").origin
+ended = threading.Event()
+
+def load():
+    while not ended.is_set():
+        _ctypes.dlclose(_ctypes.dlopen(library, 2))
+
+loading = threading.Thread(target=load)
+loading.start()
+for _ in range(20):
+    blas_threads._libraries.cache_clear()
+    blas_threads._libraries(True)
+ended.set()
+loading.join()
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="dlopen is POSIX's")
+def test_the_libraries_are_found_while_another_thread_imports():
+    """threadpoolctl before 3.8 held the loader's lock and asked for Python's, which an import holds
+    the other way round: `saltus demo` then waited for ever.
+    """
+    command = [sys.executable, "-c", WHILE_A_THREAD_LOADS]
+    subprocess.run(command, check=True, timeout=60)
