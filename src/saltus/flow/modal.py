@@ -187,7 +187,7 @@ class ModalFlow:
             if tables.full:
                 return
             which = tables.set_of(batch.param[i if batch.stride else 0])
-            if not tables.is_finite(which, int(batch.mode[i])):
+            if not tables.equations.are_finite(tables.sets[which], int(batch.mode[i])):
                 batch.status[i] = st.NONFINITE
                 continue
             at = tables.state_of(which, int(batch.mode[i]))
@@ -335,7 +335,7 @@ class ModalFlow:
         whose rate isn't.
         """
         given = self.tables.sets[which]
-        piece = self.tables.piece_of(given, mode)
+        piece = self.tables.equations.piece_of(given, mode)
         values, sizes = self._drives_at(which, time)
         rate, size, steady = state, np.abs(state), piece.constant
         open_, bits = set(np.flatnonzero(zero).tolist()), [0] * 4
