@@ -1,0 +1,51 @@
+"""Random structures with springs, dampers, preloads and drives of all kinds, moved by modes,
+against exponentials of their physical matrices.
+"""
+
+from __future__ import annotations
+
+from itertools import takewhile
+
+import numpy as np
+from tests.oracles.structures_by_exponentials import Exponentials, random_structure
+
+import saltus as sl
+from saltus.flow.maps import Stroboscope
+
+SEED = 20261126
+#: Contacts of a structure that are compared at most.
+MOST = 100
+#: Growth of a small difference up to which they are: rounding is 1e-16 of the motion.
+GROWN = 1e4
+
+
+def check(seed, method=None):
+    """Compare a random structure; return how many contacts agreed."""
+    made, given, period, t_end = random_structure(np.random.default_rng(seed))
+    method, rest = method or sl.Modal(), np.zeros(len(made.states))
+    exact = Exponentials(given)
+    found, end, whole = exact.run(rest, t_end, MOST)
+    run = sl.simulate(made, t_end=t_end, progress=False, time_errors="local", method=method)
+    assert str(run.status.values) == "ok"
+    times, names, ways = (run[f"contact_{one}"].values for one in ("time", "guard", "direction"))
+    same = list(takewhile(lambda one: one[3] < GROWN, found))
+    assert len(times) >= len(same)
+    for at, (time, stop, begins, _) in enumerate(same):
+        assert abs(times[at] - time) < 1e-10 * period, (seed, at)
+        of = given.stops[stop]
+        assert (names[at], ways[at]) == (of.name, of.side if begins else -of.side)
+    if len(same) == len(found) < MOST and np.abs(whole).max() < GROWN:
+        assert len(times) == len(found)
+        ended = np.array([run[f"end_{name}"].item() for name in made.states])
+        assert np.abs(ended - end).max() < 1e-9 * np.abs(end).max()
+    if made.forced_at is not None:
+        found, end, whole = exact.run(rest, period, MOST)
+        if len(found) < MOST and max(one[3] for one in [*found, (0, 0, 0, 0)]) < GROWN:
+            ended, tangent = Stroboscope(made, method).tangent(rest[None], 1)
+            assert np.abs(ended[0] - end).max() < 1e-9 * np.abs(end).max()
+            assert np.abs(tangent[0] - whole).max() < 1e-8 * np.abs(whole).max()
+    return len(same)
+
+
+def test_contacts_ends_and_derivatives_are_those_of_matrix_exponentials():
+    assert sum(check(seed) for seed in range(SEED, SEED + 12)) > 200
