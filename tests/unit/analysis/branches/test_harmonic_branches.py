@@ -171,6 +171,25 @@ def test_branches_of_twice_the_period_leave():
     assert np.isnan(single.point_harmonic_real.values[..., 8:]).all()
 
 
+def test_undamped_motions_are_found_from_rest():
+    """By the describing function. The motion of a growing drive turns back before 1.7: only another
+    one, in phase with the drive, is there.
+    """
+    for force in (1.0, 1.7, 3.0):
+        found = sl.branches(
+            STOP.with_values(damping=0.0, force=force), {"frequency": (1.5, 1.501)}, at=1, points=2,
+            switch=(), by=sl.HarmonicBalance(1), progress=False,
+        )  # fmt: skip
+        amplitude = np.hypot(*(
+            one.sel(output="x", harmonic=1).values
+            for one in (found.point_harmonic_real, found.point_harmonic_imag)
+        ))  # fmt: skip
+        edge = np.minimum(1.0 / amplitude, 1.0)
+        stop = (np.arccos(edge) - edge * np.sqrt(1 - edge**2)) * 2 / np.pi
+        stiffness = 1 - found.point_frequency.values**2 + 9 * stop
+        assert np.abs(stiffness * amplitude) == pytest.approx(force, rel=1e-12)
+
+
 def test_what_is_refused_says_why():
     hb = sl.HarmonicBalance(3)
     for system, words in (
