@@ -253,9 +253,10 @@ def warn_of_orbits(system: System, result: xr.Dataset, closed: ClosedOrbits) -> 
     if (near <= FAMILY).any():
         warnings.warn(
             SaltusWarning(
-                "a multiplier is 1: the orbit is one of a family, whose orbits lie beside each other "
-                "at the same values, as where a play or a slider stays where it is. Which of them it "
-                "becomes at other values depends on the past: it has no derivatives, they are NaN."
+                "a multiplier is 1: the orbit is one of a family, whose orbits lie beside each "
+                "other at the same values, as where a play or a slider stays where it is. Which of "
+                "them it becomes at other values depends on the past: it has no derivatives, they "
+                "are NaN."
             ),
             stacklevel=4,
         )
