@@ -31,6 +31,7 @@ READ = {
     "end_derivative": "end",
 }  # fmt: skip
 METHODS = {"Taylor": sl.Taylor(), "Modal": sl.Modal()}
+SETTLED = ("events", "responses")
 REACHED = ("ok", "graze_unresolved")
 SECONDS = 60  # of the processor
 NOTHING_WRONG = ("same", "undecidable", "unforced", "no orbit", "no event")
@@ -40,9 +41,9 @@ class LateError(Exception):
     """The time of one system is used up."""
 
 
-def case(seed: str) -> Case:
+def case(seed: str, of: str = "motions") -> Case:
     """The system of a seed."""
-    return random_case(Random(seed))
+    return random_case(Random(seed), of in SETTLED)
 
 
 def columns(that: Case, method: sl.Method, extremes: bool = True) -> list[Column] | str:
@@ -154,7 +155,7 @@ def main(arguments=None) -> int:
     seeds = [given.seed] if "." in given.seed else [f"{given.seed}.{i}" for i in range(given.count)]
     count, began, decided = collections.Counter(), time.process_time(), 0
     for seed in seeds:
-        that = case(seed)
+        that = case(seed, given.of)
         for which in given.methods:
             verdict, wrong, more = judged(that, which, given.of)
             count[f"{which}: {verdict}"] += 1

@@ -54,9 +54,11 @@ class Case:
         )
 
 
-def random_case(rng: Random) -> Case:
-    """An equation of one to three bodies, or a structure of one to four modes."""
-    return _structure(rng) if rng.random() < 0.3 else _equation(rng)
+def random_case(rng: Random, settles: bool = False) -> Case:
+    """An equation of one to three bodies, or a structure of one to four modes; if it `settles`, it
+    is forced and each of its bodies or modes is damped.
+    """
+    return (_structure if rng.random() < 0.3 else _equation)(rng, settles)
 
 
 def _number(rng, low, high):
@@ -174,9 +176,9 @@ class _Equation:
         self.forces[i].append(f"- {force}")
 
 
-def _drive(rng, made):
+def _drive(rng, made, settles):
     """Add a drive; returns its name and lines before the equation."""
-    moves = any("f*t" in law for law in made.laws)
+    moves = settles or any("f*t" in law for law in made.laws)
     kind, i = rng.choice(DRIVES[:4] if moves else DRIVES), made.body()
     pull = made.new("pull", 2, 12)
     text, before = "sl.cos(2*sl.pi*f*t)", ""
@@ -197,7 +199,7 @@ def _drive(rng, made):
     return kind, before
 
 
-def _equation(rng):
+def _equation(rng, settles):
     bodies = rng.choice((1, 1, 1, 2, 2, 3))
     made = _Equation(rng, bodies)
     made.values["f"] = _number(rng, 0.7, 2.5)
@@ -205,7 +207,7 @@ def _equation(rng):
     if "rough" in kinds:  # nothing else may switch where it slides
         kinds = [kind for kind in kinds if kind not in RUBBING]
     names = [made.add(kind) for kind in kinds]
-    drive, before = _drive(rng, made)
+    drive, before = _drive(rng, made, settles)
     if rng.random() < 0.3:
         made.forces[made.body()].append(f"+ {made.new('load', -3, 3)}")
     for i in range(bodies):
@@ -215,8 +217,9 @@ def _equation(rng):
         else:
             made.forces[i].append(f"- {spring}*(x{i} - x{i - 1})")
             made.forces[i - 1].append(f"+ {spring}*(x{i} - x{i - 1})")
-        if rng.random() < 0.6:
-            made.forces[i].append(f"- {made.new('d', 0.05, 1)}*v{i}")
+        if settles or rng.random() < 0.6:
+            low, high = (0.5, 3) if settles else (0.05, 1)
+            made.forces[i].append(f"- {made.new('d', low, high)}*v{i}")
     states = [f"x{i}" for i in range(bodies)] + [f"v{i}" for i in range(bodies)]
     forced = drive != "record"
     if not forced:
@@ -268,7 +271,7 @@ def _chosen(rng, names, states):
     return (*chosen, f"{rng.choice(states)}(0)")
 
 
-def _structure(rng):
+def _structure(rng, settles):
     n = rng.choice((2, 3, 4))
     modes = rng.choice((n, n, n - 1, 1)) if rng.random() < 0.5 else n
     springs = [_number(rng, 40, 400) for _ in range(n + 1)]
@@ -313,7 +316,8 @@ def _structure(rng):
         f"system = sl.structure({[[float(i == k) for k in range(n)] for i in range(n)]}, {rows},\n"
         f"    contacts=[{', '.join(contacts)}],\n"
         f"    forces=[sl.Force('x{rng.randrange(n) + 1}', {_number(rng, 3, 20)})],\n"
-        f"    frequency={_number(rng, 0.8, 3)}, damping_ratio={rng.choice((0.0, 0.02, 0.05))}, "
+        f"    frequency={_number(rng, 0.8, 3)}, "
+        f"damping_ratio={rng.choice((0.04, 0.1) if settles else (0.0, 0.02, 0.05))}, "
         f"modes={modes},\n"
         f"    sensors={{'tip': 'x{n}', 'acceleration': sl.acceleration('x1')"
         + "".join(f", 'force {k}': sl.contact_force('c{k}')" for k in soft)

@@ -31,10 +31,15 @@ def columns(that: Case, method: sl.Method) -> list[Column] | str:
     limits = (base * (1.0 - RANGE), base * (1.0 + RANGE))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        found = sl.branches(
-            system, {varied: limits}, np.zeros(len(system.states)), at=1, switch=(), points=60,
-            periods=300, method=method,
-        )  # fmt: skip
+        try:
+            found = sl.branches(
+                system, {varied: limits}, np.zeros(len(system.states)), at=1, switch=(), points=60,
+                periods=300, method=method,
+            )  # fmt: skip
+        except sl.errors.ParameterError as error:
+            if "no periodic orbit" in str(error):
+                return "no orbit"
+            raise
     which = np.flatnonzero(np.isin(found.event_kind.values, KINDS))
     first = [which[found.event_kind.values[which] == kind][:1] for kind in KINDS]
     chosen = np.concatenate(first)[:EVENTS]

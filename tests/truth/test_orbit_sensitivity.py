@@ -145,3 +145,19 @@ def test_the_largest_velocity_of_an_impact_oscillator_is_that_before_the_impact(
             each.append(sl.sensitivity(own, orbit, to=names).contact_velocity.values[0])
         by = WEIGHTS @ np.array(each) / (STEP * values[column])
         assert found.maximum_derivative.values[1, column] == pytest.approx(by, rel=1e-7)
+
+
+@sl.system(states="x v", forced_at="f")
+def creeping(t, x, v, *, f=1.0, pull=0.4, k=20.0, d=0.5, stiffness=30.0, limit=2.0):
+    held = sl.slider(x, stiffness=stiffness, limit=limit)
+    return v, pull * sl.cos(2 * sl.pi * f * t) - k * x - d * v - held
+
+
+def test_an_orbit_of_a_family_has_no_derivatives_and_stays_what_it_is():
+    """Its slider stays where the past has left it, and may stay elsewhere too."""
+    orbit = sl.attractors(creeping, (0.4, 0.0, 0.0)).isel(attractor=0)
+    with pytest.warns(sl.errors.SaltusWarning, match="one of a family"):
+        found = sl.sensitivity(creeping, orbit, to=["k"])
+    assert found.end_slider.item() == pytest.approx(orbit.attractor_slider.values[0], rel=1e-14)
+    assert np.isnan(found.end_derivative.values).all()
+    assert np.isfinite(found.multiplier_real.values).all()

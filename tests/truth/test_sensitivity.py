@@ -1,5 +1,6 @@
 """Derivatives of motions with respect to parameters: closed forms, and differences of runs."""
 
+import mpmath as mp
 import numpy as np
 import pytest
 
@@ -249,3 +250,63 @@ def test_no_sample_at_the_end_is_lost_where_the_frequency_moves():
         found = sl.sensitivity(adrift, (0, 0), at=[0.1, at], to="f", t_start=0.03)
         assert np.isfinite(found.derivative.values).all()
         assert found.sizes["time"] == 2
+
+
+def turned_back(law):
+    """A body against friction whose velocity a law takes away at a gap: it turns back at once."""
+
+    @sl.system(states="x v")
+    def system(t, x, v, *, k=40.0, slip=3.0, gap=0.3):
+        return v, -k * x - sl.friction(v, slip=slip), law(x, v, gap)
+
+    return system
+
+
+CLAY = turned_back(lambda x, v, gap: sl.impact(x < gap, v, restitution=0.0))
+
+
+@pytest.mark.nojit
+@pytest.mark.parametrize(
+    "system",
+    [CLAY, turned_back(lambda x, v, gap: sl.jump(x > gap, v=0 * v))],
+    ids=["impact", "jump"],
+)
+def test_friction_that_a_law_turns_acts_on_the_derivatives_from_that_instant_on(system):
+    """The formulas: x = (slip/k)(cos wt - 1) + (v(0)/w) sin wt up to t1, where it is the gap, then
+    slip/k + (gap - slip/k) cos w(t - t1).
+    """
+    end, start = 0.4, (0.0, 4.0)
+
+    def formula(k, slip, gap, speed):
+        w = mp.sqrt(k)
+        time = mp.findroot(
+            lambda t: slip / k * (mp.cos(w * t) - 1) + speed / w * mp.sin(w * t) - gap, 0.08
+        )
+        return slip / k + (gap - slip / k) * mp.cos(w * (end - time))
+
+    found = sl.sensitivity(
+        system, start, t_end=end, to=["k", "slip", "gap", "v(0)"], samples=2, method=sl.Taylor()
+    )
+    given = (*system.values.values(), start[1])
+    expected = [
+        float(mp.diff(formula, given, tuple(int(i == j) for i in range(4)))) for j in range(4)
+    ]
+    assert found.end_derivative.values[0] == pytest.approx(expected, rel=1e-8)
+
+
+@sl.system(states="x v", forced_at="f")
+def loose(t, x, v, *, f=1.77, k=80.0, spring=60.0, gap=0.1, pull=10.0, d=0.3):
+    return v, pull * sl.cos(2 * sl.pi * f * t) - k * x - d * v - spring * sl.play(x, gap=gap)
+
+
+def test_a_start_on_either_limit_of_a_play_has_the_derivatives_of_its_mirror_image():
+    high, low = (
+        sl.sensitivity(
+            loose.with_values(pull=side * 10.0), (side * 0.15, side * 0.2, side * 0.1),
+            t_end=1.0, to=["gap", "k"], method=sl.Taylor(),
+        )
+        for side in (1, -1)
+    )  # fmt: skip
+    assert str(high.status.item()) == str(low.status.item()) == "ok"
+    np.testing.assert_allclose(low.end_derivative, -high.end_derivative, rtol=1e-9)
+    np.testing.assert_allclose(low.minimum_derivative, -high.maximum_derivative, rtol=1e-9)

@@ -29,15 +29,16 @@ from saltus.system.modes import field
 
 #: Newton's steps that close what is nearly an orbit, and the shortest of them, in its size.
 STEPS, SHORTEST = 8, 1e-12
-#: Distance by which orbits may miss closing, in their size.
-CLOSED = 1e-8
+#: Distance by which orbits may miss closing, and that which is rounding, in their size.
+CLOSED, ROUNDED = 1e-8, 1e-14
 #: Step of the differences that give derivatives of multipliers, in the parameter, and the weights
 #: of fourth order (Abramowitz and Stegun, 25.3.6).
 STEP, SHIFTS = 5e-5, np.array([-2.0, -1.0, 1.0, 2.0])
 WEIGHTS = np.array([1.0, -8.0, 8.0, -1.0]) / 12.0
 
-#: Distance of a multiplier from 1 at which an orbit lies at a fold.
-FOLD = 1e-6
+#: Distance of a multiplier from 1 at which an orbit lies at a fold, and at which it is one of a
+#: family: others lie beside it at the same values.
+FOLD, FAMILY = 1e-6, 1e-12
 #: Speed of an impact, in that of a swing of its state, at which a rigid stop is grazed: the changes
 #: for which derivatives hold, a millionth here, are as its square.
 GRAZE = 1e-3
@@ -55,7 +56,7 @@ class ClosedOrbits:
         A period of each.
     weights : float64[n, D + P, P]
         What a column of derivatives with respect to starts and parameters counts for in one with
-        respect to a parameter alone, with the start on the orbit.
+        respect to a parameter alone, with the start on the orbit; NaN for one of a family.
     period_slope : float64[n, P]
         Derivative of the period.
     multipliers : complex128[n, m]
@@ -88,6 +89,7 @@ def closed_orbits(
         end = shots.ends(group, length)
         miss, unit = end.states - group.start, shots.unit(group, length)
         step, late = shots.moved(end, group, length, miss[..., None])
+        step[(np.abs(miss) <= ROUNDED * unit).all(axis=1)] = 0.0  # it may be one of a family
         if not (np.abs(step[..., 0]) > SHORTEST * unit).any():
             break
         values = flow.parameters(group, np.arange(n))
@@ -98,11 +100,12 @@ def closed_orbits(
             "a motion of start= doesn't close after its period: it is no periodic orbit of these "
             "equations, or so unstable that rounding moves it away."
         )
+    own = shots.multipliers(end, group)
     moves, late = shots.moved(end, group, length, shots.by_parameters(end, group))
+    moves[near_one(own) <= FAMILY] = np.nan
     count = len(flow.names)
     weights = np.concatenate([moves, np.broadcast_to(np.eye(count), (n, count, count))], axis=1)
     late = late if not shots.forced else shots.period_slope(end, group)
-    own = shots.multipliers(end, group)
     slopes = np.stack(
         [
             shots.beside(group, length, own, moves[..., c], late[:, c], name)
@@ -111,6 +114,11 @@ def closed_orbits(
         axis=2,
     )
     return ClosedOrbits(group, length, weights, late, own, slopes)
+
+
+def near_one(multipliers: np.ndarray) -> np.ndarray:
+    """Distance from 1 of the multiplier that is nearest to it, float64[n]."""
+    return np.asarray(np.abs(multipliers - 1.0).min(axis=1, initial=np.inf))
 
 
 @dataclass(frozen=True)
@@ -241,8 +249,18 @@ def warn_of_orbits(system: System, result: xr.Dataset, closed: ClosedOrbits) -> 
     rigid stop.
     """
     shortest = float(closed.length.period.min())
-    near = np.abs(closed.multipliers - 1.0).min(axis=1)
-    if (near < FOLD).any():
+    near = near_one(closed.multipliers)
+    if (near <= FAMILY).any():
+        warnings.warn(
+            SaltusWarning(
+                "a multiplier is 1: the orbit is one of a family, whose orbits lie beside each "
+                "other at the same values, as where a play or a slider stays where it is. Which of "
+                "them it becomes at other values depends on the past: it has no derivatives, they "
+                "are NaN."
+            ),
+            stacklevel=4,
+        )
+    elif (near < FOLD).any():
         warnings.warn(
             SaltusWarning(
                 f"a multiplier is within {near.min():.1g} of 1: at a fold the derivatives of an "

@@ -83,9 +83,9 @@ def sensitivity(
 
     A periodic orbit, stable or not, moves as a whole: dx/dp = (1 - dP/dx)^-1 dP/dp of the map P
     over its period. At a fold these are infinite, on the side with contact of a graze of a rigid
-    stop too; a warning says so. Derivatives of multipliers are differences of fourth order of
-    multipliers from the exact tangent map, along the orbit as it moves. NaN or large numbers are
-    those of multipliers that coincide.
+    stop too; a warning says so. One of a family, with a multiplier of 1, has none: they are NaN.
+    Derivatives of multipliers are differences of fourth order of multipliers from the exact tangent
+    map, along the orbit as it moves. NaN or large numbers are those of multipliers that coincide.
 
     Parameters
     ----------

@@ -156,14 +156,6 @@ def strike(lanes, lane, batch, g, rate, slow):
         for i in range(NSTATES):
             lanes.probe_y[i, lane], lanes.y[i, lane] = lanes.y[i, lane], slow.state[i]
         behind = mode_behind(lanes, lane, batch, g, slow)
-        if TANGENT:
-            loose = loosened(lanes, lane, batch, g, closing, behind, slow)
-            if loose != mode:
-                for i in range(NSTATES):
-                    slow.state[i] = lanes.probe_y[i, lane]
-                reset(now, slow.state, parameters, slow.held, mode, loose, g, slow.out)
-                for i in range(NSTATES):
-                    lanes.y[i, lane] = slow.state[i]
         keep_dates(lanes, lane, slow)
         for i in range(NSTATES):
             slow.state[i] = lanes.y[i, lane]
@@ -176,9 +168,13 @@ def strike(lanes, lane, batch, g, rate, slow):
         loosen(lanes, lane, batch, g, closing, slow)
     if LAW[g] == JUMP_LAW:
         after_jump(lanes, lane, batch, g, slow)
+    else:
+        face(lanes, lane, batch, g, slow)
+    if TANGENT and closing > 0.0 and mode_of(lanes, lane) != mode:
+        strike_tangent(lanes, lane, batch, g, now, mode, slow)
+    if LAW[g] == JUMP_LAW:
         stick_at_once(lanes, lane, batch, slow)
         return
-    face(lanes, lane, batch, g, slow)
     pressing, rebound = slow.gaps[NGUARDS + g], restitution * max(closing, 0.0)
     if pressing > 0.0:
         later = 0.0
@@ -255,18 +251,18 @@ def feels(lanes, lane, g, struck, closing, slow):
 
 
 @kernel
-def loosened(lanes, lane, batch, struck, closing, mode, slow):
-    """A mode behind an impact without the contacts that it releases: the rates there are those
-    that its derivative needs.
+def strike_tangent(lanes, lane, batch, g, now, before, slow):
+    """Let a jump act on the tangent anew, by the rates in the mode of the lane: the jump has come
+    out of mode `before`, and has released contacts or turned frictions.
     """
-    gaps_here(lanes, lane, batch, slow)
-    for g in range(NGUARDS):
-        if feels(lanes, lane, g, struck, closing, slow) and (mode >> PARTNER[g]) & 1:
-            side = slow.gaps[3 * NGUARDS + g] if LAW[g] == SURFACE_LAW else LAW_SIDE[g]
-            mode &= ~(1 << PARTNER[g]) & ~(1 << g)
-            if side > 0.0:
-                mode |= 1 << g
-    return mode
+    for i in range(NSTATES):
+        slow.state[i] = lanes.probe_y[i, lane]
+    show_clocks(lanes, lane, slow)
+    load_dates(lanes, lane, slow)
+    p = batch.param[lanes.memo[lane, WHO] * batch.stride]
+    reset(now, slow.state, p, slow.held, before, mode_of(lanes, lane), g, slow.out)
+    for i in range(NSTATES):
+        lanes.y[i, lane] = slow.state[i]
 
 
 @kernel

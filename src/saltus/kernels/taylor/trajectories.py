@@ -271,10 +271,13 @@ def attend(lanes, lane, batch, slow):
 @kernel
 def start_sides(lanes, lane, batch, slow):
     """Sides of all guards from the state; on a boundary the guard is fresh and the first step
-    settles its side. No contact is held yet; a stop is on its allowed side.
+    settles its side. No contact is held yet; a stop is on its allowed side. Gaps are read on the
+    sides that boundaries at zero have then, on which they may depend.
     """
     for g in range(NGUARDS):
-        lanes.side[g, lane], lanes.fresh[g, lane] = -1.0, 0.0
+        stop = LAW[g] == IMPACT_LAW and LAW_SIDE[g] < 0.0
+        lanes.side[g, lane] = -1.0 if stop or LAW[g] == HOLD_LAW else 1.0
+        lanes.fresh[g, lane] = 0.0
     gaps_here(lanes, lane, batch, slow)
     moves = False
     for i in range(NSTATES):
