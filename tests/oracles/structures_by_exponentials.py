@@ -158,21 +158,35 @@ class Exponentials:
         return tuple(touching), zero
 
     def first(self, a, rows, z, after, step, zero):
-        """The first gap that closes in a step, as (time, number); one is zero as it begins."""
-        found = []
+        """The first gap that closes in a step, as (time, number); one is zero as it begins. A gap
+        that is open at both ends may be closed between, if its rate is negative there.
+        """
+        found, ends = [], np.array([z, after])
+        gaps, rates, bends = (ends @ one.T for one in (rows, rows @ a, rows @ a @ a))
         for k, row in enumerate(rows):
-            gap = lambda t, row=row: row @ (expm(a * t) @ z)  # noqa: E731
-            rate = lambda t, row=row: row @ (a @ (expm(a * t) @ z))  # noqa: E731
+            gap, rate, bend = (
+                lambda t, one=one: one @ (expm(a * t) @ z) for one in (row, row @ a, row @ a @ a)
+            )
             begin, end = 1e-3 * step if k == zero else 0.0, step
-            if row @ after > 0:
-                if not rate(begin) < 0 < rate(end):
+            if gaps[1, k] > 0:
+                if rates[0, k] < 0 < rates[1, k]:
+                    end = zero_of(rate, begin, step)
+                elif rates[1, k] > 0 and bends[0, k] < 0 < bends[1, k]:
+                    turn = zero_of(bend, 0.0, step)
+                    if rate(turn) > 0:
+                        continue
+                    end = zero_of(rate, turn, step)
+                else:
                     continue
-                end = brentq(rate, begin, end, xtol=1e-18, rtol=1e-15)
                 if gap(end) > 0:
                     continue
             assert gap(begin) > 0, "a contact shorter than a thousandth of a step"
-            found.append((brentq(gap, begin, end, xtol=1e-18, rtol=1e-15), k))
+            found.append((zero_of(gap, begin, end), k))
         return min(found, default=None)
+
+
+def zero_of(function, begin, end):
+    return brentq(function, begin, end, xtol=1e-18, rtol=1e-15)
 
 
 def random_structure(rng):
