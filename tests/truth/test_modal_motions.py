@@ -14,7 +14,7 @@ from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.closed.field_zeros import field_of
 from saltus.analysis.closed.measures import measure
 from saltus.analysis.motion import contact_peaks
-from saltus.flow import modal_tables
+from saltus.flow import modal_state_rows
 from saltus.flow.maps import Stroboscope
 from saltus.flow.modal_motions import modal_rates
 
@@ -48,7 +48,7 @@ def test_derivative_of_the_state(modes, damping, shared, monkeypatch):
     """Also where the force of a damper jumps at the contact; by eigenvectors and their inverse,
     columns side by side, and by shapes alone.
     """
-    monkeypatch.setattr(modal_tables, "SHARED", 1 if shared else 64)
+    monkeypatch.setattr(modal_state_rows, "SHARED", 1 if shared else 64)
     system = chain(modes, damping=damping)
     start = starts(system, 6, modes)
     (ends, exact), (others, found) = (
@@ -77,7 +77,7 @@ def test_derivative_where_a_drive_resonates():
 @pytest.mark.parametrize("shared", [False, True])
 def test_derivative_is_the_difference_of_neighbours(shared, monkeypatch):
     """Through contacts whose dampers make the force jump."""
-    monkeypatch.setattr(modal_tables, "SHARED", 1 if shared else 64)
+    monkeypatch.setattr(modal_state_rows, "SHARED", 1 if shared else 64)
     modes = 5 if shared else 2
     system = chain(modes, damping=15.0)
     map_ = Stroboscope(system, sl.Modal())
