@@ -4,6 +4,7 @@ notebooks are executed as it builds.
 
 import os
 import sys
+import tempfile
 from pathlib import Path
 
 import saltus
@@ -57,6 +58,12 @@ nb_output_stderr = "remove"  # what is being compiled, and how far it is, belong
 # sharp 150 dots an inch from the style.
 os.environ.pop("MPLBACKEND", None)
 os.environ["MATPLOTLIBRC"] = str(HERE / "matplotlibrc")
+# A notebook is over before a flow gains by being compiled once more in the background.
+notebooks_home = tempfile.TemporaryDirectory()
+first_lines = Path(notebooks_home.name, "profile_default", "startup", "first_tier.py")
+first_lines.parent.mkdir(parents=True)
+first_lines.write_text("import saltus.codegen.kernels as k; k.STEADY_AFTER = float('inf'); del k")
+os.environ["IPYTHONDIR"] = notebooks_home.name
 # The commands `saltus ...` of the notebooks are those of this interpreter, and their tables are as
 # wide as those of a terminal.
 os.environ["COLUMNS"] = "170"

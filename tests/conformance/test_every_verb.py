@@ -245,8 +245,14 @@ def test_a_result_says_where_it_comes_from(verb):
 
 
 @every
-def test_asked_again_in_other_units_it_is_the_same_to_the_bit(verb):
-    assert file_hash(numbers(given(verb, "in units"))) == file_hash(numbers(given(verb)))
+def test_asked_again_in_other_units_and_watched_it_is_the_same_to_the_bit(verb):
+    shares = []
+    watched = {"progress": shares.append} if takes(verb, "progress") else {}
+    again = ask(verb, "in units", **watched)
+    assert file_hash(numbers(again)) == file_hash(numbers(given(verb)))
+    assert bool(shares) == bool(watched)
+    assert shares == sorted(shares)
+    assert all(0 <= share <= 1 for share in shares)
 
 
 @every
@@ -325,12 +331,15 @@ def test_a_start_that_is_no_number_is_refused(verb, bad):
 
 # -- how it stops ----------------------------------------------------------------------------------
 @long
-def test_a_request_ends_it(verb):
+def test_a_request_ends_it_and_asked_again_in_silence_it_is_the_same(verb, capfd):
     stop = sl.Stop()
     stop.set()
     with stop, pytest.raises(sl.Interrupted):
         ask(verb)
-    assert file_hash(numbers(ask(verb))) == file_hash(numbers(given(verb)))
+    capfd.readouterr()
+    again = ask(verb, progress=False)
+    assert capfd.readouterr() == ("", "")
+    assert file_hash(numbers(again)) == file_hash(numbers(given(verb)))
 
 
 @pytest.mark.usefixtures("ctrl_c_may_leave_files_open")
@@ -345,14 +354,3 @@ def test_ctrl_c_ends_it_as_an_interruption_that_others_know_too(verb):
     assert isinstance(stopped.value, sl.Interrupted)
     part = stopped.value.partial
     assert part is None or schema.kind_of(part) == schema.kind_of(given(verb))
-
-
-@long
-def test_progress_can_be_off_and_is_a_share(verb, capfd):
-    shares = []
-    ask(verb, progress=shares.append)
-    assert shares == sorted(shares)
-    assert 0 <= shares[0] <= shares[-1] <= 1
-    capfd.readouterr()
-    ask(verb, progress=False)
-    assert capfd.readouterr() == ("", "")

@@ -244,12 +244,13 @@ def depth_of(i, x, _v, z):
          "product", "quotient", "one in another"],
 )  # fmt: skip
 def test_work_grows_with_operations_and_boundaries(family):
-    """Twice the pieces have twice the boundaries; with what holds the motion on each of them they
-    have up to four times the operations, most of which are looked at for a few boundaries only.
-    Functions of up to seven pieces are written out for all sides of these.
+    """Half as many pieces more have half as many boundaries more; with what holds the motion on
+    each of them they have up to 1.5**2 times the operations, most of which are looked at for a few
+    boundaries only: less than the cube, 3.4, and far less than all sides, 2**4. Functions of up to
+    seven pieces are written out for all sides of these.
     """
     few = calls(family(8), 1_000_000)
-    assert calls(family(16), 7 * few) < 7 * few
+    assert calls(family(12), 3.1 * few) < 3.1 * few
 
 
 @pytest.mark.parametrize("seed", range(2))

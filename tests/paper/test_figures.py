@@ -79,10 +79,10 @@ def brief(monkeypatch):
     all of it is made.
     """
     monkeypatch.setattr(pipeline, "SCOUTS", 2)
-    monkeypatch.setattr("saltus.analysis.attractors.find_attractors.WATCHING_ITERATES", 256)
+    monkeypatch.setattr("saltus.analysis.attractors.unsettled.WATCHING_ITERATES", 256)
     monkeypatch.setattr("saltus.analysis.attractors.aperiodic.BLOCKS", 64)
     for name in (
-        "find_attractors.SURVEY_ITERATES",
+        "unsettled.SURVEY_ITERATES",
         "noisy.SURVEY_ITERATES",
         "find_responses.KEPT_ITERATES",
     ):

@@ -257,7 +257,7 @@ def test_the_size_of_chunks_changes_nothing(coarse, few_scouts, monkeypatch, siz
 def test_chunks_of_a_chaotic_map_change_nothing(monkeypatch):
     monkeypatch.setattr(plans, "SCOUTS", 16)
     # periods that the chaotic ones are followed
-    monkeypatch.setattr("saltus.analysis.attractors.find_attractors.WATCHING_ITERATES", 1024)
+    monkeypatch.setattr("saltus.analysis.attractors.unsettled.WATCHING_ITERATES", 1024)
     system = duffing.with_values(damping=0.1, force=12.0)
     axes = dict(x=(-3, 3, 6), v=(-6, 6, 6), periods=256, progress=False)
     whole = sl.basins(system, **axes)

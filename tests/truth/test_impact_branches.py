@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 
 import impact_orbits
 import saltus as sl
+from saltus.flow.maps import Stroboscope
 
 REFERENCE = Path(__file__).parents[1] / "reference"
 
@@ -160,3 +161,44 @@ def flown(state, frequency):
             return run.y[:, -1], count
         t, (x, v), count = run.t[-1], run.y[:, -1], count + 1
         state = [min(x, 1.0), -0.8 * v]
+
+
+#: Its branch over the frequency passes a graze and a period doubling.
+LEAVES, BAND = IMPACT(damping=0.04, gap=0.2, restitution=0.7), {"frequency": (2.1, 2.6)}
+
+
+def check_part(part):
+    """Its orbits close, and don't fill the band."""
+    assert part.sizes["point"] > 30
+    points = np.stack([part.point_x.values[:, 0], part.point_v.values[:, 0]], axis=1)
+    rows = np.tile(list(LEAVES.values.values()), (len(points), 1))
+    rows[:, list(LEAVES.values).index("frequency")] = part.point_frequency
+    ends, _ = Stroboscope(LEAVES, sl.Taylor(), rows).ends(points, 1)
+    np.testing.assert_allclose(ends, points, rtol=0, atol=1e-9)
+    assert np.ptp(part.point_frequency.values) < 0.4999
+
+
+def test_a_branch_through_a_graze_is_interrupted():
+    seeds = sl.bifurcation_diagram(LEAVES, {"frequency": [2.114]}, start=(0, 0), progress=False)
+    shares = []
+
+    def stop(share):
+        shares.append(share)
+        if len(shares) == 40:
+            raise KeyboardInterrupt
+
+    with pytest.raises(sl.Interrupted) as caught:
+        sl.branches(LEAVES, BAND, seeds, switch=(), progress=stop)
+    assert len(set(shares)) > 30
+    part = caught.value.partial
+    check_part(part)
+    assert "interrupted" in (part.branch_begin.values[0], part.branch_end.values[0])
+
+
+def test_a_branch_through_a_graze_ends_with_its_work(monkeypatch):
+    seeds = sl.bifurcation_diagram(LEAVES, {"frequency": [2.114]}, start=(0, 0), progress=False)
+    monkeypatch.setattr("saltus.analysis.branches.branches.MOST_WORK", 30 * 4)
+    part = sl.branches(LEAVES, BAND, seeds, switch=(), progress=False)
+    check_part(part)
+    assert "points" in (part.branch_begin.values[0], part.branch_end.values[0])
+    assert "all the work was done: branches end early, 0 orbits weren't" in sl.describe(part)

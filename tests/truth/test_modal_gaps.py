@@ -12,7 +12,7 @@ from scipy.linalg import expm
 
 import saltus as sl
 from saltus.codegen.module import MODAL_LANES
-from saltus.flow import modal_tables
+from saltus.flow import modal_state_rows
 from saltus.flow.modal import bernstein_table
 from saltus.flow.modal_eigen import shared_of
 from saltus.kernels.modal.layout import CLOSER, FACTORIAL, HALF, ORDER, QUEUE, SPANNED, STEEPER
@@ -84,7 +84,7 @@ def check_legs(system, run, parts):
 
 @pytest.mark.parametrize(("seed", "degrees", "contacts"), [(1, 9, 1), (2, 14, 3), (3, 33, 2)])
 def test_legs_of_many_modes_are_those_of_matrix_exponentials(seed, degrees, contacts, monkeypatch):
-    monkeypatch.setattr(modal_tables, "SHARED", 33)
+    monkeypatch.setattr(modal_state_rows, "SHARED", 33)
     system = spread(20261126 + seed, degrees, contacts)
     run = sl.simulate(system, periods=20, progress=False, method=sl.Modal(), time_errors="local")
     assert str(run.status.values) == "ok"
@@ -108,9 +108,9 @@ def test_samples_are_those_of_matrix_exponentials_however_many_there_are(shared,
     eigenvectors and their inverse, and by shapes alone; five coordinates fill no lanes.
     """
     found = []
-    monkeypatch.setattr(modal_tables, "SHARED", 1 if shared else 6)
+    monkeypatch.setattr(modal_state_rows, "SHARED", 1 if shared else 6)
     monkeypatch.setattr(
-        modal_tables, "shared_of", lambda *of: found.append(shared_of(*of)) or found[-1]
+        modal_state_rows, "shared_of", lambda *of: found.append(shared_of(*of)) or found[-1]
     )
     system = spread(6 + shared, 5, 1)
     few, many = (
@@ -217,7 +217,7 @@ def test_what_terms_at_both_ends_leave_out_of_waves_is_within_its_bound():
 
 
 def test_runs_hold_all_that_is_not_zero_and_no_more_than_two_gaps_less():
-    from saltus.flow.modal_rows import runs_of
+    from saltus.flow.modal_state_rows import runs_of
 
     rng = np.random.default_rng(20261126)
     for share in (0.02, 0.3, 0.9, 1.0):

@@ -14,6 +14,7 @@ from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.closed.field_zeros import field_of
 from saltus.analysis.closed.measures import measure
 from saltus.analysis.motion import contact_peaks
+from saltus.flow import modal_tables
 from saltus.flow.maps import Stroboscope
 from saltus.flow.modal_motions import modal_rates
 
@@ -39,10 +40,15 @@ def starts(system, count, seed):
     return rng.uniform(-1, 1, (count, len(sizes))) * sizes
 
 
-@pytest.mark.parametrize("damping", [None, 15.0])
-@pytest.mark.parametrize("modes", [2, 5])
-def test_derivative_of_the_state(modes, damping):
-    """Also where the force of a damper jumps at the contact."""
+@pytest.mark.parametrize(
+    ("modes", "damping", "shared"),
+    [(2, None, False), (2, 15.0, False), (5, None, False), (5, 15.0, False), (5, 15.0, True)],
+)
+def test_derivative_of_the_state(modes, damping, shared, monkeypatch):
+    """Also where the force of a damper jumps at the contact; by eigenvectors and their inverse,
+    columns side by side, and by shapes alone.
+    """
+    monkeypatch.setattr(modal_tables, "SHARED", 1 if shared else 64)
     system = chain(modes, damping=damping)
     start = starts(system, 6, modes)
     (ends, exact), (others, found) = (
@@ -68,15 +74,18 @@ def test_derivative_where_a_drive_resonates():
 
 
 @pytest.mark.nojit
-def test_derivative_is_the_difference_of_neighbours():
+@pytest.mark.parametrize("shared", [False, True])
+def test_derivative_is_the_difference_of_neighbours(shared, monkeypatch):
     """Through contacts whose dampers make the force jump."""
-    system = chain(2, damping=15.0)
+    monkeypatch.setattr(modal_tables, "SHARED", 1 if shared else 64)
+    modes = 5 if shared else 2
+    system = chain(modes, damping=15.0)
     map_ = Stroboscope(system, sl.Modal())
-    start = np.array([[0.012, -0.02, 0.4, 0.3]])
+    start = np.repeat([[0.012, -0.02, 0.4, 0.3]], [modes - 1, 1, modes - 1, 1], axis=1)
     _, found = map_.tangent(start, 1)
-    steps = 1e-6 * np.array([0.02, 0.02, 0.5, 0.5])
+    steps = 1e-6 * np.repeat([0.02, 0.5], modes)
     for j, step in enumerate(steps):
-        both = start + step * np.array([[1.0], [-1.0]]) * np.eye(4)[j]
+        both = start + step * np.array([[1.0], [-1.0]]) * np.eye(2 * modes)[j]
         (above, below), _ = map_.rows(np.zeros(2, int)).ends(both, 1)
         np.testing.assert_allclose(
             (above - below) / (2 * step), found[0, :, j], atol=1e-5 * np.abs(found).max()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
-from saltus.analysis.attractors import find_attractors
+from saltus.analysis.attractors import unsettled
 from saltus.errors import ParameterError
 
 #: Below its limit the joint is a spring that ends anywhere: x and the joint go together.
@@ -91,7 +91,7 @@ def test_what_a_chaotic_transient_settles_to_at_last_is_found(monkeypatch):
     """On the rig's chaotic saddle at 13.5 Hz many motions stay longer than a short survey lasts;
     some of those that are watched on leave it, and settle to what the other starts lead to.
     """
-    monkeypatch.setattr(find_attractors, "SURVEY_ITERATES", 256)
+    monkeypatch.setattr(unsettled, "SURVEY_ITERATES", 256)
     rig = sl.models.delangre("b", force="4 N", frequency="13.5 Hz")
     random = np.random.default_rng(3).uniform(-1, 1, (2, 150))
     found = sl.attractors(rig, {"x": 5e-3 * random[0], "v": random[1]}, periods=128)

@@ -9,15 +9,8 @@ from collections.abc import Mapping
 from functools import cache
 
 from saltus.codegen import templates
-from saltus.codegen.function_ir import (
-    INTEGER,
-    NUMBER,
-    Helpers,
-    Signature,
-    Value,
-    function_ir,
-    literal,
-)
+from saltus.codegen.expression_ir import INTEGER, NUMBER, Value, literal
+from saltus.codegen.function_ir import Helpers, Signature, function_ir
 from saltus.codegen.head import Constant
 from saltus.codegen.interface import REAL, WHOLE, Interface
 

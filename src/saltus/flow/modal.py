@@ -190,7 +190,7 @@ class ModalFlow:
             if tables.full:
                 return
             which = tables.set_of(batch.param[i if batch.stride else 0])
-            if not tables.is_finite(which, int(batch.mode[i])):
+            if not tables.equations.are_finite(tables.sets[which], int(batch.mode[i])):
                 batch.status[i] = st.NONFINITE
                 continue
             at = tables.state_of(which, int(batch.mode[i]))
@@ -215,7 +215,9 @@ class ModalFlow:
                 empty((max(drives, 1), 6)), empty((max(guards, 1), 8)),
                 empty(((terms + 2) * self.tables.block_groups, lanes)),
                 empty((max(courses, 1), layout.VALUE + self.tables.linear.terms)),
-                empty((2 * groups, lanes)), empty((amplitudes, lanes)), empty((size, columns)),
+                empty((2 * groups, lanes)),
+                empty((amplitudes + (2 * states + 4 * groups) * lanes, lanes)),
+                empty((size, columns)),
                 empty((3, size)), bernstein_table(lanes),
                 empty((max(rows, 1), layout.FIFTH + 1)),
                 empty((layout.WAVES * (groups + 1) * max(rows, 1), lanes)),
@@ -338,7 +340,7 @@ class ModalFlow:
         whose rate isn't.
         """
         given = self.tables.sets[which]
-        piece = self.tables.piece_of(given, mode)
+        piece = self.tables.equations.piece_of(given, mode)
         values, sizes = self._drives_at(which, time)
         rate, size, steady = state, np.abs(state), piece.constant
         open_, bits = set(np.flatnonzero(zero).tolist()), [0] * 4

@@ -127,7 +127,7 @@ def modal_rates(map_: Stroboscope, states: np.ndarray) -> np.ndarray | None:
             courses = [float(one.at(np.zeros(()))[0]) for one in given.courses]
             drives = np.concatenate([np.cos(given.lags), courses])
             gap = given.gaps.matrix @ state + given.gaps.constant + given.gaps.driven @ drives
-            piece = tables.piece_of(given, int((gap > 0) @ (1 << np.arange(len(gap)))))
+            piece = tables.equations.piece_of(given, int((gap > 0) @ (1 << np.arange(len(gap)))))
             found[i] = piece.matrix @ state + piece.constant + piece.driven @ drives
     return found
 

@@ -69,8 +69,8 @@ class Rubbing:
         """
         free = mode & ~sum(1 << one.hold for one in held)
         ways = [
-            self._of(self.tables.piece_of(self._given, free | 1 << one.guard))
-            - self._of(self.tables.piece_of(self._given, free & ~(1 << one.guard)))
+            self._of(self.tables.equations.piece_of(self._given, free | 1 << one.guard))
+            - self._of(self.tables.equations.piece_of(self._given, free & ~(1 << one.guard)))
             for one in held
         ]
         normals, along = self._given.gaps.matrix[[one.guard for one in held]], np.array(ways).T

@@ -6,14 +6,13 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from saltus.codegen.module import MODAL_LANES as LANES
-from saltus.flow.modal_blocks import table_of
-from saltus.flow.modal_eigen import Eigen, half_of, shared_of, slots_of
+from saltus.flow.modal_eigen import slots_of
+from saltus.flow.modal_equations import EquationsOfStates, StateEquations, numbers_of
 from saltus.flow.modal_laws import laws_of
 from saltus.flow.modal_modes import (
     Known,
@@ -23,7 +22,8 @@ from saltus.flow.modal_modes import (
     spread_over,
 )
 from saltus.flow.modal_parameters import ParameterTables
-from saltus.flow.modal_rows import Links, Rows, runs_of, shapes_table, steady_rows
+from saltus.flow.modal_rows import Links, Rows
+from saltus.flow.modal_state_rows import modes_rows, steady_rows
 from saltus.flow.modal_values import ValueSet
 from saltus.kernels.modal import layout
 from saltus.kernels.status import HOLD_LAW, NO_LAW, SURFACE_LAW
@@ -40,29 +40,11 @@ from saltus.system.quantity import remembered
 MOST_BYTES = 2**30
 #: Memory of a set of parameter values besides its arrays [bytes].
 SET_BYTES = 4096
-#: Modes from which on L and V share the shapes: with 60, all contact states of a beam against eight
-#: stops lie in a cache.
-SHARED = 64
-#: Rounding of a coefficient of the equations, relative to it.
-ROUNDED = 16 * np.finfo(float).eps
 #: Sets of values among which the nearest to a new one is looked for.
 NEAR = 64
 #: Sets through which a contact state is handed on, each from the one before, without a motion that
 #: has asked for it: a motion that still comes to it asks again.
 HANDED = 32
-
-
-@dataclass(frozen=True)
-class _Equations:
-    """The equations of a contact state, one of each pair of eigenvalues and -vectors of their
-    matrix, the largest eigenvalue, and the fastest of other states [1/s]: the same for all rates of
-    the drives.
-    """
-
-    piece: LinearPiece
-    eigen: Eigen
-    largest: float
-    fastest: float
 
 
 class Tables:
@@ -98,7 +80,7 @@ class Tables:
         rows = int(self.row_of.max(initial=-1)) + 1
         self.first_guard = [int(np.flatnonzero(self.row_of == r)[0]) for r in range(rows)]
         values = dict(linear.system.values)
-        slots = len(slots_of(np.linalg.eigvals(_numbers(linear.piece(values, 0).matrix)))) + rows
+        slots = len(slots_of(np.linalg.eigvals(numbers_of(linear.piece(values, 0).matrix)))) + rows
         self.groups, self.state_groups = -(-slots // LANES), -(-n // LANES)
         drives = len(linear.drives)
         courses = len(linear.courses)
@@ -116,12 +98,8 @@ class Tables:
         self._courses: dict[tuple[Expr, bytes], tuple[Course, list[float]]] = {}
         self._sets: dict[bytes, int] = {}
         self.sets: list[ValueSet] = []
-        self._equations: dict[tuple[object, ...], _Equations] = {}
-        self._pieces: dict[tuple[float, ...], Callable[[int], LinearPiece]] = {}
-        self._fast: dict[tuple[float, ...], float] = {}
-        self._finite: dict[tuple[float, ...], bool] = {}
+        self.equations = EquationsOfStates(self.linear, self.holds)
         self._parts: dict[tuple[int, int], Known] = {}
-        self._smooth: dict[tuple[object, ...], bool] = {}
         self._known: dict[tuple[int, bytes], int] = {}
         self._states: dict[tuple[int, int], int] = {}
         self._rests: dict[tuple[int, int, int], tuple[Constrained, LinearPiece]] = {}
@@ -130,7 +108,7 @@ class Tables:
         #: The last sets of the same equations and gaps: they differ in the rates of drives.
         self._alike: dict[tuple[object, ...], deque[int]] = {}
         #: Equations and modes of each contact state.
-        self.made: list[tuple[_Equations, StateModes]] = []
+        self.made: list[tuple[StateEquations, StateModes]] = []
         self._by: dict[tuple[str, ...], ParameterTables] = {}
         drives, gaps = max(len(self.linear.drives), 1), len(self._laws)
         self._offset, self._rate, self._lag = Rows(max(gaps, 1)), Rows(drives), Rows(drives)
@@ -146,7 +124,8 @@ class Tables:
         """True if the tables hold MOST_BYTES or more."""
         tables = [self.modes, self.steady, self.pieces, self._acts, self._presses]
         tables += [one.rows for one in self._by.values()]
-        return self._held + sum(one.table.nbytes for one in tables) >= MOST_BYTES
+        held = self._held + self.equations.held
+        return held + sum(one.table.nbytes for one in tables) >= MOST_BYTES
 
     def _rows_of_gaps(self) -> tuple[np.ndarray, np.ndarray]:
         """Row and sign of each gap: those that differ by a number only share one."""
@@ -244,16 +223,6 @@ class Tables:
             self._held += course.begins.nbytes + course.terms.nbytes
         return self._courses[key]
 
-    def is_finite(self, which: int, mode: int) -> bool:
-        """True if the equations of a contact state are made of numbers, whatever formulas say."""
-        given = self.sets[which]
-        key = mode, *(given.values[name] for name in self.linear.parameters)
-        if key not in self._finite:
-            piece = self.piece_of(given, mode)
-            parts = piece.matrix, piece.constant, piece.driven
-            self._finite[key] = all(bool(np.isfinite(part).all()) for part in parts)
-        return self._finite[key] and given.is_finite
-
     def state_of(self, which: int, mode: int) -> int:
         """Number of a contact state, made if it isn't known; the first of a set with those that the
         nearest set has.
@@ -275,7 +244,7 @@ class Tables:
         shown = self.shown(given, mode)
         stays = [g for g in np.flatnonzero(self.limits).tolist() if self.stays(given, mode, g)]
         free = constrained(self.linear.system, mode, given.gaps, given.impacts, stays)
-        known = self._equations_of(given, mode, free)
+        known = self.equations.of(given, mode, free)
         modes = self._state_modes(known, given, shown, free)
         number, guards = len(self.made), len(self.linear.system.guards)
         seen = free.levelled(shown) if len(free.kept) < len(free.spread) else shown
@@ -285,7 +254,7 @@ class Tables:
         for g in range(guards):
             behind = self._states.get((which, mode ^ 1 << g), -1)
             if behind >= 0 and self.plain[g]:
-                smooth = self._is_smooth(known, self.made[behind][0], given.gaps, g)
+                smooth = self.equations.are_smooth(known, self.made[behind][0], given.gaps, g)
                 row[0, layout.SMOOTH] |= int(smooth) << g
             row[0, layout.BEHIND + g] = behind
         self._link(row, number)
@@ -373,7 +342,7 @@ class Tables:
         return self.linear.gaps(given.values, mode) if self.holds.any() else given.gaps
 
     def _state_modes(
-        self, known: _Equations, given: ValueSet, shown: LinearPiece, free: Constrained
+        self, known: StateEquations, given: ValueSet, shown: LinearPiece, free: Constrained
     ) -> StateModes:
         """The modes of a contact state, of those states that contacts at rest allow."""
         speeds = np.array([one.speeds for one in given.courses]).reshape(-1, self.linear.terms)
@@ -392,98 +361,25 @@ class Tables:
         if (self.limits[g] > 0) != bool(mode >> g & 1):
             return False
         normal = given.gaps.matrix[g]
-        rates = [normal @ rows_of(self.piece_of(given, one)) for one in (mode, mode ^ 1 << g)]
+        rates = [
+            normal @ rows_of(self.equations.piece_of(given, one)) for one in (mode, mode ^ 1 << g)
+        ]
         return not rates[0].any() and bool(rates[1].any()) and not given.gaps.driven[g].any()
 
-    def piece_of(self, given: ValueSet, mode: int) -> LinearPiece:
-        """The matrices of a contact state."""
-        used = tuple(given.values[name] for name in self.linear.parameters)
-        if used not in self._pieces:
-            self._pieces[used] = self.linear.every_piece(given.values)
-            self._held += getattr(self._pieces[used], "nbytes", 0)
-        return self._pieces[used](mode)
-
-    def _equations_of(self, given: ValueSet, mode: int, free: Constrained) -> _Equations:
-        """The equations of a contact state, read off once for all rates of the drives."""
-        used = tuple(given.values[name] for name in self.linear.parameters)
-        key = mode, used, free.spread.tobytes()
-        if key not in self._equations:
-            piece = self.piece_of(given, mode)
-            fastest = self._fastest(given, used) if piece.constant.any() else 0.0
-            eigen = half_of(piece.matrix[free.kept] @ free.spread)
-            largest = float(np.abs(eigen[0]).max(initial=0.0))
-            self._equations[key] = _Equations(piece, eigen, largest, fastest)
-            self._held += piece.matrix.nbytes + 2 * sum(
-                one.nbytes for one in eigen
-            )  # at most two copies
-        return self._equations[key]
-
-    def _fastest(self, given: ValueSet, used: tuple[float, ...]) -> float:
-        """Size of the fastest eigenvalue where all gaps have one sign, and no contact is at rest
-        [1/s].
-        """
-        if used not in self._fast:
-            every = int(np.sum((1 << np.arange(len(self.holds)))[~self.holds]))
-            matrices = [_numbers(self.piece_of(given, mode).matrix) for mode in (0, every)]
-            self._fast[used] = max(float(np.abs(np.linalg.eigvals(one)).max()) for one in matrices)
-        return self._fast[used]
-
-    def _is_smooth(self, one: _Equations, other: _Equations, gaps: LinearPiece, g: int) -> bool:
-        key = id(one), id(other), g, gaps.constant[g], gaps.matrix[g].tobytes()
-        if key not in self._smooth:
-            self._smooth[key] = _is_smooth(one.piece, other.piece, gaps, g)
-        return self._smooth[key]
-
-    def _modes_of(self, known: _Equations, modes: StateModes, shown: LinearPiece) -> int:
+    def _modes_of(self, known: StateEquations, modes: StateModes, shown: LinearPiece) -> int:
         """First row of the table of some modes; those of equal equations share one, but for blocks,
         which hold drives.
         """
         key = id(known), shown.matrix.tobytes()
         if modes.block is not None:
-            return self.modes.add(self._table(known.piece.matrix, modes, shown.matrix))
+            return self.modes.add(self._rows(known, modes, shown))
         if key not in self._known:
-            self._known[key] = self.modes.add(self._table(known.piece.matrix, modes, shown.matrix))
+            self._known[key] = self.modes.add(self._rows(known, modes, shown))
         return self._known[key]
 
-    def _table(self, matrix: np.ndarray, modes: StateModes, gaps: np.ndarray) -> np.ndarray:
-        """The table of some modes: lambda, its size, L, V, amplitudes of the gaps; where L and V
-        aren't zero; the block.
-        """
-        values, states, slots = modes.values, len(modes.vectors), len(modes.values)
-        width, count = LANES * self.groups, LANES * self.state_groups
-        weight = np.where(values.imag > 0, 2.0, 1.0)
-        lam, size = np.zeros(width, complex), np.zeros(width)
-        lam[:slots], size[:slots] = values, np.abs(values)
-        size[slots:] = size[:slots].max(initial=0.0)
-        to_modes, to_states = np.zeros((width, count), complex), np.zeros((count, width), complex)
-        to_modes[:slots, :states] = modes.inverse
-        to_states[:states, :slots] = modes.vectors * weight
-        # L: by groups of modes, real parts then imaginary ones, each for all states
-        left = to_modes.reshape(self.groups, LANES, count).transpose(0, 2, 1)
-        left = np.concatenate([left.real, left.imag])
-        # V: by groups of states, for each mode the real part and minus the imaginary one
-        right = to_states.reshape(self.state_groups, LANES, width).transpose(0, 2, 1)
-        right = np.stack([right.real, -right.imag], axis=2)
-        eigen = values, modes.vectors, modes.inverse
-        shared = shared_of(matrix, eigen) if slots >= SHARED and modes.block is None else None
-        if shared is not None:
-            left = shapes_table(*shared, to_states, LANES, left.size)
-            right = np.zeros(right.shape)
-        gaps = gaps[self.first_guard]
-        rows = gaps @ to_states[:states]
-        waves = np.stack([rows.real, rows.imag, np.abs(rows)], axis=1)
-        block = table_of(modes.block, slots if shared else 0, gaps, LANES, self.state_groups)
-        sides = (
-            (to_modes, self.groups, self.state_groups),
-            (to_states, self.state_groups, self.groups),
-        )
-        runs = [
-            runs_of((side != 0).reshape(rows, LANES, columns, LANES).any(axis=(1, 3)))
-            for side, rows, columns in sides
-        ]
-        return np.concatenate(
-            [one.ravel() for one in (lam.real, lam.imag, size, left, right, waves, *runs, *block)]
-        )
+    def _rows(self, known: StateEquations, modes: StateModes, shown: LinearPiece) -> np.ndarray:
+        gaps = shown.matrix[self.first_guard]
+        return modes_rows(known.piece.matrix, modes, gaps, self.groups, self.state_groups)
 
     def _steady_of(self, answers: np.ndarray, given: ValueSet, shown: LinearPiece) -> np.ndarray:
         """First rows of the tables of the steady answers complex128[k, N, ..] of some contact
@@ -499,22 +395,3 @@ class Tables:
         each = rows.shape[1] // LANES
         firsts: np.ndarray = self.steady.add(rows) + each * np.arange(len(rows))
         return firsts
-
-
-def _numbers(matrix: np.ndarray) -> np.ndarray:
-    """A matrix with zeros where formulas give no numbers."""
-    return np.where(np.isfinite(matrix), matrix, 0.0)
-
-
-def _is_smooth(one: LinearPiece, other: LinearPiece, gaps: LinearPiece, g: int) -> bool:
-    """True if the rates in two contact states agree where the gap of a guard is zero: their
-    difference is a multiple of the gap, to rounding.
-    """
-    first, second, rows = (
-        np.column_stack([piece.matrix, piece.constant, piece.driven])
-        for piece in (one, other, gaps)
-    )
-    gap, jump = rows[g] / np.linalg.norm(rows[g]), first - second
-    noise = ROUNDED * (np.abs(first) + np.abs(second))
-    left = jump - np.outer(jump @ gap, gap)
-    return bool((np.abs(left) <= noise + np.outer(noise @ np.abs(gap), np.abs(gap))).all())

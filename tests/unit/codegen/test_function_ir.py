@@ -6,7 +6,8 @@ import ast
 
 import pytest
 
-from saltus.codegen.function_ir import Signature, UntranslatableError, function_ir
+from saltus.codegen.expression_ir import UntranslatableError
+from saltus.codegen.function_ir import Signature, function_ir
 from saltus.codegen.interface import ARRAY, REAL
 
 

@@ -35,7 +35,7 @@ from saltus.system.volume import nothing_attracts
 @verb
 def attractors(
     system: System,
-    start: Starts,
+    start: Starts | None = None,
     *,
     method: Method | None = None,
     periods: int = 2000,
@@ -73,7 +73,7 @@ def attractors(
     system : System
         Equations, contacts and values.
     start : sequence, mapping or array
-        Starts, as for :func:`saltus.simulate`; one or many.
+        Starts, as for :func:`saltus.simulate`; one or many. Default: rest.
     method : Method
         Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
         it serves.

@@ -201,8 +201,4 @@ def _starts(
         raise ParameterError(
             lambda say: f"{say.key('box')} is for random starts: {say.key(start='random 20')}."
         )
-    return (
-        ensemble(system, np.zeros(len(system.states)) if start is None else start, None).start,
-        (),
-        False,
-    )
+    return ensemble(system, start, None).start, (), False

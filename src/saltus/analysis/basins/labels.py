@@ -12,7 +12,8 @@ import numpy as np
 from saltus.analysis.attractors.aperiodic import SURVEY_ITERATES
 from saltus.analysis.attractors.attractor_set import AttractorSet
 from saltus.analysis.attractors.families import is_neutral, on_families
-from saltus.analysis.attractors.find_attractors import find_attractors, keeps_to_sampled
+from saltus.analysis.attractors.find_attractors import find_attractors
+from saltus.analysis.attractors.unsettled import keeps_to_sampled
 from saltus.analysis.basins.scouting import affordable
 from saltus.analysis.closed.motions import ClosedMotion
 from saltus.analysis.solve.tolerances import ROUND

@@ -54,6 +54,10 @@ class Branch(Piece):
         super().find_events()
         self.events = in_order(self, [*self.events, *self._contacts()])
 
+    def joined(self) -> Branch:
+        """The branch as far as it is known, when Ctrl-C ends it."""
+        return self
+
     def _contacts(self) -> list[Event]:
         """Events at which the contact sequence changes; of truncated motions they aren't known."""
         orbits = self.orbits

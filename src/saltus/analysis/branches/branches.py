@@ -17,7 +17,7 @@ from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.branch_table import table_of
 from saltus.analysis.branches.equilibrium_branches import trace_equilibria
 from saltus.analysis.branches.harmonic_branches import trace_harmonics, worst
-from saltus.analysis.branches.plans import LONGEST_DOUBLED, POINTS, SWITCHES, plan_of
+from saltus.analysis.branches.plans import LONGEST_DOUBLED, MOST_WORK, POINTS, SWITCHES, plan_of
 from saltus.analysis.branches.seeds import (
     equilibria_between,
     equilibrium_seeds,
@@ -113,7 +113,10 @@ def branches(
     longest : int
         Doubled branches are followed up to orbits of this number of forcing periods.
     points : int
-        Most points of a branch in each direction.
+        Most points of a branch in each direction. All branches together have so many points that
+        these times the periods of their orbits times the square of the states are 40 000 times
+        ``points``, 4e7 by default: beyond that branches end, and ``orbits_not_followed`` of the
+        result is how many orbits weren't followed.
     values : mapping, optional
         Other values of parameters.
     outputs : mapping of str to callable, or to (callable, unit), optional
@@ -226,7 +229,10 @@ def branches(
                         "static friction holds a body all the time, lead on to no branch."
                     )
                 )
-            plan = plan_of(system, name, limits, method, threads, points, longest, chosen)
+            plan = plan_of(
+                system, name, limits, method, threads, points, longest, chosen,
+                most=MOST_WORK * points / POINTS,
+            )  # fmt: skip
             if by is None:
                 follow_all(plan, system, name, begins, equilibria, done, stage(show, SEEDING, 0.9))
             else:
@@ -241,7 +247,8 @@ def branches(
         except KeyboardInterrupt:
             partial = functools.partial(table_of, system, name, limits, done, wanted, method, by)
             raise Interrupted(partial) from None
-        return table_of(system, name, limits, done, wanted, method, by)
+        table = table_of(system, name, limits, done, wanted, method, by)
+        return table.assign_attrs(orbits_not_followed=plan.watch.left) if plan.watch.over else table
 
 
 def seeds_between(

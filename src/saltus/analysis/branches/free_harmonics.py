@@ -59,7 +59,10 @@ class BesideFamily(HarmonicOrbits):
         normal = np.zeros(guess.shape)
         normal[:, :size] = (guess[:, :size] - self.exact.rest) / self.exact.scale[0, :size]
         normal /= np.linalg.norm(normal, axis=1)[:, None]
-        found = correct(self.exact, guess, normal, np.zeros(len(z), np.int64), NEAR)
+        # the scale is that of small vibrations: fast ones have larger velocities
+        ranges = np.array([np.ptp(self.samples(one), axis=0) for one in z])
+        astray = NEAR * np.maximum(1.0, (ranges / self.exact.scale[0, :size]).max(axis=1))
+        found = correct(self.exact, guess, normal, np.zeros(len(z), np.int64), astray)
         return found.z, found.found
 
     def multipliers(self, z: np.ndarray, derivative: np.ndarray, rows: np.ndarray) -> np.ndarray:  # noqa: ARG002

@@ -174,24 +174,26 @@ def _from_rest(orbits: ClosedHarmonics, value: float) -> tuple[np.ndarray, np.nd
 
 
 class _FromRest:
-    """The curve of ``R(X) = (1 - share) R(0)`` from rest to a truncated motion, where the share is
-    1: of drives on a structure at rest it is the share of the drives. A ``CurveEquations``.
+    """The curve of ``share R(X) + (1 - share) D X = 0`` from rest to a truncated motion, where the
+    share is 1. D is a damper on each signal, and a spring on its mean: with them alone rest is the
+    only motion, so the curve doesn't come back to a share of 0. A ``CurveEquations``.
     """
 
     def __init__(self, orbits: ClosedHarmonics, value: float) -> None:
         self._orbits, self._value, self.scale = orbits, value, orbits.scale
-        self._first = self._of(np.zeros((1, orbits.size)))[0]
-
-    def _of(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        here = np.append(x, np.full((len(x), 1), self._value), axis=1)
-        residual, derivative = self._orbits.evaluate(here, np.zeros(len(x), np.int64))
-        return residual, derivative[..., :-1]
+        unit = self.scale[0, :-1]
+        self._dampers = _dampers(orbits, value) * unit / unit[:, None]
 
     def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:  # noqa: ARG002
         """See :class:`saltus.analysis.branches.equations.CurveEquations`."""
-        residual, derivative = self._of(z[:, :-1])
-        along = np.broadcast_to(self._first * self.scale[0, -1], residual.shape)[..., None]
-        return residual - (1.0 - z[:, -1:]) * self._first, np.append(derivative, along, axis=2)
+        x, share = z[:, :-1], z[:, -1:]
+        here = np.append(x, np.full((len(x), 1), self._value), axis=1)
+        residual, derivative = self._orbits.evaluate(here, np.zeros(len(x), np.int64))
+        damped = x / self.scale[0, :-1] @ self._dampers.T
+        along = (residual - damped)[..., None] * self.scale[0, -1]
+        each = share[..., None]
+        slopes = each * derivative[..., :-1] + (1.0 - each) * self._dampers
+        return share * residual + (1.0 - share) * damped, np.append(slopes, along, axis=2)
 
     def accepted(self, z: np.ndarray, rows: np.ndarray) -> None:
         """Nothing depends on it."""
@@ -206,6 +208,21 @@ class _FromRest:
         up = np.eye(self._orbits.width)[-1:]
         (curve,) = follow(self, begin, up, {self._orbits.size: (0.0, 1.0)}, MOST_FROM_REST)
         return curve.z[-1][:-1] if curve.end == "range" and curve.z[-1][-1] > 0.5 else None
+
+
+def _dampers(orbits: ClosedHarmonics, value: float) -> np.ndarray:
+    """Dampers on the signals and springs on their means, seen as the forces are, float64[size,
+    size].
+    """
+    source, harmonics, count = orbits.source, orbits.harmonics, orbits.count
+    rate = 2 * np.pi / float(orbits.period(np.append(np.zeros(orbits.size), value)))
+    real, imaginary = source.response(harmonics, rate)[0][..., :count]
+    seen = real + 1j * imaginary
+    seen /= np.abs(np.diagonal(seen[1])).min()
+    seen[1:] *= 1j ** np.array([len(chain) - 1 for chain in source.chains])
+    unit = fourier.to_complex(np.eye(orbits.series))  # of each coefficient, its amplitudes
+    moved = np.einsum("kij,nk->ijnk", seen, unit)
+    return np.asarray(fourier.of_complex(moved).transpose(0, 3, 1, 2).reshape(orbits.size, -1))
 
 
 def _begun(orbits: ClosedHarmonics, z: np.ndarray, ranges: np.ndarray) -> Seed | None:

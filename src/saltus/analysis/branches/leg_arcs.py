@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from saltus.analysis.branches.arclength import FIRST, Arc, correct, follow, tangents
+from saltus.analysis.branches.arclength import Arc, correct, follow, tangents
 from saltus.analysis.branches.contact_sequences import ContactSequence
 from saltus.analysis.branches.ladders import accumulation
 from saltus.analysis.branches.leg_ends import Passage, end_of
@@ -17,6 +17,7 @@ from saltus.analysis.branches.legs import Legs
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.special_points import unstable
 from saltus.analysis.branches.tracing import halved
+from saltus.analysis.branches.watch import Watch
 
 #: Contact sequences of one branch in one direction.
 MOST_PIECES = 40
@@ -91,6 +92,8 @@ class LegWay:
         See :func:`follow_legs`.
     home : (Legs, float64[z])
         Where it begins.
+    watch : Watch
+        Of its budget and progress.
     arcs : list of SequenceArc
         The contact sequences one after the other.
     end : str
@@ -105,6 +108,7 @@ class LegWay:
     first: float
     stable: bool
     home: tuple[Legs, np.ndarray]
+    watch: Watch
     arcs: list[SequenceArc] = field(default_factory=list)
     end: str = ""
     limit: float = np.nan
@@ -133,9 +137,11 @@ class LegWay:
 
     def _arc(self, legs: Legs, z: np.ndarray, along: np.ndarray) -> Passage | None:
         """One contact sequence, and where it ends if that is at an event."""
-        again, virtual = bool(self.arcs), list[np.ndarray]()
+        again, virtual, curves = bool(self.arcs), list[np.ndarray](), list[Arc]()
 
         def ends(curve: Arc) -> str:
+            if self.watch.point(legs.n * legs.size**2):
+                curve.end = curve.end or "points"
             if not legs.admissible(curve.z[-1][None])[0]:
                 virtual.append(curve.z[-1])
                 return "virtual"
@@ -147,12 +153,15 @@ class LegWay:
         step = AFTER if again else self.first
         limits = {legs.width - 1: self.limits}
         enough = functools.partial(unstable, legs.multipliers) if self.stable else None
-        (curve,) = follow(
-            legs, z[None], along[None], limits, max(left, 2), step, ends=ends, enough=enough
-        )
+        try:
+            follow(
+                legs, z[None], along[None], limits, max(left, 2), step, ends=ends, enough=enough,
+                curves=curves,
+            )  # fmt: skip
+        finally:  # also with the points so far, when interrupted
+            self.arcs += [SequenceArc(legs, one, again) for one in curves]
+        (curve,), arc = curves, self.arcs[-1]
         curve.end = "unstable" if curve.end == "enough" else curve.end
-        arc = SequenceArc(legs, curve, again)
-        self.arcs.append(arc)
         if curve.end != "virtual":
             self.end = curve.end
             return None
@@ -187,10 +196,12 @@ def follow_legs(
     along: np.ndarray,
     limits: tuple[float, float],
     points: int,
-    first: float = FIRST,
-    stable: bool = False,
-) -> LegWay:
-    """A branch of periodic orbits in one direction, contact by contact.
+    first: float,
+    stable: bool,
+    watch: Watch,
+    ways: list[LegWay],
+) -> None:
+    """Follow a branch of periodic orbits in one direction, contact by contact.
 
     Parameters
     ----------
@@ -210,6 +221,10 @@ def follow_legs(
         First step, in units of the scale.
     stable : bool
         See :class:`saltus.analysis.branches.tracing.Plan`.
+    watch : Watch
+        Of its budget and progress.
+    ways : list of LegWay
+        Takes the branch, which grows: what is known when Ctrl-C ends this.
     """
     legs, start = Legs.of(orbits, sequence, z, scale)
     legs.accepted(start[None], _ROW)
@@ -217,6 +232,5 @@ def follow_legs(
     step = 1e-6 * tangent * legs.scale[0]
     moved = np.subtract(*legs.orbit(np.array([start + step, start - step])))
     side = 1.0 if (moved / scale) @ along > 0 else -1.0
-    way = LegWay(limits, points, first, stable, (legs, start))
-    way.follow(legs, start, side * tangent)
-    return way
+    ways.append(LegWay(limits, points, first, stable, (legs, start), watch))
+    ways[-1].follow(legs, start, side * tangent)

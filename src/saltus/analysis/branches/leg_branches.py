@@ -57,6 +57,11 @@ class LegBranch(Branch):
         pieces = [part for part in self.parts if isinstance(part, LegPiece)]
         for piece in pieces:
             piece.find_events()
+        self.joined()
+
+    def joined(self) -> LegBranch:
+        """The branch with the points and events of its pieces."""
+        pieces = [part for part in self.parts if isinstance(part, LegPiece)]
         self.z = np.concatenate([piece.by_points(piece.z) for piece in pieces])
         self.multipliers = np.concatenate([piece.multipliers for piece in pieces])
         steps = [np.append(0.0, np.diff(piece.length)) for piece in pieces]
@@ -73,6 +78,7 @@ class LegBranch(Branch):
             self.unexplained += [count + place for place in part.unexplained]
             count += len(part.z)
         self._complete()
+        return self
 
     def _complete(self) -> None:
         """Tangents and derivatives in the unknowns with the contact sequence left to the flow."""
@@ -125,21 +131,36 @@ def _branch(
 ) -> Branch | None:
     """The branch of a start in both directions, or in the one in which it leaves another."""
     ways = list[LegWay]()
-    for along in start.sides:
-        if not ways or ways[0].end != "closed":
-            ways.append(
+    try:
+        for along in start.sides:
+            if not ways or ways[0].end != "closed":
                 follow_legs(
-                    orbits,
-                    sequence,
-                    start.z,
-                    start.scale,
-                    along,
-                    plan.limits,
-                    plan.points,
-                    start.first,
-                    plan.stable,
-                )
-            )
+                    orbits, sequence, start.z, start.scale, along, plan.limits, plan.points,
+                    start.first, plan.stable, plan.watch, ways,
+                )  # fmt: skip
+    except KeyboardInterrupt:
+        for way in ways:
+            way.end = way.end or "interrupted"
+            way.arcs = [replace(arc, curve=arc.curve.whole()) for arc in way.arcs]
+        branch = _joined(orbits, ways) if ways else None
+        if branch is not None and len(ways) < len(start.sides):
+            branch.ends = "interrupted", branch.ends[1]
+        _keep(plan, branch)
+        raise
+    branch = _joined(orbits, ways)
+    _keep(plan, branch)
+    return branch
+
+
+def _keep(plan: Plan, branch: LegBranch | None) -> None:
+    """Keep a branch as it is, for Ctrl-C while its events are located."""
+    if branch is not None:
+        parts = [replace(part) for part in branch.parts]
+        plan.watch.cut[id(branch)] = replace(branch, parts=parts)
+
+
+def _joined(orbits: PeriodicOrbits, ways: list[LegWay]) -> LegBranch | None:
+    """One branch from the ways to both sides."""
     ways, ends = both_sides(ways)
     limits = (ways[1].limit if len(ways) > 1 else np.nan, ways[0].limit)
     parts, none = _parts(ways), np.zeros(0)

@@ -18,6 +18,9 @@ from saltus.system.symmetry import is_symmetric
 
 #: Doubled branches are followed to orbits of this number of periods.
 LONGEST_DOUBLED = 2
+#: Most work on all branches together where a branch has at most POINTS points, see :class:`Watch`:
+#: 6000 points of 80 states, which take some five minutes, 600 of 256 states, 100 000 of 20.
+MOST_WORK = 4e7
 #: Most points of a branch in each direction.
 POINTS = 1000
 #: Events at which the branches that leave are followed.

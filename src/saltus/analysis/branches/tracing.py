@@ -111,8 +111,9 @@ def trace(
             _trace_beside(plan, beside, waiting, branches)
             if progress is not None:
                 progress(share)
+        plan.watch.left += len(waiting)
     except KeyboardInterrupt:
-        branches += plan.watch.cut.values()
+        branches += [one.joined() for one in plan.watch.cut.values()]
         raise
 
 

@@ -25,12 +25,15 @@ class Watch:
         branches end with ``points``, and no other is begun.
     spent : float
         Work so far.
+    left : int
+        Orbits whose branches weren't begun.
     cut : dict of int to Branch
         Branches that aren't finished, as far as they are known, by the ids of those that are.
     """
 
     most: float = math.inf
     spent: float = 0.0
+    left: int = 0
     cut: dict[int, Branch] = field(default_factory=dict)
     _progress: Callable[[float], None] | None = None
     _usual: float = USUAL

@@ -197,7 +197,7 @@ def sensitivity_run(
         check_orbits(asked.names, asked.parameters, periods, t_end, t_start, values)
         group, around = given_orbits(system, start)
     else:
-        group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
+        group = ensemble(system, start, values)
     times = None if at is None else times_of(system, group.size, at)
     if times is not None and samples is not None:
         raise ParameterError(

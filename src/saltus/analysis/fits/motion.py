@@ -71,7 +71,7 @@ class Motions:
         ParameterError, UnitError
             If the start isn't one start, or the measurement begins before it.
         """
-        group = ensemble(system, np.zeros(len(system.states)) if start is None else start, None)
+        group = ensemble(system, start, None)
         if group.batch:
             raise ParameterError("a fit takes one start. Give one number for each state.")
         begin, floats = to_si(t_start, "s", "t_start"), "t_start" in unknowns.names

@@ -90,7 +90,7 @@ def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> En
         Names of states, parameters and their units.
     start : sequence, mapping or array
         One number (or text with a unit) per state; a mapping of state names to numbers or arrays;
-        or an array (n, states).
+        or an array (n, states). None: rest, all of them zero.
     values : mapping, optional
         Parameter values that replace the system's own: one each, or an array of n.
 
@@ -108,7 +108,7 @@ def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> En
         )
     _check_labels({**(start if isinstance(start, Mapping) else {}), **(values or {})})
     _check_count(system, trajectories(start, values))
-    columns = _columns(system, start)
+    columns = _columns(system, np.zeros(len(system.states)) if start is None else start)
     given = {name: _values(system, name, value) for name, value in (values or {}).items()}
     empty = [name for name, value in given.items() if not np.size(value)]
     if empty:

@@ -166,7 +166,7 @@ def lyapunov(
     _check_words(method, unit, system)
     most = _most(exponents, method, len(system.states))
     flow = check_method(flow, system)
-    group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
+    group = ensemble(system, start, values)
     periods, transient = whole(periods, "periods", LEAST_PERIODS), whole(transient, "transient", 0)
     rows = np.broadcast_to(group.parameters, (group.size, len(system.values)))
     block = looks_every(system, every, group.start, rows)

@@ -96,8 +96,7 @@ def regularisation_widths(
     """
     one_of(STEPS, "regularisation_widths: ", law=law)
     method = check_method(ODE45(rtol=1e-4, atol=1e-7) if method is None else method, system)
-    zero = dict.fromkeys(system.states, 0.0)
-    group = ensemble(system, zero if start is None else start, None)
+    group = ensemble(system, start, None)
     if len(group.start) != 1:
         raise ParameterError("regularisation_widths takes one start.")
     exact = Stroboscope(system, Taylor(), threads=threads)

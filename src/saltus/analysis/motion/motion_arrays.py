@@ -141,7 +141,7 @@ def asked_motion(
         t_end = last_of(times, t_start)
     if times is None and until is None:
         check_samples(system, many, least_samples(system, many, periods, samples, keep))
-    group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
+    group = ensemble(system, start, values)
     length = span(system, group, periods, t_end, t_start)
     end = None if until is None else _ending(system, method, group, length, until, keep)
     flown = remembering(system if end is None else end.condition.system)

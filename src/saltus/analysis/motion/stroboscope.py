@@ -95,7 +95,7 @@ def stroboscope(
         f"{many} trajectories with {count} periods each",
         lambda say: f"Give {say.key('keep')} (last periods).",
     )
-    group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
+    group = ensemble(system, start, values)
     length = span(system, group, periods, None, t_start)
     periods_kept = np.arange(first, whole_periods + 1, dtype=np.int64)
     schedule = Schedule(periods_kept, np.zeros(len(periods_kept)))

@@ -89,7 +89,7 @@ def stretch(
         As :func:`saltus.simulate`; or if the transient isn't a number of periods (a time, if
         unforced), or outlasts the run.
     """
-    group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
+    group = ensemble(system, start, values)
     if system.forced_at is None:
         length = span(system, group, periods, t_end, t_start)
         skip = to_si(transient, "s", "transient")

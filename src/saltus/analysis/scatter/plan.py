@@ -160,7 +160,7 @@ def _starts(system: System, start: Any, box: Any, seed: int) -> np.ndarray:
         raise ParameterError(
             lambda say: f"{say.key('box')} is for random starts: {say.key(start='random 20')}."
         )
-    return ensemble(system, np.zeros(len(system.states)) if start is None else start, None).start
+    return ensemble(system, start, None).start
 
 
 def _responses(

@@ -91,6 +91,9 @@ HERE, SLOPE, SIZE, FIFTH = range(4)
 # more, 0. The last two are lanes whose numbers add up to them. In place of the first four of the
 # last rows stand the Bernstein coefficients over a step.
 REAL, IMAGINARY, GOING, BOUND, BEYOND, FASTER, WAVES = range(7)
+# Rows of `column`: the amplitudes of a column of the derivative, as ROWS; then of several columns
+# side by side, two lanes for each number: the states, then the real and the imaginary part of the
+# amplitude of each mode.
 #: Samples that wait for one product with the modes of their contact state. Rows of `queue`, for
 #: each: its amplitudes, the rates of these, the steady answer.
 QUEUE = 8

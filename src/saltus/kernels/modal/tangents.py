@@ -177,39 +177,125 @@ def mix_modes(i, at, c, h, batch, m):
 
 
 @kernel
+def column_after(i, at, c, tau, h, batch, m):
+    """A column of the derivative a time h after it was moved last, to `state`. Needs `factor`."""
+    modes, states = m.links[at, MODES], m.sizes[STATES]
+    for s in range(m.sizes[STATE_GROUPS]):
+        store(m.answer, s, splat(0.0, LANES))
+    load_column(i, c, batch, m)
+    if h == 0.0:
+        return
+    if c >= states:
+        drive(i, tau - h, batch, m)
+        answer_slope(i, at, c, tau - h, batch, m)
+        less_answer(m)
+        drive(i, tau, batch, m)
+        answer_slope(i, at, c, tau, batch, m)
+    amplitudes_of(modes, m.column, m)
+    for g in range(m.sizes[MODE_GROUPS]):
+        a, b = load(m.factor, g, LANES), load(m.factor, m.sizes[MODE_GROUPS] + g, LANES)
+        turn(m.column, g, a, b, m.column, m)
+    move_block(modes, h, m.column, m.column, m)
+    if c >= states:
+        mix_modes(i, at, c, h, batch, m)
+    state_of(modes, m.column, m)
+
+
+@inner
+def add_rows(table, source, begin, end, target, step, m):
+    """Add a product with rows of a table of modes to four numbers of the columns side by side: rows
+    of `column` from `target` on, `step` apart. Row table + k is for the number k from `source` on.
+    """
+    a, b = load(m.column, target, LANES), load(m.column, target + 1, LANES)
+    c, d = load(m.column, target + step, LANES), load(m.column, target + step + 1, LANES)
+    e, f = load(m.column, target + 2 * step, LANES), load(m.column, target + 2 * step + 1, LANES)
+    g, h = load(m.column, target + 3 * step, LANES), load(m.column, target + 3 * step + 1, LANES)
+    for k in range(begin, end):
+        x, y = load(m.column, source + 2 * k, LANES), load(m.column, source + 2 * k + 1, LANES)
+        p, q, r, s = (
+            m.modes[table + k, 0],
+            m.modes[table + k, 1],
+            m.modes[table + k, 2],
+            m.modes[table + k, 3],
+        )
+        a, b, c, d = fma(x, p, a), fma(y, p, b), fma(x, q, c), fma(y, q, d)
+        e, f, g, h = fma(x, r, e), fma(y, r, f), fma(x, s, g), fma(y, s, h)
+    store(m.column, target, a)
+    store(m.column, target + 1, b)
+    store(m.column, target + step, c)
+    store(m.column, target + step + 1, d)
+    store(m.column, target + 2 * step, e)
+    store(m.column, target + 2 * step + 1, f)
+    store(m.column, target + 3 * step, g)
+    store(m.column, target + 3 * step + 1, h)
+
+
+@kernel
+def several_after(i, modes, c, count, batch, m):
+    """Columns of the derivative with respect to the start, `count` from c on, after the time of
+    `factor`, to `columns`: side by side in two lanes for each number, so that what is read of the
+    tables serves them all.
+    """
+    states, columns = m.sizes[STATES], m.sizes[TANGENTS]
+    groups, blocks, runs = m.sizes[MODE_GROUPS], m.sizes[STATE_GROUPS], runs_of(modes, m)
+    first, tables = m.sizes[ROWS], modes + 3 * groups
+    waves = first + 2 * LANES * blocks
+    for row in range(first, waves + 4 * LANES * groups):
+        store(m.column, row, splat(0.0, LANES))
+    for r in range(states):
+        for j in range(count):
+            number_of = batch.state[i, states + columns * r + c + j]
+            m.column[first + 2 * r + j // LANES, j % LANES] = number_of
+    for g in range(2 * groups):
+        part, group = g // groups, g % groups
+        for run in range(0, 4, 2):
+            begin, end = m.modes[runs + group, run], m.modes[runs + group, run + 1]
+            add_rows(
+                tables + g * LANES * blocks, first, LANES * int(begin), LANES * int(end),
+                waves + 4 * LANES * group + 2 * part, 4, m,
+            )  # fmt: skip
+    for row in range(first, waves):
+        store(m.column, row, splat(0.0, LANES))
+    for k in range(LANES * groups):
+        a, b = number(m.factor, 0, k), number(m.factor, groups, k)
+        for row in range(waves + 4 * k, waves + 4 * k + 2):
+            x, y = load(m.column, row, LANES), load(m.column, row + 2, LANES)
+            store(m.column, row, fma(y, -b, x * a))
+            store(m.column, row + 2, fma(x, b, y * a))
+    for s in range(blocks):
+        for run in range(0, 4, 2):
+            begin, end = m.modes[runs + groups + s, run], m.modes[runs + groups + s, run + 1]
+            add_rows(
+                tables + 2 * groups * LANES * (blocks + s), waves, 2 * LANES * int(begin),
+                2 * LANES * int(end), first + 2 * LANES * s, 2, m,
+            )  # fmt: skip
+    for r in range(states):
+        for j in range(count):
+            m.columns[r, c + j] = m.column[first + 2 * r + j // LANES, j % LANES]
+
+
+@kernel
 def columns_after(i, at, tau, h, batch, m):
     """The derivative a time h after it was moved last in a contact state, to `columns`. Sets
     `angle` for that time, tau.
     """
-    modes = m.links[at, MODES]
-    groups, states = m.sizes[MODE_GROUPS], m.sizes[STATES]
+    modes, groups, states = m.links[at, MODES], m.sizes[MODE_GROUPS], m.sizes[STATES]
     for g in range(groups):
         a, b = factor_of(modes, g, h, m)
         store(m.factor, g, a)
         store(m.factor, groups + g, b)
-    for s in range(m.sizes[STATE_GROUPS]):
-        store(m.answer, s, splat(0.0, LANES))
-    for c in range(m.sizes[TANGENTS]):
-        load_column(i, c, batch, m)
-        if h != 0.0:
-            if c >= states:
-                drive(i, tau - h, batch, m)
-                answer_slope(i, at, c, tau - h, batch, m)
-                less_answer(m)
-                drive(i, tau, batch, m)
-                answer_slope(i, at, c, tau, batch, m)
-            amplitudes_of(modes, m.column, m)
-            for g in range(groups):
-                turn(
-                    m.column, g, load(m.factor, g, LANES), load(m.factor, groups + g, LANES),
-                    m.column, m,
-                )  # fmt: skip
-            move_block(modes, h, m.column, m.column, m)
-            if c >= states:
-                mix_modes(i, at, c, h, batch, m)
-            state_of(modes, m.column, m)
-        for r in range(states):
-            m.columns[r, c] = m.state[r // LANES, r % LANES]
+    alone = h == 0.0 or coordinates_of(modes, m) > 0 or block_groups(modes, m) > 0
+    c = 0
+    while c < m.sizes[TANGENTS]:
+        count = min(min(m.sizes[TANGENTS], states) - c, 2 * LANES)
+        if count < LANES or alone:
+            column_after(i, at, c, tau, h, batch, m)
+            for r in range(states):
+                m.columns[r, c] = m.state[r // LANES, r % LANES]
+            c += 1
+        else:
+            several_after(i, modes, c, count, batch, m)
+            c += count
     for s in range(m.sizes[STATE_GROUPS]):  # a column without a closed form is NaN, the rest isn't
         store(m.state, s, splat(0.0, LANES))
 
@@ -332,17 +418,60 @@ def project_columns(i, tau, row, over, along, factor, batch, m):
 
 
 @kernel
-def slope_along(r, modes, m):
-    """The derivative of a row of gaps along the amplitudes in `column`."""
-    groups = m.sizes[MODE_GROUPS]
-    row = modes + groups * (3 + 4 * LANES * m.sizes[STATE_GROUPS]) + 3 * groups * r
-    total = splat(0.0, LANES)
+def gap_gradient(r, modes, m):
+    """The derivative of a row of gaps with respect to the state, to `state`."""
+    groups, count = m.sizes[MODE_GROUPS], LANES * m.sizes[STATE_GROUPS]
+    row, first, more = waves_of(r, modes, m), modes + 3 * groups, block_groups(modes, m)
+    if coordinates_of(modes, m) > 0:
+        gradient_of_shapes(row, modes, coordinates_of(modes, m), m)
+        return
+    left, waves = block_left(modes, more, m), block_waves(modes, more, m) + more * r
+    for k in range(count):
+        total = splat(0.0, LANES)
+        for g in range(groups):
+            a, b = load(m.modes, row + g, LANES), load(m.modes, row + groups + g, LANES)
+            total = fma(load(m.modes, first + g * count + k, LANES), a, total)
+            total = fma(-load(m.modes, first + (groups + g) * count + k, LANES), b, total)
+        for g in range(more):
+            part = load(m.modes, left + more * k + g, LANES)
+            total = fma(part, load(m.modes, waves + g, LANES), total)
+        store(m.sums, 0, total)
+        m.state[k // LANES, k % LANES] = total_of(m.sums, 0)
+
+
+@kernel
+def gradient_of_shapes(row, modes, count, m):
+    """The same of coordinates and rates, for the row of a gap's amplitudes w: Re(w s (C + lambda)
+    u) and Re(w s u) for a coordinate of the shapes u.
+    """
+    groups, blocks = m.sizes[MODE_GROUPS], (count + LANES - 1) // LANES
+    scale = shapes_of(modes, blocks, m)
     for g in range(groups):
-        a, b = load(m.modes, row + g, LANES), load(m.modes, row + groups + g, LANES)
-        total = fma(load(m.column, g, LANES), a, total)
-        total = fma(-load(m.column, groups + g, LANES), b, total)
-    store(m.sums, 0, total + block_gap(r, modes, m.column, m))
-    return total_of(m.sums, 0)
+        store(m.rates, g, load(m.modes, row + g, LANES))
+        store(m.rates, groups + g, load(m.modes, row + groups + g, LANES))
+        turn(
+            m.rates, g, load(m.modes, scale + g, LANES), load(m.modes, scale + groups + g, LANES),
+            m.rates, m,
+        )  # fmt: skip
+    for k in range(count):
+        first, by_rate, by_place = (
+            shapes_of(modes, k // LANES, m),
+            splat(0.0, LANES),
+            splat(0.0, LANES),
+        )
+        for g in range(groups):
+            at = first + 2 * LANES * g + 2 * (k % LANES)
+            a, b = load(m.modes, modes + g, LANES), load(m.modes, modes + groups + g, LANES)
+            c, d = load(m.rates, g, LANES), load(m.rates, groups + g, LANES)
+            u, v = load(m.modes, at, LANES), load(m.modes, at + 1, LANES)
+            p, q = fma(c, u, -(d * v)), fma(c, v, d * u)
+            by_rate, by_place = by_rate + p, fma(-b, q, fma(a, p, by_place))
+        store(m.sums, 0, by_rate)
+        store(m.sums, 1, by_place)
+        slope = total_of(m.sums, 0)
+        m.state[(count + k) // LANES, (count + k) % LANES] = slope
+        slope = m.modes[scale + 2 * groups + k // LANES, k % LANES] * slope + total_of(m.sums, 1)
+        m.state[k // LANES, k % LANES] = slope
 
 
 @kernel
@@ -366,10 +495,10 @@ def enter_columns(i, at, tau, batch, m):
         batch.carry[i, first + r] = m.state[r // LANES, r % LANES] - batch.carry[i, first + r]
     if batch.carry[i, DATED] == 0.0:
         date_landing(i, g, modes, tau, batch, m)
-    for c in range(columns):
-        early = batch.carry[i, first_date(m) + c]
-        for r in range(states):
-            batch.state[i, states + columns * r + c] += batch.carry[i, first + r] * early
+    for r in range(states):
+        for c in range(columns):
+            jump = batch.carry[i, first + r] * batch.carry[i, first_date(m) + c]
+            batch.state[i, states + columns * r + c] += jump
 
 
 @kernel
@@ -377,12 +506,18 @@ def date_landing(i, g, modes, tau, batch, m):
     """By how much earlier the boundary of a guard is met, for each column: (dg/dz Y + dg/dp) / g'.
     Needs `angle`.
     """
-    rate = batch.carry[i, first_rate(m) + m.sizes[STATES] + g]
-    for c in range(m.sizes[TANGENTS]):
-        load_column(i, c, batch, m)
-        amplitudes_of(modes, m.column, m)
-        slope = slope_along(m.row_of[g], modes, m) * m.sign_of[g]
-        if c >= m.sizes[STATES]:
-            slope += gap_slope(i, g, c, tau, batch, m)
-        batch.carry[i, first_date(m) + c] = slope / rate
+    states, columns, first = m.sizes[STATES], m.sizes[TANGENTS], first_date(m)
+    rate = batch.carry[i, first_rate(m) + states + g]
+    gap_gradient(m.row_of[g], modes, m)
+    for c in range(columns):
+        batch.carry[i, first + c] = 0.0
+    for r in range(states):
+        slope = m.state[r // LANES, r % LANES] * m.sign_of[g]
+        if slope != 0.0:
+            for c in range(columns):
+                batch.carry[i, first + c] += slope * batch.state[i, states + columns * r + c]
+    for c in range(columns):
+        if c >= states:
+            batch.carry[i, first + c] += gap_slope(i, g, c, tau, batch, m)
+        batch.carry[i, first + c] /= rate
     batch.carry[i, DATED] = 1.0

@@ -179,6 +179,11 @@ def account(ds: xr.Dataset) -> list[str]:
         + (f", {stable.mean():.0%} of them stable" if len(stable) else ""),
     ]
     lines += [f"  {i}: {_one(ds, i)}" for i in range(ds.sizes["branch"])]
+    if (left := ds.attrs.get("orbits_not_followed")) is not None:
+        lines.append(
+            f"stopped  all the work was done: branches end early, {counted(int(left), 'orbit')} "
+            "weren't followed. A narrower range or a larger points= follows more"
+        )
     lines += _truncated(ds)
     return lines + [f"unsure   {one}" for one in _unexplained(ds)]
 

@@ -58,6 +58,27 @@ def test_distance_to_the_exact_orbit_falls_by_its_order(balanced):
     assert np.abs(order - [3, 2]).max() < 0.5
 
 
+@sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
+def curved(t, x, v, *, power=1.5, w=0.8):
+    return v, sl.cos(w * t) - 0.2 * v - x - sl.hertz(x - 0.3, stiffness=4.0, exponent=power)
+
+
+@pytest.mark.parametrize("power", [0.25, 1.5])
+def test_order_by_the_power_of_a_depth(power):
+    """Harmonics of the force fall as k^-(power + 1): deflections are off by H^-(power + 2),
+    velocities by H^-(power + 1).
+    """
+    few, many = (
+        sl.branches(
+            curved.with_values(power=power), {"w": (0.7, 0.9)}, (0, 0), at=1, points=8, switch=(),
+            by=sl.HarmonicBalance(harmonics), progress=False,
+        ).point_output_error.max("point")
+        for harmonics in (20, 80)
+    )  # fmt: skip
+    order = np.log(few / many) / np.log(4)
+    assert np.abs(order - [power + 2, power + 1]).max() < 0.15
+
+
 @pytest.mark.parametrize(("model", "order"), [("chain", 2), ("gear_pair", 2), ("den_hartog", 1)])
 def test_models_come_to_their_exact_orbits(model, order):
     """Velocities by H^-2 where forces have kinks, by H^-1 where they jump."""
@@ -171,6 +192,25 @@ def test_branches_of_twice_the_period_leave():
     assert np.isnan(single.point_harmonic_real.values[..., 8:]).all()
 
 
+def test_undamped_motions_are_found_from_rest():
+    """By the describing function. The motion of a growing drive turns back before 1.7: only another
+    one, in phase with the drive, is there.
+    """
+    for force in (1.0, 1.7, 3.0):
+        found = sl.branches(
+            STOP.with_values(damping=0.0, force=force), {"frequency": (1.5, 1.501)}, at=1, points=2,
+            switch=(), by=sl.HarmonicBalance(1), progress=False,
+        )  # fmt: skip
+        amplitude = np.hypot(*(
+            one.sel(output="x", harmonic=1).values
+            for one in (found.point_harmonic_real, found.point_harmonic_imag)
+        ))  # fmt: skip
+        edge = np.minimum(1.0 / amplitude, 1.0)
+        stop = (np.arccos(edge) - edge * np.sqrt(1 - edge**2)) * 2 / np.pi
+        stiffness = 1 - found.point_frequency.values**2 + 9 * stop
+        assert np.abs(stiffness * amplitude) == pytest.approx(force, rel=1e-12)
+
+
 def test_what_is_refused_says_why():
     hb = sl.HarmonicBalance(3)
     for system, words in (
@@ -215,6 +255,26 @@ def test_backbones_of_the_duffing_oscillator(row, cubic, single):
         angular = 2 * np.pi * float(found.backbone_frequency[-1])
         assert angular == pytest.approx(known, rel=2e-13)
     assert float(found.point_error[-1]) < 1e-11
+
+
+def test_distance_from_a_fast_free_vibration():
+    """Of one harmonic from Jacobi's elliptic functions that pass rest with the same velocity: its
+    frequency is ten times that of small vibrations.
+    """
+    from scipy.special import ellipj, ellipk
+
+    cubic = 250.0
+    found = sl.backbone(
+        duffing.with_values(cubic=cubic), (0.5, 1.0), by=sl.HarmonicBalance(1), progress=False
+    )
+    rate = np.sqrt(1 + 0.75 * cubic)  # by one harmonic, amplitude 1
+    square = (np.sqrt(1 + 2 * cubic * rate**2) - 1) / cubic  # of the exact amplitude
+    share = cubic * square / (2 * (1 + cubic * square))
+    angle = 2 * np.pi * np.arange(2000) / 2000
+    sn, _, dn, _ = ellipj(4 * ellipk(share) * (angle / (2 * np.pi) + 0.75), share)
+    velocity = -np.sqrt((1 + cubic * square) * square) * sn * dn  # passes rest at an angle of zero
+    off = np.abs(velocity - rate * np.cos(angle)).max() / np.ptp(velocity)
+    assert float(found.point_error[-1]) == pytest.approx(off, rel=1e-3)
 
 
 def test_quadrature_of_few_harmonics():
