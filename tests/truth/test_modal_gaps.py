@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +11,11 @@ from scipy.interpolate import BPoly
 from scipy.linalg import expm
 
 import saltus as sl
+from saltus.codegen.module import MODAL_LANES
 from saltus.flow import modal_state_rows
+from saltus.flow.modal import bernstein_table
 from saltus.flow.modal_eigen import shared_of
-from saltus.kernels.modal.layout import QUEUE
+from saltus.kernels.modal.layout import CLOSER, FACTORIAL, HALF, ORDER, QUEUE, SPANNED, STEEPER
 from saltus.system.linearity import linear_pieces
 
 
@@ -181,18 +184,36 @@ def test_few_tries_are_in_vain():
     assert run.rejected_steps < 0.7 * run.events
 
 
-def test_bernstein_rows_are_those_of_scipy():
-    from saltus.codegen.module import MODAL_LANES
-    from saltus.flow.modal import bernstein_table
-
+def test_terms_at_both_ends_tell_the_polynomial_of_scipy():
     rows = bernstein_table(MODAL_LANES).reshape(3, 16, 16)
-    terms = np.random.default_rng(2).normal(size=16)
-    polynomial, x = BPoly((terms @ rows[0])[:, None], [0.0, 1.0]), np.linspace(0, 1, 33)
-    assert polynomial(x) == pytest.approx(np.polyval(terms[::-1], x), abs=1e-13)
-    rates = BPoly(15 * (terms @ rows[1])[:15, None], [0.0, 1.0])
-    assert rates(x) == pytest.approx(np.polyval(np.polyder(terms[::-1]), x), abs=1e-11)
-    less = BPoly((terms[:15] @ rows[2][:15])[:15, None], [0.0, 1.0])
-    assert less(x) == pytest.approx(np.polyval(terms[14::-1], x), abs=1e-13)
+    terms = np.random.default_rng(2).normal(size=(2, HALF))
+    factorials = np.array([float(math.factorial(k)) for k in range(HALF)])
+    told = BPoly.from_derivatives([0.0, 1.0], terms * factorials)
+    assert terms.ravel() @ rows[0] == pytest.approx(told.c[:, 0], abs=1e-11)
+    rates = (terms.ravel() @ rows[1])[:ORDER]
+    assert ORDER * rates == pytest.approx(told.derivative().c[:, 0], abs=1e-10)
+    x = np.linspace(0, 1, 33)
+    powers = np.polynomial.Polynomial(terms.ravel() @ rows[2])
+    assert powers(x) == pytest.approx(told(x), abs=1e-8)
+
+
+def test_what_terms_at_both_ends_leave_out_of_waves_is_within_its_bound():
+    """Of the wave, of its slope, and of the wave over the time from its zero."""
+    rng = np.random.default_rng(20261126)
+    x, shares = np.linspace(0.01, 1, 100), []
+    for _ in range(300):
+        rate = SPANNED * rng.uniform(0.5, 1) * np.exp(1j * rng.uniform(0.5, 1) * np.pi)
+        size = np.exp(2j * np.pi * rng.uniform())
+        ends = [[(size * rate**k * np.exp(rate * at)).real for k in range(HALF)] for at in (0, 1)]
+        told = BPoly.from_derivatives([0.0, 1.0], ends)
+        wave, left = size * np.exp(rate * x), abs(rate) ** (ORDER + 1) / FACTORIAL / CLOSER
+        error = np.abs(told(x) - wave.real)
+        slope_error = np.abs(told.derivative()(x) - (rate * wave).real)
+        shares.append([error.max() / left, slope_error.max() / (STEEPER * left)])
+        assert (error / x).max() < STEEPER * left
+    most, steepest = np.max(shares, axis=0)
+    assert 0.5 < most < 1.0  # twice as close would be too close
+    assert steepest < 1.0
 
 
 def test_runs_hold_all_that_is_not_zero_and_no_more_than_two_gaps_less():

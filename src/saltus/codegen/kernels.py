@@ -40,7 +40,7 @@ STEADY = FULL
 STEADY_AFTER = 2.0
 #: Constants known to the generic code too, so that loops over them are unrolled.
 _BAKED = (
-    "ORDER", "NEWTON_DEGREE_1", "NEWTON_DEGREE_2", "HORNER", "FINER", "SHORTEST",
+    "ORDER", "HALF", "NEWTON_DEGREE_1", "NEWTON_DEGREE_2", "HORNER", "FINER", "SHORTEST",
     "STAGES", "STAGE_TIME", "WEIGHT", "ERROR_WEIGHT", "DENSE_WEIGHT", "RULES",
 )  # fmt: skip
 #: Equations of many systems are the same: a tenth of a second for a long one.

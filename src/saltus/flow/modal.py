@@ -44,18 +44,21 @@ WAYS = 12
 
 
 def bernstein_table(lanes: int) -> np.ndarray:
-    """Bernstein coefficients of the powers of x on [0, 1], the differences of two that follow one
-    another, and the coefficients where the degree is one less, in the rows of the kernel:
-    float64[3 * 16 * 16 / lanes, lanes].
+    """Bernstein coefficients on [0, 1] of the polynomials of which one of the first terms at 0,
+    then at 1, is one, and the others zero; the differences of two that follow one another; the
+    powers of x in these polynomials: float64[3 * 16 * 16 / lanes, lanes], as rows of the kernel.
     """
-    terms, order = range(layout.ORDER + 1), layout.ORDER
-    table, less = (
-        np.array([[math.comb(i, k) / max(math.comb(n, k), 1) for i in terms] for k in terms])
-        for n in (order, order - 1)
-    )
+    order, half = layout.ORDER, layout.HALF
+    terms, table = range(order + 1), np.zeros((order + 1, order + 1))
+    for k in range(half):
+        table[k, :half] = [math.comb(i, k) / math.comb(order, k) for i in range(half)]
+        table[half + k, half:] = (-1) ** k * table[k, half - 1 :: -1]
     steps = np.diff(table, axis=1)
     steps = np.append(steps, steps[:, -1:], axis=1)
-    return np.concatenate([table, steps, less]).reshape(-1, lanes)
+    powers = [
+        [(-1) ** (k - i) * math.comb(order, k) * math.comb(k, i) for k in terms] for i in terms
+    ]
+    return np.concatenate([table, steps, table @ np.array(powers, float)]).reshape(-1, lanes)
 
 
 class ModalFlow:
@@ -205,11 +208,11 @@ class ModalFlow:
             columns = int(self._sizes[layout.TANGENTS]) or 1
             self._memory.arrays = (
                 empty((amplitudes, lanes)), empty((amplitudes, lanes)), empty((groups, lanes)),
-                empty((terms + 3, lanes)),
-                empty((max(rows, 1), terms)), empty((max(rows, 1), 3)), empty(terms),
+                empty((terms + 4 + layout.HALF, lanes)),
+                empty((max(rows, 1), terms + layout.HALF)), empty((max(rows, 1), 4)), empty(terms),
                 empty((DEEPEST + 2, terms)), empty((DEEPEST + 2, 2)), empty(terms), empty(2),
                 empty((MOST_TOUCHES, 2)), empty((states, lanes)), empty((states, lanes)),
-                empty((max(drives, 1), 4)), empty((max(guards, 1), 7)),
+                empty((max(drives, 1), 6)), empty((max(guards, 1), 8)),
                 empty(((terms + 2) * self.tables.block_groups, lanes)),
                 empty((max(courses, 1), layout.VALUE + self.tables.linear.terms)),
                 empty((2 * groups, lanes)),

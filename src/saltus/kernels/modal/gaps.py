@@ -22,6 +22,7 @@ from saltus.kernels.isolation import (
 )
 from saltus.kernels.lanes import bits, fma, larger, load, lowest_bit, root, smaller, splat, store
 from saltus.kernels.status import GAP_MARGIN, HOLD_LAW, MODE_VIOLATION
+from saltus.kernels.trigonometry import sincos
 
 
 # -- where the amplitudes stand --------------------------------------------------------------------
@@ -99,8 +100,8 @@ def here(i, g, batch, m):
 
 @kernel
 def reach(i, h, modes, batch, m):
-    """The part of a step that is worth trying: as long as the modes that it follows leave less than
-    half of each gap, or of its rate where that decides, to those that it bounds.
+    """The part of a step that is worth trying: as long as the modes that it follows leave no more
+    than LEFT of each gap, or of its rate where that decides, to those that it bounds.
     """
     groups, most = m.sizes[MODE_GROUPS], 0
     for g in range(m.sizes[GUARDS]):
@@ -108,8 +109,8 @@ def reach(i, h, modes, batch, m):
             continue
         r, fresh = m.row_of[g], (batch.fresh[i] >> g) & 1 == 1
         value, rate = here(i, g, batch, m)
-        slow = 0.5 * abs(rate) if fresh == (rate > 0.0) else 0.0
-        value = 0.0 if fresh else 0.5 * value
+        slow = LEFT * abs(rate) if fresh == (rate > 0.0) else 0.0
+        value = 0.0 if fresh else LEFT * value
         while most < groups:
             row = first_wave(r, m) + WAVES * most
             left, speed = total_of(m.waves, row + BEYOND), total_of(m.waves, row + FASTER)
@@ -117,8 +118,19 @@ def reach(i, h, modes, batch, m):
                 break
             most += 1
     fastest = m.modes[modes + 2 * groups + most - 1, LANES - 1] if most > 0 else 0.0
-    fastest = max(fastest, block_limit(modes, m))
-    return FOLLOWED / fastest if h * fastest > FOLLOWED else h
+    fastest = max(fastest, SPANNED / FOLLOWED * block_limit(modes, m))
+    return SPANNED / fastest if h * fastest > SPANNED else h
+
+
+@inner
+def shorter(modes, h, m):
+    """The step to try where a step tells nothing, not even by its parts: the next group of modes is
+    followed, too.
+    """
+    near, first = followed(modes, h, m), modes + 2 * m.sizes[MODE_GROUPS]
+    if near == m.sizes[MODE_GROUPS]:
+        return 0.5 * h
+    return min(0.5 * h, SPANNED / m.modes[first + near, LANES - 1])
 
 
 # -- a row of gaps over a step ---------------------------------------------------------------------
@@ -127,7 +139,7 @@ def followed(modes, h, m):
     """Number of groups of modes that are followed over a time h."""
     groups = m.sizes[MODE_GROUPS]
     sizes = modes + 2 * groups - 1
-    while groups > 0 and m.modes[sizes + groups, LANES - 1] * h > FOLLOWED:
+    while groups > 0 and m.modes[sizes + groups, LANES - 1] * h > 1.000001 * SPANNED:
         groups -= 1
     return groups
 
@@ -155,72 +167,142 @@ def bound_row(r, modes, steady, which, h, near, m):
     m.spans[r, KNOWN] = 0.0
 
 
+@inner
+def add_terms(row, term, following, twice, squared, m):
+    """Add HALF derivatives of waves to the rows of `sums` from a row on; returns the next two."""
+    # Re(lambda^(k+1) y) = 2 Re(lambda) Re(lambda^k y) - |lambda|^2 Re(lambda^(k-1) y)
+    for k in range(row, row + HALF):
+        store(m.sums, k, load(m.sums, k, LANES) + term)
+        term, following = following, fma(twice, following, -(squared * term))
+    return term, following
+
+
+@inner
+def add_drive_terms(r, at, real, imaginary, way, m):
+    """Add HALF derivatives of a drive to q[r] from column `at` on."""
+    term, following = real, -imaginary * way
+    for k in range(at, at + HALF):
+        m.q[r, k] += term
+        term, following = following, -(way * way) * term
+
+
+@inner
+def end_drives(which, h, m):
+    """Cosine and sine of each drive where a step ends, to `angle`."""
+    for d in range(m.sizes[DRIVES]):
+        sine, cosine = sincos(splat(m.rate[which, d] * h, LANES))
+        store(m.sums, 0, cosine * m.angle[d, 1] - sine * m.angle[d, 2])
+        store(m.sums, 1, sine * m.angle[d, 1] + cosine * m.angle[d, 2])
+        m.angle[d, 4], m.angle[d, 5] = m.sums[0, 0], m.sums[1, 0]
+
+
 @kernel
 def series_of(r, modes, steady, which, h, near, m):
-    """Terms of a row of gaps on [0, 1] for a step h that follows some groups of modes, to q[r]. To
-    errors[r]: what they leave out at most, of the gap and of its slope; the size of its terms.
+    """Terms of a row of gaps over a step h, as [0, 1], that follows some groups of modes, to q[r]:
+    where the step begins, HALF of them or all if they can tell the gap to rounding; then HALF of
+    them where it ends. To errors[r]: what the polynomial of both leaves out at most, of the gap
+    and of its slope; the size of its terms; what all terms of the beginning leave out.
     """
-    groups, drives = m.sizes[MODE_GROUPS], m.sizes[DRIVES]
-    for k in range(ORDER + 1):
+    groups, beyond = m.sizes[MODE_GROUPS], first_wave(r, m) + WAVES * near
+    unseen, size = total_of(m.waves, beyond + BEYOND), m.stood[r, SIZE]
+    full, rest, to = unseen <= ROUNDED * size, splat(0.0, LANES), ORDER + 4
+    for k in range(to + HALF):
         store(m.sums, k, splat(0.0, LANES))
-    rest = splat(0.0, LANES)
     for g in range(near):
         at = first_wave(r, m) + WAVES * g
+        grow = load(m.modes, modes + g, LANES) * h
+        turns = load(m.modes, modes + groups + g, LANES) * h
         part = load(m.modes, modes + 2 * groups + g, LANES) * h
-        # Re(lambda^(k+1) y) = 2 Re(lambda) Re(lambda^k y) - |lambda|^2 Re(lambda^(k-1) y)
-        twice, squared = load(m.modes, modes + g, LANES) * (2.0 * h), part * part
-        term, following = load(m.waves, at + REAL, LANES), load(m.waves, at + GOING, LANES) * h
-        for k in range(ORDER + 1):
-            store(m.sums, k, load(m.sums, k, LANES) + term)
-            term, following = following, fma(twice, following, -(squared * term))
+        twice, squared = 2.0 * grow, part * part
+        real, imaginary = load(m.waves, at + REAL, LANES), load(m.waves, at + IMAGINARY, LANES)
+        going = load(m.waves, at + GOING, LANES) * h
+        term, following = add_terms(0, real, going, twice, squared, m)
+        if full:
+            add_terms(HALF, term, following, twice, squared, m)
+        cosine, sine = factor_of(modes, g, h, m)
+        real, imaginary = fma(-imaginary, sine, real * cosine), fma(imaginary, cosine, real * sine)
+        add_terms(to, real, fma(-turns, imaginary, grow * real), twice, squared, m)
         fourth = squared * squared
         eighth = fourth * fourth
         rest = fma(load(m.waves, at + BOUND, LANES), eighth * eighth, rest)
-    store(m.sums, ORDER + 1, rest * (1.0 / FACTORIAL))
-    store(m.sums, ORDER + 2, rest * (16.0 / FACTORIAL))
-    store(m.sums, ORDER + 3, splat(0.0, LANES))
-    add_block_series(r, modes, h, m)
-    for k in range(ORDER + 1):
-        m.q[r, k] = total_of(m.sums, k)
-    beyond = first_wave(r, m) + WAVES * near
-    e0 = total_of(m.sums, ORDER + 1) + total_of(m.waves, beyond + BEYOND)
-    e1 = total_of(m.sums, ORDER + 2) + total_of(m.waves, beyond + FASTER) * h
-    size = total_of(m.sums, ORDER + 3) + m.stood[r, SIZE]
+    store(m.sums, to + HALF, rest)
+    left = total_of(m.sums, to + HALF)
+    for k in range(ORDER + 1 + HALF):
+        m.q[r, k] = 0.0
     first, at = numbers_of_gap(r, steady, m)
-    m.q[r, 0] += number(m.steady, first, at)
-    for d in range(drives):
+    for d in range(m.sizes[DRIVES]):
         a, b = number(m.steady, first, at + 1 + 2 * d), number(m.steady, first, at + 2 + 2 * d)
         cosine, sine, way = m.angle[d, 1], m.angle[d, 2], m.rate[which, d] * h
-        term, following = a * cosine - b * sine, -(a * sine + b * cosine) * way
-        squared = way * way
-        power = (squared * squared) * (squared * squared)
-        power *= power * (abs(a) + abs(b)) / FACTORIAL
-        e0, e1 = e0 + power, e1 + 16.0 * power
-        for k in range(ORDER + 1):
-            m.q[r, k] += term
-            term, following = following, -squared * term
-    size += add_course_series(r, first, at + 1 + 2 * drives, h, m)
+        power = (way * way) * (way * way)
+        power *= power
+        real, imaginary = a * cosine - b * sine, a * sine + b * cosine
+        add_drive_terms(r, 0, real, imaginary, way, m)
+        if full:
+            add_drive_terms(r, HALF, power * real, power * imaginary, way, m)
+        cosine, sine = m.angle[d, 4], m.angle[d, 5]
+        real, imaginary = a * cosine - b * sine, a * sine + b * cosine
+        add_drive_terms(r, ORDER + 1, real, imaginary, way, m)
+        left += power * power * (abs(a) + abs(b))
     share = 1.0
-    for k in range(2, ORDER + 1):
+    for k in range(HALF):
+        share /= max(k, 1)
+        m.q[r, k] = share * (m.q[r, k] + total_of(m.sums, k))
+        m.q[r, ORDER + 1 + k] = share * (m.q[r, ORDER + 1 + k] + total_of(m.sums, to + k))
+    for k in range(HALF, ORDER + 1 if full else HALF):
         share /= k
-        m.q[r, k] *= share
-    m.errors[r, 0], m.errors[r, 1], m.errors[r, 2] = e0, e1, size
+        m.q[r, k] = share * (m.q[r, k] + total_of(m.sums, k))
+    constant = number(m.steady, first, at)
+    m.q[r, 0], m.q[r, ORDER + 1] = m.q[r, 0] + constant, m.q[r, ORDER + 1] + constant
+    if m.sizes[COURSES] > 0 or block_groups(modes, m) > 0:
+        size += add_other_terms(r, modes, first, at + 1 + 2 * m.sizes[DRIVES], h, m)
+    left /= FACTORIAL
+    e0, e1 = total_of(m.sums, ORDER + 1) + unseen, total_of(m.sums, ORDER + 2)
+    m.errors[r, 1] = e1 + total_of(m.waves, beyond + FASTER) * h + STEEPER / CLOSER * left
+    m.errors[r, 0], m.errors[r, 2] = e0 + left / CLOSER, size + total_of(m.sums, ORDER + 3)
+    m.errors[r, 3] = e0 + left if full else HUGE
     span_of(r, m)
 
 
 @kernel
+def add_other_terms(r, modes, first, at, h, m):
+    """Add what blocks and courses make of a row of gaps, a polynomial, to its terms in q[r].
+    Returns the size of the courses' part.
+    """
+    for k in range(ORDER + 1):
+        store(m.sums, k, splat(0.0, LANES))
+    add_block_series(r, modes, h, m)
+    share = 1.0
+    for k in range(ORDER + 1):
+        share /= max(k, 1)
+        m.p[k] = share * total_of(m.sums, k)
+    size = add_course_series(first, at, h, m)
+    for k in range(ORDER + 1):
+        m.q[r, k] += m.p[k]
+    for k in range(HALF):  # Horner's rule, again and again: the terms where the step ends
+        for j in range(ORDER - 1, k - 1, -1):
+            m.p[j] += m.p[j + 1]
+        m.q[r, ORDER + 1 + k] += m.p[k]
+    return size
+
+
+@kernel
 def span_of(r, m):
-    """Bernstein coefficients of a row of gaps, and what they say of it, to `spans`."""
+    """Bernstein coefficients of a row of gaps, to `waves`; what they say of it, to `spans`."""
     rows, terms = (ORDER + 1) // LANES, ORDER + 1
+    into = first_wave(r, m) + WAVES * m.sizes[MODE_GROUPS]
     value = m.q[r, 0]
     low, high = splat(value, LANES), splat(value, LANES)
     drop, rise = splat(HUGE, LANES), splat(-HUGE, LANES)
     rises, falls, below, above = 0, 0, 0, 0
     for i in range(rows):
         a, b = splat(0.0, LANES), splat(0.0, LANES)
-        for k in range(min((i + 1) * LANES + 1, terms)):
+        for k in range(HALF if 2 * i < rows else 0):
             a = fma(load(m.bernstein, k * rows + i, LANES), m.q[r, k], a)
             b = fma(load(m.bernstein, (terms + k) * rows + i, LANES), m.q[r, k], b)
+        for k in range(HALF if 2 * i + 2 >= rows else terms, terms):
+            a = fma(load(m.bernstein, k * rows + i, LANES), m.q[r, HALF + k], a)
+            b = fma(load(m.bernstein, (terms + k) * rows + i, LANES), m.q[r, HALF + k], b)
+        store(m.waves, into + i, a)
         low, high = smaller(low, a), larger(high, a)
         drop, rise = smaller(drop, b), larger(rise, b)
         rises |= bits(b > 0.0) << (i * LANES)
@@ -235,10 +317,7 @@ def span_of(r, m):
     m.spans[r, DROP], m.spans[r, RISE] = least_of(m.sums, 2), -least_of(m.sums, 3)
     m.spans[r, RISES], m.spans[r, FALLS] = float(rises), float(falls)
     m.spans[r, BELOW], m.spans[r, ABOVE] = float(below), float(above)
-    last = 0.0
-    for k in range(terms):
-        last += m.q[r, k]
-    m.spans[r, FIRST], m.spans[r, LAST], m.spans[r, KNOWN] = value, last, 1.0
+    m.spans[r, FIRST], m.spans[r, LAST], m.spans[r, KNOWN] = value, m.q[r, terms], 1.0
 
 
 @inner
@@ -287,27 +366,24 @@ def glance(i, g, batch, m):
         if last - error > noise:
             return CLEAR
         if last + error < -noise:
-            terms_of(i, g, side, batch, m)
             first = sign * m.spans[r, FIRST] + away
-            place_root(g, ORDER, 0.0, 1.0, first / (first - last), m)
+            bracket(g, 0.0, 1.0, first / (first - last), m)
             return CROSSES
     return OPEN
 
 
-@kernel
-def place_root(g, degree, low, high, guess, m):
-    """Place of a crossing in a part of the step, roughly: by a few steps of Newton's method."""
-    x = guess
-    for _ in range(3):
-        rate = slope(m.p, degree, x)
-        x = x - polynomial(m.p, degree, x) / rate if rate != 0.0 else x
-        x = min(max(x, low), high)
-    m.found[g, PLACE], m.found[g, FINAL], m.found[g, BRACKET] = x, 0.0, high
+@inner
+def bracket(g, low, high, guess, m):
+    """Note the part of the step where a gap crosses, and about where."""
+    m.found[g, PLACE], m.found[g, FINAL] = guess, 0.0
+    m.found[g, BEGINS], m.found[g, BRACKET] = low, high
 
 
 @kernel
 def terms_of(i, g, side, batch, m):
-    """Terms of the gap of a guard on its side, on [0, 1], to p; returns its rounding error."""
+    """Terms of the gap of a guard on its side where the step begins, to p; returns its rounding
+    error.
+    """
     r, sign = m.row_of[g], side * m.sign_of[g]
     away = m.offset[int(batch.carry[i, SET]), g]
     for k in range(ORDER + 1):
@@ -317,21 +393,17 @@ def terms_of(i, g, side, batch, m):
 
 
 @kernel
-def bernstein_of(degree, m):
-    """Bernstein coefficients of the terms in `p` on [0, 1], to the first row of `bern`."""
-    if degree < ORDER - 1:
-        to_bernstein(m.p, degree, m.bern[0])
-        return
-    rows = (ORDER + 1) // LANES
-    first = 0 if degree == ORDER else 2 * (ORDER + 1) * rows
-    for i in range(rows):
-        a = splat(0.0, LANES)
-        for k in range(min((i + 1) * LANES, degree + 1)):
-            a = fma(load(m.bernstein, first + k * rows + i, LANES), m.p[k], a)
-        store(m.sums, 0, a)
-        for j in range(LANES):
-            m.bern[0, i * LANES + j] = m.sums[0, j]
-    m.bern[0, degree] = polynomial(m.p, degree, 1.0)
+def curve_of(r, sign, away, fresh, m):
+    """Bernstein coefficients of a gap by those of its row, to the first row of `bern`: of the gap
+    over x, if it is zero where the step begins.
+    """
+    row = first_wave(r, m) + WAVES * m.sizes[MODE_GROUPS]
+    for k in range(ORDER + 1):
+        m.bern[0, k] = sign * number(m.waves, row, k) + away
+    value = m.bern[0, 0]
+    if fresh:
+        for k in range(ORDER):
+            m.bern[0, k] = (m.bern[0, k + 1] - value) * (ORDER / (k + 1.0))
 
 
 @kernel
@@ -388,7 +460,7 @@ def judge(g, top, degree, fresh, error, whole, slope_error, noise, m):
         return CLEAR
     if last + error < -noise:
         guess = low + (high - low) * min(max(begin / (begin - last), 0.0), 1.0)
-        place_root(g, degree, low, high, guess, m)
+        bracket(g, low, high, guess, m)
         return CROSSES
     return OPEN
 
@@ -419,8 +491,10 @@ def decide(i, g, batch, m):
     """
     side = side_of(g, batch.mode[i])
     noise = terms_of(i, g, side, batch, m)
-    error, slope_error = m.errors[m.row_of[g], 0], m.errors[m.row_of[g], 1]
-    exact, known = error <= noise, known_zeros(i, g, batch)
+    r, exact, known = m.row_of[g], m.errors[m.row_of[g], 3] <= noise, known_zeros(i, g, batch)
+    error, slope_error = m.errors[r, 0], m.errors[r, 1]
+    if exact:  # by the terms of the beginning alone
+        error, slope_error = m.errors[r, 3], slope_error + (ORDER + 1) * m.errors[r, 3]
     if known == 1 and m.laws[g, LIMITS] != 0 and turns_here(i, g, noise, batch, m):
         known = 2
     fresh, degree, whole = known > 0, ORDER - known, error
@@ -428,7 +502,7 @@ def decide(i, g, batch, m):
         whole += abs(m.p[0])  # what the bounded modes add to the gap where it is zero
         for k in range(ORDER + 1):
             m.p[k] = m.p[k + known] if k <= degree else 0.0
-        error = slope_error
+        error = slope_error if exact else slope_error + ORDER * noise
         if known > 1 and not exact:
             return OPEN
         leaves = way_of(i, g, degree, known, noise, batch, m) if exact else 1
@@ -440,7 +514,7 @@ def decide(i, g, batch, m):
             return CROSSES
         if not exact and m.p[0] <= error:
             return OPEN
-    elif not exact and m.p[0] <= error:
+    elif not exact and m.p[0] <= max(error, noise):
         return OPEN
     elif m.p[0] <= noise:
         if m.p[0] < -noise and m.laws[g, KIND] != HOLD_LAW:
@@ -457,7 +531,11 @@ def decide(i, g, batch, m):
         elif ends:
             m.found[g, PLACE], m.found[g, FINAL] = 0.0, 1.0
             return CROSSES
-    bernstein_of(degree, m)
+    if exact:
+        to_bernstein(m.p, degree, m.bern[0])
+    else:
+        sign = side * m.sign_of[g]
+        curve_of(r, sign, side * m.offset[int(batch.carry[i, SET]), g], fresh, m)
     shortest = 1.0 if exact else SHORTEST_PIECE
     answer = pieces(g, degree, fresh, error, whole, slope_error, noise, shortest, m)
     if answer != OPEN or not exact:
@@ -492,6 +570,7 @@ def look(i, tau, h, modes, steady, batch, m):
     which, near = int(batch.carry[i, SET]), followed(modes, h, m)
     margin = batch.minima[i, GAP_MARGIN]
     follow_block(modes, h, m)
+    end_drives(which, h, m)
     for r in range(m.sizes[GAP_ROWS]):
         bound_row(r, modes, steady, which, h, near, m)
     m.out[MARGIN], m.found[0, TOUCHED] = margin, 0.0
@@ -535,13 +614,36 @@ def look(i, tau, h, modes, steady, batch, m):
 
 # -- the place of a crossing -----------------------------------------------------------------------
 @kernel
+def about(g, r, sign, away, m):
+    """Part of the step at which a gap crosses in its bracket, roughly: by a few steps of Newton's
+    method on the polynomial of both ends.
+    """
+    rows, first = (ORDER + 1) // LANES, 2 * (ORDER + 1) * ((ORDER + 1) // LANES)
+    for i in range(rows // 2, rows):
+        a = splat(0.0, LANES)
+        for k in range(ORDER + 1):
+            value = m.q[r, k if k < HALF else HALF + k]
+            a = fma(load(m.bernstein, first + k * rows + i, LANES), value, a)
+        store(m.sums, i, a)
+    for k in range(ORDER + 1):
+        m.p[k] = sign * (m.q[r, k] if k < HALF else number(m.sums, 0, k))
+    m.p[0] += away
+    x, low, high = m.found[g, PLACE], m.found[g, BEGINS], m.found[g, BRACKET]
+    for _ in range(3):
+        rate = slope(m.p, ORDER, x)
+        x = x - polynomial(m.p, ORDER, x) / rate if rate != 0.0 else x
+        x = min(max(x, low), high)
+    return x
+
+
+@kernel
 def place_of(i, g, tau, h, modes, steady, batch, m):
     """Time after tau at which a gap that falls all the way crosses, by Newton's method on the modes
     inside a shrinking bracket: each step goes to a zero of the terms up to the fourth.
     """
     which, side, r = int(batch.carry[i, SET]), side_of(g, batch.mode[i]), m.row_of[g]
     sign, away = side * m.sign_of[g], side * m.offset[which, g]
-    low, high, d = 0.0, m.found[g, BRACKET] * h, m.found[g, PLACE] * h
+    low, high, d = 0.0, m.found[g, BRACKET] * h, about(g, r, sign, away, m) * h
     noise = 2.3e-16 * (m.errors[r, 2] + abs(away))
     cubic = m.sizes[COURSES] == 0 or m.sizes[TERMS] <= 4
     bounded = cubic and block_groups(modes, m) == 0  # FIFTH holds all that has a fifth derivative

@@ -19,9 +19,18 @@ from collections import namedtuple
 #: Terms of a gap's series beyond the first, and what the last one's successor is divided by.
 ORDER = 15
 FACTORIAL = 20922789888000.0
-#: A mode is followed in the series of a gap while |lambda| h is at most this; what is left out of
-#: its own series is at most its amplitude there.
-FOLLOWED = 6.0
+#: Terms of a gap where a step begins that tell a polynomial with as many where it ends: what it
+#: leaves out is smaller by (x (1 - x))^HALF, of which CLOSER times is 1 at most. Its slope leaves
+#: out STEEPER times as much: it meets that of the gap HALF - 1 times at both ends, and once between
+#: them.
+HALF = (ORDER + 1) // 2
+CLOSER, STEEPER = 65536.0, 64.0
+#: A mode is followed between both ends of a step while |lambda| h is at most SPANNED, a block from
+#: its beginning while that is at most FOLLOWED: what is left out is at most an amplitude.
+SPANNED, FOLLOWED = 12.0, 6.0
+#: Largest part of a gap, or of its rate where that decides, that a step leaves to modes that it
+#: doesn't follow.
+LEFT = 0.15
 # Columns of `sizes`; ROWS are the rows of amplitudes: those of the modes, real parts then imaginary
 # ones, then those of a block; TANGENTS are the columns of the derivative of the state that is
 # carried: one for each state at the start, then one for each parameter; 0: none. REMEMBERED are the
@@ -71,14 +80,16 @@ MOST_STEPS, MOST_CONTACTS = range(2)
 CLEAR, CROSSES, OPEN = range(3)
 # Columns of `found`, for each guard: the place of its crossing as a part of the step, whether that
 # is final, whether it is ridden, touches of the step (first row), the part of the step that is
-# decided, the end of the bracket of the crossing, whether a stop is pressed at the start.
-PLACE, FINAL, RIDDEN, TOUCHED, DECIDED, BRACKET, PRESSED = range(7)
+# decided, the end of the bracket of the crossing, whether a stop is pressed at the start, the
+# beginning of that bracket.
+PLACE, FINAL, RIDDEN, TOUCHED, DECIDED, BRACKET, PRESSED, BEGINS = range(8)
 # Columns of `stood`, for each row of gaps where the amplitudes stand: value and rate, the size of
 # its terms, what its fifth derivative is at most.
 HERE, SLOPE, SIZE, FIFTH = range(4)
 # Rows of `waves`, for each row of gaps: of each group of modes its real and imaginary part, its
 # rate, its size, the sizes of all terms from it on, and those of their rates; then these two once
-# more, 0. The last two are lanes whose numbers add up to them.
+# more, 0. The last two are lanes whose numbers add up to them. In place of the first four of the
+# last rows stand the Bernstein coefficients over a step.
 REAL, IMAGINARY, GOING, BOUND, BEYOND, FASTER, WAVES = range(7)
 # Rows of `column`: the amplitudes of a column of the derivative, as ROWS; then of several columns
 # side by side, two lanes for each number: the states, then the real and the imaginary part of the

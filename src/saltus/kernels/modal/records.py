@@ -104,19 +104,18 @@ def courses_at(tau, m):
 
 
 @kernel
-def add_course_series(r, first, at, h, m):
-    """Add the courses' part of a row of gaps to its terms in q[r], each times the factorial of its
-    order; returns its size over a time h. Its numbers stand in the rows from `first` on, from `at`
-    on.
+def add_course_series(first, at, h, m):
+    """Add the courses' part of a row of gaps to its terms in `p`; returns its size over a time h.
+    Its numbers stand in the rows from `first` on, from `at` on.
     """
     size = 0.0
     for p in range(m.sizes[COURSES]):
         for k in range(m.sizes[TERMS]):
             factor, power, share = number(m.steady, first, at + m.sizes[TERMS] * p + k), 1.0, 1.0
             for j in range(m.sizes[TERMS] - k):
-                part = factor * m.record[p, VALUE + k + j] * power
-                m.q[r, j] += part
-                size += abs(part) * share
+                part = factor * m.record[p, VALUE + k + j] * power * share
+                m.p[j] += part
+                size += abs(part)
                 power, share = power * h, share / (j + 1)
     return size
 

@@ -389,7 +389,7 @@ def advance(i, budget, batch, m):
             status = batch.status[i]
         elif answer == OPEN:
             batch.counters[i, REJECTED] += 1
-            batch.carry[i, NEXT_STEP], stands = 0.5 * h, True
+            batch.carry[i, NEXT_STEP], stands = shorter(modes, h, m), True
             status = NONFINITE if is_lost(modes, m) or not h > LEAST_STEP else RUNNING
         else:
             stands = False
