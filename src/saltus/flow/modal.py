@@ -132,6 +132,11 @@ class ModalFlow:
             for g in [-1, *np.flatnonzero(rests[rows[0]] & (tables.allowed != 0)).tolist()]:
                 self._rest(given, free, shown, g, held[rows, g], state, rows, time[rows])
         batch.state[who, : self._states] = state
+        gap, _ = self._values(given.gaps, given, state, drives)
+        for i, g in np.argwhere(gap * tables.limits > 0).tolist():  # a memory isn't beyond
+            row = given.gaps.matrix[g]
+            j = int(np.argmax(np.abs(row)))
+            batch.state[who[i], j] = state[i, j] = state[i, j] - gap[i, g] / row[j]
         gap, noise = self._values(given.gaps, given, state, drives)
         free = (tables.plain | (tables.allowed != 0)) & ~(stays | held)
         side, met = np.where((mode >> guards) & 1, 1.0, -1.0), (fresh >> guards) & (gap == 0.0) != 0

@@ -54,7 +54,7 @@ def ending_holds(i, tau, modes, steady, batch, m):
     set_block_drives(modes, m)
     stand(modes, steady, which, m)
     fastest = max(m.modes[modes + 3 * m.sizes[MODE_GROUPS] - 1, LANES - 1], block_limit(modes, m))
-    h = min(batch.carry[i, NEXT_STEP], next_break(m) - tau)
+    h = min(batch.period[i], next_break(m) - tau)  # the last step may have been rounding
     h = FOLLOWED / fastest if h * fastest > FOLLOWED else h
     for g in range(guards):
         rubs, row = m.laws[g, SECOND] >= 0, m.row_of[g]
@@ -81,7 +81,7 @@ def left_at_once(i, tau, modes, steady, batch, m):
     drive(i, tau, batch, m)
     set_block_drives(modes, m)
     stand(modes, steady, int(batch.carry[i, SET]), m)
-    h, margin = min(batch.carry[i, NEXT_STEP], next_break(m) - tau), batch.minima[i, GAP_MARGIN]
+    h, margin = min(batch.period[i], next_break(m) - tau), batch.minima[i, GAP_MARGIN]
     answer, d, hits = OPEN, 0.0, 0
     while answer == OPEN and h > LEAST_STEP:
         h = reach(i, h, modes, batch, m)
