@@ -11,7 +11,6 @@ import pytest
 
 import saltus as sl
 from conformance.systems import contacts, lab, pair, slider, walls
-from oracles import cut_check
 from saltus.analysis.motion.poincare import crossed
 
 FLIGHT = lab.with_values(boundary=0.0)  # x' = v, nothing else
@@ -286,20 +285,6 @@ def test_friction_cut_where_it_sticks_slides_and_turns(level, method):
             ]
             assert kinds[0] == kinds[1], (contact.time, shift)
             assert end_of(end, system) == pytest.approx(end_of(whole, system), abs=1e-13)
-
-
-@pytest.fixture(scope="module")
-def bodies():
-    return cut_check.made("bodies")
-
-
-def test_bodies_that_rub_and_strike_cut_anywhere(bodies):
-    """Frictions, a memory, stops without rebound, at once."""
-    for number in range(3):
-        rng = np.random.default_rng([20261126, number])
-        one = cut_check.drawn("bodies without rebound", bodies, rng)
-        answer = cut_check.cuts(*one, sl.Modal(), rng, 4)
-        assert {wrong for *_, wrong in answer} == {""}, (number, answer)
 
 
 def end_of(run, system):
