@@ -262,5 +262,30 @@ def test_rest_on_a_stop_without_rebound_cut_where_it_ends(gap, method):
         assert rows[-1].time == pytest.approx(leaves, abs=1e-14)
 
 
+@sl.system(states="x y u v", forced_at="w", units={"w": "rad/s"})
+def rubbed(t, x, y, u, v, *, w=3.0, level=1.1):
+    force = sl.friction(0.3 * u - 0.7 * v, slip=level)
+    push = 2 * sl.cos(w * t) - x - 0.3 * force
+    return u, v, push, 0.5 * sl.sin(w * t) - 2 * y + 0.7 * force
+
+
+@pytest.mark.nojit
+@pytest.mark.parametrize("method", [sl.Taylor(), sl.Modal()], ids=lambda one: one.name)
+@pytest.mark.parametrize("level", [0.4, 1.1])
+def test_friction_cut_where_it_sticks_slides_and_turns(level, method):
+    """Where it sticks its velocity, a sum, is rounding; so it is where it has nearly come to."""
+    system, start = rubbed.with_values(level=level), (0.1, 0.0, 0.3, 0.1)
+    whole = sl.simulate(system, start, t_end=2.0, samples=4, method=method, progress=False)
+    for contact in contacts(whole):
+        for shift in (-3, -1, 0, 1, 3):
+            cut = contact.time + shift * np.spacing(contact.time)
+            before, after, end = _halves(system, start, cut, 2.0, method)
+            kinds = [
+                [(c.kind, c.direction) for c in of] for of in (before + after, contacts(whole))
+            ]
+            assert kinds[0] == kinds[1], (contact.time, shift)
+            assert end_of(end, system) == pytest.approx(end_of(whole, system), abs=1e-13)
+
+
 def end_of(run, system):
     return np.array([float(run[f"end_{name}"]) for name in system.states])

@@ -135,6 +135,11 @@ class ModalFlow:
             for g in [-1, *np.flatnonzero(rests[rows[0]] & (tables.allowed != 0)).tolist()]:
                 self._rest(given, free, shown, g, held[rows, g], state, rows, time[rows])
         batch.state[who, : self._states] = state
+        gap, _ = self._values(given.gaps, given, state, drives)
+        for i, g in np.argwhere(gap * tables.limits > 0).tolist():  # a memory isn't beyond
+            row = given.gaps.matrix[g]
+            j = int(np.argmax(np.abs(row)))
+            batch.state[who[i], j] = state[i, j] = state[i, j] - gap[i, g] / row[j]
         gap, noise = self._values(given.gaps, given, state, drives)
         free = (tables.plain | (tables.allowed != 0)) & ~(stays | held)
         side, met = np.where((mode >> guards) & 1, 1.0, -1.0), (fresh >> guards) & (gap == 0.0) != 0
@@ -261,7 +266,8 @@ class ModalFlow:
             batch.status[who] = st.INVALID_FRICTION
         rubs = zero & self.tables.rubs
         zero &= plain | (allowed != 0) | rubs
-        up = np.where(zero, allowed > 0, gap > 0) & ~self.tables.holds
+        within = (allowed > 0) | (self.tables.limits < 0)
+        up = np.where(zero, within, gap > 0) & ~self.tables.holds
         mode = up @ bits if gap.shape[1] else np.zeros(len(who), np.int64)
         fresh = zero @ bits if gap.shape[1] else mode
         zero &= plain
@@ -276,14 +282,15 @@ class ModalFlow:
                 rows = batch.state[who[i], self._states :].reshape(self._states, -1)
                 rows[:] = begin.projection(int(mode[i]), held) @ rows
         twice, thrice = self._at_rest(given, state, drives, fresh), np.zeros(len(who), np.int64)
-        within = ((gap * allowed > 0) & state.any(axis=1)[:, None]) @ bits if len(bits) else fresh
-        fresh &= ~(within & ~twice)
+        apart = ((gap * allowed > 0) & state.any(axis=1)[:, None]) @ bits if len(bits) else fresh
+        fresh &= ~(apart & ~twice)
         for i in np.flatnonzero(zero.any(axis=1)).tolist():
             up, slow, slower, moves = self._ways(which, int(mode[i]), zero[i], state[i], time[i])
             # with a rate a gap in rounding isn't zero either, if it is that of a motion
             moves &= int((gap[i] != 0.0) @ bits) if state[i].any() else 0
             up = (up & ~moves) | (moves & int((gap[i] > 0.0) @ bits))
-            mode[i], twice[i], thrice[i] = mode[i] | up, twice[i] | slow, slower
+            mode[i] = (mode[i] & ~(zero[i] @ bits)) | up
+            twice[i], thrice[i] = twice[i] | slow, slower
             fresh[i] &= ~moves
             zero[i] &= (moves & bits) == 0
         batch.mode[who], batch.fresh[who] = mode, fresh

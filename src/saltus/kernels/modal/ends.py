@@ -5,7 +5,7 @@ wouldn't tell happens in this one.
 """
 
 from saltus.kernels.lanes import load, store
-from saltus.kernels.status import HOLD_LAW, IMPACT_LAW
+from saltus.kernels.status import GAP_MARGIN, HOLD_LAW, IMPACT_LAW, RUNNING
 
 
 @kernel
@@ -54,7 +54,7 @@ def ending_holds(i, tau, modes, steady, batch, m):
     set_block_drives(modes, m)
     stand(modes, steady, which, m)
     fastest = max(m.modes[modes + 3 * m.sizes[MODE_GROUPS] - 1, LANES - 1], block_limit(modes, m))
-    h = min(batch.carry[i, NEXT_STEP], next_break(m) - tau)
+    h = min(batch.period[i], next_break(m) - tau)  # the last step may have been rounding
     h = FOLLOWED / fastest if h * fastest > FOLLOWED else h
     for g in range(guards):
         rubs, row = m.laws[g, SECOND] >= 0, m.row_of[g]
@@ -68,6 +68,27 @@ def ending_holds(i, tau, modes, steady, batch, m):
             noise = terms_of(i, g, side_of(g, batch.mode[i]), batch, m)
             ending |= 1 << g if side_of_leaving(m.p, ORDER, 0, noise) < 0 else 0
     return ending
+
+
+@kernel
+def left_at_once(i, tau, modes, steady, batch, m):
+    """Bits of the guards that the motion would cross at tau, the end, if it went on: a landing
+    there isn't done before what follows from it at the same instant.
+    """
+    if batch.carry[i, STARTS] > 0.5:
+        return 0
+    keep_state(i, tau, batch, m)
+    drive(i, tau, batch, m)
+    set_block_drives(modes, m)
+    stand(modes, steady, int(batch.carry[i, SET]), m)
+    h, margin = min(batch.period[i], next_break(m) - tau), batch.minima[i, GAP_MARGIN]
+    answer, d, hits = OPEN, 0.0, 0
+    while answer == OPEN and h > LEAST_STEP:
+        h = reach(i, h, modes, batch, m)
+        answer, d, hits = look(i, tau, h, modes, steady, batch, m)
+        h *= 0.5
+    batch.status[i], batch.minima[i, GAP_MARGIN] = RUNNING, margin
+    return hits if answer == CROSSES and d == 0.0 else 0
 
 
 @kernel

@@ -197,7 +197,7 @@ def act(i, g, tau, d, hits, modes, steady, batch, m):
         know_rides(i, batch, m)
     elif d > 0.0:
         know_nothing(i, batch)
-    elif m.laws[g, KIND] == IMPACT_LAW:
+    elif m.laws[g, KIND] != HOLD_LAW:
         end_start(i, d, 1 << g, batch)
     for other in range(m.sizes[GUARDS]):
         jumps = d == 0.0 and m.laws[other, KIND] == HOLD_LAW  # what presses it isn't zero

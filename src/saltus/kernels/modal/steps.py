@@ -370,6 +370,8 @@ def advance(i, budget, batch, m):
                 take_samples(i, tau, tau, modes, steady, batch, m)
             if batch.count[i] >= batch.end_count[i] and tau >= batch.end_phase[i]:
                 hits = ending_holds(i, tau, modes, steady, batch, m)
+                if hits == 0 and batch.fresh[i] != 0:
+                    hits = left_at_once(i, tau, modes, steady, batch, m)
                 status = at_the_end(i, batch)
                 if hits != 0:
                     status = land_and_enter(i, tau, 0.0, hits, modes, steady, batch, m)

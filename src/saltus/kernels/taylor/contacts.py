@@ -177,7 +177,7 @@ def decide(lanes, lane, batch, slow):
     """
     h = lanes.run[STEP, lane]
     now = abs(lanes.clock[TAU, lane] + lanes.clock[BASE, lane])
-    first, hits, count, least = h, 0, 0, lanes.run[LEAST, lane]
+    first, hits, early, count, least = h, 0, 0, 0, lanes.run[LEAST, lane]
     lanes.memo[lane, DECIDED], lanes.memo[lane, RESTS], lanes.memo[lane, HITS] = 1, 0, 0
     if is_broken(lanes, lane, h, slow):
         lanes.memo[lane, BROKEN], lanes.found[DELTA, lane] = 1, 0.0
@@ -187,11 +187,15 @@ def decide(lanes, lane, batch, slow):
         if begins_in_rounding(lanes, lane, g):
             beyond = size_beyond(lanes, lane, batch, g, h, slow)
         at, count = first_place(lanes, lane, g, h, beyond, slow, count)
+        if at == 0.0 and lanes.run[STARTING, lane] > 0.5 and lanes.fresh[g, lane] > 0.5:
+            early |= 1 << g
         if at <= h:
             if hits != 0 and abs(at - first) <= COINCIDENT * now:
                 hits |= 1 << g
             elif hits == 0 or at < first:
                 hits, first = 1 << g, at
+    if early != 0:  # how the start begins is settled before others are met
+        first, hits = 0.0, early
     lanes.found[DELTA, lane] = first
     lanes.memo[lane, HITS] = hits
     note_touches(lanes, lane, batch, slow, first, count)
@@ -355,10 +359,8 @@ def show_clocks(lanes, lane, slow):
 
 @inner
 def begins_at_zero(g, slow):
-    """True if a gap in slow.gaps is zero, or the rounding of terms that cancel. The velocities of
-    surfaces tell their sides.
-    """
-    told = SNAP_STATE[g] >= 0 or LAW[g] == SURFACE_LAW
+    """True if a gap in slow.gaps is zero, or the rounding of terms that cancel."""
+    told = SNAP_STATE[g] >= 0
     return abs(slow.gaps[g]) <= (0.0 if told else ROUNDING * slow.gaps[SIZES * NGUARDS + g])
 
 

@@ -354,6 +354,8 @@ def caught(lanes, lane, batch, g, slow):
     gap = lanes.work[GAP_ROW + g, lane]
     if lanes.found[DELTA, lane] == 0.0 and lanes.fresh[g, lane] < 0.5 and gap != 0.0:
         return False  # it jumped over the surface
+    if lanes.fresh[g, lane] < 0.5:  # it comes from one side
+        lanes.run[STARTING, lane] = 0.0
     snap(lanes, lane, g)
     gaps_here(lanes, lane, batch, slow)
     back_again = lanes.run[BOUNCES, lane] > 1.5 and (int(lanes.run[FLIPPED, lane]) >> g) & 1 == 1
@@ -698,15 +700,15 @@ def rest_at_once(lanes, lane, batch, moves, slow):
 @kernel
 def end_rests(lanes, lane, batch, slow):
     """Release the stops at rest that a run which began here would find free: what presses them is
-    rounding, and falls. Put the others onto their constraints.
+    rounding, and falls. Put the others, and what sticks, onto their constraints.
     """
     d = lanes.found[DELTA, lane]
     for g in range(NGUARDS):
         h = PARTNER[g]
-        if LAW[g] == IMPACT_LAW and lanes.side[h, lane] > 0.0:
+        if LAW[g] != HOLD_LAW and h >= 0 and lanes.side[h, lane] > 0.0:
             gaps_here(lanes, lane, batch, slow)
-            pressed = presses(lanes, lane, batch, g, slow) > 0
-            if not pressed and gap_rate(lanes, lane, h, d) < 0.0:
+            asked = LAW[g] == IMPACT_LAW and presses(lanes, lane, batch, g, slow) <= 0
+            if asked and gap_rate(lanes, lane, h, d) < 0.0:
                 release(lanes, lane, batch, h, slow)
                 continue
             begin_impacts(lanes, lane, slow)

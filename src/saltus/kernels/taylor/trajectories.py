@@ -26,6 +26,7 @@ from saltus.kernels.status import (
     RESTING,
     RUNNING,
     STEPS,
+    SURFACE_LAW,
     UNRESOLVED,
 )
 
@@ -121,16 +122,21 @@ def final_contacts(lanes, lane, batch, slow):
 @kernel
 def keep_sides(lanes, lane, batch, slow):
     """Move an end on a boundary that rounding put on the side it came from, by rounding, to the
-    side on which the motion goes on: a run that begins there doesn't meet the contact again.
+    side on which the motion goes on: a run that begins there doesn't meet the contact again. What
+    slides isn't taken to stick there.
     """
     for g in range(NGUARDS):
         met = lanes.fresh[g, lane] > 0.5 and lanes.fresh[g, lane] < RIDDEN and SNAP_STATE[g] < 0
-        if not met or LAW[g] != NO_LAW:
+        slides = LAWS and LAW[g] == SURFACE_LAW and lanes.side[WATCHED + g, lane] > 0.5
+        slides = slides and SNAP_STATE[g] < 0
+        if not slides and (not met or LAW[g] != NO_LAW):
             continue
         most, inside = -1, side_here(lanes, lane, batch, g, slow)
-        wanted = 2.0e-16 * slow.gaps[SIZES * NGUARDS + g] - inside
+        size = slow.gaps[SIZES * NGUARDS + g]
+        least = 2.0 * ROUNDING * size if slides else 0.0
+        wanted = max(2.0 * least, 2.0e-16 * size) - inside
         change = 0.0
-        for i in range(NSTATES if inside < 0.0 else 0):
+        for i in range(NSTATES if inside < least else 0):
             kept = lanes.y[i, lane]
             lanes.y[i, lane] = kept * (1.0 + ALTERED)
             effect = side_here(lanes, lane, batch, g, slow) - inside
@@ -285,7 +291,10 @@ def start_sides(lanes, lane, batch, slow):
     for g in range(NGUARDS):
         zero = begins_at_zero(g, slow)
         past = LAW[g] == IMPACT_LAW and slow.gaps[g] * LAW_SIDE[g] < 0.0
-        doubtful = moves and slow.gaps[g] != 0.0 and not past
+        slides = LAW[g] == SURFACE_LAW
+        doubtful = moves and slow.gaps[g] != 0.0 and not past and not slides
+        if slides and zero:
+            lanes.prior[PRIOR_ROWS * g + NEW, lane] = slow.gaps[SIZES * NGUARDS + g]
         lanes.side[g, lane] = -1.0 if slow.gaps[g] < 0.0 else 1.0
         lanes.fresh[g, lane] = (DOUBTFUL if doubtful else 1.0) if zero else 0.0
         lanes.memo[lane, ALWAYS] |= (1 if zero else 0) << g
