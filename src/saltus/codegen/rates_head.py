@@ -22,9 +22,9 @@ from saltus.codegen.taylor_head import (
     tables,
     tables_of_laws,
 )
-from saltus.contact.guards import Guard
+from saltus.contact.guards import Guard, is_hold
 from saltus.errors import ParameterError
-from saltus.language import assuming
+from saltus.language import all_assuming
 from saltus.language import expression as ex
 from saltus.language.derivatives import differentiate
 from saltus.language.expression import Expr
@@ -145,12 +145,13 @@ def never_held(system: System) -> System:
                 f"{system.name} has static friction above kinetic friction at {guard.name!r}, "
                 f"which only sl.Taylor() follows. Leave method= out."
             )
-    guards, field = list(system.guards), system.field
-    for number, guard in enumerate(system.guards):
-        if guard.law and guard.law.kind == "hold":
-            guards[number] = Guard(guard.name, ex.constant(-1.0))
-            field = tuple(assuming(entry, number, False) for entry in field)
-    return system if field is system.field else replace(system, field=field, guards=tuple(guards))
+    guards, holds = list(system.guards), [n for n, one in enumerate(system.guards) if is_hold(one)]
+    if not holds:
+        return system
+    for number in holds:
+        guards[number] = Guard(guards[number].name, ex.constant(-1.0))
+    field = all_assuming(system.field, holds, False)
+    return replace(system, field=field, guards=tuple(guards))
 
 
 def rates_head(system: System, numbers: Mapping[str, Constant], jacobian: bool = False) -> Head:

@@ -22,7 +22,7 @@ from saltus.codegen.series import Linear, SeriesBuilder, is_constant
 from saltus.contact.guards import Guard, is_hold
 from saltus.contact.singular import set_aside
 from saltus.kernels.status import LAW_KINDS, NO_LAW
-from saltus.language import assuming
+from saltus.language import all_assuming
 from saltus.language import expression as ex
 from saltus.language.expression import Expr
 from saltus.system import System
@@ -189,7 +189,7 @@ def taylor_head(system: System, order: int, lanes: int) -> Head:
         code.values()
     for j in range(len(aside.guards)):
         if isinstance(code, LoopCode) and sums:
-            parts = [assuming(part, aside.first + j, True) for part in sums.parts]
+            parts = list(all_assuming(sums.parts, [aside.first + j], True))
             code.without(parts, calm_row + j * moved, moved)
             continue
         for i, entry in enumerate(aside.without(j, moved)):

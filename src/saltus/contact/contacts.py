@@ -34,7 +34,7 @@ from saltus.language.canonical import Canonical, proportion
 from saltus.language.derivatives import gradient, time_derivative
 from saltus.language.evaluate import evaluate
 from saltus.language.expression import Bit, Expr, Friction, Not, Operand
-from saltus.language.known_sides import assuming
+from saltus.language.known_sides import all_assuming, assuming
 from saltus.language.roots import with_root, zero_where_idle
 from saltus.language.sums import dot, ratio
 
@@ -335,7 +335,7 @@ class _Forces:
         if rubbing is None:
             return held
         sticks = self._held[rubbing.guard].hold
-        return replace(held, direction=tuple(assuming(x, sticks, True) for x in held.direction))
+        return replace(held, direction=all_assuming(held.direction, [sticks], True))
 
     def without_friction(self, held: Held) -> Expr:
         """The pivot of a contact without its friction."""

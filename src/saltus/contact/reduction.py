@@ -15,12 +15,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from saltus.contact.guards import Guard, bits_in
+from saltus.contact.guards import Guard, bits_in, is_hold
 from saltus.language import expression as ex
 from saltus.language.canonical import Canonical
 from saltus.language.derivatives import gradient, time_derivative
 from saltus.language.expression import Bit, Expr
-from saltus.language.known_sides import assuming
+from saltus.language.known_sides import all_assuming, assuming
 from saltus.language.sums import dot, ratio, total
 
 _ZERO, _ONE = ex.constant(0.0), ex.constant(1.0)
@@ -155,8 +155,8 @@ class Elimination:
         the field by a unit of force.
         """
         field, directions = self._without(contact)
-        field = tuple(assuming(entry, contact.hold, True) for entry in field)
-        direction = tuple(assuming(x, contact.hold, True) for x in directions[contact.hold])
+        field = all_assuming(field, [contact.hold], True)
+        direction = all_assuming(directions[contact.hold], [contact.hold], True)
         drive = ex.add(dot(contact.normal, field), contact.drift)
         strength = assuming(contact.strength, contact.hold, True)
         return drive, ex.mul(strength, dot(contact.normal, direction)), direction
@@ -180,7 +180,8 @@ class Elimination:
             field = self._take(contact, field, direction, ratio(rate, across), contact.drift)
             for other in later:
                 along = dot(contact.normal, directions[other.hold])
-                if self._canonical.polynomial(along):
+                while_free = dot(contact.normal, other.direction)  # short, and mostly enough
+                if any(map(self._canonical.polynomial, (while_free, along))):
                     directions[other.hold] = self._take(
                         contact, directions[other.hold], direction, ratio(along, across), _ZERO
                     )
@@ -266,7 +267,5 @@ def hold_gap(kind: str, drive: Expr, pivot: Expr, limit: Expr | None) -> Expr:
 
 def free_field(field: Sequence[Expr], guards: Sequence[Guard]) -> tuple[Expr, ...]:
     """The field as it was written, with no contact held."""
-    for number, guard in enumerate(guards):
-        if guard.law is not None and guard.law.kind == "hold":
-            field = [assuming(entry, number, False) for entry in field]
-    return tuple(field)
+    holds = [number for number, guard in enumerate(guards) if is_hold(guard)]
+    return all_assuming(field, holds, False)

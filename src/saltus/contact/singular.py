@@ -23,7 +23,7 @@ from saltus.errors import TraceError
 from saltus.language import expression as ex
 from saltus.language.canonical import Canonical, is_multiple
 from saltus.language.expression import And, Bit, Condition, Expr, Not, Or
-from saltus.language.known_sides import assuming
+from saltus.language.known_sides import all_assuming, assuming
 
 _ZERO = ex.constant(0.0)
 #: Order of a logarithm: below every power.
@@ -63,7 +63,7 @@ class SetAside(NamedTuple):
 
     def without(self, j: int, count: int | None = None) -> tuple[Expr, ...]:
         """The field, or its first entries, without the terms of ``guards[j]``."""
-        return tuple(assuming(entry, self.first + j, True) for entry in self.field[:count])
+        return all_assuming(self.field[:count], [self.first + j], True)
 
 
 def set_aside(field: Sequence[Expr], guards: Sequence[Guard]) -> SetAside:

@@ -40,7 +40,7 @@ from saltus.language.functions import (
     tanh,
 )
 from saltus.language.inputs import pulse, recorded, sawtooth, square
-from saltus.language.known_sides import assuming
+from saltus.language.known_sides import all_assuming, assuming
 from saltus.language.names import why_no_title
 from saltus.language.roots import root_name
 from saltus.language.sums import dot, total
@@ -48,8 +48,8 @@ from saltus.language.sweeps import sweep
 from saltus.language.tables import Table, curve, table
 
 __all__ = [
-    "Table", "abs", "acos", "asin", "assuming", "atan", "atan2", "clip", "cos", "cosh", "curve",
-    "dot", "exp", "heaviside", "hypot", "log", "max", "min", "mod", "pi", "piecewise", "pulse",
-    "recorded", "root_name", "sawtooth", "sign", "sin", "sinh", "sqrt", "square", "sweep", "table",
-    "tan", "tanh", "total", "units_of", "where", "why_no_title",
+    "Table", "abs", "acos", "all_assuming", "asin", "assuming", "atan", "atan2", "clip", "cos",
+    "cosh", "curve", "dot", "exp", "heaviside", "hypot", "log", "max", "min", "mod", "pi",
+    "piecewise", "pulse", "recorded", "root_name", "sawtooth", "sign", "sin", "sinh", "sqrt",
+    "square", "sweep", "table", "tan", "tanh", "total", "units_of", "where", "why_no_title",
 ]  # fmt: skip

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+
 from saltus.language import expression as ex
 from saltus.language.expression import And, Bit, Condition, Expr, Not, Or, Relation
 
@@ -11,15 +13,21 @@ def assuming(root: Expr, bit: int, value: bool) -> Expr:
     quotient by something that the bit makes zero is zero: it is the force of a contact that can't
     be held then, and is released.
     """
+    return all_assuming((root,), (bit,), value)[0]
+
+
+def all_assuming(roots: Sequence[Expr], bits: Iterable[int], value: bool) -> tuple[Expr, ...]:
+    """Substitute bits of one value in several expressions; what they share is substituted once."""
+    known = sum(1 << bit for bit in set(bits))
     memo: dict[Expr, Expr] = {}
-    stack = [root]
+    stack = [*roots]
     while stack:
         node = stack[-1]
-        if not node.bits >> bit & 1:
-            memo[node] = node
+        if node in memo or not node.bits & known:
+            memo.setdefault(node, node)
             stack.pop()
             continue
-        condition = _knowing(node.payload, bit, value) if node.op == "select" else None
+        condition = _knowing(node.payload, known, value) if node.op == "select" else None
         decided = isinstance(condition, bool)
         args = (node.args[not condition],) if decided else node.args
         if missing := [child for child in args if child not in memo]:
@@ -33,19 +41,19 @@ def assuming(root: Expr, bit: int, value: bool) -> Expr:
             memo[node] = ex.constant(0.0)
         else:
             memo[node] = ex.rebuild(node, new, node.payload if condition is None else condition)
-    return memo[root]
+    return tuple(memo[root] for root in roots)
 
 
-def _knowing(condition: Condition, bit: int, value: bool) -> Condition | bool:
-    if not condition.bits >> bit & 1:
+def _knowing(condition: Condition, known: int, value: bool) -> Condition | bool:
+    if not condition.bits & known:
         return condition
     match condition:
-        case Bit(number):
-            return value if number == bit else condition
+        case Bit():
+            return value
         case Relation():  # a switch of time
             return condition
         case Not(inner):
-            inside = _knowing(inner, bit, value)
+            inside = _knowing(inner, known, value)
             return (
                 not inside
                 if isinstance(inside, bool)
@@ -53,7 +61,7 @@ def _knowing(condition: Condition, bit: int, value: bool) -> Condition | bool:
             )
         case And(left, right) | Or(left, right):
             neutral = isinstance(condition, And)
-            a, b = _knowing(left, bit, value), _knowing(right, bit, value)
+            a, b = _knowing(left, known, value), _knowing(right, known, value)
             if isinstance(a, bool):
                 return b if a is neutral else a
             if isinstance(b, bool):

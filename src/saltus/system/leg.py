@@ -13,7 +13,7 @@ import functools
 from saltus.errors import ParameterError
 from saltus.language import expression as ex
 from saltus.language.expression import Expr
-from saltus.language.known_sides import assuming
+from saltus.language.known_sides import all_assuming
 from saltus.system.system import System
 
 #: Most states of a system whose segments are followed, parameters that vary included.
@@ -79,7 +79,8 @@ def _smooth_in_time(entry: Expr) -> bool:
 
 def frozen(system: System, expressions: tuple[Expr, ...], mode: int) -> tuple[Expr, ...]:
     """Expressions in one mode; bit i is the side of guard i."""
-    for number in range(len(system.guards)):
-        side = bool(mode >> number & 1)
-        expressions = tuple(assuming(entry, number, side) for entry in expressions)
-    return expressions
+    guards = range(len(system.guards))
+    above = [number for number in guards if mode >> number & 1]
+    return all_assuming(
+        all_assuming(expressions, above, True), set(guards).difference(above), False
+    )
