@@ -11,6 +11,7 @@ import pytest
 
 import saltus as sl
 from conformance.systems import contacts, lab, pair, slider, walls
+from oracles import cut_check
 from saltus.analysis.motion.poincare import crossed
 
 FLIGHT = lab.with_values(boundary=0.0)  # x' = v, nothing else
@@ -286,6 +287,16 @@ def test_friction_cut_where_it_sticks_slides_and_turns(level, method):
             ]
             assert kinds[0] == kinds[1], (contact.time, shift)
             assert end_of(end, system) == pytest.approx(end_of(whole, system), abs=1e-13)
+
+
+@pytest.mark.parametrize(("kind", "method"), [("rough", "Taylor"), ("clays", "Modal")])
+def test_random_motions_cut_beside_contacts(kind, method):
+    """``python -m oracles.cut_check`` draws hundreds, of more kinds."""
+    rng = np.random.default_rng([112723, 0])
+    one = cut_check.drawn(kind, cut_check.made(kind), rng)
+    found = cut_check.cuts(*one, cut_check.METHODS[method], rng, most=3)
+    assert len(found) == 17
+    assert [row for row in found if row[2]] == []
 
 
 def end_of(run, system):

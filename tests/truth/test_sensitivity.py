@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
+from saltus.errors import SaltusWarning
 
 #: Differences of fourth order, and their steps.
 WEIGHTS = np.array([1.0, -8.0, 8.0, -1.0]) / 12.0
@@ -310,3 +311,16 @@ def test_a_start_on_either_limit_of_a_play_has_the_derivatives_of_its_mirror_ima
     assert str(high.status.item()) == str(low.status.item()) == "ok"
     np.testing.assert_allclose(low.end_derivative, -high.end_derivative, rtol=1e-9)
     np.testing.assert_allclose(low.minimum_derivative, -high.maximum_derivative, rtol=1e-9)
+
+
+def test_a_graze_of_a_rigid_stop_to_rounding_is_warned_of():
+    """x = cos t with a damper that the force balances touches its stop where it turns."""
+    motion = sl.models.impact_oscillator(force=0.1)
+    with pytest.warns(SaltusWarning, match="slope is infinite on the side with contact"):
+        result = sl.sensitivity(motion, (0.0, 1.0), t_end=3.0, to="force")
+    assert str(result.status.values) == "graze_unresolved"
+
+
+def test_two_samples_on_zeros_of_a_motion_tell_nothing_of_its_range():
+    motion = sl.models.impact_oscillator(force=0.1 - 1e-6)
+    sl.sensitivity(motion, (0.0, 1.0 - 1e-5), t_end=5.0, samples=2, to="force")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from saltus.analysis.derivatives.sensitivity import sensitivity_run, warn_of_chaos
+from saltus.analysis.derivatives.sensitivity import sensitivity_run, warn_of_limits
 from saltus.analysis.derivatives.sensitivity_table import (
     SensitivityRun,
     sensitivity_dataset,
@@ -79,7 +79,7 @@ class DividedSensitivity(DividedRows):
             raise Interrupted(result)
         ds = result()
         warn(ds, self.asked.length, self.system)
-        warn_of_chaos(ds)
+        warn_of_limits(self.system, ds)
         return ds
 
     def _part(

@@ -169,7 +169,7 @@ def sensitivity(
         result = answer(outcome)
     warn(result, run.length, system)
     if run.closed is None:
-        warn_of_chaos(result)
+        warn_of_limits(system, result)
     else:
         warn_of_orbits(system, result, run.closed)
     return result
@@ -224,12 +224,34 @@ def sensitivity_run(
     )  # fmt: skip
 
 
-def warn_of_chaos(result: xr.Dataset) -> None:
-    """Say so where a motion is so sensitive that its derivatives hold for no change at all."""
+def warn_of_limits(system: System, result: xr.Dataset) -> None:
+    """Say so where derivatives of a motion hold for no change at all, or for none on one side."""
+    rigid = any(one.law is not None and one.law.kind == "impact" for one in system.guards)
+    if rigid and (result["status"].values == "graze_unresolved").any():
+        warnings.warn(
+            SaltusWarning(
+                "a contact is grazed to rounding (status graze_unresolved). At the graze of a "
+                "rigid stop the slope is infinite on the side with contact: derivatives from there "
+                "on, and those of a largest value there, are of neither side. Compare with runs at "
+                "values a little above and below."
+            ),
+            stacklevel=2,
+        )
+    _warn_of_chaos(result)
+
+
+def _warn_of_chaos(result: xr.Dataset) -> None:
+    """Say so where a change of a parameter by :data:`SLIGHT` of itself moves an output by more than
+    its range: between its extremes where they are known, else of its samples.
+    """
     size = np.abs(result["to_value"].values)[..., None, None, :]
     change = SLIGHT * np.abs(result["derivative"].values) * size
     values = result["value"].values
-    span = np.nanmax(values, axis=-2, initial=-np.inf) - np.nanmin(values, axis=-2, initial=np.inf)
+    if "maximum" in result:
+        span = result["maximum"].values - result["minimum"].values
+    else:
+        span = np.nanmax(values, axis=-2, initial=-np.inf)
+        span = span - np.nanmin(values, axis=-2, initial=np.inf)
     beyond = change > np.where(span > 0, span, np.inf)[..., None, :, None]
     if not beyond.any():
         return
@@ -240,5 +262,5 @@ def warn_of_chaos(result: xr.Dataset) -> None:
             f"parameter by {SLIGHT:g} of itself would change an output by more than its range. "
             "Run for a shorter time, or take averages of many motions."
         ),
-        stacklevel=2,
+        stacklevel=3,
     )
