@@ -289,12 +289,12 @@ def test_friction_cut_where_it_sticks_slides_and_turns(level, method):
             assert end_of(end, system) == pytest.approx(end_of(whole, system), abs=1e-13)
 
 
-@pytest.mark.parametrize(("kind", "method"), [("rough", "Taylor"), ("clays", "Modal")])
-def test_random_motions_cut_beside_contacts(kind, method):
+@pytest.mark.parametrize("number", [0, 2])
+def test_random_rough_structures_cut_beside_contacts(number):
     """``python -m oracles.cut_check`` draws hundreds, of more kinds."""
-    rng = np.random.default_rng([112723, 0])
-    one = cut_check.drawn(kind, cut_check.made(kind), rng)
-    found = cut_check.cuts(*one, cut_check.METHODS[method], rng, most=3)
+    rng = np.random.default_rng([112725, number])
+    one = cut_check.drawn("rough", cut_check.made("rough"), rng)
+    found = cut_check.cuts(*one, cut_check.METHODS["Taylor"], rng, most=3)
     assert len(found) == 17
     assert [row for row in found if row[2]] == []
 
