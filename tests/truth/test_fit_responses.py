@@ -73,6 +73,13 @@ def test_derivatives_of_sizes_are_limits_of_differences_through_a_jump(size):
         assert slopes[i] == pytest.approx(step @ each / 12e-6, abs=1e-9)
 
 
+@pytest.mark.parametrize("size", ["amplitude", "rms", "peak"])
+def test_the_size_of_an_output_that_stays_zero_doesnt_change(size):
+    parts = OrbitParts.of(np.zeros(0), np.zeros((0, 1)), 1.0, 0.1)
+    none = np.zeros((len(parts.times), 1, 1))
+    assert parts.slopes(size, none[..., 0], none, 2 * np.pi).tolist() == [[0.0]]
+
+
 def test_a_response_with_a_jump_gives_the_gap_and_the_stiffness():
     exact = model({"frequency": FREQUENCY, "x": SIZE}).plain(TRUTH[None])[0][:, 0]
     noise = 1e-5 * np.random.default_rng(9).standard_normal(len(exact))

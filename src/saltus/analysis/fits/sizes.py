@@ -74,14 +74,14 @@ class OrbitParts:
             rms = np.sqrt(np.einsum("qn,qnk->k", share, y**2))
             half = np.einsum("qn,qnk,qnkp->kp", share, y, by)
             half += 0.5 * np.einsum("qek,qep->kp", ends**2, moved)
-            return np.asarray(half / rms[:, None])
+            return _quotients(half, rms)
         turn = 2.0 * np.exp(-1j * rate * self.times).reshape(share.shape)
         whole = np.einsum("qn,qnk->k", share * turn, y)
         change = np.einsum("qn,qnkp->kp", share * turn, by)
         instants = np.stack([self.begin, self.begin + self.length], axis=1)
         jumps = 2.0 * np.exp(-1j * rate * instants)[..., None] * ends
         change += np.einsum("qek,qep->kp", jumps, moved)
-        return np.asarray((np.conj(whole)[:, None] * change).real / np.abs(whole)[:, None])
+        return _quotients((np.conj(whole)[:, None] * change).real, np.abs(whole))
 
     def _peak(self, y: np.ndarray, by: np.ndarray) -> np.ndarray:
         """Those of the largest magnitude, where the output turns or jumps."""
@@ -100,6 +100,15 @@ class OrbitParts:
             own = polynomials.value(slopes[:, one, k], np.full(by.shape[3], at))
             change[k] = np.sign(values[best]) * (own + rate * late)
         return change
+
+
+def _quotients(changes: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """Slopes float64[K, p] of sizes float64[K]. That of an output which stays zero, as the force at
+    a stop that isn't met, is zero: the mean of both sides.
+    """
+    slopes = np.zeros(changes.shape)
+    np.divide(changes, sizes[:, None], out=slopes, where=sizes[:, None] > 0)
+    return slopes
 
 
 def _at(y: np.ndarray, place: float) -> np.ndarray:
