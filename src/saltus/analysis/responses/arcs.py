@@ -45,9 +45,9 @@ TAKEN = 8
 #: Most unknowns of an orbit that is followed: each point of its branch asks for their square in
 #: memory, and for their cube in work.
 MOST_UNKNOWNS = 400
-#: Most work on the branches of responses, see :class:`saltus.analysis.branches.watch.Watch`: 780
-#: points of 80 states, which take half a minute.
-MOST_WORK = 5e6
+#: Most work on the branches of responses, see :class:`saltus.analysis.branches.watch.Watch`: 470
+#: points of 80 states, some ten seconds.
+MOST_WORK = 3e6
 #: Largest distance of a response of an inexact method from its exact orbit, in units of its range.
 INEXACT = 0.05
 

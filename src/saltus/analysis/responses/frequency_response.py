@@ -47,7 +47,7 @@ def frequency_response(
        rounding.
 
     Branches have a budget, which models of few states never reach: points times periods of their
-    orbits times squares of their states are at most 4e6, 625 points of an orbit of 80 states
+    orbits times squares of their states are at most 3e6, 470 points of an orbit of 80 states
     that repeats every period. Those of few periods come first; an orbit of n periods and D states
     with n D > 400 isn't followed. What was left is counted in the attribute
     ``responses_not_followed``; such responses are matched with their neighbours by where they lie.
