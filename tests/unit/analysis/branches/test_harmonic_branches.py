@@ -63,6 +63,7 @@ def curved(t, x, v, *, power=1.5, w=0.8):
     return v, sl.cos(w * t) - 0.2 * v - x - sl.hertz(x - 0.3, stiffness=4.0, exponent=power)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("power", [0.25, 1.5])
 def test_order_by_the_power_of_a_depth(power):
     """Harmonics of the force fall as k^-(power + 1): deflections are off by H^-(power + 2),
