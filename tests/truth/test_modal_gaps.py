@@ -15,7 +15,21 @@ from saltus.codegen.module import MODAL_LANES
 from saltus.flow import modal_state_rows
 from saltus.flow.modal import bernstein_table
 from saltus.flow.modal_eigen import shared_of
-from saltus.kernels.modal.layout import CLOSER, FACTORIAL, HALF, ORDER, QUEUE, SPANNED, STEEPER
+from saltus.kernels.modal.layout import (
+    CLOSER,
+    FACTORIAL,
+    HALF,
+    LEFT_HALF,
+    ORDER,
+    OVER_X,
+    PLACES,
+    QUEUE,
+    RIGHT_HALF,
+    SHARES,
+    SPANNED,
+    STEEPER,
+    TABLE,
+)
 from saltus.system.linearity import linear_pieces
 
 
@@ -185,7 +199,7 @@ def test_few_tries_are_in_vain():
 
 
 def test_terms_at_both_ends_tell_the_polynomial_of_scipy():
-    rows = bernstein_table(MODAL_LANES).reshape(3, 16, 16)
+    rows = bernstein_table(MODAL_LANES)[:LEFT_HALF].reshape(3, 16, 16)
     terms = np.random.default_rng(2).normal(size=(2, HALF))
     factorials = np.array([float(math.factorial(k)) for k in range(HALF)])
     told = BPoly.from_derivatives([0.0, 1.0], terms * factorials)
@@ -195,6 +209,24 @@ def test_terms_at_both_ends_tell_the_polynomial_of_scipy():
     x = np.linspace(0, 1, 33)
     powers = np.polynomial.Polynomial(terms.ravel() @ rows[2])
     assert powers(x) == pytest.approx(told(x), abs=1e-8)
+
+
+def test_tables_of_the_halves_of_a_part_are_those_of_de_casteljau():
+    """By scipy's Bernstein polynomials; one of a lower degree is the end of the right table."""
+    table, rng = bernstein_table(MODAL_LANES), np.random.default_rng(5)
+    left, right = (table[at : at + TABLE].reshape(16, 16) for at in (LEFT_HALF, RIGHT_HALF))
+    x = np.linspace(0, 1, 30)
+    for degree in (15, 14, 13):
+        less, parts = ORDER - degree, rng.normal(size=degree + 1)
+        whole = BPoly(parts[:, None], [0, 1])
+        first = BPoly((parts @ left[: degree + 1, : degree + 1])[:, None], [0, 1])
+        second = BPoly((parts @ right[less:, less:])[:, None], [0, 1])
+        assert first(x) == pytest.approx(whole(x / 2), abs=1e-14)
+        assert second(x) == pytest.approx(whole((1 + x) / 2), abs=1e-14)
+    places, over_x, shares = (table[at:].ravel()[:16] for at in (PLACES, OVER_X, SHARES))
+    assert places.tolist() == list(range(16))
+    assert over_x.tolist() == [ORDER / (k + 1.0) for k in range(16)]
+    assert shares.tolist() == [1.0 / math.factorial(k) for k in range(16)]
 
 
 def test_what_terms_at_both_ends_leave_out_of_waves_is_within_its_bound():

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from saltus.codegen.blocks import Line
 from saltus.codegen.interface import ARRAY
+from saltus.kernels.lanes import WHOLE_IN_LAST_BITS
 
 # Kinds of values: a lane, a mask of lanes, a double, a truth value, a whole number; a table of
 # doubles, of whole numbers.
@@ -253,6 +254,13 @@ class Expressions:
                     LANE,
                     f"select {self.types[MASK]} {mask.text}, {vector} {a.text}, {vector} {b.text}",
                 )
+            case "is_odd":
+                first = self._shifted(self.lane(values[0]), 63)
+                zero = self._whole_lane(0)
+                whole = f"<{self.lanes} x i64>"
+                return self.new(MASK, f"icmp slt {whole} {first}, {zero}")
+            case "turned_half":
+                return self._turned_half(self.lane(values[0]), self.lane(values[1]))
             case "turned":
                 given = ", ".join(f"{self.types[v.kind]} {v.text}" for v in values)
                 return self.new(NUMBER, f"call double @saltus_turned({given})")
@@ -261,6 +269,26 @@ class Expressions:
         if name.startswith("libm_"):
             return self._lane_by_lane(name.removeprefix("libm_"), [self.lane(v) for v in values])
         raise UntranslatableError(name)
+
+    def _whole_lane(self, value: int) -> str:
+        """The same integer in every lane."""
+        return f"<{', '.join([f'i64 {value}'] * self.lanes)}>"
+
+    def _shifted(self, n: Value, by: int) -> str:
+        """The last bits of a lane of whole numbers as first ones; see lowering/lane_types.py."""
+        vector, whole = self.types[LANE], f"<{self.lanes} x i64>"
+        high = self.lane(Value(NUMBER, literal(WHOLE_IN_LAST_BITS)))
+        total = self.new(LANE, f"fadd {vector} {n.text}, {high.text}")
+        last = self.new(LANE, f"bitcast {vector} {total.text} to {whole}")
+        return self.new(LANE, f"shl {whole} {last.text}, {self._whole_lane(by)}").text
+
+    def _turned_half(self, a: Value, n: Value) -> Value:
+        vector, whole = self.types[LANE], f"<{self.lanes} x i64>"
+        sign, first = self._whole_lane(-(2**63)), self._shifted(n, 62)
+        turned = self.new(LANE, f"and {whole} {first}, {sign}")
+        plain = self.new(LANE, f"bitcast {vector} {a.text} to {whole}")
+        both = self.new(LANE, f"xor {whole} {plain.text}, {turned.text}")
+        return self.new(LANE, f"bitcast {whole} {both.text} to {vector}")
 
     def _library(self, name: str, kind: str, values: list[Value]) -> Value:
         type_ = self.types[kind]

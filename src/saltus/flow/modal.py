@@ -46,7 +46,8 @@ WAYS = 12
 def bernstein_table(lanes: int) -> np.ndarray:
     """Bernstein coefficients on [0, 1] of the polynomials of which one of the first terms at 0,
     then at 1, is one, and the others zero; the differences of two that follow one another; the
-    powers of x in these polynomials: float64[3 * 16 * 16 / lanes, lanes], as rows of the kernel.
+    powers of x in these polynomials; what each coefficient adds to those of the left half, and of
+    the right one; numbers: float64[rows, lanes], see `bernstein` in kernels/modal/layout.py.
     """
     order, half = layout.ORDER, layout.HALF
     terms, table = range(order + 1), np.zeros((order + 1, order + 1))
@@ -58,7 +59,13 @@ def bernstein_table(lanes: int) -> np.ndarray:
     powers = [
         [(-1) ** (k - i) * math.comb(order, k) * math.comb(k, i) for k in terms] for i in terms
     ]
-    return np.concatenate([table, steps, table @ np.array(powers, float)]).reshape(-1, lanes)
+    left = [[math.comb(i, k) / 2.0**i for i in terms] for k in terms]
+    halves = [left, np.array(left)[::-1, ::-1]]
+    places = np.arange(order + 1.0)
+    shares = [1.0 / math.factorial(k) for k in terms]
+    numbers = [[*places, *(order / (places + 1.0)), *shares, *(0.0 for _ in terms)]]
+    tables = [table, steps, table @ np.array(powers, float), *halves]
+    return np.concatenate([*map(np.ravel, tables), *numbers]).reshape(-1, lanes)
 
 
 class ModalFlow:
@@ -217,7 +224,7 @@ class ModalFlow:
                 empty((max(rows, 1), terms + layout.HALF)), empty((max(rows, 1), 4)), empty(terms),
                 empty((DEEPEST + 2, terms)), empty((DEEPEST + 2, 2)), empty(terms), empty(2),
                 empty((MOST_TOUCHES, 2)), empty((states, lanes)), empty((states, lanes)),
-                empty((max(drives, 1), 6)), empty((max(guards, 1), 8)),
+                empty((max(drives, 1), 6)), empty((max(guards, 1), layout.FACTORS + 1)),
                 empty(((terms + 2) * self.tables.block_groups, lanes)),
                 empty((max(courses, 1), layout.VALUE + self.tables.linear.terms)),
                 empty((2 * groups, lanes)),

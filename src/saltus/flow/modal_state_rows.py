@@ -18,7 +18,7 @@ def modes_rows(
     matrix: np.ndarray, modes: StateModes, gaps: np.ndarray, groups: int, state_groups: int
 ) -> np.ndarray:
     """The table of some modes: lambda, its size, L, V, amplitudes of the gaps; where L and V aren't
-    zero; the block.
+    zero; the groups of modes in use; the block.
 
     Parameters
     ----------
@@ -62,8 +62,9 @@ def modes_rows(
         runs_of((side != 0).reshape(rows, LANES, columns, LANES).any(axis=(1, 3)))
         for side, rows, columns in sides
     ]
+    used = np.array([-(-slots // LANES), 0.0, 0.0, 0.0])
     return np.concatenate(
-        [one.ravel() for one in (lam.real, lam.imag, size, left, right, waves, *runs, *block)]
+        [one.ravel() for one in (lam.real, lam.imag, size, left, right, waves, *runs, used, *block)]
     )
 
 

@@ -6,13 +6,18 @@ below. Compiled they are single machine instructions (AVX-512: 8 lanes, AVX2: 4,
 lane takes several): codegen/lowering/lane_types.py says which. Here they are NumPy on arrays of
 shape ``(width,)``, which is what runs with ``SALTUS_DISABLE_JIT=1``.
 
-No operation mixes lanes except :func:`any_lane` and :func:`bits`, which only steer: a lane's digits
-never depend on its neighbours.
+No operation mixes lanes except :func:`any_lane` and :func:`bits`, which only steer, and
+:func:`totals`, for lanes that hold the parts of one number: else a lane's digits never depend on
+its neighbours.
 """
 
 from __future__ import annotations
 
 import numpy as np
+
+#: Added to a whole number n less than 2^50 in size, 1.5 * 2^52 leaves n in the last bits: no
+#: instruction before AVX-512 makes lanes of doubles integers.
+WHOLE_IN_LAST_BITS = 6755399441055744.0
 
 
 def load(array, row, width):
@@ -23,6 +28,22 @@ def load(array, row, width):
 def store(array, row, lane):
     """Write a lane to row ``row`` of ``array`` (rows, width)."""
     array[row] = lane
+
+
+def load_at(array, row, column, width):
+    """Row ``row`` of ``array`` (rows, columns) from a column on; behind the row the next one."""
+    start = row * array.shape[1] + column
+    return array.reshape(-1)[start : start + width].copy()
+
+
+def store_at(array, row, column, lane):
+    """Write a lane to row ``row`` of ``array`` (rows, columns) from a column on."""
+    array[row, column : column + len(lane)] = lane
+
+
+def totals(a, b, c, d):
+    """The sums of four lanes of width four, as one lane."""
+    return np.array([(x[0] + x[1]) + (x[2] + x[3]) for x in (a, b, c, d)])
 
 
 def splat(value, width):
@@ -95,6 +116,28 @@ def coarse_log2(a):
 def coarse_exp2(a):
     """The inverse of :func:`coarse_log2`."""
     return ((np.clip(a, -1000.0, 1000.0) + 1023.0) * 2.0**52).astype(np.int64).view(np.float64)
+
+
+def power_of_two(n):
+    """2^n of whole numbers n, at most 1000 in size."""
+    return np.ldexp(1.0, _whole(n))
+
+
+def is_odd(n):
+    """A mask of the whole numbers that are odd; they are less than 2^50 in size."""
+    return _whole(n) & 1 == 1
+
+
+def turned_half(a, n):
+    """``-a`` where the whole number n, less than 2^50 in size, has its second bit set: where n
+    quarter turns are a half turn, or a half and a quarter. Else ``a``.
+    """
+    return np.where(_whole(n) & 2 == 2, -a, a)
+
+
+def _whole(n):
+    """Whole numbers as integers."""
+    return np.nan_to_num(np.clip(n, -(2.0**50), 2.0**50)).astype(np.int64)
 
 
 def libm_sin(a):

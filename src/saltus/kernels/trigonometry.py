@@ -11,11 +11,13 @@ import math
 from saltus.kernels.lanes import (
     any_lane,
     fma,
+    is_odd,
     libm_cos,
     libm_sin,
     magnitude,
     nearest_integer,
     select,
+    turned_half,
 )
 from saltus.kernels.marks import inner, kernel
 
@@ -60,14 +62,9 @@ def sincos(angle):
     w = 1.0 - half
     cosine = w + fma(z * z, q, (1.0 - w) - half)
     # quarter turns exchange sine and cosine
-    odd = magnitude(n - 2.0 * nearest_integer(0.5 * n)) > 0.5
+    odd = is_odd(n)
     s, c = select(odd, cosine, sine), select(odd, sine, cosine)
-    half_turns = nearest_integer(0.5 * n - 0.25)  # floor(n/2) for whole n
-    negative_s = magnitude(half_turns - 2.0 * nearest_integer(0.5 * half_turns)) > 0.5
-    s = select(negative_s, -s, s)
-    quarter = nearest_integer(0.5 * n + 0.25)  # ceil(n/2)
-    negative_c = magnitude(quarter - 2.0 * nearest_integer(0.5 * quarter)) > 0.5
-    c = select(negative_c, -c, c)
+    s, c = turned_half(s, n), turned_half(c, n + 1.0)
     large = magnitude(angle) > LARGEST_ANGLE
     if any_lane(large):
         s, c = select(large, libm_sin(angle), s), select(large, libm_cos(angle), c)

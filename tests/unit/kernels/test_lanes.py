@@ -21,6 +21,7 @@ from saltus.kernels.lanes import (
     coarse_exp2,
     coarse_log2,
     fma,
+    is_odd,
     larger,
     libm_atan,
     libm_cos,
@@ -31,15 +32,20 @@ from saltus.kernels.lanes import (
     libm_tan,
     libm_tanh,
     load,
+    load_at,
     lowest_bit,
     magnitude,
     nearest_integer,
+    power_of_two,
     root,
     select,
     smaller,
     spacing,
     splat,
     store,
+    store_at,
+    totals,
+    turned_half,
 )
 
 JIT = not jit_disabled()
@@ -99,6 +105,12 @@ def _arithmetic(a, b, c, out, flags):
 def _rough(a, out):
     store(out, 0, coarse_log2(a))
     store(out, 1, coarse_exp2(a))
+
+
+def _whole_numbers(n, a, out):
+    store(out, 0, power_of_two(n))
+    store(out, 1, select(is_odd(n), 1.0, n - n))
+    store(out, 2, turned_half(a, n))
 
 
 def _library(a, b, out):
@@ -236,6 +248,43 @@ def test_a_nan_stays_in_its_lane():
 def test_a_comparison_with_nan_holds_nowhere():
     (_, flags) = in_lanes(_arithmetic, [[math.nan] * 4, [1.0] * 4, [1.0] * 4], 4, 23, 5)
     assert flags.tolist() == [0, 0, 0, 0, 0]
+
+
+@pytest.mark.nojit
+@pytest.mark.parametrize("width", WIDTHS)
+def test_whole_numbers_in_lanes(width):
+    rng = np.random.default_rng(3)
+    for _ in range(40):
+        n, a = rng.integers(-1000, 1001, width), rng.normal(size=width)
+        found, _ = in_lanes(_whole_numbers, [n.astype(float), a], width, 3)
+        half = np.mod(n // 2, 2) == 1  # n quarter turns: a half turn, or three quarters
+        assert found[0].tolist() == [2.0 ** int(k) for k in n]
+        assert found[1].tolist() == np.mod(n, 2).tolist()
+        assert found[2].tolist() == np.where(half, -a, a).tolist()
+    large, _ = in_lanes(_whole_numbers, [[2.0**49 + 1] * width, [-0.0] * width], width, 3)
+    assert large[1].tolist() == [1.0] * width
+
+
+@pytest.mark.nojit
+def test_totals_are_the_sums_of_each_lane():
+    arguments = np.random.default_rng(4).normal(size=(4, 4))
+    out, _ = in_lanes(lambda a, b, c, d, out: store(out, 0, totals(a, b, c, d)), arguments, 4, 1)
+    assert out[0].tolist() == [(a + b) + (c + d) for a, b, c, d in arguments]
+
+
+@njit
+def _shift(table, row, column, to):
+    store_at(table, row, to, load_at(table, row, column, 4))
+
+
+@pytest.mark.nojit
+def test_lanes_from_a_column_on():
+    table = np.arange(24.0).reshape(3, 8)
+    _shift(table, 1, 3, 1)
+    assert table[1].tolist() == [8.0, 11.0, 12.0, 13.0, 14.0, 13.0, 14.0, 15.0]
+    _shift(table, 1, 6, 0)  # behind the row stands the next one
+    assert table[1, :4].tolist() == [14.0, 15.0, 16.0, 17.0]
+    assert table[[0, 2]].ravel().tolist() == [*range(8), *range(16, 24)]
 
 
 @njit

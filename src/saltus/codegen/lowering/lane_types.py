@@ -15,11 +15,13 @@ from numba.extending import lower_builtin, models, register_model
 from numba.np.arrayobj import make_array, populate_array
 
 from saltus.kernels.lanes import (
+    WHOLE_IN_LAST_BITS,
     any_lane,
     bits,
     coarse_exp2,
     coarse_log2,
     fma,
+    is_odd,
     larger,
     libm_atan,
     libm_cos,
@@ -30,15 +32,20 @@ from saltus.kernels.lanes import (
     libm_tan,
     libm_tanh,
     load,
+    load_at,
     lowest_bit,
     magnitude,
     nearest_integer,
+    power_of_two,
     root,
     select,
     smaller,
     spacing,
     splat,
     store,
+    store_at,
+    totals,
+    turned_half,
 )
 from saltus.kernels.parts import part
 
@@ -139,6 +146,31 @@ _register(
     lambda a: signature(types.none, a[0], types.intp, a[2]) if isinstance(a[2], LaneType) else None,
 )
 _register(
+    load_at,
+    lambda a: (
+        signature(LaneType(a[3].literal_value), types.unliteral(a[0]), *[types.intp] * 3)
+        if isinstance(a[3], types.Literal)
+        else None
+    ),
+    literal=True,
+)
+_register(
+    store_at,
+    lambda a: (
+        signature(types.none, a[0], types.intp, types.intp, a[3])
+        if isinstance(a[3], LaneType)
+        else None
+    ),
+)
+_register(
+    totals,
+    lambda a: signature(LaneType(4), *a) if all(one == LaneType(4) for one in a) else None,
+)
+_register(
+    is_odd,
+    lambda a: signature(MaskType(a[0].width), a[0]) if isinstance(a[0], LaneType) else None,
+)
+_register(
     splat,
     lambda a: (
         signature(LaneType(a[1].literal_value), types.float64, types.intp)
@@ -183,6 +215,8 @@ for _f in (
     nearest_integer,
     coarse_log2,
     coarse_exp2,
+    power_of_two,
+    turned_half,
     operator.neg,
     *_LIBM,
 ):
@@ -284,6 +318,36 @@ def _lower_coarse_exp2(builder, sig, v):
     return builder.bitcast(builder.fptosi(scaled, integer), vector)
 
 
+def _last_bits(builder, n, more=0.0):
+    """The whole numbers n + more in the last bits of integers."""
+    integer = ir.VectorType(ir.IntType(64), n.type.count)
+    return builder.bitcast(builder.fadd(n, _constant(n.type, WHOLE_IN_LAST_BITS + more)), integer)
+
+
+def _lower_power_of_two(builder, sig, v):
+    whole = _last_bits(builder, v[0], 1023.0)
+    return builder.bitcast(builder.shl(whole, _constant(whole.type, 52)), v[0].type)
+
+
+def _lower_turned_half(builder, sig, v):
+    a, whole = v[0], _last_bits(builder, v[1])
+    sign = builder.and_(
+        builder.shl(whole, _constant(whole.type, 62)), _constant(whole.type, -(2**63))
+    )
+    return builder.bitcast(builder.xor(builder.bitcast(a, whole.type), sign), a.type)
+
+
+_lower(power_of_two, 1, _lower_power_of_two)
+_lower(turned_half, 2, _lower_turned_half)
+
+
+@lower_builtin(is_odd, LaneType)
+def _lower_is_odd(context, builder, sig, args):
+    whole = _last_bits(builder, args[0])
+    first = builder.shl(whole, _constant(whole.type, 63))
+    return builder.icmp_signed("<", first, _constant(whole.type, 0))
+
+
 _lower(coarse_log2, 1, _lower_coarse_log2)
 _lower(coarse_exp2, 1, _lower_coarse_exp2)
 
@@ -319,12 +383,13 @@ def _align_stack(builder):
     builder.function.attributes.add("nounwind")
 
 
-def _pointer(context, builder, array_type, array, row, width):
-    """Pointer to the first lane of a row, as a pointer to a vector."""
+def _pointer(context, builder, array_type, array, row, width, column=None):
+    """Pointer to the lane of a row that begins at a column, as a pointer to a vector."""
     _align_stack(builder)
     view = context.make_array(array_type)(context, builder, array)
+    begin = ir.Constant(row.type, 0) if column is None else column
     first = cgutils.get_item_pointer(
-        context, builder, array_type, view, [row, ir.Constant(row.type, 0)], wraparound=False
+        context, builder, array_type, view, [row, begin], wraparound=False
     )
     return builder.bitcast(first, ir.VectorType(ir.DoubleType(), width).as_pointer())
 
@@ -342,6 +407,37 @@ def _lower_store(context, builder, sig, args):
     pointer = _pointer(context, builder, sig.args[0], args[0], args[1], sig.args[2].width)
     builder.store(args[2], pointer, align=8)
     return context.get_dummy_value()
+
+
+@lower_builtin(load_at, types.Array, types.Integer, types.Integer, types.Integer)
+def _lower_load_at(context, builder, sig, args):
+    width = sig.return_type.width
+    pointer = _pointer(context, builder, sig.args[0], args[0], args[1], width, args[2])
+    value = builder.load(pointer)
+    value.align = 8
+    return value
+
+
+@lower_builtin(store_at, types.Array, types.Integer, types.Integer, LaneType)
+def _lower_store_at(context, builder, sig, args):
+    width = sig.args[3].width
+    pointer = _pointer(context, builder, sig.args[0], args[0], args[1], width, args[2])
+    builder.store(args[3], pointer, align=8)
+    return context.get_dummy_value()
+
+
+@lower_builtin(totals, LaneType, LaneType, LaneType, LaneType)
+def _lower_totals(context, builder, sig, args):
+    def mixed(x, y, places):
+        mask = ir.Constant(ir.VectorType(ir.IntType(32), 4), places)
+        return builder.shuffle_vector(x, y, mask)
+
+    def paired(x, y):
+        """(x0 + x1, y0 + y1, x2 + x3, y2 + y3): what a processor adds in one instruction."""
+        return builder.fadd(mixed(x, y, [0, 4, 2, 6]), mixed(x, y, [1, 5, 3, 7]))
+
+    a, b = paired(args[0], args[1]), paired(args[2], args[3])
+    return builder.fadd(mixed(a, b, [0, 1, 4, 5]), mixed(a, b, [2, 3, 6, 7]))
 
 
 @lower_builtin(splat, types.Float, types.Integer)

@@ -21,7 +21,13 @@ TAIL = 1.6
 @inner
 def block_of(modes, m):
     """First row of the block of a contact state, behind its modes."""
-    return runs_of(modes, m) + m.sizes[MODE_GROUPS] + m.sizes[STATE_GROUPS]
+    return runs_of(modes, m) + m.sizes[MODE_GROUPS] + m.sizes[STATE_GROUPS] + 1
+
+
+@inner
+def groups_of(modes, m):
+    """Groups of modes in use: other contact states may have more, of modes that don't oscillate."""
+    return int(m.modes[block_of(modes, m) - 1, 0])
 
 
 @inner

@@ -13,8 +13,7 @@ def is_pressed(i, g, tau, batch, m):
     """True if the state at a start or an end presses a contact, by more than rounding, of the time
     too. Needs `angle`.
     """
-    for j in range(m.sizes[STATES]):
-        m.state[j // LANES, j % LANES] = batch.state[i, j]
+    take_state(i, batch, m)
     row, which = int(batch.carry[i, AT]) * m.sizes[GUARDS] + g, int(batch.carry[i, SET])
     speed, first = 0.0, m.sizes[STATES] + 1
     for d in range(m.sizes[DRIVES]):
@@ -56,6 +55,7 @@ def ending_holds(i, tau, modes, steady, batch, m):
     fastest = max(m.modes[modes + 3 * m.sizes[MODE_GROUPS] - 1, LANES - 1], block_limit(modes, m))
     h = min(batch.period[i], next_break(m) - tau)  # the last step may have been rounding
     h = FOLLOWED / fastest if h * fastest > FOLLOWED else h
+    end_factors(modes, h, groups_of(modes, m), m)
     for g in range(guards):
         rubs, row = m.laws[g, SECOND] >= 0, m.row_of[g]
         value, _ = here(i, g, batch, m)
@@ -64,7 +64,7 @@ def ending_holds(i, tau, modes, steady, batch, m):
         if asked and not rubs:
             asked = not is_pressed(i, m.laws[g, PARTNER], tau, batch, m)
         if asked and (value <= noise or not rubs):
-            series_of(row, modes, steady, which, h, m.sizes[MODE_GROUPS], m)
+            series_of(row, modes, steady, which, h, groups_of(modes, m), m)
             noise = terms_of(i, g, side_of(g, batch.mode[i]), batch, m)
             ending |= 1 << g if side_of_leaving(m.p, ORDER, 0, noise) < 0 else 0
     return ending
@@ -99,8 +99,7 @@ def know_rests(i, tau, batch, m):
         free = m.laws[g, KIND] == IMPACT_LAW and is_watched(g, batch.mode[i], m)
         if free and known_zeros(i, g, batch) == 0:
             if not loaded:
-                for j in range(m.sizes[STATES]):
-                    m.state[j // LANES, j % LANES] = batch.state[i, j]
+                take_state(i, batch, m)
                 drive(i, tau, batch, m)
                 for row in range(m.sizes[ROWS]):
                     store(m.moved, row, load(m.y, row, LANES))

@@ -12,15 +12,23 @@ from saltus.kernels.isolation import (
     MARGIN,
     MOST_TOUCHES,
     first_crossing,
-    halve,
     is_rounding,
     leading_sign,
-    polynomial,
     side_of_leaving,
-    slope,
     to_bernstein,
 )
-from saltus.kernels.lanes import bits, fma, larger, load, lowest_bit, root, smaller, splat, store
+from saltus.kernels.lanes import (
+    fma,
+    load,
+    load_at,
+    lowest_bit,
+    root,
+    smaller,
+    splat,
+    store,
+    store_at,
+    totals,
+)
 from saltus.kernels.status import GAP_MARGIN, HOLD_LAW, MODE_VIOLATION
 from saltus.kernels.trigonometry import sincos
 
@@ -29,17 +37,17 @@ from saltus.kernels.trigonometry import sincos
 @kernel
 def stand(modes, steady, which, m):
     """Put what the amplitudes in `y` say of all gaps to `stood` and `waves`. Needs `angle`."""
-    groups = m.sizes[MODE_GROUPS]
-    for g in range(groups):
+    groups, used = m.sizes[MODE_GROUPS], groups_of(modes, m)
+    for g in range(used):
         real, imaginary = load(m.y, g, LANES), load(m.y, groups + g, LANES)
         store(m.size, g, root(fma(real, real, imaginary * imaginary)))
     for r in range(m.sizes[GAP_ROWS]):
         row, at = waves_of(r, modes, m), first_wave(r, m)
         value, rate, fifth = splat(0.0, LANES), splat(0.0, LANES), splat(0.0, LANES)
         size, speed = splat(0.0, LANES), splat(0.0, LANES)
-        store(m.waves, at + WAVES * groups + BEYOND, size)
-        store(m.waves, at + WAVES * groups + FASTER, speed)
-        for g in range(groups - 1, -1, -1):
+        store(m.waves, at + WAVES * used + BEYOND, size)
+        store(m.waves, at + WAVES * used + FASTER, speed)
+        for g in range(used - 1, -1, -1):
             real, imaginary = load(m.y, g, LANES), load(m.y, groups + g, LANES)
             a, b = load(m.modes, row + g, LANES), load(m.modes, row + groups + g, LANES)
             real, imaginary = fma(-b, imaginary, a * real), fma(b, real, a * imaginary)
@@ -103,7 +111,7 @@ def reach(i, h, modes, batch, m):
     """The part of a step that is worth trying: as long as the modes that it follows leave no more
     than LEFT of each gap, or of its rate where that decides, to those that it bounds.
     """
-    groups, most = m.sizes[MODE_GROUPS], 0
+    groups, used, most = m.sizes[MODE_GROUPS], groups_of(modes, m), 0
     for g in range(m.sizes[GUARDS]):
         if not is_watched(g, batch.mode[i], m):
             continue
@@ -111,7 +119,7 @@ def reach(i, h, modes, batch, m):
         value, rate = here(i, g, batch, m)
         slow = LEFT * abs(rate) if fresh == (rate > 0.0) else 0.0
         value = 0.0 if fresh else LEFT * value
-        while most < groups:
+        while most < used:
             row = first_wave(r, m) + WAVES * most
             left, speed = total_of(m.waves, row + BEYOND), total_of(m.waves, row + FASTER)
             if left <= value or speed <= slow:
@@ -128,7 +136,7 @@ def shorter(modes, h, m):
     followed, too.
     """
     near, first = followed(modes, h, m), modes + 2 * m.sizes[MODE_GROUPS]
-    if near == m.sizes[MODE_GROUPS]:
+    if near == groups_of(modes, m):
         return 0.5 * h
     return min(0.5 * h, SPANNED / m.modes[first + near, LANES - 1])
 
@@ -137,11 +145,10 @@ def shorter(modes, h, m):
 @kernel
 def followed(modes, h, m):
     """Number of groups of modes that are followed over a time h."""
-    groups = m.sizes[MODE_GROUPS]
-    sizes = modes + 2 * groups - 1
-    while groups > 0 and m.modes[sizes + groups, LANES - 1] * h > 1.000001 * SPANNED:
-        groups -= 1
-    return groups
+    near, sizes = groups_of(modes, m), modes + 2 * m.sizes[MODE_GROUPS] - 1
+    while near > 0 and m.modes[sizes + near, LANES - 1] * h > 1.000001 * SPANNED:
+        near -= 1
+    return near
 
 
 @kernel
@@ -187,6 +194,23 @@ def add_drive_terms(r, at, real, imaginary, way, m):
 
 
 @inner
+def collect(r, at, row, count, m):
+    """Put the sums of the lanes of `sums` from a row on to q[r], from column `at` on."""
+    for k in range(0, count, LANES):
+        a, b = load(m.sums, row + k, LANES), load(m.sums, row + k + 1, LANES)
+        c, d = load(m.sums, row + k + 2, LANES), load(m.sums, row + k + 3, LANES)
+        store_at(m.q, r, at + k, totals(a, b, c, d))
+
+
+@inner
+def divide(r, at, count, m):
+    """Make derivatives in q[r], from column `at` on, terms: over k!."""
+    for k in range(0, count, LANES):
+        share = load(m.bernstein, SHARES + k // LANES, LANES)
+        store_at(m.q, r, at + k, load_at(m.q, r, at + k, LANES) * share)
+
+
+@inner
 def end_drives(which, h, m):
     """Cosine and sine of each drive where a step ends, to `angle`."""
     for d in range(m.sizes[DRIVES]):
@@ -201,7 +225,8 @@ def series_of(r, modes, steady, which, h, near, m):
     """Terms of a row of gaps over a step h, as [0, 1], that follows some groups of modes, to q[r]:
     where the step begins, HALF of them or all if they can tell the gap to rounding; then HALF of
     them where it ends. To errors[r]: what the polynomial of both leaves out at most, of the gap
-    and of its slope; the size of its terms; what all terms of the beginning leave out.
+    and of its slope; the size of its terms; what all terms of the beginning leave out. Needs
+    `factor` and the drives where the step ends.
     """
     groups, beyond = m.sizes[MODE_GROUPS], first_wave(r, m) + WAVES * near
     unseen, size = total_of(m.waves, beyond + BEYOND), m.stood[r, SIZE]
@@ -219,7 +244,7 @@ def series_of(r, modes, steady, which, h, near, m):
         term, following = add_terms(0, real, going, twice, squared, m)
         if full:
             add_terms(HALF, term, following, twice, squared, m)
-        cosine, sine = factor_of(modes, g, h, m)
+        cosine, sine = load(m.factor, g, LANES), load(m.factor, groups + g, LANES)
         real, imaginary = fma(-imaginary, sine, real * cosine), fma(imaginary, cosine, real * sine)
         add_terms(to, real, fma(-turns, imaginary, grow * real), twice, squared, m)
         fourth = squared * squared
@@ -227,8 +252,10 @@ def series_of(r, modes, steady, which, h, near, m):
         rest = fma(load(m.waves, at + BOUND, LANES), eighth * eighth, rest)
     store(m.sums, to + HALF, rest)
     left = total_of(m.sums, to + HALF)
-    for k in range(ORDER + 1 + HALF):
-        m.q[r, k] = 0.0
+    for k in range(HALF, ORDER + 1, LANES):
+        store_at(m.q, r, k, splat(0.0, LANES))
+    collect(r, 0, 0, ORDER + 1 if full else HALF, m)
+    collect(r, ORDER + 1, to, HALF, m)
     first, at = numbers_of_gap(r, steady, m)
     for d in range(m.sizes[DRIVES]):
         a, b = number(m.steady, first, at + 1 + 2 * d), number(m.steady, first, at + 2 + 2 * d)
@@ -243,14 +270,8 @@ def series_of(r, modes, steady, which, h, near, m):
         real, imaginary = a * cosine - b * sine, a * sine + b * cosine
         add_drive_terms(r, ORDER + 1, real, imaginary, way, m)
         left += power * power * (abs(a) + abs(b))
-    share = 1.0
-    for k in range(HALF):
-        share /= max(k, 1)
-        m.q[r, k] = share * (m.q[r, k] + total_of(m.sums, k))
-        m.q[r, ORDER + 1 + k] = share * (m.q[r, ORDER + 1 + k] + total_of(m.sums, to + k))
-    for k in range(HALF, ORDER + 1 if full else HALF):
-        share /= k
-        m.q[r, k] = share * (m.q[r, k] + total_of(m.sums, k))
+    divide(r, 0, ORDER + 1 if full else HALF, m)
+    divide(r, ORDER + 1, HALF, m)
     constant = number(m.steady, first, at)
     m.q[r, 0], m.q[r, ORDER + 1] = m.q[r, 0] + constant, m.q[r, ORDER + 1] + constant
     if m.sizes[COURSES] > 0 or block_groups(modes, m) > 0:
@@ -283,47 +304,6 @@ def add_other_terms(r, modes, first, at, h, m):
             m.p[j] += m.p[j + 1]
         m.q[r, ORDER + 1 + k] += m.p[k]
     return size
-
-
-@kernel
-def span_of(r, m):
-    """Bernstein coefficients of a row of gaps, to `waves`; what they say of it, to `spans`."""
-    rows, terms = (ORDER + 1) // LANES, ORDER + 1
-    into = first_wave(r, m) + WAVES * m.sizes[MODE_GROUPS]
-    value = m.q[r, 0]
-    low, high = splat(value, LANES), splat(value, LANES)
-    drop, rise = splat(HUGE, LANES), splat(-HUGE, LANES)
-    rises, falls, below, above = 0, 0, 0, 0
-    for i in range(rows):
-        a, b = splat(0.0, LANES), splat(0.0, LANES)
-        for k in range(HALF if 2 * i < rows else 0):
-            a = fma(load(m.bernstein, k * rows + i, LANES), m.q[r, k], a)
-            b = fma(load(m.bernstein, (terms + k) * rows + i, LANES), m.q[r, k], b)
-        for k in range(HALF if 2 * i + 2 >= rows else terms, terms):
-            a = fma(load(m.bernstein, k * rows + i, LANES), m.q[r, HALF + k], a)
-            b = fma(load(m.bernstein, (terms + k) * rows + i, LANES), m.q[r, HALF + k], b)
-        store(m.waves, into + i, a)
-        low, high = smaller(low, a), larger(high, a)
-        drop, rise = smaller(drop, b), larger(rise, b)
-        rises |= bits(b > 0.0) << (i * LANES)
-        falls |= bits(b < 0.0) << (i * LANES)
-        below |= bits(a < value) << (i * LANES)
-        above |= bits(a > value) << (i * LANES)
-    store(m.sums, 0, low)
-    store(m.sums, 1, -high)
-    store(m.sums, 2, drop)
-    store(m.sums, 3, -rise)
-    m.spans[r, LEAST], m.spans[r, MOST] = least_of(m.sums, 0), -least_of(m.sums, 1)
-    m.spans[r, DROP], m.spans[r, RISE] = least_of(m.sums, 2), -least_of(m.sums, 3)
-    m.spans[r, RISES], m.spans[r, FALLS] = float(rises), float(falls)
-    m.spans[r, BELOW], m.spans[r, ABOVE] = float(below), float(above)
-    m.spans[r, FIRST], m.spans[r, LAST], m.spans[r, KNOWN] = value, m.q[r, terms], 1.0
-
-
-@inner
-def least_of(rows, row):
-    """The least lane of a row."""
-    return min(min(rows[row, 0], rows[row, 1]), min(rows[row, 2], rows[row, 3]))
 
 
 # -- one gap over a step ---------------------------------------------------------------------------
@@ -372,13 +352,6 @@ def glance(i, g, batch, m):
     return OPEN
 
 
-@inner
-def bracket(g, low, high, guess, m):
-    """Note the part of the step where a gap crosses, and about where."""
-    m.found[g, PLACE], m.found[g, FINAL] = guess, 0.0
-    m.found[g, BEGINS], m.found[g, BRACKET] = low, high
-
-
 @kernel
 def terms_of(i, g, side, batch, m):
     """Terms of the gap of a guard on its side where the step begins, to p; returns its rounding
@@ -390,79 +363,6 @@ def terms_of(i, g, side, batch, m):
         m.p[k] = sign * m.q[r, k]
     m.p[0] += side * away
     return ROUNDED * (m.errors[r, 2] + abs(away))
-
-
-@kernel
-def curve_of(r, sign, away, fresh, m):
-    """Bernstein coefficients of a gap by those of its row, to the first row of `bern`: of the gap
-    over x, if it is zero where the step begins.
-    """
-    row = first_wave(r, m) + WAVES * m.sizes[MODE_GROUPS]
-    for k in range(ORDER + 1):
-        m.bern[0, k] = sign * number(m.waves, row, k) + away
-    value = m.bern[0, 0]
-    if fresh:
-        for k in range(ORDER):
-            m.bern[0, k] = (m.bern[0, k + 1] - value) * (ORDER / (k + 1.0))
-
-
-@kernel
-def pieces(g, degree, fresh, error, whole, slope_error, noise, shortest, m):
-    """Outcome of a gap by the parts of its step, from the first on, as far as they tell: the whole
-    step, its halves, their halves, down to the shortest.
-    """
-    top, decided = 0, 0.0
-    m.bounds[0, 0], m.bounds[0, 1] = 0.0, 1.0
-    while top >= 0:
-        answer = judge(g, top, degree, fresh, error, whole, slope_error, noise, m)
-        if answer == CROSSES:
-            return CROSSES
-        if answer == CLEAR:
-            decided = m.bounds[top, 1]
-            top -= 1
-        elif m.bounds[top, 1] - m.bounds[top, 0] <= shortest:
-            break
-        else:
-            halve(m.bern, m.bounds, top, degree)
-            top += 1
-    if decided == 0.0:
-        return OPEN
-    m.found[g, DECIDED] = decided
-    return CLEAR
-
-
-@kernel
-def judge(g, top, degree, fresh, error, whole, slope_error, noise, m):
-    """Outcome of a gap in a part of the step, whose Bernstein coefficients are a row of `bern`: of
-    the gap over x, if it is zero where the step begins.
-    """
-    low, high, row, terms = m.bounds[top, 0], m.bounds[top, 1], top, degree
-    first = fresh and low == 0.0
-    if fresh and not first:  # times x: the gap itself
-        row, terms, error = top + 1, degree + 1, whole
-        m.bern[row, 0] = low * m.bern[top, 0]
-        for k in range(1, degree + 1):
-            part = (terms - k) * low * m.bern[top, k] + k * high * m.bern[top, k - 1]
-            m.bern[row, k] = part / terms
-        m.bern[row, terms] = high * m.bern[top, degree]
-    begin, least, turns, steepest = m.bern[row, 0], m.bern[row, 0], False, -HUGE
-    for k in range(terms):
-        change = m.bern[row, k + 1] - m.bern[row, k]
-        least = min(least, m.bern[row, k + 1])
-        turns = turns or (change > 0.0 and least < begin)
-        steepest = max(steepest, change)
-    if least > error + noise and (first or not turns or least - error >= m.out[MARGIN]):
-        return CLEAR
-    if first or not terms * steepest + slope_error * (high - low) < 0.0:
-        return OPEN
-    last = m.bern[row, terms]
-    if last - error > noise:
-        return CLEAR
-    if last + error < -noise:
-        guess = low + (high - low) * min(max(begin / (begin - last), 0.0), 1.0)
-        bracket(g, low, high, guess, m)
-        return CROSSES
-    return OPEN
 
 
 @inner
@@ -573,7 +473,7 @@ def look(i, tau, h, modes, steady, batch, m):
     end_drives(which, h, m)
     for r in range(m.sizes[GAP_ROWS]):
         bound_row(r, modes, steady, which, h, near, m)
-    m.out[MARGIN], m.found[0, TOUCHED] = margin, 0.0
+    m.out[MARGIN], m.found[0, TOUCHED], m.found[0, FACTORS] = margin, 0.0, 0.0
     crossing, hits, first, until = 0, 0, h, 1.0
     for g in range(m.sizes[GUARDS]):
         m.found[g, RIDDEN], m.found[g, DECIDED] = 0.0, 1.0
@@ -583,6 +483,9 @@ def look(i, tau, h, modes, steady, batch, m):
         if m.spans[r, KNOWN] == 0.0:
             if is_far(i, g, batch, m):
                 continue
+            if m.found[0, FACTORS] == 0.0:
+                end_factors(modes, h, near, m)
+                m.found[0, FACTORS] = float(near)
             series_of(r, modes, steady, which, h, near, m)
         answer = glance(i, g, batch, m)
         if answer == OPEN:
@@ -610,118 +513,3 @@ def look(i, tau, h, modes, steady, batch, m):
     if early != 0:
         first, hits = 0.0, early
     return (CROSSES if hits != 0 else CLEAR), first, hits
-
-
-# -- the place of a crossing -----------------------------------------------------------------------
-@kernel
-def about(g, r, sign, away, m):
-    """Part of the step at which a gap crosses in its bracket, roughly: by a few steps of Newton's
-    method on the polynomial of both ends.
-    """
-    rows, first = (ORDER + 1) // LANES, 2 * (ORDER + 1) * ((ORDER + 1) // LANES)
-    for i in range(rows // 2, rows):
-        a = splat(0.0, LANES)
-        for k in range(ORDER + 1):
-            value = m.q[r, k if k < HALF else HALF + k]
-            a = fma(load(m.bernstein, first + k * rows + i, LANES), value, a)
-        store(m.sums, i, a)
-    for k in range(ORDER + 1):
-        m.p[k] = sign * (m.q[r, k] if k < HALF else number(m.sums, 0, k))
-    m.p[0] += away
-    x, low, high = m.found[g, PLACE], m.found[g, BEGINS], m.found[g, BRACKET]
-    for _ in range(3):
-        rate = slope(m.p, ORDER, x)
-        x = x - polynomial(m.p, ORDER, x) / rate if rate != 0.0 else x
-        x = min(max(x, low), high)
-    return x
-
-
-@kernel
-def place_of(i, g, tau, h, modes, steady, batch, m):
-    """Time after tau at which a gap that falls all the way crosses, by Newton's method on the modes
-    inside a shrinking bracket: each step goes to a zero of the terms up to the fourth.
-    """
-    which, side, r = int(batch.carry[i, SET]), side_of(g, batch.mode[i]), m.row_of[g]
-    sign, away = side * m.sign_of[g], side * m.offset[which, g]
-    low, high, d = 0.0, m.found[g, BRACKET] * h, about(g, r, sign, away, m) * h
-    noise = 2.3e-16 * (m.errors[r, 2] + abs(away))
-    cubic = m.sizes[COURSES] == 0 or m.sizes[TERMS] <= 4
-    bounded = cubic and block_groups(modes, m) == 0  # FIFTH holds all that has a fifth derivative
-    for _ in range(60):
-        drive(i, tau + d, batch, m)
-        gap_after(r, d, modes, steady, which, m)
-        value, rate = sign * m.near[0] + away, sign * m.near[1]
-        if value == 0.0:
-            break
-        if value > 0.0:
-            low = d
-        else:
-            high = d
-        way, left = -value / rate if rate < 0.0 else h, value
-        for _ in range(4):
-            bend = m.near[2] + way * (m.near[3] + way * m.near[4])
-            twist = 2.0 * m.near[2] + way * (3.0 * m.near[3] + 4.0 * way * m.near[4])
-            steep = rate + sign * way * twist
-            left = value + way * (rate + sign * way * bend)
-            if steep < 0.0 and abs(left) > 0.1 * noise:
-                way -= left / steep
-        new = d + way
-        if not low <= new <= high:
-            new, left = 0.5 * (low + high), HUGE
-        change, d = abs(new - d), new
-        square = change * change
-        left = abs(left) + m.stood[r, FIFTH] * (square * square * change) * (1.0 / 120.0)
-        if bounded and left <= noise:
-            break
-        if change <= 2.3e-16 * d or change * abs(rate) <= noise:
-            break
-    return d
-
-
-@kernel
-def gap_after(r, h, modes, steady, which, m):
-    """Terms up to the fourth of a row of gaps a time h after where the amplitudes stand, to `near`.
-    Needs `angle`.
-    """
-    groups = m.sizes[MODE_GROUPS]
-    a, b, c = splat(0.0, LANES), splat(0.0, LANES), splat(0.0, LANES)
-    d, e = splat(0.0, LANES), splat(0.0, LANES)
-    for g in range(groups):
-        at = first_wave(r, m) + WAVES * g
-        cosine, sine = factor_of(modes, g, h, m)
-        real, imaginary = load(m.waves, at + REAL, LANES), load(m.waves, at + IMAGINARY, LANES)
-        real, imaginary = fma(-imaginary, sine, real * cosine), fma(imaginary, cosine, real * sine)
-        grow, size = load(m.modes, modes + g, LANES), load(m.modes, modes + 2 * groups + g, LANES)
-        turns, twice, squared = load(m.modes, modes + groups + g, LANES), 2.0 * grow, size * size
-        rate = fma(-turns, imaginary, grow * real)
-        second = fma(twice, rate, -(squared * real))
-        third = fma(twice, second, -(squared * rate))
-        a, b, c, d = a + real, b + rate, c + second, d + third
-        e = fma(twice, third, fma(-squared, second, e))
-    store(m.sums, 0, a)
-    store(m.sums, 1, b)
-    store(m.sums, 2, c)
-    store(m.sums, 3, d)
-    store(m.sums, 4, e)
-    if block_groups(modes, m) > 0:
-        move_block(modes, h, m.y, m.moved, m)
-        add_block_terms(r, modes, m.moved, m)
-    for k in range(5):
-        m.near[k] = total_of(m.sums, k)
-    first, at = numbers_of_gap(r, steady, m)
-    value, rate = steady_gap(first, at, which, m)
-    m.near[0], m.near[1] = m.near[0] + value, m.near[1] + rate
-    for j in range(m.sizes[DRIVES]):
-        u, v = number(m.steady, first, at + 1 + 2 * j), number(m.steady, first, at + 2 + 2 * j)
-        real, w = u * m.angle[j, 1] - v * m.angle[j, 2], m.rate[which, j]
-        imaginary = u * m.angle[j, 2] + v * m.angle[j, 1]
-        m.near[2] -= w * w * real
-        m.near[3] += w * w * w * imaginary
-        m.near[4] += w * w * w * w * real
-    for p in range(m.sizes[COURSES]):
-        numbers = at + 1 + 2 * m.sizes[DRIVES] + m.sizes[TERMS] * p
-        for order in range(2, 5):
-            for k in range(m.sizes[TERMS] - order):
-                part = number(m.steady, first, numbers + k) * m.record[p, VALUE + order + k]
-                m.near[order] += part
-    m.near[2], m.near[3], m.near[4] = m.near[2] / 2.0, m.near[3] / 6.0, m.near[4] / 24.0

@@ -239,15 +239,13 @@ def state_at(i, tau, d, modes, steady, batch, m):
     """
     state_after(i, tau, d, modes, steady, batch, m)
     if d == 0.0 and has_just_landed(i, tau, batch):
-        for j in range(m.sizes[STATES]):
-            m.state[j // LANES, j % LANES] = batch.state[i, j]
+        take_state(i, batch, m)
 
 
 @kernel
 def leave(i, before, batch, m):
     """Store the state in `state` and look up the contact state of the mode, which was another."""
-    for j in range(m.sizes[STATES]):
-        batch.state[i, j] = m.state[j // LANES, j % LANES]
+    write_state(batch.state, i, 0, m)
     at, changed = int(batch.carry[i, AT]), before ^ batch.mode[i]
     for g in range(m.sizes[GUARDS]):
         if (changed >> g) & 1 and at >= 0:
@@ -349,8 +347,7 @@ def rest_or_go(i, now, modes, steady, batch, m):
     """
     g, before = int(batch.carry[i, ASKS]) - 1, batch.mode[i]
     batch.carry[i, ASKS] = 0.0
-    for j in range(m.sizes[STATES]):
-        m.state[j // LANES, j % LANES] = batch.state[i, j]
+    take_state(i, batch, m)
     for row in range(m.sizes[ROWS]):
         store(m.moved, row, load(m.y, row, LANES))
     drive(i, now, batch, m)

@@ -81,8 +81,9 @@ CLEAR, CROSSES, OPEN = range(3)
 # Columns of `found`, for each guard: the place of its crossing as a part of the step, whether that
 # is final, whether it is ridden, touches of the step (first row), the part of the step that is
 # decided, the end of the bracket of the crossing, whether a stop is pressed at the start, the
-# beginning of that bracket.
-PLACE, FINAL, RIDDEN, TOUCHED, DECIDED, BRACKET, PRESSED, BEGINS = range(8)
+# beginning of that bracket, groups of modes whose factors at the end of the step are known (first
+# row).
+PLACE, FINAL, RIDDEN, TOUCHED, DECIDED, BRACKET, PRESSED, BEGINS, FACTORS = range(9)
 # Columns of `stood`, for each row of gaps where the amplitudes stand: value and rate, the size of
 # its terms, what its fifth derivative is at most.
 HERE, SLOPE, SIZE, FIFTH = range(4)
@@ -102,6 +103,13 @@ QUEUE = 8
 # and the largest difference of two, those that rise and that fall (bits), coefficients below and
 # above the first one.
 LEAST, MOST, KNOWN, FIRST, LAST, DROP, RISE, RISES, FALLS, BELOW, ABOVE = range(11)
+# Rows of `bernstein`, tables of four numbers in a row: Bernstein coefficients by the terms at both
+# ends, their differences and the powers of x, for each term; coefficients of the left and of the
+# right half of a part of the step, for each of its own; the places of coefficients; what makes
+# those of a gap over x of their differences from the first; 1 over k!.
+TABLE = (ORDER + 1) * (ORDER + 1) // 4
+POWERS, LEFT_HALF, RIGHT_HALF, PLACES = 2 * TABLE, 3 * TABLE, 4 * TABLE, 5 * TABLE
+OVER_X, SHARES = PLACES + (ORDER + 1) // 4, PLACES + (ORDER + 1) // 2
 #: Shortest part of a step by which a gap is decided.
 SHORTEST_PIECE = 0.125
 #: A step as short as this [s] decides nothing because the gaps are no numbers.

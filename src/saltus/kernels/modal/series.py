@@ -3,12 +3,16 @@
 import math
 
 from saltus.kernels.lanes import (
-    coarse_exp2,
     fma,
+    larger,
     load,
+    load_at,
     nearest_integer,
+    power_of_two,
+    smaller,
     splat,
     store,
+    store_at,
 )
 from saltus.kernels.trigonometry import sincos, turned
 
@@ -33,7 +37,7 @@ def exponential(a):
     p = fma(p, r, 1.0 / 6.0)
     p = fma(p, r, 0.5)
     p = fma(p * r, r, r) + 1.0
-    return p * coarse_exp2(n)
+    return p * power_of_two(smaller(larger(n, -1000.0), 1000.0))
 
 
 @inner
@@ -64,8 +68,10 @@ def drive(i, tau, batch, m):
     which = int(batch.carry[i, SET])
     for d in range(m.sizes[DRIVES]):
         if m.angle[d, 3] != tau:
-            at = m.angle[d, 0] + m.rate[which, d] * tau
-            m.angle[d, 1], m.angle[d, 2], m.angle[d, 3] = math.cos(at), math.sin(at), tau
+            sine, cosine = sincos(splat(m.angle[d, 0] + m.rate[which, d] * tau, LANES))
+            store(m.sums, 0, cosine)
+            store(m.sums, 1, sine)
+            m.angle[d, 1], m.angle[d, 2], m.angle[d, 3] = m.sums[0, 0], m.sums[1, 0], tau
     courses_at(tau, m)
 
 
@@ -74,17 +80,24 @@ def answer_now(steady, m):
     """The steady answer to the drives, whose phases are in `angle`, to `answer`."""
     groups = m.sizes[STATE_GROUPS]
     for s in range(groups):
-        total = load(m.steady, steady + s, LANES)
-        for d in range(m.sizes[DRIVES]):
-            row = steady + (1 + 2 * d) * groups + s
-            total = fma(load(m.steady, row, LANES), m.angle[d, 1], total)
-            total = fma(load(m.steady, row + groups, LANES), -m.angle[d, 2], total)
-        for p in range(m.sizes[COURSES]):
-            row = steady + (1 + 2 * m.sizes[DRIVES] + m.sizes[TERMS] * p) * groups + s
-            for k in range(m.sizes[TERMS]):
-                part = load(m.steady, row + k * groups, LANES)
-                total = fma(part, m.record[p, VALUE + k], total)
-        store(m.answer, s, total)
+        store(m.answer, s, load(m.steady, steady + s, LANES))
+    for d in range(m.sizes[DRIVES]):
+        row = steady + (1 + 2 * d) * groups
+        cosine, sine = splat(m.angle[d, 1], LANES), splat(m.angle[d, 2], LANES)
+        for s in range(groups):
+            total = fma(load(m.steady, row + s, LANES), cosine, load(m.answer, s, LANES))
+            store(m.answer, s, fma(-load(m.steady, row + groups + s, LANES), sine, total))
+    for p in range(m.sizes[COURSES]):
+        for k in range(m.sizes[TERMS]):
+            row = steady + (1 + 2 * m.sizes[DRIVES] + m.sizes[TERMS] * p + k) * groups
+            add_answer(row, m.record[p, VALUE + k], m)
+
+
+@inner
+def add_answer(row, factor, m):
+    """Add a factor times the lanes of the table of drives from a row on to `answer`."""
+    for s in range(m.sizes[STATE_GROUPS]):
+        store(m.answer, s, fma(load(m.steady, row + s, LANES), factor, load(m.answer, s, LANES)))
 
 
 @kernel
@@ -114,6 +127,26 @@ def numbers_of_gap(r, steady, m):
 
 # -- states and amplitudes -------------------------------------------------------------------------
 @inner
+def take_state(i, batch, m):
+    """The state of a trajectory, to `state`."""
+    whole = m.sizes[STATES] // LANES
+    for s in range(whole):
+        store(m.state, s, load_at(batch.state, i, LANES * s, LANES))
+    for j in range(LANES * whole, m.sizes[STATES]):
+        m.state[whole, j - LANES * whole] = batch.state[i, j]
+
+
+@inner
+def write_state(table, row, first, m):
+    """Write what is in `state` to a row of a table, from a column on."""
+    whole = m.sizes[STATES] // LANES
+    for s in range(whole):
+        store_at(table, row, first + LANES * s, load(m.state, s, LANES))
+    for j in range(LANES * whole, m.sizes[STATES]):
+        table[row, first + j] = m.state[whole, j - LANES * whole]
+
+
+@inner
 def less_answer(m):
     """Subtract the answer from `state`."""
     for s in range(m.sizes[STATE_GROUPS]):
@@ -128,20 +161,29 @@ def amplitudes_of(modes, y, m):
     if coordinates > 0:
         amplitudes_of_shapes(modes, coordinates, y, m)
         return
-    for g in range(2 * groups):
-        runs = runs_of(modes, m) + g % groups
+    for g in range(groups):
+        runs, zero = runs_of(modes, m) + g, splat(0.0, LANES)
         first = modes + 3 * groups + g * count
-        a, b = splat(0.0, LANES), splat(0.0, LANES)
-        c, d = splat(0.0, LANES), splat(0.0, LANES)
+        a, b, c, d = zero, zero, zero, zero
+        e, f, p, q = zero, zero, zero, zero
         for run in range(0, LANES, 2):
             for s in range(int(m.modes[runs, run]), int(m.modes[runs, run + 1])):
-                row = first + LANES * s
-                a = fma(load(m.modes, row, LANES), m.state[s, 0], a)
-                b = fma(load(m.modes, row + 1, LANES), m.state[s, 1], b)
-                c = fma(load(m.modes, row + 2, LANES), m.state[s, 2], c)
-                d = fma(load(m.modes, row + 3, LANES), m.state[s, 3], d)
+                row, other = first + LANES * s, first + LANES * s + groups * count
+                one, two, three, four = m.state[s, 0], m.state[s, 1], m.state[s, 2], m.state[s, 3]
+                a, e = times_rows(row, other, one, a, e, m)
+                b, f = times_rows(row + 1, other + 1, two, b, f, m)
+                c, p = times_rows(row + 2, other + 2, three, c, p, m)
+                d, q = times_rows(row + 3, other + 3, four, d, q, m)
         store(y, g, (a + b) + (c + d))
+        store(y, groups + g, (e + f) + (p + q))
     block_amplitudes(modes, y, m)
+
+
+@inner
+def times_rows(row, other, value, a, b, m):
+    """A number times two rows of the table of modes, added to a and b."""
+    value = splat(value, LANES)
+    return fma(load(m.modes, row, LANES), value, a), fma(load(m.modes, other, LANES), value, b)
 
 
 @inner
@@ -182,9 +224,49 @@ def state_of(modes, y, m):
     if coordinates > 0:
         state_of_shapes(modes, coordinates, y, m)
         return
-    for s in range(m.sizes[STATE_GROUPS]):
-        store(m.state, s, group_of_states(s, modes, y, 0, load(m.answer, s, LANES), m))
+    s, groups, runs = 0, m.sizes[STATE_GROUPS], runs_of(modes, m) + m.sizes[MODE_GROUPS]
+    while s < groups:
+        answer = load(m.answer, s, LANES)
+        if s + 1 < groups and are_alike(runs + s, m):
+            both = two_groups_of_states(s, modes, y, answer, load(m.answer, s + 1, LANES), m)
+            store(m.state, s, both[0])
+            store(m.state, s + 1, both[1])
+            s += 2
+        else:
+            store(m.state, s, group_of_states(s, modes, y, 0, answer, m))
+            s += 1
     add_block_state(modes, y, m)
+
+
+@inner
+def are_alike(row, m):
+    """True if two rows of runs that follow one another are the same."""
+    alike = True
+    for k in range(LANES):
+        alike = alike and m.modes[row, k] == m.modes[row + 1, k]
+    return alike
+
+
+@inner
+def two_groups_of_states(s, modes, y, first_answer, second_answer, m):
+    """As :func:`group_of_states`, of two groups that follow one another and have the same runs."""
+    groups, runs = m.sizes[MODE_GROUPS], runs_of(modes, m) + m.sizes[MODE_GROUPS] + s
+    across = 2 * groups * LANES
+    first, zero = modes + 3 * groups + across * (m.sizes[STATE_GROUPS] + s), splat(0.0, LANES)
+    a, b, c, d = first_answer, zero, zero, zero
+    e, f, p, q = second_answer, zero, zero, zero
+    for run in range(0, LANES, 2):
+        for g in range(int(m.modes[runs, run]), int(m.modes[runs, run + 1])):
+            row, real, imaginary = first + 2 * LANES * g, g, groups + g
+            a, e = times_rows(row, row + across, y[real, 0], a, e, m)
+            b, f = times_rows(row + 1, row + 1 + across, y[imaginary, 0], b, f, m)
+            c, p = times_rows(row + 2, row + 2 + across, y[real, 1], c, p, m)
+            d, q = times_rows(row + 3, row + 3 + across, y[imaginary, 1], d, q, m)
+            a, e = times_rows(row + 4, row + 4 + across, y[real, 2], a, e, m)
+            b, f = times_rows(row + 5, row + 5 + across, y[imaginary, 2], b, f, m)
+            c, p = times_rows(row + 6, row + 6 + across, y[real, 3], c, p, m)
+            d, q = times_rows(row + 7, row + 7 + across, y[imaginary, 3], d, q, m)
+    return (a + b) + (c + d), (e + f) + (p + q)
 
 
 # -- structures: coordinates and their rates -------------------------------------------------------
@@ -321,12 +403,29 @@ def turn(y, g, a, b, to, m):
     store(to, groups + g, fma(imaginary, a, real * b))
 
 
+@inner
+def end_factors(modes, h, near, m):
+    """e^{lambda h} of some groups of modes, where a step ends, to `factor`."""
+    for g in range(near):
+        real, imaginary = factor_of(modes, g, h, m)
+        store(m.factor, g, real)
+        store(m.factor, m.sizes[MODE_GROUPS] + g, imaginary)
+
+
 @kernel
-def move(modes, h, m):
-    """The amplitudes after a time h, to `moved`."""
-    for g in range(m.sizes[MODE_GROUPS]):
+def move(modes, h, known, m):
+    """The amplitudes after a time h, to `moved`. Of some groups of modes e^{lambda h} is known: it
+    stands in `factor`.
+    """
+    used, groups = groups_of(modes, m), m.sizes[MODE_GROUPS]
+    for g in range(known):
+        turn(m.y, g, load(m.factor, g, LANES), load(m.factor, groups + g, LANES), m.moved, m)
+    for g in range(known, used):
         a, b = factor_of(modes, g, h, m)
         turn(m.y, g, a, b, m.moved, m)
+    for g in range(used, groups):
+        store(m.moved, g, splat(0.0, LANES))
+        store(m.moved, groups + g, splat(0.0, LANES))
     move_block(modes, h, m.y, m.moved, m)
 
 
@@ -349,7 +448,7 @@ def gap_of_moved(r, modes, steady, which, m):
     """Value and rate of a row of gaps by the amplitudes in `moved`, the drives in `angle`."""
     groups, row = m.sizes[MODE_GROUPS], waves_of(r, modes, m)
     value, rate = splat(0.0, LANES), splat(0.0, LANES)
-    for g in range(groups):
+    for g in range(groups_of(modes, m)):
         real, imaginary = load(m.moved, g, LANES), load(m.moved, groups + g, LANES)
         a, b = load(m.modes, row + g, LANES), load(m.modes, row + groups + g, LANES)
         real, imaginary = fma(-b, imaginary, a * real), fma(b, real, a * imaginary)

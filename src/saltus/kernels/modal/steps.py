@@ -72,8 +72,7 @@ def record(i, g, tau, kind, direction, velocity, after, error, batch, m):
     batch.rec_i[r, REC_MODE_BEFORE], batch.rec_i[r, REC_MODE_AFTER] = batch.mode[i], after
     batch.rec_f[r, REC_PHASE], batch.rec_f[r, REC_VELOCITY] = tau, velocity
     batch.rec_f[r, REC_TIME_ERROR] = error
-    for j in range(m.sizes[STATES]):
-        batch.rec_f[r, RECORD_FLOATS + j] = m.state[j // LANES, j % LANES]
+    write_state(batch.rec_f, r, RECORD_FLOATS, m)
     for j in range(m.sizes[STATES], m.sizes[STATES] + m.sizes[REMEMBERED]):
         batch.rec_f[r, RECORD_FLOATS + j] = batch.state[i, j]
     batch.rec_f[r, RECORD_FLOATS + batch.state.shape[1]] = time_of(i, tau, batch)
@@ -98,7 +97,7 @@ def note_touches(i, tau, h, until, modes, steady, batch, m):
 @inner
 def state_after(i, tau, d, modes, steady, batch, m):
     """The state a time d after tau, to `state`; its amplitudes to `moved`."""
-    move(modes, d, m)
+    move(modes, d, 0, m)
     drive(i, tau + d, batch, m)
     answer_now(steady, m)
     state_of(modes, m.moved, m)
@@ -155,7 +154,7 @@ def put_off(i, k, tau, d, modes, steady, batch, m):
     """Put the amplitudes of a sample a time d after tau, and the answer, into the queue."""
     if m.queued[0] == QUEUE:
         write_queue(i, k, modes, batch, m)
-    move(modes, d, m)
+    move(modes, d, 0, m)
     drive(i, tau + d, batch, m)
     answer_now(steady, m)
     width = 2 * m.sizes[MODE_GROUPS]
@@ -215,8 +214,7 @@ def write_shapes(i, first, count, modes, coordinates, batch, m):
 def enter(i, tau, batch, m):
     """Begin in a contact state with the state of the trajectory: its amplitudes to `y`."""
     at = int(batch.carry[i, AT])
-    for j in range(m.sizes[STATES]):
-        m.state[j // LANES, j % LANES] = batch.state[i, j]
+    take_state(i, batch, m)
     drive(i, tau, batch, m)
     answer_now(m.links[at, STEADY], m)
     less_answer(m)
@@ -236,8 +234,7 @@ def keep_state(i, tau, batch, m):
         drive(i, tau, batch, m)
         answer_now(m.links[at, STEADY], m)
         state_of(m.links[at, MODES], m.y, m)
-        for j in range(m.sizes[STATES]):
-            batch.state[i, j] = m.state[j // LANES, j % LANES]
+        write_state(batch.state, i, 0, m)
 
 
 @kernel
@@ -399,8 +396,9 @@ def advance(i, budget, batch, m):
             take_samples(i, tau, tau + d, modes, steady, batch, m)
             note_touches(i, tau, h, d, modes, steady, batch, m)
             if answer == CLEAR:
+                kept = d == h and m.sizes[TANGENTS] == 0  # columns have a use for `factor`
                 h = d
-                move(modes, h, m)
+                move(modes, h, int(m.found[0, FACTORS]) if kept else 0, m)
                 keep_moved(modes, m)
                 keep_on(i, h, batch, m)
                 batch.carry[i, WAITED] += h
