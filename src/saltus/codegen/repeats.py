@@ -16,7 +16,7 @@ from saltus.codegen.expression_ir import Value
 
 #: Most shapes that are kept.
 MAX_KNOWN = 20_000
-#: What a repeated statement assigns to, in its shape.
+#: The name that a statement assigns, in its shape.
 TARGET = "assigned"
 
 _SIMPLE = re.compile(r"(?:(\w+) = |store\(|\w+\[[^\]]*\] \+?= ).*")
@@ -46,7 +46,7 @@ class Shape(NamedTuple):
 
 
 class Recorded(NamedTuple):
-    """What a shape was translated to.
+    """The translation of a shape.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ def recorded(
     shape: Shape,
     translated: Callable[[str, dict[str, Value], int], tuple[list[Line], Value | None, set[str]]],
 ) -> Recorded:
-    """What a shape was translated to, or is now.
+    """The translation of a shape, made now if it is new.
 
     Parameters
     ----------
