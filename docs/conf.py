@@ -58,16 +58,26 @@ nb_output_stderr = "remove"  # what is being compiled, and how far it is, belong
 # sharp 150 dots an inch from the style.
 os.environ.pop("MPLBACKEND", None)
 os.environ["MATPLOTLIBRC"] = str(HERE / "matplotlibrc")
-# A notebook is over before a flow gains by being compiled once more in the background.
+# A notebook is over before a flow gains by being compiled once more in the background, and so are
+# its commands `saltus ...`, which are those of this interpreter. Nobody presses Ctrl-C there, for
+# which another process would compile what takes long, after it has imported everything once more.
 notebooks_home = tempfile.TemporaryDirectory()
+first_tier = """\
+from saltus.codegen import building, kernels
+kernels.STEADY_AFTER = building.OTHER_PROCESS = float("inf")
+del building, kernels
+"""
 first_lines = Path(notebooks_home.name, "profile_default", "startup", "first_tier.py")
 first_lines.parent.mkdir(parents=True)
-first_lines.write_text("import saltus.codegen.kernels as k; k.STEADY_AFTER = float('inf'); del k")
+first_lines.write_text(first_tier)
 os.environ["IPYTHONDIR"] = notebooks_home.name
-# The commands `saltus ...` of the notebooks are those of this interpreter, and their tables are as
-# wide as those of a terminal.
+command = Path(notebooks_home.name, "bin", "saltus")
+command.parent.mkdir()
+command.write_text(f"#!{sys.executable}\n{first_tier}from saltus.cli import main\n\nmain()\n")
+command.chmod(0o755)
+os.environ["PATH"] = os.pathsep.join([str(command.parent), os.environ.get("PATH", "")])
+# Their tables are as wide as those of a terminal.
 os.environ["COLUMNS"] = "170"
-os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
 
 # -- API -------------------------------------------------------------------------------------------
 autodoc_typehints = "none"  # the docstrings say types, with units and shapes

@@ -11,7 +11,8 @@ import ast
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
-from saltus.codegen.blocks import in_blocks
+from saltus.codegen import repeats, templates
+from saltus.codegen.blocks import Line, in_blocks
 from saltus.codegen.expression_ir import (
     INTEGER,
     LANE,
@@ -22,6 +23,7 @@ from saltus.codegen.expression_ir import (
     UntranslatableError,
     Value,
 )
+from saltus.codegen.head_text import Function
 from saltus.codegen.interface import ARRAY, REAL, WHOLE
 
 #: Functions of a head that its others call: their arguments, None before the first call.
@@ -47,10 +49,12 @@ class _Body(Expressions):
         self._labels += 1
         return self._labels
 
-    def run(self, statements: list[ast.stmt]) -> None:
+    def run(self, statements: Iterable[str | ast.stmt]) -> None:
         """Translate statements."""
         for statement in statements:
             match statement:
+                case str(text):
+                    self._text(text)
                 case ast.Pass() | ast.Expr(value=ast.Constant()):
                     pass
                 case ast.Assign(targets=[target], value=value):
@@ -85,6 +89,30 @@ class _Body(Expressions):
                     self._leave(value)
                 case _:
                     raise UntranslatableError(ast.unparse(statement))
+
+    def _text(self, statement: str) -> None:
+        """Translate a statement, or repeat what one of its shape became."""
+        found = repeats.read(statement, self.names, self.lanes, self.row)
+        if found is None:
+            self.run(templates.tree_of(statement).body)
+            return
+        target, shape, numbers = found
+        known = repeats.recorded(shape, self._alone)
+        lines, value = repeats.lines_of(known, numbers, len(self.lines))
+        self.lines += lines
+        if known.declared:
+            self.declared |= known.declared
+        if target is not None and value is not None:
+            self.names[target] = value
+
+    def _alone(
+        self, text: str, names: dict[str, Value], count: int
+    ) -> tuple[list[Line], Value | None, set[str]]:
+        """The lines of a statement on its own, behind those of its ``count`` operands."""
+        body = _Body(self.lanes, self.row, self.pointers, names, set(), {})
+        body.lines = [Line("", "", "")] * count
+        body.run(templates.tree_of(text).body)
+        return body.lines[count:], body.names.get(repeats.TARGET), body.declared
 
     def _assign(self, target: ast.expr, value: ast.expr) -> None:
         match target, value:
@@ -261,7 +289,7 @@ class Signature(NamedTuple):
 
 
 def function_ir(
-    tree: ast.FunctionDef,
+    function: Function,
     signature: Signature,
     lanes: int,
     constants: Mapping[str, Value],
@@ -270,9 +298,7 @@ def function_ir(
 ) -> str:
     """One function as IR text for some lanes of each row, in blocks if it is long."""
     kinds = {WHOLE: INTEGER, REAL: NUMBER}
-    arguments = list(
-        zip((argument.arg for argument in tree.args.args), signature.arguments, strict=True)
-    )
+    arguments = list(zip(function.arguments, signature.arguments, strict=True))
     given = {
         name: Value(kinds.get(type_, LANE), f"%{name}")
         for name, type_ in arguments
@@ -280,10 +306,15 @@ def function_ir(
     }
     arrays = [name for name, type_ in arguments if type_ == ARRAY]
     body = _Body(lanes, signature.row, arrays, {**constants, **given}, declared, helpers)
-    body.run(tree.body)
+    body.run(function.body)
     if signature.result == "void":
         body.do("ret void")
     parameters = ", ".join(f"{type_} %{name}" for name, type_ in arguments)
     return in_blocks(
-        f"saltus_{tree.name}", signature.result, parameters, signature.attributes, body.lines, lanes
+        f"saltus_{function.name}",
+        signature.result,
+        parameters,
+        signature.attributes,
+        body.lines,
+        lanes,
     )

@@ -12,16 +12,16 @@ from saltus.codegen import templates
 from saltus.codegen.expression_ir import INTEGER, NUMBER, Value, literal
 from saltus.codegen.function_ir import Helpers, Signature, function_ir
 from saltus.codegen.head import Constant
+from saltus.codegen.head_text import Function, function_of, functions_of
 from saltus.codegen.interface import REAL, WHOLE, Interface
 
 #: Functions whose arrays hold a lane in each row; arrays of the others hold numbers.
 OF_LANES = ("jets", "rates")
 
 
-def _part_by_part(tree: ast.FunctionDef, signature: Signature, lanes: int, name: str) -> str:
+def _part_by_part(function: Function, signature: Signature, lanes: int, name: str) -> str:
     """A function that calls another for a few lanes of each row at a time."""
-    arguments = [argument.arg for argument in tree.args.args]
-    lines = []
+    arguments, lines = function.arguments, []
     for first in range(0, signature.row, lanes):
         places = [f"%{argument}.{first}" for argument in arguments]
         lines += [
@@ -31,7 +31,7 @@ def _part_by_part(tree: ast.FunctionDef, signature: Signature, lanes: int, name:
         lines.append(f"call void @saltus_{name}({', '.join(f'ptr {one}' for one in places)})")
     given = ", ".join(f"ptr %{argument}" for argument in arguments)
     body = "".join(f"  {line}\n" for line in [*lines, "ret void"])
-    return f"define void @saltus_{tree.name}({given}) {signature.attributes} {{\n{body}}}\n"
+    return f"define void @saltus_{function.name}({given}) {signature.attributes} {{\n{body}}}\n"
 
 
 @cache
@@ -48,7 +48,7 @@ def _trigonometry(lanes: int) -> tuple[str, frozenset[str]]:
     }
     texts = [
         function_ir(
-            node,
+            function_of(node),
             Signature(*kinds[node.name], "alwaysinline nounwind"),
             lanes,
             numbers,
@@ -113,16 +113,14 @@ def equation_ir(
     shared, declared = _trigonometry(part)
     known = {name: Value(INTEGER, str(int(value))) for name, value in sizes}
     needed = set(declared)
-    body = templates.tree_of(functions).body
-    trees = {node.name: node for node in body if isinstance(node, ast.FunctionDef)}
+    tables, bodies = functions_of(functions)
     texts, made = [], set[str]()
-    for node in body:
-        if isinstance(node, ast.Assign):
-            name, kind, text = _table_ir(node)
-            known[name] = Value(kind, f"@saltus_{name}")
-            texts.append(text)
+    for table in tables:
+        name, kind, text = _table_ir(table)
+        known[name] = Value(kind, f"@saltus_{name}")
+        texts.append(text)
     for name, arguments in interface.functions.items():
-        of_lanes, tree = name in OF_LANES, trees[name]
+        of_lanes, function = name in OF_LANES, bodies[name]
         width, attributes = (part, "nounwind alignstack(64)") if of_lanes else (lanes, "nounwind")
         signature = Signature(
             arguments,
@@ -131,19 +129,18 @@ def equation_ir(
             lanes if of_lanes else 1,
         )
         if width < signature.row:
-            texts.append(_part_by_part(tree, signature, width, f"part_of_{name}"))
-            tree = ast.FunctionDef(f"part_of_{name}", tree.args, tree.body, [])
+            texts.append(_part_by_part(function, signature, width, f"part_of_{name}"))
+            function = function._replace(name=f"part_of_{name}")
             signature = signature._replace(attributes=f"noinline {attributes}")
-        helpers: Helpers = {other: None for other in trees if other not in interface.functions}
-        texts.append(function_ir(tree, signature, width, known, needed, helpers))
+        helpers: Helpers = {other: None for other in bodies if other not in interface.functions}
+        texts.append(function_ir(function, signature, width, known, needed, helpers))
         for helper, given in helpers.items():
             if given is not None and helper not in made:
                 made.add(helper)
-                tree = trees[helper]
-                loops = any(isinstance(node, ast.For) for node in tree.body)
+                loops = any(str(one).startswith("for ") for one in bodies[helper].body)
                 own = f"noinline {attributes}" if loops else attributes
                 signature = Signature(given, "void", own, signature.row)
-                texts.append(function_ir(tree, signature, width, known, needed, {}))
+                texts.append(function_ir(bodies[helper], signature, width, known, needed, {}))
     return "\n".join([shared, *texts, *sorted(needed)]) + "\n"
 
 
