@@ -149,6 +149,18 @@ def test_a_sweep(folder):
 
 
 CONTACT = 'contacts = {{ at = "w_2", {} }}\n'
+CROSSED = """
+[[system.structure.contacts]]
+at = "w_2"
+gap = "-2 mm"
+restitution = 0
+
+[[system.structure.contacts]]
+at = "w_2"
+gap = "1 mm"
+restitution = 0
+side = "lower"
+"""
 
 
 @pytest.mark.parametrize(
@@ -176,11 +188,7 @@ CONTACT = 'contacts = {{ at = "w_2", {} }}\n'
         ('base = { direction = "z", amplitude = "t" }', "names no degree of freedom"),
         ("damping_ratio = [0.01, 0.02]", "one number or 3 of them"),
         ('sensors = { a = "w_1 - w_1" }', "'a' is the difference of 'w_1' and itself"),
-        (
-            'contacts = [{ at = "w_2", gap = "-2 mm", restitution = 0 }, { at = "w_2", gap = "1 mm", '
-            'restitution = 0, side = "lower" }]',
-            "overlap by 1 mm: nothing fits between",
-        ),
+        (CROSSED, "overlap by 1 mm: nothing fits between"),
     ],
 )
 def test_refusals(keys, message, folder):
