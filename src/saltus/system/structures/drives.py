@@ -29,7 +29,7 @@ def entries(label: str, drive: Force | Base, unit: str) -> list[tuple[str, Any, 
     own = getattr(drive.amplitude, "unit", "")
     if own and unit and dimension(own) != dimension(unit):
         raise UnitError(
-            f"{label}: its values are in {own}, and {_what(drive)} is in {unit}. Give "
+            f"{label}: its values are in {own}, and {_what(drive)} is in {unit}. Give a record of "
             f"{_what(drive)}."
         )
     return [(f"{label}_scale", 1.0, "1")]
