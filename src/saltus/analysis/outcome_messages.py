@@ -11,12 +11,13 @@ import xarray as xr
 
 from saltus.analysis.inputs.spans import Span
 from saltus.contact.guards import is_hold
-from saltus.errors import SaltusWarning
+from saltus.errors import SaltusWarning, listed
 from saltus.kernels import status as st
 from saltus.language import root_name
 from saltus.language.evaluate import evaluate
 from saltus.language.expression import varies, walk
-from saltus.system import System
+from saltus.results.dataset.schema import told_of
+from saltus.system import System, gap_units
 from saltus.system.modes import sides
 from saltus.units import from_si
 
@@ -102,7 +103,7 @@ def messages(run: xr.Dataset, asked: Span | None = None, system: System | None =
             if code == st.SLIDING:
                 advice = _surfaces(run, int(here[0]), system) + advice
             if code == st.INVALID and _is_finite(run, int(here[0]), system):
-                meaning = "the start lies beyond a stop"
+                meaning = f"the start lies beyond a stop{_beyond(run, int(here[0]), system)}"
             if code == st.NONFINITE and run.attrs.get("method") == "RK4":
                 meaning, advice = f"{meaning}, or is made of errors that grew", _GROWN + advice
             texts.append(
@@ -126,9 +127,9 @@ def _where(run: xr.Dataset, index: int) -> str:
     parts = [f"trajectory {index}"]
     if "end_time" in place:
         parts.append(f"t = {place['end_time'].item():.9g} s")
-        states = str(run.attrs["states"]).split()
-        parts += [_value(place, name) for name in states[:MOST_STATES]]
-        parts += ["..."] * (len(states) > MOST_STATES)
+        shown = told_of(run)  # of structures the sensors
+        parts += [_value(place, name) for name in shown[:MOST_STATES]]
+        parts += ["..."] * (len(shown) > MOST_STATES)
     return ", ".join(parts)
 
 
@@ -190,6 +191,23 @@ def _surfaces(run: xr.Dataset, index: int, system: System | None) -> str:
     gaps = evaluate([one.gap for one in own], t=time, states=state, values=values, bits=bits)
     names = [one.name for one, gap in zip(own, gaps, strict=True) if abs(float(gap)) < ON_IT * size]
     return f"It stands on {' and '.join(names)}, and every side leads back. " if names else ""
+
+
+def _beyond(run: xr.Dataset, index: int, system: System | None) -> str:
+    """The rigid stops beyond which a trajectory starts, and how far, as the end of a sentence."""
+    if system is None:
+        return ""
+    _, time, state, values = _end(run, index, system)
+    bits = sides(system, time, list(state.values()), values)
+    gaps = evaluate(
+        [one.gap for one in system.guards], t=time, states=state, values=values, bits=bits
+    )
+    beyond = [
+        f"{guard.name} by {from_si(-guard.law.side * float(gap), unit)}"
+        for guard, gap, unit in zip(system.guards, gaps, gap_units(system), strict=True)
+        if guard.law and guard.law.kind == "impact" and guard.law.side * float(gap) < 0
+    ]
+    return f", {listed(beyond)}" if beyond else ""
 
 
 def _root(run: xr.Dataset, index: int, system: System) -> str:

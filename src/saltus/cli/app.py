@@ -5,17 +5,28 @@ Ctrl-C.
 from __future__ import annotations
 
 import errno
+import functools
 import os
+import warnings
 from typing import Any
 
 import typer
 from typer.core import TyperGroup
 
-from saltus.errors import SaltusError
+from saltus.errors import SaltusError, SaltusWarning
 from saltus.interrupt import EXIT_CODE
 
 #: Exit code if the task can't be done as asked.
 REFUSED = 2
+
+
+def _sentence(
+    message: Any, category: Any, filename: Any, lineno: Any, line: Any = None, usual: Any = None
+) -> str:
+    """A warning as text: of saltus's own the sentence alone, without a place in its code."""
+    if issubclass(category, SaltusWarning):
+        return f"saltus: {message}\n"
+    return str(usual(message, category, filename, lineno, line))
 
 
 class Commands(TyperGroup):
@@ -25,6 +36,14 @@ class Commands(TyperGroup):
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command."""
+        usual = warnings.formatwarning
+        warnings.formatwarning = functools.partial(_sentence, usual=usual)
+        try:
+            return self._ended(ctx)
+        finally:
+            warnings.formatwarning = usual
+
+    def _ended(self, ctx: Any) -> Any:
         from saltus.cli import screen
 
         try:

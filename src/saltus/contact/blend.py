@@ -57,6 +57,7 @@ def blended(
     states: Sequence[str],
     step: Step,
     parameters: Mapping[int, str],
+    units: Mapping[str, str],
     outputs: tuple[Sequence[Expr], Sequence[Guard]] = ((), ()),
 ) -> tuple[tuple[Expr, ...], tuple[Guard, ...], list[Expr]]:
     """Return field and guards of a regularised system, and the formulas of its outputs, which are
@@ -71,7 +72,7 @@ def blended(
         if guard.law is not None:
             blend.keep_friction(number, guard.law)
     rates = [blend.rewrite(entry) for entry in field]
-    new, found = find_contacts(rates, (), states)
+    new, found = find_contacts(rates, (), states, units)
     named = _with_old_names(guards, blend.sides, found)
     formulas, more = outputs
     for guard in more:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import functools
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from saltus.contact.guards import Guard, at_equality, bits_in, is_hold, renumbered
@@ -17,10 +17,14 @@ from saltus.language.clocks import of_time_only, switch
 from saltus.language.expression import And, Bit, Condition, Expr, Not, Or, Relation
 from saltus.language.roots import without_root
 from saltus.language.text import Writer
+from saltus.units import dimension
 
 
-def find_guards(field: Iterable[Expr]) -> tuple[tuple[Expr, ...], tuple[Guard, ...]]:
-    """The guards of a traced field, and the field with bits in place of comparisons.
+def find_guards(
+    field: Iterable[Expr], units: Mapping[str, str] | None = None
+) -> tuple[tuple[Expr, ...], tuple[Guard, ...]]:
+    """The guards of a traced field, and the field with bits in place of comparisons. Units are
+    those of states and parameters that have one.
 
     Guards are listed in the order in which the equations name them first, a boundary inside a gap
     before that gap. A boundary on which nothing depends (equal values on both sides) is left out.
@@ -31,11 +35,11 @@ def find_guards(field: Iterable[Expr]) -> tuple[tuple[Expr, ...], tuple[Guard, .
         If a comparison depends on parameters only, compares equal things, or depends on time in a
         way that can't be solved.
     """
-    return join_guards(field, ())
+    return join_guards(field, (), units)
 
 
 def join_guards(
-    roots: Iterable[Expr], known: Sequence[Guard]
+    roots: Iterable[Expr], known: Sequence[Guard], units: Mapping[str, str] | None = None
 ) -> tuple[tuple[Expr, ...], tuple[Guard, ...]]:
     """Extend known guards by those of expressions that join a system: known guards don't change,
     and new ones follow them. As :func:`find_guards` otherwise.
@@ -46,7 +50,7 @@ def join_guards(
         As :func:`find_guards`.
     """
     roots = tuple(roots)
-    finder = _Finder(known)
+    finder = _Finder(known, units)
     for relation in relations(roots):
         finder.add(relation)
     return _used_only(tuple(finder.rewrite(root) for root in roots), finder.guards, len(known))
@@ -124,8 +128,9 @@ def relations(roots: Sequence[Expr]) -> Iterator[Relation]:
 class _Finder:
     """Collects guards and remembers the outcome of every relation."""
 
-    def __init__(self, known: Sequence[Guard] = ()) -> None:
+    def __init__(self, known: Sequence[Guard] = (), units: Mapping[str, str] | None = None) -> None:
         self.guards: list[Guard] = list(known)
+        self._units = units or {}
         self._canonical = Canonical()
         self._numbers: dict[Expr, int] = {}
         for number, guard in enumerate(known):
@@ -163,7 +168,7 @@ class _Finder:
                 self.outcome[relation] = Bit(number) if sign > 0 else Not(Bit(number))
                 return
         _check_moves(gap, self._canonical.kinds(polynomial))
-        guard, positive = _guard(gap, self._canonical)
+        guard, positive = _guard(gap, self._canonical, self._units)
         self.outcome[relation] = Bit(len(self.guards)) if positive else Not(Bit(len(self.guards)))
         self._numbers.setdefault(guard.gap, len(self.guards))
         self.guards.append(guard)
@@ -247,7 +252,9 @@ def _check_moves(gap: Expr, kinds: frozenset[str]) -> None:
 
 
 # -- the form of a guard ---------------------------------------------------------------------------
-def _guard(gap: Expr, canonical: Canonical) -> tuple[Guard, bool]:
+def _guard(
+    gap: Expr, canonical: Canonical, units: Mapping[str, str] | None = None
+) -> tuple[Guard, bool]:
     """The guard of a gap, and True if both have the same sign. Guards get their names later."""
     gap, positive = _oriented(gap)
     name, factor = canonical.level_of(gap)
@@ -255,9 +262,19 @@ def _guard(gap: Expr, canonical: Canonical) -> tuple[Guard, bool]:
         return Guard("", gap), positive
     state, at_zero = ex.state(name), ex.substituted(gap, {ex.state(name): ex.constant(0.0)})
     boundary = ex.div(_negated(at_zero) if factor > 0 else at_zero, abs(factor))
-    if ex.varies(boundary):
+    if ex.varies(boundary) or _in_another_unit(name, boundary, units or {}):
         return Guard("", gap), positive
     return Guard("", ex.sub(state, boundary), name, boundary), positive == (factor > 0)
+
+
+def _in_another_unit(name: str, boundary: Expr, units: Mapping[str, str]) -> bool:
+    """True if the only parameter of a level has another unit than the state: the number beside the
+    state, such as the shape of a mode, carries a unit, and the gap is physical as it is written.
+    """
+    names = {node.payload for node in ex.walk(boundary) if node.op == "param"}
+    own = units.get(name, "")
+    other = units.get(names.pop(), "") if len(names) == 1 else ""
+    return bool(own and other) and dimension(own) != dimension(other)
 
 
 def _oriented(gap: Expr) -> tuple[Expr, bool]:

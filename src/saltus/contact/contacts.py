@@ -89,10 +89,13 @@ class _Rubbing:
 
 
 def find_contacts(
-    rates: Sequence[Expr], declared: Sequence[Declared], states: Sequence[str]
+    rates: Sequence[Expr],
+    declared: Sequence[Declared],
+    states: Sequence[str],
+    units: Mapping[str, str],
 ) -> tuple[Field, tuple[Guard, ...]]:
     """Field and guards of traced rates and the laws that follow them. Hold guards come after all
-    others.
+    others. Units are those of states and parameters that have one.
 
     Raises
     ------
@@ -106,7 +109,7 @@ def find_contacts(
     for friction in frictions:
         limit = _ONE if friction.limit is None else friction.limit
         roots += [ex.select(friction, 1.0, 0.0), limit, *friction.levels]
-    found, guards = find_guards(roots)
+    found, guards = find_guards(roots, units)
     rest = iter(found[len(rates) :])
     met = [_met(law, next(rest), [next(rest) for _ in law.parts]) for law in declared]
     limits, levels = dict[int, Expr](), dict[int, Field]()

@@ -14,7 +14,7 @@ import sys
 from types import ModuleType
 
 from saltus.system.checks import check_values
-from saltus.system.guard_units import gap_units, margin_gaps, written_gaps
+from saltus.system.guard_units import gap_units, margin_gaps
 from saltus.system.periodic import jumps_by_time, repeats_by_formula
 from saltus.system.regularisation import regularise
 from saltus.system.structures import (
@@ -32,7 +32,7 @@ from saltus.system.trace import system
 __all__ = [
     "Base", "Contact", "Force", "System", "acceleration", "check_values", "contact_force",
     "gap_units", "jumps_by_time", "margin_gaps", "regularise", "repeats_by_formula", "structure",
-    "system", "velocity", "written_gaps",
+    "system", "velocity",
 ]  # fmt: skip
 
 

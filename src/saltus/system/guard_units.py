@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-import numpy as np
-
 from saltus.contact.guards import is_hold
 from saltus.contact.reduction import free_field
 from saltus.language.dimensions import units_of
-from saltus.language.evaluate import evaluate
-from saltus.language.expression import Expr, walk
+from saltus.language.expression import Expr
 from saltus.language.roots import with_root
 from saltus.system.system import System
-from saltus.units import dimension
 
 
 def gap_units(system: System) -> list[str]:
@@ -62,23 +58,3 @@ def _of_summand(system: System, gap: Expr) -> str:
         elif node.op == "param":
             found.add(system.units[node.payload])
     return found.pop() if len(found) == 1 else ""
-
-
-def written_gaps(system: System) -> tuple[np.ndarray, list[str]]:
-    """Ratio of each gap as it was written to that of its guard, float64[guard], and its unit.
-
-    The guard of ``0.5*q - gap > 0`` is that of ``q > gap/0.5``. Where the coordinate q of a mode
-    has a unit of its own, the gap is as large as written in the unit of its parameter.
-    """
-    scales, units = np.ones(len(system.guards)), gap_units(system)
-    for number, guard in enumerate(system.guards):
-        if guard.state is None or guard.boundary is None:
-            continue
-        names = {node.payload for node in walk(guard.boundary) if node.op == "param"}
-        own = system.units[guard.state]
-        if len(names) != 1 or not own or not (unit := system.units[name := names.pop()]):
-            continue
-        if dimension(unit) != dimension(own):
-            scales[number] = 1.0 / abs(float(evaluate([guard.boundary], values={name: 1.0})[0]))
-            units[number] = unit
-    return scales, units

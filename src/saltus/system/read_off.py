@@ -108,8 +108,22 @@ def called(
         if returned is None:
             raise TraceError("it returns nothing. End it with: return ...")
     except Exception as error:
+        if isinstance(error, ValueError) and (row := _row(function, _own_states(system))):
+            raise TraceError(f"{title} ({place(function)}): {error}. {row}") from error
         raise TraceError(*explained(error, function, title)) from error
     return returned
+
+
+def _row(function: Quantity, states: Sequence[str]) -> str:
+    """A sentence on the values that ``*q`` takes, for a row of another length."""
+    for argument in inspect.signature(function).parameters.values():
+        if argument.kind == argument.VAR_POSITIONAL:
+            taken = _numbered(argument.name, states) or states
+            return (
+                f"*{argument.name} stands for {len(taken)} values, {taken[0]} to {taken[-1]}: a "
+                f"row has a number for each."
+            )
+    return ""
 
 
 def _own_states(system: EquationsOfMotion) -> tuple[str, ...]:

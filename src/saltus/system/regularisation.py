@@ -128,6 +128,7 @@ def regularise(
             system.states,
             step,
             parameters,
+            system.units,
             (system.outputs.formulas, system.outputs.guards),
         )
     except TraceError as error:

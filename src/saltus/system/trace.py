@@ -369,7 +369,7 @@ def _traced(
         raise kind(*explained(error, function, title)) from error
     own = {one.name: _unit_of(one.x, states, units, dimensions) for one in remembered}
     try:
-        return *find_contacts(derivatives, laws, (*states, *own)), own
+        return *find_contacts(derivatives, laws, (*states, *own), {**units, **own}), own
     except TraceError as error:
         raise TraceError(f"{title} ({place(function)}): ", error) from error
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 import scipy.io
@@ -9,6 +12,7 @@ import scipy.io
 import saltus as sl
 from saltus.errors import StudyError
 from saltus.flow.methods import default_method
+from saltus.study.ask import ask
 from saltus.study.read import parse
 from saltus.study.setting.inputs import Inputs
 from saltus.study.setting.setting import setting_of
@@ -145,6 +149,18 @@ def test_a_sweep(folder):
 
 
 CONTACT = 'contacts = {{ at = "w_2", {} }}\n'
+CROSSED = """
+[[system.structure.contacts]]
+at = "w_2"
+gap = "-2 mm"
+restitution = 0
+
+[[system.structure.contacts]]
+at = "w_2"
+gap = "1 mm"
+restitution = 0
+side = "lower"
+"""
 
 
 @pytest.mark.parametrize(
@@ -170,6 +186,9 @@ CONTACT = 'contacts = {{ at = "w_2", {} }}\n'
         ('base = { direction = "w", amplitude = "quke(t)" }', "quke"),
         ('base = { direction = "w", amplitude = "quake(w_1)" }', "the time t, frequency"),
         ('base = { direction = "z", amplitude = "t" }', "names no degree of freedom"),
+        ("damping_ratio = [0.01, 0.02]", "one number or 3 of them"),
+        ('sensors = { a = "w_1 - w_1" }', "'a' is the difference of 'w_1' and itself"),
+        (CROSSED, "overlap by 1 mm: nothing fits between"),
     ],
 )
 def test_refusals(keys, message, folder):
@@ -183,3 +202,34 @@ def test_it_is_the_only_system(folder):
     text = '[system]\nmodel = "delangre"\nstructure.mass = "frame.npz"\n'
     with pytest.raises(StudyError, match="a model and structure: these are several systems"):
         system_in(folder, text)
+
+
+def test_the_command_line_doubts_in_sentences(folder):
+    """Without the place in the code, which no author of a study knows."""
+    np.savez(folder / "swapped.npz", M=K, K=1e-3 * M, names=NAMES)
+    text = '[system.structure]\nmass = "swapped.npz"\n'
+    (folder / "study.toml").write_text(HEAD.replace("1 s", "1 ms") + text)
+    out = subprocess.run(
+        [sys.executable, "-m", "saltus", "run", folder / "study.toml", "--out", folder / "found"],
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    doubts = [line for line in out.stderr.splitlines() if "natural frequency" in line]
+    assert len(doubts) == 1
+    assert doubts[0].startswith("saltus: the highest natural frequency of this structure is")
+    assert "Warning" not in out.stderr
+
+
+def test_a_surface_of_a_formula_is_told_as_it_was_written(folder):
+    text = """
+[poincare]
+t_end = "1 s"
+surface = { formula = "tip - 0.001" }
+start = { tip = "2 mm" }
+
+[system.structure]
+mass = "frame.npz"
+modes = 2
+sensors = { tip = "w_2" }
+"""
+    (answer,) = ask(HEAD.split("[simulate]")[0] + text, inputs=Inputs(folder))
+    assert answer.dataset.attrs["surface"] == "tip - 0.001 = 0"

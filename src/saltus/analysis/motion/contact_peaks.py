@@ -23,7 +23,7 @@ from saltus.flow.request import Outcome
 from saltus.interrupt import check_stop
 from saltus.language.derivatives import gradient
 from saltus.language.expression import Expr, constant, div, mul, walk
-from saltus.system import System, written_gaps
+from saltus.system import System, gap_units
 from saltus.system.contact_forces import force_unit, forces_in_equations
 from saltus.system.quantity import formula_of
 from saltus.system.read_off import Quantity, quantity
@@ -158,7 +158,7 @@ def _impulse_of_stops(system: System, stops: Sequence[int]) -> str:
     """The unit that the impulses of rigid stops share: that of a velocity where no inertia is
     given, ``""`` if it isn't known.
     """
-    written, found = written_gaps(system)[1], set()
+    written, found = gap_units(system), set()
     for number in stops:
         law = system.guards[number].law
         assert law is not None
@@ -173,16 +173,6 @@ def _impulse_of_stops(system: System, stops: Sequence[int]) -> str:
         else:  # of coordinates of modes, the mass is 1 without a unit
             found.add("N*m*s" if written[number] == "rad" else "N*s")
     return found.pop() if len(found) == 1 else ""
-
-
-def as_written(
-    system: System, found: Touchdowns, tops: Peaks | None
-) -> tuple[Touchdowns, Peaks | None, list[str]]:
-    """Speeds and depths of the gaps as they were written, and the units of these gaps."""
-    scales, units = written_gaps(system)
-    scale = scales[found.guard]
-    found = replace(found, speed=scale * found.speed, exit_speed=scale * found.exit_speed)
-    return found, tops and replace(tops, depth=scale * tops.depth), units
 
 
 def most(system: System) -> int:

@@ -119,7 +119,9 @@ class Ending:
         return show and (lambda done: show(FINDING + (1.0 - FINDING) * done))
 
     def of_the_user(self, outcome: Outcome, errors: np.ndarray) -> tuple[Outcome, np.ndarray]:
-        """The outcome, and the errors of its contact times, without the guards of the condition."""
+        """The outcome, and the errors of its contact times, without the guards of the condition.
+        Trajectories that end where they start, which no kernel moved, have the mode there.
+        """
         table, own = outcome.contacts, (1 << self.own_guards) - 1
         added = table.guard >= self.own_guards
         crossed = table.trajectory[added & (table.kind == st.CROSSING)]
@@ -128,7 +130,8 @@ class Ending:
         kept = ContactTable(table.integers[~added], table.floats[~added])
         kept.mode_before[:] &= own
         kept.mode_after[:] &= own
-        return replace(outcome, counters=counters, contacts=kept), errors[~added]
+        mode = np.where(self.until.at_start, self.first_mode, outcome.mode)
+        return replace(outcome, mode=mode, counters=counters, contacts=kept), errors[~added]
 
     def with_ends(
         self, outcome: Outcome, samples: np.ndarray, modes: np.ndarray, times: np.ndarray

@@ -27,7 +27,7 @@ from saltus.flow.room import check_room
 from saltus.interrupt import Interrupted
 from saltus.language.evaluate import evaluate
 from saltus.results.dataset import schema
-from saltus.system import System
+from saltus.system import System, gap_units
 from saltus.system.contact_forces import side_that_pushes
 from saltus.system.quantity import with_impulses, with_integrals
 from saltus.system.read_off import Quantity
@@ -250,8 +250,8 @@ def _dataset(
     """The contacts and their statistics, by name."""
     size, guards = seen.group.size, len(system.guards)
     found, words = contact_peaks.with_found(system, found, forces, tops)
-    found, tops, units = contact_peaks.as_written(system, found, tops)
-    common = {unit for unit, one in zip(units, system.guards, strict=True) if not is_hold(one)}
+    gaps = zip(gap_units(system), system.guards, strict=True)
+    common = {unit for unit, one in gaps if not is_hold(one)}
     if len(common) == 1:
         words |= {"<gap>": (gap := common.pop()), "<gap rate>": schema.rate_unit(gap)}
     ends = np.searchsorted(found.trajectory, np.arange(size + 1))
@@ -303,18 +303,7 @@ def _dataset(
             columns["contact_peak_force"] = tops.force
         columns["contact_depth"] = tops.depth
     columns |= {"contact_side": sides, "speed_low": edges[:-1], "speed_high": edges[1:]}
-    result = dataset(schema.IMPACTS, seen, system, method, outcome, columns, each, words=words)
-    return _with_own_units(result, system, units)
-
-
-def _with_own_units(result: xr.Dataset, system: System, units: list[str]) -> xr.Dataset:
-    """The result with the units of gaps as written; a boundary has that of its state."""
-    bounded = {system.units[guard.state] for guard in system.guards if guard.state is not None}
-    named = result["guard_units"]
-    result["guard_units"] = (named.dims, np.array(units, np.str_), named.attrs)
-    if "guard_boundary" in result:
-        result["guard_boundary"].attrs["units"] = bounded.pop() if len(bounded) == 1 else ""
-    return result
+    return dataset(schema.IMPACTS, seen, system, method, outcome, columns, each, words=words)
 
 
 def _edges(bins: Any, speed: np.ndarray) -> np.ndarray:

@@ -24,6 +24,7 @@ from saltus.flow.request import Outcome, Schedule
 from saltus.kernels import status as st
 from saltus.results.dataset import schema
 from saltus.system import System
+from saltus.system.formula import Formula
 from saltus.system.quantity import (
     acting_guards,
     turning_surfaces,
@@ -172,7 +173,8 @@ def crossed(system: System, surface: Any, values: Mapping[str, Any]) -> Crossed:
     does.
     """
     if callable(surface):
-        return _last(with_surface(system, surface), "", "")
+        text = f"{surface.text} = 0" if isinstance(surface, Formula) else ""
+        return _last(with_surface(system, surface), "", text)
     if isinstance(surface, tuple | list):
         if len(surface) != 2 or not isinstance(surface[0], str):
             raise ParameterError(

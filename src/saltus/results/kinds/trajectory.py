@@ -70,7 +70,8 @@ def account(ds: xr.Dataset) -> list[str]:
     """Extent, status and contacts."""
     lines = [f"extent   {_extent(ds)}", f"status   {told(ds['status'].values)}"]
     if "until" in ds.attrs:
-        lines.append(f"until    {ds.attrs['until']}")
+        met = int((ds["status"].values == "until").sum())
+        lines.append(f"until    {ds.attrs['until']}{'' if met else ', which never came true'}")
     if "contact_kind" in ds:
         kinds = told(ds["contact_kind"].values) if ds.sizes["contact"] else "none"
         lines.append(f"contacts {kinds}")

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from saltus.contact.declared import Impact
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, shown
 from saltus.language.expression import Relation
+from saltus.language.names import why_no_name
 from saltus.system.structures import drives, laws, matrices
 from saltus.system.structures.drives import FREQUENCY
 from saltus.system.structures.parts import Base, Contact, Force, direction, vector_of
@@ -125,6 +126,7 @@ def traced(
             load = [sum_of(row, load) for row in moving.inverse]
         return (*w, *load, *stops)
 
+    _check_names((*moving.names, *moving.rates), defaults)
     rates.__signature__ = _signature((*moving.names, *moving.rates), defaults)  # type: ignore[attr-defined]
     made: Callable[..., System] = system(
         (*moving.names, *moving.rates),
@@ -216,6 +218,22 @@ def _parameters(loads: Loads, unit: str) -> tuple[dict[str, Any], dict[str, str]
             f"names by name=."
         )
     return {key: value for key, value, _ in given}, {key: of for key, _, of in given if of}
+
+
+def _check_names(states: tuple[str, ...], parameters: Mapping[str, Any]) -> None:
+    """Raise a ParameterError where the names of degrees of freedom can't be those of states."""
+    for name in states:
+        if (why := why_no_name(name)) is not None:
+            raise ParameterError(
+                f"names: {shown(name)} can't be the name of a state: {why}. With modes= the states "
+                f"are coordinates of modes, and it can."
+            )
+    twice = [name for name in (*states, *parameters) if [*states, *parameters].count(name) > 1]
+    if twice:
+        raise ParameterError(
+            f"names: {shown(twice[0])} would be a degree of freedom and another rate or parameter. "
+            f"Rename it."
+        )
 
 
 def _signature(states: tuple[str, ...], defaults: dict[str, Any]) -> inspect.Signature:

@@ -206,11 +206,14 @@ def _mat(stream: BinaryIO) -> dict[str, Any]:
 def _mtx(stream: BinaryIO) -> dict[str, Any]:
     from scipy.io import mminfo, mmread
 
-    rows, columns, _, kind, *_ = mminfo(stream)
+    # by its path: of an open file of more than some lines SciPy seeks before the beginning, which
+    # ends the process
+    source = getattr(stream, "name", stream)
+    rows, columns, _, kind, *_ = mminfo(source)
     if kind == "array":
         _check_size(8 * rows * columns)
     stream.seek(0)
-    return {"": mmread(stream)}  # entries alone: rows take memory, and are counted before
+    return {"": mmread(source)}  # entries alone: rows take memory, and are counted before
 
 
 def _check_size(size: int) -> None:

@@ -17,6 +17,8 @@ MOST_DENSE = 1500
 RIGID = 1e-7
 #: Least square of the share of a static deflection that the modes, and others, miss.
 INDEPENDENT = 1e-18
+#: Most restarts of Lanczos' method, of which five do for a membrane of 1e5 degrees of freedom.
+MOST_RESTARTS = 30
 #: Roundings of the largest term that an eigenvalue may be off.
 _FEW = 16
 
@@ -47,8 +49,8 @@ def modes_of(mass: Any, stiffness: Any, count: int) -> Modes:
     Raises
     ------
     ParameterError
-        If the mass matrix isn't positive definite or the stiffness matrix has a negative
-        eigenvalue.
+        If the mass matrix isn't positive definite (of large ones the diagonal), the stiffness
+        matrix has a negative eigenvalue, or the modes aren't found in :data:`MOST_RESTARTS`.
     """
     from scipy.linalg import LinAlgError, eigh
 
@@ -61,13 +63,14 @@ def modes_of(mass: Any, stiffness: Any, count: int) -> Modes:
         squares, shapes = _lowest(mass, stiffness, count)
     noise = _rounding(stiffness, shapes)
     if (squares < -np.maximum(noise, 1e-9 * abs(squares).max())).any():
-        raise ParameterError(
-            f"stiffness has a negative eigenvalue, {squares[0]:.3g} 1/s^2 with respect to mass: "
-            f"its modes don't vibrate. Leave modes= out."
-        )
+        _refuse_negative(f"a negative eigenvalue, {squares[0]:.3g} 1/s^2 with respect to mass")
     squares = np.where(np.abs(squares) <= noise, 0.0, squares)
     signs = np.sign(shapes[np.abs(shapes).argmax(axis=0), np.arange(shapes.shape[1])])
     return Modes(np.sqrt(np.maximum(squares, 0.0)), shapes * signs)
+
+
+def _refuse_negative(what: str) -> None:
+    raise ParameterError(f"stiffness has {what}: its modes don't vibrate. Leave modes= out.")
 
 
 def _rounding(stiffness: Any, shapes: np.ndarray) -> np.ndarray:
@@ -79,17 +82,49 @@ def _rounding(stiffness: Any, shapes: np.ndarray) -> np.ndarray:
 def _lowest(mass: Any, stiffness: Any, count: int) -> tuple[np.ndarray, np.ndarray]:
     """The lowest eigenpairs of large matrices, by Lanczos' method about a shift below zero, which
     rigid-body modes don't disturb.
+
+    By Sylvester's law of inertia the pivots of the shifted matrix have the signs of its
+    eigenvalues, of which Lanczos' method sees only those near the shift.
     """
     from scipy.sparse import csc_matrix
-    from scipy.sparse.linalg import eigsh
+    from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
-    shift = -1e-3 * abs(stiffness.diagonal()).max() / abs(mass.diagonal()).max() / len_of(mass)
+    diagonal = mass.diagonal()
+    if (diagonal < 0).any():
+        i = int(diagonal.argmin())
+        raise ParameterError(
+            f"mass must be positive definite, but mass[{i}, {i}] = {diagonal[i]:.3g}."
+        )
+    shift = -1e-3 * abs(stiffness.diagonal()).max() / diagonal.max() / len_of(mass)
+    factors = _factors(stiffness - shift * mass)
+    negative = int((factors.U.diagonal() < 0).sum())
+    if negative:
+        _refuse_negative(f"{negative} negative eigenvalue{'s' * (negative > 1)}")
+    inverse = LinearOperator(mass.shape, matvec=factors.solve, dtype=np.float64)
     start = np.random.default_rng(0).normal(size=len_of(mass))
-    squares, shapes = eigsh(
-        csc_matrix(stiffness), k=count, M=csc_matrix(mass), sigma=shift, v0=start
-    )
+    try:
+        squares, shapes = eigsh(
+            csc_matrix(stiffness), k=count, M=csc_matrix(mass), sigma=shift, v0=start,
+            OPinv=inverse, maxiter=MOST_RESTARTS,
+        )  # fmt: skip
+    except ArpackNoConvergence as found:
+        raise ParameterError(
+            f"Lanczos' method found {len(found.eigenvalues)} of the {count} lowest modes in "
+            f"{MOST_RESTARTS} restarts: their frequencies lie too close together. Are mass and "
+            f"stiffness swapped? The mass comes first, sl.structure(mass, stiffness, ...)."
+        ) from None
     order = np.argsort(squares)
     return squares[order], shapes[:, order]
+
+
+def _factors(matrix: Any) -> Any:
+    """Sparse factors of a symmetric positive definite matrix, whose pivots are its diagonal's."""
+    from scipy.sparse import csc_matrix
+    from scipy.sparse.linalg import splu
+
+    return splu(
+        csc_matrix(matrix), "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+    )
 
 
 def with_residuals(kept: Modes, mass: Any, stiffness: Any, forces: Sequence[np.ndarray]) -> Modes:
@@ -102,8 +137,6 @@ def with_residuals(kept: Modes, mass: Any, stiffness: Any, forces: Sequence[np.n
         If the stiffness matrix is singular: a rigid body moves.
     """
     from scipy.linalg import eigh
-    from scipy.sparse import csc_matrix
-    from scipy.sparse.linalg import splu
 
     if kept.angular.min() <= RIGID * kept.angular.max():
         raise ParameterError(
@@ -112,7 +145,7 @@ def with_residuals(kept: Modes, mass: Any, stiffness: Any, forces: Sequence[np.n
         )
     pushed = np.stack(forces, axis=1)
     pushed = pushed / np.abs(pushed).max(axis=0)
-    missed = splu(csc_matrix(stiffness)).solve(pushed)
+    missed = _factors(stiffness).solve(pushed)
     size = np.sqrt((missed * (mass @ missed)).sum(axis=0))
     for _ in range(2):
         missed -= kept.shapes @ (kept.shapes.T @ (mass @ missed))
@@ -160,10 +193,7 @@ def flexibility(
     elif first:
         residual = np.full(len(at), np.nan)  # the others aren't known, and K has no inverse
     else:
-        from scipy.sparse import csc_matrix
-        from scipy.sparse.linalg import splu
-
-        whole = np.einsum("mn,nm->m", at, splu(csc_matrix(stiffness)).solve(at.T))
+        whole = np.einsum("mn,nm->m", at, _factors(stiffness).solve(at.T))
         residual = whole - parts.sum(axis=1)
     total = np.where(moves, np.inf, parts.sum(axis=1) + residual)
     return total, residual

@@ -241,6 +241,11 @@ class _Sensors:
                     f"the sensor {shown(name)}: {shown(place)} is no degree of freedom. "
                     f"{named(place, self.degrees)}"
                 )
+        if one.at == one.to:
+            raise ParameterError(
+                f"the sensor {shown(name)} is the difference of {shown(one.at)} and itself. Give "
+                f"two degrees of freedom, or one."
+            )
         return vector_of(places, self.degrees)
 
     def _base(self, vector: np.ndarray) -> Any:

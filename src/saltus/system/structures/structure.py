@@ -206,12 +206,14 @@ def structure(
     words += told.travels(loads.drives, unit)
     angular = known.angular if known is not None else _angular(moving, stiffness)
     told.doubt(angular)
+    told.doubt_damping(moving.damping, moving.transform is not None)
     made, sides = traced(moving, degrees, loads, frequency, unit=unit, name=name, source=source)
     for label, contact in touching:
         spring = made.values.get(f"{label}_stiffness")
         if spring is not None and contact.power in (None, 1):
             compliance = moving.compliance(moving.along(direction(contact, degrees)))
             told.doubt_stiff(label, spring, compliance, angular[:count].max(initial=0.0))
+    words += told.closed(touching, made.values, degrees, unit)
     numbers = dict(zip(sides, numbers_of(sides.values(), made.guards), strict=True))
     named = {number: label for label, number in numbers.items() if number is not None}
     made = replace(made, guards=renamed(made.guards, named), description=words)
@@ -238,6 +240,8 @@ def degree_names(names: Any, size: int) -> list[str]:
     if len(set(found)) < size:
         twice = next(one for one in found if found.count(one) > 1)
         raise ParameterError(f"names: two degrees of freedom are called {twice!r}.")
+    if "" in found:
+        raise ParameterError(f"names: that of degree of freedom {found.index('') + 1} is empty.")
     return found
 
 
@@ -308,8 +312,10 @@ def _ratio(ratio: Any, modes: Modes, count: int) -> np.ndarray:
     """The damping matrix of modes with given damping ratios."""
     try:
         several = isinstance(ratio, list | tuple)
-        plain = [_share(one) for one in ratio] if several else _share(ratio)
-        ratios = np.broadcast_to(np.asarray(plain, float), count)
+        plain = np.asarray([_share(one) for one in ratio] if several else _share(ratio))
+        if plain.dtype.kind == "b":
+            raise TypeError(ratio)
+        ratios = np.broadcast_to(plain.astype(float), count)
     except (TypeError, ValueError, OverflowError):
         raise must_be("damping_ratio", f"one number or {count} of them", ratio) from None
     if not (np.isfinite(ratios).all() and (ratios >= 0).all()):

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from saltus.errors import SaltusWarning, listed
+from saltus.errors import ParameterError, SaltusWarning, listed
 from saltus.language.inputs import Record
 from saltus.system.display import STRUCTURE
 from saltus.system.equations_of_motion import EquationsOfMotion
-from saltus.system.structures.parts import Base, direction
+from saltus.system.structures.laws import sides
+from saltus.system.structures.matrices import dense
+from saltus.system.structures.parts import Base, Contact, direction
 from saltus.system.structures.reduction import RIGID, Modes, flexibility
+from saltus.units import from_si
 
 #: Natural frequency [Hz] below which mass and stiffness may be swapped.
 _SWAPPED = 3e-2
@@ -24,6 +28,8 @@ _USUAL = (1e-3, 1e6)
 _STIFF = 1e3
 #: Share of the fastest velocity of a record below which it ends at rest.
 _AT_REST = 0.05
+#: Share of the largest entry of a damping matrix below which an eigenvalue is rounding.
+_NOTHING = 1e-9
 #: Natural frequencies that the description lists, and modes of which it says what mass they move.
 _TOLD = 6
 #: Share of a flexibility that may be left out where all of it is said to be kept.
@@ -154,6 +160,77 @@ def doubt(angular: np.ndarray) -> None:
             f"the lowest natural frequency of this structure is {elastic.min():.3g} Hz. Are its "
             f"matrices in kg and N/m, or in other units that fit together?"
         )
+
+
+def doubt_damping(damping: Any, modal: bool) -> None:
+    """Warn of a damping matrix that feeds energy; it is that of modes or of degrees of freedom."""
+    if damping is None:
+        return
+    symmetric = dense(damping + damping.T) / 2  # gyroscopic parts do no work
+    lowest = float(np.linalg.eigvalsh(symmetric)[0])
+    if lowest < -_NOTHING * abs(damping).max():
+        _warn(
+            f"damping has a negative eigenvalue, {lowest:.3g} "
+            f"{'1/s among the modes' if modal else 'N*s/m'}: it feeds energy, and motions may grow "
+            f"without end. A damping that takes energy is positive."
+        )
+
+
+def closed(
+    contacts: list[tuple[str, Contact]], values: Mapping[str, float], degrees: list[str], unit: str
+) -> str:
+    """Sentences on the stops that touch where the structure stands without load.
+
+    A rigid one is doubted: no motion can start there.
+
+    Raises
+    ------
+    ParameterError
+        If rigid stops of the two sides leave no room between them.
+    """
+    _check_room(contacts, values, degrees, unit)
+    words = ""
+    for label, contact in contacts:
+        gap = values[f"{label}_gap"]
+        if gap > 0:
+            continue
+        depth = from_si(-gap, unit)
+        if gap == 0:
+            words += f" Without load the structure touches {label}."
+        elif contact.restitution is None:
+            words += f" Without load the structure presses {depth} into {label}."
+        else:
+            words += f" Without load the structure stands {depth} beyond {label}, a rigid stop."
+            place = from_si(gap if contact.side == "upper" else -gap, unit)
+            _warn(
+                f"{label}_gap = {from_si(gap, unit)}: without load the structure stands {depth} "
+                f"beyond this rigid stop, so no motion starts from rest there. Give a start in "
+                f'front of it, by a sensor of {contact.at} such as {{"tip": "{place}"}}; or '
+                f"stiffness= in place of restitution=."
+            )
+    return words
+
+
+def _check_room(
+    contacts: list[tuple[str, Contact]], values: Mapping[str, float], degrees: list[str], unit: str
+) -> None:
+    """Raise a ParameterError where a rigid stop of one side lies beyond one of the other side."""
+    rigid = [(label, one) for label, one in contacts if one.restitution is not None]
+    faced = [
+        (label, way if side == "upper" else -way)
+        for label, one in rigid
+        for way in [direction(one, degrees)]
+        for side in sides(one)
+    ]
+    for number, (label, way) in enumerate(faced):
+        for other, opposite in faced[number + 1 :]:
+            room = values[f"{label}_gap"] + values[f"{other}_gap"]
+            if room < 0 and np.array_equal(way, -opposite):
+                raise ParameterError(
+                    f"{label} and {other} are rigid stops of two sides, and overlap by "
+                    f"{from_si(-room, unit)}: nothing fits between. One gap may be negative as far "
+                    f"as the other is open."
+                )
 
 
 def doubt_stiff(label: str, stiffness: float, compliance: float, highest: float) -> None:

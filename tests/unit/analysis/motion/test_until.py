@@ -314,3 +314,31 @@ def test_methods_that_step_over_contacts_are_refused():
         sl.simulate(shaken, (0, 1), periods=3, keep=1, until="x > 1 m")
     with pytest.raises(UnitError):
         sl.simulate(falling, (0, 1), t_end=3, until="x > 3 parsec/kg")
+
+
+def test_outputs_at_an_end_at_the_start_are_those_of_its_side():
+    """Free between two stops: their force there is none."""
+    ask = {"t_end": 1, "progress": False}
+    with pytest.warns(SaltusWarning, match="holds at the start"):
+        run = sl.simulate(between_stops, (0.0, 0.0), until="x > -1 m", **ask)
+    assert float(run.end_force) == float(run.force[0]) == 0.0
+    with pytest.warns(SaltusWarning, match="holds at the start"):
+        run = sl.simulate(between_stops, (0.3, 0.0), until="x > -1 m", **ask)
+    assert float(run.end_force) == pytest.approx(0.2)
+
+
+def test_a_condition_that_never_came_true_is_told():
+    run = sl.simulate(between_stops, (0.0, 0.05), t_end=1, until="x > 1 m", progress=False)
+    assert "x > 1 m, which never came true" in sl.describe(run)
+    run = sl.simulate(between_stops, (0.0, 0.05), t_end=1, until="x > 0.01 m", progress=False)
+    assert "never" not in sl.describe(run)
+
+
+@sl.system(
+    states="x v",
+    units={"x": "m", "v": "m/s", "gap": "m", "k": "N/m", "m": "kg"},
+    outputs={"force": (lambda x, k, gap: sl.freeplay(x, stiffness=k, upper_gap=gap,
+        lower_gap=gap), "N")},
+)  # fmt: skip
+def between_stops(t, x, v, *, m=1.0, k=1.0, gap=0.1):
+    return v, -(sl.freeplay(x, stiffness=k, upper_gap=gap, lower_gap=gap)) / m

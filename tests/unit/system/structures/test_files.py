@@ -123,3 +123,14 @@ def test_more_degrees_of_freedom_than_fit(kind, tmp_path):
     (tmp_path / "M.mtx").write_text(f"%%MatrixMarket matrix {kind} real symmetric\n{size} 1.0\n")
     with pytest.raises(ParameterError, match="at most"):
         sl.structure(tmp_path / "M.mtx", K)
+
+
+def test_a_long_file_of_matrix_market(tmp_path):
+    """SciPy's reader of open files ended the process from some lines on."""
+    size = 400
+    chain = sp.diags_array([-np.ones(size - 1), 2e3 * np.ones(size), -np.ones(size - 1)],
+        offsets=[-1, 0, 1])  # fmt: skip
+    scipy.io.mmwrite(tmp_path / "K.mtx", chain)
+    scipy.io.mmwrite(tmp_path / "M.mtx", sp.eye_array(size))
+    made = sl.structure(tmp_path / "M.mtx", tmp_path / "K.mtx", modes=2)
+    assert made.fingerprint() == sl.structure(sp.eye_array(size), chain, modes=2).fingerprint()

@@ -89,12 +89,19 @@ def changed(matrix, place, value):
         ({"damping": K, "damping_ratio": 0.1}, "not both"),
         ({"damping_ratio": -0.1}, "0 or more"),
         ({"damping_ratio": [0.1, 0.2]}, "3 of them"),
+        ({"damping_ratio": True}, "one number or 3 of them, not True"),
         ({"modes": 4}, "at most 3"),
         ({"modes": 1.5}, "whole number"),
         ({"frequency": None}, "give frequency="),
         ({"names": "a b"}, "3 degrees of freedom, not 2: 'a b'"),
         ({"names": [1, 2, 3]}, "3 degrees of freedom, as texts"),
         ({"names": "a b a"}, "two degrees of freedom are called 'a'"),
+        ({"names": ["a", "", "b"]}, "that of degree of freedom 2 is empty"),
+        ({"names": ["x1", "t", "x3"]}, "'t' can't be the name of a state"),
+        ({"names": ["x1", "a b", "x3"]}, r"'a b' can't be the name of a state.* With modes= "),
+        ({"names": ["x1", "v1", "x3"]}, "'v1' would be a degree of freedom and another rate"),
+        ({"names": ["x1", "x2", "stop_gap"], "contacts": [sl.Contact("x1", 1.0, 1.0)]},
+            "'stop_gap' would be a degree of freedom and"),
         ({"stiffness": 0 * K, "modes": 2}, "entries of stiffness are zero"),
         ({"unit": "inch"}, "unit must be"),
         ({"contacts": STOP}, "a list"),
@@ -125,6 +132,11 @@ def changed(matrix, place, value):
         ({"contacts": [sl.Contact("x1", gap=1.0, restitution=1, friction=0.1, sliding="x2")]},
             "no rebound"),
         ({"mass": M + 0.1, "contacts": [sl.Contact("x1", gap=1.0, restitution=1)]}, "Give modes="),
+        ({"sensors": {"a": ("x1", "x1")}}, "'a' is the difference of 'x1' and itself"),
+        ({"contacts": [sl.Contact("x1", gap=-2.0, restitution=1), sl.Contact("x1", gap=1.0,
+            restitution=1, side="lower")]}, "stop1 and stop2 .* overlap by 1 m: nothing fits"),
+        ({"contacts": [sl.Contact("x1", gap=-2.0, restitution=1, to="x2"), sl.Contact("x2", gap=1.0,
+            restitution=1, to="x1")]}, "stop1 and stop2 .* overlap by 1 m: nothing fits"),
         ({"base": sl.Base("y", 1.0)}, "names no degree of freedom"),
         ({"base": sl.Base("rot", 1.0), "names": "rx_1_1 rx_1_2 w_1_2", "contacts": [],
             "forces": []}, "'rot' names no degree of freedom. Known: rx, w"),
@@ -198,6 +210,32 @@ def test_names_of_numpy_become_plain_text():
 def test_a_free_mass_between_stops_needs_no_stiffness():
     made = sl.structure([[1.0]], [[0.0]], contacts=[sl.Contact("x1", 1.0, 1.0, side="both")])
     assert made.rhs(0.0, [3.0, 0.0]).tolist() == [0.0, -2.0]
+
+
+def test_a_row_of_another_length_than_the_modes():
+    with pytest.raises(TraceError, match=r"\*q stands for 2 values, q1 to q2: a row has a number"):
+        sl.structure(M, K, modes=2, sensors={"strain": lambda *q: np.ones(3) @ q})
+
+
+@pytest.mark.parametrize("law", [{"stiffness": 1e3}, {"restitution": 0.5}])
+@pytest.mark.parametrize("side", ["upper", "lower"])
+def test_gaps_of_one_mode_are_those_of_its_contacts(side, law):
+    """The gap at a contact that one mode moves, upside down, is as written: in m, not in the
+    coordinate of the mode.
+    """
+    made = sl.structure(
+        [[4.0, 0.0], [0.0, 1.0]], [[400.0, 0.0], [0.0, 900.0]], modes=2, frequency="3 Hz",
+        names="x y", contacts=[sl.Contact("y", gap="1 mm", to="x", side=side, name="near", **law),
+            sl.Contact("x", gap="1 mm", side=side, **law)],
+        forces=[sl.Force("x", "20 N")], sensors={"v": sl.velocity("x")},
+    )  # fmt: skip
+    run = sl.simulate(made, periods=5)
+    found = sl.contacts(run)
+    found = found[(found.guard == "stop") & found.kind.isin(["crossing", "impact"])]
+    assert len(found) > 3
+    assert np.allclose(found.velocity, found.v_before, rtol=1e-12)
+    assert np.array_equal(found.direction, np.sign(found.v_before))
+    assert run.guard_units.values.tolist()[:2] == ["m", "m"]
 
 
 def test_a_record_of_something_else():

@@ -12,6 +12,7 @@ import scipy.sparse as sp
 
 import saltus as sl
 from saltus.errors import ParameterError, SaltusWarning
+from saltus.system.structures import reduction
 
 N = 9
 MASS, CHAIN = 0.5 * np.eye(N), 900.0 * (2 * np.eye(N) - np.eye(N, k=1) - np.eye(N, k=-1))
@@ -104,6 +105,73 @@ def test_singular_and_indefinite_matrices():
         sl.structure(np.diag([1.0, 0.0]), np.eye(2), modes=1)
     with pytest.raises(ParameterError, match="negative eigenvalue"):
         sl.structure(np.eye(2), np.diag([1.0, -1e-3]), modes=1)
+
+
+@pytest.mark.parametrize("size", [6, 1600])
+def test_indefinite_matrices_of_any_size(size):
+    """Of large ones a negative eigenvalue far from the lowest modes is one of the pivots."""
+    mass = sp.eye_array(size).tolil()
+    chain = sp.diags_array([-np.ones(size - 1), 2.5 * np.ones(size), -np.ones(size - 1)],
+        offsets=[-1, 0, 1]).tolil()  # fmt: skip
+    chain[3, 3] = -1e5
+    with pytest.raises(ParameterError, match=r"stiffness has .* negative eigenvalue"):
+        sl.structure(mass.tocsr(), chain.tocsr(), modes=2)
+    chain[3, 3], mass[4, 4] = 2.5, -1.0
+    with pytest.raises(ParameterError, match="mass must be positive definite"):
+        sl.structure(mass.tocsr(), chain.tocsr(), modes=2)
+
+
+def test_modes_that_lie_too_close_together_are_not_waited_for(monkeypatch):
+    monkeypatch.setattr(reduction, "MOST_RESTARTS", 1)
+    size = 3000
+    chain = sp.diags_array([-np.ones(size - 1), 2 * np.ones(size), -np.ones(size - 1)],
+        offsets=[-1, 0, 1])  # fmt: skip
+    with pytest.raises(ParameterError, match=r"of the 9 lowest modes in 1 restarts.*swapped\?"):
+        sl.structure(chain, sp.eye_array(size), modes=9)
+
+
+NEGATIVE = np.diag([0.1, -0.2, 0.1])
+
+
+@pytest.mark.parametrize(("modes", "told"), [(None, "-0.2 N"), (3, "-0.4 1/s among the modes")])
+def test_damping_that_feeds_energy_is_doubted(modes, told):
+    mass, stiffness = 0.5 * np.eye(3), np.diag([1e3, 2e3, 3e3])
+    with pytest.warns(SaltusWarning, match=f"damping has a negative eigenvalue, {told}"):
+        sl.structure(mass, stiffness, NEGATIVE, modes=modes)
+    turning = 5 * (np.eye(3, k=1) - np.eye(3, k=-1))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        sl.structure(mass, stiffness, turning, modes=modes)
+        sl.structure(mass, stiffness, 1e-3 * stiffness, modes=modes)
+
+
+@pytest.mark.parametrize(
+    ("gap", "law", "told"),
+    [
+        ("1 mm", {"stiffness": 1e3}, ""),
+        ("0 mm", {"stiffness": 1e3}, " Without load the structure touches stop."),
+        ("-1 mm", {"stiffness": 1e3}, " Without load the structure presses 1 mm into stop."),
+        ("0 mm", {"restitution": 0.5}, " Without load the structure touches stop."),
+        ("-1 mm", {"restitution": 0.5},
+            " Without load the structure stands 1 mm beyond stop, a rigid stop."),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("side", ["upper", "lower"])
+def test_stops_that_touch_without_load(gap, law, told, side):
+    stop = sl.Contact("x2", gap=gap, side=side, **law)
+    with warnings.catch_warnings(record=True) as heard:
+        warnings.simplefilter("always")
+        made = sl.structure(MASS, CHAIN, modes=N, contacts=[stop], sensors={"tip": "x2"})
+    assert made.description.partition(" of it kept.")[2] == told
+    assert len(heard) == ("beyond" in told)
+    if heard:
+        start = '"1 mm"' if side == "lower" else '"-1 mm"'
+        assert f'such as {{"tip": {start}}}' in str(heard[0].message)
+        at_rest = r"beyond a stop, stop by 1 mm \(first: trajectory 0, t = 0 s, tip = 0 m\)"
+        with pytest.warns(SaltusWarning, match=at_rest):
+            sl.simulate(made, t_end=1e-3)
+        sign = 1 if side == "lower" else -1
+        assert sl.simulate(made, {"tip": sign * 1.001e-3}, t_end=1e-3).status == "ok"
 
 
 def test_long_equations_are_not_shown():
