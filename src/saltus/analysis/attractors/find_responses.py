@@ -21,6 +21,7 @@ import numpy as np
 from saltus.analysis.attractors.aperiodic import kinds_of
 from saltus.analysis.attractors.growth import BUDGET
 from saltus.analysis.attractors.recurrence import recurrence, recurring_orbits
+from saltus.analysis.attractors.settling import may_settle
 from saltus.analysis.closed import unforced
 from saltus.analysis.closed.field_zeros import autonomous
 from saltus.analysis.closed.motions import ClosedMotions
@@ -294,6 +295,10 @@ def _classify_aperiodic(
     state, kinds = kinds_of(maps, start, result.scale[who], groups, BUDGET * most, known)
     result.share[who] = MEASURED
     iterates, recurs = _watched(maps, state, who, result, past)
+    tori = np.array([one is not None and one[0] == Kind.QUASI_PERIODIC.word for one in kinds])
+    if tori.any() and not autonomous(map_.system):
+        rows = np.flatnonzero(tori)
+        recurs[rows] |= may_settle(maps.rows(rows), iterates[rows], result.scale[who[rows]])
     result.share[who], unclear = KEPT, np.ones(len(who), bool)
     if autonomous(map_.system):  # a limit cycle that is reached slowly, and no torus
         recurs |= unforced.nearly_recurs(maps, result.end[who], ROUND * float(map_.period[0]))
