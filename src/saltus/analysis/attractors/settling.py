@@ -4,6 +4,8 @@ their largest exponent is hardly below zero, as that of a quasi-periodic motion 
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from saltus.analysis.attractors.growth import BUDGET, NEWTON, tangent_cost
@@ -21,7 +23,7 @@ APPROACHING = 0.75
 
 
 def may_settle(map_: Map, points: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """Which motions settle to an orbit, or may do so more slowly than can be seen: an attracting
+    """True for motions that settle to an orbit, or may do so too slowly to be seen: an attracting
     orbit is found from their last points, and either their distance from it shrinks in each quarter
     of the points, or its multipliers shrink nothing visibly in so short a time.
 
@@ -63,4 +65,4 @@ def _approaches(points: np.ndarray, orbit: ClosedMotion, scale: np.ndarray) -> b
 
 def _is_slow(orbit: ClosedMotion, span: int) -> bool:
     """True where an orbit attracts too slowly for its approach to be seen in so many iterates."""
-    return orbit.exponent * span * (1 - 1 / PARTS) > np.log(APPROACHING)
+    return orbit.exponent * span * (1 - 1 / PARTS) > math.log(APPROACHING)

@@ -8,7 +8,6 @@ import numpy as np
 
 from saltus.analysis.attractors.grid import Grid
 from saltus.analysis.attractors.grid_responses import GridResponses, find
-from saltus.analysis.attractors.growth import BUDGET, NEWTON, tangent_cost
 from saltus.analysis.branches.seeds import scaled, seeds_at
 from saltus.analysis.branches.switching import Seed
 from saltus.flow.methods import Method
@@ -19,9 +18,6 @@ from saltus.flow.progress import stage
 SEEDING_WORK = 2e9
 #: Values that are run together where the budget may not last for all.
 TOGETHER = 4
-#: Most periods that a start may cost, in multiples of those that it is followed for: twice that,
-#: and as much as closing orbits and measuring exponents may cost.
-WORST = 2 * BUDGET + 2
 
 
 def seeds_in(
@@ -52,7 +48,7 @@ def _parts(grid: Grid, periods: int) -> list[np.ndarray]:
     else few, spread over the range, then those between them.
     """
     every, states = np.arange(grid.places), grid.starts.shape[1]
-    worst = WORST * periods * states**2 * len(grid.starts) * grid.places
+    worst = grid.most_spent(periods) * states**2
     if worst <= SEEDING_WORK or grid.sweeps:
         return [every]
     count = -(-grid.places // TOGETHER)
@@ -63,10 +59,8 @@ def _parts(grid: Grid, periods: int) -> list[np.ndarray]:
 
 def _work(found: GridResponses, periods: int) -> float:
     """Work on the starts that were run."""
-    states, settled = found.motions.end.shape[1], found.motions.settled
-    closing = NEWTON * tangent_cost(states) * found.motions.orbits.period
-    cost = np.where(settled >= 0, np.maximum(settled, 1) + closing, WORST * periods)
-    return float(cost.sum()) * states**2
+    spent, states = found.motions.spent(periods), found.motions.end.shape[1]
+    return float(spent.sum()) * float(states**2)
 
 
 def _seeds_of(found: GridResponses, grid: Grid, method: Method) -> list[Seed]:
