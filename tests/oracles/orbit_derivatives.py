@@ -52,13 +52,20 @@ def columns(that: Case, method: sl.Method, seed: int = 1) -> list[Column] | str:
     ]
 
 
+#: Statuses of motions that came to the end of their period.
+ENDED = ("ok", "graze_unresolved")
+
+
 def _of_orbit(system, orbit, to, method):
     fly = partial(_sensitivity, to=to, method=method)
-    (one,) = fly(system, orbit, None)
-    if one["status"] not in ("ok", "graze_unresolved"):
+    try:
+        (one,) = fly(system, orbit, None)
+        times = np.linspace(0.21, 0.97, 4) * one["period"]
+        (one,) = fly(system, orbit, times)
+    except sl.errors.ParameterError:  # it ends before its period does, or doesn't close
+        return [Column("lost", name, *np.empty((3, 0))) for name in to]
+    if one["status"] not in ENDED:
         return [Column(one["status"], name, *np.empty((3, 0))) for name in to]
-    times = np.linspace(0.21, 0.97, 4) * one["period"]
-    (one,) = fly(system, orbit, times)
     answer = []
     for number, name in enumerate(to):
         base = json.loads(orbit.attrs["parameters"])[name]
@@ -67,6 +74,9 @@ def _of_orbit(system, orbit, to, method):
             runs = [fly(system, _moved(orbit, {name: base + s}), times)[0] for s in moved]
         except sl.errors.ParameterError:
             answer.append(Column("lost", name, *np.empty((3, 0))))
+            continue
+        if stopped := [run["status"] for run in runs if run["status"] not in ENDED]:
+            answer.append(Column(stopped[0], name, *np.empty((3, 0))))
             continue
         if any(run["contacts"] != one["contacts"] for run in runs):
             answer.append(Column("other contacts", name, *np.empty((3, 0))))

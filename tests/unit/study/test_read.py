@@ -62,7 +62,7 @@ def test_not_toml(text, parts):
         (
             HEAD,
             "a study asks something: it has a table [simulate], [poincare], [spectrum], "
-            "[impacts], [energy], [sensitivity], [scatter], [fit], [lyapunov], ",
+            "[impacts], [energy], [attractors], [sensitivity], [scatter], [fit], [lyapunov], ",
         ),
         (WHOLE.replace("periods", "# "), "[simulate] give the length once"),
         (WHOLE + 't_end = "2 s"', "[simulate] give the length once"),
@@ -129,7 +129,7 @@ def test_schema_tells_editors_the_keys():
         "study", "system", "method", "simulate", "sensitivity", "fit", "scatter", "compare",
         "poincare", "spectrum", "impacts", "energy", "lyapunov",
         "frequency_response", "bifurcation_diagram", "equilibria", "periodic_orbits", "branches",
-        "bifurcation_curve", "event_sensitivity", "backbone", "basins",
+        "bifurcation_curve", "event_sensitivity", "backbone", "basins", "attractors",
     }  # fmt: skip
     assert schema["$defs"]["Simulate"]["additionalProperties"] is False
     assert schema["$defs"]["SystemTable"]["additionalProperties"] != {}, (

@@ -19,8 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from saltus.analysis.attractors.aperiodic import kinds_of
-from saltus.analysis.attractors.growth import BUDGET
+from saltus.analysis.attractors.growth import BUDGET, NEWTON, tangent_cost
 from saltus.analysis.attractors.recurrence import recurrence, recurring_orbits
+from saltus.analysis.attractors.settling import may_settle
 from saltus.analysis.closed import unforced
 from saltus.analysis.closed.field_zeros import autonomous
 from saltus.analysis.closed.motions import ClosedMotions
@@ -109,12 +110,25 @@ class SettledMotions:
             np.zeros(count),
         )
 
+    def spent(self, most: int) -> np.ndarray:
+        """Iterates that each took, where it was followed for ``most`` at most, float64[k]."""
+        closing = NEWTON * tangent_cost(self.end.shape[1]) * self.orbits.period
+        followed = np.maximum(self.settled, 1) + closing
+        return np.where(self.settled >= 0, followed, float(most_spent(most)))
+
     def put(self, where: np.ndarray, other: SettledMotions) -> None:
         """Write another's results to the rows int64[m]."""
         for name in ("kind", "exponent", "exponent_error", "settled", "scale", "end", "share"):
             getattr(self, name)[where] = getattr(other, name)
         self.orbits.put(where, other.orbits)
         self.iterates.update({int(where[i]): iterates for i, iterates in other.iterates.items()})
+
+
+def most_spent(most: int) -> int:
+    """Iterates that a trajectory which is followed for ``most`` may cost: twice that, and as much
+    as closing orbits and measuring exponents may cost.
+    """
+    return (2 * BUDGET + 2) * most
 
 
 def find_responses(
@@ -294,6 +308,10 @@ def _classify_aperiodic(
     state, kinds = kinds_of(maps, start, result.scale[who], groups, BUDGET * most, known)
     result.share[who] = MEASURED
     iterates, recurs = _watched(maps, state, who, result, past)
+    tori = np.array([one is not None and one[0] == Kind.QUASI_PERIODIC.word for one in kinds])
+    if tori.any() and not autonomous(map_.system):
+        rows = np.flatnonzero(tori)
+        recurs[rows] |= may_settle(maps.rows(rows), iterates[rows], result.scale[who[rows]])
     result.share[who], unclear = KEPT, np.ones(len(who), bool)
     if autonomous(map_.system):  # a limit cycle that is reached slowly, and no torus
         recurs |= unforced.nearly_recurs(maps, result.end[who], ROUND * float(map_.period[0]))

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from saltus.analysis.attractors.find_responses import most_spent
 from saltus.analysis.closed.turns import ASKED, looks_every
 from saltus.analysis.inputs.axes import along, count_along
 from saltus.analysis.inputs.random_starts import random_count, random_starts
@@ -63,6 +64,10 @@ class Grid:
     def shape(self) -> tuple[int, ...]:
         """Values along each axis."""
         return tuple(len(values) for values in self.axes.values())
+
+    def most_spent(self, most: int) -> int:
+        """Iterates that all starts at all values may cost, each followed for ``most`` at most."""
+        return most_spent(most) * len(self.starts) * self.places
 
     @property
     def places(self) -> int:

@@ -5,26 +5,21 @@ their bifurcations.
 from __future__ import annotations
 
 import functools
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.attractors.grid import Grid, check_grid, grid_of
-from saltus.analysis.attractors.grid_responses import find
+from saltus.analysis.attractors.grid import check_grid, grid_of
 from saltus.analysis.branches.branch import Branch
 from saltus.analysis.branches.branch_table import table_of
 from saltus.analysis.branches.equilibrium_branches import trace_equilibria
 from saltus.analysis.branches.harmonic_branches import trace_harmonics, worst
 from saltus.analysis.branches.plans import LONGEST_DOUBLED, MOST_WORK, POINTS, SWITCHES, plan_of
-from saltus.analysis.branches.seeds import (
-    equilibria_between,
-    equilibrium_seeds,
-    scaled,
-    seeds_at,
-    seeds_of,
-)
+from saltus.analysis.branches.run_seeds import seeds_in
+from saltus.analysis.branches.seeds import equilibria_between, equilibrium_seeds, scaled, seeds_of
 from saltus.analysis.branches.switching import Seed
 from saltus.analysis.branches.tracing import Plan, trace
 from saltus.analysis.closed.field_zeros import autonomous
@@ -33,7 +28,7 @@ from saltus.analysis.inputs.given import Range, Reading, Starts, Value
 from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.inputs.starts import at_values, check_system, range_of
 from saltus.analysis.inputs.verb import verb
-from saltus.errors import ParameterError, among, nearest, shown
+from saltus.errors import ParameterError, SaltusWarning, among, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.methods import Method, check_method, exact_method
 from saltus.flow.progress import reporting, stage
@@ -130,7 +125,10 @@ def branches(
         Motions of a few harmonics are followed in place of exact orbits, and each is held against
         the exact orbit beside it: see :class:`saltus.HarmonicBalance`.
     periods : int
-        For starts: forcing periods after which a trajectory hasn't settled.
+        For starts: forcing periods after which a trajectory hasn't settled. Starts have a budget:
+        beyond 2e9 periods times the square of the states, some five minutes, no more values are
+        run, and a warning says how many weren't. The first ones are spread over the range. Starts
+        that sweep have no budget but the periods.
     seed : int
         Of random starts.
     threads : int, optional
@@ -278,7 +276,15 @@ def seeds_between(
         grid = grid_of(system, {name: places}, start, box, None, seed, None, every)
         if autonomous(system):
             equilibria = equilibria_between(system, name, limits, grid.starts)
-        begins = _found_in(grid, method, periods, threads, progress)
+        begins, left = seeds_in(grid, method, periods, threads, progress)
+        if left:
+            warnings.warn(
+                f"{left} of {at} values of {name} weren't run for seeds: the others took all the "
+                "work that seeds may take. Branches that lie at these alone are missing: give "
+                "fewer periods, a narrower range, or start= with what sl.frequency_response found.",
+                SaltusWarning,
+                stacklevel=2,
+            )
     begins = scaled(system, name, _inside(begins, limits), method)
     return begins, _inside(equilibria, limits)
 
@@ -334,22 +340,3 @@ def _kinds(switch: Any) -> Sequence[str]:
 
 def _inside(seeds: list[Seed], limits: tuple[float, float]) -> list[Seed]:
     return [seed for seed in seeds if limits[0] <= seed.others[-1] <= limits[1]]
-
-
-def _found_in(
-    grid: Grid,
-    method: Method,
-    periods: int,
-    threads: int | None,
-    progress: Callable[[float], None] | None,
-) -> list[Seed]:
-    """Seeds from the attractors that starts lead to at some values of the parameter."""
-    found = find(grid, method, periods, threads, progress)
-    if not found.complete:
-        raise KeyboardInterrupt
-    ((name, values),) = grid.axes.items()
-    orbits = found.motions.orbits.rows(found.row)
-    place = values[found.place]
-    isolated = np.where(orbits.neutral, 0, orbits.period)
-    seeds = seeds_at(grid.system, orbits.points, isolated, orbits.time, place)
-    return scaled(grid.system, name, list(seeds), method)

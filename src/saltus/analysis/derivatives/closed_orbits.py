@@ -24,6 +24,7 @@ from saltus.analysis.solve.floquet import across, multipliers
 from saltus.analysis.solve.linear import moves
 from saltus.errors import ParameterError, SaltusWarning
 from saltus.flow.request import Outcome, Request
+from saltus.kernels import status as st
 from saltus.system import System
 from saltus.system.modes import field
 
@@ -36,6 +37,8 @@ CLOSED, ROUNDED = 1e-8, 1e-14
 STEP, SHIFTS = 5e-5, np.array([-2.0, -1.0, 1.0, 2.0])
 WEIGHTS = np.array([1.0, -8.0, 8.0, -1.0]) / 12.0
 
+#: Statuses of motions that came to the end of their period.
+ENDED = (st.OK, st.GRAZE_UNRESOLVED)
 #: Distance of a multiplier from 1 at which an orbit lies at a fold, and at which it is one of a
 #: family: others lie beside it at the same values.
 FOLD, FAMILY = 1e-6, 1e-12
@@ -81,7 +84,7 @@ def closed_orbits(
     Raises
     ------
     ParameterError
-        If a motion doesn't close.
+        If a motion doesn't close, or ends before its period does.
     """
     shots = _Shots(flow, run)
     n = group.size
@@ -133,8 +136,14 @@ class _Shots:
         return self.flow.system.forced_at is not None
 
     def ends(self, group: Ensemble, length: Span) -> Places:
-        """The ends of a period."""
+        """The ends of a period. Raises ParameterError if a motion ends before."""
         outcome = self.run(self.flow.request(group, length, NO_SAMPLES))
+        if (stopped := ~np.isin(outcome.status, ENDED)).any():
+            word, meaning = st.STATUS[int(outcome.status[stopped][0])][:2]
+            raise ParameterError(
+                f"a motion beside the orbit ends before its period does, {word}: {meaning}. There "
+                "the orbit has no derivatives that can be computed; sl.simulate shows its motion."
+            )
         return self.flow.ends(outcome, group, length)
 
     def rates(self, group: Ensemble) -> np.ndarray:

@@ -130,9 +130,10 @@ def lyapunov(
         than 1e-12 of the fastest one in a block is lost in its rounding: one alone has what is left
         of the mean divergence without the others, several are NaN (a shorter ``every`` helps).
         ``kind``: ``periodic``, ``quasi_periodic``,
-        ``chaotic``, ``equilibrium``, ``limit_cycle`` or ``unclear``; ``response_period``: n of nT,
-        or 0. ``exponent_sum`` (of all) beside ``mean_divergence``, which must agree: the mean trace
-        of the Jacobian and what contacts add, found without the tangent. ``near_graze``: 1 if the
+        ``chaotic``, ``equilibrium``, ``limit_cycle`` or ``unclear``, as of a motion that may still
+        be settling; ``response_period``: n of nT, or 0. ``exponent_sum`` (of all) beside
+        ``mean_divergence``, which must agree: the mean trace of the Jacobian and what contacts add,
+        found without the tangent. ``near_graze``: 1 if the
         motion after the transient grazes a boundary, or is an orbit that misses one by less than a
         thousandth of its size: then deviations that could be seen in practice don't grow as
         infinitesimal ones do. ``running_exponent`` and its interval over ``running_time``;

@@ -14,6 +14,7 @@ import numpy as np
 
 from saltus.analysis.attractors.aperiodic import SURE
 from saltus.analysis.attractors.recurrence import recurring_orbits
+from saltus.analysis.attractors.settling import may_settle
 from saltus.analysis.closed.motions import ClosedMotion
 from saltus.analysis.lyapunov.qr import GOOD, Growth, carry, grow
 from saltus.analysis.lyapunov.segments import TangentFlow
@@ -106,7 +107,9 @@ def spectrum(
     kinds = []
     for i, orbit in enumerate(orbits):
         if orbit is None:
-            kinds.append(kind_of(rates[i], errors[i], forced))
+            kind = kind_of(rates[i], errors[i], forced)
+            torus = forced and kind == Kind.QUASI_PERIODIC.word
+            kinds.append("unclear" if torus and _may_settle(flow, i, growth) else kind)
             _vanish(size - growth.zeros[i], exponents[i], errors[i], half_width[i])
             continue
         kinds.append((Kind.PERIODIC if forced else Kind.EQUILIBRIUM).word)
@@ -165,6 +168,13 @@ def _arrives(points: np.ndarray, orbit: ClosedMotion, scale: np.ndarray, noise: 
     return bool(
         late <= max(SAME, 4.0 * noise) or (late <= max(NEAR, 4.0 * noise) and late < GAINED * early)
     )
+
+
+def _may_settle(flow: TangentFlow, i: int, growth: Growth) -> bool:
+    """True if a trajectory is on its way to an orbit, or may be."""
+    which = np.array([i])
+    found = may_settle(flow.map.rows(which), growth.segment.points[which], growth.scale[which])
+    return bool(found[0])
 
 
 def _of_orbit(
@@ -237,8 +247,11 @@ def kind_of(rates: np.ndarray, errors: np.ndarray, forced: bool) -> str:
     limit = np.maximum(SURE * errors, BOUNDED / len(rates))
     if mean[0] > limit[0] and second[0] > 0.5 * first[0]:  # not one that was chaotic only at first
         return Kind.CHAOTIC.word
-    # zero only if the growth stays bounded, however wide the error is
-    if abs(second[0]) > min(limit[0], 2 * BOUNDED / len(rates)):
+    # zero only if the growth stays bounded, and the error says that it isn't less
+    bounded = 2 * BOUNDED / len(rates)
+    if SURE * errors[0] > bounded or abs(second[0]) > min(limit[0], bounded):
+        return "unclear"
+    if mean[0] < -SURE * errors[0]:  # deviations die out: a motion that hasn't settled yet
         return "unclear"
     torus = forced or (len(mean) > 2 and abs(second[1]) <= limit[1])
     return (Kind.QUASI_PERIODIC if torus else Kind.LIMIT_CYCLE).word

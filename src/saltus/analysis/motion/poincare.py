@@ -44,8 +44,8 @@ EVERYWHERE = ((0, 0),)
 @verb
 def poincare(
     system: System,
-    start: Starts,
-    surface: Quantity | str | tuple[str, float | str],
+    start: Starts | None = None,
+    surface: Quantity | str | tuple[str, float | str] | None = None,
     *,
     direction: int = 0,
     periods: int | None = None,
@@ -65,15 +65,17 @@ def poincare(
     Parameters
     ----------
     system, start, t_start, method, values, threads, progress
-        As for :func:`saltus.simulate`. The method must locate contacts. A Taylor flow isn't
-        disturbed by the surface; ``ODE45`` restarts at each crossing, as MATLAB does at a terminal
-        event, so its steps and with them its errors are others than without the surface.
+        As for :func:`saltus.simulate`; without a start, from rest. The method must locate contacts.
+        A Taylor flow isn't disturbed by the surface; ``ODE45`` restarts at each crossing, as MATLAB
+        does at a terminal event, so its steps and with them its errors are others than without the
+        surface.
     surface : callable, str or tuple
-        A function of (t, states, parameters), zero on the surface: ``lambda x, v: v + 10 * x``; its
-        arguments are found by name. Or ``("x", "0.3 mm")``, a level of a state or an output; or
-        ``"x turns"``, its turning points; or the name of a guard of the system. An output that
-        contacts switch, such as the force of a stop, turns where its rate is zero between them: it
-        doesn't while the stop is open, and its jumps and corners are no turning points.
+        Needed. A function of (t, states, parameters), zero on the surface:
+        ``lambda x, v: v + 10 * x``; its arguments are found by name. Or ``("x", "0.3 mm")``, a
+        level of a state or an output; or ``"x turns"``, its turning points; or the name of a guard
+        of the system. An output that contacts switch, such as the force of a stop, turns where its
+        rate is zero between them: it doesn't while the stop is open, and its jumps
+        and corners are no turning points.
     direction : {0, 1, -1}
         Keep all crossings, or only those where the function rises (1) or falls (-1).
     periods : int
@@ -119,6 +121,14 @@ def poincare(
     6
     """
     check_system(system)
+    if surface is None:
+        state = (*system.outputs.names, *system.states)[0]
+        raise ParameterError(
+            lambda say: (
+                f"poincare needs a surface, such as {say.key(surface=f'{state} turns')}, or a "
+                "function that is zero on it."
+            )
+        )
     method = check_method(method, system)
     if not method.records_contacts:
         raise ParameterError(

@@ -82,8 +82,10 @@ def frequency_response(
     periods : int
         Forcing periods after which a trajectory that hasn't settled is looked at for chaos. It
         bounds the work: closing orbits and measuring exponents may each cost ten times as many
-        periods of the motion. What isn't typed by then is ``not_repeating``; more periods spend
-        more on it, and :func:`saltus.lyapunov` tells all exponents of one motion.
+        periods of the motion, and 20 000 more are spent on orbits that one which seems
+        quasi-periodic may settle to. What isn't typed by then is ``not_repeating``; more periods
+        spend more on it, and :func:`saltus.lyapunov` tells all exponents of one motion. What is
+        ``chaotic`` is so for as long as it was followed: chaos may end later.
     seed : int
         Of random starts.
     threads : int, optional

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.errors import counted
-from saltus.results.dataset.kinds import LONGER
+from saltus.results.dataset.kinds import LONGER, Kind
 from saltus.results.dataset.schema import ResultKind, kind_text
 from saltus.results.dataset.variable import MINIMA, STATUS, TRAJECTORY_NUMBER, VARIED, Variable
 from saltus.results.table import (
@@ -106,10 +106,27 @@ def account(ds: xr.Dataset) -> list[str]:
             f"  {i}: {kind}, {values} {unit}, the first +- {width:.1e}{graze and f', {graze}'}"
         )
     lines += more(count)
-    if (ds["kind"].values == "unclear").any():
-        lines.append(f"untyped  {LONGER}")
+    lines += _doubts(ds)
     if np.isneginf(ds["lyapunov_exponent"].values).any():
         lines.append("-inf     where a contact sticks or rests, nothing is left of a deviation")
+    return lines
+
+
+def _doubts(ds: xr.Dataset) -> list[str]:
+    """Lines on what the time of measurement leaves open."""
+    kinds, lines = ds["kind"].values, []
+    watched = int(ds.attrs.get("transient", 0)) + int(ds.attrs.get("periods", 0))
+    if (kinds == "unclear").any():
+        lines.append(
+            f"untyped  a motion may not have settled in {watched} blocks: a longer transient= and "
+            "more periods= tell more"
+        )
+        lines.append(f"untyped  {LONGER}")
+    if (kinds == Kind.CHAOTIC.word).any() and watched:
+        lines.append(
+            f"unsure   chaotic for as long as it was watched, {watched} blocks: chaos that ends "
+            "later looks the same"
+        )
     return lines
 
 

@@ -81,8 +81,9 @@ def account(ds: xr.Dataset) -> list[str]:
     if ds.sizes.get("event"):
         lines.append(f"events   {_tally(ds['event_kind'].values.tolist())}")
     lines += _ends(ds)
-    if left := _open(ds):
+    if left := _count_of(ds, Kind.NOT_REPEATING):
         lines.append(f"open     {counted(left, 'response')} {OPEN}")
+    lines += _chaotic(ds)
     lines += [
         settled(labels),
         *families(ds, "response"),
@@ -133,9 +134,21 @@ def _tally(kinds: list[str]) -> str:
     return plain(", ".join(f"{n} {word}" for word, n in found[:LINES])) + more
 
 
-def _open(ds: xr.Dataset) -> int:
-    """Count the responses that haven't repeated, and may be periodic or not."""
-    return int((ds["response_type"].values == Kind.NOT_REPEATING.word).sum())
+def _chaotic(ds: xr.Dataset) -> list[str]:
+    """Line on responses that are chaotic as far as is known."""
+    left = _count_of(ds, Kind.CHAOTIC)
+    if not left or "periods" not in ds.attrs:
+        return []
+    return [
+        f"unsure   {counted(left, 'response')} chaotic for as long as watched, at least "
+        f"{ds.attrs['periods']} periods: chaos that ends later looks the same, and a larger "
+        "periods= watches for longer"
+    ]
+
+
+def _count_of(ds: xr.Dataset, kind: Kind) -> int:
+    """Count the responses of a kind."""
+    return int((ds["response_type"].values == kind.word).sum())
 
 
 # -- rows ------------------------------------------------------------------------------------------
@@ -233,7 +246,7 @@ def _notes(ds: xr.Dataset, more: int = 0) -> tuple[str, ...]:
     ]
     if more:
         notes.append(f"{more} shorter branches are in the file.")
-    if left := _open(ds):
+    if left := _count_of(ds, Kind.NOT_REPEATING):
         notes.append(f"{left} responses {OPEN}")
     return (*notes, *sentences(labels))
 

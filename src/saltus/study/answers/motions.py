@@ -108,6 +108,11 @@ class Section(OfMotions):
             *(guard.name for guard in self.system.guards),
             *(f"{name} turns" for name in (*self.system.states, *self.system.outputs.names)),
         ]
+        if surface is None:
+            raise StudyError(
+                f'[{self.place}] lacks surface. Write surface = "{self.system.states[0]} turns", '
+                "or a level."
+            )
         if (
             isinstance(surface, dict)
             and isinstance(text := surface.get(FORMULA), str)

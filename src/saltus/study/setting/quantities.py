@@ -60,7 +60,7 @@ def parameters(
 def states(system: System, table: Mapping[str, Quantity], place: str) -> dict[str, float]:
     """Values of some states in SI. Raises StudyError for an unknown state or a missing unit."""
     return {
-        name: number(value, _unit(system, name, system.states, place), place, name)
+        name: number(value, _unit(system, name, _shown(system), place), place, name)
         for name, value in table.items()
     }
 
@@ -157,10 +157,16 @@ def axes(
     """Starts along some states in SI: (first, last, count, scale), or a list of the starts
     themselves.
     """
+    known = _shown(system)
     return {
-        name: _values(given, _unit(system, name, system.states, place), name, place)
+        name: _values(given, _unit(system, name, known, place), name, place)
         for name, given in table.items()
     }
+
+
+def _shown(system: System) -> tuple[str, ...]:
+    """Names that a map may be drawn over: states, and sensors of a structure by its modes."""
+    return (*system.states, *(system.outputs.names if by_modes(system) else ()))
 
 
 def _values(given: Range, unit: str, name: str, place: str) -> tuple[Any, ...] | list[float]:
@@ -215,4 +221,5 @@ def _unit(
 ) -> str:
     if name not in known:
         raise StudyError(f"[{place}] {name!r} is unknown to {system.name}. {nearest(name, known)}")
-    return system.units.get(name, "")
+    outputs = dict(zip(system.outputs.names, system.outputs.units, strict=True))
+    return system.units.get(name, outputs.get(name, ""))

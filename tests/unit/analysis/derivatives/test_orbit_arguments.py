@@ -41,6 +41,11 @@ def test_orbits_that_do_not_fit_are_told_apart(orbits):
         sl.event_sensitivity(RIG, orbits, to="force")
 
 
+def test_a_motion_that_ends_before_its_period_is_no_orbit(orbits):
+    with pytest.raises(sl.SaltusError, match="ends before its period does, budget_steps"):
+        sl.sensitivity(RIG, orbits.isel(orbit=0), to="force", method=sl.Taylor(max_steps=3))
+
+
 def test_saddles_of_one_period_are_trajectories(orbits):
     saddles = orbits.isel(orbit=(orbits.orbit_period == 1).values)
     found = sl.sensitivity(RIG, saddles, to=["force", "frequency"])
