@@ -13,10 +13,11 @@ from saltus.analysis.branches.parametric_map import ParametricStroboscope
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.closed.field_zeros import field_of
 from saltus.analysis.closed.measures import measure
+from saltus.analysis.inputs.outputs import states_alone
 from saltus.analysis.motion import contact_peaks
 from saltus.flow import modal_state_rows
 from saltus.flow.maps import Stroboscope
-from saltus.flow.modal_motions import modal_rates
+from saltus.flow.modal_motions import modal_rates, wave_motions
 
 
 def chain(modes, *, damping=None, side="both", gap=0.01):
@@ -166,6 +167,48 @@ def test_numbers_of_a_motion_are_those_of_its_polynomials(modes):
     np.testing.assert_allclose(
         other.turning[0], one.turning[0], atol=1e-8 * np.abs(one.maximum).max()
     )
+
+
+@pytest.mark.parametrize(
+    ("modes", "restitution", "preload"), [(2, 0.6, 0.0), (4, 0.8, 0.0), (3, 0.3, 4.0)]
+)
+def test_numbers_of_a_motion_between_rigid_stops(modes, restitution, preload):
+    """Rates jump at impacts, and a stop may be at rest: beside Taylor's method, and turning points
+    beside sign changes of samples.
+    """
+    stiffness = 400.0 * (2 * np.eye(modes) - np.eye(modes, k=1) - np.eye(modes, k=-1))
+    stops = [
+        sl.Contact(f"x{place}", gap=0.01, restitution=restitution, name=name)
+        for place, name in ((1, "first"), (modes, "last"))
+    ]
+    loads = [sl.Force("x1", preload, harmonic=0, name="dead")] if preload else []
+    system = sl.structure(
+        np.eye(modes), stiffness, damping_ratio=0.02, modes=modes, contacts=stops, frequency=2.3,
+        forces=[sl.Force(f"x{modes}", 20.0, phase=0.3, name="drive"), *loads],
+    )  # fmt: skip
+    start, _ = Stroboscope(system, sl.Modal()).ends(np.zeros((1, 2 * modes)), 30)
+    maps = [Stroboscope(system, method) for method in (sl.Taylor(), sl.Modal())]
+    assert wave_motions(maps[1], start, 2, *_asked(system)) is not None
+    one, other = (measure(map_, start, np.array([2])) for map_ in maps)
+    # what is left of a chatter is completed to 1e-8 of a time scale
+    size = (1e-8 if preload else 1e-9) * np.abs(one.maximum).max()
+    for name in ("maximum", "minimum", "mean", "deviation", "harmonic", "span", "contacts"):
+        np.testing.assert_allclose(
+            getattr(other, name), getattr(one, name), atol=size, err_msg=name
+        )
+    assert one.contacts[0] > 1
+    assert other.itinerary == one.itinerary
+    run = sl.simulate(
+        system, start[0], periods=2, samples=20_000, progress=False, method=sl.Modal()
+    )
+    signs = np.sign(run[system.states[modes]].values.ravel()[:-1])
+    assert len(other.turning[0]) == np.sum(signs != np.roll(signs, 1))
+
+
+def _asked(system):
+    """No quantities, and all guards."""
+    outputs = states_alone(system)
+    return outputs.formulas, outputs.guards
 
 
 def test_modal_is_the_default_of_many_states_that_it_serves():

@@ -39,16 +39,18 @@ def wave_motions(
     list of WaveLegs, Outcome
         The legs of each motion, None of one that didn't reach the end; their quantities are the
         states, then those asked for, then the gaps. None in place of both if another method moves
-        this system, a quantity isn't linear, a drive is a record, a contact has a law, or modes go
-        together in a block.
+        this system, a quantity isn't linear, a drive is a record, a contact rubs or remembers, or
+        modes go together in a block.
     """
     system = map_.system
     method = map_.method.serving(system.origin)
     if not isinstance(method, Modal) or system.tangent_of is not None:
         return None
-    if len(guards) != len(system.guards) or any(guard.law for guard in system.guards):
+    if len(guards) != len(system.guards):
         return None
     tables = modal_flow(system.origin).tables
+    if tables.rubs.any() or (~tables.plain & ~tables.strikes & ~tables.holds).any():
+        return None
     asked = tables.linear.of(tuple(quantities))
     if asked is None or tables.linear.courses:
         return None

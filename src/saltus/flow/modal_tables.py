@@ -26,7 +26,7 @@ from saltus.flow.modal_rows import Links, Rows
 from saltus.flow.modal_state_rows import modes_rows, steady_rows
 from saltus.flow.modal_values import ValueSet
 from saltus.kernels.modal import layout
-from saltus.kernels.status import HOLD_LAW, NO_LAW, SURFACE_LAW
+from saltus.kernels.status import HOLD_LAW, IMPACT_LAW, NO_LAW, SURFACE_LAW
 from saltus.language.evaluate import evaluate
 from saltus.language.expression import Expr, walk
 from saltus.system.courses import Course, course_of
@@ -68,6 +68,7 @@ class Tables:
         for g, guard in enumerate(linear.system.guards):
             sides[g] = guard.law.side if guard.law else 0
         self.holds, self.plain = kinds == HOLD_LAW, kinds == NO_LAW
+        self.strikes = kinds == IMPACT_LAW
         self.rubs, self.allowed = kinds == SURFACE_LAW, sides
         self.limits = self._laws[:, layout.LIMITS]
         self.partners = self._laws[:, layout.PARTNER].astype(int)
