@@ -375,10 +375,14 @@ def begins_pressed(i, g, batch, m):
 def way_of(i, g, degree, known, noise, batch, m):
     """Side to which a gap leaves its boundary in a step (0: it doesn't). The velocity of a rebound
     or a crossing tells it, however small; the first term of what begins at rest may be rounding.
+    Where a force has vanished the first term that isn't tells it, though the gap may close again
+    before it is more than rounding.
     """
     rests = known > 1 or m.laws[g, KIND] == HOLD_LAW
     if known == 2 and begins_pressed(i, g, batch, m):
         return -1
+    if known > 2 and abs(m.p[0]) > CERTAIN * noise:
+        return leading_sign(m.p, degree)
     if rests or (int(batch.carry[i, RIDES]) >> g) & 1 == 1:
         return side_of_leaving(m.p, degree, known, noise)
     return 0 if is_rounding(m.p, degree, noise) else leading_sign(m.p, degree)

@@ -131,6 +131,9 @@ CHATTER = 1.0e-8
 COINCIDENT = 10.0 * 2.220446049250313e-16
 #: Rounding of a gap, in units of the sizes of its terms.
 ROUNDED = 16.0 * 2.220446049250313e-16
+#: A third term this many times the rounding of a gap isn't rounding itself: SPANNED^3 / 3! times
+#: that of amplitudes is less.
+CERTAIN = 100.0
 #: Rounding of the time at the end of a run, as a part of it.
 CLOCK = 2.0 * 2.220446049250313e-16
 HUGE = 1.0e300
