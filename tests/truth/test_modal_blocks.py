@@ -286,6 +286,21 @@ def test_a_body_under_its_weight_that_is_shaken_needs_no_compiler():
     assert check_contacts(body, np.zeros(2), run, 2, 1e-12, [DRIVES["a spline"][1]]) == 2
 
 
+@pytest.mark.nojit
+def test_a_free_body_that_nothing_moves_rests_on_its_boundary_beside_one_that_resonates():
+    """Both go together, and x stays exactly zero: y = t sin(t)/2."""
+
+    @sl.system(states="x y v w")
+    def pair(t, x, y, v, w, *, stiffness=900.0, gap=0.0):
+        return v, w, -stiffness * sl.max(x - gap, 0.0), sl.cos(t) - y
+
+    run = moved(pair, np.zeros(4), t_end=9.0, samples=1)
+    assert str(run.status.values) == "resting"
+    assert int(run.steps) < 2000
+    assert (float(run.end_x), float(run.end_v), run.sizes["contact"]) == (0.0, 0.0, 0)
+    assert float(run.end_y) == pytest.approx(4.5 * np.sin(9.0), abs=1e-13)
+
+
 def test_two_free_bodies_that_bounce_keep_their_energy():
     """Joined by a spring, under their weight, over ten thousand contacts: rounding of each."""
 
