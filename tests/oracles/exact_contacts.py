@@ -88,14 +88,16 @@ class Exact:
         return mp.matrix(parts)
 
 
-def check_contacts(system, start, run, most, tolerance, courses=()):
-    """Each contact is a zero of its gap on the exact motion from the exact contact before it, and
-    no other gap is beyond its boundary on the way. Returns how many there were.
+def check_contacts(system, start, run, most, tolerance, courses=(), *, afresh=False):
+    """Each contact is a zero of its gap on the exact motion from the exact contact before it - or
+    afresh, from the recorded one, to which it leads - and no other gap is beyond its boundary on
+    the way. Returns how many there were.
     """
     linear, values = linear_pieces(system), dict(system.values)
     names = [guard.name for guard in system.guards]
     gaps, (rates, lags), known = linear.gaps(values), linear.rates(values), {}
     count = min(run.sizes["contact"], most)
+    sizes = np.array([np.abs(run[f"contact_{name}"]).max() for name in system.states])
     with mp.workdps(50):
         state = mp.matrix([mp.mpf(float(one)) for one in start])
         mode, now = int(run.contact_mode_before[0]), mp.mpf(0)
@@ -113,6 +115,11 @@ def check_contacts(system, start, run, most, tolerance, courses=()):
             others = np.array(mp.matrix([list(z) for z in way]).tolist(), float) @ gaps.matrix.T
             assert ((others + gaps.constant) * sides > -1e-12).all()
             now, mode = found, int(run.contact_mode_after[k])
+            if afresh:
+                recorded = [float(run[f"contact_{name}"][k]) for name in system.states]
+                apart = np.abs(np.array(state.tolist(), float).ravel() - recorded)
+                assert (apart < 1e-11 * sizes).all(), (k, apart / sizes)
+                state, now = mp.matrix(recorded), claimed
     return count
 
 
