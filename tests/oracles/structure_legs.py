@@ -26,6 +26,8 @@ from saltus.system.linearity import linear_pieces
 TURN, EPS = 0.2, 2.0**-52
 #: Steps of a leg, at most: longer ones aren't asked.
 MOST = 2**16
+#: Contacts as near as this in time are one instant.
+ONE_INSTANT = 1e-13
 #: Parts of a step in which a gap that turns near its boundary is looked at.
 PARTS = 64
 METHOD = sl.Modal(max_events=600, max_steps=20_000)
@@ -116,14 +118,18 @@ def check(system, run, records=()):
             piece = linear.piece(values, mode)
             known[mode] = Leg(piece, gaps, sides, rates, lags, records, units)
         to = times[k] if k < len(times) else float(run.end_time)
-        met = names.index(str(run.contact_guard.values[k])) if k < len(times) else -1
-        fresh = names.index(str(run.contact_guard.values[k - 1])) if k else -1
-        _look(found, known[mode], z, now, to, ends[k], met, fresh, sizes)
+        met, fresh = (
+            {names.index(str(run.contact_guard.values[j])) for j in np.flatnonzero(one)}
+            for one in (np.abs(times - to) <= ONE_INSTANT * to,
+                        np.abs(times - now) <= ONE_INSTANT * now)
+        )  # fmt: skip
+        at = names.index(str(run.contact_guard.values[k])) if k < len(times) else -1
+        _look(found, known[mode], z, now, to, ends[k], met, fresh, at, sizes)
         z, now = ends[k], to
     return found
 
 
-def _look(found, leg, z, begin, to, end, met, fresh, sizes):
+def _look(found, leg, z, begin, to, end, met, fresh, crossed, sizes):
     """Look at one leg: where it leads, and whether a gap closes on the way."""
     n, length, at = len(z), to - begin, begin
     if length * leg.fastest > MOST * TURN:
@@ -140,8 +146,8 @@ def _look(found, leg, z, begin, to, end, met, fresh, sizes):
         noise = 64 * EPS * terms * (1 + 0.02 * leg.fastest * length)
         values, slopes = leg.gaps @ path, leg.slopes @ path
         for g in range(len(values)):
-            first = 1 if g == fresh and at == begin else 0
-            last = -1 if g == met and stop == to else None
+            first = 1 if g in fresh and at == begin else 0
+            last = -1 if g in met and stop == to else None
             least = values[g, first:last].min(initial=np.inf)
             least = min(least, _dip(leg, g, path, values[g, :last], slopes[g, :last], terms[g]))
             if least < -noise[g]:
@@ -150,8 +156,8 @@ def _look(found, leg, z, begin, to, end, met, fresh, sizes):
     loss = 1 + 0.02 * leg.fastest * length
     apart = np.abs((z - end) * leg.units[:n]).max()
     found.state = max(found.state, apart / max(largest[:n].max(), sizes.max()) / loss)
-    if met >= 0 and abs(values[met, -1]) > 30 * EPS * terms[met]:
-        found.time = max(found.time, abs(values[met, -1] / slopes[met, -1]))
+    if crossed >= 0 and abs(values[crossed, -1]) > 30 * EPS * terms[crossed]:
+        found.time = max(found.time, abs(values[crossed, -1] / slopes[crossed, -1]))
 
 
 def _dip(leg, g, path, values, slopes, terms):
