@@ -115,16 +115,19 @@ class ModalFlow:
         ended = np.flatnonzero(running & np.isin(batch.status, ENDED))
         sets = batch.carry[ended, layout.SET].astype(int)
         for which in np.unique(sets).tolist():
-            self._keep_sides(batch, ended[sets == which], which)
+            self._keep_sides(batch, ended[sets == which])
         return answer
 
-    def _keep_sides(self, batch: Batch, who: np.ndarray, which: int) -> None:
+    def _keep_sides(self, batch: Batch, who: np.ndarray) -> None:
         """Move ends that rounding put on the other side of a boundary, by rounding, to their side:
         a run that begins there meets what this one hasn't met, and not again what it has. Contacts
-        at rest are put onto their constraints.
+        at rest are put onto their constraints. All have one set of parameter values, whose number
+        another thread may have dropped meanwhile.
         """
         tables, state = self.tables, batch.state[who, : self._states]
-        given = tables.sets[which]
+        values = batch.param[who[0] if batch.stride else 0]
+        with tables.lock:
+            given = tables.sets[tables.set_of(values)]
         time = _times(batch, who)
         drives = self._drives(given, time)
         mode, fresh, carry = batch.mode[who, None], batch.fresh[who, None], batch.carry[who]
@@ -138,7 +141,7 @@ class ModalFlow:
         for some, bits in {(int(a), int(b)) for a, b in zip(mode[:, 0], holds, strict=True) if b}:
             rows = np.flatnonzero((mode[:, 0] == some) & (holds == bits))
             with tables.lock:
-                free, shown = tables.rests(which, some, bits)
+                free, shown = tables.rests(tables.set_of(values), some, bits)
             for g in [-1, *np.flatnonzero(rests[rows[0]] & (tables.allowed != 0)).tolist()]:
                 self._rest(given, free, shown, g, held[rows, g], state, rows, time[rows])
         batch.state[who, : self._states] = state

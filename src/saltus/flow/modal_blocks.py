@@ -13,6 +13,8 @@ from saltus.flow.modal_eigen import ROUNDING
 MOST_LOSS = 2.0**10
 #: The same for each of two modes that coincide: their losses are multiplied.
 MOST_LOSS_OF_TWO = 2.0**5
+#: Least unit of a course's derivatives, in units of its steepest: the fifteenth has a number still.
+LEAST_UNIT = 2.0**-40
 #: Times that the slowest pair of modes may be slower than the fastest: its amplitudes hold speeds
 #: over its rate, and its vectors rounding of the others.
 MOST_SPREAD = 2.0**14
@@ -114,7 +116,7 @@ def block_of(
             elif load.any():
                 _answer(d, space, load, acts, answers)
         if column.any():
-            speed = (_speed(acts.speeds[d - harmonic]) if d >= harmonic else 0.0) or 1.0
+            speed = _unit_of(acts.speeds[d - harmonic], norm) if d >= harmonic else 1.0
             own.append(_generator(d, speed, acts))
             fastest = max(norm, np.abs(own[-1]).max())
             scale = np.abs(column).max() / fastest if fastest > 0 else 1.0
@@ -147,6 +149,15 @@ def _generator(drive: int, speed: float, acts: ModalLoads) -> np.ndarray:
 def _speed(speeds: np.ndarray) -> float:
     """Rate of change of a course, that makes its derivatives as large as its values [1/s]."""
     return float(max(speeds[1], speeds[2] ** (1 / 2), speeds[3] ** (1 / 3)))
+
+
+def _unit_of(speeds: np.ndarray, norm: float) -> float:
+    """By what each derivative of a course is divided [1/s]: not more than the modes turn, for it
+    limits the steps of slow pieces too. They end with the last derivative, so a piece that is far
+    steeper needs no other unit.
+    """
+    fastest = _speed(speeds) or 1.0
+    return min(fastest, max(norm, LEAST_UNIT * fastest))
 
 
 def _is_near(drive: int, values: np.ndarray, acts: ModalLoads) -> bool:

@@ -395,8 +395,9 @@ def decide(i, g, batch, m):
     """
     side = side_of(g, batch.mode[i])
     noise = terms_of(i, g, side, batch, m)
-    r, exact, known = m.row_of[g], m.errors[m.row_of[g], 3] <= noise, known_zeros(i, g, batch)
+    r, known = m.row_of[g], known_zeros(i, g, batch)
     error, slope_error = m.errors[r, 0], m.errors[r, 1]
+    exact = m.errors[r, 3] <= noise or m.errors[r, 2] == 0.0  # nothing moves it
     if exact:  # by the terms of the beginning alone
         error, slope_error = m.errors[r, 3], slope_error + (ORDER + 1) * m.errors[r, 3]
     if known == 1 and m.laws[g, LIMITS] != 0 and turns_here(i, g, noise, batch, m):
