@@ -292,9 +292,10 @@ def _of_parts(
     system = seen.system
     watched = watched_system(system.origin, forces.guards, tuple(forces.formulas.values()))
     nodes = _nodes(seen, outcome, row, states)
+    by_length = np.argsort(nodes.length)  # the longest of those together sets their steps
     for begin in range(0, len(row), WIDTH):
         check_stop()
-        some = slice(begin, begin + WIDTH)
+        some = by_length[begin : begin + WIDTH]
         here = nodes.rows(some)
         of = here.motion if len(seen.group.parameters) > 1 else np.zeros(len(here.motion), int)
         map_ = Stroboscope(
