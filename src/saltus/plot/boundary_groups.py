@@ -1,4 +1,4 @@
-"""Boundaries as pictures of contacts name them: where there are many, those of one stop together."""
+"""Boundaries as pictures of contacts name them: of many, those of one stop together."""
 
 from __future__ import annotations
 
