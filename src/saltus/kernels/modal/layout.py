@@ -123,6 +123,9 @@ CHATTER = 1.0e-8
 COINCIDENT = 10.0 * 2.220446049250313e-16
 #: Rounding of a gap, in units of the sizes of its terms.
 ROUNDED = 16.0 * 2.220446049250313e-16
+#: Times its rounding by which a gap may lie behind its boundary: it was landed on, and other landings
+#: have made the state and its amplitudes of each other since, which rounds each time.
+MISSED = 4.0
 #: Rounding of the time at the end of a run, as a part of it.
 CLOCK = 2.0 * 2.220446049250313e-16
 HUGE = 1.0e300
