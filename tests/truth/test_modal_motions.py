@@ -14,7 +14,6 @@ from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.closed.field_zeros import field_of
 from saltus.analysis.closed.measures import measure
 from saltus.analysis.inputs.outputs import states_alone
-from saltus.analysis.motion import contact_peaks
 from saltus.flow import modal_state_rows
 from saltus.flow.maps import Stroboscope
 from saltus.flow.modal_motions import modal_rates, wave_motions
@@ -221,11 +220,6 @@ def test_modal_is_the_default_of_many_states_that_it_serves():
     curved = [sl.Contact("x1", stiffness=1e4, gap=0.01, power=1.5)]
     hertz = sl.structure(np.eye(5), 400.0 * np.eye(5), modes=5, contacts=curved)
     assert sl.simulate(hertz, t_end=0.1, progress=False).attrs["method"] == "Taylor"
-
-
-def test_peaks_of_many_contacts_are_found_within_seconds():
-    """Their number falls with the square of the states."""
-    assert [contact_peaks.most(chain(modes)) for modes in (2, 4, 8)] == [10_000, 10_000, 2_500]
 
 
 @pytest.mark.parametrize("seed", [40917, 40918, 40919, 40920])

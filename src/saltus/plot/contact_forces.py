@@ -11,9 +11,9 @@ from matplotlib.axes import Axes
 from saltus.errors import ParameterError
 from saltus.plot import axes as draw
 from saltus.plot import selection
-from saltus.plot.palette import hues
+from saltus.plot.boundary_groups import boundary_groups, legend_beside
 from saltus.plot.picture import picture
-from saltus.plot.style import CYCLE, display_scale
+from saltus.plot.style import display_scale
 
 #: Heights of the stems: the first of these that the result has.
 _HEIGHTS = ("contact_peak_force", "contact_impulse")
@@ -26,7 +26,7 @@ def contact_forces(
     ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, legend: bool = True
 ) -> Axes:
     """Stems of the peak force of each contact over the time at which it begins, a colour for each
-    guard; of rigid stops the impulse.
+    guard (of more than eight for each stop); of rigid stops the impulse.
 
     Parameters
     ----------
@@ -68,25 +68,23 @@ def contact_forces(
             draw.say(panel, "No contact in the observed time.", ds)
             return panel
         names = ds["guard"].values.tolist()
-        colours = CYCLE if len(names) <= len(CYCLE) else hues(len(names))
-        for i, name in enumerate(names):
-            if (rows := guards == name).any():
-                colour = colours[i]
+        for group in boundary_groups(names):
+            if (rows := np.isin(guards, [names[place] for place in group.places])).any():
                 top = height[rows] * y.factor
-                panel.vlines(time[rows] * x.factor, 0.0, top, color=colour, linewidth=0.8)
+                panel.vlines(time[rows] * x.factor, 0.0, top, color=group.color, linewidth=0.8)
                 panel.plot(
                     time[rows] * x.factor,
                     top,
                     "o",
-                    color=colour,
+                    color=group.color,
                     markersize=3.5,
-                    label=name.replace("_", " "),
+                    label=group.label,
                 )
         panel.axhline(0.0, color="0.6", linewidth=0.6)
         panel.set_xlabel(x.label("time"))
         panel.set_ylabel(y.label(_WORDS[shown]))
         if legend:
-            panel.legend(loc="upper left", bbox_to_anchor=(1.02, 1))
+            legend_beside(panel)
     return panel
 
 

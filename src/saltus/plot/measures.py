@@ -11,8 +11,9 @@ from matplotlib.ticker import MaxNLocator
 
 from saltus.plot import axes as draw
 from saltus.plot import selection
+from saltus.plot.boundary_groups import MOST_ALONE, boundary_groups, legend_beside
 from saltus.plot.picture import picture
-from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
+from saltus.plot.style import OKABE_ITO, Scale, display_scale
 
 #: Speeds closer than this share of the guard's largest speed are one speed.
 _SAME = 1e-7
@@ -28,8 +29,8 @@ _LINE = 60
 def impacts(
     ds: xr.Dataset, trajectory: int | None = None, ax: Axes | None = None, *, legend: bool = True
 ) -> Axes:
-    """Histogram of the speeds at contact, a colour for each guard. Where they repeat, or there are
-    none, it is said in words.
+    """Histogram of the speeds at contact, a colour for each guard; of more than eight guards
+    stacked, a colour for each stop. Where they repeat, or there are none, it is said in words.
 
     Parameters
     ----------
@@ -63,25 +64,33 @@ def impacts(
     low, high = ds["speed_low"].values, ds["speed_high"].values
     scale = display_scale(ds["speed_low"].attrs.get("units", ""), float(np.abs(high).max()))
     names = ds["guard"].values.tolist()
-    width = (high - low) * scale.factor / len(names)
+    groups = boundary_groups(names)
+    stacked = len(names) > MOST_ALONE  # bars side by side would be hairlines
+    width = (high - low) * scale.factor / (1 if stacked else len(groups))
     sentence = _in_words(ds, labels, counts, scale)
     with draw.panels(ax, 1, (5.2, 2.8)) as (panel,):
         if sentence:
             draw.say(panel, sentence, ds if labels is None else ds.sel(trajectory=labels))
             return panel
-        for i, name in enumerate(names):
+        below = np.zeros(len(low))
+        for i, group in enumerate(groups):
+            height = counts.values[list(group.places)].sum(axis=0)
+            if not height.any():
+                continue
             panel.bar(
-                low * scale.factor + i * width,
-                counts.values[i],
+                low * scale.factor + (0 if stacked else i) * width,
+                height,
                 width=width,
+                bottom=below if stacked else None,
                 align="edge",
-                color=CYCLE[i % len(CYCLE)],
-                label=name.replace("_", " "),
+                color=group.color,
+                label=group.label,
             )
+            below += height
         panel.set_xlabel(scale.label("speed at contact"))
         panel.set_ylabel("contacts")
         if legend:
-            panel.legend(loc="upper left", bbox_to_anchor=(1.02, 1))
+            legend_beside(panel)
     return panel
 
 

@@ -11,7 +11,7 @@ from saltus.contact.guards import Law, at_equality, is_hold
 from saltus.contact.reduction import free_field
 from saltus.errors import counted
 from saltus.language.evaluate import evaluate
-from saltus.language.expression import Expr, state, varies
+from saltus.language.expression import Expr, depends_on, state, varies
 from saltus.language.latex import LatexWriter, latex_name
 from saltus.language.text import Writer
 from saltus.system.equations_of_motion import EquationsOfMotion
@@ -71,7 +71,8 @@ def system_text(system: EquationsOfMotion) -> str:
         _labelled("equations", equations or equation_lines(system)),
     ]
     if system.guards and long:
-        blocks.append([f"guards      {', '.join(guard.name for guard in system.guards)}"])
+        named = ", ".join(guard.name for guard in system.guards if not is_hold(guard))
+        blocks.append(textwrap.wrap(f"guards      {named}", 100, subsequent_indent=" " * 12))
     elif system.guards:
         blocks.append(_labelled("guards", _aligned(_guard_rows(system))))
     if len(system.outputs):
@@ -106,7 +107,8 @@ def _output_rows(system: EquationsOfMotion) -> list[tuple[str, str]]:
 
 def _forcing(system: EquationsOfMotion) -> str:
     if system.forced_at is None:
-        return ", not forced"
+        driven = any(depends_on(entry, ("time",)) for entry in system.field)
+        return ", driven by functions of the time" if driven else ", not forced"
     return (
         f", forced at {system.forced_at} = {_value(system, system.forced_at)} (T = "
         f"{from_si(system.period(), 's')})"

@@ -72,6 +72,42 @@ def test_impacts_are_counted_by_guard():
     assert axes.get_xlabel() == "speed at contact [m/s]"
 
 
+def many_stops(count):
+    """Impacts at so many stops with two sides each, one contact at each side."""
+    ds = data.impacts()
+    names = [f"stop_{i} {side}" for i in range(count) for side in ("upper", "lower")]
+    places = np.arange(2 * count) % 2
+    rows = ds.isel(guard=places, contact=np.zeros(2 * count, dtype=int))
+    return rows.assign_coords(guard=names).assign(
+        contact_guard=("contact", names),
+        contact_speed=("contact", np.linspace(0.01, 0.29, 2 * count)),
+        contact_peak_force=("contact", np.linspace(1.0, 2.0, 2 * count), {"units": "N"}),
+    )
+
+
+@pytest.mark.parametrize("count", [8, 20])
+@pytest.mark.parametrize("picture", [sl.plot.impacts, sl.plot.contact_forces])
+def test_of_many_stops_both_sides_have_one_name_and_the_legend_fits(picture, count):
+    axes = picture(many_stops(count))
+    named = axes.get_legend()
+    assert [text.get_text() for text in named.get_texts()] == [f"stop {i}" for i in range(count)]
+    colours = {tuple(np.ravel(one.get_facecolor())) for one in axes.patches}
+    assert len(colours) in (0, count)
+    figure = axes.get_figure()
+    figure.canvas.draw()
+    assert named.get_window_extent().height <= figure.bbox.height
+
+
+def test_bars_of_many_stops_stand_on_each_other():
+    ds = many_stops(8)
+    axes = sl.plot.impacts(ds)
+    tops = {}
+    for bar in axes.patches:
+        begin = round(bar.get_x(), 9)
+        tops[begin] = max(tops.get(begin, 0.0), bar.get_y() + bar.get_height())
+    assert list(tops.values()) == ds.speed_histogram.sum("guard").values.tolist()
+
+
 def with_speeds(speeds):
     """Impacts at the lower gap with these speeds."""
     ds = data.impacts()

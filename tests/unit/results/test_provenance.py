@@ -49,6 +49,16 @@ def test_hash_sees_a_word_and_a_name(run):
     assert content_hash(run.rename(x="y")) != run.attrs["result_hash"]
 
 
+def test_describe_says_from_when_on_contacts_are_not_known(run):
+    assert "aren't known" not in describe(run)
+    error = run["contact_time_error"].values.copy()
+    error[2:] = np.inf
+    lost = run.assign(contact_time_error=("contact", error))
+    first = float(run["contact_time"][2])
+    said = f"times of {len(error) - 2} aren't known, from {first:.6g} s on"
+    assert said in " ".join(describe(lost).split())
+
+
 def test_hash_ignores_attributes_and_widths(run):
     changed = run.copy(deep=True).assign_attrs(system="other")
     changed["mode"] = changed["mode"].astype(np.int32)

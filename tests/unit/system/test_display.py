@@ -2,6 +2,7 @@
 
 import re
 
+import numpy as np
 import pytest
 
 import saltus as sl
@@ -60,6 +61,28 @@ def test_a_system_without_anything():
         "System decay: 1 state, 0 guards, not forced\nstates      x\nequations   dx/dt = -x"
     )
     assert "table" not in decay._repr_html_()
+
+
+def test_what_a_record_drives_is_not_called_free():
+    shaken = sl.recorded([0.0, 1.0, 2.0, 3.0], [0.0, 1.0, -1.0, 0.0], "N")
+
+    @system(states="x")
+    def driven(t, x):
+        return shaken(t) - x
+
+    assert "0 guards, driven by functions of the time" in repr(driven).splitlines()[0]
+
+
+def test_the_guards_of_a_large_structure_fit_the_line():
+    count = 13
+    names = [f"a_node_{i}" for i in range(count)]
+    stops = [sl.Contact(name, restitution=0.5, gap=1e-3, side="both") for name in names]
+    matrix = np.eye(count)
+    lines = repr(sl.structure(matrix, 1e6 * matrix, names=names, contacts=stops)).splitlines()
+    begin = next(i for i, line in enumerate(lines) if line.startswith("guards"))
+    block = [line for line in lines[begin:] if line.startswith(("guards", " " * 12))]
+    assert max(map(len, lines)) <= 100
+    assert "at rest" not in " ".join(block)  # hold guards count as no boundary in the first line
 
 
 def test_shared_parts_are_named_and_names_do_not_clash():

@@ -29,10 +29,11 @@ from saltus.system.quantity import formula_of
 from saltus.system.read_off import Quantity, quantity
 from saltus.units import dimension
 
-#: Contacts whose peaks are found unless more are asked for: some seconds. Of systems of more than
-#: eight states they are fewer, by the square of the states.
+#: Contacts whose peaks are found unless more are asked for; fewer, where the contacts times the
+#: operations of the equations would be more than so many: some seconds (2 us each were measured of
+#: plates of 40 and 60 modes).
 MOST_CONTACTS = 10_000
-FEW_STATES = 8
+MOST_OPERATIONS = 2_000_000
 #: Parts of contacts whose series are made at a time: some tens of megabytes.
 WIDTH = 256
 #: In place of a unit: there is no such impulse.
@@ -177,7 +178,8 @@ def _impulse_of_stops(system: System, stops: Sequence[int]) -> str:
 
 def most(system: System) -> int:
     """Contacts whose peaks are found within seconds."""
-    return int(MOST_CONTACTS / max(1.0, (len(system.states) / FEW_STATES) ** 2))
+    operations = sum(1 for _ in walk(*system.field))
+    return int(min(MOST_CONTACTS, MOST_OPERATIONS / max(operations, 1)))
 
 
 def warn_of_many(system: System, contacts: int) -> None:
@@ -282,9 +284,10 @@ def _of_parts(
     system = seen.system
     watched = watched_system(system.origin, forces.guards, tuple(forces.formulas.values()))
     nodes = _nodes(seen, outcome, row, states)
+    by_length = np.argsort(nodes.length)  # the longest of those together sets their steps
     for begin in range(0, len(row), WIDTH):
         check_stop()
-        some = slice(begin, begin + WIDTH)
+        some = by_length[begin : begin + WIDTH]
         here = nodes.rows(some)
         of = here.motion if len(seen.group.parameters) > 1 else np.zeros(len(here.motion), int)
         map_ = Stroboscope(

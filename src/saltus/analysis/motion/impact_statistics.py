@@ -87,8 +87,9 @@ def impact_statistics(
         and a boundary at rest itself touches where the equations push.
     peaks : bool, optional
         Whether to find the peak force and the depth of every contact, from the series of the
-        motion in it: by default of 10 000 contacts at most, of systems with N > 8 states of
-        640 000/N^2 at most. Where there are more, a warning says so.
+        motion in it: by default of 10 000 contacts at most, of long equations of fewer, two
+        million over their operations (a structure of 40 modes and eight stops: 1200). Where there
+        are more, a warning says so.
     bins : int or sequence of float
         Bins of the histogram of speeds: how many between zero and the largest one, or their edges
         [unit of the gap per second].

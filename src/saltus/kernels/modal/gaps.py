@@ -422,9 +422,11 @@ def decide(i, g, batch, m):
     elif not exact and m.p[0] <= max(error, noise):
         return OPEN
     elif m.p[0] <= noise:
-        if m.p[0] < -noise and m.laws[g, KIND] != HOLD_LAW:
-            batch.status[i] = MODE_VIOLATION
-            return CLEAR
+        if m.laws[g, KIND] != HOLD_LAW:
+            if m.p[0] < -MISSED * noise:
+                batch.status[i] = MODE_VIOLATION
+                return CLEAR
+            m.p[0] = max(m.p[0], -noise)
         if exact and m.laws[g, KIND] != HOLD_LAW and is_rounding(m.p, degree, noise):
             m.found[g, RIDDEN] = 1.0  # held contacts keep it at zero
             return CLEAR

@@ -75,7 +75,21 @@ def account(ds: xr.Dataset) -> list[str]:
     if "contact_kind" in ds:
         kinds = told(ds["contact_kind"].values) if ds.sizes["contact"] else "none"
         lines.append(f"contacts {kinds}")
+    if "contact_time_error" in ds:
+        lines += _unknown(ds)
     return lines
+
+
+def _unknown(ds: xr.Dataset) -> list[str]:
+    """A line on the contacts of which nothing is known, as their motion has magnified rounding."""
+    unknown = np.isinf(ds["contact_time_error"].values)
+    if not unknown.any():
+        return []
+    first = float(ds["contact_time"].values[unknown].min())
+    return [
+        f"         times of {int(unknown.sum())} aren't known, from {first:.6g} s on: rounding has "
+        f"grown to the size of the motion"
+    ]
 
 
 def headline(ds: xr.Dataset) -> str:
