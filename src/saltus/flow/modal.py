@@ -141,11 +141,13 @@ class ModalFlow:
             j = int(np.argmax(np.abs(row)))
             batch.state[who[i], j] = state[i, j] = state[i, j] - gap[i, g] / row[j]
         gap, noise = self._values(given.gaps, given, state, drives)
+        noise = noise + self._noise_of_time(given.gaps, given, time) * tables.rubs
         free = (tables.plain | (tables.allowed != 0)) & ~(stays | held)
         side, met = np.where((mode >> guards) & 1, 1.0, -1.0), (fresh >> guards) & (gap == 0.0) != 0
         least = np.where(tables.rubs, 2 * noise, noise / 4)  # what slides isn't taken to stick
         near = ((free & ~met) | (tables.rubs & ~held)) & (np.abs(gap) <= 2 * noise)
         near &= (side * gap < least) & (tables.rubs | (np.abs(gap) <= noise))
+        near |= free & ~tables.rubs & ((fresh >> guards) & 1 == 1) & (side * gap < 0)  # just met
         for i, g in np.argwhere(near).tolist():
             row = given.gaps.matrix[g]
             j = int(np.argmax(np.abs(row)))
@@ -173,8 +175,7 @@ class ModalFlow:
         if g < 0 or not ways.any():
             return
         value, noise = (of[:, h] for of in self._values(shown, given, states[rows], drives))
-        speeds = self._speeds(given, time) @ np.abs(shown.driven[h])
-        noise = noise + layout.CLOCK * np.abs(time) * speeds
+        noise = noise + self._noise_of_time(shown, given, time)[:, h]
         wanted = np.where(held, np.maximum(value, 2 * noise), np.minimum(value, 0.0))
         for i in np.flatnonzero((np.abs(value) <= 2 * noise) & (wanted != value)).tolist():
             j = int(np.argmax(np.abs(ways * states[rows[i], free.kept])))
@@ -258,6 +259,7 @@ class ModalFlow:
             )
         drives = self._drives(given, time)
         gap, noise = self._values(given.gaps, given, state, drives)
+        noise = noise + self._noise_of_time(given.gaps, given, time) * self.tables.rubs
         zero = np.abs(gap) <= noise
         bits, allowed, plain = 1 << np.arange(gap.shape[1]), self.tables.allowed, self.tables.plain
         beyond = ((gap * self.tables.limits > 0) & ~zero).any(axis=1)
@@ -309,10 +311,13 @@ class ModalFlow:
         return np.column_stack([waves, *(course.at(time)[0] for course in given.courses)])
 
     @staticmethod
-    def _speeds(given: ValueSet, time: np.ndarray) -> np.ndarray:
-        """Bounds of the rates of the drives, float64[times, drives]."""
+    def _noise_of_time(of: LinearPiece, given: ValueSet, time: np.ndarray) -> np.ndarray:
+        """What the rounding of the time does to linear functions of states and drives."""
         waves = np.broadcast_to(np.abs(given.rates), (len(time), len(given.rates)))
-        return np.column_stack([waves, *(np.abs(course.at(time)[1]) for course in given.courses)])
+        courses = (np.abs(course.at(time)[1]) for course in given.courses)
+        speeds = np.column_stack([waves, *courses])
+        noise: np.ndarray = layout.CLOCK * np.abs(time)[:, None] * (speeds @ np.abs(of.driven.T))
+        return noise
 
     @staticmethod
     def _values(

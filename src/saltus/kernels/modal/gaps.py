@@ -19,6 +19,7 @@ from saltus.kernels.isolation import (
     side_of_leaving,
     slope,
     to_bernstein,
+    without_start,
 )
 from saltus.kernels.lanes import bits, fma, larger, load, lowest_bit, root, smaller, splat, store
 from saltus.kernels.status import GAP_MARGIN, HOLD_LAW, MODE_VIOLATION
@@ -540,10 +541,12 @@ def decide(i, g, batch, m):
     answer = pieces(g, degree, fresh, error, whole, slope_error, noise, shortest, m)
     if answer != OPEN or not exact:
         return answer
+    before = min(int(m.found[0, TOUCHED]), MOST_TOUCHES - 1)
     crosses, touched = first_crossing(
-        m.p, degree, fresh, noise, g, m.bern, m.bounds, m.slopes, m.out, m.touches,
-        min(int(m.found[0, TOUCHED]), MOST_TOUCHES - 1),
-    )  # fmt: skip
+        m.p, degree, fresh, noise, g, m.bern, m.bounds, m.slopes, m.out, m.touches, before
+    )
+    if not fresh and batch.carry[i, STARTS] > 0.5:
+        touched = without_start(m.p, degree, noise, m.touches, before, touched)
     m.found[0, TOUCHED] = min(touched, MOST_TOUCHES - 1)
     m.found[g, PLACE], m.found[g, FINAL] = m.out[ROOT_AT], 1.0
     return CROSSES if crosses else CLEAR

@@ -284,6 +284,8 @@ def step_all(lanes, batch, slow):
     """Take one step of every lane; return the bit set of lanes that need attention."""
     coefficients(lanes)
     room = load(lanes.run, END, LANES) - load(lanes.clock, TAU, LANES)
+    looks = load(lanes.run, LOOKS, LANES)
+    room = room + looks
     if NCLOCKS > 0:
         room = smaller(load(lanes.run, BREAK, LANES) - load(lanes.clock, TAU, LANES), room)
     log2_tolerance = load(lanes.run, TOLERANCE, LANES)
@@ -302,4 +304,6 @@ def step_all(lanes, batch, slow):
     while waiting != 0:
         decide(lanes, lowest_bit(waiting), batch, slow)
         waiting &= waiting - 1
+    if any_lane(looks > 0.0):
+        hold_still(lanes)
     return open_lanes | bits(advance(lanes, room, batch.rec_i.shape[0] > 0))
