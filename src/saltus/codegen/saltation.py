@@ -76,8 +76,7 @@ def jump_function(system: System, clocks: Clocks, dated: bool = False) -> str:
     leap += [f"{entry} += leap_{i} * along" for i, entry in enumerate(column)]
     given = f"dated, date, {given}" if dated else given
     return (
-        f"@kernel\ndef jump_of_column(y, {given}):\n{indented(leap)}\n\n"
-        f"{head}{indented(lines)}\n"
+        f"@kernel\ndef jump_of_column(y, {given}):\n{indented(leap)}\n\n{head}{indented(lines)}\n"
     )
 
 

@@ -93,13 +93,12 @@ def end_impacts(i, stops, now, batch, m):
         m.struck[AT_FIRST, j] = m.state[j // LANES, j % LANES]
     take_impacts(i, stops, False, CLOSED * fastest, now, False, batch, m)
     batch.carry[i, CROSSED] = float(stops)
-    turn_over(i, -1, now, batch, m)
-    loosen(i, -1, now, fastest, batch, m)
     for g in range(m.sizes[GUARDS]):
         if (stops >> g) & 1 and (batch.mode[i] >> m.laws[g, PARTNER]) & 1 == 0:
             snap(i, g, batch, m)
             stands = abs(closing_of(i, g, batch, m)) <= FELT * fastest
             know_zeros(i, g, 2 if stands else 1, batch)
+    turn_over(i, -1, now, batch, m)
     return True
 
 

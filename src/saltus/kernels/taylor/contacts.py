@@ -202,7 +202,7 @@ def decide(lanes, lane, batch, slow):
         first, hits = 0.0, early
     lanes.found[DELTA, lane] = first
     lanes.memo[lane, HITS] = hits
-    if lanes.run[LOOKS, lane] > 0.0:
+    if lanes.run[AHEAD, lane] > 0.0:
         lanes.run[LEAST, lane] = least
         return
     note_touches(lanes, lane, batch, slow, first, count)

@@ -137,19 +137,19 @@ def look_or_end(lanes, lane, batch, slow):
     """Let a lane at its end look beyond it if it stands on a boundary; else end. Returns the
     status.
     """
-    lanes.run[LOOKS, lane] = 0.0
+    lanes.run[AHEAD, lane] = 0.0
     for g in range(NGUARDS):
         watched = not LAWS or lanes.side[WATCHED + g, lane] > 0.5
         if watched and lanes.fresh[g, lane] > 0.5:
-            lanes.run[LOOKS, lane] = batch.period[lanes.memo[lane, WHO]]
-    return RUNNING if lanes.run[LOOKS, lane] > 0.0 else finish(lanes, lane, batch, slow)
+            lanes.run[AHEAD, lane] = batch.period[lanes.memo[lane, WHO]]
+    return RUNNING if lanes.run[AHEAD, lane] > 0.0 else finish(lanes, lane, batch, slow)
 
 
 @inner
 def hold_still(lanes):
     """Of the steps of lanes that look beyond their end keep what is met at once."""
     for lane in range(LANES):
-        if lanes.run[LOOKS, lane] > 0.0:
+        if lanes.run[AHEAD, lane] > 0.0:
             if lanes.found[DELTA, lane] > 0.0:
                 lanes.found[WHICH, lane], lanes.memo[lane, HITS] = -1.0, 0
             lanes.found[DELTA, lane], lanes.found[TURNED, lane] = 0.0, math.inf
@@ -179,7 +179,7 @@ def end_at_once(lanes, lane, batch, slow):
 @kernel
 def finish(lanes, lane, batch, slow):
     """End a run where nothing more happens. Returns the status."""
-    lanes.run[LOOKS, lane] = 0.0
+    lanes.run[AHEAD, lane] = 0.0
     if LAWS:
         end_rests(lanes, lane, batch, slow)
     keep_sides(lanes, lane, batch, slow)

@@ -312,7 +312,7 @@ def too_short(lanes, lane, g, restitution):
     row = GUARD_ROW[g]
     second = abs(lanes.work[row + 2, lane])
     third, fourth = abs(lanes.work[row + 3, lane]), abs(lanes.work[row + 4, lane])
-    scale = lanes.run[END, lane]
+    scale = max(lanes.run[END, lane], lanes.run[AHEAD, lane])
     if second < scale * third:
         scale = second / third
     if second < scale * scale * fourth:

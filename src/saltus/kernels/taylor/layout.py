@@ -66,7 +66,7 @@ CLOCK_ROWS = CLOCK_ROW + HELD * NCLOCKS
     BREAK,
     WATCH,
 ) = range(18)
-TOLERANCE, MOST_MET, CAUSE, LOOKS, DATED, DATES = range(18, 24)
+TOLERANCE, MOST_MET, CAUSE, AHEAD, DATED, DATES = range(18, 24)
 RUN_ROWS = DATES + NCOLUMNS
 # Rows of `bounds`, for each series that a gap reads (see bound_series).
 LINEAR, QUADRATIC, CUBIC, CHANGE, SLOPE_AT_END, REST, BOUNDS = range(7)

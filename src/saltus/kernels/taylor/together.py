@@ -65,7 +65,6 @@ def end_impacts(lanes, lane, batch, hits, slow):
     for i in range(NSTATES):
         lanes.y[i, lane] = slow.state[i]
     turn_over(lanes, lane, batch, mode_behind(lanes, lane, batch, -1, slow), slow)
-    loosen(lanes, lane, batch, -1, fastest, slow)
     gaps_here(lanes, lane, batch, slow)
     for g in range(NGUARDS):
         if (stops >> g) & 1:

@@ -149,7 +149,7 @@ def crossing_guards(lanes, lane):
 @inner
 def attend(lanes, lane, batch, slow):
     """Attend to all events of one lane in this step. Returns its status."""
-    if lanes.run[LOOKS, lane] > 0.0:
+    if lanes.run[AHEAD, lane] > 0.0:
         return end_at_once(lanes, lane, batch, slow)
     start = lanes.run[START, lane]
     if overflowed(lanes, lane):
@@ -258,7 +258,7 @@ def fill(lanes, lane, who, batch, slow):
     lanes.run[BOUNCES, lane], lanes.run[STARTING, lane], lanes.run[FLIPPED, lane] = 0.0, 0.0, 0.0
     lanes.run[CAUSE, lane], lanes.run[DATED, lane] = -1.0, 0.0
     begun = batch.mode[who] >= 0
-    lanes.run[LOOKS, lane] = batch.period[who] if begun and is_at_end(who, batch) else 0.0
+    lanes.run[AHEAD, lane] = batch.period[who] if begun and is_at_end(who, batch) else 0.0
     lanes.run[ACTIVE, lane] = 1.0
     lanes.run[TOLERANCE, lane] = batch.options[who, LOG2_TOLERANCE]
     lanes.run[MOST_MET, lane] = batch.options[who, MOST_CONTACTS]
