@@ -2,10 +2,10 @@
 together both parts have the contacts and the end of the whole motion.
 
 ``PYTHONPATH=src:tests python -m oracles.cut_check COUNT SEED`` prints how many cuts of COUNT random
-systems of each kind ended how, by both methods, and each cut that is wrong; ``--kinds rough`` asks
-for some kinds. A motion that a start one unit in the last place away would change is
-"sensitive", and isn't asked. Of the last 1e-7 s of a chatter only its outcome is compared: a state
-behind a cut knows gaps to their rounding, which over velocities as low as there is 1e-8 s.
+systems of each kind ended how, by both methods, and each cut that is wrong; ``--kinds rough`` and
+``--methods Modal`` ask for some. A motion that a start one unit in the last place away would change
+is "sensitive", and isn't asked. Of the last 1e-7 s of a chatter only its outcome is compared: a
+state behind a cut knows gaps to their rounding, which over velocities as low as there is 1e-8 s.
 """
 
 from __future__ import annotations
@@ -177,16 +177,17 @@ def main():
     parser.add_argument("count", type=int)
     parser.add_argument("seed", type=int)
     parser.add_argument("--kinds", nargs="*", default=KINDS, help=", ".join(KINDS))
+    parser.add_argument("--methods", nargs="*", default=METHODS, help=", ".join(METHODS))
     given = parser.parse_args()
     warnings.simplefilter("ignore")
     for kind in given.kinds:
         system = made(kind)
-        for name, method in METHODS.items():
+        for name in given.methods:
             outcomes = collections.Counter()
             for number in range(given.count):
                 rng = np.random.default_rng([given.seed, number])
                 one = drawn(kind, system, rng)
-                answer = cuts(*one, method, rng)
+                answer = cuts(*one, METHODS[name], rng)
                 if isinstance(answer, str):
                     outcomes[f"{answer} motion"] += 1
                     continue

@@ -85,6 +85,7 @@ class ModalFlow:
         self.CARRY = layout.AMPLITUDES + rows * self._lanes + columns
         self.CARRY += size + guards if self._tangents else 0
         self.CARRY += 2 * tables.groups * self._lanes if names else 0
+        self.CARRY += guards
         self.STEP_RECORDS = 2 * guards + MOST_TOUCHES
 
     def workspace(self) -> tuple[np.ndarray, ...]:
@@ -122,6 +123,8 @@ class ModalFlow:
         drives = self._drives(given, time)
         mode, fresh, carry = batch.mode[who, None], batch.fresh[who, None], batch.carry[who]
         guards = np.arange(len(tables.partners))
+        if not len(guards):
+            return
         twice = carry[:, [layout.TWICE]].astype(int) >> guards & 1 == 1
         stays = (carry[:, [layout.RIDES]].astype(int) >> guards & 1 == 1) | twice
         held = (mode >> np.maximum(tables.partners, 0)) & 1 == 1
@@ -145,9 +148,9 @@ class ModalFlow:
         free = (tables.plain | (tables.allowed != 0)) & ~(stays | held)
         side, met = np.where((mode >> guards) & 1, 1.0, -1.0), (fresh >> guards) & (gap == 0.0) != 0
         least = np.where(tables.rubs, 2 * noise, noise / 4)  # what slides isn't taken to stick
-        near = ((free & ~met) | (tables.rubs & ~held)) & (np.abs(gap) <= 2 * noise)
-        near &= (side * gap < least) & (tables.rubs | (np.abs(gap) <= noise))
-        near |= free & ~tables.rubs & ((fresh >> guards) & 1 == 1) & (side * gap < 0)  # just met
+        most = np.maximum(np.where(tables.rubs, 2 * noise, noise), carry[:, -len(guards) :])
+        near = ((free & ~met) | (tables.rubs & ~held)) & (np.abs(gap) <= most)
+        near &= side * gap < least
         for i, g in np.argwhere(near).tolist():
             row = given.gaps.matrix[g]
             j = int(np.argmax(np.abs(row)))
