@@ -117,7 +117,7 @@ def ordered(rows, intervals):
         return any(begin - CHATTER < time < end + CHATTER for begin, end in intervals)
 
     answer, group = [], []
-    for row in [*sorted(rows), (np.inf, "", "")]:
+    for row in [*sorted(rows, key=lambda one: one[0]), (np.inf, "", "")]:
         if group and row[0] - group[-1][0] > (CHATTER if within(row[0]) else TOGETHER):
             stops = [one for one in group if within(one[0]) and is_of_stop(one)]
             last = {one[1].removesuffix(" at rest"): one for one in stops}

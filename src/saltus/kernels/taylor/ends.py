@@ -50,36 +50,46 @@ def final_contacts(lanes, lane, batch, slow):
 
 @kernel
 def keep_sides(lanes, lane, batch, slow):
-    """Move an end on a boundary that rounding put on the side it came from, by rounding, to the
-    side on which the motion goes on: a run that begins there doesn't meet the contact again. What
-    slides isn't taken to stick there.
+    """Move an end that rounding put on the other side of a boundary, by rounding, to the side on
+    which the motion goes on: a run that begins there meets what this one hasn't met, and not again
+    what it has. What slides isn't taken to stick there.
     """
+    gaps_here(lanes, lane, batch, slow)
     for g in range(NGUARDS):
-        met = lanes.fresh[g, lane] > 0.5 and lanes.fresh[g, lane] < RIDDEN and SNAP_STATE[g] < 0
-        slides = LAWS and LAW[g] == SURFACE_LAW and lanes.side[WATCHED + g, lane] > 0.5
-        slides = slides and SNAP_STATE[g] < 0
-        if not slides and (not met or LAW[g] != NO_LAW):
+        watched = SNAP_STATE[g] < 0 and (not LAWS or lanes.side[WATCHED + g, lane] > 0.5)
+        slides, free = watched and LAW[g] == SURFACE_LAW, LAW[g] == NO_LAW
+        free = free or (LAW[g] == IMPACT_LAW and lanes.fresh[g, lane] < 0.5)
+        if not slides and not (watched and free and lanes.fresh[g, lane] < RIDDEN):
             continue
-        most, inside = -1, side_here(lanes, lane, batch, g, slow)
-        size, least = slow.gaps[SIZES * NGUARDS + g], 0.0
+        inside, least = slow.gaps[g] * lanes.side[g, lane], 0.0
+        size = slow.gaps[SIZES * NGUARDS + g]
         if slides:
             least = 2.0 * noise_of_speed(lanes, lane, batch, g, slow)
-        wanted = max(2.0 * least, 2.0e-16 * size) - inside
-        change = 0.0
-        for i in range(NSTATES if inside < least else 0):
-            kept = lanes.y[i, lane]
-            lanes.y[i, lane] = kept * (1.0 + ALTERED)
-            effect = side_here(lanes, lane, batch, g, slow) - inside
-            lanes.y[i, lane] = kept
-            if abs(effect) > abs(change):
-                most, change = i, effect
-        if abs(wanted) < KEPT * abs(change):
-            lanes.y[most, lane] *= 1.0 + ALTERED * wanted / change
+            gaps_here(lanes, lane, batch, slow)
+        if inside < least:
+            wanted = max(2.0 * least, 2.0e-16 * size) - inside
+            move_off(lanes, lane, batch, g, inside, wanted, slow)
+            gaps_here(lanes, lane, batch, slow)
+
+
+@kernel
+def move_off(lanes, lane, batch, g, inside, wanted, slow):
+    """Change the gap of a guard by the state that it depends on most, if that is rounding."""
+    most, change = -1, 0.0
+    for i in range(NSTATES):
+        kept = lanes.y[i, lane]
+        lanes.y[i, lane] = kept * (1.0 + ALTERED)
+        effect = side_here(lanes, lane, batch, g, slow) - inside
+        lanes.y[i, lane] = kept
+        if abs(effect) > abs(change):
+            most, change = i, effect
+    if abs(wanted) < KEPT * abs(change):
+        lanes.y[most, lane] *= 1.0 + ALTERED * wanted / change
 
 
 @kernel
 def side_here(lanes, lane, batch, g, slow):
-    """Gap of a guard at the node, positive on its side; its size is in slow.gaps."""
+    """Gap of a guard at the node, positive on its side."""
     gaps_here(lanes, lane, batch, slow)
     return slow.gaps[g] * lanes.side[g, lane]
 
@@ -87,10 +97,12 @@ def side_here(lanes, lane, batch, g, slow):
 @kernel
 def end_rests(lanes, lane, batch, slow):
     """Release the stops at rest that a run which began here would find free: what presses them is
-    rounding, and falls. Put the others, and what sticks, onto their constraints.
+    rounding, and falls. Put the others, and what sticks, onto their constraints, twice: one takes
+    the state off another by rounding.
     """
     d = lanes.found[DELTA, lane]
-    for g in range(NGUARDS):
+    for look in range(2 * NGUARDS):
+        g = look % NGUARDS
         h = PARTNER[g]
         if LAW[g] != HOLD_LAW and h >= 0 and lanes.side[h, lane] > 0.0:
             gaps_here(lanes, lane, batch, slow)
