@@ -134,8 +134,8 @@ ROUNDED = 16.0 * 2.220446049250313e-16
 #: A third term this many times the rounding of a gap isn't rounding itself: SPANNED^3 / 3! times
 #: that of amplitudes is less.
 CERTAIN = 100.0
-#: Times its rounding by which a gap may lie behind its boundary: it was landed on, and other landings
-#: have made the state and its amplitudes of each other since, which rounds each time.
+#: Times its rounding by which a gap may lie behind its boundary: it was landed on, and other
+#: landings have made the state and its amplitudes of each other since, which rounds each time.
 MISSED = 4.0
 #: Rounding of the time at the end of a run, as a part of it.
 CLOCK = 2.0 * 2.220446049250313e-16
