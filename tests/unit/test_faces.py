@@ -14,7 +14,7 @@ USUAL = 25
 LARGER = {
     "system": (85, "what is added to a system, structures, linear pieces for the modal flow"),
     "results": (105, "names of kinds and of variables, which pictures and verbs share"),
-    "kernels": (55, "codes of what happened, columns of the tables that kernels fill"),
+    "kernels": (60, "codes of what happened, columns of the tables that kernels fill"),
     "flow": (60, "maps, requests, series of a motion, threads, progress"),
     "analysis.closed": (40, "closed motions, isolated or not, their measures and units, cycles"),
     "analysis.inputs": (40, "types of arguments, the readers of each, the orbits of a result"),

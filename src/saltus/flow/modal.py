@@ -325,7 +325,7 @@ class ModalFlow:
 
     @staticmethod
     def _noise_of_time(of: LinearPiece, given: ValueSet, time: np.ndarray) -> np.ndarray:
-        """What the rounding of the time does to linear functions of states and drives."""
+        """Errors of linear functions of states and drives by the rounding of the time."""
         waves = np.broadcast_to(np.abs(given.rates), (len(time), len(given.rates)))
         courses = (np.abs(course.at(time)[1]) for course in given.courses)
         speeds = np.column_stack([waves, *courses])

@@ -10,8 +10,8 @@ from saltus.kernels.status import GAP_MARGIN, HOLD_LAW, IMPACT_LAW, RUNNING
 
 @kernel
 def pressing_at(i, g, tau, batch, m):
-    """What presses a contact in the state at a start or an end, or a margin of a friction there;
-    its rounding, and that of the time. Needs `angle`.
+    """Acceleration that presses a contact in the state at a start or an end, or a margin of a
+    friction there; its rounding, and that of the time. Needs `angle`.
     """
     take_state(i, batch, m)
     row, which = int(batch.carry[i, AT]) * m.sizes[GUARDS] + g, int(batch.carry[i, SET])

@@ -208,7 +208,7 @@ def act(i, g, tau, d, hits, modes, steady, batch, m):
     if m.laws[g, SECOND] >= 0:
         rub(i, g, tau + d, d > 0.0, modes, steady, batch, m)
     elif m.laws[g, KIND] == HOLD_LAW:
-        release(i, g, tau + d, zeros_of_release(i, g, d, batch, m), batch, m)
+        release(i, g, tau + d, 3 if d > 0.0 else 2, batch, m)
     else:
         status, endless = impacts(i, g, tau + d, hits, modes, steady, batch, m)
     leave(i, before, batch, m)
@@ -224,16 +224,6 @@ def act(i, g, tau, d, hits, modes, steady, batch, m):
             strike_columns(i, g, tau + d, batch, m)
     slides = count_landing(i, tau + d, batch)
     return slides if status == RUNNING else status
-
-
-@inner
-def zeros_of_release(i, g, d, batch, m):
-    """What is known to be zero of the gap of a stop whose force ends: 3 with its acceleration, if
-    the force vanishes continuously or is rounding; 2 if it jumps.
-    """
-    value, _ = here(i, g, batch, m)
-    size = m.stood[m.row_of[g], SIZE] + abs(m.offset[int(batch.carry[i, SET]), g])
-    return 3 if d > 0.0 or abs(value) <= ROUNDED * size else 2
 
 
 @inner
