@@ -68,10 +68,8 @@ def drive(i, tau, batch, m):
     which = int(batch.carry[i, SET])
     for d in range(m.sizes[DRIVES]):
         if m.angle[d, 3] != tau:
-            sine, cosine = sincos(splat(m.angle[d, 0] + m.rate[which, d] * tau, LANES))
-            store(m.sums, 0, cosine)
-            store(m.sums, 1, sine)
-            m.angle[d, 1], m.angle[d, 2], m.angle[d, 3] = m.sums[0, 0], m.sums[1, 0], tau
+            at = m.angle[d, 0] + m.rate[which, d] * tau
+            m.angle[d, 1], m.angle[d, 2], m.angle[d, 3] = math.cos(at), math.sin(at), tau
     courses_at(tau, m)
 
 
