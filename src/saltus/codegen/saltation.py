@@ -29,18 +29,16 @@ _CLOSING_ROUNDING = 16.0 * 2.0**-52
 _LEVEL_ROUNDING = 1e-9
 
 
-def jump_function(system: System, clocks: Clocks, dated: bool = False) -> str:
+def jump_function(system: System, clocks: Clocks) -> str:
     """``jump(t, y, p, h, before, after, g)``: multiply the tangent rows of y by S at a crossing of
     guard g, between two modes (bits).
 
     Does nothing for a system that carries no tangent. A crossing at zero rate makes the tangent
-    infinite, as it is. If `dated`, it takes the ``out`` of ``reset`` as well: if out[2] isn't zero,
-    the instant is that of the jump which wrote it, and how it moves stands in out[3:].
+    infinite, as it is.
     """
-    head = f"@kernel\ndef jump(t, y, p, h, before, after, g{', out' if dated else ''}):\n"
     base = system.tangent_of
     if base is None or not base.guards:
-        return head + "    pass\n"
+        return "@kernel\ndef jump(t, y, p, h, before, after, g):\n    pass\n"
     size = len(base.states)
     # terms without a derivative on the boundary are zero on it, and don't jump
     aside = set_aside(base.field, base.guards)
@@ -68,15 +66,15 @@ def jump_function(system: System, clocks: Clocks, dated: bool = False) -> str:
         "closing = " + " + ".join([*(f"n_{i} * rate_before_{i}" for i in range(size)), f"n_{size}"])
     )
     given = ", ".join([*(f"leap_{i}, n_{i}" for i in range(size)), "closing"])
-    dates = [f"out[2], out[{3 + j}:], " if dated else "" for j in range(size)]
-    lines += [f"jump_of_column(y[{j}:], {date}{given})" for j, date in enumerate(dates)]
+    lines += [f"jump_of_column(y[{j}:], {given})" for j in range(size)]
     column = [f"y[{i}]" for i in first_column(system)]
-    own = f"({' + '.join(f'n_{i} * {entry}' for i, entry in enumerate(column))}) / closing"
-    leap = [f"along = date[0] if dated != 0.0 else {own}" if dated else f"along = {own}"]
+    leap = [
+        f"along = ({' + '.join(f'n_{i} * {entry}' for i, entry in enumerate(column))}) / closing"
+    ]
     leap += [f"{entry} += leap_{i} * along" for i, entry in enumerate(column)]
-    given = f"dated, date, {given}" if dated else given
     return (
-        f"@kernel\ndef jump_of_column(y, {given}):\n{indented(leap)}\n\n{head}{indented(lines)}\n"
+        f"@kernel\ndef jump_of_column(y, {given}):\n{indented(leap)}\n\n"
+        f"@kernel\ndef jump(t, y, p, h, before, after, g):\n{indented(lines)}\n"
     )
 
 

@@ -92,7 +92,6 @@ class ModalFlow:
         self.CARRY = layout.AMPLITUDES + rows * self._lanes + columns
         self.CARRY += size + guards if self._tangents else 0
         self.CARRY += 2 * tables.groups * self._lanes if names else 0
-        self.CARRY += guards
         self.STEP_RECORDS = 2 * guards + MOST_TOUCHES
 
     def workspace(self) -> tuple[np.ndarray, ...]:
@@ -133,8 +132,6 @@ class ModalFlow:
         drives = self._drives(given, time)
         mode, fresh, carry = batch.mode[who, None], batch.fresh[who, None], batch.carry[who]
         guards = np.arange(len(tables.partners))
-        if not len(guards):
-            return
         twice = carry[:, [layout.TWICE]].astype(int) >> guards & 1 == 1
         stays = (carry[:, [layout.RIDES]].astype(int) >> guards & 1 == 1) | twice
         held = (mode >> np.maximum(tables.partners, 0)) & 1 == 1
@@ -154,13 +151,11 @@ class ModalFlow:
             j = int(np.argmax(np.abs(row)))
             batch.state[who[i], j] = state[i, j] = state[i, j] - gap[i, g] / row[j]
         gap, noise = self._values(given.gaps, given, state, drives)
-        noise = noise + self._noise_of_time(given.gaps, given, time) * tables.rubs
         free = (tables.plain | (tables.allowed != 0)) & ~(stays | held)
         side, met = np.where((mode >> guards) & 1, 1.0, -1.0), (fresh >> guards) & (gap == 0.0) != 0
         least = np.where(tables.rubs, 2 * noise, noise / 4)  # what slides isn't taken to stick
-        most = np.maximum(np.where(tables.rubs, 2 * noise, noise), carry[:, -len(guards) :])
-        near = ((free & ~met) | (tables.rubs & ~held)) & (np.abs(gap) <= most)
-        near &= side * gap < least
+        near = ((free & ~met) | (tables.rubs & ~held)) & (np.abs(gap) <= 2 * noise)
+        near &= (side * gap < least) & (tables.rubs | (np.abs(gap) <= noise))
         for i, g in np.argwhere(near).tolist():
             row = given.gaps.matrix[g]
             j = int(np.argmax(np.abs(row)))
@@ -188,7 +183,8 @@ class ModalFlow:
         if g < 0 or not ways.any():
             return
         value, noise = (of[:, h] for of in self._values(shown, given, states[rows], drives))
-        noise = noise + self._noise_of_time(shown, given, time)[:, h]
+        speeds = self._speeds(given, time) @ np.abs(shown.driven[h])
+        noise = noise + layout.CLOCK * np.abs(time) * speeds
         wanted = np.where(held, np.maximum(value, 2 * noise), np.minimum(value, 0.0))
         for i in np.flatnonzero((np.abs(value) <= 2 * noise) & (wanted != value)).tolist():
             j = int(np.argmax(np.abs(ways * states[rows[i], free.kept])))
@@ -272,7 +268,6 @@ class ModalFlow:
             )
         drives = self._drives(given, time)
         gap, noise = self._values(given.gaps, given, state, drives)
-        noise = noise + self._noise_of_time(given.gaps, given, time) * self.tables.rubs
         zero = np.abs(gap) <= noise
         bits, allowed, plain = 1 << np.arange(gap.shape[1]), self.tables.allowed, self.tables.plain
         beyond = ((gap * self.tables.limits > 0) & ~zero).any(axis=1)
@@ -324,13 +319,10 @@ class ModalFlow:
         return np.column_stack([waves, *(course.at(time)[0] for course in given.courses)])
 
     @staticmethod
-    def _noise_of_time(of: LinearPiece, given: ValueSet, time: np.ndarray) -> np.ndarray:
-        """Errors of linear functions of states and drives by the rounding of the time."""
+    def _speeds(given: ValueSet, time: np.ndarray) -> np.ndarray:
+        """Bounds of the rates of the drives, float64[times, drives]."""
         waves = np.broadcast_to(np.abs(given.rates), (len(time), len(given.rates)))
-        courses = (np.abs(course.at(time)[1]) for course in given.courses)
-        speeds = np.column_stack([waves, *courses])
-        noise: np.ndarray = layout.CLOCK * np.abs(time)[:, None] * (speeds @ np.abs(of.driven.T))
-        return noise
+        return np.column_stack([waves, *(np.abs(course.at(time)[1]) for course in given.courses)])
 
     @staticmethod
     def _values(

@@ -9,9 +9,9 @@ from saltus.kernels.status import GAP_MARGIN, HOLD_LAW, IMPACT_LAW, RUNNING
 
 
 @kernel
-def pressing_at(i, g, tau, batch, m):
-    """Acceleration that presses a contact in the state at a start or an end, or a margin of a
-    friction there; its rounding, and that of the time. Needs `angle`.
+def is_pressed(i, g, tau, batch, m):
+    """True if the state at a start or an end presses a contact, by more than rounding, of the time
+    too. Needs `angle`.
     """
     take_state(i, batch, m)
     row, which = int(batch.carry[i, AT]) * m.sizes[GUARDS] + g, int(batch.carry[i, SET])
@@ -21,25 +21,7 @@ def pressing_at(i, g, tau, batch, m):
     for p in range(m.sizes[COURSES]):
         speed += abs(m.presses[row, first + m.sizes[DRIVES] + p] * m.record[p, VALUE + 1])
     noise = ROUNDED * size_of(m.presses, row, 0, m) + CLOCK * abs(time_of(i, tau, batch)) * speed
-    return value_of(m.presses, row, 0, m), noise
-
-
-@inner
-def is_pressed(i, g, tau, batch, m):
-    """True if the state at a start or an end presses a contact, by more than rounding."""
-    pressing, noise = pressing_at(i, g, tau, batch, m)
-    return pressing > noise
-
-
-@kernel
-def rounding_of_margins(i, g, tau, batch, m):
-    """Rounding of the margins of a friction in the state at an end, if one of them is no more; else
-    zero. Needs `angle`.
-    """
-    upper, noise = pressing_at(i, g, tau, batch, m)
-    lower, other = pressing_at(i, m.laws[g, SECOND], tau, batch, m)
-    noise = max(noise, other)
-    return noise if min(upper, -lower) <= noise else 0.0
+    return value_of(m.presses, row, 0, m) > noise
 
 
 @kernel
@@ -78,14 +60,12 @@ def ending_holds(i, tau, modes, steady, batch, m):
         rubs, row = m.laws[g, SECOND] >= 0, m.row_of[g]
         value, _ = here(i, g, batch, m)
         noise = ROUNDED * (m.stood[row, SIZE] + abs(m.offset[which, g]))
-        asked, least = (holds >> g) & 1 == 1 and h > 0.0, 0.0
-        if asked and rubs:
-            least = rounding_of_margins(i, m.laws[g, PARTNER], tau, batch, m)
-        elif asked:
+        asked = (holds >> g) & 1 == 1 and h > 0.0
+        if asked and not rubs:
             asked = not is_pressed(i, m.laws[g, PARTNER], tau, batch, m)
-        if asked and (value <= noise or least > 0.0 or not rubs):
+        if asked and (value <= noise or not rubs):
             series_of(row, modes, steady, which, h, groups_of(modes, m), m)
-            noise = max(terms_of(i, g, side_of(g, batch.mode[i]), batch, m), least)
+            noise = terms_of(i, g, side_of(g, batch.mode[i]), batch, m)
             ending |= 1 << g if side_of_leaving(m.p, ORDER, 0, noise) < 0 else 0
     return ending
 
@@ -109,16 +89,6 @@ def left_at_once(i, tau, modes, steady, batch, m):
         h *= 0.5
     batch.status[i], batch.minima[i, GAP_MARGIN] = RUNNING, margin
     return hits if answer == CROSSES and d == 0.0 else 0
-
-
-@kernel
-def keep_sizes(i, modes, steady, batch, m):
-    """Keep the rounding that the modes leave in each gap at the end: more than the state shows."""
-    stand(modes, steady, int(batch.carry[i, SET]), m)
-    guards, first = m.sizes[GUARDS], batch.carry.shape[1] - m.sizes[GUARDS]
-    for g in range(guards):
-        away = abs(m.offset[int(batch.carry[i, SET]), g])
-        batch.carry[i, first + g] = ROUNDED * (m.stood[m.row_of[g], SIZE] + away)
 
 
 @kernel

@@ -16,7 +16,6 @@ from saltus.kernels.isolation import (
     leading_sign,
     side_of_leaving,
     to_bernstein,
-    without_start,
 )
 from saltus.kernels.lanes import (
     fma,
@@ -448,12 +447,10 @@ def decide(i, g, batch, m):
     answer = pieces(g, degree, fresh, error, whole, slope_error, noise, shortest, m)
     if answer != OPEN or not exact:
         return answer
-    before = min(int(m.found[0, TOUCHED]), MOST_TOUCHES - 1)
     crosses, touched = first_crossing(
-        m.p, degree, fresh, noise, g, m.bern, m.bounds, m.slopes, m.out, m.touches, before
-    )
-    if not fresh and batch.carry[i, STARTS] > 0.5:
-        touched = without_start(m.p, degree, noise, m.touches, before, touched)
+        m.p, degree, fresh, noise, g, m.bern, m.bounds, m.slopes, m.out, m.touches,
+        min(int(m.found[0, TOUCHED]), MOST_TOUCHES - 1),
+    )  # fmt: skip
     m.found[0, TOUCHED] = min(touched, MOST_TOUCHES - 1)
     m.found[g, PLACE], m.found[g, FINAL] = m.out[ROOT_AT], 1.0
     return CROSSES if crosses else CLEAR

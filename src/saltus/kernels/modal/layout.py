@@ -55,7 +55,7 @@ MODES, STEADY, SMOOTH, SLOPES, BEHIND = range(5)
 # frictions whose sliding has been reversed at this instant (bits); then the
 # amplitudes, and with tangents the rates of the states and the gaps before these boundaries,
 # how that instant moves with each column, and with parameters the amplitudes when the derivative
-# was moved last; at last the rounding of each gap at the end of the run, by the sizes of its modes.
+# was moved last.
 AT, ENTERS, NEXT_STEP, LANDED_AT, LANDINGS, RIDES, SET, TABLES, WAITED, CROSSED = range(10)
 TWICE, THRICE, STARTS, ASKS, DATED, REVERSED, AMPLITUDES = range(10, 17)
 # Columns of `laws`, for each guard: the kind of its law (status.py), its hold guard (of a hold

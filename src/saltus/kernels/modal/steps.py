@@ -437,7 +437,6 @@ def put_back(i, tau, status, batch, m):
             move_columns(i, at, tau, batch, m)
             keep_amplitudes(i, batch, m)
             know_rests(i, tau, batch, m)
-            keep_sizes(i, m.links[at, MODES], m.links[at, STEADY], batch, m)
     batch.phase[i], batch.status[i] = tau, status
 
 
