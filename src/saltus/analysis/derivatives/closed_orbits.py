@@ -136,9 +136,12 @@ class _Shots:
         return self.flow.system.forced_at is not None
 
     def ends(self, group: Ensemble, length: Span) -> Places:
-        """The ends of a period. Raises ParameterError if a motion ends before."""
+        """The ends of a period, NaN of what has no start. Raises ParameterError if another motion
+        ends before.
+        """
         outcome = self.run(self.flow.request(group, length, NO_SAMPLES))
-        if (stopped := ~np.isin(outcome.status, ENDED)).any():
+        known = np.isfinite(group.start).all(axis=1)
+        if (stopped := known & ~np.isin(outcome.status, ENDED)).any():
             word, meaning = st.STATUS[int(outcome.status[stopped][0])][:2]
             raise ParameterError(
                 f"a motion beside the orbit ends before its period does, {word}: {meaning}. There "

@@ -5,7 +5,9 @@ layout            its tables and work arrays
 records           drives that are polynomials of the time between breaks
 blocks            modes that go together
 series            amplitudes on their way, states, and gaps there
-gaps              what the gaps do over a step, and where they cross
+pieces            a gap over a part of a step, by Bernstein coefficients
+gaps              what the gaps do over a step
+places            where a gap crosses
 laws              impacts, contacts at rest, their release
 impacts           several impacts at one instant
 friction          friction that sticks and slides
