@@ -298,8 +298,7 @@ def test_the_values_of_the_system_are_part_of_every_answer(question, tmp_path):
             r"one state"),
         (SECTION.replace('"upper_gap"', "3"), r"surface = 3 must be text in quotes\. For example: "
                                               r"surface = { x ="),
-        (SECTION.replace('surface = "upper_gap"\n', ""), r"\[poincare 1\] needs 'surface'\. For "
-                                                         r"example"),
+        (SECTION.replace('surface = "upper_gap"\n', ""), r"\[poincare\] lacks surface\. Write"),
         (SECTION.replace("direction = 1", "direction = 2"), r"direction = 2 must be 0, 1 or -1"),
         (SECTION.replace("direction", "directon"), r"no key 'directon'\. Did you mean "
                                                    r"'direction'\?"),

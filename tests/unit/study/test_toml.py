@@ -34,7 +34,7 @@ from saltus.study.tables.toml import FILE, fault, toml
         (lambda say: say.verb("poincare", "system, start"), "sl.poincare(system, start)",
          "[poincare]"),
         (lambda say: say.verb("energy_balance"), "sl.energy_balance", "[energy]"),
-        (lambda say: say.verb("attractors"), "sl.attractors", "sl.attractors in Python"),
+        (lambda say: say.verb("attractors"), "sl.attractors", "[attractors]"),
         (lambda say: f"{say.sl}piecewise((k, x > g), otherwise=0)",
          "sl.piecewise((k, x > g), otherwise=0)", "piecewise((k, x > g), otherwise=0)"),
         ("values={'f': [}", "values={'f': [}", "values={'f': [}"),
