@@ -216,6 +216,18 @@ def bits(run: xr.Dataset, trajectory: int | None = None) -> dict[str, bytes]:
     return found
 
 
+def differing(ours, theirs):
+    """Trajectories of two lists of :func:`bits` that aren't the same to the bit, with the variables
+    that differ.
+    """
+    assert len(ours) == len(theirs)
+    return {
+        i: names
+        for i, (a, b) in enumerate(zip(ours, theirs, strict=True))
+        if (names := [name for name in a if a[name] != b.get(name, a[name])])
+    }
+
+
 @sl.system(states="T on")
 def thermostat(t, T, on):
     """A room that is heated from 22 up to 23.5 degrees."""

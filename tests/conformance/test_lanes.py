@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
-from conformance.systems import bits, lab
+from conformance.systems import bits, differing, lab
 
 # these tests look at the status themselves
 pytestmark = pytest.mark.filterwarnings("ignore::saltus.errors.SaltusWarning")
@@ -69,17 +69,6 @@ def _each(run):
     return [bits(run, i) for i in range(run.sizes["trajectory"])]
 
 
-def _differing(ours, theirs):
-    """Trajectories that aren't the same to the bit, with the variables that differ."""
-    assert len(ours) == len(theirs)
-    pairs = enumerate(zip(ours, theirs, strict=True))
-    return {
-        i: [name for name in a if a[name] != b.get(name, a[name])]
-        for i, (a, b) in pairs
-        if any(a[n] != b.get(n, a[n]) for n in a)
-    }
-
-
 def test_the_batch_is_worth_the_comparison(batch):
     """Thousands of contacts, states that differ, starts on the boundary, one that slides from the
     start.
@@ -103,7 +92,7 @@ def test_alone_or_in_a_batch(batch):
         bits(_run((float(x), float(v)), system=own))
         for x, v, own in zip(start["x"], start["v"], owns, strict=True)
     ]
-    assert _differing(alone, _each(batch)) == {}
+    assert differing(alone, _each(batch)) == {}
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
@@ -113,7 +102,7 @@ def test_permuted(batch, seed):
         {k: a[order] for k, a in _starts().items()}, {k: a[order] for k, a in _values().items()}
     )
     wanted = _each(batch)
-    assert _differing(_each(shuffled), [wanted[i] for i in order]) == {}
+    assert differing(_each(shuffled), [wanted[i] for i in order]) == {}
 
 
 def test_among_other_neighbours(batch):
@@ -123,7 +112,7 @@ def test_among_other_neighbours(batch):
         {k: np.stack([others[k], start[k]], 1).ravel() for k in start},
         {k: np.stack([other_values[k], values[k]], 1).ravel() for k in values},
     )
-    assert _differing(_each(mixed)[1::2], _each(batch)) == {}
+    assert differing(_each(mixed)[1::2], _each(batch)) == {}
 
 
 @pytest.mark.parametrize(
@@ -133,20 +122,20 @@ def test_among_other_neighbours(batch):
 def test_lanes(batch, lanes):
     """Any number of lanes gives the digits of the default."""
     assert (
-        _differing(_each(_run(values=_values(), method=sl.Taylor(lanes=lanes))), _each(batch)) == {}
+        differing(_each(_run(values=_values(), method=sl.Taylor(lanes=lanes))), _each(batch)) == {}
     )
 
 
 @pytest.mark.parametrize("threads", [2, 3])
 def test_threads(batch, threads, monkeypatch):
     monkeypatch.setattr("saltus.flow.engine.CHUNK", 4)
-    assert _differing(_each(_run(values=_values(), threads=threads)), _each(batch)) == {}
+    assert differing(_each(_run(values=_values(), threads=threads)), _each(batch)) == {}
 
 
 @pytest.mark.parametrize("chunk", [1, 2, 5, 36])
 def test_chunks(batch, chunk, monkeypatch):
     monkeypatch.setattr("saltus.flow.engine.CHUNK", chunk)
-    assert _differing(_each(_run(values=_values())), _each(batch)) == {}
+    assert differing(_each(_run(values=_values())), _each(batch)) == {}
 
 
 @pytest.mark.parametrize("slice_", [1, 2, 3, 17, 100])
@@ -155,7 +144,7 @@ def test_paused_and_resumed(batch, slice_, monkeypatch):
     start on a boundary included.
     """
     monkeypatch.setattr("saltus.flow.engine.SLICE", slice_)
-    assert _differing(_each(_run(values=_values())), _each(batch)) == {}
+    assert differing(_each(_run(values=_values())), _each(batch)) == {}
 
 
 @pytest.mark.parametrize("spare", [1, 2, 9])
@@ -164,14 +153,14 @@ def test_table_of_contacts_that_fills_up(batch, spare, monkeypatch):
     and again, nothing is lost.
     """
     monkeypatch.setattr("saltus.flow.engine.RECORDS", spare)
-    assert _differing(_each(_run(values=_values())), _each(batch)) == {}
+    assert differing(_each(_run(values=_values())), _each(batch)) == {}
 
 
 def test_all_at_once(batch, monkeypatch):
     """Tiny chunks, slices and tables on two threads."""
     for name, value in (("CHUNK", 3), ("SLICE", 5), ("RECORDS", 4)):
         monkeypatch.setattr(f"saltus.flow.engine.{name}", value)
-    assert _differing(_each(_run(values=_values(), threads=2)), _each(batch)) == {}
+    assert differing(_each(_run(values=_values(), threads=2)), _each(batch)) == {}
 
 
 def test_stroboscope_and_simulate_agree(batch):
@@ -192,7 +181,7 @@ def test_stroboscope_and_simulate_agree(batch):
 
 
 def test_same_call_twice(batch):
-    assert _differing(_each(_run(values=_values())), _each(batch)) == {}
+    assert differing(_each(_run(values=_values())), _each(batch)) == {}
 
 
 def test_rig_in_any_company():
@@ -202,9 +191,9 @@ def test_rig_in_any_company():
     rig = sl.models.delangre("b")
     together = _each(_run({"x": x, "v": v}, system=rig))
     backwards = _each(_run({"x": x[::-1], "v": v[::-1]}, system=rig))
-    assert _differing(together, backwards[::-1]) == {}
+    assert differing(together, backwards[::-1]) == {}
     assert (
-        _differing(
+        differing(
             [bits(_run(pair, system=rig)) for pair in zip(x.tolist(), v.tolist(), strict=True)],
             together,
         )

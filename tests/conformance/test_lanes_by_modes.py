@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
-from conformance.systems import bits
+from conformance.systems import bits, differing
 from saltus.flow import modal_tables
 
 # these tests look at the status themselves
@@ -70,16 +70,6 @@ def _each(run):
     return [bits(run, i) for i in range(run.sizes["trajectory"])]
 
 
-def _differing(ours, theirs):
-    """Trajectories that aren't the same to the bit, with the variables that differ."""
-    assert len(ours) == len(theirs)
-    return {
-        i: names
-        for i, (a, b) in enumerate(zip(ours, theirs, strict=True))
-        if (names := [name for name in a if a[name] != b.get(name, a[name])])
-    }
-
-
 def test_the_batch_is_worth_the_comparison(batch):
     assert batch.attrs["method"] == "Modal"
     assert batch.sizes["contact"] > 500
@@ -96,7 +86,7 @@ def test_alone_or_in_a_batch(batch):
         for i in range(COUNT)
     ]
     alone = [bits(_run(z, system=own)) for z, own in zip(start, owns, strict=True)]
-    assert _differing(alone, _each(batch)) == {}
+    assert differing(alone, _each(batch)) == {}
 
 
 @pytest.mark.parametrize("seed", [0, 1])
@@ -104,7 +94,7 @@ def test_permuted(batch, seed):
     order = np.random.default_rng(seed).permutation(COUNT)
     shuffled = _run(_starts()[order], {name: one[order] for name, one in _values().items()})
     wanted = _each(batch)
-    assert _differing(_each(shuffled), [wanted[i] for i in order]) == {}
+    assert differing(_each(shuffled), [wanted[i] for i in order]) == {}
 
 
 def test_among_other_neighbours(batch):
@@ -114,7 +104,7 @@ def test_among_other_neighbours(batch):
         np.stack([others, start], 1).reshape(-1, 10),
         {name: np.stack([other_values[name], values[name]], 1).ravel() for name in values},
     )
-    assert _differing(_each(mixed)[1::2], _each(batch)) == {}
+    assert differing(_each(mixed)[1::2], _each(batch)) == {}
 
 
 @pytest.mark.parametrize(
@@ -122,7 +112,7 @@ def test_among_other_neighbours(batch):
 )
 def test_in_chunks_slices_and_small_tables(batch, name, value, monkeypatch):
     monkeypatch.setattr(f"saltus.flow.engine.{name}", value)
-    assert _differing(_each(_run(values=_values())), _each(batch)) == {}
+    assert differing(_each(_run(values=_values())), _each(batch)) == {}
 
 
 def test_on_threads_with_few_tables_in_memory(batch, monkeypatch):
@@ -130,4 +120,4 @@ def test_on_threads_with_few_tables_in_memory(batch, monkeypatch):
     for name, value in (("CHUNK", 3), ("SLICE", 5), ("RECORDS", 9)):
         monkeypatch.setattr(f"saltus.flow.engine.{name}", value)
     monkeypatch.setattr(modal_tables, "MOST_BYTES", 2**16)
-    assert _differing(_each(_run(values=_values(), threads=2)), _each(batch)) == {}
+    assert differing(_each(_run(values=_values(), threads=2)), _each(batch)) == {}
