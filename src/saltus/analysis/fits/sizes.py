@@ -7,6 +7,7 @@ derivatives are polynomials through nodes of Gauss's rule.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -118,6 +119,14 @@ def _at(y: np.ndarray, place: float) -> np.ndarray:
 
 def _terms(y: np.ndarray) -> np.ndarray:
     """Terms of the polynomials through nodes [q, NODES, ...]: [NODES, q, ...]."""
-    places, _ = polynomials.gauss(NODES)
-    inverse = np.linalg.inv(np.vander(places, increasing=True))
-    return np.asarray(np.einsum("mn,qn...->mq...", inverse, y))
+    places, weights = polynomials.gauss(NODES)
+    orders = np.arange(NODES)
+    waves = np.polynomial.legendre.legvander(2.0 * places - 1.0, NODES - 1)
+    sums = np.einsum("nm,qn...->mq...", (weights[:, None] * (2 * orders + 1)) * waves, y)
+    # Legendre's shifted polynomials have whole coefficients: these sums lose no figures, as the
+    # inverse of Vandermonde's matrix would
+    whole = [
+        [(-1) ** (m + k) * math.comb(m, k) * math.comb(m + k, k) for m in range(NODES)]
+        for k in range(NODES)
+    ]
+    return np.asarray(np.einsum("km,mq...->kq...", np.array(whole, float), sums))

@@ -247,11 +247,13 @@ def kind_of(rates: np.ndarray, errors: np.ndarray, forced: bool) -> str:
     limit = np.maximum(SURE * errors, BOUNDED / len(rates))
     if mean[0] > limit[0] and second[0] > 0.5 * first[0]:  # not one that was chaotic only at first
         return Kind.CHAOTIC.word
-    # zero only if the growth stays bounded, and the error says that it isn't less
     bounded = 2 * BOUNDED / len(rates)
-    if SURE * errors[0] > bounded or abs(second[0]) > min(limit[0], bounded):
+    if abs(second[0]) > min(limit[0], bounded):  # zero only if the growth stays bounded
         return "unclear"
     if mean[0] < -SURE * errors[0]:  # deviations die out: a motion that hasn't settled yet
         return "unclear"
     torus = forced or (len(mean) > 2 and abs(second[1]) <= limit[1])
+    # a cycle's own exponent is zero; that of a torus may be less, if its error is that wide
+    if torus and SURE * errors[0] > bounded:
+        return "unclear"
     return (Kind.QUASI_PERIODIC if torus else Kind.LIMIT_CYCLE).word
