@@ -1,5 +1,5 @@
-"""Three published systems (and the rig) written by hand for heyoka: an independent solver for
-models that have no closed form.
+"""Three published systems, a row of bodies and the rig, written by hand for heyoka: an independent
+solver for models that have no closed form.
 
 heyoka's events go wrong in known ways: a start at rest on a boundary hangs it; its cool-down after
 an event swallows shallow grazes; a field that switches by itself is silently wrong; an event
@@ -132,6 +132,22 @@ def _rig(t, y, p, stretch):
     return y[1], force / p["mass"] - 2 * p["damping_ratio"] * wn * y[1] - wn * wn * y[0]
 
 
+def _row(t, y, p, stretch):
+    """Bodies in a row between springs and dashpots from a wall on, the last one driven; the second
+    and the last between stops to ground.
+    """
+    n = len(y) // 2
+    links = []
+    for i in range(n):
+        apart, rate = (y[i], y[n + i]) if i == 0 else (y[i] - y[i - 1], y[n + i] - y[n + i - 1])
+        links.append(p["stiffness"] * (1 + 0.1 * i) * apart + p["damping"] * rate)
+    forces = [links[i + 1] - links[i] for i in range(n - 1)] + [-links[-1]]
+    forces[1] -= p["contact_stiffness"] * stretch[0]
+    forces[-1] += p["force"] * hy.cos(2 * np.pi * p["frequency"] * t)
+    forces[-1] -= p["contact_stiffness"] * stretch[1]
+    return *y[n:], *(force / (p["mass"] * (1 + 0.2 * i)) for i, force in enumerate(forces))
+
+
 def _symmetric(displacement, gap, moved, base=None):
     return Clearance(displacement, lambda p: -p[gap], lambda p: p[gap], moved, base)
 
@@ -172,6 +188,12 @@ SYSTEMS = {
         ),
         (_symmetric(lambda y: y[1], "pitch_gap", 1),),
         _aeroelastic,
+    ),
+    "row": Equations(
+        _names("x1 x2 x3 x4 x5 x6 v1 v2 v3 v4 v5 v6"),
+        _names("mass stiffness damping contact_stiffness gap force frequency"),
+        (_symmetric(lambda y: y[1], "gap", 1), _symmetric(lambda y: y[5], "gap", 5)),
+        _row,
     ),
     "delangre": Equations(
         ("x", "v"),
@@ -310,7 +332,7 @@ def simulate(name: str, parameters: dict, start, t_end: float, *, tolerance: flo
     Parameters
     ----------
     name : str
-        ``chain``, ``gear_pair``, ``aeroelastic`` or ``delangre``.
+        ``chain``, ``gear_pair``, ``aeroelastic``, ``row`` or ``delangre``.
     parameters : dict of str to float
         All parameters of the model of that name, SI, frequencies in Hz.
     start : sequence of float (states,)

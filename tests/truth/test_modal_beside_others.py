@@ -1,5 +1,5 @@
-"""Beams of many modes by the modal flow beside Taylor's method and a stiff solver: contact times,
-multipliers and exponents.
+"""Beams of many modes by the modal flow beside Taylor's method, a stiff solver and heyoka: contact
+times, multipliers and exponents.
 """
 
 from __future__ import annotations
@@ -123,3 +123,57 @@ def test_contacts_of_a_stiff_stop_are_those_of_a_stiff_solver(beam):
     )
     assert run.sizes["contact"] == len(times) > 3
     assert np.abs(run.contact_time.values - times).max() < 1e-6 / system.values["frequency"]
+
+
+ROW = {
+    "mass": 0.5,
+    "stiffness": 4e3,
+    "damping": 0.4,
+    "contact_stiffness": 2e4,
+    "gap": 1e-3,
+    "force": 12.0,
+    "frequency": 7.0,
+}
+
+
+@pytest.mark.slow
+def test_contacts_of_six_bodies_are_those_of_heyoka():
+    """The structure has matrices and modes; heyoka has the bodies' equations, written by hand."""
+    pytest.importorskip("heyoka", reason="extra `reference` isn't installed")
+    from oracles import heyoka_systems
+
+    n, each = 6, np.arange(6)
+    mass = np.diag(ROW["mass"] * (1 + 0.2 * each))
+    strain = np.eye(n) - np.eye(n, k=-1)
+    stiffness = strain.T @ np.diag(ROW["stiffness"] * (1 + 0.1 * each)) @ strain
+    stop = {"stiffness": ROW["contact_stiffness"], "gap": ROW["gap"], "side": "both"}
+    names = [f"x{i + 1}" for i in range(n)]
+    system = sl.structure(
+        mass,
+        stiffness,
+        damping=ROW["damping"] * strain.T @ strain,
+        names=names,
+        modes=n,
+        contacts=[sl.Contact("x2", name="second", **stop), sl.Contact("x6", name="last", **stop)],
+        forces=[sl.Force("x6", ROW["force"])],
+        frequency=ROW["frequency"],
+        sensors={name: name for name in names},
+    )
+    periods = 8
+    run = sl.simulate(
+        system, np.zeros(2 * n), periods=periods, samples=2, method=sl.Modal(), progress=False
+    )
+    end = run.end_time.item()
+    fine, coarse = (
+        heyoka_systems.simulate("row", ROW, np.zeros(2 * n), end, tolerance=tolerance)
+        for tolerance in (1e-16, 1e-13)
+    )
+    assert run.sizes["contact"] == len(fine.times) > 40
+    met = zip(fine.clearances, fine.sides, strict=True)
+    stops = [f"{('second', 'last')[c]} {'upper' if side > 0 else 'lower'}" for c, side in met]
+    assert run.contact_guard.values.tolist() == stops
+    own = 2e-14 + np.abs(fine.times - coarse.times)  # heyoka's error, with the motion's growth
+    apart = np.abs(run.contact_time.values - fine.times)
+    assert (apart < 10 * own + run.contact_time_error.values).all()
+    last = [run[name].values[-1] for name in names]
+    np.testing.assert_allclose(last, fine.end[:n], rtol=0, atol=1e-12 * np.abs(fine.end[:n]).max())
