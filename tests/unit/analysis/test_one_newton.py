@@ -20,7 +20,6 @@ WHY = {
     "branches/codimension_two.py": "the quadratic part at a fold",
     "harmonics/signals.py": "dynamic stiffness",
     "fits/search.py": "the gain that the next linear step would bring",
-    "fits/sizes.py": "polynomials through the nodes of a rule",
     "fits/windows.py": "a Kalman filter, and least squares with joints between windows",
     "branches/forced_vibration.py": "the answer of a rigid body to a static force",
 }
