@@ -40,6 +40,8 @@ _NAMES = {
 
 #: Attributes of results of systems with outputs: their names, and whether they come first.
 _ABOUT_OUTPUTS = ("outputs", "outputs_first")
+#: Doubles of a line of the processor's cache; doubles that are brought together at once.
+NUMBERS_OF_A_LINE, BLOCK = 8, 32768
 
 
 # -- what the caller hands over --------------------------------------------------------------------
@@ -268,7 +270,11 @@ class _Building:
         of_each = (
             values.items()
             if isinstance(values, Mapping)
-            else zip(self._outputs(np.shape(values)[-1]), np.moveaxis(values, -1, 0), strict=True)
+            else zip(
+                self._outputs(np.shape(values)[-1]),
+                _last_axis_first(np.asarray(values)),
+                strict=True,
+            )
         )
         for name, given in of_each:
             if row == f"<{what}>" and name in self._reserved:
@@ -355,6 +361,22 @@ class _Building:
 def _is_plain(dims: tuple[str, ...]) -> bool:
     """True where these dims are the same in every result of the kind."""
     return not any(dim[0] in ".<" or dim[-1] == "?" for dim in dims)
+
+
+def _last_axis_first(values: np.ndarray) -> np.ndarray:
+    """Values with their last axis first. Where no two numbers of one entry share a line of the
+    processor's cache, they are brought together, by blocks: else whoever reads an entry fetches all
+    of them.
+    """
+    count, found = values.shape[-1], np.moveaxis(values, -1, 0)
+    if count <= NUMBERS_OF_A_LINE:
+        return found
+    rows = values.reshape(-1, count)
+    together = np.empty((count, len(rows)), values.dtype)
+    block = max(BLOCK // count, NUMBERS_OF_A_LINE)
+    for begin in range(0, len(rows), block):
+        together[:, begin : begin + block] = rows[begin : begin + block].T
+    return together.reshape(found.shape)
 
 
 def _array(name: str, spec: Variable, values: Any) -> np.ndarray:
