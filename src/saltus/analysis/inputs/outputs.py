@@ -14,6 +14,8 @@ from saltus.contact.guards import Guard
 from saltus.errors import ParameterError, shown
 from saltus.language.evaluate import evaluate
 from saltus.language.expression import Expr
+from saltus.language.rows import products, split_rows
+from saltus.results.dataset.build import last_axis_first
 from saltus.results.dataset.schema import reserved_names
 from saltus.system import System
 from saltus.system.outputs import with_more
@@ -70,14 +72,16 @@ class Outputs:
         if not self.formulas:
             return states
         names = self.names[: states.shape[-1]]
-        known = dict(zip(names, np.moveaxis(states, -1, 0), strict=True))
+        more = self.guards[self.own_guards :]
+        asked, sums, rows = split_rows((*(guard.gap for guard in more), *self.formulas), names)
+        known = dict(zip(names, last_axis_first(states), strict=True))
+        known |= dict(zip(sums, products(states, rows), strict=True))
         bits: list[Any] = [(np.asarray(mode) >> i) & 1 == 1 for i in range(self.own_guards)]
         about: dict[str, Any] = {"t": t, "states": known, "values": parameters}
-        for guard in self.guards[self.own_guards :]:
-            (gap,) = evaluate([guard.gap], **about, bits=bits)
-            bits.append(gap > 0)
+        for gap in asked[: len(more)]:
+            bits.append(evaluate([gap], **about, bits=bits)[0] > 0)
         there = np.isfinite(states).all(axis=-1)
-        found = evaluate(self.formulas, **about, bits=bits)
+        found = evaluate(asked[len(more) :], **about, bits=bits)
         columns = [np.where(there, one, np.nan) for one in found]
         return np.concatenate([states, np.stack(columns, axis=-1)], axis=-1)
 

@@ -272,7 +272,7 @@ class _Building:
             if isinstance(values, Mapping)
             else zip(
                 self._outputs(np.shape(values)[-1]),
-                _last_axis_first(np.asarray(values)),
+                last_axis_first(np.asarray(values)),
                 strict=True,
             )
         )
@@ -363,7 +363,7 @@ def _is_plain(dims: tuple[str, ...]) -> bool:
     return not any(dim[0] in ".<" or dim[-1] == "?" for dim in dims)
 
 
-def _last_axis_first(values: np.ndarray) -> np.ndarray:
+def last_axis_first(values: np.ndarray) -> np.ndarray:
     """Values with their last axis first. Where no two numbers of one entry share a line of the
     processor's cache, they are brought together, by blocks: else whoever reads an entry fetches all
     of them.
