@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from saltus.language.expression import Expr, all_substituted, operands, state, walk
+from saltus.language.expression import Expr, add, constant, mul, operands, rebuild, state, walk
 
 #: Fewest states in a sum that becomes a row.
 LONG = 16
@@ -24,35 +24,51 @@ def split_rows(
     """Expressions with a new state in place of each long sum of numbers times states; the names of
     these, and the numbers, float64[sums, D].
     """
-    rows = _rows(expressions, states)
-    used = {below for node in walk(*expressions) if node not in rows for below in operands(node)}
-    used |= set(expressions)
-    long = [node for node, row in rows.items() if node in used and np.count_nonzero(row) >= LONG]
-    names = tuple(f"sum {i}" for i in range(len(long)))
-    new = {node: state(name) for node, name in zip(long, names, strict=True)}
-    table = np.array([rows[node] for node in long]).reshape(len(long), len(states))
-    return all_substituted(expressions, new), names, table
+    terms = _terms(expressions)
+    leaves = {node for node, parts in terms.items() if node in parts}
+    used = {below for leaf in leaves for below in operands(leaf)} | set(expressions)
+    number, new = {name: i for i, name in enumerate(states)}, dict[Expr, Expr]()
+    rows: dict[bytes, tuple[str, np.ndarray]] = {}
+    for node, parts in terms.items():
+        row = np.zeros(len(states))
+        for leaf, factor in parts.items() if node in used else ():
+            if leaf.op == "state":
+                row[number[leaf.payload]] = factor
+        if np.count_nonzero(row) < LONG:
+            new[node] = rebuild(node, tuple(new[one] for one in node.args), node.payload)
+            continue
+        name, _ = rows.setdefault(row.tobytes(), (f"sum {len(rows)}", row))
+        new[node] = state(name)
+        for leaf, factor in parts.items():
+            if leaf.op != "state":
+                new[node] = add(new[node], mul(constant(factor), new[leaf]))
+    names, table = tuple(name for name, _ in rows.values()), [row for _, row in rows.values()]
+    return tuple(new[one] for one in expressions), names, np.reshape(table, (-1, len(states)))
 
 
-def _rows(expressions: tuple[Expr, ...], states: tuple[str, ...]) -> dict[Expr, np.ndarray]:
-    """The factors float64[D] of the nodes that are sums of numbers times states."""
-    rows = {state(name): row for name, row in zip(states, np.eye(len(states)), strict=True)}
+def _terms(expressions: tuple[Expr, ...]) -> dict[Expr, dict[Expr, float]]:
+    """Every node as numbers times others that are no sums, operands before what is made of them."""
+    terms: dict[Expr, dict[Expr, float]] = {}
     for node in walk(*expressions):
-        known = [rows.get(one) for one in node.args]
-        match node.op, known:
-            case "neg", [np.ndarray() as a]:
-                rows[node] = -a
-            case "add", [np.ndarray() as a, np.ndarray() as b]:
-                rows[node] = a + b
-            case "sub", [np.ndarray() as a, np.ndarray() as b]:
-                rows[node] = a - b
-            case "mul", [np.ndarray() as a, None] if node.args[1].op == "const":
-                rows[node] = a * node.args[1].payload
-            case "mul", [None, np.ndarray() as b] if node.args[0].op == "const":
-                rows[node] = b * node.args[0].payload
-            case "div", [np.ndarray() as a, None] if node.args[1].op == "const":
-                rows[node] = a / node.args[1].payload
-    return rows
+        args, factor = node.args, None
+        if node.op == "neg":
+            factor, summed = -1.0, args[0]
+        elif node.op == "mul" and args[1].op == "const":
+            factor, summed = args[1].payload, args[0]
+        elif node.op == "div" and args[1].op == "const" and args[1].payload != 0.0:
+            factor, summed = 1.0 / args[1].payload, args[0]
+        elif node.op == "mul" and args[0].op == "const":
+            factor, summed = args[0].payload, args[1]
+        if factor is not None:
+            terms[node] = {leaf: factor * one for leaf, one in terms[summed].items()}
+        elif node.op in ("add", "sub"):
+            total, sign = dict(terms[args[0]]), 1.0 if node.op == "add" else -1.0
+            for leaf, one in terms[args[1]].items():
+                total[leaf] = total.get(leaf, 0.0) + sign * one
+            terms[node] = total
+        else:
+            terms[node] = {node: 1.0}
+    return terms
 
 
 def products(states: np.ndarray, rows: np.ndarray) -> np.ndarray:

@@ -21,8 +21,8 @@ def weighted(count):
 
 
 def test_long_sums_become_rows_wherever_they_stand():
-    """By themselves, in a product, in a condition's branch, and within a longer one; short ones,
-    sums with parameters and products of states stay as they are.
+    """By themselves, in a product, in a condition's branch, within a longer one, and beside terms
+    that are no numbers times states, in which they stand again; short ones stay as they are.
     """
     k, gap = ex.parameter("k"), ex.parameter("gap")
     long, longer, short = weighted(LONG + 4), weighted(40), weighted(LONG - 1)
@@ -34,10 +34,11 @@ def test_long_sums_become_rows_wherever_they_stand():
         short,
         longer * Q[0],
         Q[1] + gap,
+        longer - 2.0 * (k * long * gap) + 0.5 * (Q[0] * Q[1] - longer / 4.0),
     )
     found, names, rows = split_rows(given, NAMES)
-    assert names == ("sum 0", "sum 1", "sum 2")
-    assert rows.shape == (3, 40)
+    assert names == ("sum 0", "sum 1", "sum 2", "sum 3")
+    assert rows.shape == (4, 40)
     assert found[4] is short
     assert found[6] is given[6]
     states = np.random.default_rng(4).normal(size=(3, 70, 40))
