@@ -12,11 +12,13 @@ import numpy as np
 
 from saltus.errors import ParameterError, among, must_be, nearest, shown
 from saltus.language.expression import TIME, Expr, add, as_expr, constant, parameter, state
+from saltus.language.names import why_no_output
+from saltus.system.checks import MOST_GUARDS
 from saltus.system.outputs import check_name, with_formula, with_more
 from saltus.system.read_off import joined
 from saltus.system.structures import drives, laws
 from saltus.system.structures.equations import UNITS, Coordinates, Loads, sum_of, way_of
-from saltus.system.structures.parts import Base, direction, named, vector_of
+from saltus.system.structures.parts import Base, Force, direction, named, vector_of
 from saltus.system.system import System
 
 ZERO = constant(0.0)
@@ -160,7 +162,8 @@ def with_sensors(
     made : System
         The structure.
     sensors : mapping of str to str, (str, str), Sensor, or what :meth:`System.with_outputs` takes
-        A degree of freedom stands for its deflection, a pair for a stretch.
+        A degree of freedom stands for its deflection, a pair for a stretch. None: :func:`_usual`
+        ones in front of the coordinates of modes, else none.
     moving, degrees, loads, unit
         What it is made of: coordinates, names of degrees of freedom, contacts and drives, and the
         unit of the degrees of freedom.
@@ -170,10 +173,12 @@ def with_sensors(
     ParameterError
         If there is no such degree of freedom or contact, or no mode moves it.
     """
+    if sensors is None:
+        sensors = _usual(made, moving, degrees, loads) if moving.transform is not None else {}
     if not isinstance(sensors, Mapping):
         raise must_be("sensors", 'a mapping, such as {"tip": "x3"}', sensors)
     plan = _Sensors(made, moving, degrees, loads)
-    found = replace(made.outputs, first=moving.transform is not None)
+    found = replace(made.outputs, first=bool(sensors) and moving.transform is not None)
     for name, given in sensors.items():
         if callable(given) or (isinstance(given, tuple) and given and callable(given[0])):
             found = with_more(replace(made, outputs=found), {name: given})
@@ -184,6 +189,38 @@ def with_sensors(
         formula, guards = joined(rest, made, found)
         found = with_formula(made, found, name, add(own, formula), guards, _unit(one, unit))
     return replace(made, outputs=found)
+
+
+def _usual(
+    made: System, moving: Coordinates, degrees: list[str], loads: Loads
+) -> dict[str, Sensor]:
+    """Sensors of a structure by its modes for which none are given: deflection, velocity and force
+    at each contact.
+
+    Without contacts it is the deflection and velocity at each force, without forces those of the
+    degree of freedom that its first mode moves most. They take half of the room for outputs at
+    most.
+    """
+    found: dict[str, Sensor] = {}
+    for label, one in loads.contacts:
+        found |= _motion(f"at {label}", one.at, one.to)
+        if one.restitution is None:
+            found[f"force at {label}"] = contact_force(label)
+    for label, drive in loads.drives if not found else ():
+        if isinstance(drive, Force) and moving.along(vector_of([drive.at], degrees)).any():
+            found |= _motion(f"at {label}", drive.at)
+    if not found and moving.transform is not None:
+        most = degrees[int(np.abs(moving.transform[:, 0]).argmax())]
+        found = _motion("of mode 1" if why_no_output(most) else f"of {most}", most)
+    return dict(list(found.items())[: (MOST_GUARDS - len(made.guards)) // 2])
+
+
+def _motion(where: str, at: str, to: str | None = None) -> dict[str, Sensor]:
+    """Sensors of the deflection and the velocity at a place, by their names."""
+    return {
+        f"deflection {where}": Sensor("deflection", at, to),
+        f"velocity {where}": velocity(at, to),
+    }
 
 
 def _sensor(name: Any, given: Any) -> Sensor:

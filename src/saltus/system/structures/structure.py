@@ -118,7 +118,9 @@ def structure(
         Named outputs, which every result holds and every picture shows: a degree of freedom for its
         deflection, a pair of them for a stretch, ``sl.velocity("x3")``, ``sl.acceleration("x3")``,
         ``sl.contact_force("stop")``, or a function of the states as of
-        :meth:`saltus.System.with_outputs`.
+        :meth:`saltus.System.with_outputs`. Default, with ``modes=``: ``deflection at stop``,
+        ``velocity at stop`` and ``force at stop`` of each contact ``stop``, since no one measures
+        coordinates of modes; without contacts those of the points where forces act. ``{}``: none.
 
     Returns
     -------
@@ -218,7 +220,7 @@ def structure(
     named = {number: label for label, number in numbers.items() if number is not None}
     made = replace(made, guards=renamed(made.guards, named), description=words)
     made = replace(made, interfaces=seen_by_contacts(made, moving, degrees, loads, frequency, unit))
-    return made if sensors is None else with_sensors(made, sensors, moving, degrees, loads, unit)
+    return with_sensors(made, sensors, moving, degrees, loads, unit)
 
 
 # -- coordinates -----------------------------------------------------------------------------------

@@ -198,3 +198,40 @@ def test_a_base_record_that_leaves_the_base_in_motion_is_told(turns, told):
     made = sl.structure(np.eye(2), np.diag([4e3, 9e3]), base=sl.Base("x1", record))
     assert ("leaves it at 0.637 m/s, 100 %" in made.description) == told
     assert ("subtract the record's mean, 0.637 m/s^2" in made.description) == told
+
+
+def test_sensors_where_none_are_given():
+    rigid = sl.Contact("x2", restitution=0.5, gap=0.1, to="x1", name="wall")
+    pushed = sl.Force("x4", lambda t: 1.0)
+    outputs = [
+        sl.structure(MASS, CHAIN, **options).outputs.names
+        for options in (
+            {"modes": 3, "contacts": [rigid], "forces": [pushed]},
+            {"modes": 3, "forces": [pushed]},
+            {"modes": 3},
+            {"modes": 3, "sensors": {}},
+            {},
+        )
+    ]
+    assert outputs == [
+        ("deflection at wall", "velocity at wall"),
+        ("deflection at force", "velocity at force"),
+        ("deflection of x5", "velocity of x5"),
+        (),
+        (),
+    ]
+    many = [
+        sl.Contact(f"x{i}", stiffness=1e3, gap=0.1, side="both", name=f"s{i}", friction=0.1,
+            sliding=f"x{i + 1}")
+        for i in range(1, 9)
+    ]  # fmt: skip
+    made = sl.structure(MASS, CHAIN, modes=9, contacts=many)
+    assert len(made.guards) == 32 and len(made.outputs) == 10  # of the 52 that both may be
+    made.with_outputs(more=lambda q1: 2 * q1)
+    shown = sl.simulate(
+        sl.structure(MASS, CHAIN, modes=3, contacts=[rigid]),
+        {"deflection at wall": 0.01},
+        t_end=0.1,
+        progress=False,
+    )
+    assert shown["deflection at wall"].values[0] == pytest.approx(0.01)
