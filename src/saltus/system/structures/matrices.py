@@ -125,5 +125,5 @@ def check_positive(holds: bool, mass: np.ndarray) -> None:
         smallest = float(np.linalg.eigvalsh(mass)[0])
         raise ParameterError(
             f"mass must be positive definite, but its smallest eigenvalue is {smallest:.3g}. "
-            f"Condense degrees of freedom without mass out of the matrices first."
+            f"Degrees of freedom without mass, rows of zeros, follow the others with modes=."
         )

@@ -17,6 +17,7 @@ from saltus.contact.boundaries import numbers_of
 from saltus.contact.contacts import renamed
 from saltus.errors import ParameterError, SaltusWarning, among, must_be, shown
 from saltus.system.structures import matrices, told
+from saltus.system.structures.drives import FREQUENCY
 from saltus.system.structures.equations import UNITS, Coordinates, Loads, traced
 from saltus.system.structures.files import matrices_of
 from saltus.system.structures.interfaces import seen_by_contacts
@@ -216,6 +217,7 @@ def structure(
             compliance = moving.compliance(moving.along(direction(contact, degrees)))
             told.doubt_stiff(label, spring, compliance, angular[:count].max(initial=0.0))
     words += told.closed(touching, made.values, degrees, unit)
+    told.doubt_frequency(frequency, FREQUENCY in made.values)
     numbers = dict(zip(sides, numbers_of(sides.values(), made.guards), strict=True))
     named = {number: label for label, number in numbers.items() if number is not None}
     made = replace(made, guards=renamed(made.guards, named), description=words)

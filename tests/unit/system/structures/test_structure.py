@@ -321,3 +321,18 @@ def test_a_rough_rigid_stop_of_one_mode_is_refused_in_words():
             modes=1,
             contacts=[rough],
         )
+
+
+@pytest.mark.parametrize("n", [5, 1601])
+def test_a_loose_degree_of_freedom_without_mass_is_refused_in_words(n):
+    weight = np.ones(n)
+    weight[2] = 0.0
+    with pytest.raises(ParameterError, match=r"^some .* no mass, and the stiffness .* matrices\.$"):
+        sl.structure(sp.diags(weight, format="csr"), 900 * sp.diags(weight, format="csr"), modes=2)
+
+
+def test_without_modes_a_mass_of_zero_asks_for_them():
+    with pytest.raises(ParameterError, match="follow the others with modes="):
+        sl.structure(np.diag([1.0, 0]), np.eye(2))
+    with pytest.raises(ParameterError, match="give modes=, at most 1"):
+        sl.structure(np.diag([1.0, 0]), np.eye(2), damping_ratio=0.1)

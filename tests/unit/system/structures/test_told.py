@@ -226,8 +226,7 @@ def test_sensors_where_none_are_given():
         for i in range(1, 9)
     ]  # fmt: skip
     made = sl.structure(MASS, CHAIN, modes=9, contacts=many)
-    assert len(made.guards) == 32 and len(made.outputs) == 10  # of the 52 that both may be
-    made.with_outputs(more=lambda q1: 2 * q1)
+    assert (len(made.guards), len(made.outputs)) == (32, 10)  # of the 52 that both may be
     shown = sl.simulate(
         sl.structure(MASS, CHAIN, modes=3, contacts=[rigid]),
         {"deflection at wall": 0.01},
@@ -235,3 +234,20 @@ def test_sensors_where_none_are_given():
         progress=False,
     )
     assert shown["deflection at wall"].values[0] == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize(
+    "drive",
+    [
+        {},
+        {"base": sl.Base("x", lambda t: 1.0)},
+        {"forces": [sl.Force("x1", "2 N", harmonic=0)]},
+    ],
+)
+def test_a_frequency_that_no_drive_has_is_doubted(drive):
+    with pytest.warns(SaltusWarning, match=r"^frequency = '4 Hz' isn't used, since .* out\.$"):
+        made = sl.structure(MASS, CHAIN, frequency="4 Hz", **drive)
+    assert made.forced_at is None
+    assert "frequency" not in made.values
+    used = sl.structure(MASS, CHAIN, frequency="4 Hz", forces=[sl.Force("x1", 0.0)])
+    assert used.forced_at == "frequency"
