@@ -30,8 +30,8 @@ def describe(ds: xr.Dataset) -> str:
     Returns
     -------
     str
-        System, parameters (of many the drives and the stops first), method, extent, contacts, status and hash, a line each; of attractors
-        and basins what was found.
+        System, parameters (of many the drives and the stops first), method, extent, contacts,
+        status and hash, a line each; of attractors and basins what was found.
 
     Raises
     ------
