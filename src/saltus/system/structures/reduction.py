@@ -55,7 +55,10 @@ def modes_of(mass: Any, stiffness: Any, count: int) -> Modes:
         aren't found in :data:`MOST_RESTARTS`.
     """
     heavy = np.ravel(abs(mass).sum(axis=1)) > 0
-    if (number := int(heavy.sum())) < count:
+    number = int(heavy.sum())
+    if not number:
+        raise ParameterError("all entries of mass are zero. Give the mass matrix.")
+    if number < count:
         light = len(heavy) - number
         raise ParameterError(
             f"{light} of {len(heavy)} degrees of freedom have no mass, so there are {number} "

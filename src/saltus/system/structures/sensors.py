@@ -4,6 +4,7 @@ forces of its contacts.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -22,6 +23,8 @@ from saltus.system.structures.parts import Base, Force, direction, named, vector
 from saltus.system.system import System
 
 ZERO = constant(0.0)
+#: A sensor as study files write it.
+_CALL = re.compile(r"\s*(velocity|acceleration|contact_force)\(\s*(\w+)\s*\)\s*")
 
 
 @dataclass(frozen=True)
@@ -274,9 +277,11 @@ class _Sensors:
         places = [one.at] if one.to is None else [one.at, one.to]
         for place in places:
             if not among(place, self.degrees):
+                written = _CALL.fullmatch(place) if isinstance(place, str) else None
+                advice = f"Write sl.{written[1]}({written[2]!r})." if written else ""
                 raise ParameterError(
                     f"the sensor {shown(name)}: {shown(place)} is no degree of freedom. "
-                    f"{named(place, self.degrees)}"
+                    f"{advice or named(place, self.degrees)}"
                 )
         if one.at == one.to:
             raise ParameterError(
@@ -304,10 +309,10 @@ class _Sensors:
             else [label for label, one in contacts.items() if one.at == at]
         )
         if not mine:
-            known = [*contacts, *(one.at for one in contacts.values())]
+            known = list(dict.fromkeys([*contacts, *(one.at for one in contacts.values())]))
             raise ParameterError(
                 f"the sensor {shown(name)}: there is no contact at {shown(at)}. "
-                f"{nearest(at, list(dict.fromkeys(known)))}"
+                f"{nearest(at, known) if known else 'This structure has none: give contacts=.'}"
             )
         total: Any = 0.0
         for label in mine:
