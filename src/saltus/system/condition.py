@@ -154,7 +154,7 @@ def _by_pieces(condition: Condition, values: Mapping[str, float], room: list[int
 
 
 def _piece_of(gap: Expr, values: Mapping[str, float], room: list[int]) -> Condition | bool:
-    """Whether a gap with pieces is positive; a truth value if it is one of levels alone."""
+    """The condition that a gap with pieces is positive; a truth value if it is of levels alone."""
     piece = next((one for one in walk(gap) if one.op == "select"), None)
     if piece is None or not room[0]:
         names = {one.payload for one in walk(gap) if one.op == "param"}

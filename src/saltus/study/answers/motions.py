@@ -11,7 +11,7 @@ from saltus.study.answers.question import OneVerb, asked, first_figure
 from saltus.study.code import code_hash
 from saltus.study.setting import quantities
 from saltus.study.tables.kinds import KINDS, whole
-from saltus.study.tables.signature import Asked, OfLength, table, verb
+from saltus.study.tables.signature import Asked, OfLength, WrittenAs, table, verb
 from saltus.system.read_off import quantity
 
 if TYPE_CHECKING:
@@ -124,12 +124,12 @@ class Points(OfMotions):
     table(
         "settled",
         ["settled", "simulate"],
-        KINDS,
+        KINDS | {"tolerance": WrittenAs(examples=(1e-6,))},
         called="Settled response",
         without=(*_LEFT_OUT, "t_end"),
     ),
 )
-class Response(OneVerb):
+class SettledResponse(OneVerb):
     """[settled]: the responses that given starts settle to."""
 
     def check_first(self, table: Any) -> None:
