@@ -62,7 +62,8 @@ def test_not_toml(text, parts):
         (
             HEAD,
             "a study asks something: it has a table [simulate], [stroboscope], [settled], "
-            "[poincare], [spectrum], [impacts], [energy], [attractors], [sensitivity], [scatter], [fit], [lyapunov], ",
+            "[poincare], [spectrum], [impacts], [energy], [attractors], [sensitivity], [scatter], "
+            "[fit], [lyapunov], ",
         ),
         (WHOLE.replace("periods", "# "), "[simulate] give the length once"),
         (WHOLE + 't_end = "2 s"', "[simulate] give the length once"),
