@@ -102,6 +102,16 @@ def test_attractors_are_those_of_python(folder):
     assert len(rows) == again.sizes["attractor"]
 
 
+def test_a_box_is_over_sensors(folder):
+    box = 'start = "random 6"\nperiods = 1\nbox = { tip = ["-2 mm", "2 mm"] }'
+    _, found = answered(folder, "periodic_orbits", box)
+    assert found.attrs["starts"] == 6
+    (folder / "more").mkdir()
+    (folder / "more" / "frame.npz").write_bytes((folder / "frame.npz").read_bytes())
+    with pytest.raises(sl.SaltusError, match=r"'tp' is unknown to a frame\. Did you mean 'tip'"):
+        answered(folder / "more", "periodic_orbits", box.replace("tip", "tp"))
+
+
 def test_settled_is_that_of_python(folder):
     _, found = answered(folder, "settled", "periods = 200\nlast = 8")
     pushed = sl.structure(
