@@ -238,7 +238,7 @@ sensors = { tip = "w_2" }
 @pytest.mark.parametrize(
     ("key", "said"),
     [
-        ("power = 9\n", r"\[system\.structure\.contacts\] power = 9 must be"),
+        ("power = 9\n", r"\[system\.structure\.contacts 1\] power = 9 must be"),
         ('preload = "3 m"\n', r"^\[system\.structure\.contacts\] preload = '3 m' has the "),
     ],
 )
