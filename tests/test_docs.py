@@ -7,6 +7,7 @@ from __future__ import annotations
 import re
 import shlex
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner
@@ -31,6 +32,17 @@ ELSEWHERE = {
 FOREIGN = {"matlab", "julia"}
 
 _BLOCK = re.compile(r"^```(?:\{code-block\} )?(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+
+
+_CELL = re.compile(r"^```\{code-cell\}[^\n]*\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+
+
+def cells(page: str, heading: str = "") -> list[str]:
+    """The code cells of a notebook's page, or of one of its sections, in order."""
+    text = (DOCS / page).read_text(encoding="utf-8")
+    begin = text.index(f"\n## {heading}\n") if heading else 0
+    end = text.find("\n## ", begin + 1) if heading else len(text)
+    return _CELL.findall(text[begin:end])
 
 
 def is_notebook(text: str) -> bool:
@@ -119,3 +131,26 @@ def test_ci_builds_the_documentation_without_warnings():
     script = (ROOT / ".ci" / "run").read_text()
     assert 'pip install -q -e ".[docs,lint,browser]"' in script
     assert "sphinx-build -W --keep-going" in script
+
+
+@pytest.mark.slow
+def test_the_superelement_of_the_page_on_structures_is_its_beam(tmp_path, monkeypatch):
+    """The cells as they stand there; what a boundary of Craig and Bampton keeps is exact."""
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, Any] = {}
+    for cell in [*cells("structures.md")[:2], *cells("structures.md", "Superelements")]:
+        exec(compile(cell, "structures.md", "exec"), names)
+    reduced = names["reduced"]
+    assert "Static flexibility at stop: 100 % of it kept" in reduced.description
+    transform, known = names["T"], "tip middle m1 m2 m3 m4"
+    small = [transform.T @ names[one] @ transform for one in "MK"]
+    found = saltus.structure_modes(*small, 3, at="tip", names=known)
+    full = saltus.structure_modes("beam.npz", modes=3, at="w_20")
+    assert float(found["flexibility"][0]) == pytest.approx(float(full["flexibility"][0]), rel=1e-9)
+    ratio = found["frequency"].values / full["frequency"].values
+    assert (ratio > 1 - 1e-9).all()  # Rayleigh: a reduction stiffens
+    assert (ratio < 1.01).all()
+    run = saltus.simulate(reduced, t_end=0.3, progress=False)
+    whole = saltus.simulate(names["beam"], t_end=0.3, progress=False)
+    tips = (run["deflection at stop"].values[-1], whole["tip"].values[-1])
+    assert tips[0] == pytest.approx(tips[1], rel=0.05)

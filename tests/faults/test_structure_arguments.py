@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
-from saltus.errors import SaltusError
+from saltus.errors import ParameterError, SaltusError, TraceError
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 
@@ -58,3 +58,41 @@ def test_odd_arguments_are_refused_in_words(name):
                 function(**{**usual, argument: odd})
             except SaltusError as error:
                 assert str(error)  # noqa: PT017
+
+
+CHAIN = 900.0 * (2 * np.eye(4) - np.eye(4, k=1) - np.eye(4, k=-1))
+STOP = sl.Contact("x1", 1e3, 1e-3)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"contacts": STOP}, r"^contacts must be a list of sl\.Contact\(\.\.\.\), not Contact"),
+        ({"forces": "x1"}, r"^forces must be a list of sl\.Force\(\.\.\.\), not 'x1'\.$"),
+        ({"forces": [sl.Force("x1", 1, name="t")]}, r"^a force can't be called 't', the name of "
+            r"the time\. Give it another name=\.$"),
+        ({"forces": [sl.Force("x1", 1, name="frequency")], "frequency": 3}, r"'frequency', the "
+            r"name of the forcing frequency\."),
+        ({"forces": [sl.Force("x1", None)], "frequency": 3}, r"^force: the force needs amplitude="),
+        ({"base": sl.Base("x", None), "frequency": 3}, r"^base: the acceleration needs amplitude="),
+        ({"contacts": [sl.Contact("x1", 1e3, 1e-3, friction=0.1, sliding=())]},
+            r"^stop: sliding must be a degree of freedom, or two of them, not \(\)\.$"),
+        ({"sensors": {"f": sl.contact_force("stop")}}, r"no contact at 'stop'\. This structure "
+            r"has none: give contacts=\.$"),
+        ({"sensors": {"f": "acceleration(x1)"}}, r"Write sl\.acceleration\('x1'\)\.$"),
+        ({"damping": 0.02}, r"^damping must be a square matrix; its shape is \(\)\. Of a ratio "),
+        ({"mass": 0 * CHAIN}, r"^all entries of mass are zero\. Give the mass matrix\.$"),
+        ({"mass": -np.eye(4)}, r"^mass must be positive definite, but its smallest eigenvalue is "
+            r"-1\.$"),
+    ],
+)  # fmt: skip
+def test_a_newcomers_mistakes_are_answered_in_a_sentence(given, said):
+    with pytest.raises(ParameterError, match=said):
+        sl.structure(**{"mass": np.eye(4), "stiffness": CHAIN, "modes": 2} | given)
+
+
+@pytest.mark.parametrize("values", [[1j, 2.0], np.array(["2020-01-01", "2020-01-02"], "M8[s]")])
+def test_records_are_real_numbers(values):
+    for pair in (([0.0, 1.0], values), (values, [0.0, 1.0])):
+        with pytest.raises(TraceError, match="must be real numbers"):
+            sl.recorded(*pair, "N")

@@ -11,6 +11,7 @@ import pytest
 import scipy.sparse as sp
 
 import saltus as sl
+from saltus.errors import ParameterError
 from saltus.flow.maps import Stroboscope
 
 N, F = 6, 0.17
@@ -175,3 +176,27 @@ def test_damping_ratios():
         [-modal.rhs(0.0, row)[3 + i] for i, row in enumerate(np.eye(6)[3:])],
         2 * np.array(ratios) * np.sort(np.abs(eigenvalues))[::2], rtol=1e-12,
     )  # fmt: skip
+
+
+@pytest.mark.parametrize("masses", [4, 800])  # dense, and sparse above 1500 degrees of freedom
+def test_degrees_of_freedom_without_mass_follow_the_others(masses):
+    """Of a chain whose every other point has a mass each two springs are one of half the rate."""
+    n, rate = 2 * masses + 1, 900.0
+    ones = np.ones(n)
+    chain = rate * sp.diags([-ones[1:], 2 * ones, -ones[1:]], [-1, 0, 1], format="csr")
+    weight = np.arange(n) % 2.0
+    mass = sp.diags(weight, format="csr")
+    table = sl.structure_modes(mass, chain, 3, at="x1")
+    turns = np.arange(1, 4) * np.pi / (2 * (masses + 1))
+    closed = 2 * np.sqrt(rate / 2) * np.sin(turns) / (2 * np.pi)
+    np.testing.assert_allclose(table["frequency"], closed, rtol=1e-9)
+    middle = table["shape"].values[2::2][: masses - 1]
+    apart = table["shape"].values
+    np.testing.assert_allclose(middle, (apart[1:-2:2] + apart[3::2]) / 2, atol=1e-9)
+    x1 = n / (n + 1) / rate  # static deflection of the first of n under its own force
+    assert float(table["flexibility"][0]) == pytest.approx(x1, rel=1e-9)
+    stop = sl.Contact("x3", stiffness=1e4, gap=1e-3)
+    made = sl.structure(mass, chain, modes=3, contacts=[stop])
+    assert len(made.states) == 6
+    with pytest.raises(ParameterError, match=r"no mass, so there are \d+ modes: give modes="):
+        sl.structure_modes(mass, chain, masses + 1)

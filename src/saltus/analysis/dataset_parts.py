@@ -12,6 +12,7 @@ import numpy as np
 
 from saltus.analysis.inputs.outputs import outputs_of
 from saltus.analysis.inputs.starts import Ensemble
+from saltus.contact.guards import is_hold
 from saltus.flow.contact_table import ContactTable
 from saltus.flow.methods import Method, note_on
 from saltus.flow.request import Outcome
@@ -85,6 +86,7 @@ def trajectories(
         states=system.states,
         units=system.units,
         guards=guards(system, group),
+        gap_unit=gap_unit(system),
         varied=group.varied,
         batch=group.batch,
         forcing_period=forcing_period,
@@ -165,8 +167,11 @@ def provenance(
 
 
 def gap_unit(system: System) -> str:
-    """Unit of the gaps of all guards, ``""`` if they differ or aren't known."""
-    units = set(gap_units(system))
+    """Unit of the gaps of all guards, ``""`` if they differ or aren't known. What holds a contact
+    is a force and doesn't count: its rows have no rate.
+    """
+    gaps = zip(gap_units(system), system.guards, strict=True)
+    units = {unit for unit, guard in gaps if not is_hold(guard)}
     return units.pop() if len(units) == 1 else ""
 
 

@@ -256,6 +256,8 @@ def recorded(
 def _times(numbers: Any, factor: float) -> Any:
     """Numbers times a factor; anything else unchanged, for :func:`curve` to refuse."""
     try:
+        if np.asarray(numbers).dtype.kind in "cMm":
+            return numbers
         return np.asarray(numbers, dtype=np.float64) * factor
     except (TypeError, ValueError, OverflowError):
         return numbers

@@ -238,10 +238,12 @@ def curve(
             "them out of both."
         )
     try:
+        if any(np.asarray(data).dtype.kind in "cMm" for data in (points, values)):
+            raise TypeError("complex numbers, dates")
         x, y = (np.array(data, dtype=np.float64) for data in (points, values))
     except (TypeError, ValueError, OverflowError):
         raise TraceError(
-            f"{title}: points and values must be numbers [SI], as two lists or arrays."
+            f"{title}: points and values must be real numbers [SI], as two lists or arrays."
         ) from None
     if x.ndim != 1 or x.shape != y.shape or len(x) < 2:
         raise TraceError(

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 
 import xarray as xr
 
+from saltus.errors import counted
 from saltus.results.dataset.reader import reader
 from saltus.results.dataset.schema import KINDS, NAMES, check, kind_of
 from saltus.units import from_si
 
 #: Lines of a result that a notebook shows above its variables.
 _LINES = 8
+#: Values of parameters that are told: all of the published systems, whose longest list it is.
+_VALUES = 13
 
 
 @reader
@@ -26,8 +30,8 @@ def describe(ds: xr.Dataset) -> str:
     Returns
     -------
     str
-        System, parameters, method, extent, contacts, status and hash, a line each; of attractors
-        and basins what was found.
+        System, parameters (of many the drives and the stops first), method, extent, contacts,
+        status and hash, a line each; of attractors and basins what was found.
 
     Raises
     ------
@@ -70,12 +74,30 @@ def headline(ds: xr.Dataset) -> str:
 
 
 def _parameters(ds: xr.Dataset) -> str:
+    """The values of the parameters, of many the drives, the gaps and the stiffnesses first."""
     units = json.loads(ds.attrs.get("units", "{}"))
     values = json.loads(ds.attrs.get("parameters", "{}"))
-    fixed = [f"{name} = {from_si(value, units.get(name, ''))}" for name, value in values.items()]
+    varied = [f"{name} varies" for name in json.loads(ds.attrs.get("varied_parameters", "[]"))]
+    told = list(values) if len(values) <= _VALUES else _told_first(values)[:_VALUES]
+    more = len(values) - len(told)
     return ", ".join(
-        fixed + [f"{name} varies" for name in json.loads(ds.attrs.get("varied_parameters", "[]"))]
+        [f"{name} = {from_si(values[name], units.get(name, ''))}" for name in told]
+        + varied
+        + ([f"and {counted(more, 'parameter')} more"] if more else [])
     )
+
+
+def _told_first(names: Iterable[str]) -> list[str]:
+    """Names of parameters, those of drives before those of stops, whose gaps come first."""
+    stops = tuple(name.removesuffix("gap") for name in names if name.endswith("_gap"))
+    kinds = ("gap", "stiffness", "restitution")
+
+    def rank(name: str) -> int:
+        stop = next((one for one in stops if name.startswith(one)), "")
+        kind = name.removeprefix(stop)
+        return 0 if not stop else 1 + kinds.index(kind) if kind in kinds else 1 + len(kinds)
+
+    return sorted(names, key=rank)
 
 
 def _options(ds: xr.Dataset) -> str:

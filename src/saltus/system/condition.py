@@ -9,23 +9,34 @@ of the system, behind its own, unless it means one of these.
 from __future__ import annotations
 
 import ast
+import functools
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from operator import or_
 from typing import Any
 
 from saltus.contact.boundaries import join_guards
 from saltus.contact.guards import bits_in
 from saltus.errors import ParameterError, TraceError, UnitError, nearest, shown
 from saltus.language.dimensions import DimensionCheck
+from saltus.language.evaluate import evaluate
 from saltus.language.expression import (
+    And,
     Bit,
     Condition,
     Expr,
+    Not,
+    Or,
+    Relation,
+    depends_on,
     observed,
     relations_in,
     select,
+    substituted,
+    varies,
+    walk,
 )
 from saltus.system.formula import Formula, Formulas
 from saltus.system.named_outputs import NamedOutputs
@@ -39,6 +50,8 @@ _QUANTITY = re.compile(
     r"(?<![\w.])(?P<number>(?>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?))\s*"
     r"(?P<unit>[^\W\d_]+(?:\^-?[\d.]+)?(?:[*/][^\W\d_]+(?:\^-?[\d.]+)?)*)(?![\w(])"
 )
+#: Pieces of forces that the comparisons of a condition are made of at most.
+MOST_PIECES = 16
 #: Words of formulas that may follow a number.
 _WORDS = ("and", "or", "if", "else", "not")
 #: The name of the parameter that holds a number with a unit, before its number.
@@ -107,7 +120,7 @@ def end_condition(system: System, given: Any) -> EndCondition:
     with observed(units):
         found = called(system, function, "the condition until", outputs)
     if isinstance(found, Condition):
-        return _of_comparisons(system, found, text)
+        return _of_comparisons(system, _by_pieces(found, system.values, [MOST_PIECES]), text)
     if isinstance(found, Expr) and found.op != "const":
         extended = with_surface(system, lambda **_: found, "until")
         return EndCondition(extended, _sides(Bit(len(extended.guards) - 1)), True, f"{text} = 0")
@@ -119,6 +132,46 @@ def end_condition(system: System, given: Any) -> EndCondition:
 
 def _sides(condition: Condition) -> Expr:
     return select(condition, 1.0, 0.0)
+
+
+def _by_pieces(condition: Condition, values: Mapping[str, float], room: list[int]) -> Condition:
+    """The same condition with comparisons of forces that have pieces as comparisons of these
+    pieces: ``force > level`` as ``touches and spring > level``. Between contacts the pieces are
+    linear where the whole isn't, so structures keep their method. ``room`` is the number of pieces
+    that may be made yet.
+    """
+    match condition:
+        case And(left, right):
+            return _by_pieces(left, values, room) & _by_pieces(right, values, room)
+        case Or(left, right):
+            return _by_pieces(left, values, room) | _by_pieces(right, values, room)
+        case Not(inner):
+            return ~_by_pieces(inner, values, room)
+        case Relation(gap=gap) if type(condition) is Relation and depends_on(gap, ("select",)):
+            found = _piece_of(gap, values, room)
+            return found if isinstance(found, Condition) else condition
+    return condition
+
+
+def _piece_of(gap: Expr, values: Mapping[str, float], room: list[int]) -> Condition | bool:
+    """The condition that a gap with pieces is positive; a truth value if it is of levels alone."""
+    piece = next((one for one in walk(gap) if one.op == "select"), None)
+    if piece is None or not room[0]:
+        names = {one.payload for one in walk(gap) if one.op == "param"}
+        if varies(gap) or any(not name.startswith(_LEVEL) for name in names):
+            return Relation(gap)
+        return bool(evaluate([gap], values=values)[0] > 0)  # of numbers, which no run varies
+    room[0] -= 1
+    inside, outside = (
+        _piece_of(substituted(gap, {piece: one}), values, room) for one in piece.args
+    )
+    there, parts = piece.payload, list[Condition]()
+    for holds, truth in ((there, inside), (~there, outside)):
+        if isinstance(truth, Condition):
+            parts.append(holds & truth)
+        elif truth:
+            parts.append(holds)
+    return functools.reduce(or_, parts) if parts else False
 
 
 def _of_comparisons(system: System, condition: Condition, text: str) -> EndCondition:

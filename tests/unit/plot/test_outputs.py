@@ -51,6 +51,24 @@ def test_pictures_of_a_run_show_sensors(run, responses):
     assert labels(sl.plot.frequency_response(responses)) == ("frequency [Hz]", "rms of tip [mm]")
 
 
+def test_pictures_without_sensors_show_the_stop_and_no_coordinate_of_a_mode():
+    given = structure(sensors={"deflection at stop": "x3", "velocity at stop": sl.velocity("x3"),
+        "force at stop": sl.contact_force("x3")})  # fmt: skip
+    made = structure(sensors=None)
+    assert (made.outputs.names, made.outputs.units) == (given.outputs.names, ("m", "m/s", "N"))
+    runs = [sl.simulate(one, periods=9, progress=False) for one in (made, given)]
+    for name in (*made.states, *made.outputs.names):
+        assert np.array_equal(*(one[name] for one in runs))
+    assert labels(sl.plot.history(runs[0])) == ("time [s]", "deflection at stop [mm]")
+    assert labels(sl.plot.phase(runs[0])) == ("deflection at stop [mm]", "velocity at stop [mm/s]")
+    shown = labels(sl.plot.spectrum(sl.spectrum(runs[0])))[1]
+    assert shown == "amplitude of deflection at stop [mm]"
+    section = sl.poincare(made, None, "stop", periods=9, progress=False)
+    assert "q1" not in "".join(labels(sl.plot.section(section)))
+    responses = sl.frequency_response(made, frequency=[1.8], progress=False)
+    assert labels(sl.plot.frequency_response(responses))[1] == "rms of deflection at stop [mm]"
+
+
 def test_outputs_are_chosen_by_name(run, responses):
     assert labels(sl.plot.history(run, state="stop force"))[1] == "stop force [N]"
     assert labels(sl.plot.history(run, state="q1"))[1].startswith("q1 [")

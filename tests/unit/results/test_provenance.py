@@ -81,3 +81,16 @@ def test_describe_says_what_it_is(batch):
     assert batch.attrs["result_hash"].startswith(text.split()[-1])
     assert "1 ok, 1 resting" in describe(sine_points())
     assert "contacts none" in describe(sine_run((0.5e-3,)))
+
+
+def test_of_many_parameters_drives_and_stops_are_told(run):
+    stops = [f"stop{i}_{kind}" for i in range(1, 9) for kind in ("gap", "stiffness", "damping")]
+    values = dict.fromkeys([*stops, "base", "frequency"], 2.0)
+    many = run.assign_attrs(parameters=json.dumps(values), units="{}", varied_parameters="[]")
+    told = describe(many).splitlines()[0].partition(": ")[2].split(", ")
+    names = [one.partition(" = ")[0] for one in told]
+    gaps, springs = ([f"stop{i}_{kind}" for i in range(1, 9)] for kind in ("gap", "stiffness"))
+    assert names == ["base", "frequency", *gaps, *springs[:3], "and 13 parameters more"]
+    few = run.assign_attrs(parameters=json.dumps(dict.fromkeys(stops[:13], 2.0)), units="{}")
+    assert [one.partition(" = ")[0] for one in
+        describe(few).splitlines()[0].partition(": ")[2].split(", ")] == stops[:13]  # fmt: skip

@@ -61,8 +61,9 @@ def test_not_toml(text, parts):
         (HEAD + "[simulat]", "the file has no table 'simulat'. Did you mean 'simulate'?"),
         (
             HEAD,
-            "a study asks something: it has a table [simulate], [poincare], [spectrum], "
-            "[impacts], [energy], [attractors], [sensitivity], [scatter], [fit], [lyapunov], ",
+            "a study asks something: it has a table [simulate], [stroboscope], [settled], "
+            "[poincare], [spectrum], [impacts], [energy], [attractors], [sensitivity], [scatter], "
+            "[fit], [lyapunov], ",
         ),
         (WHOLE.replace("periods", "# "), "[simulate] give the length once"),
         (WHOLE + 't_end = "2 s"', "[simulate] give the length once"),
@@ -127,7 +128,7 @@ def test_schema_tells_editors_the_keys():
     json.dumps(schema)
     assert set(schema["properties"]) == {
         "study", "system", "method", "simulate", "sensitivity", "fit", "scatter", "compare",
-        "poincare", "spectrum", "impacts", "energy", "lyapunov",
+        "stroboscope", "settled", "poincare", "spectrum", "impacts", "energy", "lyapunov",
         "frequency_response", "bifurcation_diagram", "equilibria", "periodic_orbits", "branches",
         "bifurcation_curve", "event_sensitivity", "backbone", "basins", "attractors",
     }  # fmt: skip

@@ -34,6 +34,9 @@ structure.contacts = { at = "x2", stiffness = "100 kN/m", gap = "1 mm" }
 #: Tables, each with a variable of its result that has a row or a name for the sensor.
 TABLES = {
     "simulate": ("periods = 20", "tip"),
+    "stroboscope": ("periods = 50\nkeep = 5", "tip"),
+    "settled": ("periods = 200", "tip_peak"),
+    "periodic_orbits": ("periods = 1", "orbit_peak"),
     "poincare": ('surface = "tip turns"\nperiods = 5\ntransient = 50', "tip"),
     "spectrum": ("periods = 16\ntransient = 50", "tip_amplitude"),
     "impacts": ("periods = 20\ntransient = 50", "contact_peak_force"),
@@ -97,3 +100,38 @@ def test_attractors_are_those_of_python(folder):
     with table.open() as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
     assert len(rows) == again.sizes["attractor"]
+
+
+def test_a_box_is_over_sensors(folder):
+    box = 'start = "random 6"\nperiods = 1\nbox = { tip = ["-2 mm", "2 mm"] }'
+    _, found = answered(folder, "periodic_orbits", box)
+    assert found.attrs["starts"] == 6
+    (folder / "more").mkdir()
+    (folder / "more" / "frame.npz").write_bytes((folder / "frame.npz").read_bytes())
+    with pytest.raises(sl.SaltusError, match=r"'tp' is unknown to a frame\. Did you mean 'tip'"):
+        answered(folder / "more", "periodic_orbits", box.replace("tip", "tp"))
+
+
+def test_settled_is_that_of_python(folder):
+    _, found = answered(folder, "settled", "periods = 200\nlast = 8")
+    pushed = sl.structure(
+        np.eye(2), STIFFNESS, modes=2, damping_ratio="2 %", frequency="13 Hz",
+        sensors={"tip": "x2"}, forces=[sl.Force("x1", "9 N")],
+        contacts=[sl.Contact("x2", stiffness="100 kN/m", gap="1 mm")],
+    )  # fmt: skip
+    again = sl.settled(sl.simulate(pushed, periods=200, progress=False))
+    assert found["response_period"] == again["response_period"]
+    assert float(found["tip_peak"]) == pytest.approx(float(again["tip_peak"]), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("table", "text", "said"),
+    [
+        ("settled", "", r"\[settled\] lacks periods\. Write periods = 400\."),
+        ("settled", "periods = 20\nlast = 30", r"\[settled\] compares 30 last periods of 20\."),
+        ("stroboscope", "periods = 2\nstart = { q1 = 1 }", "start"),
+    ],
+)
+def test_what_is_refused(folder, table, text, said):
+    with pytest.raises(sl.SaltusError, match=said):
+        answered(folder, table, text)

@@ -233,3 +233,36 @@ sensors = { tip = "w_2" }
 """
     (answer,) = ask(HEAD.split("[simulate]")[0] + text, inputs=Inputs(folder))
     assert answer.dataset.attrs["surface"] == "tip - 0.001 = 0"
+
+
+@pytest.mark.parametrize(
+    ("key", "said"),
+    [
+        ("power = 9\n", r"\[system\.structure\.contacts 1\] power = 9 must be"),
+        ('preload = "3 m"\n', r"^\[system\.structure\.contacts\] preload = '3 m' has the "),
+    ],
+)
+def test_a_wrong_quantity_of_a_part_is_called_by_its_key(folder, key, said):
+    text = f"""
+[system]
+structure.mass = "frame.npz"
+structure.modes = 2
+[[system.structure.contacts]]
+at = "w_2"
+stiffness = "5 kN/m"
+gap = "1 mm"
+{key}"""
+    with pytest.raises(StudyError, match=said) as caught:
+        system_in(folder, text)
+    assert "_stiffness" not in str(caught.value)
+
+
+def test_a_drive_that_holds_an_unknown_name_lists_no_tables_where_there_are_none(folder):
+    text = """
+[system]
+structure.mass = "frame.npz"
+structure.modes = 2
+structure.forces = { at = "u_1", amplitude = "9*cos(w*t)" }
+"""
+    with pytest.raises(StudyError, match=r"terms and tables only\.$"):
+        system_in(folder, text)

@@ -14,7 +14,7 @@ from saltus.analysis.closed.motions import (
     least_period,
     phase_distances,
 )
-from saltus.analysis.closed.search import AGES, BESIDE, Family, Search, used_up
+from saltus.analysis.closed.search import AGES, BESIDE, Family, Search, parts_of, used_up
 from saltus.analysis.closed.shooting import Shooting
 from saltus.analysis.solve.newton import leading_first
 from saltus.analysis.solve.tolerances import AMPLIFIED, SAME
@@ -24,6 +24,9 @@ from saltus.interrupt import PartInterrupted
 
 #: Most guesses beside known orbits.
 MOST_BESIDE = 1024
+#: Shares of the work, about: starts are followed before any search; Newton's method starts from
+#: them, and what is left of a search is deflation.
+FOLLOWED, HUNTED = 0.1, 0.5
 
 
 class Orbits(Family[ClosedMotion]):
@@ -157,15 +160,17 @@ def _search(
     progress: Callable[[float], None] | None,
 ) -> None:
     """Search for orbits of one period after the other."""
+    if progress:
+        progress(FOLLOWED / 2)
     iterates = _guesses(map_, start, longest)
+    progress = stage(progress, FOLLOWED, 1.0)
     for n in range(1, longest + 1):
         search = Search(n, len(start), given_up=len(start) - len(iterates))
         show = stage(progress, *(m * (m + 1) / (longest * (longest + 1)) for m in (n - 1, n)))
         guesses = result.guess(iterates[:, :n])
-        result.hunt(search, [(guesses, np.arange(len(guesses)))])
-        if show:
-            show(0.5)
-        result.deflate(search, guesses)
+        parts = parts_of(guesses, stage(show, 0.0, HUNTED))
+        result.hunt(search, ((guesses.rows(part), part) for part in parts))
+        result.deflate(search, guesses, stage(show, HUNTED, 1.0))
         if show:
             show(1.0)
 

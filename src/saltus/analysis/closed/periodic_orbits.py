@@ -43,12 +43,17 @@ STEPS = 10_000
 #: Contacts for each iterate likewise: a ball that keeps 0.9 of its speed comes to rest in 200, and
 #: never where the impacts are written as jumps.
 CONTACTS = 1000
+#: Periods of the motion from rest whose points are starts where none are given.
+FROM_REST = 64
+#: States from which on Newton's method is dear, and the random starts there: of eight modes each
+#: takes a second.
+MANY_STATES, FEW_STARTS = 8, 64
 
 
 @verb
 def periodic_orbits(
     system: System,
-    start: Starts = "random 1000",
+    start: Starts | None = None,
     *,
     box: Mapping[str, Range] | None = None,
     periods: int = 3,
@@ -83,9 +88,13 @@ def periodic_orbits(
     system : System
         Forced; or nothing in it depends on time.
     start : sequence, mapping, array or str
-        Where to begin, as for :func:`saltus.simulate`, one or many; ``"random 1000"`` with ``box``.
+        Where to begin, as for :func:`saltus.simulate`, one or many; ``"random 1000"`` with
+        ``box``, which is the default there, of more than seven states ``"random 64"``. Without a
+        box the default of a forced system are 64 points of its motion from rest, one each period
+        from the start on; of more than seven states 16 of the first 64.
     box : mapping, optional
-        Range (low, high) of each state for random starts. Orbits may leave it.
+        Range (low, high) of each state, or of what sensors of a structure show, for random starts.
+        Orbits may leave it.
     periods : int
         Longest period looked for [forcing periods; about a turn of the motion each, in a system
         without forcing].
@@ -152,6 +161,9 @@ def periodic_orbits(
     check_system(system)
     periods = whole(periods, "periods", 1, LONGEST)
     size = len(system.states)
+    method = exact_method(method, system)
+    if start is None:
+        start = _usual(system, method, box, threads)
     many = random_count(start) if isinstance(start, str) else trajectories(start, None)
     check_room(many * periods * size * 400.0, f"{many} starts", "Take fewer.")
     states = (
@@ -159,7 +171,6 @@ def periodic_orbits(
         if isinstance(start, str)
         else _given(system, start, box)
     )
-    method = exact_method(method, system)
     attrs = provenance(system, method, system.values) | {"starts": len(states), "seed": seed}
     if system.forced_at is None:
         rotation = _turn(system, states)
@@ -181,13 +192,25 @@ def periodic_orbits(
         )
     map_ = Stroboscope(system, _with_budget(method, 1), threads=threads)
     before = map_.by(_with_budget(method, AGES[-1] + periods))
-    scale = spread(before, states)
     attrs |= {"periods": periods}
     with reporting(progress) as show:
+        scale = spread(before, states)
         return answered(
             lambda: all_orbits(map_, states, periods, scale, show, before),
             lambda found: _dataset(map_, attrs, found),
         )
+
+
+def _usual(system: System, method: Method, box: Any, threads: int | None) -> Any:
+    """The starts where none are given."""
+    many = len(system.states) >= MANY_STATES
+    if box is not None or system.forced_at is None:
+        return f"random {FEW_STARTS if many else 1000}"
+    rest = ensemble(system, None, None).start
+    map_ = Stroboscope(system, _with_budget(method, FROM_REST), threads=threads)
+    found = map_.launch(rest, FROM_REST).advance(FROM_REST - 1)
+    points = np.concatenate([rest[:, None], found], axis=1)[0, :: 4 if many else 1]
+    return points[np.isfinite(points).all(axis=1)]
 
 
 def _dataset(map_: Stroboscope, attrs: Mapping[str, Any], found: Family[Any]) -> xr.Dataset:

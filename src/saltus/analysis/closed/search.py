@@ -14,7 +14,7 @@ How many motions were missed is estimated from those that a single start led to:
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Generic, Self, TypeVar
 
@@ -24,6 +24,7 @@ from saltus.analysis.closed.motions import ClosedMotion
 from saltus.analysis.closed.shooting import Shooting, close
 from saltus.analysis.solve.deflation import Known
 from saltus.flow.maps import Travel
+from saltus.flow.progress import stage
 from saltus.kernels import status as st
 
 #: Iterates before Newton's method begins, in rotation: 0 finds motions that repel, more iterates
@@ -33,6 +34,9 @@ AGES = (0, 4, 8, 12)
 DEFLATED_STARTS = 64
 #: Steps of such a search: most guesses lead nowhere.
 DEFLATED_STEPS = 40
+#: Guesses that Newton's method takes together, times the square of the number of states; and the
+#: fewest.
+TOGETHER, FEWEST = 16_384, 8
 #: Distances from known motions at which it begins too, in units of their range.
 BESIDE = np.repeat([0.01, 0.1, 0.3], 6)
 
@@ -157,17 +161,24 @@ class Family(ABC, Generic[M]):
         search.found_once = int(np.count_nonzero(count == 1))
         return Shooting.joined(tried)
 
-    def deflate(self, search: Search, guesses: Shooting) -> None:
+    def deflate(
+        self,
+        search: Search,
+        guesses: Shooting,
+        progress: Callable[[float], None] | None = None,
+    ) -> None:
         """Search on with the known motions deflated, from some guesses and from beside the known
         motions, until nothing more is found.
         """
         n, random = guesses.points.shape[1], np.random.default_rng(0)
         every = max(1, len(guesses) // DEFLATED_STARTS)
         some = guesses.rows(np.arange(0, len(guesses), every))
-        for _ in range(self.rounds):
-            before = len(self.motions)
+        for turn in range(self.rounds):
+            before, known = len(self.motions), self.known(n)
             starts = Shooting.joined([some, *self.beside(n, random)])
-            self.take(close(starts, self.known(n), DEFLATED_STEPS)[1])
+            show = stage(progress, turn / self.rounds, (turn + 1) / self.rounds)
+            for part in parts_of(starts, show):
+                self.take(close(starts.rows(part), known, DEFLATED_STEPS)[1])
             search.deflated += len(self.motions) - before
             if len(self.motions) == before:
                 search.exhausted = True
@@ -179,6 +190,20 @@ class Family(ABC, Generic[M]):
         order = sorted((pair for pair in pairs if wanted(pair[0])), key=lambda p: self.place(p[0]))
         self.motions, self.found = [one for one, _ in order], [count for _, count in order]
         return self
+
+
+def parts_of(
+    guesses: Shooting, progress: Callable[[float], None] | None = None
+) -> Iterator[np.ndarray]:
+    """Rows of guesses that Newton's method takes together, int64[..]: few of many states, so that
+    the bar moves and Ctrl-C hands out what was found before. Tells the share that was asked for.
+    """
+    size = max(FEWEST, TOGETHER // guesses.points.shape[2] ** 2)
+    total = len(guesses)
+    for first in range(0, max(total, 1), size):  # of none one part, which is empty
+        if progress:
+            progress(first / max(total, 1))
+        yield np.arange(first, min(first + size, total))
 
 
 def used_up(flight: Travel) -> np.ndarray:

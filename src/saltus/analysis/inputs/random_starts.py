@@ -8,11 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from saltus.analysis.inputs.box import box_ranges, draw, fixed_of, states_at, units_of
 from saltus.errors import ParameterError, UnitError, must_be, nearest, shown, unknown
 from saltus.flow.counts import whole
 from saltus.flow.room import check_room
 from saltus.sentences import Given
 from saltus.system import System
+from saltus.system.structures.told import by_modes
 from saltus.units import to_si
 
 _COUNT = re.compile("0*[1-9][0-9]{0,11}")
@@ -21,7 +23,9 @@ _COUNT = re.compile("0*[1-9][0-9]{0,11}")
 def random_starts(
     system: System, start: str, box: Any, seed: int, others: Sequence[str] = ()
 ) -> np.ndarray:
-    """Starts uniform in a box, float64[n, D]; states without a range start at zero.
+    """Starts uniform in a box, float64[n, D]; states without a range start at zero. Of a structure
+    by its modes the box may be over what sensors show: of all states that show it, each start is
+    that of least energy.
 
     Parameters
     ----------
@@ -30,7 +34,7 @@ def random_starts(
     start : str
         ``"random 20"``.
     box : mapping
-        Range (low, high) of each state that varies [SI or text with a unit].
+        Range (low, high) of each state, or sensor, that varies [SI or text with a unit].
     seed : int
         Of the random numbers.
     others : sequence of str
@@ -50,13 +54,18 @@ def random_starts(
             )
         )
     if not isinstance(box, Mapping) or not box:
-        units = {name: system.units[name] for name in system.states[:2]}
+        known = units_of(system)
+        units = {name: known[name] for name in list(known)[:2]}
         example = {name: (f"-1 {unit}", f"1 {unit}") for name, unit in units.items()}
         raise ParameterError(
             lambda say: f"random starts need a box to be drawn from: {say.key(box=example)}."
         )
     check_room(16.0 * count * len(system.states), f"{count} random starts", "Draw fewer.")
     unit = np.random.default_rng(whole(seed, "seed", 0)).random((count, len(system.states)))
+    if by_modes(system) and not any(name in system.states for name in box):
+        fixed = fixed_of(system, None, box)
+        ranges = box_ranges(system, box)
+        return states_at(system, draw(ranges, unit[:, : len(ranges)]), fixed)
     starts = np.zeros((count, len(system.states)))
     for name, ends in box.items():
         low, high = _range(system, name, ends)

@@ -30,7 +30,7 @@ from saltus.system.quantity import remembering
 #: Derivatives of a gap that is zero at the start: the first that isn't zero tells its side.
 DERIVATIVES = 4
 #: Share of the progress for the run that finds the ends, before the one that is kept.
-FINDING = 0.2
+FINDING = 0.5
 #: A sample within this time of the end is the end: rounding [times the end].
 AT_THE_END = 4.0 * float(np.finfo(float).eps)
 
@@ -114,9 +114,16 @@ class Ending:
         return planned(system, group, reached, samples, None, states)
 
     @staticmethod
-    def afterwards(show: Callable[[float], None] | None) -> Callable[[float], None] | None:
-        """Progress of the run that is kept, behind the one of :meth:`plan`."""
-        return show and (lambda done: show(FINDING + (1.0 - FINDING) * done))
+    def afterwards(
+        length: Span, times: np.ndarray, show: Callable[[float], None] | None
+    ) -> Callable[[float], None] | None:
+        """Progress of the run that is kept, behind the one of :meth:`times`, which ended at these
+        times float64[n] [s]. A trajectory alone passes its last share there.
+        """
+        span = length.count * length.period + length.phase
+        last = float((times - length.t_start)[0] / span[0]) if len(times) == 1 else 1.0
+        last = max(last, np.finfo(float).tiny)
+        return show and (lambda done: show(FINDING + (1.0 - FINDING) * min(done / last, 1.0)))
 
     def of_the_user(self, outcome: Outcome, errors: np.ndarray) -> tuple[Outcome, np.ndarray]:
         """The outcome, and the errors of its contact times, without the guards of the condition.

@@ -18,7 +18,6 @@ from saltus.analysis.motion.contact_peaks import ContactForces, Peaks
 from saltus.analysis.motion.touchdowns import Touchdowns
 from saltus.analysis.motion.window import Stretch, computed, dataset, stretch
 from saltus.analysis.outcome_messages import warn
-from saltus.contact.guards import is_hold
 from saltus.errors import ParameterError, listed, must_be, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.methods import Method, check_method
@@ -27,7 +26,7 @@ from saltus.flow.room import check_room
 from saltus.interrupt import Interrupted
 from saltus.language.evaluate import evaluate
 from saltus.results.dataset import schema
-from saltus.system import System, gap_units
+from saltus.system import System
 from saltus.system.contact_forces import side_that_pushes
 from saltus.system.quantity import with_impulses, with_integrals
 from saltus.system.read_off import Quantity
@@ -251,10 +250,6 @@ def _dataset(
     """The contacts and their statistics, by name."""
     size, guards = seen.group.size, len(system.guards)
     found, words = contact_peaks.with_found(system, found, forces, tops)
-    gaps = zip(gap_units(system), system.guards, strict=True)
-    common = {unit for unit, one in gaps if not is_hold(one)}
-    if len(common) == 1:
-        words |= {"<gap>": (gap := common.pop()), "<gap rate>": schema.rate_unit(gap)}
     ends = np.searchsorted(found.trajectory, np.arange(size + 1))
     cells = [
         (i, g, ends[i] + np.flatnonzero(found.guard[ends[i] : ends[i + 1]] == g))

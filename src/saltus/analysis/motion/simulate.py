@@ -151,7 +151,9 @@ def simulate(
     with reporting(progress) as show:
         try:
             if end is not None and not asked.given:
-                asked, show = asked.with_end(threads, show), end.afterwards(show)
+                times = end.times(asked.method, asked.group, asked.length, threads, show)
+                show = end.afterwards(asked.length, times, show)
+                asked = asked.until(times)
             outcome, errors = asked.run(threads, show)
             result = simulation(asked, outcome, errors)
         except KeyboardInterrupt as stop:

@@ -155,7 +155,11 @@ def dataset(
     own = dataset_parts.trajectories(seen.system, method, seen.group, seen.forcing_period)
     guards = None if own.guards is None else own.guards.first(len(system.guards))
     subject = replace(
-        own, states=system.states, guards=guards, attrs={**own.attrs, **(attrs or {})}
+        own,
+        states=system.states,
+        guards=guards,
+        gap_unit=dataset_parts.gap_unit(system),
+        attrs={**own.attrs, **(attrs or {})},
     )
     counters = ("steps", "rejected_steps", "mode_violations", "grazes_unresolved")
     ending = {**dataset_parts.endings(outcome, counters), "end_time": outcome.time}

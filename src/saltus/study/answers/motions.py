@@ -1,4 +1,4 @@
-"""[poincare], [spectrum], [impacts] and [energy]: analyses of motions after a transient."""
+"""[stroboscope], [settled], [poincare], [spectrum], [impacts] and [energy]: analyses of motions."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from saltus.study.answers.question import OneVerb, asked, first_figure
 from saltus.study.code import code_hash
 from saltus.study.setting import quantities
 from saltus.study.tables.kinds import KINDS, whole
-from saltus.study.tables.signature import Asked, OfLength, table, verb
+from saltus.study.tables.signature import Asked, OfLength, WrittenAs, table, verb
 from saltus.system.read_off import quantity
 
 if TYPE_CHECKING:
@@ -90,6 +90,77 @@ class OfMotions(OneVerb):
                 f"[{self.place}] needs a method that locates contacts: name = "
                 f'"Taylor", or ODE45 with events = "locate".'
             )
+
+
+def _only_forced(question: OneVerb) -> None:
+    """Refuse a system without forcing, which has no periods."""
+    if question.system.forced_at is None:
+        raise StudyError(
+            f"[{question.place}] looks at whole forcing periods, and {question.system.name} is not "
+            f'forced. Ask [simulate] with t_end = "20 s", or [poincare].'
+        )
+
+
+@asked(12, table("stroboscope", ["stroboscope"], KINDS, called="Stroboscope"))
+class Points(OfMotions):
+    """[stroboscope]: states at whole forcing periods."""
+
+    several = True
+
+    def check_first(self, table: Any) -> None:  # noqa: ARG002
+        """It needs forcing."""
+        _only_forced(self)
+
+    def check(self, table: Any, setting: Setting) -> None:
+        """Check start and values."""
+        from saltus.analysis.inputs.starts import ensemble
+
+        ensemble(self.system, self.arguments["start"], self.arguments["values"])
+        self.check_more(table, setting)
+
+
+@asked(
+    14,
+    table(
+        "settled",
+        ["settled", "simulate"],
+        KINDS | {"tolerance": WrittenAs(examples=(1e-6,))},
+        called="Settled response",
+        without=(*_LEFT_OUT, "t_end"),
+    ),
+)
+class SettledResponse(OneVerb):
+    """[settled]: the responses that given starts settle to."""
+
+    def check_first(self, table: Any) -> None:
+        """It needs forcing, and a length."""
+        _only_forced(self)
+        if table.periods is None:
+            raise StudyError(f"[{self.place}] lacks periods. Write periods = 400.")
+
+    def check(self, table: Any, setting: Setting) -> None:  # noqa: ARG002
+        """Check start, values and the periods that are compared."""
+        from saltus.analysis.inputs.starts import ensemble
+        from saltus.analysis.motion.settled import LAST
+
+        asked = self.arguments
+        ensemble(self.system, asked["start"], asked["values"])
+        self.compared = asked["last"] or min(LAST, asked["periods"])
+        if not 2 <= self.compared <= asked["periods"]:
+            raise StudyError(
+                f"[{self.place}] compares {self.compared} last periods of {asked['periods']}. "
+                "Write at least periods = 2, and last between 2 and periods."
+            )
+
+    def call(self, how: dict[str, Any]) -> xr.Dataset:
+        """Simulate, and compare the last periods."""
+        asked = self.arguments
+        motion = {name: asked[name] for name in ("start", "t_start", "values", "samples")}
+        run = verb("simulate")(
+            self.system, periods=asked["periods"], keep=self.compared, **motion, **how
+        )
+        ds: xr.Dataset = verb(self.function)(run, tolerance=asked["tolerance"], last=self.compared)
+        return ds
 
 
 @asked(20, table("poincare", ["poincare"], KINDS, base=_BASE, called="Poincare section"))

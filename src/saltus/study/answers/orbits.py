@@ -21,7 +21,8 @@ Period = Annotated[
 #: They are found from many starts.
 KEYS = OF_RESPONSES | {
     "start": WrittenAs(Starts, (*KINDS["start"].examples, "random 1000"),
-        'Where to begin: every state, lists making a batch; or "random 1000" with box.',
+        'Where to begin: every state, lists making a batch; or "random 1000" with box. Default '
+        "without a box: along the motion from rest.",
         convert="start"),
     "periods": whole(3, most=MOST_PERIODS),
     "period": WrittenAs(Period, (["1 s", "5 s"], "0.1 s"), convert="period"),

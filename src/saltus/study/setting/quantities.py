@@ -123,12 +123,14 @@ def starts(
 def box(
     system: System, given: Mapping[str, list[Quantity]] | None, place: str
 ) -> dict[str, list[float]] | None:
-    """Ranges of states in SI."""
+    """Ranges of states in SI, or of what sensors of a structure by its modes show."""
     if given is None:
         return None
-    place = f"{place}.box"
+    place, known = f"{place}.box", system.states
+    if by_modes(system) and not any(name in known for name in given):
+        known = system.outputs.names
     return {
-        name: [number(end, _unit(system, name, system.states, place), place, name) for end in ends]
+        name: [number(end, _unit(system, name, known, place), place, name) for end in ends]
         for name, ends in given.items()
     }
 

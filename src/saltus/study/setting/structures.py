@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from saltus.system.formula import Formulas
 
 _PLACE = "system.structure"
+#: Name of a part while its quantities are checked, before it has one.
+_PART = "part"
 #: A quantity: a number, alone or with a unit. Everything else is a formula.
 _QUANTITY = re.compile(r"\s*[+-]?[\d.]+([eE][+-]?\d+)?\s*([A-Za-zµμΩ°%].*)?")
 #: Names that the formula of a drive may hold.
@@ -50,9 +52,13 @@ def structure_of(table: Any, inputs: Inputs, formulas: Formulas, header: Header 
     units = UNITS[given.get("unit", "m")]
     length, (_, force, spring, damper, acceleration) = given.get("unit", "m"), units
     kinds: tuple[tuple[str, Any, Callable[[Any], Any]], ...] = (
-        ("contacts", Contact, lambda one: laws.entries("", one, (length, force, spring, damper))),
-        ("forces", Force, lambda one: drives.entries("", one, force)),
-        ("base", Base, lambda one: drives.entries("", one, acceleration)),
+        (
+            "contacts",
+            Contact,
+            lambda one: laws.entries(_PART, one, (length, force, spring, damper)),
+        ),
+        ("forces", Force, lambda one: drives.entries(_PART, one, force)),
+        ("base", Base, lambda one: drives.entries(_PART, one, acceleration)),
     )
     try:
         for key, kind, entries in kinds:
@@ -63,7 +69,8 @@ def structure_of(table: Any, inputs: Inputs, formulas: Formulas, header: Header 
             for one in given[key]:
                 for name, value, unit in entries(one):
                     if value is not None and length:
-                        quantities.number(value, unit, place, name.lstrip("_") or "amplitude")
+                        key = name.removeprefix(_PART).lstrip("_") or "amplitude"
+                        quantities.number(value, unit, place, key)
         if "sensors" in given:
             given["sensors"] = {name: _sensor(text) for name, text in given["sensors"].items()}
         if "frequency" in given:
@@ -117,7 +124,8 @@ def _function(text: str, formulas: Formulas, place: str) -> Callable[..., Any]:
     if unknown := [name for name in formula.names if name not in _HELD]:
         raise StudyError(
             f"[{place}] {formula.place} holds {unknown[0]!r}, and the formula of a drive holds the "
-            f"time t, frequency, terms and tables only. {nearest(unknown[0], formulas.tables)}"
+            f"time t, frequency, terms and tables only."
+            + (f" {nearest(unknown[0], formulas.tables)}" if formulas.tables else "")
         )
     if drives.FREQUENCY in formula.names:
         return lambda t, frequency: formula(

@@ -9,6 +9,7 @@ from typing import Any
 from saltus.study.tables.kinds import whole
 from saltus.study.tables.parts import Quantity, one_or_many
 from saltus.study.tables.signature import Generated, WrittenAs, table
+from saltus.system.structures.parts import MOST_POWER
 
 _PLACE = "system.structure"
 _FILE = "File in the study's folder: {}"
@@ -32,7 +33,7 @@ Contact: Any = table(
         "damping": WrittenAs(examples=("20 N*s/m",)),
         "name": WrittenAs(examples=("bumper",)),
         "restitution": WrittenAs(examples=(0.6,)),
-        "power": WrittenAs(examples=(1.5,), limits={"ge": 1}),
+        "power": WrittenAs(examples=(1.5,), limits={"ge": 1, "le": MOST_POWER}),
         "preload": WrittenAs(examples=("50 N",)),
         "friction": WrittenAs(examples=(0.2,)),
         "sliding": WrittenAs(str | list[str], ("u_12",)),

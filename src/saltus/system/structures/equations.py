@@ -181,6 +181,11 @@ def way_of(moving: Coordinates, degrees: list[str], label: str, contact: Contact
         raise ParameterError(f"no mode that is kept moves {label}. Keep more by modes=.")
     inertia = {}
     if contact.restitution is not None:
+        if rubbed.any() and np.linalg.matrix_rank([pushed, rubbed]) < 2:
+            raise ParameterError(
+                f"{label}: the modes that are kept can't slide where they rest on this rigid stop. "
+                f"Keep more by modes=."
+            )
         masses = _masses(moving, label)
         moved = np.flatnonzero((pushed != 0) | (rubbed != 0)).tolist()
         inertia = {moving.rates[i]: float(masses[i]) for i in moved}

@@ -44,7 +44,8 @@ def checked(matrix: Any, name: str, size: int | None = None, symmetric: bool = F
     if entries.dtype.kind not in "fiu":
         raise ParameterError(f"{name} must hold real numbers, not {entries.dtype}.")
     if square.ndim != 2 or square.shape[0] != square.shape[1] or not square.shape[0]:
-        raise ParameterError(f"{name} must be a square matrix; its shape is {square.shape}.")
+        ratio = " Of a ratio write damping_ratio=." if name == "damping" and not square.ndim else ""
+        raise ParameterError(f"{name} must be a square matrix; its shape is {square.shape}.{ratio}")
     if size is not None and len_of(square) != size:
         raise ParameterError(
             f"{name} is {square.shape[0]} x {square.shape[0]}, but mass is {size} x {size}."
@@ -123,7 +124,9 @@ def check_positive(holds: bool, mass: np.ndarray) -> None:
     """Raise a ParameterError for a mass matrix that isn't positive definite."""
     if not holds:
         smallest = float(np.linalg.eigvalsh(mass)[0])
+        light = not mass.any(axis=1).all()
         raise ParameterError(
-            f"mass must be positive definite, but its smallest eigenvalue is {smallest:.3g}. "
-            f"Condense degrees of freedom without mass out of the matrices first."
+            f"mass must be positive definite, but its smallest eigenvalue is {smallest:.3g}."
+            + light
+            * " Degrees of freedom without mass, rows of zeros, follow the others with modes=."
         )

@@ -20,6 +20,8 @@ SIDES = ("upper", "lower", "both")
 MOST_POWER = 5
 #: Signs at the end of a name that number degrees of freedom of one kind.
 _NUMBERS = "_0123456789"
+#: Names that no part can have, and what they are the names of.
+RESERVED = {"t": "the time", "frequency": "the forcing frequency"}
 P = TypeVar("P", "Contact", "Force", "Base")
 
 #: Advice on arguments that a part lacks or calls otherwise.
@@ -211,7 +213,8 @@ def parts(kind: type[P], given: Any, word: str, known: Iterable[str]) -> list[tu
     """
     alone = isinstance(given, Contact | Force | Base | Mapping | str)
     if alone or not isinstance(given, Iterable):
-        raise must_be(f"{word}s", "a list of them", given)
+        argument = {Contact: "contacts", Force: "forces"}.get(kind, "base")
+        raise must_be(argument, f"a list of sl.{kind.__name__}(...)", given)
     degrees = list(known)
     found = [part if isinstance(part, kind) else _made(kind, part) for part in given]
     unnamed = [part for part in found if part.name is None]
@@ -226,6 +229,11 @@ def parts(kind: type[P], given: Any, word: str, known: Iterable[str]) -> list[tu
         if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
             raise ParameterError(
                 f"{shown(name)} can't be the name of a {word}: use letters, digits and _."
+            )
+        if name in RESERVED:
+            raise ParameterError(
+                f"a {word} can't be called {name!r}, the name of {RESERVED[name]}. Give it another "
+                f"name=."
             )
         if name in degrees:
             raise ParameterError(
@@ -269,6 +277,10 @@ def _check(name: str, part: Contact | Force | Base, known: list[str]) -> None:
 def _check_amplitude(name: str, part: Force | Base) -> None:
     kind, unit = ("acceleration", "m/s^2") if isinstance(part, Base) else ("force", "N")
     amplitude: Any = part.amplitude
+    if amplitude is None:
+        raise ParameterError(
+            f"{name}: the {kind} needs amplitude=, such as '2 {unit}', or a function of the time."
+        )
     if callable(amplitude) and (part.phase is not None or part.harmonic != 1):
         raise ParameterError(
             f"{name}: phase= and harmonic= are those of a harmonic {kind}, and this is a function "
@@ -329,7 +341,7 @@ def _check_friction(name: str, part: Contact, known: list[str]) -> None:
     if part.sliding is None:
         return
     pair = part.sliding if isinstance(part.sliding, tuple | list) else (part.sliding,)
-    if len(pair) > 2:
+    if not 1 <= len(pair) <= 2:
         raise must_be(f"{name}: sliding", "a degree of freedom, or two of them", part.sliding)
     _check_places(name, pair, known)
     if np.array_equal(np.abs(vector_of(pair, known)), np.abs(direction(part, known))):

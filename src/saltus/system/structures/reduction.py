@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -44,21 +44,28 @@ class Modes:
 
 
 def modes_of(mass: Any, stiffness: Any, count: int) -> Modes:
-    """The lowest modes, or all of a structure that is small enough to be dense.
+    """The lowest modes, or all of a structure that is small enough to be dense. Degrees of freedom
+    without mass follow the others statically.
 
     Raises
     ------
     ParameterError
-        If the mass matrix isn't positive definite (of large ones the diagonal), the stiffness
-        matrix has a negative eigenvalue, or the modes aren't found in :data:`MOST_RESTARTS`.
+        If the mass matrix of the others isn't positive definite (of large ones the diagonal), they
+        are fewer than ``count``, the stiffness matrix has a negative eigenvalue, or the modes
+        aren't found in :data:`MOST_RESTARTS`.
     """
-    from scipy.linalg import LinAlgError, eigh
-
+    heavy = np.ravel(abs(mass).sum(axis=1)) > 0
+    number = int(heavy.sum())
+    if not number:
+        raise ParameterError("all entries of mass are zero. Give the mass matrix.")
+    if number < count:
+        light = len(heavy) - number
+        raise ParameterError(
+            f"{light} of {len(heavy)} degrees of freedom have no mass, so there are {number} "
+            f"modes: give modes=, at most {number}. Those without mass then follow the others."
+        )
     if len_of(mass) <= MOST_DENSE or count > len_of(mass) // 2:
-        try:
-            squares, shapes = eigh(dense(stiffness), dense(mass))
-        except LinAlgError:
-            check_positive(False, dense(mass))
+        squares, shapes = _all(dense(mass), dense(stiffness), heavy)
     else:
         squares, shapes = _lowest(mass, stiffness, count)
     noise = _rounding(stiffness, shapes)
@@ -67,6 +74,38 @@ def modes_of(mass: Any, stiffness: Any, count: int) -> Modes:
     squares = np.where(np.abs(squares) <= noise, 0.0, squares)
     signs = np.sign(shapes[np.abs(shapes).argmax(axis=0), np.arange(shapes.shape[1])])
     return Modes(np.sqrt(np.maximum(squares, 0.0)), shapes * signs)
+
+
+def _all(mass: np.ndarray, stiffness: np.ndarray, heavy: np.ndarray) -> tuple[Any, np.ndarray]:
+    """All eigenpairs of the degrees of freedom that have mass, and what these leave to the others:
+    their static deflections (Guyan, AIAA J. 3 (1965) 380, which without mass is exact).
+    """
+    from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
+
+    light = ~heavy
+    follow = np.zeros((len(mass), int(heavy.sum())))
+    follow[heavy] = np.eye(follow.shape[1])
+    if light.any():
+        try:
+            held = cho_factor(stiffness[np.ix_(light, light)])
+        except LinAlgError:
+            _refuse_loose()
+        follow[light] = -cho_solve(held, stiffness[np.ix_(light, heavy)])
+        stiffness = follow.T @ stiffness @ follow
+        stiffness = (stiffness + stiffness.T) / 2
+    mass = mass[np.ix_(heavy, heavy)]
+    try:
+        squares, shapes = eigh(stiffness, mass)
+    except LinAlgError:
+        check_positive(False, mass)
+    return squares, follow @ shapes if light.any() else shapes
+
+
+def _refuse_loose() -> NoReturn:
+    raise ParameterError(
+        "some degrees of freedom have no mass, and the stiffness alone doesn't hold them, so they "
+        "don't follow the others. Take them out of the matrices."
+    )
 
 
 def _refuse_negative(what: str) -> None:
@@ -96,7 +135,10 @@ def _lowest(mass: Any, stiffness: Any, count: int) -> tuple[np.ndarray, np.ndarr
             f"mass must be positive definite, but mass[{i}, {i}] = {diagonal[i]:.3g}."
         )
     shift = -1e-3 * abs(stiffness.diagonal()).max() / diagonal.max() / len_of(mass)
-    factors = _factors(stiffness - shift * mass)
+    try:
+        factors = _factors(stiffness - shift * mass)
+    except RuntimeError:  # a pivot is zero, which a shifted stiffness with mass has none of
+        _refuse_loose()
     negative = int((factors.U.diagonal() < 0).sum())
     if negative:
         _refuse_negative(f"{negative} negative eigenvalue{'s' * (negative > 1)}")

@@ -4,6 +4,7 @@ forces of its contacts.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -12,14 +13,18 @@ import numpy as np
 
 from saltus.errors import ParameterError, among, must_be, nearest, shown
 from saltus.language.expression import TIME, Expr, add, as_expr, constant, parameter, state
+from saltus.language.names import why_no_output
+from saltus.system.checks import MOST_GUARDS
 from saltus.system.outputs import check_name, with_formula, with_more
 from saltus.system.read_off import joined
 from saltus.system.structures import drives, laws
 from saltus.system.structures.equations import UNITS, Coordinates, Loads, sum_of, way_of
-from saltus.system.structures.parts import Base, direction, named, vector_of
+from saltus.system.structures.parts import Base, Force, direction, named, vector_of
 from saltus.system.system import System
 
 ZERO = constant(0.0)
+#: A sensor as study files write it.
+_CALL = re.compile(r"\s*(velocity|acceleration|contact_force)\(\s*(\w+)\s*\)\s*")
 
 
 @dataclass(frozen=True)
@@ -160,7 +165,8 @@ def with_sensors(
     made : System
         The structure.
     sensors : mapping of str to str, (str, str), Sensor, or what :meth:`System.with_outputs` takes
-        A degree of freedom stands for its deflection, a pair for a stretch.
+        A degree of freedom stands for its deflection, a pair for a stretch. None: :func:`_usual`
+        ones in front of the coordinates of modes, else none.
     moving, degrees, loads, unit
         What it is made of: coordinates, names of degrees of freedom, contacts and drives, and the
         unit of the degrees of freedom.
@@ -170,10 +176,12 @@ def with_sensors(
     ParameterError
         If there is no such degree of freedom or contact, or no mode moves it.
     """
+    if sensors is None:
+        sensors = _usual(made, moving, degrees, loads) if moving.transform is not None else {}
     if not isinstance(sensors, Mapping):
         raise must_be("sensors", 'a mapping, such as {"tip": "x3"}', sensors)
     plan = _Sensors(made, moving, degrees, loads)
-    found = replace(made.outputs, first=moving.transform is not None)
+    found = replace(made.outputs, first=bool(sensors) and moving.transform is not None)
     for name, given in sensors.items():
         if callable(given) or (isinstance(given, tuple) and given and callable(given[0])):
             found = with_more(replace(made, outputs=found), {name: given})
@@ -184,6 +192,38 @@ def with_sensors(
         formula, guards = joined(rest, made, found)
         found = with_formula(made, found, name, add(own, formula), guards, _unit(one, unit))
     return replace(made, outputs=found)
+
+
+def _usual(
+    made: System, moving: Coordinates, degrees: list[str], loads: Loads
+) -> dict[str, Sensor]:
+    """Sensors of a structure by its modes for which none are given: deflection, velocity and force
+    at each contact.
+
+    Without contacts it is the deflection and velocity at each force, without forces those of the
+    degree of freedom that its first mode moves most. They take half of the room for outputs at
+    most.
+    """
+    found: dict[str, Sensor] = {}
+    for label, one in loads.contacts:
+        found |= _motion(f"at {label}", one.at, one.to)
+        if one.restitution is None:
+            found[f"force at {label}"] = contact_force(label)
+    for label, drive in loads.drives if not found else ():
+        if isinstance(drive, Force) and moving.along(vector_of([drive.at], degrees)).any():
+            found |= _motion(f"at {label}", drive.at)
+    if not found and moving.transform is not None:
+        most = degrees[int(np.abs(moving.transform[:, 0]).argmax())]
+        found = _motion("of mode 1" if why_no_output(most) else f"of {most}", most)
+    return dict(list(found.items())[: (MOST_GUARDS - len(made.guards)) // 2])
+
+
+def _motion(where: str, at: str, to: str | None = None) -> dict[str, Sensor]:
+    """Sensors of the deflection and the velocity at a place, by their names."""
+    return {
+        f"deflection {where}": Sensor("deflection", at, to),
+        f"velocity {where}": velocity(at, to),
+    }
 
 
 def _sensor(name: Any, given: Any) -> Sensor:
@@ -237,9 +277,11 @@ class _Sensors:
         places = [one.at] if one.to is None else [one.at, one.to]
         for place in places:
             if not among(place, self.degrees):
+                written = _CALL.fullmatch(place) if isinstance(place, str) else None
+                advice = f"Write sl.{written[1]}({written[2]!r})." if written else ""
                 raise ParameterError(
                     f"the sensor {shown(name)}: {shown(place)} is no degree of freedom. "
-                    f"{named(place, self.degrees)}"
+                    f"{advice or named(place, self.degrees)}"
                 )
         if one.at == one.to:
             raise ParameterError(
@@ -267,10 +309,10 @@ class _Sensors:
             else [label for label, one in contacts.items() if one.at == at]
         )
         if not mine:
-            known = [*contacts, *(one.at for one in contacts.values())]
+            known = list(dict.fromkeys([*contacts, *(one.at for one in contacts.values())]))
             raise ParameterError(
                 f"the sensor {shown(name)}: there is no contact at {shown(at)}. "
-                f"{nearest(at, list(dict.fromkeys(known)))}"
+                f"{nearest(at, known) if known else 'This structure has none: give contacts=.'}"
             )
         total: Any = 0.0
         for label in mine:

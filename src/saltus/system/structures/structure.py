@@ -17,6 +17,7 @@ from saltus.contact.boundaries import numbers_of
 from saltus.contact.contacts import renamed
 from saltus.errors import ParameterError, SaltusWarning, among, must_be, shown
 from saltus.system.structures import matrices, told
+from saltus.system.structures.drives import FREQUENCY
 from saltus.system.structures.equations import UNITS, Coordinates, Loads, traced
 from saltus.system.structures.files import matrices_of
 from saltus.system.structures.interfaces import seen_by_contacts
@@ -118,7 +119,9 @@ def structure(
         Named outputs, which every result holds and every picture shows: a degree of freedom for its
         deflection, a pair of them for a stretch, ``sl.velocity("x3")``, ``sl.acceleration("x3")``,
         ``sl.contact_force("stop")``, or a function of the states as of
-        :meth:`saltus.System.with_outputs`.
+        :meth:`saltus.System.with_outputs`. Default, with ``modes=``: ``deflection at stop``,
+        ``velocity at stop`` and ``force at stop`` of each contact ``stop``, since no one measures
+        coordinates of modes; without contacts those of the points where forces act. ``{}``: none.
 
     Returns
     -------
@@ -214,11 +217,12 @@ def structure(
             compliance = moving.compliance(moving.along(direction(contact, degrees)))
             told.doubt_stiff(label, spring, compliance, angular[:count].max(initial=0.0))
     words += told.closed(touching, made.values, degrees, unit)
+    told.doubt_frequency(frequency, FREQUENCY in made.values)
     numbers = dict(zip(sides, numbers_of(sides.values(), made.guards), strict=True))
     named = {number: label for label, number in numbers.items() if number is not None}
     made = replace(made, guards=renamed(made.guards, named), description=words)
     made = replace(made, interfaces=seen_by_contacts(made, moving, degrees, loads, frequency, unit))
-    return made if sensors is None else with_sensors(made, sensors, moving, degrees, loads, unit)
+    return with_sensors(made, sensors, moving, degrees, loads, unit)
 
 
 # -- coordinates -----------------------------------------------------------------------------------

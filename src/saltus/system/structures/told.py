@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.errors import ParameterError, SaltusWarning, listed
+from saltus.errors import ParameterError, SaltusWarning, listed, shown
 from saltus.language.inputs import Record
 from saltus.system.display import STRUCTURE
 from saltus.system.equations_of_motion import EquationsOfMotion
@@ -159,6 +159,16 @@ def doubt(angular: np.ndarray) -> None:
         _warn(
             f"the lowest natural frequency of this structure is {elastic.min():.3g} Hz. Are its "
             f"matrices in kg and N/m, or in other units that fit together?"
+        )
+
+
+def doubt_frequency(frequency: Any, used: bool) -> None:
+    """Warn of a forcing frequency that no drive has."""
+    if frequency is not None and not used:
+        _warn(
+            f"frequency = {shown(frequency)} isn't used, since nothing of this structure "
+            f"oscillates with it. Give a drive that does, forces=[sl.Force(...)] or "
+            f"base=sl.Base(...) with an amplitude, or leave frequency= out."
         )
 
 

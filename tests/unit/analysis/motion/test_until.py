@@ -342,3 +342,42 @@ def test_a_condition_that_never_came_true_is_told():
 )  # fmt: skip
 def between_stops(t, x, v, *, m=1.0, k=1.0, gap=0.1):
     return v, -(sl.freeplay(x, stiffness=k, upper_gap=gap, lower_gap=gap)) / m
+
+
+def stopped(**options):
+    """Four masses in a row that a force pushes onto a damped stop."""
+    chain = 900.0 * (2 * np.eye(4) - np.eye(4, k=1) - np.eye(4, k=-1))
+    about = {"modes": 4, "damping_ratio": 0.02, "frequency": "4 Hz",
+        "forces": [sl.Force("x1", "6 N")], "contacts": [sl.Contact("x4", stiffness=3e3, gap="2 mm",
+            damping=5.0, side="both")]}  # fmt: skip
+    return sl.structure(np.eye(4), chain, **about | options)
+
+
+@pytest.mark.parametrize("limit", ["> 4 N", "< -4 N"])
+def test_the_force_of_a_contact_ends_a_run_of_modes(limit):
+    """Where the force is a spring's, the condition is about what is linear: the modal method finds
+    the same instant as Taylor's, which has the force as it is written.
+    """
+    until = f"'force at stop' {limit}"
+    run = sl.simulate(stopped(), periods=20, until=until, progress=False)
+    assert run.attrs["method"] == "Modal"
+    assert run.status == "until"
+    assert abs(float(run["end_force at stop"])) == pytest.approx(4.0, abs=1e-9)
+    sign = 1.0 if limit[0] == ">" else -1.0
+    force = sl.simulate(stopped(), periods=20, samples=2000, method=sl.Taylor(), progress=False)
+    first = int((sign * force["force at stop"].values > 4.0).argmax())
+    before, after = force["time"].values[first - 1 : first + 1]
+    assert before <= float(run.end_time) <= after
+    exact = sl.simulate(stopped(), periods=20, until=until, method=sl.Taylor(), progress=False)
+    assert float(run.end_time) == pytest.approx(float(exact.end_time), rel=1e-10)
+
+
+def test_the_bar_of_a_run_that_ends_early_moves_through_both_runs():
+    shares: list[float] = []
+    run = sl.simulate(
+        stopped(), periods=1000, until="'force at stop' > 4 N", progress=shares.append
+    )
+    assert float(run.end_time) < 0.05 * 250
+    assert shares == sorted(shares)
+    assert shares[-1] > 0.9
+    assert sum(0.5 < one < 0.95 for one in shares) > 1

@@ -295,3 +295,44 @@ def test_work_of_tracing_grows_with_the_equations():
 
     work(2)  # what is done once in a process
     assert work(32) < 2.2 * work(16)
+
+
+@pytest.mark.parametrize("modes", [None, 1, 3])
+@pytest.mark.parametrize("unit", ["m", "rad"])
+def test_velocities_at_rigid_stops_have_a_unit(modes, unit):
+    chain = 900.0 * (2 * np.eye(3) - np.eye(3, k=1) - np.eye(3, k=-1))
+    stop = sl.Contact("x2", restitution=0.5, gap=1e-3)
+    made = sl.structure(np.eye(3), chain, modes=modes, unit=unit, contacts=[stop],
+        forces=[sl.Force("x1", lambda t: 5.0)])  # fmt: skip
+    assert made.guards[1].name == "stop at rest"  # held by a force, whose unit is another
+    run = sl.simulate(made, t_end=0.3, progress=False)
+    assert run.sizes["contact"]
+    assert run.contact_velocity.attrs["units"] == f"{unit}/s"
+    hits = sl.impact_statistics(made, t_end=0.3, progress=False)
+    assert hits.contact_speed.attrs["units"] == f"{unit}/s"
+
+
+def test_a_rough_rigid_stop_of_one_mode_is_refused_in_words():
+    rough = sl.Contact("x2", restitution=0, gap=1e-3, friction=0.2, sliding="x3")
+    with pytest.raises(ParameterError, match=r"^stop: the modes .* can't slide .* modes=\.$"):
+        sl.structure(
+            np.eye(3),
+            900.0 * (2 * np.eye(3) - np.eye(3, k=1) - np.eye(3, k=-1)),
+            modes=1,
+            contacts=[rough],
+        )
+
+
+@pytest.mark.parametrize("n", [5, 1601])
+def test_a_loose_degree_of_freedom_without_mass_is_refused_in_words(n):
+    weight = np.ones(n)
+    weight[2] = 0.0
+    with pytest.raises(ParameterError, match=r"^some .* no mass, and the stiffness .* matrices\.$"):
+        sl.structure(sp.diags(weight, format="csr"), 900 * sp.diags(weight, format="csr"), modes=2)
+
+
+def test_without_modes_a_mass_of_zero_asks_for_them():
+    with pytest.raises(ParameterError, match="follow the others with modes="):
+        sl.structure(np.diag([1.0, 0]), np.eye(2))
+    with pytest.raises(ParameterError, match="give modes=, at most 1"):
+        sl.structure(np.diag([1.0, 0]), np.eye(2), damping_ratio=0.1)

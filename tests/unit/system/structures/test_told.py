@@ -102,7 +102,7 @@ def test_a_spring_that_is_rigid_is_doubted(modes):
 
 def test_singular_and_indefinite_matrices():
     with pytest.raises(ParameterError, match="mass must be positive definite"):
-        sl.structure(np.diag([1.0, 0.0]), np.eye(2), modes=1)
+        sl.structure(np.ones((2, 2)), np.eye(2), modes=1)
     with pytest.raises(ParameterError, match="negative eigenvalue"):
         sl.structure(np.eye(2), np.diag([1.0, -1e-3]), modes=1)
 
@@ -198,3 +198,56 @@ def test_a_base_record_that_leaves_the_base_in_motion_is_told(turns, told):
     made = sl.structure(np.eye(2), np.diag([4e3, 9e3]), base=sl.Base("x1", record))
     assert ("leaves it at 0.637 m/s, 100 %" in made.description) == told
     assert ("subtract the record's mean, 0.637 m/s^2" in made.description) == told
+
+
+def test_sensors_where_none_are_given():
+    rigid = sl.Contact("x2", restitution=0.5, gap=0.1, to="x1", name="wall")
+    pushed = sl.Force("x4", lambda t: 1.0)
+    outputs = [
+        sl.structure(MASS, CHAIN, **options).outputs.names
+        for options in (
+            {"modes": 3, "contacts": [rigid], "forces": [pushed]},
+            {"modes": 3, "forces": [pushed]},
+            {"modes": 3},
+            {"modes": 3, "sensors": {}},
+            {},
+        )
+    ]
+    assert outputs == [
+        ("deflection at wall", "velocity at wall"),
+        ("deflection at force", "velocity at force"),
+        ("deflection of x5", "velocity of x5"),
+        (),
+        (),
+    ]
+    many = [
+        sl.Contact(f"x{i}", stiffness=1e3, gap=0.1, side="both", name=f"s{i}", friction=0.1,
+            sliding=f"x{i + 1}")
+        for i in range(1, 9)
+    ]  # fmt: skip
+    made = sl.structure(MASS, CHAIN, modes=9, contacts=many)
+    assert (len(made.guards), len(made.outputs)) == (32, 10)  # of the 52 that both may be
+    shown = sl.simulate(
+        sl.structure(MASS, CHAIN, modes=3, contacts=[rigid]),
+        {"deflection at wall": 0.01},
+        t_end=0.1,
+        progress=False,
+    )
+    assert shown["deflection at wall"].values[0] == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize(
+    "drive",
+    [
+        {},
+        {"base": sl.Base("x", lambda t: 1.0)},
+        {"forces": [sl.Force("x1", "2 N", harmonic=0)]},
+    ],
+)
+def test_a_frequency_that_no_drive_has_is_doubted(drive):
+    with pytest.warns(SaltusWarning, match=r"^frequency = '4 Hz' isn't used, since .* out\.$"):
+        made = sl.structure(MASS, CHAIN, frequency="4 Hz", **drive)
+    assert made.forced_at is None
+    assert "frequency" not in made.values
+    used = sl.structure(MASS, CHAIN, frequency="4 Hz", forces=[sl.Force("x1", 0.0)])
+    assert used.forced_at == "frequency"
