@@ -83,7 +83,9 @@ def beam(elements: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def structure(modes: int, stops: int, **more: Any) -> sl.System:
-    """The beam with stops, and what else :func:`saltus.structure` takes."""
+    """The beam with stops, and what else :func:`saltus.structure` takes: no sensors, unless they
+    are given, since nobody else here has any.
+    """
     mass, stiffness = beam(elements_for(modes))
     fine = len(mass) // 60
     names = [f"{kind}{(i // 2 + 1) / fine:g}" for i, kind in enumerate("wr" * (len(mass) // 2))]
@@ -94,7 +96,7 @@ def structure(modes: int, stops: int, **more: Any) -> sl.System:
     ]
     return sl.structure(
         mass, stiffness, names=names, modes=modes, damping_ratio=RATIO, contacts=contacts,
-        forces=[sl.Force("w30", FORCE)], frequency=1.1 * first, **more,
+        forces=[sl.Force("w30", FORCE)], frequency=1.1 * first, **{"sensors": {}, **more},
     )  # fmt: skip
 
 
