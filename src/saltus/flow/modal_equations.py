@@ -49,7 +49,7 @@ class EquationsOfStates:
         self.linear, self._holds, self.held = linear, holds, 0
         self._equations: dict[tuple[object, ...], StateEquations] = {}
         self._pieces: dict[tuple[float, ...], Callable[[int], LinearPiece]] = {}
-        self._fast: dict[tuple[float, ...], float] = {}
+        self._ends: dict[tuple[float, ...], tuple[float, float]] = {}
         self._finite: dict[tuple[float, ...], bool] = {}
         self._smooth: dict[tuple[object, ...], bool] = {}
 
@@ -67,7 +67,7 @@ class EquationsOfStates:
         key = mode, used, free.spread.tobytes()
         if key not in self._equations:
             piece = self.piece_of(given, mode)
-            fastest = self._fastest(given, used) if piece.constant.any() else 0.0
+            fastest = self._ends_of(given, used)[0] if piece.constant.any() else 0.0
             eigen = half_of(piece.matrix[free.kept] @ free.spread)
             largest = float(np.abs(eigen[0]).max(initial=0.0))
             self._equations[key] = StateEquations(piece, eigen, largest, fastest)
@@ -75,15 +75,22 @@ class EquationsOfStates:
             self.held += piece.matrix.nbytes + 2 * sum(one.nbytes for one in eigen)
         return self._equations[key]
 
-    def _fastest(self, given: ValueSet, used: tuple[float, ...]) -> float:
-        """Size of the fastest eigenvalue where all gaps have one sign, and no contact is at rest
-        [1/s].
+    def slowest(self, given: ValueSet) -> float:
+        """The slowest decay of a free motion where all gaps have one sign, and no contact is at
+        rest [1/s]; 0 or less where one doesn't decay.
         """
-        if used not in self._fast:
+        return self._ends_of(given, tuple(given.values[name] for name in self.linear.parameters))[1]
+
+    def _ends_of(self, given: ValueSet, used: tuple[float, ...]) -> tuple[float, float]:
+        """Size of the fastest eigenvalue, and the slowest decay, where all gaps have one sign, and
+        no contact is at rest [1/s].
+        """
+        if used not in self._ends:
             every = int(np.sum((1 << np.arange(len(self._holds)))[~self._holds]))
             matrices = [numbers_of(self.piece_of(given, mode).matrix) for mode in (0, every)]
-            self._fast[used] = max(float(np.abs(np.linalg.eigvals(one)).max()) for one in matrices)
-        return self._fast[used]
+            found = np.concatenate([np.linalg.eigvals(one) for one in matrices])
+            self._ends[used] = float(np.abs(found).max()), float(-found.real.max())
+        return self._ends[used]
 
     def are_finite(self, given: ValueSet, mode: int) -> bool:
         """True if the equations of a contact state are made of numbers, whatever formulas say."""

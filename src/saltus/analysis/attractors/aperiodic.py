@@ -255,6 +255,17 @@ def kinds_of(
     return state, kinds
 
 
+def first_look(
+    map_: Map, past: np.ndarray, scale: np.ndarray
+) -> list[tuple[str, float, float] | None]:
+    """(kind, exponent, its standard error) of motions, row i by row i of a map, that strong growth
+    along the last of their iterates float64[k, m, D] tells to be chaotic; None of others.
+    """
+    _, rates = growth_rates(map_, past[:, -1], scale, FIRST_LOOK, past)
+    kinds = [kind_of_growth(one[:, None]) for one in rates.T]
+    return [one if one is not None and one[0] == Kind.CHAOTIC.word else None for one in kinds]
+
+
 def _measurements(map_: Map, size: int, budget: float) -> Iterator[int]:
     """Blocks of one measurement after the other: of many states a first look comes before them; the
     last is shorter where the budget ends.

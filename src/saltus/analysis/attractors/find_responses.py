@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from saltus.analysis.attractors.aperiodic import kinds_of
+from saltus.analysis.attractors.early_chaos import looked_at, told_early
 from saltus.analysis.attractors.growth import BUDGET, NEWTON, tangent_cost
 from saltus.analysis.attractors.recurrence import recurrence, recurring_orbits
 from saltus.analysis.attractors.settling import may_settle
@@ -76,8 +77,8 @@ class SettledMotions:
         Iterates after which it was known; -1 if it isn't.
     scale : float64[k, D]
         Range of each state in the motion.
-    iterates : dict of int to float64[KEPT_ITERATES, D]
-        Points of those that never repeat.
+    iterates : dict of int to float64[n, D]
+        Points of those that never repeat, KEPT_ITERATES of them at most.
     end : float64[k, D]
         Where the trajectory stood last.
     share : float64[k]
@@ -211,7 +212,7 @@ def _follow(
     what is known, and their last iterates into ``past``, returns those that haven't.
     """
     flight, begun = map_.rows(who).launch(start[who], most + ROUND), result.share[who]
-    purse = np.zeros(len(start))
+    purse, looks = np.zeros(len(start)), looked_at(map_, most)
     while len(who) and flight.age < most:
         points = flight.advance(ROUND)
         going = flight.going
@@ -230,10 +231,37 @@ def _follow(
             purse[who[rows]] += BUDGET * ROUND
             stay[rows[_settled(map_, points[rows], who[rows], near, result, purse)]] = False
             result.settled[who[going & ~stay]] = flight.age
+            if past is not None and flight.age < most:
+                stay[_told(map_, who, stay & (flight.age == looks[who]), result, past)] = False
         result.share[who] = np.where(stay, begun + (share - begun) * min(flight.age / most, 1), 1)
         flight.keep(stay)
         who, begun = who[stay], begun[stay]
     return who
+
+
+def _told(
+    map_: Stroboscope,
+    who: np.ndarray,
+    due: np.ndarray,
+    result: SettledMotions,
+    past: np.ndarray,
+) -> np.ndarray:
+    """Which of the trajectories int64[k] that are due, bool[k], are strongly chaotic, int64[m]:
+    writes what they are.
+    """
+    at = np.flatnonzero(due)
+    if not len(at):
+        return at
+    rows = who[at]
+    result.scale[rows] = motion_range(map_.rows(rows), result.end[rows])
+    kinds = told_early(map_.rows(rows), past[rows], result.scale[rows])
+    told = [i for i, kind in enumerate(kinds) if kind is not None]
+    for i in told:
+        kind, row = kinds[i], int(rows[i])
+        assert kind is not None
+        known = past[row][np.isfinite(past[row]).all(axis=1)]
+        _put_aperiodic(result, row, Kind[kind[0].upper()], kind[1:], known)
+    return np.asarray(at[told])
 
 
 def _settled(
