@@ -49,7 +49,8 @@ class EquationsOfStates:
         self.linear, self._holds, self.held = linear, holds, 0
         self._equations: dict[tuple[object, ...], StateEquations] = {}
         self._pieces: dict[tuple[float, ...], Callable[[int], LinearPiece]] = {}
-        self._ends: dict[tuple[float, ...], tuple[float, float]] = {}
+        self._fast: dict[tuple[float, ...], float] = {}
+        self._slow: dict[tuple[float, ...], float] = {}
         self._finite: dict[tuple[float, ...], bool] = {}
         self._smooth: dict[tuple[object, ...], bool] = {}
 
@@ -67,7 +68,7 @@ class EquationsOfStates:
         key = mode, used, free.spread.tobytes()
         if key not in self._equations:
             piece = self.piece_of(given, mode)
-            fastest = self._ends_of(given, used)[0] if piece.constant.any() else 0.0
+            fastest = self._fastest(given, used) if piece.constant.any() else 0.0
             eigen = half_of(piece.matrix[free.kept] @ free.spread)
             largest = float(np.abs(eigen[0]).max(initial=0.0))
             self._equations[key] = StateEquations(piece, eigen, largest, fastest)
@@ -75,22 +76,26 @@ class EquationsOfStates:
             self.held += piece.matrix.nbytes + 2 * sum(one.nbytes for one in eigen)
         return self._equations[key]
 
-    def slowest(self, given: ValueSet) -> float:
-        """The slowest decay of a free motion where all gaps have one sign, and no contact is at
-        rest [1/s]; 0 or less where one doesn't decay.
+    def _fastest(self, given: ValueSet, used: tuple[float, ...]) -> float:
+        """Size of the fastest eigenvalue where all gaps have one sign, and no contact is at rest
+        [1/s].
         """
-        return self._ends_of(given, tuple(given.values[name] for name in self.linear.parameters))[1]
-
-    def _ends_of(self, given: ValueSet, used: tuple[float, ...]) -> tuple[float, float]:
-        """Size of the fastest eigenvalue, and the slowest decay, where all gaps have one sign, and
-        no contact is at rest [1/s].
-        """
-        if used not in self._ends:
+        if used not in self._fast:
             every = int(np.sum((1 << np.arange(len(self._holds)))[~self._holds]))
             matrices = [numbers_of(self.piece_of(given, mode).matrix) for mode in (0, every)]
-            found = np.concatenate([np.linalg.eigvals(one) for one in matrices])
-            self._ends[used] = float(np.abs(found).max()), float(-found.real.max())
-        return self._ends[used]
+            self._fast[used] = max(float(np.abs(np.linalg.eigvals(one)).max()) for one in matrices)
+        return self._fast[used]
+
+    def slowest(self, given: ValueSet) -> float:
+        """The slowest decay of a free motion in the contact state in which all states are zero
+        [1/s]; 0 or less where one doesn't decay.
+        """
+        mode = int((given.gaps.constant > 0) @ (1 << np.arange(len(self._holds))))
+        key = mode, *(given.values[name] for name in self.linear.parameters)
+        if key not in self._slow:
+            values = np.linalg.eigvals(numbers_of(self.piece_of(given, mode).matrix))
+            self._slow[key] = float(-values.real.max())
+        return self._slow[key]
 
     def are_finite(self, given: ValueSet, mode: int) -> bool:
         """True if the equations of a contact state are made of numbers, whatever formulas say."""

@@ -135,8 +135,9 @@ def modal_rates(map_: Stroboscope, states: np.ndarray) -> np.ndarray | None:
 
 
 def slowest_decays(map_: Stroboscope) -> np.ndarray | None:
-    """The slowest decay of a free motion of each row of a map, float64[k] [1/period], 0 or less
-    where one doesn't decay; None if another method moves this system.
+    """The slowest decay of a free motion of each row of a map, in the contact state in which all
+    states are zero, float64[k] [1/period]; 0 or less where one doesn't decay. None if another
+    method moves this system.
     """
     system = map_.system
     if not isinstance(map_.method.serving(system.origin), Modal):

@@ -187,11 +187,11 @@ def kind_of_growth(blocks: np.ndarray) -> tuple[str, float, float] | None:
         float(blocks.mean()),
         float(blocks.mean(axis=1).std(ddof=1) / math.sqrt(len(blocks))),
     )
-    if error > UNCLEAR:
-        return None
     # growth like t seems exponential at first
     if exponent > max(SURE * error, FLOOR) and second.mean() > 0.5 * first.mean():
-        return Kind.CHAOTIC.word, exponent, error
+        return Kind.CHAOTIC.word, exponent, error  # however unsure its size is
+    if error > UNCLEAR:
+        return None
     zero = max(FLOOR, min(SURE * error, BOUNDED / (len(second) * BLOCK)))
     return (Kind.QUASI_PERIODIC.word, exponent, error) if abs(second.mean()) <= zero else None
 
