@@ -22,7 +22,10 @@ from saltus.flow.modal_motions import slowest_decays
 
 #: Share of the iterates that a motion may be followed for after which it is looked at: 512 of 2000.
 EARLY = 0.25
-#: To this share of themselves free motions have decayed by then: numbers of chaos don't know more.
+#: Iterates that are looked at, and kept.
+SEEN = FIRST_LOOK * BLOCK + 1
+#: To this share of themselves free motions have decayed before these: numbers of chaos don't know
+#: more.
 DIED = 1e-3
 
 
@@ -39,8 +42,8 @@ def looked_at(map_: Stroboscope, most: int) -> np.ndarray:
         return late
     with np.errstate(divide="ignore"):
         died = np.where(decays > 0, -math.log(DIED) / decays, np.inf)
-    least = max(EARLY * most, FIRST_LOOK * BLOCK + 1)
-    rounds = ROUND * np.ceil(np.minimum(np.maximum(died, least), most) / ROUND)
+    least = np.maximum(died + SEEN, EARLY * most)
+    rounds = ROUND * np.ceil(np.minimum(least, most) / ROUND)
     ages: np.ndarray = np.minimum(rounds, most).astype(np.int64)
     return ages
 
@@ -49,11 +52,12 @@ def told_early(
     map_: Stroboscope, past: np.ndarray, scale: np.ndarray
 ) -> list[tuple[str, float, float] | None]:
     """(kind, exponent, its standard error) of motions that are strongly chaotic along their last
-    iterates float64[k, m, D], row i by row i of the map, with ranges float64[k, D]; None of others.
+    iterates float64[k, SEEN, D], row i by row i of the map, with ranges float64[k, D]; None of
+    others.
     """
     found: list[tuple[str, float, float] | None] = [None] * len(past)
     apart = recurrence(past[:, -ROUND:], scale)[1]
-    finite = np.isfinite(past[:, -FIRST_LOOK * BLOCK - 1 :]).all(axis=(1, 2))
+    finite = np.isfinite(past).all(axis=(1, 2))
     rows = np.flatnonzero(finite & (apart >= np.maximum(NEAR, map_.noise_of(scale))))
     if len(rows):
         for row, kind in zip(

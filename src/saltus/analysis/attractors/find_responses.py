@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from saltus.analysis.attractors.aperiodic import kinds_of
-from saltus.analysis.attractors.early_chaos import looked_at, told_early
+from saltus.analysis.attractors.early_chaos import SEEN, looked_at, told_early
 from saltus.analysis.attractors.growth import BUDGET, NEWTON, tangent_cost
 from saltus.analysis.attractors.recurrence import recurrence, recurring_orbits
 from saltus.analysis.attractors.settling import may_settle
@@ -252,15 +252,14 @@ def _told(
     at = np.flatnonzero(due)
     if not len(at):
         return at
-    rows = who[at]
+    rows, seen = who[at], past[who[at], -SEEN:]
     result.scale[rows] = motion_range(map_.rows(rows), result.end[rows])
-    kinds = told_early(map_.rows(rows), past[rows], result.scale[rows])
+    kinds = told_early(map_.rows(rows), seen, result.scale[rows])
     told = [i for i, kind in enumerate(kinds) if kind is not None]
     for i in told:
-        kind, row = kinds[i], int(rows[i])
+        kind = kinds[i]
         assert kind is not None
-        known = past[row][np.isfinite(past[row]).all(axis=1)]
-        _put_aperiodic(result, row, Kind[kind[0].upper()], kind[1:], known)
+        _put_aperiodic(result, int(rows[i]), Kind[kind[0].upper()], kind[1:], seen[i])
     return np.asarray(at[told])
 
 

@@ -81,9 +81,9 @@ def frequency_response(
         it serves.
     periods : int
         Forcing periods after which a trajectory that hasn't settled is looked at for chaos. A
-        structure is looked at after a quarter of them, 385 at least, once its free motions have
-        decayed to a thousandth: what is strongly chaotic by then isn't followed any further. They
-        bound the work: closing orbits and measuring exponents may each cost ten times as many
+        structure is looked at after a quarter of them, or 305 after its free motions have decayed
+        to a thousandth: what is strongly chaotic by then isn't followed any further. They bound
+        the work: closing orbits and measuring exponents may each cost ten times as many
         periods of the motion, and 20 000 more are spent on orbits that one which seems
         quasi-periodic may settle to. What isn't typed by then is ``not_repeating``; more periods
         spend more on it, and :func:`saltus.lyapunov` tells all exponents of one motion. What is
