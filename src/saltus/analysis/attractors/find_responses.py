@@ -246,8 +246,8 @@ def _told(
     result: SettledMotions,
     past: np.ndarray,
 ) -> np.ndarray:
-    """Which of the trajectories int64[k] that are due, bool[k], are strongly chaotic, int64[m]:
-    writes what they are.
+    """Write what those of trajectories int64[k] that are due, bool[k], are, if they are strongly
+    chaotic; returns the indices of these, int64[m].
     """
     at = np.flatnonzero(due)
     if not len(at):

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.attractors.early_chaos import looked_at
 from saltus.analysis.attractors.grid import Grid
 from saltus.analysis.attractors.grid_responses import GridResponses, find, table_of
 from saltus.analysis.dataset_parts import guards_over, provenance, subject
@@ -25,7 +24,6 @@ from saltus.interrupt import Interrupted
 from saltus.results import build
 from saltus.results.dataset import schema
 from saltus.results.dataset.attractors import padded
-from saltus.results.dataset.kinds import Kind
 from saltus.results.dataset.responses import SAMPLES, grid_values, response_values
 
 #: States from which on most of the time goes into branches.
@@ -116,17 +114,6 @@ def finished(
         raise Interrupted(lambda: part(found)) from None
 
 
-def _watched(found: GridResponses, plan: ResponsePlan) -> dict[str, int]:
-    """Attribute on the periods that every chaotic response was watched for at least, if that is
-    less than a motion is followed for.
-    """
-    chaotic = found.place[found.kind == Kind.CHAOTIC]
-    if not len(chaotic):
-        return {}
-    least = int(looked_at(plan.grid.map(plan.method).rows(chaotic), plan.periods).min())
-    return {"periods_watched": least} if least < plan.periods else {}
-
-
 def _dataset(
     plan: ResponsePlan, threads: int | None, arcs: Arcs, found: GridResponses
 ) -> xr.Dataset:
@@ -169,10 +156,11 @@ def _dataset(
     }
     output = outputs.units[0] if len(set(outputs.units)) == 1 else ""
     words = {"<when>": table.points_when, "<output>": output, "<sampled>": SAMPLES.get(sample, "")}
+    watched = found.watched(grid, method, plan.periods)
     attrs = provenance(system, method, fixed, grid.axes) | {
         "periods": plan.periods,
         "random_starts": int(grid.drawn),
-        **_watched(found, plan),
+        **({"periods_watched": watched} if watched < plan.periods else {}),
         **about_branches,
     }
     about = subject(
