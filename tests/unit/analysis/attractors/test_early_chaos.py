@@ -8,8 +8,9 @@ import pytest
 import saltus as sl
 from saltus.analysis.attractors import early_chaos
 from saltus.analysis.attractors.aperiodic import kind_of_growth
+from saltus.analysis.attractors.divided_grid import _settled_arrays, _settled_from
 from saltus.analysis.attractors.early_chaos import SEEN, looked_at, told_early
-from saltus.analysis.attractors.find_responses import find_responses
+from saltus.analysis.attractors.find_responses import SettledMotions, find_responses
 from saltus.analysis.solve.tolerances import ROUND
 from saltus.flow.maps import Stroboscope
 from saltus.results.dataset.kinds import Kind
@@ -100,3 +101,13 @@ def test_growth_of_many_errors_is_chaos_however_unsure_its_size_is():
     strong = random.normal(1.6, 1.0, (29, 1))
     assert kind_of_growth(strong)[0] == "chaotic"
     assert kind_of_growth(random.normal(0.0, 1.0, (29, 1))) is None
+
+
+@pytest.mark.parametrize("counts", [{}, {0: 5, 2: 3}])
+def test_points_of_unequal_numbers_come_back_from_a_chunk(counts):
+    random, settled = np.random.default_rng(2), SettledMotions.empty(3, 2)
+    settled.iterates.update({row: random.normal(size=(n, 2)) for row, n in counts.items()})
+    back = _settled_from(_settled_arrays(settled), 3, 2)
+    assert list(back.iterates) == list(counts)
+    for row, points in settled.iterates.items():
+        assert np.array_equal(back.iterates[row], points)
