@@ -29,10 +29,11 @@ SEEN = FIRST_LOOK * BLOCK + 1
 DIED = 1e-3
 
 
-def looked_at(map_: Stroboscope, most: int) -> np.ndarray:
+def looked_at(map_: Stroboscope, most: int, kept: int = SEEN) -> np.ndarray:
     """Iterates, in whole rounds, after which motions that are followed for ``most`` may be told to
     be chaotic, int64[k] for the rows of a map: at most ``most``, which it is of systems of few
-    states, and of those that aren't linear between contacts.
+    states, and of those that aren't linear between contacts. The last ``kept`` of them come when
+    free motions have died.
     """
     late = np.full(len(map_), most)
     if len(map_.states) <= MOST_STATES or autonomous(map_.system):
@@ -42,7 +43,7 @@ def looked_at(map_: Stroboscope, most: int) -> np.ndarray:
         return late
     with np.errstate(divide="ignore"):
         died = np.where(decays > 0, -math.log(DIED) / decays, np.inf)
-    least = np.maximum(died + SEEN, EARLY * most)
+    least = np.maximum(died + kept, EARLY * most)
     rounds = ROUND * np.ceil(np.minimum(least, most) / ROUND)
     ages: np.ndarray = np.minimum(rounds, most).astype(np.int64)
     return ages

@@ -152,13 +152,15 @@ def find_responses(
     result = SettledMotions.empty(*start.shape) if result is None else result
     alone = isinstance(map_.method.serving(map_.system.origin), Modal)
     fewest = ALONE if alone else LANES
+    shared = len(np.unique(map_.parameters, axis=0)) < len(start)
+    kept = KEPT_ITERATES if shared else SEEN  # places tell whether two starts lead to one motion
     pieces = _pieces(len(start), start.shape[1], threads or usable_processors(), fewest)
     parts = [SettledMotions.empty(len(piece), start.shape[1]) for piece in pieces]
 
     def work(number: int) -> None:
         piece = pieces[number]
         try:
-            _settle(map_.rows(piece, threads=1), start[piece], most, parts[number])
+            _settle(map_.rows(piece, threads=1), start[piece], most, parts[number], kept)
             if then is not None:
                 then(piece, parts[number])
             parts[number].share[:] = 1.0
@@ -184,10 +186,12 @@ def _pieces(count: int, states: int, threads: int, fewest: int = LANES) -> list[
     return np.split(every, range(size, count, size))
 
 
-def _settle(map_: Stroboscope, start: np.ndarray, most: int, result: SettledMotions) -> None:
-    """One piece, on one thread."""
+def _settle(
+    map_: Stroboscope, start: np.ndarray, most: int, result: SettledMotions, kept: int
+) -> None:
+    """One piece, on one thread; ``kept``: iterates to be known of chaos that is told early."""
     past = np.full((len(start), KEPT_ITERATES, start.shape[1]), np.nan)
-    who = _follow(map_, start, np.arange(len(start)), most, result, SETTLED, FOLLOWED, past)
+    who = _follow(map_, start, np.arange(len(start)), most, result, SETTLED, FOLLOWED, past, kept)
     if len(who):
         result.scale[who] = motion_range(map_.rows(who), result.end[who])
         who = _follow(map_, result.end, who, ROUND, result, NEAR, FOLLOWED, past)
@@ -207,12 +211,13 @@ def _follow(
     near: float,
     share: float,
     past: np.ndarray | None = None,
+    kept: int = SEEN,
 ) -> np.ndarray:
     """Follow trajectories until they settle on an orbit, or this share of the work is done; writes
     what is known, and their last iterates into ``past``, returns those that haven't.
     """
     flight, begun = map_.rows(who).launch(start[who], most + ROUND), result.share[who]
-    purse, looks = np.zeros(len(start)), looked_at(map_, most)
+    purse, looks = np.zeros(len(start)), looked_at(map_, most, kept)
     while len(who) and flight.age < most:
         points = flight.advance(ROUND)
         going = flight.going
@@ -232,7 +237,8 @@ def _follow(
             stay[rows[_settled(map_, points[rows], who[rows], near, result, purse)]] = False
             result.settled[who[going & ~stay]] = flight.age
             if past is not None and flight.age < most:
-                stay[_told(map_, who, stay & (flight.age == looks[who]), result, past)] = False
+                due = stay & (flight.age == looks[who])
+                stay[_told(map_, who, due, result, past[:, -kept:])] = False
         result.share[who] = np.where(stay, begun + (share - begun) * min(flight.age / most, 1), 1)
         flight.keep(stay)
         who, begun = who[stay], begun[stay]
@@ -252,9 +258,9 @@ def _told(
     at = np.flatnonzero(due)
     if not len(at):
         return at
-    rows, seen = who[at], past[who[at], -SEEN:]
+    rows, seen = who[at], past[who[at]]
     result.scale[rows] = motion_range(map_.rows(rows), result.end[rows])
-    kinds = told_early(map_.rows(rows), seen, result.scale[rows])
+    kinds = told_early(map_.rows(rows), seen[:, -SEEN:], result.scale[rows])
     told = [i for i, kind in enumerate(kinds) if kind is not None]
     for i in told:
         kind = kinds[i]

@@ -11,8 +11,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from saltus.analysis.attractors.aperiodic import SampledMotion, alike
-from saltus.analysis.attractors.early_chaos import looked_at
-from saltus.analysis.attractors.find_responses import SettledMotions, find_responses
+from saltus.analysis.attractors.early_chaos import SEEN, looked_at
+from saltus.analysis.attractors.find_responses import (
+    KEPT_ITERATES,
+    SettledMotions,
+    find_responses,
+)
 from saltus.analysis.attractors.grid import Grid
 from saltus.analysis.closed.cycles import ASIDE
 from saltus.analysis.closed.measures import Measures, measure, unknown
@@ -103,7 +107,8 @@ class GridResponses:
         ``most``.
         """
         chaotic = self.place[self.kind == Kind.CHAOTIC]
-        return int(looked_at(grid.map(method).rows(chaotic), most).min(initial=most))
+        kept = KEPT_ITERATES if len(grid.starts) > 1 else SEEN
+        return int(looked_at(grid.map(method).rows(chaotic), most, kept).min(initial=most))
 
     def start(self, aside: bool = False) -> np.ndarray:
         """A state on each, float64[m, D]; ``aside``: not where a limit cycle turns."""
