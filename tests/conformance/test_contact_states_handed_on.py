@@ -10,6 +10,7 @@ import pytest
 import saltus as sl
 from saltus.flow.maps import Stroboscope
 from saltus.flow.modal import modal_flow
+from saltus.kernels.modal import layout
 
 MASS = np.diag([1.0, 2.0, 1.5])
 STIFFNESS = np.array([[30.0, -12, 0], [-12, 25, -7], [0, -7, 20]])
@@ -49,3 +50,20 @@ def test_they_are_those_that_a_set_makes_by_itself():
         assert np.isfinite(own_matrix).all()
         assert np.array_equal(end, own_end)
         assert np.array_equal(matrix, own_matrix)
+
+
+@pytest.mark.nojit
+def test_derivatives_are_made_of_those_that_a_motion_comes_to():
+    """A longer motion has left others at the values nearby, which this one doesn't ask for."""
+    tables, names = modal_flow(CHAIN).tables, ("frequency",)
+    tables.clear()
+    rows = [list(CHAIN.with_values(frequency=one).values.values()) for one in FREQUENCIES[:2]]
+    longer, short = (Stroboscope(CHAIN, sl.Modal(), np.array([row]), threads=1) for row in rows)
+    longer.ends(np.full((1, 6), 0.03), 12)
+    outcome = short.run(np.zeros((1, 6)), 1, record=0)
+    met = {int(outcome.contacts.mode_before[0]), *outcome.contacts.mode_after.tolist()}
+    for _ in range(2):
+        short.tangent_by(np.zeros((1, 6)), 1, names)
+    links = tables.by(names).links
+    assert (links.table[: links.used, layout.SLOPES] >= 0).sum() == len(met)
+    assert len(tables._handed[tables.set_of(np.array(rows[1]))]) > len(met)

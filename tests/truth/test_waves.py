@@ -168,3 +168,14 @@ def test_mean_squares_of_waves_of_every_speed():
         total += length / 800 * np.tile(weights, 400) @ (q - 0.25) ** 2
     found = deviations(one, np.full(3, 0.25))
     np.testing.assert_allclose(found, np.sqrt(total / one.length.sum()), rtol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_largest_values_are_the_same_whether_many_are_looked_at_together(monkeypatch, seed):
+    one, found = legs(np.random.default_rng(seed), 5, 40), []
+    for few in (0, 4, 10**9):
+        monkeypatch.setattr(waves, "FEW", 0)
+        monkeypatch.setattr(waves, "FEW_OF_EACH", few)
+        found.append(extremes(one))
+    for other in found[1:]:
+        np.testing.assert_allclose(other, found[0], rtol=0, atol=1e-13 * np.abs(found[0]).max())

@@ -367,17 +367,21 @@ class Stroboscope:
 
     def images(
         self, start: np.ndarray, count: np.ndarray | int, directions: np.ndarray
-    ) -> np.ndarray:
-        """The derivative of ``count`` periods times directions float64[k, D, m], float64[k, D, m]:
-        where the flow carries few columns, at the cost of these.
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Ends float64[k, D] of ``count`` periods, and the derivative times directions float64[k,
+        D, m], float64[k, D, m]: where the flow carries few columns, at the cost of these.
         """
-        map_ = self._tangent_map((), directions.shape[2])
+        map_, (k, size) = self._tangent_map((), directions.shape[2]), start.shape
         if map_ is None:
-            return np.asarray(self.tangent(start, count)[1] @ directions)
-        k, size = start.shape
+            end, derivative = self.tangent(start, count)
+            return end, np.asarray(derivative @ directions)
         state, status = map_.ends(np.hstack([start, directions.reshape(k, -1)]), count)
         state[(status != st.OK) & (status != st.GRAZE_UNRESOLVED)] = np.nan
-        return state[:, size:].reshape(directions.shape)
+        return state[:, :size], state[:, size:].reshape(directions.shape)
+
+    def carries(self, directions: int) -> bool:
+        """True where the flow carries the derivative along so few directions at their cost."""
+        return self._tangent_map((), directions) is not None
 
     def tangent_samples(
         self, start: np.ndarray, count: np.ndarray | int, schedule: Schedule

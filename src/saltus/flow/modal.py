@@ -210,7 +210,7 @@ class ModalFlow:
                 continue
             at = tables.state_of(which, int(batch.mode[i]))
             if self._names:
-                tables.need(which, self._names)
+                tables.need(which, self._names, int(batch.mode[i]))
             batch.carry[i, [layout.AT, layout.SET, layout.TABLES]] = at, which, tables.generation
 
     def _work(self) -> tuple[np.ndarray, ...]:

@@ -50,6 +50,7 @@ class EquationsOfStates:
         self._equations: dict[tuple[object, ...], StateEquations] = {}
         self._pieces: dict[tuple[float, ...], Callable[[int], LinearPiece]] = {}
         self._fast: dict[tuple[float, ...], float] = {}
+        self._slow: dict[tuple[float, ...], float] = {}
         self._finite: dict[tuple[float, ...], bool] = {}
         self._smooth: dict[tuple[object, ...], bool] = {}
 
@@ -84,6 +85,17 @@ class EquationsOfStates:
             matrices = [numbers_of(self.piece_of(given, mode).matrix) for mode in (0, every)]
             self._fast[used] = max(float(np.abs(np.linalg.eigvals(one)).max()) for one in matrices)
         return self._fast[used]
+
+    def slowest(self, given: ValueSet) -> float:
+        """The slowest decay of a free motion in the contact state in which all states are zero
+        [1/s]; 0 or less where one doesn't decay.
+        """
+        mode = int((given.gaps.constant > 0) @ (1 << np.arange(len(self._holds))))
+        key = mode, *(given.values[name] for name in self.linear.parameters)
+        if key not in self._slow:
+            values = np.linalg.eigvals(numbers_of(self.piece_of(given, mode).matrix))
+            self._slow[key] = float(-values.real.max())
+        return self._slow[key]
 
     def are_finite(self, given: ValueSet, mode: int) -> bool:
         """True if the equations of a contact state are made of numbers, whatever formulas say."""

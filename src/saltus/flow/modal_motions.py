@@ -134,6 +134,21 @@ def modal_rates(map_: Stroboscope, states: np.ndarray) -> np.ndarray | None:
     return found
 
 
+def slowest_decays(map_: Stroboscope) -> np.ndarray | None:
+    """The slowest decay of a free motion of each row of a map, in the contact state in which all
+    states are zero, float64[k] [1/period]; 0 or less where one doesn't decay. None if another
+    method moves this system.
+    """
+    system = map_.system
+    if not isinstance(map_.method.serving(system.origin), Modal):
+        return None
+    tables = modal_flow(system.origin).tables
+    with tables.lock:
+        sets = [tables.sets[tables.set_of(row)] for row in map_.parameters]
+    found: np.ndarray = np.array([tables.equations.slowest(given) for given in sets]) * map_.period
+    return found
+
+
 @dataclass(frozen=True)
 class _Waves:
     """The waves of a contact state: its modes, a constant and the drives; see flow/waves.py.

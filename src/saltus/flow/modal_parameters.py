@@ -11,7 +11,7 @@ with the time where p is a frequency. A state whose derivative has no such form 
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
 
@@ -27,6 +27,10 @@ from saltus.system.linear import LinearPiece, LinearSystem
 
 #: Contact states whose differentiated equations are kept: those of some periods.
 KEPT = 64
+#: Sets of values through which the derivatives of a contact state are made with those of others,
+#: without a motion that asks for them: a chaotic motion at the same values leaves hundreds of
+#: states, of which an orbit needs a few.
+REMEMBERED = 64
 
 
 @functools.lru_cache(maxsize=256)
@@ -101,6 +105,20 @@ class ParameterTables:
         self._pieces: dict[tuple[float, ...], Callable[[int], LinearPiece]] = {}
         self._piece = functools.lru_cache(maxsize=KEPT)(self._piece_of)
         self._every, self.links = links, Links(links.table.shape[1])
+        #: Contact states that were asked for, each with the number of sets since then; the last
+        #: set.
+        self._asked: dict[int, int] = {}
+        self._last = -1
+
+    def wanted(self, which: int, mode: int, known: Collection[int]) -> list[int]:
+        """A contact state that a motion has come to, and those of the ``known`` ones of its set
+        that others came to in the last sets.
+        """
+        if which != self._last:
+            self._asked = {one: age + 1 for one, age in self._asked.items() if age < REMEMBERED}
+            self._last = which
+        self._asked[mode] = 0
+        return [one for one in self._asked if one in known]
 
     def need(self, numbers: Sequence[int], which: int, modes: Sequence[int]) -> None:
         """Make the derivatives of contact states of one set of values, and of this set."""

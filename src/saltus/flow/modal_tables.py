@@ -235,10 +235,13 @@ class Tables:
             self._handed[which][mode] = 0
         return self._states[which, mode]
 
-    def need(self, which: int, names: tuple[str, ...]) -> None:
-        """Make the derivatives of all contact states of a set with respect to some parameters."""
-        modes = list(self._handed[which])
-        self.by(names).need([self._states[which, mode] for mode in modes], which, modes)
+    def need(self, which: int, names: tuple[str, ...], mode: int) -> None:
+        """Make the derivatives of a contact state of a set with respect to some parameters, and of
+        those others of the set that motions with such derivatives have come to in sets before.
+        """
+        slopes = self.by(names)
+        modes = slopes.wanted(which, mode, self._handed[which])
+        slopes.need([self._states[which, one] for one in modes], which, modes)
 
     def _make(self, which: int, mode: int) -> None:
         given = self.sets[which]

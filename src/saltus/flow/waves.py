@@ -33,6 +33,9 @@ SLOW = 1.0
 #: Share of all quantities in all intervals, and number of them, below which those that may hold
 #: what is looked for are looked at one by one.
 FEW_SHARE, FEW = 0.03, 1024
+#: Quantities in an interval, in the mean over those that may hold something, of which it is quicker
+#: to look at each by itself: at an impact the least gap, zero, is never decided by halving.
+FEW_OF_EACH = 4
 #: Legs int64[m], quantities int64[m], middles float64[m] and half lengths float64[m] [s].
 Intervals = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 #: True where quantities int64[m] on legs int64[m], whose values are float64[m] or differ by
@@ -241,7 +244,7 @@ def _open(one: WaveLegs, leg: np.ndarray, found: np.ndarray, wanted: Wanted) -> 
     """
     middle, half = 0.5 * one.length[leg], 0.5 * one.length[leg]
     open_ = np.ones((len(leg), one.rows.shape[1]), bool)
-    while open_.sum() > max(FEW_SHARE * open_.size, FEW):
+    while open_.sum() > max(FEW_SHARE * open_.size, FEW, FEW_OF_EACH * len(leg)):
         row = np.flatnonzero(open_.any(axis=0))
         waves, reach = one.waves(leg, middle), _reach(one, leg, half)
         slow = np.where(reach < 1.0, waves, 0.0)

@@ -187,11 +187,11 @@ def kind_of_growth(blocks: np.ndarray) -> tuple[str, float, float] | None:
         float(blocks.mean()),
         float(blocks.mean(axis=1).std(ddof=1) / math.sqrt(len(blocks))),
     )
-    if error > UNCLEAR:
-        return None
     # growth like t seems exponential at first
     if exponent > max(SURE * error, FLOOR) and second.mean() > 0.5 * first.mean():
-        return Kind.CHAOTIC.word, exponent, error
+        return Kind.CHAOTIC.word, exponent, error  # however unsure its size is
+    if error > UNCLEAR:
+        return None
     zero = max(FLOOR, min(SURE * error, BOUNDED / (len(second) * BLOCK)))
     return (Kind.QUASI_PERIODIC.word, exponent, error) if abs(second.mean()) <= zero else None
 
@@ -253,6 +253,17 @@ def kinds_of(
     for n in again:
         kinds[n] = _undecided(np.stack([rates[i] for i in groups[n]], axis=1))
     return state, kinds
+
+
+def first_look(
+    map_: Map, past: np.ndarray, scale: np.ndarray
+) -> list[tuple[str, float, float] | None]:
+    """(kind, exponent, its standard error) of motions, row i by row i of a map, that strong growth
+    along the last of their iterates float64[k, m, D] tells to be chaotic; None of others.
+    """
+    _, rates = growth_rates(map_, past[:, -1], scale, FIRST_LOOK, past)
+    kinds = [kind_of_growth(one[:, None]) for one in rates.T]
+    return [one if one is not None and one[0] == Kind.CHAOTIC.word else None for one in kinds]
 
 
 def _measurements(map_: Map, size: int, budget: float) -> Iterator[int]:

@@ -106,7 +106,7 @@ class DividedGrid(Division):
 
 
 def _settled_arrays(settled: SettledMotions) -> dict[str, np.ndarray]:
-    """Motions that settled, as arrays: the points of all orbits one behind the other."""
+    """Motions that settled, as arrays: the points of all one behind the other."""
     orbits, rows = settled.orbits, np.array(sorted(settled.iterates), np.int64)
     there = np.arange(orbits.points.shape[1]) < orbits.period[:, None]
     return {
@@ -114,7 +114,10 @@ def _settled_arrays(settled: SettledMotions) -> dict[str, np.ndarray]:
         **{f"orbit_{name}": getattr(orbits, name) for name in _ORBITS},
         "orbit_points": orbits.points[there],
         "aperiodic": rows,
-        "iterates": np.array([settled.iterates[row] for row in rows.tolist()]),
+        "iterates_of": np.array([len(settled.iterates[row]) for row in rows.tolist()], np.int64),
+        "iterates": np.concatenate(
+            [settled.end[:0], *(settled.iterates[row] for row in rows.tolist())]
+        ),
     }
 
 
@@ -127,8 +130,9 @@ def _settled_from(values: Mapping[str, np.ndarray], count: int, size: int) -> Se
         getattr(settled.orbits, name)[:] = values[f"orbit_{name}"]
     points = settled.orbits.points
     points[np.arange(points.shape[1]) < settled.orbits.period[:, None]] = values["orbit_points"]
-    rows = values["aperiodic"].tolist()
-    settled.iterates.update(zip(rows, values["iterates"], strict=True))
+    rows, ends = values["aperiodic"].tolist(), np.cumsum(values["iterates_of"])
+    parts = np.split(values["iterates"], ends)[: len(rows)]
+    settled.iterates.update(zip(rows, parts, strict=True))
     return settled
 
 

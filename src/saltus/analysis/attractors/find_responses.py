@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from saltus.analysis.attractors.aperiodic import kinds_of
+from saltus.analysis.attractors.early_chaos import SEEN, looked_at, told_early
 from saltus.analysis.attractors.growth import BUDGET, NEWTON, tangent_cost
 from saltus.analysis.attractors.recurrence import recurrence, recurring_orbits
 from saltus.analysis.attractors.settling import may_settle
@@ -76,8 +77,8 @@ class SettledMotions:
         Iterates after which it was known; -1 if it isn't.
     scale : float64[k, D]
         Range of each state in the motion.
-    iterates : dict of int to float64[KEPT_ITERATES, D]
-        Points of those that never repeat.
+    iterates : dict of int to float64[n, D]
+        Points of those that never repeat, KEPT_ITERATES of them at most.
     end : float64[k, D]
         Where the trajectory stood last.
     share : float64[k]
@@ -151,13 +152,15 @@ def find_responses(
     result = SettledMotions.empty(*start.shape) if result is None else result
     alone = isinstance(map_.method.serving(map_.system.origin), Modal)
     fewest = ALONE if alone else LANES
+    shared = len(np.unique(map_.parameters, axis=0)) < len(start)
+    kept = KEPT_ITERATES if shared else SEEN  # places tell whether two starts lead to one motion
     pieces = _pieces(len(start), start.shape[1], threads or usable_processors(), fewest)
     parts = [SettledMotions.empty(len(piece), start.shape[1]) for piece in pieces]
 
     def work(number: int) -> None:
         piece = pieces[number]
         try:
-            _settle(map_.rows(piece, threads=1), start[piece], most, parts[number])
+            _settle(map_.rows(piece, threads=1), start[piece], most, parts[number], kept)
             if then is not None:
                 then(piece, parts[number])
             parts[number].share[:] = 1.0
@@ -183,10 +186,12 @@ def _pieces(count: int, states: int, threads: int, fewest: int = LANES) -> list[
     return np.split(every, range(size, count, size))
 
 
-def _settle(map_: Stroboscope, start: np.ndarray, most: int, result: SettledMotions) -> None:
-    """One piece, on one thread."""
+def _settle(
+    map_: Stroboscope, start: np.ndarray, most: int, result: SettledMotions, kept: int
+) -> None:
+    """One piece, on one thread; ``kept``: iterates to be known of chaos that is told early."""
     past = np.full((len(start), KEPT_ITERATES, start.shape[1]), np.nan)
-    who = _follow(map_, start, np.arange(len(start)), most, result, SETTLED, FOLLOWED, past)
+    who = _follow(map_, start, np.arange(len(start)), most, result, SETTLED, FOLLOWED, past, kept)
     if len(who):
         result.scale[who] = motion_range(map_.rows(who), result.end[who])
         who = _follow(map_, result.end, who, ROUND, result, NEAR, FOLLOWED, past)
@@ -206,12 +211,13 @@ def _follow(
     near: float,
     share: float,
     past: np.ndarray | None = None,
+    kept: int = SEEN,
 ) -> np.ndarray:
     """Follow trajectories until they settle on an orbit, or this share of the work is done; writes
     what is known, and their last iterates into ``past``, returns those that haven't.
     """
     flight, begun = map_.rows(who).launch(start[who], most + ROUND), result.share[who]
-    purse = np.zeros(len(start))
+    purse, looks = np.zeros(len(start)), looked_at(map_, most, kept)
     while len(who) and flight.age < most:
         points = flight.advance(ROUND)
         going = flight.going
@@ -230,10 +236,37 @@ def _follow(
             purse[who[rows]] += BUDGET * ROUND
             stay[rows[_settled(map_, points[rows], who[rows], near, result, purse)]] = False
             result.settled[who[going & ~stay]] = flight.age
+            if past is not None and flight.age < most:
+                due = stay & (flight.age == looks[who])
+                stay[_told(map_, who, due, result, past[:, -kept:])] = False
         result.share[who] = np.where(stay, begun + (share - begun) * min(flight.age / most, 1), 1)
         flight.keep(stay)
         who, begun = who[stay], begun[stay]
     return who
+
+
+def _told(
+    map_: Stroboscope,
+    who: np.ndarray,
+    due: np.ndarray,
+    result: SettledMotions,
+    past: np.ndarray,
+) -> np.ndarray:
+    """Write what those of trajectories int64[k] that are due, bool[k], are, if they are strongly
+    chaotic; returns the indices of these, int64[m].
+    """
+    at = np.flatnonzero(due)
+    if not len(at):
+        return at
+    rows, seen = who[at], past[who[at]]
+    result.scale[rows] = motion_range(map_.rows(rows), result.end[rows])
+    kinds = told_early(map_.rows(rows), seen[:, -SEEN:], result.scale[rows])
+    told = [i for i, kind in enumerate(kinds) if kind is not None]
+    for i in told:
+        kind = kinds[i]
+        assert kind is not None
+        _put_aperiodic(result, int(rows[i]), Kind[kind[0].upper()], kind[1:], seen[i])
+    return np.asarray(at[told])
 
 
 def _settled(

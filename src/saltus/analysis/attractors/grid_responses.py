@@ -11,7 +11,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from saltus.analysis.attractors.aperiodic import SampledMotion, alike
-from saltus.analysis.attractors.find_responses import SettledMotions, find_responses
+from saltus.analysis.attractors.early_chaos import SEEN, looked_at
+from saltus.analysis.attractors.find_responses import (
+    KEPT_ITERATES,
+    SettledMotions,
+    find_responses,
+)
 from saltus.analysis.attractors.grid import Grid
 from saltus.analysis.closed.cycles import ASIDE
 from saltus.analysis.closed.measures import Measures, measure, unknown
@@ -96,6 +101,14 @@ class GridResponses:
             if row in self.motions.iterates
             else self.motions.orbits.points[row, : self.motions.orbits.period[row]]
         )
+
+    def watched(self, grid: Grid, method: Method, most: int) -> int:
+        """Iterates for which all chaotic ones were watched at least, where motions are followed for
+        ``most``.
+        """
+        chaotic = self.place[self.kind == Kind.CHAOTIC]
+        kept = KEPT_ITERATES if len(grid.starts) > 1 else SEEN
+        return int(looked_at(grid.map(method).rows(chaotic), most, kept).min(initial=most))
 
     def start(self, aside: bool = False) -> np.ndarray:
         """A state on each, float64[m, D]; ``aside``: not where a limit cycle turns."""

@@ -2,7 +2,8 @@
 
 Costs are counted in iterates of the motion itself. D + 1 of them is what an iterate of the tangent
 flow costs, which carries D deviations of D states. Of many states the distance from a neighbour is
-measured instead, which costs two, and compiles nothing. Both are renormalised at every block:
+measured instead, which costs two, and compiles nothing; or one deviation is carried, where a flow
+can do that, which costs two also. All are renormalised at every block:
 Benettin, Galgani & Strelcyn, Phys. Rev. A 14 (1976) 2338-2345; Benettin, Galgani, Giorgilli &
 Strelcyn, Meccanica 15 (1980) 9-20.
 """
@@ -43,20 +44,26 @@ def tangent_cost(size: int) -> int:
 
 def growth_cost(map_: Map, size: int) -> int:
     """Cost of measuring growth over an iterate [iterates]."""
-    return 2 if by_neighbours(map_, size) else tangent_cost(size)
+    return 2 if by_neighbours(map_, size) or _by_one_direction(map_) else tangent_cost(size)
 
 
 def by_neighbours(map_: Map, size: int) -> bool:
-    """True where growth is measured by the distance from a neighbour: with many states, errors of
-    rounding only, and no law at a contact, which could take a neighbour for a start behind its
-    wall.
+    """True where growth is measured by the distance from a neighbour: with many states, by a flow
+    that can't carry one deviation alone, with errors of rounding only, and no law at a contact,
+    which could take a neighbour for a start behind its wall.
     """
     return (
         size > MOST_STATES
         and isinstance(map_, Stroboscope)
         and map_.exact
+        and not map_.carries(1)
         and all(guard.law is None for guard in map_.system.guards)
     )
+
+
+def _by_one_direction(map_: Map) -> bool:
+    """True where the flow carries one deviation without the others."""
+    return isinstance(map_, Stroboscope) and map_.carries(1)
 
 
 def growth_rates(
@@ -88,17 +95,19 @@ def growth_rates(
 
 
 def _tangents(
-    map_: Map,
-    start: np.ndarray,
-    direction: np.ndarray,
-    end: np.ndarray | None,  # noqa: ARG001
+    map_: Map, start: np.ndarray, direction: np.ndarray, end: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """States after a block from float64[k, D], and the image of a direction of each."""
-    k, size = start.shape
-    directions = np.zeros((k, size, size))
-    directions[:, :, 0] = direction
-    state, image = map_.tangent(start, BLOCK, directions)
-    return state, image[:, :, 0]
+    """States after a block from float64[k, D], and the image of a direction of each; ``end``: these
+    states, where they are known.
+    """
+    if isinstance(map_, Stroboscope) and map_.carries(1):
+        state, images = map_.images(start, BLOCK, direction[:, :, None])
+    else:
+        k, size = start.shape
+        directions = np.zeros((k, size, size))
+        directions[:, :, 0] = direction
+        state, images = map_.tangent(start, BLOCK, directions)
+    return state if end is None else end, images[:, :, 0]
 
 
 def _neighbours(

@@ -86,7 +86,7 @@ class TangentFlow:
         """Images of directions float64[k, D, m] behind the block that begins at each of
         float64[k, D], float64[k, D, m].
         """
-        return self.map.images(states, 1, directions)
+        return self.map.images(states, 1, directions)[1]
 
     def divergences(self, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Growth of volumes in the block from each of float64[k, n, D]: logarithm, float64[k, n],

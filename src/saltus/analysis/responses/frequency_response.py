@@ -80,12 +80,15 @@ def frequency_response(
         Default :class:`saltus.Taylor`, or :class:`saltus.Modal` from eight states on where
         it serves.
     periods : int
-        Forcing periods after which a trajectory that hasn't settled is looked at for chaos. It
-        bounds the work: closing orbits and measuring exponents may each cost ten times as many
+        Forcing periods after which a trajectory that hasn't settled is looked at for chaos. A
+        structure is looked at after a quarter of them, or 305 after its free motions have decayed
+        to a thousandth: what is strongly chaotic by then isn't followed any further. They bound
+        the work: closing orbits and measuring exponents may each cost ten times as many
         periods of the motion, and 20 000 more are spent on orbits that one which seems
         quasi-periodic may settle to. What isn't typed by then is ``not_repeating``; more periods
         spend more on it, and :func:`saltus.lyapunov` tells all exponents of one motion. What is
-        ``chaotic`` is so for as long as it was followed: chaos may end later.
+        ``chaotic`` is so for as long as it was followed (the attribute ``periods_watched``, where
+        that is less than ``periods``): chaos may end later.
     seed : int
         Of random starts.
     threads : int, optional

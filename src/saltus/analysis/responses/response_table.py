@@ -156,9 +156,11 @@ def _dataset(
     }
     output = outputs.units[0] if len(set(outputs.units)) == 1 else ""
     words = {"<when>": table.points_when, "<output>": output, "<sampled>": SAMPLES.get(sample, "")}
+    watched = found.watched(grid, method, plan.periods)
     attrs = provenance(system, method, fixed, grid.axes) | {
         "periods": plan.periods,
         "random_starts": int(grid.drawn),
+        **({"periods_watched": watched} if watched < plan.periods else {}),
         **about_branches,
     }
     about = subject(

@@ -139,10 +139,10 @@ def _chaotic(ds: xr.Dataset) -> list[str]:
     left = _count_of(ds, Kind.CHAOTIC)
     if not left or "periods" not in ds.attrs:
         return []
+    least = ds.attrs.get("periods_watched", ds.attrs["periods"])
     return [
-        f"unsure   {counted(left, 'response')} chaotic for as long as watched, at least "
-        f"{ds.attrs['periods']} periods: chaos that ends later looks the same, and a larger "
-        "periods= watches for longer"
+        f"unsure   {counted(left, 'response')} chaotic for as long as watched, at least {least} "
+        "periods: chaos that ends later looks the same, and a larger periods= watches for longer"
     ]
 
 

@@ -36,6 +36,15 @@ def start():
     return np.array([[0.1, -0.05, 0.02, 0.0, 0.3, 0.0]])
 
 
+def chain(contact, damping_ratio=0.02, frequency=13.0):
+    """Four masses between springs, the first one driven, with a stop."""
+    stiffness = 1e4 * (2 * np.eye(4) - np.eye(4, k=1) - np.eye(4, k=-1))
+    return sl.structure(
+        np.eye(4), stiffness, frequency=frequency, damping_ratio=damping_ratio, modes=4,
+        contacts=[contact], forces=[sl.Force("x1", 5.0)],
+    )  # fmt: skip
+
+
 @pytest.fixture
 def spent(monkeypatch):
     """Cost of everything that is integrated [iterates]; a list of the shares shown."""
@@ -103,6 +112,34 @@ def test_a_neighbour_along_the_past_comes_nearer_as_damping_says(damping, spent)
     assert rates.mean() == pytest.approx(-damping, abs=2.0 / (8 * len(rates)))
     assert sum(spent) == 200 * 8
     assert (end == past[:, -1]).all()
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.02])
+def test_one_direction_shrinks_as_damping_says_where_a_flow_carries_it_alone(damping):
+    """Along the past too, whose end is given back to the bit."""
+    map_ = Stroboscope(oscillators(damping), sl.Modal(), threads=1)
+    assert map_.carries(1)
+    assert not by_neighbours(map_, 6)
+    past = map_.launch(start(), 801).advance(801)
+    scale = np.array([[0.1, 0.1, 0.1, 1.0, 1.0, 1.0]])
+    for before in (None, past):
+        end, rates = growth_rates(map_, past[:, -1], scale, 100, before)
+        assert rates.mean() == pytest.approx(-damping, abs=2.0 / (8 * len(rates)))
+        assert (end == past[:, -1]).all() == (before is not None)
+
+
+def test_growth_along_one_direction_is_that_of_the_whole_tangent():
+    """A stop with restitution, which no neighbour may pass: the same blocks either way."""
+    map_ = Stroboscope(chain(sl.Contact("x4", restitution=0.7, gap="0.2 mm")), sl.Modal())
+    begin, scale = map_.ends(np.zeros((1, 8)), 40)[0], np.ones((1, 8))
+    direction = np.random.default_rng(3).normal(size=(1, 8))
+    end, images = map_.images(begin, 8, direction[:, :, None])
+    whole_end, whole = map_.tangent(begin, 8)
+    np.testing.assert_allclose(end, whole_end, rtol=0, atol=1e-9 * np.abs(whole_end).max())
+    size = np.abs(whole @ direction[:, :, None]).max()
+    np.testing.assert_allclose(images, whole @ direction[:, :, None], rtol=0, atol=1e-6 * size)
+    _, rates = growth_rates(map_, begin, scale, 16)
+    assert np.isfinite(rates).all()
 
 
 @pytest.mark.parametrize("most", [200, 400])
