@@ -71,6 +71,7 @@ def end_impacts(lanes, lane, batch, hits, slow):
         g = look % NGUARDS
         if (stops >> g) & 1 and lanes.side[PARTNER[g], lane] < 0.0:
             rest_or_leave(lanes, lane, batch, g, FELT * fastest, slow)
+    go_on_together(lanes, lane, batch, stops, slow)
     stick_at_once(lanes, lane, batch, slow)
     return True
 
@@ -88,6 +89,30 @@ def rest_or_leave(lanes, lane, batch, g, least, slow):
     elif velocity <= least:
         lanes.fresh[g, lane] = 2.0
         ask_for_paradox(lanes, lane, g, slow)
+
+
+@kernel
+def go_on_together(lanes, lane, batch, stops, slow):
+    """Take from stops whose gaps and rates are known to be zero what completed impacts have left of
+    their rates, down to the rounding of their terms: it is that of the velocities before, and these
+    may be much larger than the common one behind. What one gives off the others take, in turn.
+    """
+    away, rounds = True, 0
+    while away and rounds < MOST_IMPACTS:
+        away, rounds = False, rounds + 1
+        for g in range(NGUARDS):
+            rests = (stops >> g) & 1 == 1 and lanes.fresh[g, lane] > 1.5
+            if not rests or lanes.side[PARTNER[g], lane] > 0.0:
+                continue
+            gaps_here(lanes, lane, batch, slow)
+            if abs(slow.gaps[3 * NGUARDS + g]) > ROUNDING * slow.gaps[5 * NGUARDS + g]:
+                away = True
+                begin_impacts(lanes, lane, slow)
+                now, who = time_of_law(lanes, lane, batch), lanes.memo[lane, WHO]
+                p = batch.param[who * batch.stride]
+                settle(now, slow.state, p, slow.held, mode_of(lanes, lane), g)
+                for i in range(NMOVED):
+                    lanes.y[i, lane] = slow.state[i]
 
 
 @kernel
