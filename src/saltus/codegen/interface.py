@@ -63,6 +63,7 @@ BATCH = (
 
 _CLOCKS = {"numbers_of_clocks": (ARRAY, ARRAY)}
 _JUMP = {"jump": (REAL, ARRAY, ARRAY, ARRAY, WHOLE, WHOLE, WHOLE)}
+_DATED_JUMP = {"jump": (REAL, ARRAY, ARRAY, ARRAY, WHOLE, WHOLE, WHOLE, ARRAY)}
 _RESET = {"reset": (REAL, ARRAY, ARRAY, ARRAY, WHOLE, WHOLE, WHOLE, ARRAY)}
 _LEVELS = {"levels": (REAL, ARRAY, ARRAY, ARRAY, WHOLE, ARRAY)}
 _SETTLE = {"settle": (REAL, ARRAY, ARRAY, ARRAY, WHOLE, WHOLE)}
@@ -101,7 +102,7 @@ TAYLOR = Interface(
             "jets": (ARRAY,) * 5,
             "rates": (ARRAY,) * 5,
             **_CLOCKS,
-            **_JUMP,
+            **_DATED_JUMP,
             **_RESET,
             **_LEVELS,
             **_SETTLE,

@@ -617,12 +617,14 @@ def change_side(lanes, lane, batch, g, rate, before, crossed, slow):
 @kernel
 def saltate(lanes, lane, batch, g, before, slow):
     """Apply the jump of the tangent that the states carry, at a crossing of the boundary of guard g
-    out of mode `before`.
+    out of mode `before`. Where an impact is at that instant it tells how the instant moves: it may
+    have left no rate at the boundary.
     """
     for i in range(NSTATES):
         slow.state[i] = lanes.y[i, lane]
     parameters = batch.param[lanes.memo[lane, WHO] * batch.stride]
     show_clocks(lanes, lane, slow)
+    load_dates(lanes, lane, slow)
     jump(
         lanes.clock[TAU, lane] + lanes.clock[BASE, lane],
         slow.state,
@@ -631,6 +633,7 @@ def saltate(lanes, lane, batch, g, before, slow):
         before,
         mode_of(lanes, lane),
         g,
+        slow.out,
     )
     for i in range(NSTATES):
         lanes.y[i, lane] = slow.state[i]
