@@ -56,17 +56,23 @@ def end_impacts(lanes, lane, batch, hits, slow):
     if fastest <= 0.0:
         return False
     least = CLOSED * fastest
-    if take_impacts(now, rows, p, held, mode, stops, False, least, told) == INVALID_RESTITUTION:
+    for i in range(NSTATES):
+        lanes.probe_y[i, lane] = lanes.y[i, lane]
+    status = take_impacts(now, rows, p, held, mode, mode, stops, False, least, told)
+    if status == INVALID_RESTITUTION:
         lanes.memo[lane, FAULT] = INVALID_RESTITUTION
         return True
     for i in range(NSTATES):
         lanes.y[i, lane] = slow.state[i]
+    turn_over(lanes, lane, batch, mode_behind(lanes, lane, batch, -1, slow), slow)
     gaps_here(lanes, lane, batch, slow)
     for g in range(NGUARDS):
         if (stops >> g) & 1:
             if lanes.side[PARTNER[g], lane] > 0.0:
                 loosen_one(lanes, lane, batch, g, mode_of(lanes, lane), slow)
             snap(lanes, lane, g)
+    if TANGENT and mode_of(lanes, lane) != mode:
+        end_impacts_of_tangent(lanes, lane, batch, mode, stops, least, slow)
     for look in range(NGUARDS * NGUARDS):
         g = look % NGUARDS
         if (stops >> g) & 1 and lanes.side[PARTNER[g], lane] < 0.0:
@@ -74,6 +80,23 @@ def end_impacts(lanes, lane, batch, hits, slow):
     go_on_together(lanes, lane, batch, stops, slow)
     stick_at_once(lanes, lane, batch, slow)
     return True
+
+
+@kernel
+def end_impacts_of_tangent(lanes, lane, batch, before, stops, least, slow):
+    """Let impacts that were completed act on the tangent anew, by the rates in the mode of the lane
+    behind them: they have come out of mode `before`, and have released contacts or turned frictions
+    (see strike_tangent).
+    """
+    for i in range(NSTATES):
+        slow.state[i] = lanes.probe_y[i, lane]
+    show_clocks(lanes, lane, slow)
+    load_dates(lanes, lane, slow)
+    now, after = time_of_law(lanes, lane, batch), mode_of(lanes, lane)
+    p, rows = batch.param[lanes.memo[lane, WHO] * batch.stride], slow.state
+    take_impacts(now, rows, p, slow.held, before, after, stops, False, least, slow.out)
+    for i in range(NMOVED, NSTATES):
+        lanes.y[i, lane] = slow.state[i]
 
 
 @inner
