@@ -76,7 +76,7 @@ TAYLOR = Interface(
     arguments=BATCH + _TAYLOR_WORK,
     layout="taylor/layout",
     templates=("clocks", "taylor/singular", "taylor/crossings", "taylor/step", "taylor/contacts",
-        "impacts", "taylor/laws", "taylor/together", "taylor/trajectories"),
+        "impacts", "taylor/laws", "taylor/together", "taylor/ends", "taylor/trajectories"),
     sizes=(
         "NSTATES", "NGUARDS", "ORDER", "NCONST", "NTURNS", "CLOCK_ROW", "GAP_ROW", "SCALE_ROW",
         "CALM_ROW", "ROWS", "NMOVED", "NSINGULAR", "NCOLUMNS",

@@ -19,6 +19,7 @@ from saltus.kernels.isolation import (
     leading_sign,
     polynomial,
     side_of_leaving,
+    without_start,
 )
 from saltus.kernels.status import (
     BUDGET_EVENTS,
@@ -125,6 +126,7 @@ def first_place(lanes, lane, g, h, beyond, slow, count):
         slow.touches[count, TOUCH_AT], slow.touches[count, TOUCH_GUARD] = 0.0, g
         slow.out[MARGIN] = 0.0
         count += 1
+    before = min(count, MOST_TOUCHES - 1)
     crosses, count = first_crossing(
         slow.q,
         ORDER,
@@ -136,8 +138,10 @@ def first_place(lanes, lane, g, h, beyond, slow, count):
         slow.rates,
         slow.out,
         slow.touches,
-        min(count, MOST_TOUCHES - 1),
+        before,
     )
+    if not fresh and lanes.run[STARTING, lane] > 0.5:
+        count = without_start(slow.q, ORDER, noise, slow.touches, before, count)
     lanes.run[LEAST, lane] = slow.out[MARGIN]
     return (slow.out[AT] * h if crosses else 2.0 * h), min(count, MOST_TOUCHES - 1)
 
@@ -198,6 +202,9 @@ def decide(lanes, lane, batch, slow):
         first, hits = 0.0, early
     lanes.found[DELTA, lane] = first
     lanes.memo[lane, HITS] = hits
+    if lanes.run[AHEAD, lane] > 0.0:
+        lanes.run[LEAST, lane] = least
+        return
     note_touches(lanes, lane, batch, slow, first, count)
     # a gap may have turned after the crossing, which it won't reach
     if first < h and lanes.run[LEAST, lane] < least:
