@@ -233,6 +233,25 @@ def test_three_bodies_that_meet_without_rebound_go_on_as_one(middle):
     assert [float(run[f"end_{n}"]) for n in "uvwz"] == pytest.approx([-0.5] * 4, abs=1e-13)
 
 
+@sl.system(states="a b c u v w", forced_at="beat", units={"beat": "rad/s"})
+def pinched_by_the_beat(t, a, b, c, u, v, w, *, middle=0.01, beat=2 * math.pi):
+    return (
+        u, v, w, 0.0, 0.0, 0.0,
+        sl.impact(a < b, u - v, restitution=0.0, inertia=(1.0, middle)),
+        sl.impact(b < c, v - w, restitution=0.0, inertia=(middle, 1.0)),
+    )  # fmt: skip
+
+
+def test_bodies_that_meet_without_rebound_stay_together():
+    """What is left of their velocities is the rounding of those before; a body of one hundredth of
+    the others' mass hands it on slowly. Each beat ends a step.
+    """
+    start = (-1.0, 0.0, 1.0, 1.0, 0.0, -1.0)
+    run = sl.simulate(pinched_by_the_beat, start, t_end=10.0, samples=1)
+    assert str(run.status.values) == "ok"
+    assert [float(run[f"end_{name}"]) for name in "abcuvw"] == pytest.approx([0.0] * 6, abs=1e-14)
+
+
 @sl.system(states="a b c d u v w z")
 def row_of_four(t, a, b, c, d, u, v, w, z, *, restitution=1.0):
     return (

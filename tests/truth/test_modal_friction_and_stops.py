@@ -160,21 +160,43 @@ def thrown_along(a, b, c, e, pairs):
     return -velocity[2]
 
 
-def test_impacts_without_end_that_turn_a_friction_are_completed_on_its_other_side():
-    """Floor and wall throw the body to and fro at one instant, t = 1. After the 50 blows that are
-    taken one by one it slides along z as before; those that are completed at once turn it.
+PUSH, SLIP = 0.2, 0.05
+
+
+def wedged():
+    """The body, a start that comes to the wedge at t = 1, and its velocities behind all impacts:
+    after the 50 that are taken one by one it slides along z as before, the others turn it.
     """
-    b, e, push, slip = 0.9995, 0.9, 0.2, 0.05
+    b, e = 0.9995, 0.9
     a = c = math.sqrt((1 - b * b) / 2)
     some, every = (thrown_along(a, b, c, e, pairs) for pairs in (25, 5000))
     share = (some + every) / 2
     speed = share * a / (1 - share * c)
-    one = wedge.with_values(a=a, b=b, c=c, e=e, push=push, slip=slip)
-    start = (-1 + push / 2, 0.0, -speed - slip / 2, 1 - push, 0.0, speed + slip)
+    one = wedge.with_values(a=a, b=b, c=c, e=e, push=PUSH, slip=SLIP)
+    start = (-1 + PUSH / 2, 0.0, -speed - SLIP / 2, 1 - PUSH, 0.0, speed + SLIP)
+    return one, start, speed - every * (a + c * speed)
+
+
+def test_impacts_without_end_that_turn_a_friction_are_completed_on_its_other_side():
+    """Floor and wall throw the body to and fro at one instant, t = 1."""
+    one, start, left = wedged()
     for run in runs(one, start, t_end=1.2):
         assert str(run.status.values) == "ok"
-        left = speed - every * (a + c * speed)
         assert left < 0
         # on the wall and the floor it is moved along (c, 0, -a)
-        assert float(run.end_w) == pytest.approx(left - 0.2 * (push - slip) / 2, abs=1e-9)
+        assert float(run.end_w) == pytest.approx(left - 0.2 * (PUSH - SLIP) / 2, abs=1e-9)
         assert float(run.end_u) == pytest.approx(-float(run.end_w), abs=1e-12)
+
+
+def test_impacts_without_end_that_turn_a_friction_have_the_rates_behind_it():
+    """Central differences. How early they come depends on the place of the start."""
+    one, start, _ = wedged()
+    given = {"t_end": 1.2, "samples": 2, "method": sl.Taylor(), "progress": False}
+    found = sl.sensitivity(one, start, to=["x(0)", "z(0)"], extremes=False, **given)
+    assert str(found.status.values) == "ok"
+    for column, at in enumerate((0, 2)):
+        beside = start + 1e-6 * np.outer([1.0, -1.0], np.arange(6) == at)
+        run = sl.simulate(one, beside, **given)
+        ends = np.array([run[f"end_{name}"].values for name in one.states])
+        known = (ends[:, 0] - ends[:, 1]) / 2e-6
+        assert found.end_derivative.values[:, column] == pytest.approx(known, abs=1e-7)

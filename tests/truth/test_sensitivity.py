@@ -324,3 +324,41 @@ def test_a_graze_of_a_rigid_stop_to_rounding_is_warned_of():
 def test_two_samples_on_zeros_of_a_motion_tell_nothing_of_its_range():
     motion = sl.models.impact_oscillator(force=0.1 - 1e-6)
     sl.sensitivity(motion, (0.0, 1.0 - 1e-5), t_end=5.0, samples=2, to="force")
+
+
+@sl.system(states="x y u w")
+def trip(t, x, y, u, w, *, push=1.0, load=0.5, gap=0.0, near=0.0):
+    """A body that comes to rest on a stop and releases a load on another one there."""
+    trigger = sl.piecewise((load, x > near), otherwise=0.0)
+    return u, w, push, trigger, sl.impact(x < gap, u, restitution=0.0)
+
+
+@pytest.mark.parametrize("method", [sl.Taylor(), sl.Modal()], ids=lambda one: one.name)
+@pytest.mark.nojit
+def test_a_load_begins_where_a_stop_takes_the_rate_away(method):
+    """The body arrives at t = 1 with velocity 1; the load acts for a time of 1."""
+    found = sl.sensitivity(
+        trip, (-0.5, 0.0, 0.0, 0.0), t_end=2.0, to=["x(0)", "u(0)", "load"], samples=2,
+        method=method, extremes=False, progress=False,
+    )  # fmt: skip
+    assert str(found.status.values) == "ok"
+    known = [[0, 0, 0], [0.5, 0.5, 0.5], [0, 0, 0], [0.5, 0.5, 1]]
+    assert found.end_derivative.values == pytest.approx(np.array(known), abs=1e-14)
+
+
+@sl.system(states="x y u w")
+def beside(t, x, y, u, w, *, brake=0.7):
+    """A body that rebounds, and another one that runs into a brake."""
+    force = sl.piecewise((-brake, y > 0.0), otherwise=0.0)
+    return u, w, 0.0, force, sl.impact(x < 0.0, u, restitution=0.5)
+
+
+@pytest.mark.nojit
+def test_a_crossing_that_comes_with_an_impact_by_chance_moves_by_itself():
+    """Both at t = 1, with velocities 1 and 2; they have nothing to do with each other."""
+    found = sl.sensitivity(
+        beside, (-1.0, -2.0, 1.0, 2.0), t_end=1.5, to=["x(0)", "y(0)"], samples=2,
+        method=sl.Taylor(), extremes=False, progress=False,
+    )  # fmt: skip
+    known = [[-0.5, 0], [0, 1 - 0.35 / 2], [0, 0], [0, -0.35]]
+    assert found.end_derivative.values == pytest.approx(np.array(known), abs=1e-14)

@@ -63,6 +63,7 @@ BATCH = (
 
 _CLOCKS = {"numbers_of_clocks": (ARRAY, ARRAY)}
 _JUMP = {"jump": (REAL, ARRAY, ARRAY, ARRAY, WHOLE, WHOLE, WHOLE)}
+_DATED_JUMP = {"jump": (REAL, ARRAY, ARRAY, ARRAY, WHOLE, WHOLE, WHOLE, ARRAY)}
 _RESET = {"reset": (REAL, ARRAY, ARRAY, ARRAY, WHOLE, WHOLE, WHOLE, ARRAY)}
 _LEVELS = {"levels": (REAL, ARRAY, ARRAY, ARRAY, WHOLE, ARRAY)}
 _SETTLE = {"settle": (REAL, ARRAY, ARRAY, ARRAY, WHOLE, WHOLE)}
@@ -75,7 +76,7 @@ TAYLOR = Interface(
     arguments=BATCH + _TAYLOR_WORK,
     layout="taylor/layout",
     templates=("clocks", "taylor/singular", "taylor/crossings", "taylor/step", "taylor/contacts",
-        "impacts", "taylor/laws", "taylor/together", "taylor/trajectories"),
+        "impacts", "taylor/laws", "taylor/together", "taylor/ends", "taylor/trajectories"),
     sizes=(
         "NSTATES", "NGUARDS", "ORDER", "NCONST", "NTURNS", "CLOCK_ROW", "GAP_ROW", "SCALE_ROW",
         "CALM_ROW", "ROWS", "NMOVED", "NSINGULAR", "NCOLUMNS",
@@ -101,7 +102,7 @@ TAYLOR = Interface(
             "jets": (ARRAY,) * 5,
             "rates": (ARRAY,) * 5,
             **_CLOCKS,
-            **_JUMP,
+            **_DATED_JUMP,
             **_RESET,
             **_LEVELS,
             **_SETTLE,

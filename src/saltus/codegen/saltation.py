@@ -29,16 +29,20 @@ _CLOSING_ROUNDING = 16.0 * 2.0**-52
 _LEVEL_ROUNDING = 1e-9
 
 
-def jump_function(system: System, clocks: Clocks) -> str:
+def jump_function(system: System, clocks: Clocks, dated: bool = False) -> str:
     """``jump(t, y, p, h, before, after, g)``: multiply the tangent rows of y by S at a crossing of
     guard g, between two modes (bits).
 
     Does nothing for a system that carries no tangent. A crossing at zero rate makes the tangent
-    infinite, as it is.
+    infinite, as it is. If `dated`, it takes the ``out`` of ``reset`` as well: if out[2] isn't zero,
+    a jump is at this instant, and out[3:] tells how it moves. A rate that is the rounding of its
+    terms has been taken away by that jump, and the crossing moves as it does; others move by
+    themselves.
     """
+    head = f"@kernel\ndef jump(t, y, p, h, before, after, g{', out' if dated else ''}):\n"
     base = system.tangent_of
     if base is None or not base.guards:
-        return "@kernel\ndef jump(t, y, p, h, before, after, g):\n    pass\n"
+        return head + "    pass\n"
     size = len(base.states)
     # terms without a derivative on the boundary are zero on it, and don't jump
     aside = set_aside(base.field, base.guards)
@@ -66,15 +70,19 @@ def jump_function(system: System, clocks: Clocks) -> str:
         "closing = " + " + ".join([*(f"n_{i} * rate_before_{i}" for i in range(size)), f"n_{size}"])
     )
     given = ", ".join([*(f"leap_{i}, n_{i}" for i in range(size)), "closing"])
-    lines += [f"jump_of_column(y[{j}:], {given})" for j in range(size)]
+    if dated:
+        terms = [*(f"abs(n_{i} * rate_before_{i})" for i in range(size)), f"abs(n_{size})"]
+        noise = f"{_CLOSING_ROUNDING} * ({' + '.join(terms)})"
+        lines.append(f"dated = out[2] if abs(closing) <= {noise} else 0.0")
+    dates = [f"dated, out[{3 + j}:], " if dated else "" for j in range(size)]
+    lines += [f"jump_of_column(y[{j}:], {date}{given})" for j, date in enumerate(dates)]
     column = [f"y[{i}]" for i in first_column(system)]
-    leap = [
-        f"along = ({' + '.join(f'n_{i} * {entry}' for i, entry in enumerate(column))}) / closing"
-    ]
+    own = f"({' + '.join(f'n_{i} * {entry}' for i, entry in enumerate(column))}) / closing"
+    leap = [f"along = date[0] if dated != 0.0 else {own}" if dated else f"along = {own}"]
     leap += [f"{entry} += leap_{i} * along" for i, entry in enumerate(column)]
+    given = f"dated, date, {given}" if dated else given
     return (
-        f"@kernel\ndef jump_of_column(y, {given}):\n{indented(leap)}\n\n"
-        f"@kernel\ndef jump(t, y, p, h, before, after, g):\n{indented(lines)}\n"
+        f"@kernel\ndef jump_of_column(y, {given}):\n{indented(leap)}\n\n{head}{indented(lines)}\n"
     )
 
 

@@ -228,7 +228,7 @@ def taylor_head(system: System, order: int, lanes: int) -> Head:
         _constants_function(system, constants),
         clocks.function(),
         gaps_function(system, clocks),
-        jump_function(system, clocks),
+        jump_function(system, clocks, dated=True),
         reset_function(system, clocks, dated=True),
         levels_function(system, clocks),
         settle_function(system, clocks),

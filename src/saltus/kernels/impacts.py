@@ -33,11 +33,13 @@ def is_possible(g, told):
 
 
 @kernel
-def closes_at(t, rows, p, held, mode, g, told):
-    """The velocity at which stop g closes; the state behind its impact, at TRIED."""
+def closes_at(t, rows, p, held, mode, after, g, told):
+    """The velocity at which stop g closes; the state behind its impact, which leads from one mode
+    to another, at TRIED.
+    """
     for i in range(NSTATES):
         rows[TRIED + i] = rows[i]
-    reset(t, part(rows, TRIED, NSTATES), p, held, mode, mode, g, told)
+    reset(t, part(rows, TRIED, NSTATES), p, held, mode, after, g, told)
     return told[1]
 
 
@@ -49,25 +51,25 @@ def closing_of(t, rows, p, held, mode, stops, told):
     closing, fastest = 0, 0.0
     for g in range(NGUARDS):
         if (stops >> g) & 1:
-            fastest = max(fastest, closes_at(t, rows, p, held, mode, g, told))
+            fastest = max(fastest, closes_at(t, rows, p, held, mode, mode, g, told))
     for g in range(NGUARDS):
-        if (stops >> g) & 1 and closes_at(t, rows, p, held, mode, g, told) > FELT * fastest:
+        if (stops >> g) & 1 and closes_at(t, rows, p, held, mode, mode, g, told) > FELT * fastest:
             closing += 1
     return closing, fastest
 
 
 @kernel
-def take_impacts(t, rows, p, held, mode, stops, backwards, least, told):
+def take_impacts(t, rows, p, held, mode, after, stops, backwards, least, told):
     """The state after all impacts of this instant, in the order of the guards or against it, until
-    none closes faster than `least`. Returns OK, or the status that ends the motion; impacts without
-    end have no order.
+    none closes faster than `least`: the first leads from one mode to another. Returns OK, or the
+    status that ends the motion; impacts without end have no order.
     """
     for _ in range(MOST_IMPACTS):
         struck = False
         for place in range(NGUARDS):
             g = NGUARDS - 1 - place if backwards else place
             if not struck and (stops >> g) & 1:
-                struck = closes_at(t, rows, p, held, mode, g, told) > least
+                struck = closes_at(t, rows, p, held, mode, after, g, told) > least
                 if struck and not is_possible(g, told):
                     return INVALID_RESTITUTION
         if not struck:
@@ -75,6 +77,7 @@ def take_impacts(t, rows, p, held, mode, stops, backwards, least, told):
         for i in range(NSTATES):
             rows[WAY + i] += abs(rows[TRIED + i] - rows[i])
             rows[i] = rows[TRIED + i]
+        mode = after
     return AMBIGUOUS_IMPACT
 
 
@@ -91,7 +94,9 @@ def order_of_impacts(t, rows, p, held, mode, stops, told):
     for backwards in range(2):
         for i in range(NSTATES):
             rows[BY_GUARDS + i], rows[i] = rows[i], rows[AT_FIRST + i]
-        status = take_impacts(t, rows, p, held, mode, stops, backwards == 1, ENDED * fastest, told)
+        status = take_impacts(
+            t, rows, p, held, mode, mode, stops, backwards == 1, ENDED * fastest, told
+        )
         if status != OK:
             return status
     for i in range(NMOVED):

@@ -27,6 +27,8 @@ TOUCH_AT, TOUCH_GUARD = range(2)
 ROUNDING = 4.0 * 2.220446049250313e-16
 #: Touches closer than this are one: a minimum within rounding is flat over about 1e-8 of the step.
 SAME_TOUCH = 1.0e-6
+#: A gap that is wider than this many rounding errors where a motion begins isn't there at zero.
+BESIDE = 64.0
 #: Most touches recorded in one step.
 MOST_TOUCHES = 16
 #: Halvings after which an interval counts as a touch: 2**-48 of a step is below its rounding error.
@@ -217,6 +219,25 @@ def _note_touch(place, guard, touches, count):
         touches[count, TOUCH_AT], touches[count, TOUCH_GUARD] = place, guard
         count += 1
     return count
+
+
+@kernel
+def without_start(q, degree, noise, touches, before, count):
+    """Drop the first touch of a gap behind the first `before` ones on the list if the gap begins
+    within rounding and doesn't leave it before: that is how a motion begins. Returns the touches
+    left.
+    """
+    near = BESIDE * noise
+    if count == before or abs(q[0]) > near:
+        return count
+    if abs(polynomial(q, degree, 0.5 * touches[before, TOUCH_AT])) > near:
+        return count
+    for j in range(before, count - 1):
+        touches[j, TOUCH_AT], touches[j, TOUCH_GUARD] = (
+            touches[j + 1, TOUCH_AT],
+            touches[j + 1, TOUCH_GUARD],
+        )
+    return count - 1
 
 
 @kernel

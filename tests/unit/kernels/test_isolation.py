@@ -265,6 +265,23 @@ def test_touches_that_are_held_already_stay():
 # -- parts -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize(
+    ("roots", "left"),
+    [([1e-8, 1e-8, -1.0], []), ([0.3, 0.3, -1e-15], [0.3]), ([1e-6, 1e-6, -1.0], [1e-6])],
+)
+def test_a_dip_that_rounding_has_put_behind_a_start_is_no_touch(roots, left):
+    """One that the gap leaves before is, and one of a gap that begins beside zero."""
+    q = from_roots(roots)
+    touches, noise = np.zeros((iso.MOST_TOUCHES, 2)), 1.2e-16
+    touches[0] = 0.9, 1.0
+    _, count = iso.first_crossing(
+        q, 3, False, noise, 2, *iso.work_arrays(3), np.full(2, np.inf), touches, 1
+    )
+    assert count == 2
+    count = iso.without_start(q, 3, noise, touches, 1, count)
+    assert touches[:count, iso.TOUCH_AT].tolist() == pytest.approx([0.9, *left], abs=1e-7)
+
+
 def test_bernstein_coefficients_and_halving():
     rng = np.random.default_rng(2)
     q = rng.normal(size=DEGREE + 1)

@@ -8,6 +8,7 @@ step              one step of all lanes: its length and its execution
 contacts          contacts of one lane: what `crossings` leaves open, landing, recording
 laws              impacts, jumps, contacts that are held
 together          several impacts at one instant
+ends              the end of a run
 trajectories      the life of a lane: filled, attended to, emptied
 ================  ==================================================================================
 

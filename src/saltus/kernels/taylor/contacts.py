@@ -19,6 +19,7 @@ from saltus.kernels.isolation import (
     leading_sign,
     polynomial,
     side_of_leaving,
+    without_start,
 )
 from saltus.kernels.status import (
     BUDGET_EVENTS,
@@ -125,6 +126,7 @@ def first_place(lanes, lane, g, h, beyond, slow, count):
         slow.touches[count, TOUCH_AT], slow.touches[count, TOUCH_GUARD] = 0.0, g
         slow.out[MARGIN] = 0.0
         count += 1
+    before = min(count, MOST_TOUCHES - 1)
     crosses, count = first_crossing(
         slow.q,
         ORDER,
@@ -136,8 +138,10 @@ def first_place(lanes, lane, g, h, beyond, slow, count):
         slow.rates,
         slow.out,
         slow.touches,
-        min(count, MOST_TOUCHES - 1),
+        before,
     )
+    if not fresh and lanes.run[STARTING, lane] > 0.5:
+        count = without_start(slow.q, ORDER, noise, slow.touches, before, count)
     lanes.run[LEAST, lane] = slow.out[MARGIN]
     return (slow.out[AT] * h if crosses else 2.0 * h), min(count, MOST_TOUCHES - 1)
 
@@ -198,6 +202,9 @@ def decide(lanes, lane, batch, slow):
         first, hits = 0.0, early
     lanes.found[DELTA, lane] = first
     lanes.memo[lane, HITS] = hits
+    if lanes.run[AHEAD, lane] > 0.0:
+        lanes.run[LEAST, lane] = least
+        return
     note_touches(lanes, lane, batch, slow, first, count)
     # a gap may have turned after the crossing, which it won't reach
     if first < h and lanes.run[LEAST, lane] < least:
@@ -617,12 +624,14 @@ def change_side(lanes, lane, batch, g, rate, before, crossed, slow):
 @kernel
 def saltate(lanes, lane, batch, g, before, slow):
     """Apply the jump of the tangent that the states carry, at a crossing of the boundary of guard g
-    out of mode `before`.
+    out of mode `before`. Where an impact is at that instant it tells how the instant moves: it may
+    have left no rate at the boundary.
     """
     for i in range(NSTATES):
         slow.state[i] = lanes.y[i, lane]
     parameters = batch.param[lanes.memo[lane, WHO] * batch.stride]
     show_clocks(lanes, lane, slow)
+    load_dates(lanes, lane, slow)
     jump(
         lanes.clock[TAU, lane] + lanes.clock[BASE, lane],
         slow.state,
@@ -631,6 +640,7 @@ def saltate(lanes, lane, batch, g, before, slow):
         before,
         mode_of(lanes, lane),
         g,
+        slow.out,
     )
     for i in range(NSTATES):
         lanes.y[i, lane] = slow.state[i]

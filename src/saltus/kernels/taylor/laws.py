@@ -312,7 +312,7 @@ def too_short(lanes, lane, g, restitution):
     row = GUARD_ROW[g]
     second = abs(lanes.work[row + 2, lane])
     third, fourth = abs(lanes.work[row + 3, lane]), abs(lanes.work[row + 4, lane])
-    scale = lanes.run[END, lane]
+    scale = max(lanes.run[END, lane], lanes.run[AHEAD, lane])
     if second < scale * third:
         scale = second / third
     if second < scale * scale * fourth:
@@ -661,7 +661,37 @@ def release(lanes, lane, batch, h, slow):
         stick_at_once(lanes, lane, batch, slow)
 
 
-# -- stops at rest at the start and at the end of a run --------------------------------------------
+# -- what rests at the start and at the end of a run -----------------------------------------------
+@kernel
+def noise_of_speed(lanes, lane, batch, g, slow):
+    """Rounding of the velocity of a surface where a run begins or ends: of its terms, and of the
+    time. Needs slow.gaps, and leaves those of a moment later there.
+    """
+    value, size = slow.gaps[g], slow.gaps[SIZES * NGUARDS + g]
+    for j in range(NGUARDS):
+        slow.gaps[j] = lanes.side[j, lane]
+    now = lanes.clock[TAU, lane] + abs(lanes.clock[BASE, lane])
+    look_at_gaps(lanes, lane, batch, 2.0 * SHORTEST_FLIGHT * now, slow)
+    return ROUNDING * size + abs(slow.gaps[g] - value)
+
+
+@kernel
+def slides_on(lanes, lane, batch, slow):
+    """Bits of the surfaces on which a run begins: their velocities are rounding. Needs slow.gaps,
+    and leaves them.
+    """
+    on = 0
+    for g in range(NGUARDS):
+        size, moves = slow.gaps[SIZES * NGUARDS + g], SNAP_STATE[g] < 0
+        if LAW[g] == SURFACE_LAW and moves and abs(slow.gaps[g]) <= KEPT * size:
+            speed = abs(slow.gaps[g])
+            noise = noise_of_speed(lanes, lane, batch, g, slow)
+            on |= (1 if speed <= noise else 0) << g
+            lanes.prior[PRIOR_ROWS * g + NEW, lane] = max(size, noise / ROUNDING)
+            gaps_here(lanes, lane, batch, slow)
+    return on
+
+
 @kernel
 def presses(lanes, lane, batch, g, slow):
     """1 if a stop at rest is pressed, -1 if it is pulled, by more than rounding, of the time too:
@@ -695,25 +725,3 @@ def rest_at_once(lanes, lane, batch, moves, slow):
                 if pressing > 0:
                     snap(lanes, lane, g)
                     hold(lanes, lane, batch, g, 0.0, 0.0, slow)
-
-
-@kernel
-def end_rests(lanes, lane, batch, slow):
-    """Release the stops at rest that a run which began here would find free: what presses them is
-    rounding, and falls. Put the others, and what sticks, onto their constraints.
-    """
-    d = lanes.found[DELTA, lane]
-    for g in range(NGUARDS):
-        h = PARTNER[g]
-        if LAW[g] != HOLD_LAW and h >= 0 and lanes.side[h, lane] > 0.0:
-            gaps_here(lanes, lane, batch, slow)
-            asked = LAW[g] == IMPACT_LAW and presses(lanes, lane, batch, g, slow) <= 0
-            if asked and gap_rate(lanes, lane, h, d) < 0.0:
-                release(lanes, lane, batch, h, slow)
-                continue
-            begin_impacts(lanes, lane, slow)
-            now, who = time_of_law(lanes, lane, batch), lanes.memo[lane, WHO]
-            mode, p = mode_of(lanes, lane) & ~(1 << h), batch.param[who * batch.stride]
-            settle(now, slow.state, p, slow.held, mode, g)
-            for i in range(NMOVED):
-                lanes.y[i, lane] = slow.state[i]

@@ -43,8 +43,9 @@ CLOCK_ROWS = CLOCK_ROW + HELD * NCLOCKS
 # counted again); the number of steps at which its pace is looked at next, and the periods behind it
 # when that was done last; the phase of the next break of a clock, and from which on it counts as
 # reached; log2 of the tolerance, and the contacts that the trajectory may make; the guard whose
-# boundary the state came to at the last landing's instant (-1: none); whether there was an impact
-# at that instant (0/1), and by how much earlier it came, for each column of a tangent.
+# boundary the state came to at the last landing's instant (-1: none); how far a lane at the end of
+# its run looks beyond it (0: it isn't there); whether there was an impact at that instant (0/1),
+# and by how much earlier it came, for each column of a tangent.
 (
     END,
     DUE,
@@ -65,7 +66,7 @@ CLOCK_ROWS = CLOCK_ROW + HELD * NCLOCKS
     BREAK,
     WATCH,
 ) = range(18)
-TOLERANCE, MOST_MET, CAUSE, DATED, DATES = range(18, 23)
+TOLERANCE, MOST_MET, CAUSE, AHEAD, DATED, DATES = range(18, 24)
 RUN_ROWS = DATES + NCOLUMNS
 # Rows of `bounds`, for each series that a gap reads (see bound_series).
 LINEAR, QUADRATIC, CUBIC, CHANGE, SLOPE_AT_END, REST, BOUNDS = range(7)

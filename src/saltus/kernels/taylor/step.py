@@ -284,13 +284,16 @@ def step_all(lanes, batch, slow):
     """Take one step of every lane; return the bit set of lanes that need attention."""
     coefficients(lanes)
     room = load(lanes.run, END, LANES) - load(lanes.clock, TAU, LANES)
+    ahead = load(lanes.run, AHEAD, LANES)
+    room = room + ahead
     if NCLOCKS > 0:
         room = smaller(load(lanes.run, BREAK, LANES) - load(lanes.clock, TAU, LANES), room)
     log2_tolerance = load(lanes.run, TOLERANCE, LANES)
     h = step_length(lanes.work, log2_tolerance)
     h = away_from_boundaries(lanes, h, room) if NSINGULAR > 0 else smaller(h, room)
     if PROBED:
-        h = probed(lanes, smaller(h, LONGEST_SHARE * load(lanes.run, END, LANES)), log2_tolerance)
+        most = LONGEST_SHARE * larger(load(lanes.run, END, LANES), ahead)
+        h = probed(lanes, smaller(h, most), log2_tolerance)
     store(lanes.run, STEP, h)
     undecided = locate(lanes, h)
     open_lanes = (
@@ -302,4 +305,6 @@ def step_all(lanes, batch, slow):
     while waiting != 0:
         decide(lanes, lowest_bit(waiting), batch, slow)
         waiting &= waiting - 1
+    if any_lane(ahead > 0.0):
+        hold_still(lanes)
     return open_lanes | bits(advance(lanes, room, batch.rec_i.shape[0] > 0))

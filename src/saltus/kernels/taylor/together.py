@@ -56,23 +56,47 @@ def end_impacts(lanes, lane, batch, hits, slow):
     if fastest <= 0.0:
         return False
     least = CLOSED * fastest
-    if take_impacts(now, rows, p, held, mode, stops, False, least, told) == INVALID_RESTITUTION:
+    for i in range(NSTATES):
+        lanes.probe_y[i, lane] = lanes.y[i, lane]
+    status = take_impacts(now, rows, p, held, mode, mode, stops, False, least, told)
+    if status == INVALID_RESTITUTION:
         lanes.memo[lane, FAULT] = INVALID_RESTITUTION
         return True
     for i in range(NSTATES):
         lanes.y[i, lane] = slow.state[i]
+    turn_over(lanes, lane, batch, mode_behind(lanes, lane, batch, -1, slow), slow)
     gaps_here(lanes, lane, batch, slow)
     for g in range(NGUARDS):
         if (stops >> g) & 1:
             if lanes.side[PARTNER[g], lane] > 0.0:
                 loosen_one(lanes, lane, batch, g, mode_of(lanes, lane), slow)
             snap(lanes, lane, g)
+    if TANGENT and mode_of(lanes, lane) != mode:
+        end_impacts_of_tangent(lanes, lane, batch, mode, stops, least, slow)
     for look in range(NGUARDS * NGUARDS):
         g = look % NGUARDS
         if (stops >> g) & 1 and lanes.side[PARTNER[g], lane] < 0.0:
             rest_or_leave(lanes, lane, batch, g, FELT * fastest, slow)
+    go_on_together(lanes, lane, batch, stops, slow)
     stick_at_once(lanes, lane, batch, slow)
     return True
+
+
+@kernel
+def end_impacts_of_tangent(lanes, lane, batch, before, stops, least, slow):
+    """Let impacts that were completed act on the tangent anew, by the rates in the mode of the lane
+    behind them: they have come out of mode `before`, and have released contacts or turned frictions
+    (see strike_tangent).
+    """
+    for i in range(NSTATES):
+        slow.state[i] = lanes.probe_y[i, lane]
+    show_clocks(lanes, lane, slow)
+    load_dates(lanes, lane, slow)
+    now, after = time_of_law(lanes, lane, batch), mode_of(lanes, lane)
+    p, rows = batch.param[lanes.memo[lane, WHO] * batch.stride], slow.state
+    take_impacts(now, rows, p, slow.held, before, after, stops, False, least, slow.out)
+    for i in range(NMOVED, NSTATES):
+        lanes.y[i, lane] = slow.state[i]
 
 
 @inner
@@ -88,6 +112,30 @@ def rest_or_leave(lanes, lane, batch, g, least, slow):
     elif velocity <= least:
         lanes.fresh[g, lane] = 2.0
         ask_for_paradox(lanes, lane, g, slow)
+
+
+@kernel
+def go_on_together(lanes, lane, batch, stops, slow):
+    """Take from stops whose gaps and rates are known to be zero what completed impacts have left of
+    their rates, down to the rounding of their terms: it is that of the velocities before, and these
+    may be much larger than the common one behind. What one gives off the others take, in turn.
+    """
+    away, rounds = True, 0
+    while away and rounds < MOST_IMPACTS:
+        away, rounds = False, rounds + 1
+        for g in range(NGUARDS):
+            rests = (stops >> g) & 1 == 1 and lanes.fresh[g, lane] > 1.5
+            if not rests or lanes.side[PARTNER[g], lane] > 0.0:
+                continue
+            gaps_here(lanes, lane, batch, slow)
+            if abs(slow.gaps[3 * NGUARDS + g]) > ROUNDING * slow.gaps[5 * NGUARDS + g]:
+                away = True
+                begin_impacts(lanes, lane, slow)
+                now, who = time_of_law(lanes, lane, batch), lanes.memo[lane, WHO]
+                p = batch.param[who * batch.stride]
+                settle(now, slow.state, p, slow.held, mode_of(lanes, lane), g)
+                for i in range(NMOVED):
+                    lanes.y[i, lane] = slow.state[i]
 
 
 @kernel

@@ -13,17 +13,14 @@ from saltus.kernels.status import (
     EVENTS,
     FINISHED,
     GAP_MARGIN,
-    GRAZE_UNRESOLVED,
     HOLD_LAW,
     IMPACT_LAW,
     INVALID_FRICTION,
     MODE_VIOLATION,
-    NO_LAW,
     NONFINITE,
     NONUNIQUE,
     OK,
     PAUSED,
-    RESTING,
     RUNNING,
     STEPS,
     SURFACE_LAW,
@@ -89,101 +86,6 @@ def set_period(lanes, lane, batch, slow):
     set_due(lanes, lane, batch)
 
 
-@kernel
-def final_contacts(lanes, lane, batch, slow):
-    """Report a gap that is exactly zero, or past zero by rounding, at the very end: once as an
-    event there, or as a graze if it turns.
-    """
-    gaps_here(lanes, lane, batch, slow)
-    d, met, past = lanes.found[DELTA, lane], 0, 0
-    for g in range(NGUARDS):
-        inside = slow.gaps[g] * lanes.side[g, lane]
-        if LAWS and lanes.side[WATCHED + g, lane] < 0.5:
-            continue
-        if lanes.fresh[g, lane] < 0.5 and inside <= 0.0:
-            if inside == 0.0 and gap_rate(lanes, lane, g, d) >= 0.0:
-                note_touch(lanes, lane, batch, slow, g, d, lanes.run[START, lane])
-            else:
-                met |= 1 << g
-                past |= is_past(lanes, lane, g, slow) << g
-    if met != 0:
-        note_arrival(lanes, lane)
-    if LAWS and met & ~past != 0:
-        met = strike_together(lanes, lane, batch, met & ~past, slow)
-    for g in range(NGUARDS):
-        if (past >> g) & 1:
-            jump_over(lanes, lane, batch, g, gap_rate(lanes, lane, g, d), slow)
-        elif (met >> g) & 1:
-            rate = gap_rate(lanes, lane, g, d)
-            if not (LAWS and meet(lanes, lane, batch, g, rate, slow)):
-                land(lanes, lane, batch, g, rate, slow)
-
-
-@kernel
-def keep_sides(lanes, lane, batch, slow):
-    """Move an end on a boundary that rounding put on the side it came from, by rounding, to the
-    side on which the motion goes on: a run that begins there doesn't meet the contact again. What
-    slides isn't taken to stick there.
-    """
-    for g in range(NGUARDS):
-        met = lanes.fresh[g, lane] > 0.5 and lanes.fresh[g, lane] < RIDDEN and SNAP_STATE[g] < 0
-        slides = LAWS and LAW[g] == SURFACE_LAW and lanes.side[WATCHED + g, lane] > 0.5
-        slides = slides and SNAP_STATE[g] < 0
-        if not slides and (not met or LAW[g] != NO_LAW):
-            continue
-        most, inside = -1, side_here(lanes, lane, batch, g, slow)
-        size = slow.gaps[SIZES * NGUARDS + g]
-        least = 2.0 * ROUNDING * size if slides else 0.0
-        wanted = max(2.0 * least, 2.0e-16 * size) - inside
-        change = 0.0
-        for i in range(NSTATES if inside < least else 0):
-            kept = lanes.y[i, lane]
-            lanes.y[i, lane] = kept * (1.0 + ALTERED)
-            effect = side_here(lanes, lane, batch, g, slow) - inside
-            lanes.y[i, lane] = kept
-            if abs(effect) > abs(change):
-                most, change = i, effect
-        if abs(wanted) < KEPT * abs(change):
-            lanes.y[most, lane] *= 1.0 + ALTERED * wanted / change
-
-
-@kernel
-def side_here(lanes, lane, batch, g, slow):
-    """Gap of a guard at the node, positive on its side; its size is in slow.gaps."""
-    gaps_here(lanes, lane, batch, slow)
-    return slow.gaps[g] * lanes.side[g, lane]
-
-
-@inner
-def end_stretch(lanes, lane, batch, slow):
-    """The end of a period, or of the run. Returns the status."""
-    who = lanes.memo[lane, WHO]
-    if lanes.memo[lane, COUNT] < batch.end_count[who]:
-        landed_now = lanes.run[LANDED, lane] == lanes.clock[TAU, lane] + lanes.clock[BASE, lane]
-        lanes.memo[lane, COUNT] += 1
-        lanes.clock[TAU, lane] = 0.0
-        set_period(lanes, lane, batch, slow)
-        if landed_now:  # the same instant, as the new period rounds it
-            lanes.run[LANDED, lane] = lanes.clock[BASE, lane]
-        if lanes.run[DUE, lane] <= 0.0:
-            write_samples(lanes, lane, batch, 0.0, slow)
-    if (
-        lanes.memo[lane, COUNT] < batch.end_count[who]
-        or lanes.clock[TAU, lane] < batch.end_phase[who]
-    ):
-        return RUNNING
-    final_contacts(lanes, lane, batch, slow)
-    if LAWS:
-        end_rests(lanes, lane, batch, slow)
-    keep_sides(lanes, lane, batch, slow)
-    if LAWS and lanes.memo[lane, FAULT] != 0:
-        return lanes.memo[lane, FAULT]
-    for g in range(NGUARDS):
-        if (lanes.memo[lane, ALWAYS] >> g) & 1 and LAW[g] == NO_LAW:
-            return RESTING
-    return GRAZE_UNRESOLVED if lanes.run[SHALLOW, lane] > 0.0 else OK
-
-
 @inner
 def overflowed(lanes, lane):
     """True if the step left the range of numbers; the lane then keeps the state and the time at the
@@ -247,6 +149,8 @@ def crossing_guards(lanes, lane):
 @inner
 def attend(lanes, lane, batch, slow):
     """Attend to all events of one lane in this step. Returns its status."""
+    if lanes.run[AHEAD, lane] > 0.0:
+        return end_at_once(lanes, lane, batch, slow)
     start = lanes.run[START, lane]
     if overflowed(lanes, lane):
         return RUNNING if LAWS and gives_way(lanes, lane, batch, slow) else NONFINITE
@@ -285,16 +189,14 @@ def start_sides(lanes, lane, batch, slow):
         lanes.side[g, lane] = -1.0 if stop or LAW[g] == HOLD_LAW else 1.0
         lanes.fresh[g, lane] = 0.0
     gaps_here(lanes, lane, batch, slow)
-    moves = False
+    moves, on = False, slides_on(lanes, lane, batch, slow) if LAWS else 0
     for i in range(NSTATES):
         moves = moves or lanes.y[i, lane] != 0.0
     for g in range(NGUARDS):
-        zero = begins_at_zero(g, slow)
+        zero = begins_at_zero(g, slow) or (on >> g) & 1 == 1
         past = LAW[g] == IMPACT_LAW and slow.gaps[g] * LAW_SIDE[g] < 0.0
         slides = LAW[g] == SURFACE_LAW
         doubtful = moves and slow.gaps[g] != 0.0 and not past and not slides
-        if slides and zero:
-            lanes.prior[PRIOR_ROWS * g + NEW, lane] = slow.gaps[SIZES * NGUARDS + g]
         lanes.side[g, lane] = -1.0 if slow.gaps[g] < 0.0 else 1.0
         lanes.fresh[g, lane] = (DOUBTFUL if doubtful else 1.0) if zero else 0.0
         lanes.memo[lane, ALWAYS] |= (1 if zero else 0) << g
@@ -319,6 +221,12 @@ def start_sides(lanes, lane, batch, slow):
     if LAWS:
         rest_at_once(lanes, lane, batch, moves, slow)
         stick_at_once(lanes, lane, batch, slow)
+
+
+@inner
+def is_at_end(who, batch):
+    """True if a trajectory is at the end of its run."""
+    return batch.count[who] >= batch.end_count[who] and batch.phase[who] >= batch.end_phase[who]
 
 
 @kernel
@@ -349,6 +257,8 @@ def fill(lanes, lane, who, batch, slow):
     )
     lanes.run[BOUNCES, lane], lanes.run[STARTING, lane], lanes.run[FLIPPED, lane] = 0.0, 0.0, 0.0
     lanes.run[CAUSE, lane], lanes.run[DATED, lane] = -1.0, 0.0
+    begun = batch.mode[who] >= 0
+    lanes.run[AHEAD, lane] = batch.period[who] if begun and is_at_end(who, batch) else 0.0
     lanes.run[ACTIVE, lane] = 1.0
     lanes.run[TOLERANCE, lane] = batch.options[who, LOG2_TOLERANCE]
     lanes.run[MOST_MET, lane] = batch.options[who, MOST_CONTACTS]
@@ -436,16 +346,13 @@ def refill(lanes, lane, cursor, batch, slow):
     """Give an idle lane the next trajectory that wants to run; returns the next place to search."""
     while cursor < batch.status.shape[0]:
         if batch.status[cursor] == RUNNING:
-            if (
-                batch.count[cursor] < batch.end_count[cursor]
-                or batch.phase[cursor] < batch.end_phase[cursor]
-            ):
+            if batch.mode[cursor] < 0 and is_at_end(cursor, batch):
+                batch.status[cursor] = OK
+            else:  # one that was paused at its end goes on to look beyond it
                 fill(lanes, lane, cursor, batch, slow)
                 if not (LAWS and lanes.memo[lane, FAULT] != 0):
                     return cursor + 1
                 empty(lanes, lane, batch, lanes.memo[lane, FAULT])
-            else:
-                batch.status[cursor] = OK
         cursor += 1
     return cursor
 
