@@ -11,7 +11,10 @@ import saltus as sl
 from conformance.systems import contacts, lab, pair, quartic, ring, slider, walls
 
 # these tests look at the status themselves
-pytestmark = pytest.mark.filterwarnings("ignore::saltus.errors.SaltusWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::saltus.errors.SaltusWarning"),
+    pytest.mark.usefixtures("exact_method"),
+]
 
 FREE, CONTACT = 0, 1
 
