@@ -63,11 +63,11 @@ def ball_of_clay(t, x, v, *, slope=1.0):
 
 
 @sl.system(states="x v a j")
-def quartic(t, x, v, a, j, *, snap=24.0, push=0.0, lacunary=0.0):
+def quartic(t, x, v, a, j, *, snap=24.0, push=0.0):
     """x is a polynomial of degree 4 in time: gaps of any shape, exact in a single step of any
     length.
     """
-    return v, a, j, snap + sl.piecewise((push, x > 0), otherwise=0) - lacunary * t**4 * x
+    return v, a, j, snap + sl.piecewise((push, x > 0), otherwise=0)
 
 
 def quartic_with_roots(*roots: float) -> tuple[float, float, float, float]:

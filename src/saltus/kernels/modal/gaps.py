@@ -459,7 +459,7 @@ def decide(i, g, batch, m):
     crosses, touched = isolate(g, degree, known, noise, m)
     m.found[g, PLACE], m.found[g, FINAL] = m.out[ROOT_AT], 1.0
     if m.laws[g, KIND] != HOLD_LAW:
-        crosses, touched = end_at(g, degree, known, noise, crosses, touched, m)
+        crosses, touched = settle(g, degree, known, noise, crosses, touched, m)
     m.found[0, TOUCHED] = min(touched, MOST_TOUCHES - 1)
     return CROSSES if crosses else CLEAR
 
@@ -492,7 +492,9 @@ def turn_before(i, d, margin, modes, steady, batch, m):
             known = known_zeros(i, g, batch)
             without_zeros(known, m)
             side_of_leaving(m.p, ORDER - known, known, noise)
-            isolate(g, ORDER - known, known, noise, m)
+            crosses, touched = isolate(g, ORDER - known, known, noise, m)
+            m.found[g, PLACE] = m.out[ROOT_AT]
+            settle(g, ORDER - known, known, noise, crosses, touched, m)
 
 
 @inner
@@ -544,8 +546,6 @@ def look(i, tau, h, modes, steady, batch, m):
         until = min(until, m.found[g, DECIDED])
         m.found[g, TURNED], lowest = m.out[MARGIN], min(lowest, m.out[MARGIN])
     m.out[MARGIN] = lowest
-    if until < 1.0 and lowest < margin:
-        return OPEN, 0.0, 0
     for g in range(m.sizes[GUARDS]):
         if (crossing >> g) & 1:
             d = m.found[g, PLACE] * h
@@ -557,10 +557,10 @@ def look(i, tau, h, modes, steady, batch, m):
             elif hits == 0 or d < first:
                 hits, first = 1 << g, d
     if first > until * h:
-        return CLEAR, until * h, 0
+        first, hits = until * h, 0
     early = begun(i, hits, batch, m)
     if early != 0:
         first, hits = 0.0, early
-    if hits != 0 and lowest < margin:
+    if first < h and lowest < margin:
         turn_before(i, first, margin, modes, steady, batch, m)
     return (CROSSES if hits != 0 else CLEAR), first, hits

@@ -15,8 +15,9 @@ from saltus.kernels.isolation import (
     is_exact_zero,
     polynomial,
     rounding,
+    turning_place,
 )
-from saltus.kernels.status import GRAZE, GRAZE_SHALLOW, GRAZES, UNRESOLVED
+from saltus.kernels.status import GAP_MARGIN, GRAZE, GRAZE_SHALLOW, GRAZES, UNRESOLVED
 
 #: Longest way from a place on which a gap is looked at, as a part of the step.
 BESIDE = 0.5
@@ -40,30 +41,40 @@ def told_beside(degree, known, noise, place, way, m):
 
 
 @kernel
-def end_at(g, degree, known, noise, crosses, touched, m):
-    """Settle a gap that a step ends in, within rounding: it crosses there if it is zero and falls
-    on; if it turns about it touches, and a crossing that the sum of its terms shows is rounding.
-    Returns whether it crosses, and the touches now held.
+def settle(g, degree, known, noise, crosses, touched, m):
+    """Settle what rounding has to do with. A gap that is negative behind its crossing by no more
+    than rounding has touched: the step ends where it can be told from zero again. One that is zero
+    at the end of the step and falls on crosses there, one within rounding that turns about has
+    touched. Returns whether it crosses, and the touches now held.
     """
-    value, doubt = polynomial(m.p, degree, 1.0), rounding(m.p, degree, known > 0, noise, 1.0)
-    touched = min(touched, MOST_TOUCHES - 1)
+    place = m.found[g, PLACE] if crosses else 1.0
+    doubt = rounding(m.p, degree, known > 0, noise, place)
+    value = polynomial(m.p, degree, place)
     if abs(value) > doubt:
         return crosses, touched
-    before = told_beside(degree, known, doubt, 1.0, -1.0, m)
-    behind = told_beside(degree, known, doubt, 1.0, 1.0, m)
-    if before <= 0.0 or (crosses and m.found[g, PLACE] < 1.0 - before):
-        return crosses, touched
-    if behind > 0.0:
+    before = told_beside(degree, known, doubt, place, -1.0, m)
+    behind = told_beside(degree, known, doubt, place, 1.0, m)
+    if before > 0.0 and behind > 0.0:
         m.out[MARGIN] = min(m.out[MARGIN], abs(value))
-        again = touched > 0 and m.touches[touched - 1, TOUCH_GUARD] == g
-        if not (again and 1.0 - m.touches[touched - 1, TOUCH_AT] < SAME_TOUCH):
-            m.touches[touched, TOUCH_AT], m.touches[touched, TOUCH_GUARD] = 1.0, g
-            touched += 1
-        return False, touched
-    if behind < 0.0 and value == 0.0:
+        m.found[g, DECIDED] = min(place + behind, 1.0)
+        if crosses:
+            place = min(turning_place(m.p, degree, place, place + behind, m.slopes), 1.0)
+        return False, add_touch(g, place, touched, m)
+    if not crosses and before > 0.0 and behind < 0.0 and value == 0.0:
         m.found[g, PLACE] = 1.0
         return True, touched
     return crosses, touched
+
+
+@inner
+def add_touch(g, place, touched, m):
+    """Add a touch to the list, unless it is that of its last one; returns how many it holds."""
+    last = min(touched, MOST_TOUCHES - 1) - 1
+    again = last >= 0 and m.touches[last, TOUCH_GUARD] == g
+    if again and place - m.touches[last, TOUCH_AT] < SAME_TOUCH:
+        return last + 1
+    m.touches[last + 1, TOUCH_AT], m.touches[last + 1, TOUCH_GUARD] = place, g
+    return last + 2
 
 
 @kernel
@@ -102,6 +113,7 @@ def note_touch(i, g, tau, d, h, modes, steady, batch, m):
         kind = GRAZE
     m.errors[r, 2], m.found[0, FACTORS] = size, 0.0
     batch.counters[i, GRAZES if kind == GRAZE else UNRESOLVED] += 1
+    batch.minima[i, GAP_MARGIN] = 0.0
     state_after(i, tau, d, modes, steady, batch, m)
     _, rate = gap_of_moved(r, modes, steady, int(batch.carry[i, SET]), m)
     side, rate = int(side_of(g, batch.mode[i])), m.sign_of[g] * rate
