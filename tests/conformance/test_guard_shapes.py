@@ -13,8 +13,6 @@ from scipy.integrate import solve_ivp
 import saltus as sl
 from conformance.systems import EPS, contacts, pair, ring, walls
 
-pytestmark = pytest.mark.usefixtures("exact_method")
-
 WALL = "x = amplitude*cos(2*pi*frequency*t)"
 
 
